@@ -1,0 +1,110 @@
+//! In: a situation that bad input, a bad machine or a weak measurement led to.
+//! Out: one error type with its four sentences (what, numbers, cause, next step) and the exit code.
+//! Frame and unit: none; numbers inside the text carry their own units.
+
+use std::fmt;
+use std::path::Path;
+
+/// What sort of trouble it is; decides the exit code and lets tests match without reading words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// The command or its options make no sense. Exit code 2.
+    Usage,
+    /// A file or its content is missing, malformed or contradicts another.
+    Input,
+    /// The input is well formed but does not determine the answer well enough to give one.
+    Refused,
+    /// A result could not be written.
+    Output,
+    /// The GPU or its driver failed.
+    Device,
+}
+
+/// An error a person can act on: what happened (with the number seen and the limit), the likely
+/// cause, and the next step. A bug is a panic, never a `Fault`; missing laser pixels are neither.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Fault {
+    pub kind: Kind,
+    pub what: String,
+    pub cause: String,
+    pub next: String,
+}
+
+pub type Result<T> = std::result::Result<T, Fault>;
+
+impl Fault {
+    pub fn new(kind: Kind, what: impl Into<String>) -> Fault {
+        Fault { kind, what: what.into(), cause: String::new(), next: String::new() }
+    }
+    pub fn usage(what: impl Into<String>) -> Fault {
+        Fault::new(Kind::Usage, what)
+    }
+    pub fn input(what: impl Into<String>) -> Fault {
+        Fault::new(Kind::Input, what)
+    }
+    pub fn refused(what: impl Into<String>) -> Fault {
+        Fault::new(Kind::Refused, what)
+    }
+    pub fn output(what: impl Into<String>) -> Fault {
+        Fault::new(Kind::Output, what)
+    }
+    pub fn device(what: impl Into<String>) -> Fault {
+        Fault::new(Kind::Device, what)
+    }
+    /// The likely cause, in one sentence.
+    pub fn cause(mut self, cause: impl Into<String>) -> Fault {
+        self.cause = cause.into();
+        self
+    }
+    /// What to do next, in one sentence.
+    pub fn next(mut self, next: impl Into<String>) -> Fault {
+        self.next = next.into();
+        self
+    }
+    /// Puts the place (a file, a shot, a key) before what happened.
+    pub fn at(mut self, place: impl fmt::Display) -> Fault {
+        self.what = format!("{place}: {}", self.what);
+        self
+    }
+    /// 2 for misuse, 1 for everything else.
+    pub fn exit_code(&self) -> u8 {
+        if self.kind == Kind::Usage { 2 } else { 1 }
+    }
+    /// A file that could not be read.
+    pub fn read(path: &Path, e: std::io::Error) -> Fault {
+        Fault::input(format!("{}: cannot be read: {e}", path.display()))
+            .cause(if e.kind() == std::io::ErrorKind::NotFound {
+                "the path is wrong, or the file was moved"
+            } else {
+                "no permission, or a disk fault"
+            })
+            .next("check the path and its permissions")
+    }
+    /// A file or folder that could not be written.
+    pub fn write(path: &Path, e: std::io::Error) -> Fault {
+        let full = e.kind() == std::io::ErrorKind::StorageFull;
+        Fault::output(format!("{}: cannot be written: {e}", path.display()))
+            .cause(if full { "the disk is full" } else { "the folder is missing or not writable" })
+            .next(if full {
+                "free some space or choose another --out, then run the same command again"
+            } else {
+                "choose an --out folder that you may write to"
+            })
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.what)?;
+        if !self.cause.is_empty() {
+            write!(f, "\n  likely cause: {}", self.cause)?;
+        }
+        if !self.next.is_empty() {
+            write!(f, "\n  next step: {}", self.next)?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for Fault {}

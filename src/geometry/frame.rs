@@ -1,0 +1,35 @@
+//! In: nothing. Out: the coordinate frames of the product as types without content.
+//! Frame and unit: this file is where the frames are named; all are right-handed, millimetres.
+
+/// A coordinate frame. `NAME` appears in files and messages.
+pub trait Frame: Copy + Clone + std::fmt::Debug + PartialEq + Send + Sync + 'static {
+    const NAME: &'static str;
+}
+
+macro_rules! frames {
+    ($($(#[$doc:meta])* $name:ident = $text:literal;)*) => {$(
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub struct $name;
+        impl Frame for $name { const NAME: &'static str = $text; }
+    )*};
+}
+
+frames! {
+    /// The robot's base: where clouds and insertion poses live.
+    Base = "base";
+    /// The robot's mounting flange, which the robot reports its pose of.
+    Flange = "flange";
+    /// The camera: x right, y down, z forward, origin in the centre of projection.
+    Camera = "camera";
+    /// A calibration board: see docs/conventions.md for the origin of each kind.
+    Board = "board";
+    /// A part: origin in the insertion datum, z out of the part, x along the long axis.
+    Part = "part";
+    /// The tool that holds the part to be inserted; z points against the direction of insertion.
+    Tool = "tool";
+    /// A height map: x along columns, y along rows, z up from the datum plane.
+    Grid = "grid";
+    /// A line-profile sensor: measures in its own x-z plane, y = 0.
+    Sensor = "sensor";
+}

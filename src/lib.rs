@@ -1,0 +1,15 @@
+//! Sheetlight: sheet-of-light scanning with a robot.
+//!
+//! The modules stand in floor order; each imports only from floors above it in this list
+//! (ARCHITECTURE.md, enforced by tests/floors.rs).
+
+pub mod fault;
+
+pub mod geometry;
+pub mod raster;
+pub mod solve;
+
+pub mod camera;
+pub mod recording;
+pub mod rig;
+pub mod robot;

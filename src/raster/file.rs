@@ -1,0 +1,141 @@
+//! In: PNG, JPEG, TIFF and PGM files, grey or colour. Out: grey images with the depth the sensor had.
+//! Frame and unit: pixels, grey levels. The only place that names the `image` crate with `image8`.
+
+use super::{Image, Pixels};
+use crate::fault::{Fault, Result};
+use std::path::Path;
+
+/// Which part of a colour picture is taken as grey. A grey picture ignores it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Channel {
+    Red,
+    Green,
+    Blue,
+    /// (299 R + 587 G + 114 B + 500) / 1000, the luma of ITU-R BT.601.
+    #[default]
+    Luma,
+}
+
+impl std::str::FromStr for Channel {
+    type Err = String;
+    fn from_str(s: &str) -> std::result::Result<Channel, String> {
+        match s {
+            "red" => Ok(Channel::Red),
+            "green" => Ok(Channel::Green),
+            "blue" => Ok(Channel::Blue),
+            "luma" => Ok(Channel::Luma),
+            _ => Err(format!("unknown channel '{s}': red, green, blue or luma")),
+        }
+    }
+}
+
+/// Reads a picture. `bits` is the depth the recording declares: 8, or 9..=16 for 16-bit files.
+pub fn load(path: &Path, channel: Channel, bits: u8) -> Result<Image> {
+    let bytes = std::fs::read(path).map_err(|e| Fault::read(path, e))?;
+    decode(&bytes, channel, bits).map_err(|e| e.at(path.display()))
+}
+
+/// Decodes a picture held in memory.
+pub fn decode(bytes: &[u8], channel: Channel, bits: u8) -> Result<Image> {
+    let picture = image::load_from_memory(bytes).map_err(|e| {
+        Fault::input(format!("is not a readable picture ({} bytes): {e}", bytes.len()))
+            .cause("the file is truncated, empty, or of a format other than PNG, JPEG, TIFF and PGM")
+            .next("record the shot again, or pass --skip-bad to leave it out")
+    })?;
+    let (width, height) = (picture.width(), picture.height());
+    let deep = matches!(picture.color().bytes_per_pixel() / picture.color().channel_count(), 2..);
+    if deep != (bits > 8) {
+        return Err(Fault::input(format!(
+            "holds {} bits a pixel, the recording declares {bits}",
+            if deep { 16 } else { 8 }
+        ))
+        .cause("meta.json and the pictures are from different cameras or exports")
+        .next("correct image.bits in meta.json"));
+    }
+    if picture.color().has_color() {
+        return Ok(from_colour(&picture, channel, bits, width, height));
+    }
+    if !deep {
+        return Ok(Image::from_u8(width, height, picture.into_luma8().into_raw()));
+    }
+    within_depth(Image::from_u16(width, height, bits, picture.into_luma16().into_raw()))
+}
+
+fn within_depth(image: Image) -> Result<Image> {
+    let Pixels::U16(p) = &image.pixels else { return Ok(image) };
+    let largest = p.iter().copied().max().unwrap_or(0);
+    if largest > image.full_scale() {
+        return Err(Fault::input(format!(
+            "holds the grey level {largest}, above the {} of a {}-bit sensor",
+            image.full_scale(),
+            image.bits
+        ))
+        .cause("image.bits in meta.json is too small, or the file was stretched to 16 bits")
+        .next("set image.bits to the depth that the files really have"));
+    }
+    Ok(image)
+}
+
+fn from_colour(picture: &image::DynamicImage, channel: Channel, bits: u8, width: u32, height: u32) -> Image {
+    let grey = |c: &[u16]| -> u16 {
+        match channel {
+            Channel::Red => c[0],
+            Channel::Green => c[1],
+            Channel::Blue => c[2],
+            Channel::Luma => {
+                ((299 * u32::from(c[0]) + 587 * u32::from(c[1]) + 114 * u32::from(c[2]) + 500) / 1000) as u16
+            }
+        }
+    };
+    if bits > 8 {
+        let rgb = picture.to_rgb16();
+        return Image::from_u16(width, height, bits, rgb.pixels().map(|p| grey(&p.0)).collect());
+    }
+    let rgb = picture.to_rgb8();
+    Image::from_u8(width, height, rgb.pixels().map(|p| grey(&p.0.map(u16::from)) as u8).collect())
+}
+
+/// Writes a grey image as PNG, 8 or 16 bits.
+pub fn save_png(image: &Image, path: &Path) -> Result<()> {
+    let done = match &image.pixels {
+        Pixels::U8(p) => image::save_buffer_with_format(
+            path,
+            p,
+            image.width,
+            image.height,
+            image::ExtendedColorType::L8,
+            image::ImageFormat::Png,
+        ),
+        Pixels::U16(p) => image::save_buffer_with_format(
+            path,
+            bytemuck::cast_slice(p),
+            image.width,
+            image.height,
+            image::ExtendedColorType::L16,
+            image::ImageFormat::Png,
+        ),
+    };
+    done.map_err(|e| match e {
+        image::ImageError::IoError(e) => Fault::write(path, e),
+        e => Fault::output(format!("{}: cannot be written: {e}", path.display())),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn depth_round_trips_and_lies_are_caught() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.png");
+        let deep = Image::from_u16(3, 2, 12, vec![0, 1, 4095, 7, 300, 2048]);
+        save_png(&deep, &path).unwrap();
+        assert_eq!(load(&path, Channel::Luma, 12).unwrap(), deep);
+        assert!(load(&path, Channel::Luma, 10).unwrap_err().what.contains("4095"));
+        assert!(load(&path, Channel::Luma, 8).unwrap_err().what.contains("16 bits"));
+        std::fs::write(&path, &std::fs::read(&path).unwrap()[..40]).unwrap();
+        assert!(load(&path, Channel::Luma, 12).is_err());
+    }
+}

@@ -1,0 +1,81 @@
+//! In: the `board` entries of meta.json and board description files. Out: the board's layout.
+//! Frame and unit: board frame, mm. Chessboard: origin in the first inner corner, x along the
+//! columns, y along the rows, z into the board. ChArUco: origin in the outer corner of the first square.
+
+use crate::geometry::Vec3;
+
+/// A calibration target as a description file or meta.json states it.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
+pub enum BoardSpec {
+    Chessboard {
+        /// Inner corners [columns, rows].
+        inner_corners: [u32; 2],
+        square_mm: f64,
+        #[serde(default)]
+        border_mm: f64,
+        /// Colour of the corner square outside the origin; "black" unless stated.
+        #[serde(default = "black")]
+        first_square: String,
+    },
+    Charuco {
+        /// Squares [columns, rows].
+        squares: [u32; 2],
+        square_mm: f64,
+        marker_mm: f64,
+        /// OpenCV's name, e.g. DICT_5X5_250.
+        dictionary: String,
+        #[serde(default)]
+        border_mm: f64,
+    },
+    /// Dots on a square grid [columns, rows]; asymmetric grids shift every other row by half a pitch.
+    Circles {
+        dots: [u32; 2],
+        pitch_mm: f64,
+        diameter_mm: f64,
+        #[serde(default)]
+        asymmetric: bool,
+        #[serde(default)]
+        border_mm: f64,
+    },
+}
+
+fn black() -> String {
+    "black".into()
+}
+
+impl BoardSpec {
+    /// Positions of the features in the board frame, row by row; their index is the feature's id.
+    /// Chessboard: inner corners. ChArUco: inner corners too, with the origin one square outside
+    /// the first of them. Circles: centres; in an asymmetric grid (OpenCV's layout) columns are
+    /// two half pitches apart and odd rows are shifted by one.
+    pub fn features(&self) -> Vec<Vec3> {
+        match self {
+            BoardSpec::Chessboard { inner_corners: [nx, ny], square_mm, .. } => {
+                lattice(*nx, *ny, |i, j| [f64::from(i) * square_mm, f64::from(j) * square_mm])
+            }
+            BoardSpec::Charuco { squares: [nx, ny], square_mm, .. } => {
+                lattice(nx.saturating_sub(1), ny.saturating_sub(1), |i, j| {
+                    [f64::from(i + 1) * square_mm, f64::from(j + 1) * square_mm]
+                })
+            }
+            BoardSpec::Circles { dots: [nx, ny], pitch_mm, asymmetric, .. } => lattice(*nx, *ny, |i, j| {
+                if *asymmetric {
+                    [f64::from(2 * i + j % 2) * pitch_mm, f64::from(j) * pitch_mm]
+                } else {
+                    [f64::from(i) * pitch_mm, f64::from(j) * pitch_mm]
+                }
+            }),
+        }
+    }
+}
+
+fn lattice(nx: u32, ny: u32, at: impl Fn(u32, u32) -> [f64; 2]) -> Vec<Vec3> {
+    (0..ny)
+        .flat_map(|j| (0..nx).map(move |i| (i, j)))
+        .map(|(i, j)| {
+            let [x, y] = at(i, j);
+            Vec3::new(x, y, 0.0)
+        })
+        .collect()
+}

@@ -1,0 +1,163 @@
+//! In: `meta.json`. Out: the recording's contents, with unknown keys, units and versions refused.
+//! Frame and unit: mm; pixel centres at integer coordinates.
+
+use super::BoardSpec;
+use crate::fault::{Fault, Result};
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Content of `meta.json` (docs/file-formats.md).
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Meta {
+    pub format: u32,
+    pub set: String,
+    pub units: String,
+    pub image: ImageSpec,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub beam: Option<Beam>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub board: Option<BoardSpec>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub boards: Vec<BoardSpec>,
+    /// The one picture with the laser off, where a scan has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ambient: Option<AmbientRef>,
+    pub frames: Vec<FrameRef>,
+    /// Name of the pose file without extension.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pose_file: Option<String>,
+    /// Several pose files for the same pictures, with what they are.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub pose_files: BTreeMap<String, String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub part: Option<String>,
+    /// Path of the part's nominal model, relative to the folder.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub model: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub target: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub distance_definition: Option<String>,
+}
+
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ImageSpec {
+    pub width: u32,
+    pub height: u32,
+    pub bits: u8,
+    pub channels: u8,
+    pub response: String,
+    pub pixel_centre: String,
+}
+
+/// What the laser is: a sheet or a pointer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Beam {
+    Line,
+    Pointer,
+}
+
+/// One moment of the recording: pictures taken without moving.
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrameRef {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub laser: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ambient: Option<String>,
+    /// Index into the pose file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pose: Option<usize>,
+    /// Index into `boards`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub board: Option<usize>,
+}
+
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AmbientRef {
+    pub file: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pose: Option<usize>,
+}
+
+impl Meta {
+    pub fn load(path: &Path) -> Result<Meta> {
+        let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+        Meta::parse(&text).map_err(|e| e.at(path.display()))
+    }
+
+    /// Parses and checks; refuses unknown keys, units, formats and pixel conventions.
+    pub fn parse(text: &str) -> Result<Meta> {
+        let meta: Meta = serde_json::from_str(text).map_err(|e| {
+            Fault::input(format!("is not a recording's meta.json: {e}"))
+                .cause("a misspelt key, a missing entry, or a file of another program")
+                .next("compare it with docs/file-formats.md")
+        })?;
+        meta.check()?;
+        Ok(meta)
+    }
+
+    fn check(&self) -> Result<()> {
+        let refuse = |what: String, next: &str| {
+            Err(Fault::input(what).cause("written by another program or by hand").next(next))
+        };
+        if self.format != 1 {
+            return refuse(
+                format!("format is {}, this version reads 1", self.format),
+                "use a newer sheetlight, or export the recording again",
+            );
+        }
+        if self.units != "mm" {
+            return refuse(
+                format!("units are '{}', only 'mm' is read", self.units),
+                "convert boards and poses to millimetres",
+            );
+        }
+        if self.image.pixel_centre != "integer coordinates" {
+            return refuse(
+                format!("pixel_centre is '{}', only 'integer coordinates' is read", self.image.pixel_centre),
+                "say where the pixel centres are",
+            );
+        }
+        if self.image.response != "linear" {
+            return refuse(
+                format!("response is '{}', only 'linear' is read", self.image.response),
+                "switch the camera's gamma off",
+            );
+        }
+        if !(8..=16).contains(&self.image.bits) || self.image.width == 0 || self.image.height == 0 {
+            return refuse(
+                format!(
+                    "image {}x{} with {} bits is out of range",
+                    self.image.width, self.image.height, self.image.bits
+                ),
+                "bits must be 8 to 16 and the size at least 1x1",
+            );
+        }
+        if self.frames.is_empty() {
+            return refuse("the recording has no frames".into(), "record at least one shot");
+        }
+        let boards = self.boards.len() + usize::from(self.board.is_some());
+        for (i, f) in self.frames.iter().enumerate() {
+            if f.laser.is_none() && f.ambient.is_none() {
+                return refuse(format!("frame {i} names no picture"), "give it a 'laser' or an 'ambient' picture");
+            }
+            if f.board.is_some_and(|b| b >= boards) {
+                return refuse(
+                    format!("frame {i} refers to board {}, {boards} are described", f.board.unwrap_or(0)),
+                    "describe the board under 'boards'",
+                );
+            }
+        }
+        Ok(())
+    }
+
+    /// The board of a frame: its own, or the only one there is.
+    pub fn board_of(&self, frame: &FrameRef) -> Option<&BoardSpec> {
+        frame.board.and_then(|i| self.boards.get(i)).or(self.board.as_ref()).or(self.boards.first())
+    }
+}

@@ -1,0 +1,74 @@
+//! In: a recording folder (`meta.json`, pictures, `poses*.json|csv`). Out: what it contains, checked.
+//! Frame and unit: poses are base_from_flange in mm; boards in mm; see docs/file-formats.md.
+
+mod board;
+mod meta;
+mod poses;
+
+pub use board::BoardSpec;
+pub use meta::{AmbientRef, Beam, FrameRef, ImageSpec, Meta};
+pub use poses::{PoseFile, load_poses, save_poses};
+
+use crate::fault::{Fault, Result};
+use crate::geometry::{Base, Flange, Rigid};
+use crate::raster::{Channel, Image};
+use std::path::{Path, PathBuf};
+
+/// A recording on disk. Pictures are read one at a time, never all at once.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    pub folder: PathBuf,
+    pub meta: Meta,
+    /// Which part of colour pictures is used.
+    pub channel: Channel,
+}
+
+impl Recording {
+    /// Opens a folder and checks `meta.json`.
+    pub fn open(folder: &Path) -> Result<Recording> {
+        if !folder.is_dir() {
+            return Err(Fault::input(format!("{}: is no folder", folder.display()))
+                .cause("a recording is a folder with meta.json, pictures and poses")
+                .next("give the folder, not one of its files"));
+        }
+        let meta = Meta::load(&folder.join("meta.json"))?;
+        Ok(Recording { folder: folder.to_owned(), meta, channel: Channel::default() })
+    }
+
+    /// Reads one of the recording's pictures and checks its size against `meta.json`.
+    pub fn picture(&self, name: &str) -> Result<Image> {
+        let path = self.folder.join(name);
+        let image = crate::raster::load(&path, self.channel, self.meta.image.bits)?;
+        let (w, h) = (self.meta.image.width, self.meta.image.height);
+        if (image.width, image.height) != (w, h) {
+            return Err(Fault::input(format!(
+                "{}: is {}x{}, meta.json says {w}x{h}",
+                path.display(),
+                image.width,
+                image.height
+            ))
+            .cause("pictures of two cameras or two resolutions in one folder")
+            .next("correct meta.json, or take the odd pictures out"));
+        }
+        Ok(image)
+    }
+
+    /// The poses in file `name` (without extension), or in the file that meta.json names.
+    pub fn poses(&self, name: Option<&str>) -> Result<Vec<Rigid<Base, Flange>>> {
+        let name = match (name, &self.meta.pose_file) {
+            (Some(n), _) => n,
+            (None, Some(n)) => n.as_str(),
+            (None, None) => {
+                let known: Vec<&str> = self.meta.pose_files.keys().map(String::as_str).collect();
+                return Err(Fault::usage(format!("{}: meta.json names no single pose file", self.folder.display()))
+                    .cause(if known.is_empty() {
+                        "the recording has no poses".into()
+                    } else {
+                        format!("it has several: {}", known.join(", "))
+                    })
+                    .next("name one with --poses NAME"));
+            }
+        };
+        poses::find_and_load(&self.folder, name).map(|f| f.poses)
+    }
+}

@@ -1,0 +1,228 @@
+//! In: poses as robots print them. Out: rigid transforms, and back; the convention is always named,
+//! never guessed (docs/conventions.md has the table).
+//! Frame and unit: whatever frames the caller names; each convention states its own units.
+
+use crate::fault::{Fault, Result};
+use crate::geometry::{Frame, Mat3, Rigid, Vec3, exp, log, repair};
+
+/// How a robot writes a pose as numbers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Convention {
+    /// X Y Z RX RY RZ: mm, degrees, R = Rz·Ry·Rx.
+    Denso,
+    /// X Y Z RX RY RZ: metres and a rotation vector in radians.
+    Ur,
+    /// X Y Z A B C: mm, degrees, R = Rz(A)·Ry(B)·Rx(C).
+    Kuka,
+    /// X Y Z W P R: mm, degrees, R = Rz(R)·Ry(P)·Rx(W).
+    Fanuc,
+    /// X Y Z q1 q2 q3 q4: mm, quaternion with the real part first.
+    Abb,
+    /// X Y Z Rx Ry Rz: mm, degrees, R = Rz·Ry·Rx.
+    Yaskawa,
+    /// x y z qx qy qz qw: metres, quaternion with the real part last.
+    Ros,
+    /// x y z qw qx qy qz: mm, quaternion with the real part first.
+    Quaternion,
+    /// 16 numbers, row-major 4x4, mm.
+    Matrix,
+}
+
+impl Convention {
+    pub const ALL: [Convention; 9] = [
+        Convention::Denso,
+        Convention::Ur,
+        Convention::Kuka,
+        Convention::Fanuc,
+        Convention::Abb,
+        Convention::Yaskawa,
+        Convention::Ros,
+        Convention::Quaternion,
+        Convention::Matrix,
+    ];
+
+    pub fn name(self) -> &'static str {
+        match self {
+            Convention::Denso => "denso",
+            Convention::Ur => "ur",
+            Convention::Kuka => "kuka",
+            Convention::Fanuc => "fanuc",
+            Convention::Abb => "abb",
+            Convention::Yaskawa => "yaskawa",
+            Convention::Ros => "ros",
+            Convention::Quaternion => "quaternion",
+            Convention::Matrix => "matrix",
+        }
+    }
+
+    /// Labels of the numbers with their units, in order.
+    pub fn labels(self) -> &'static [&'static str] {
+        match self {
+            Convention::Denso => &["X mm", "Y mm", "Z mm", "RX deg", "RY deg", "RZ deg"],
+            Convention::Ur => &["X m", "Y m", "Z m", "RX rad", "RY rad", "RZ rad"],
+            Convention::Kuka => &["X mm", "Y mm", "Z mm", "A deg", "B deg", "C deg"],
+            Convention::Fanuc => &["X mm", "Y mm", "Z mm", "W deg", "P deg", "R deg"],
+            Convention::Abb => &["X mm", "Y mm", "Z mm", "q1", "q2", "q3", "q4"],
+            Convention::Yaskawa => &["X mm", "Y mm", "Z mm", "Rx deg", "Ry deg", "Rz deg"],
+            Convention::Ros => &["x m", "y m", "z m", "qx", "qy", "qz", "qw"],
+            Convention::Quaternion => &["x mm", "y mm", "z mm", "qw", "qx", "qy", "qz"],
+            Convention::Matrix => &[
+                "m00", "m01", "m02", "m03", "m10", "m11", "m12", "m13", "m20", "m21", "m22", "m23", "m30", "m31",
+                "m32", "m33",
+            ],
+        }
+    }
+
+    /// Reads a pose. Wrong counts, numbers that are not finite and quaternions whose length is
+    /// off by more than 1e-2 are refused.
+    pub fn read<To: Frame, From: Frame>(self, numbers: &[f64]) -> Result<Rigid<To, From>> {
+        let want = self.labels().len();
+        if numbers.len() != want {
+            return Err(Fault::input(format!(
+                "a {} pose has {want} numbers ({}), {} given",
+                self.name(),
+                self.labels().join(", "),
+                numbers.len()
+            ))
+            .cause("another convention than the one named")
+            .next("name the convention that the robot really writes"));
+        }
+        if numbers.iter().any(|x| !x.is_finite()) {
+            return Err(Fault::input("a pose holds a number that is not finite")
+                .cause("NaN in the pose file")
+                .next("export the pose again"));
+        }
+        if self == Convention::Matrix {
+            let rows: [f64; 16] = numbers.try_into().expect("counted above");
+            return Rigid::from_rows(&rows).map(|(pose, _)| pose);
+        }
+        let unit = if matches!(self, Convention::Ur | Convention::Ros) { 1000.0 } else { 1.0 };
+        let t = Vec3::new(numbers[0], numbers[1], numbers[2]) * unit;
+        let r = &numbers[3..];
+        let rotation = match self {
+            Convention::Denso | Convention::Fanuc | Convention::Yaskawa => zyx_deg(r[2], r[1], r[0]),
+            Convention::Kuka => zyx_deg(r[0], r[1], r[2]),
+            Convention::Ur => exp(&Vec3::new(r[0], r[1], r[2])),
+            Convention::Abb | Convention::Quaternion => quaternion(r[0], r[1], r[2], r[3])?,
+            Convention::Ros => quaternion(r[3], r[0], r[1], r[2])?,
+            Convention::Matrix => unreachable!("returned above"),
+        };
+        Ok(Rigid::new(rotation, t))
+    }
+
+    /// Writes a pose in this convention. Angles lie in (-180, 180]; where Ry is ±90 degrees the
+    /// split between Rz and Rx is free and Rx is set to 0.
+    pub fn write<To: Frame, From: Frame>(self, pose: &Rigid<To, From>) -> Vec<f64> {
+        if self == Convention::Matrix {
+            return pose.to_rows().to_vec();
+        }
+        let unit = if matches!(self, Convention::Ur | Convention::Ros) { 1e-3 } else { 1.0 };
+        let t = pose.translation * unit;
+        let mut out = vec![t.x, t.y, t.z];
+        let [z, y, x] = zyx_of(&pose.rotation);
+        let q =
+            nalgebra::UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(pose.rotation));
+        let s = if q.w < 0.0 { -1.0 } else { 1.0 };
+        let (qw, qx, qy, qz) = (s * q.w, s * q.i, s * q.j, s * q.k);
+        out.extend(match self {
+            Convention::Denso | Convention::Fanuc | Convention::Yaskawa => vec![x, y, z],
+            Convention::Kuka => vec![z, y, x],
+            Convention::Ur => log(&pose.rotation).iter().copied().collect(),
+            Convention::Abb | Convention::Quaternion => vec![qw, qx, qy, qz],
+            Convention::Ros => vec![qx, qy, qz, qw],
+            Convention::Matrix => unreachable!("returned above"),
+        });
+        out
+    }
+}
+
+impl std::str::FromStr for Convention {
+    type Err = String;
+    fn from_str(s: &str) -> std::result::Result<Convention, String> {
+        Convention::ALL.into_iter().find(|c| c.name() == s).ok_or_else(|| {
+            format!("unknown pose convention '{s}': {}", Convention::ALL.map(Convention::name).join(", "))
+        })
+    }
+}
+
+/// Rz(z)·Ry(y)·Rx(x), degrees (the paper's Table 2).
+pub fn zyx_deg(z: f64, y: f64, x: f64) -> Mat3 {
+    exp(&(Vec3::z() * z.to_radians())) * exp(&(Vec3::y() * y.to_radians())) * exp(&(Vec3::x() * x.to_radians()))
+}
+
+/// The angles [z, y, x] in degrees with `zyx_deg(z, y, x) == r`.
+pub fn zyx_of(r: &Mat3) -> [f64; 3] {
+    let cos_y = r[(0, 0)].hypot(r[(1, 0)]);
+    let y = (-r[(2, 0)]).atan2(cos_y);
+    let (z, x) = if cos_y > 1e-9 {
+        (r[(1, 0)].atan2(r[(0, 0)]), r[(2, 1)].atan2(r[(2, 2)]))
+    } else {
+        ((-r[(0, 1)]).atan2(r[(1, 1)]), 0.0)
+    };
+    [z, y, x].map(f64::to_degrees)
+}
+
+fn quaternion(w: f64, x: f64, y: f64, z: f64) -> Result<Mat3> {
+    let q = nalgebra::Quaternion::new(w, x, y, z);
+    if (q.norm() - 1.0).abs() > 1e-2 {
+        return Err(Fault::input(format!("a quaternion has length {:.4}, limit 1 ± 0.01", q.norm()))
+            .cause("numbers in another order, or another convention")
+            .next("check where the convention puts the real part"));
+    }
+    let m = nalgebra::UnitQuaternion::from_quaternion(q).to_rotation_matrix().into_inner();
+    repair(&m).map(|r| r.rotation)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Base, Camera, Flange};
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn every_convention_reads_what_it_writes(
+            w in proptest::array::uniform3(-1.8f64..1.8), t in proptest::array::uniform3(-900.0f64..900.0)
+        ) {
+            let pose: Rigid<Base, Flange> = Rigid::from_vectors(&Vec3::from(w), Vec3::from(t));
+            for c in Convention::ALL {
+                let (angle, shift) = c.read(&c.write(&pose)).unwrap().difference(&pose);
+                prop_assert!(angle < 1e-7 && shift < 1e-9, "{} {angle} {shift}", c.name());
+            }
+        }
+    }
+
+    /// The paper's Table 2: angles, and the matrix it prints (truncated to four decimals).
+    #[test]
+    fn table_2_of_the_paper() {
+        let denso = [-46.2089, 1.38484, 93.631, 359.941, 1.00457, 267.802];
+        let flange_from_camera: Rigid<Flange, Camera> = Convention::Denso.read(&denso).unwrap();
+        let r = flange_from_camera.rotation;
+        let (s, c) = (267.802f64.to_radians().sin(), 267.802f64.to_radians().cos());
+        // Rz dominates: the first two columns are those of a turn by 267.802 degrees to 2e-2.
+        assert!((r[(0, 0)] - c).abs() < 2e-2 && (r[(1, 0)] - s).abs() < 2e-2);
+        assert!((r[(2, 0)] + 1.00457f64.to_radians().sin()).abs() < 1e-4);
+        let truncated = r.map(|x| (x * 1e4).trunc() / 1e4);
+        let repaired = repair(&truncated).unwrap();
+        assert!((repaired.rotation - r).amax() < 1e-4);
+        assert!(
+            zyx_of(&repaired.rotation)
+                .iter()
+                .zip([267.802 - 360.0, 1.00457, 359.941 - 360.0])
+                .all(|(a, b)| (a - b).abs() < 1e-2)
+        );
+    }
+
+    #[test]
+    fn a_gimbal_locked_pose_survives() {
+        let pose: Rigid<Base, Flange> = Rigid::new(zyx_deg(30.0, 90.0, 20.0), Vec3::zeros());
+        let again: Rigid<Base, Flange> = Convention::Denso.read(&Convention::Denso.write(&pose)).unwrap();
+        assert!(again.difference(&pose).0 < 1e-7);
+    }
+
+    #[test]
+    fn a_wrong_count_is_refused() {
+        assert!(Convention::Abb.read::<Base, Flange>(&[0.0; 6]).is_err());
+    }
+}
