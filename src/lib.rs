@@ -13,3 +13,5 @@ pub mod camera;
 pub mod recording;
 pub mod rig;
 pub mod robot;
+
+pub mod scan;

@@ -1,0 +1,298 @@
+//! In: points as they leave the scanner, shot by shot. Out: a binary PLY that grows on disk, can be
+//! resumed after a crash, and gets its final name only when it is complete; and the way back.
+//! Frame and unit: robot base, mm; (u, v) in pixels of the shot; byte layout in docs/file-formats.md.
+
+use crate::fault::{Fault, Result};
+use std::fs::File;
+use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+/// One measured point. The layout is the PLY's record, little endian.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct CloudPoint {
+    /// Base frame, mm.
+    pub position: [f32; 3],
+    /// Standard deviation of the position along its worst direction, mm.
+    pub sigma_mm: f32,
+    /// Stripe amplitude, grey levels of the recording's depth.
+    pub intensity: f32,
+    /// 0 (barely believed) to 1.
+    pub quality: f32,
+    /// Index of the shot in the recording.
+    pub shot: u32,
+    /// Sub-pixel place of the peak in that shot, px.
+    pub u: f32,
+    pub v: f32,
+}
+
+const RECORD: u64 = size_of::<CloudPoint>() as u64;
+/// The count is written in this many characters so that it can be replaced in place.
+const COUNT_DIGITS: usize = 20;
+const PROPERTIES: [(&str, &str); 9] = [
+    ("float", "x"),
+    ("float", "y"),
+    ("float", "z"),
+    ("float", "sigma_mm"),
+    ("float", "intensity"),
+    ("float", "quality"),
+    ("uint", "shot"),
+    ("float", "u"),
+    ("float", "v"),
+];
+/// Points read or written at a time: 2.3 MB.
+const CHUNK: usize = 1 << 16;
+
+fn header(count: u64) -> String {
+    // Leading zeros, not spaces: every PLY reader takes them as a number.
+    let mut text = String::from("ply\nformat binary_little_endian 1.0\ncomment sheetlight cloud, base frame, mm\n");
+    text += &format!("element vertex {count:0COUNT_DIGITS$}\n");
+    for (kind, name) in PROPERTIES {
+        text += &format!("property {kind} {name}\n");
+    }
+    text + "end_header\n"
+}
+
+/// Anything that can hand out its points in chunks, more than once.
+pub trait PointSource {
+    /// Calls `take` with every point, in order, in chunks of any size.
+    fn for_each_chunk(&self, take: &mut dyn FnMut(&[CloudPoint])) -> Result<()>;
+}
+
+impl PointSource for [CloudPoint] {
+    fn for_each_chunk(&self, take: &mut dyn FnMut(&[CloudPoint])) -> Result<()> {
+        take(self);
+        Ok(())
+    }
+}
+
+impl PointSource for Vec<CloudPoint> {
+    fn for_each_chunk(&self, take: &mut dyn FnMut(&[CloudPoint])) -> Result<()> {
+        self.as_slice().for_each_chunk(take)
+    }
+}
+
+/// Writes `PATH.part` point by point; [`CloudWriter::finish`] renames it to `PATH`.
+pub struct CloudWriter {
+    path: PathBuf,
+    out: BufWriter<File>,
+    count: u64,
+}
+
+impl CloudWriter {
+    /// Starts a cloud; an unfinished one of the same name is discarded.
+    pub fn create(path: &Path) -> Result<CloudWriter> {
+        let part = part_of(path);
+        let file = File::create(&part).map_err(|e| Fault::write(&part, e))?;
+        let mut writer = CloudWriter { path: path.to_owned(), out: BufWriter::with_capacity(1 << 20, file), count: 0 };
+        writer.put(header(0).as_bytes())?;
+        Ok(writer)
+    }
+
+    /// Continues an unfinished cloud after its first `keep` points, as [`CloudWriter::checkpoint`]
+    /// returned them; what came after is cut off.
+    pub fn resume(path: &Path, keep: u64) -> Result<CloudWriter> {
+        let part = part_of(path);
+        let mut file = File::options().read(true).write(true).open(&part).map_err(|e| Fault::read(&part, e))?;
+        let head = header(0);
+        let mut found = vec![0; head.len()];
+        let good = file.read_exact(&mut found).is_ok() && found == head.as_bytes();
+        let length = file.metadata().map_err(|e| Fault::read(&part, e))?.len();
+        let wanted = head.len() as u64 + keep * RECORD;
+        if !good || length < wanted {
+            return Err(Fault::input(format!("{}: holds {length} bytes, {wanted} needed to resume", part.display()))
+                .cause("another program's file, or the disk lost what was written")
+                .next("start the scan again without resuming"));
+        }
+        file.set_len(wanted).and_then(|()| file.seek(SeekFrom::End(0))).map_err(|e| Fault::write(&part, e))?;
+        Ok(CloudWriter { path: path.to_owned(), out: BufWriter::with_capacity(1 << 20, file), count: keep })
+    }
+
+    fn put(&mut self, bytes: &[u8]) -> Result<()> {
+        self.out.write_all(bytes).map_err(|e| Fault::write(&part_of(&self.path), e))
+    }
+
+    pub fn append(&mut self, points: &[CloudPoint]) -> Result<()> {
+        self.put(bytemuck::cast_slice(points))?;
+        self.count += points.len() as u64;
+        Ok(())
+    }
+
+    /// Points written so far.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// Puts everything on the disk; the returned count is what [`CloudWriter::resume`] can keep.
+    pub fn checkpoint(&mut self) -> Result<u64> {
+        let done = self.out.flush().and_then(|()| self.out.get_ref().sync_data());
+        done.map_err(|e| Fault::write(&part_of(&self.path), e))?;
+        Ok(self.count)
+    }
+
+    /// Writes the count into the header, syncs, and gives the file its name.
+    pub fn finish(mut self) -> Result<u64> {
+        let part = part_of(&self.path);
+        let done = self
+            .out
+            .seek(SeekFrom::Start(0))
+            .and_then(|_| self.out.write_all(header(self.count).as_bytes()))
+            .and_then(|()| self.out.flush())
+            .and_then(|()| self.out.get_ref().sync_all())
+            .and_then(|()| std::fs::rename(&part, &self.path));
+        done.map_err(|e| Fault::write(&self.path, e))?;
+        Ok(self.count)
+    }
+}
+
+fn part_of(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".part");
+    PathBuf::from(name)
+}
+
+/// Writes a whole cloud at once.
+pub fn write_cloud(path: &Path, points: &[CloudPoint]) -> Result<()> {
+    let mut out = CloudWriter::create(path)?;
+    out.append(points)?;
+    out.finish().map(|_| ())
+}
+
+/// A finished cloud on disk; points are streamed, never all held.
+#[derive(Clone, Debug)]
+pub struct CloudFile {
+    path: PathBuf,
+    count: u64,
+    start: u64,
+}
+
+impl CloudFile {
+    /// Opens a PLY that this program wrote; other layouts are refused.
+    pub fn open(path: &Path) -> Result<CloudFile> {
+        let mut file = File::open(path).map_err(|e| Fault::read(path, e))?;
+        let mut bytes = vec![0; header(0).len()];
+        let strange = |what: &str| {
+            Fault::input(format!("{}: {what}", path.display()))
+                .cause("a PLY of another program, or a truncated one")
+                .next("give the cloud.ply of a sheetlight scan")
+        };
+        file.read_exact(&mut bytes).map_err(|_| strange("is too short for a cloud"))?;
+        let text = String::from_utf8_lossy(&bytes);
+        let count = text
+            .lines()
+            .find_map(|l| l.strip_prefix("element vertex "))
+            .and_then(|n| n.parse::<u64>().ok())
+            .filter(|&n| header(n).as_bytes() == bytes)
+            .ok_or_else(|| strange("has another header than a sheetlight cloud"))?;
+        let start = bytes.len() as u64;
+        let length = file.metadata().map_err(|e| Fault::read(path, e))?.len();
+        if length != start + count * RECORD {
+            return Err(strange(&format!("is {length} bytes long, {count} points need {}", start + count * RECORD)));
+        }
+        Ok(CloudFile { path: path.to_owned(), count, start })
+    }
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+}
+
+impl PointSource for CloudFile {
+    fn for_each_chunk(&self, take: &mut dyn FnMut(&[CloudPoint])) -> Result<()> {
+        let mut file = File::open(&self.path).map_err(|e| Fault::read(&self.path, e))?;
+        file.seek(SeekFrom::Start(self.start)).map_err(|e| Fault::read(&self.path, e))?;
+        let mut buffer = vec![CloudPoint::default(); CHUNK];
+        let mut left = self.count;
+        while left > 0 {
+            let n = left.min(CHUNK as u64) as usize;
+            file.read_exact(bytemuck::cast_slice_mut(&mut buffer[..n])).map_err(|e| Fault::read(&self.path, e))?;
+            take(&buffer[..n]);
+            left -= n as u64;
+        }
+        Ok(())
+    }
+}
+
+/// Reads a whole cloud into memory.
+pub fn read_cloud(path: &Path) -> Result<Vec<CloudPoint>> {
+    let file = CloudFile::open(path)?;
+    let mut all = Vec::with_capacity(file.count as usize);
+    file.for_each_chunk(&mut |chunk| all.extend_from_slice(chunk))?;
+    Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn some(n: u32) -> Vec<CloudPoint> {
+        (0..n)
+            .map(|i| CloudPoint {
+                position: [i as f32, 0.5, -2.0],
+                shot: i / 7,
+                u: i as f32 * 0.25,
+                ..Default::default()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_cloud_comes_back_as_it_was() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("cloud.ply");
+        let points = some(100_001);
+        write_cloud(&path, &points).unwrap();
+        assert_eq!(read_cloud(&path).unwrap(), points);
+    }
+
+    /// An independent PLY reader agrees on header and records.
+    #[test]
+    fn another_reader_understands_it() {
+        #[derive(serde::Deserialize)]
+        struct Row {
+            x: f32,
+            z: f32,
+            shot: u32,
+            u: f32,
+        }
+        #[derive(serde::Deserialize)]
+        struct File {
+            vertex: Vec<Row>,
+        }
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("cloud.ply");
+        write_cloud(&path, &some(20)).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        let file: File = serde_ply::from_bytes(&bytes).unwrap();
+        assert_eq!(file.vertex.len(), 20);
+        let row = &file.vertex[15];
+        assert_eq!((row.x, row.z, row.shot, row.u), (15.0, -2.0, 2, 3.75));
+    }
+
+    #[test]
+    fn an_unfinished_cloud_resumes_and_has_no_final_name() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("cloud.ply");
+        let points = some(50);
+        let mut writer = CloudWriter::create(&path).unwrap();
+        writer.append(&points[..30]).unwrap();
+        assert_eq!(writer.checkpoint().unwrap(), 30);
+        writer.append(&points[10..20]).unwrap();
+        drop(writer);
+        assert!(!path.exists());
+        let mut writer = CloudWriter::resume(&path, 30).unwrap();
+        writer.append(&points[30..]).unwrap();
+        assert_eq!(writer.finish().unwrap(), 50);
+        assert_eq!(read_cloud(&path).unwrap(), points);
+        assert!(CloudWriter::resume(&path, 1).is_err());
+    }
+
+    #[test]
+    fn a_truncated_cloud_is_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("cloud.ply");
+        write_cloud(&path, &some(20)).unwrap();
+        let bytes = std::fs::read(&path).unwrap();
+        std::fs::write(&path, &bytes[..bytes.len() - 3]).unwrap();
+        assert!(read_cloud(&path).unwrap_err().what.contains("20 points need"));
+    }
+}

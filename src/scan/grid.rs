@@ -1,0 +1,394 @@
+//! In: a cloud (in memory or on disk) and a choice of grid. Out: a height map whose cells hold the mean
+//! of their points; a cell with two surfaces takes the one with more points, never a height between.
+//! Frame and unit: points in the base frame, mm; the grid's frame is the scan's best plane unless given.
+
+use super::{CloudPoint, HeightMap, PointSource};
+use crate::fault::{Fault, Result};
+use crate::geometry::{Base, Grid, Mat3, Plane, Rigid, Vec3, fit_plane};
+use rand::{Rng, SeedableRng};
+
+/// How a cloud becomes a height map.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct GridOptions {
+    /// Edge of a cell, mm, 0.005..=50; by default about 1.5 points a cell, rounded to 0.05 mm.
+    #[serde(rename = "cell_mm")]
+    pub cell: Option<f64>,
+    /// Where the grid lies; by default the scan's best plane, x along the base's x.
+    pub base_from_grid: Option<Rigid<Base, Grid>>,
+    /// Cells [x, y]; by default what the points need.
+    pub cells: Option<[u32; 2]>,
+    /// Points farther apart than this in one cell belong to two surfaces, mm, 0.01..=10.
+    #[serde(rename = "layer_mm")]
+    pub layer: f64,
+    /// Points of less quality are left out, 0..=1.
+    pub min_quality: f32,
+    /// A direction in the base frame that "up" shall agree with: towards the camera.
+    pub up: Vec3,
+}
+
+impl Default for GridOptions {
+    fn default() -> Self {
+        GridOptions { cell: None, base_from_grid: None, cells: None, layer: 0.3, min_quality: 0.0, up: Vec3::z() }
+    }
+}
+
+/// Most cells a height map may have: 64 M cells take 2.5 GB while they are filled.
+const MOST_CELLS: u64 = 1 << 26;
+
+impl GridOptions {
+    pub fn check(&self) -> Result<()> {
+        let bad = |name: &str, value: f64, range: &str| {
+            Err(Fault::usage(format!("{name} is {value}, allowed {range}")).next("correct the grid options"))
+        };
+        match self.cell {
+            Some(c) if !(0.005..=50.0).contains(&c) => return bad("cell_mm", c, "0.005..=50"),
+            _ => {}
+        }
+        if !(0.01..=10.0).contains(&self.layer) {
+            return bad("layer_mm", self.layer, "0.01..=10");
+        }
+        if !(0.0..=1.0).contains(&self.min_quality) {
+            return bad("min_quality", f64::from(self.min_quality), "0..=1");
+        }
+        if self.up.norm() < 1e-6 {
+            return bad("length of up", self.up.norm(), "more than 1e-6");
+        }
+        Ok(())
+    }
+}
+
+/// Where the cells lie and how heights become integers: what both the CPU and the GPU need.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GridSpec {
+    pub base_from_grid: Rigid<Base, Grid>,
+    pub width: u32,
+    pub height: u32,
+    /// mm
+    pub cell: f64,
+    /// Height of one integer step, mm; 16-bit heights times 65,535 points stay within 32 bits.
+    pub z_step: f32,
+    /// Two surfaces where a cell spans more integer steps than this.
+    pub layer_steps: i32,
+}
+
+/// Largest integer height; the sum over the most points a cell counts fits an i32.
+pub const Z_MOST: i32 = 32_767;
+/// A cell takes no more points than this; later ones are dropped.
+pub const COUNT_MOST: u32 = 65_535;
+/// Intensities are summed in steps of 1/16 grey level up to 4,095 and saturate above.
+pub const INTENSITY_STEP: f32 = 1.0 / 16.0;
+/// Sigmas are summed in steps of 0.1 µm and saturate at 6.5 mm.
+pub const SIGMA_STEP: f32 = 1e-4;
+
+/// Integer sums of the points of one surface in one cell.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Layer {
+    pub count: u32,
+    pub z: i32,
+    pub intensity: u32,
+    pub sigma: u32,
+}
+
+/// Fills a grid in two passes over the same points: first the span of heights in each cell, then the
+/// sums below and above its middle. Integers only, so the result does not depend on the order of points.
+pub struct Accumulator {
+    pub spec: GridSpec,
+    /// Lowest and highest integer height of each cell; low > high where it is empty.
+    pub span: Vec<[i32; 2]>,
+    /// Sums below and above the middle of the span.
+    pub layers: Vec<[Layer; 2]>,
+    grid_from_base: Rigid<Grid, Base>,
+}
+
+impl Accumulator {
+    pub fn new(spec: GridSpec) -> Accumulator {
+        let n = spec.width as usize * spec.height as usize;
+        Accumulator {
+            spec,
+            span: vec![[i32::MAX, i32::MIN]; n],
+            layers: vec![[Layer::default(); 2]; n],
+            grid_from_base: spec.base_from_grid.inverse(),
+        }
+    }
+
+    /// Cell and integer height of a point; `None` outside the grid. In f64 up to the last division,
+    /// because the base frame's coordinates are large against a cell.
+    pub fn place(&self, p: &CloudPoint) -> Option<(usize, i32)> {
+        let q = self.grid_from_base.point(&Vec3::from(p.position.map(f64::from)));
+        let (x, y) = ((q.x / self.spec.cell).floor(), (q.y / self.spec.cell).floor());
+        let inside = x >= 0.0 && y >= 0.0 && x < f64::from(self.spec.width) && y < f64::from(self.spec.height);
+        let z = (q.z / f64::from(self.spec.z_step) + 0.5).floor() as i32;
+        (inside && z.abs() <= Z_MOST).then(|| (y as usize * self.spec.width as usize + x as usize, z))
+    }
+
+    pub fn first_pass(&mut self, p: &CloudPoint) {
+        if let Some((cell, z)) = self.place(p) {
+            let [low, high] = &mut self.span[cell];
+            (*low, *high) = ((*low).min(z), (*high).max(z));
+        }
+    }
+
+    pub fn second_pass(&mut self, p: &CloudPoint) {
+        let Some((cell, z)) = self.place(p) else { return };
+        let [low, high] = self.span[cell];
+        let layer = &mut self.layers[cell][usize::from(2 * z > low + high)];
+        if layer.count < COUNT_MOST {
+            layer.count += 1;
+            layer.z += z;
+            layer.intensity += (p.intensity / INTENSITY_STEP + 0.5).clamp(0.0, 65_535.0) as u32;
+            layer.sigma += (p.sigma_mm / SIGMA_STEP + 0.5).clamp(0.0, 65_535.0) as u32;
+        }
+    }
+
+    /// Means of the sums. Of two surfaces in a cell the one with more points wins, the upper one in a tie.
+    pub fn resolve(&self) -> HeightMap {
+        let spec = &self.spec;
+        let mut map = HeightMap::empty(spec.width, spec.height, spec.cell, spec.base_from_grid);
+        for (i, (&[low, high], &[below, above])) in self.span.iter().zip(&self.layers).enumerate() {
+            let merged = Layer {
+                count: below.count + above.count,
+                z: below.z.saturating_add(above.z),
+                intensity: below.intensity.saturating_add(above.intensity),
+                sigma: below.sigma.saturating_add(above.sigma),
+            };
+            let two = high.saturating_sub(low) > spec.layer_steps;
+            let chosen = match two {
+                false => merged,
+                true if below.count > above.count => below,
+                true => above,
+            };
+            if chosen.count > 0 {
+                let n = chosen.count as f32;
+                map.count[i] = chosen.count;
+                map.z[i] = (f64::from(chosen.z) / f64::from(n) * f64::from(spec.z_step)) as f32;
+                map.intensity[i] = chosen.intensity as f32 / n * INTENSITY_STEP;
+                map.sigma[i] = chosen.sigma as f32 / n * SIGMA_STEP / n.sqrt();
+            }
+        }
+        map
+    }
+}
+
+/// Grids a cloud. Refuses an empty one, and grids of more than 64 million cells.
+pub fn grid(source: &(impl PointSource + ?Sized), options: &GridOptions) -> Result<HeightMap> {
+    options.check()?;
+    let spec = choose(source, options)?;
+    let mut sums = Accumulator::new(spec);
+    let good = |p: &&CloudPoint| p.quality >= options.min_quality;
+    source.for_each_chunk(&mut |chunk| chunk.iter().filter(good).for_each(|p| sums.first_pass(p)))?;
+    source.for_each_chunk(&mut |chunk| chunk.iter().filter(good).for_each(|p| sums.second_pass(p)))?;
+    Ok(sums.resolve())
+}
+
+/// Works out frame, extent, cell and height step from the points and what the options leave open.
+pub fn choose(source: &(impl PointSource + ?Sized), options: &GridOptions) -> Result<GridSpec> {
+    let sample = sample(source, options.min_quality)?;
+    if sample.points.len() < 3 {
+        return Err(Fault::refused(format!("the cloud has {} points, 3 are needed for a height map", sample.total))
+            .cause("no laser was found in the shots, or min_quality is too high")
+            .next("look at the overlays of a few shots"));
+    }
+    let base_from_grid = match options.base_from_grid {
+        Some(frame) => frame,
+        None => best_frame(&sample.points, &options.up)?,
+    };
+    let grid_from_base = base_from_grid.inverse();
+    let local: Vec<Vec3> = sample.points.iter().map(|p| grid_from_base.point(p)).collect();
+    // All points lie within the sample's extent but for the thin margin that a sample can miss.
+    let (x0, x1) = extent(&local, 0);
+    let (y0, y1) = extent(&local, 1);
+    let (z0, z1) = extent(&local, 2);
+    let area = ((x1 - x0) * (y1 - y0)).max(1e-6);
+    let cell = options.cell.unwrap_or_else(|| {
+        let wished = (1.5 * area / sample.total as f64).sqrt();
+        ((wished / 0.05).round() * 0.05).clamp(0.05, 50.0)
+    });
+    let shift = if options.base_from_grid.is_some() { Vec3::zeros() } else { Vec3::new(x0, y0, 0.0) };
+    let base_from_grid = Rigid::new(base_from_grid.rotation, base_from_grid.point(&shift));
+    let [width, height] = options.cells.map_or_else(
+        || [(x1 - shift.x) / cell, (y1 - shift.y) / cell].map(|n| n.ceil().max(1.0)),
+        |c| c.map(f64::from),
+    );
+    if width * height > MOST_CELLS as f64 {
+        return Err(Fault::refused(format!(
+            "the height map would have {width:.0} x {height:.0} cells of {cell} mm, limit {MOST_CELLS}"
+        ))
+        .cause("the cell is small against the scan, or a few stray points widen it")
+        .next("choose a larger cell_mm, or give base_from_grid and cells"));
+    }
+    let reach = z0.abs().max(z1.abs()) * 1.05 + 1.0;
+    let z_step = (reach / f64::from(Z_MOST)) as f32;
+    let layer_steps = (options.layer / f64::from(z_step)).round() as i32;
+    Ok(GridSpec { base_from_grid, width: width as u32, height: height as u32, cell, z_step, layer_steps })
+}
+
+struct Sample {
+    points: Vec<Vec3>,
+    total: u64,
+}
+
+/// Up to 200,000 points, evenly through the source; the extreme points of every chunk are among them,
+/// so that the extent is that of the whole cloud.
+fn sample(source: &(impl PointSource + ?Sized), min_quality: f32) -> Result<Sample> {
+    const MOST: usize = 200_000;
+    let mut out = Sample { points: Vec::new(), total: 0 };
+    let mut extremes: [[Option<(f32, Vec3)>; 2]; 3] = Default::default();
+    let mut stride = 1u64;
+    source.for_each_chunk(&mut |chunk| {
+        for p in chunk.iter().filter(|p| p.quality >= min_quality && p.position.iter().all(|x| x.is_finite())) {
+            let point = Vec3::from(p.position.map(f64::from));
+            for (axis, [low, high]) in extremes.iter_mut().enumerate() {
+                let value = p.position[axis];
+                if low.is_none_or(|(v, _)| value < v) {
+                    *low = Some((value, point));
+                }
+                if high.is_none_or(|(v, _)| value > v) {
+                    *high = Some((value, point));
+                }
+            }
+            if out.total % stride == 0 {
+                out.points.push(point);
+                if out.points.len() >= MOST {
+                    let mut i = 0;
+                    out.points.retain(|_| {
+                        i += 1;
+                        i % 2 == 1
+                    });
+                    stride *= 2;
+                }
+            }
+            out.total += 1;
+        }
+    })?;
+    out.points.extend(extremes.iter().flatten().flatten().map(|(_, p)| *p));
+    Ok(out)
+}
+
+/// 0.02 % of the points on either side may be strays and do not widen the grid.
+fn extent(points: &[Vec3], axis: usize) -> (f64, f64) {
+    let mut values: Vec<f64> = points.iter().map(|p| p[axis]).collect();
+    values.sort_unstable_by(f64::total_cmp);
+    let cut = values.len() / 5_000;
+    let (low, high) = (values[cut], values[values.len() - 1 - cut]);
+    // Strays are those that leave a gap; a dense edge is kept whole.
+    let margin = 0.01 * (high - low) + 0.5;
+    (values[0].max(low - margin), values[values.len() - 1].min(high + margin))
+}
+
+/// The scan's best plane: the one with most points within 0.2 mm (seeded consensus over 400 triples),
+/// then least squares over its points. x is the base's x laid into the plane, z points `up`.
+fn best_frame(points: &[Vec3], up: &Vec3) -> Result<Rigid<Base, Grid>> {
+    let flat = || {
+        Fault::refused("the cloud's points lie on a line, a height map needs a surface")
+            .cause("only one shot, or a robot that did not move")
+            .next("scan across the part, or give the grid's frame")
+    };
+    let mut rng = rand_pcg::Pcg64::seed_from_u64(1);
+    let step = (points.len() / 5_000).max(1);
+    let probe: Vec<Vec3> = points.iter().step_by(step).copied().collect();
+    let mut best: Option<(usize, Plane<Base>)> = None;
+    for _ in 0..400 {
+        let [a, b, c] = std::array::from_fn(|_| probe[rng.random_range(0..probe.len())]);
+        let normal = (b - a).cross(&(c - a));
+        // A sliver of a triangle says nothing about the plane's tilt.
+        if normal.norm() < 1e-2 * (b - a).norm() * (c - a).norm() {
+            continue;
+        }
+        let Some(plane) = Plane::<Base>::new(normal, normal.dot(&a)) else { continue };
+        let count = probe.iter().filter(|p| plane.distance(p).abs() < 0.2).count();
+        if best.is_none_or(|(n, _)| count > n) {
+            best = Some((count, plane));
+        }
+    }
+    let (_, mut plane) = best.ok_or_else(flat)?;
+    for _ in 0..3 {
+        let near: Vec<Vec3> = points.iter().filter(|p| plane.distance(p).abs() < 0.2).copied().collect();
+        plane = fit_plane(&near).ok_or_else(flat)?.0;
+    }
+    if plane.normal.dot(up) < 0.0 {
+        plane = plane.flipped();
+    }
+    let z = plane.normal;
+    let along = if z.x.abs() < 0.9 { Vec3::x() } else { Vec3::y() };
+    let x = (along - z * z.dot(&along)).normalize();
+    let rotation = Mat3::from_columns(&[x, z.cross(&x), z]);
+    Ok(Rigid::new(rotation, z * plane.offset))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A plate with a raised square, in a tilted frame, points on a 0.2 mm raster.
+    fn plate(tilt: &Rigid<Base, Grid>) -> Vec<CloudPoint> {
+        let mut out = Vec::new();
+        for i in 0..200 {
+            for j in 0..150 {
+                let (x, y) = (0.2 * f64::from(i) + 0.013, 0.2 * f64::from(j) + 0.017);
+                let z = if (10.0..20.0).contains(&x) && (8.0..18.0).contains(&y) { 3.0 } else { 0.0 };
+                let p = tilt.point(&Vec3::new(x, y, z));
+                out.push(CloudPoint {
+                    position: [p.x as f32, p.y as f32, p.z as f32],
+                    sigma_mm: 0.02,
+                    intensity: 80.0,
+                    quality: 1.0,
+                    ..Default::default()
+                });
+            }
+        }
+        out
+    }
+
+    #[test]
+    fn the_best_plane_is_the_plate_and_heights_are_above_it() {
+        let tilt = Rigid::from_vectors(&Vec3::new(0.2, -0.1, 0.3), Vec3::new(400.0, -100.0, 60.0));
+        let map = grid(&plate(&tilt), &GridOptions::default()).unwrap();
+        let normal = map.base_from_grid.direction(&Vec3::z());
+        assert!(normal.dot(&tilt.direction(&Vec3::z())) > 1.0 - 1e-9);
+        let measured: Vec<f32> = map.z.iter().copied().filter(|z| z.is_finite()).collect();
+        assert!(measured.iter().all(|z| z.abs() < 2e-3 || (z - 3.0).abs() < 2e-3), "no cell between the surfaces");
+        let high = measured.iter().filter(|z| **z > 1.5).count() as f64 / measured.len() as f64;
+        assert!((high - 100.0 / 1200.0).abs() < 0.01, "{high}");
+    }
+
+    #[test]
+    fn a_given_grid_is_filled_exactly() {
+        let frame = Rigid::<Base, Grid>::identity();
+        let options =
+            GridOptions { cell: Some(0.4), base_from_grid: Some(frame), cells: Some([100, 75]), ..Default::default() };
+        let map = grid(&plate(&frame), &options).unwrap();
+        assert_eq!((map.width, map.height), (100, 75));
+        assert!(map.count.iter().all(|&n| n == 4));
+        assert!((map.get(26, 21).unwrap() - 3.0).abs() < 1e-3 && map.get(5, 5).unwrap().abs() < 1e-3);
+        assert!((map.sigma[0] - 0.01).abs() < 1e-6 && (map.intensity[0] - 80.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn empty_cells_are_missing_and_the_order_does_not_matter() {
+        let frame = Rigid::<Base, Grid>::identity();
+        let mut points = plate(&frame);
+        points.retain(|p| p.position[0] < 15.0 || p.position[0] > 16.0);
+        let options = GridOptions { cell: Some(0.5), base_from_grid: Some(frame), ..Default::default() };
+        let a = grid(&points, &options).unwrap();
+        points.reverse();
+        let b = grid(&points, &options).unwrap();
+        assert!(a.z.iter().zip(&b.z).all(|(x, y)| x.to_bits() == y.to_bits()));
+        assert_eq!(a.get(31, 20), None);
+        assert!(a.z[20 * a.width as usize + 31].is_nan());
+    }
+
+    #[test]
+    fn a_huge_grid_and_an_empty_cloud_are_refused() {
+        let options = GridOptions { cell: Some(0.005), ..Default::default() };
+        let tilt = Rigid::<Base, Grid>::identity();
+        let mut points = plate(&tilt);
+        for p in &mut points {
+            p.position[0] *= 40.0;
+        }
+        assert!(grid(&points, &options).unwrap_err().what.contains("limit"));
+        assert!(grid(&Vec::new(), &GridOptions::default()).is_err());
+        assert!(GridOptions { cell: Some(0.0), ..Default::default() }.check().is_err());
+    }
+}

@@ -1,0 +1,10 @@
+//! In: shots with poses and a calibrated rig. Out: point clouds, height maps and the files that hold them.
+//! Frame and unit: clouds in the robot's base frame, height maps in a grid frame of their own; mm.
+
+mod cloud;
+mod grid;
+mod heightmap;
+
+pub use cloud::{CloudFile, CloudPoint, CloudWriter, PointSource, read_cloud, write_cloud};
+pub use grid::{Accumulator, GridOptions, GridSpec, grid};
+pub use heightmap::HeightMap;
