@@ -15,3 +15,6 @@ pub mod rig;
 pub mod robot;
 
 pub mod scan;
+pub mod station;
+
+pub mod cli;

@@ -1,0 +1,37 @@
+# make demo   build, simulate a station, scan it, leave ./demo/index.html
+# make test   everything, on software Vulkan where it can be had
+# make bench  figures of this machine;  make bench-peers  side by side with OpenCV and numba
+
+CARGO ?= cargo
+VENV := .venv
+export XDG_RUNTIME_DIR ?= $(shell mktemp -d /tmp/sheetlight-run.XXXXXX)
+
+.PHONY: demo test bench bench-peers vulkan python build clean
+
+demo: vulkan build
+	target/release/sheetlight demo --out demo
+
+build:
+	$(CARGO) build --release --locked
+
+test: vulkan python
+	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(CARGO) test --locked -- --show-output
+
+bench: vulkan build
+	target/release/sheetlight bench
+
+bench-peers: vulkan build
+	tools/python-env.sh $(VENV) peers
+	$(VENV)/bin/python benches/peers/run.py
+
+# Software Vulkan (Mesa lavapipe) is installed where we may; without it the CPU twins do the work.
+vulkan:
+	tools/vulkan.sh
+
+# The scorer of the reference data and the comparisons need numpy, scipy and libigl.
+python:
+	tools/python-env.sh $(VENV) test
+
+clean:
+	$(CARGO) clean
+	rm -rf demo $(VENV)

@@ -1,0 +1,64 @@
+//! In: the command line. Out: one library call a subcommand, its result on stdout, talk on stderr.
+//! Frame and unit: as the subcommands say; every number is printed with its unit.
+
+mod console;
+mod station;
+
+pub use console::Console;
+
+use crate::fault::Result;
+use clap::{Parser, Subcommand};
+
+/// Sheet-of-light scanning with a robot: calibrate, scan, find, insert.
+///
+/// Data goes to stdout, talk to stderr. Exit code 0: done; 1: failed; 2: the command was misused.
+#[derive(Parser)]
+#[command(name = "sheetlight", version, max_term_width = 100)]
+struct Cli {
+    /// Print the result as JSON on stdout, for machines
+    #[arg(long, global = true)]
+    json: bool,
+    /// No progress bars, no talk
+    #[arg(long, global = true)]
+    quiet: bool,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Make, show, import into or export from a station folder
+    #[command(subcommand)]
+    Station(station::Command),
+}
+
+fn run(command: &Command, console: &Console) -> Result<()> {
+    match command {
+        Command::Station(c) => station::run(c, console),
+    }
+}
+
+/// Parses the command line, runs it, prints an error if there is one. Returns the exit code.
+pub fn main() -> u8 {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(e) => {
+            // Nothing is left to be said when even stderr is closed.
+            let _ = e.print();
+            return if e.use_stderr() { 2 } else { 0 };
+        }
+    };
+    let console = Console::new(cli.json, cli.quiet);
+    match run(&cli.command, &console) {
+        Ok(()) => 0,
+        Err(fault) => {
+            console.fault(&fault);
+            fault.exit_code()
+        }
+    }
+}
+
+/// Reads an option's value with the type's own `FromStr`, for clap's `value_parser`.
+pub(crate) fn parse<T: std::str::FromStr<Err = String>>(s: &str) -> std::result::Result<T, String> {
+    s.parse()
+}

@@ -1,0 +1,126 @@
+//! In: a station folder. Out: a new one, a summary of one, or values moved in and out of it.
+//! Frame and unit: camera and flange frames, mm.
+
+use super::Console;
+use crate::fault::{Fault, Result};
+use crate::rig::{Calibration, Rig};
+use crate::robot::Convention;
+use crate::station::{Settings, Values};
+use std::path::PathBuf;
+
+#[derive(clap::Subcommand)]
+pub enum Command {
+    /// Make a station folder with its station.toml
+    New(New),
+    /// Show what a station knows of its rig, and how well
+    Show(Show),
+    /// Put known values into a station: a JSON file with any of intrinsics, flange_T_camera,
+    /// laser_plane_camera, pointer_camera
+    Import(Import),
+    /// Write a station's values as one JSON file, in the keys that import reads
+    Export(Export),
+}
+
+#[derive(clap::Args)]
+pub struct New {
+    station: PathBuf,
+    /// A name for pages and files
+    #[arg(long, default_value = "station")]
+    name: String,
+    /// How the robot writes poses: denso, ur, kuka, fanuc, abb, yaskawa, ros, quaternion, matrix
+    #[arg(long, value_parser = super::parse::<Convention>)]
+    robot: Option<Convention>,
+}
+
+#[derive(clap::Args)]
+pub struct Show {
+    station: PathBuf,
+}
+
+#[derive(clap::Args)]
+pub struct Import {
+    /// JSON file with the values
+    values: PathBuf,
+    #[arg(long)]
+    station: PathBuf,
+}
+
+#[derive(clap::Args)]
+pub struct Export {
+    station: PathBuf,
+    #[arg(long)]
+    out: PathBuf,
+}
+
+pub fn run(command: &Command, console: &Console) -> Result<()> {
+    match command {
+        Command::New(a) => {
+            if a.station.join("station.toml").exists() {
+                let what = format!("{}: is a station already", a.station.display());
+                return Err(Fault::usage(what).next("choose another folder"));
+            }
+            let settings = Settings { name: a.name.clone(), robot: a.robot, ..Settings::default() };
+            settings.store(&a.station)?;
+            console.result(&settings, &format!("{}: made; calibrate it or import values next", a.station.display()));
+        }
+        Command::Show(a) => {
+            let (settings, rig) = (Settings::load(&a.station)?, Rig::load(&a.station)?);
+            console.result(&Values::of(&rig), &summary(&settings, &rig));
+        }
+        Command::Import(a) => {
+            if !a.station.join("station.toml").exists() {
+                Settings { name: "station".into(), ..Settings::default() }.store(&a.station)?;
+            }
+            let stored = Values::load(&a.values)?.store(&a.station, &a.values)?;
+            console.result(&stored, &format!("{}: imported {}", a.station.display(), stored.join(", ")));
+        }
+        Command::Export(a) => {
+            let values = Values::of(&Rig::load(&a.station)?);
+            let text = serde_json::to_string_pretty(&values).expect("plain numbers");
+            crate::rig::write_atomically(&a.out, text.as_bytes())?;
+            console.say(format!("{}: written", a.out.display()));
+        }
+    }
+    Ok(())
+}
+
+fn summary(settings: &Settings, rig: &Rig) -> String {
+    let camera = line("camera", &rig.camera, |c| {
+        let d = c.distortion;
+        format!(
+            "fx {:.3} fy {:.3} cx {:.3} cy {:.3} px, k1 k2 p1 p2 k3 {:.5} {:.5} {:.6} {:.6} {:.5}, {}x{}",
+            c.fx, c.fy, c.cx, c.cy, d[0], d[1], d[2], d[3], d[4], c.width, c.height
+        )
+    });
+    let plane = line("laser plane", &rig.laser_plane, |p| {
+        format!("normal {:.6} {:.6} {:.6}, offset {:.4} mm", p.normal.x, p.normal.y, p.normal.z, p.offset)
+    });
+    let pointer = line("pointer", &rig.pointer, |r| {
+        let (o, d) = (r.origin, r.direction);
+        format!("through {:.3} {:.3} {:.3} mm along {:.6} {:.6} {:.6}", o.x, o.y, o.z, d.x, d.y, d.z)
+    });
+    let hand_eye = line("hand-eye", &rig.hand_eye, |h| {
+        let n = Convention::Denso.write(h);
+        format!(
+            "{:.4} {:.4} {:.4} mm, RX {:.4} RY {:.4} RZ {:.4} degrees (R = Rz·Ry·Rx)",
+            n[0], n[1], n[2], n[3], n[4], n[5]
+        )
+    });
+    format!("{}\n{camera}{plane}{pointer}{hand_eye}", settings.name)
+}
+
+fn line<T>(what: &str, calibration: &Option<Calibration<T>>, value: impl Fn(&T) -> String) -> String {
+    let Some(c) = calibration else { return format!("{what:12} not calibrated\n") };
+    let mut s = format!(
+        "{what:12} {}\n{:12} {} ({}, {})\n",
+        value(&c.value),
+        "",
+        c.quality.verdict.words(),
+        c.program,
+        c.created
+    );
+    for r in &c.quality.reasons {
+        s += &format!("{:12} {r}\n", "");
+    }
+    s
+}

@@ -1,0 +1,95 @@
+//! In: `station.toml`, what a person chose. Out: names, working volume, extraction settings, limits.
+//! Frame and unit: camera frame for the working volume, mm; docs/file-formats.md lists every key.
+
+use crate::fault::{Fault, Result};
+use crate::robot::Convention;
+use std::path::Path;
+
+/// The part of a station that a person decides. Unknown keys are refused.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Settings {
+    /// A name for pages and files.
+    pub name: String,
+    /// How this station's robot writes poses; needed only where poses are printed for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub robot: Option<Convention>,
+    pub working_volume: WorkingVolume,
+}
+
+/// Where parts can be: camera-frame depths between which the laser plane is believed.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct WorkingVolume {
+    /// Nearest depth along the optical axis, mm, > 0.
+    pub near_mm: f64,
+    /// Farthest depth, mm, > near. Points outside are rejected with reason "region".
+    pub far_mm: f64,
+}
+
+impl Default for WorkingVolume {
+    /// The range of the paper's pointer, 70 to 290 mm, with a margin.
+    fn default() -> WorkingVolume {
+        WorkingVolume { near_mm: 60.0, far_mm: 320.0 }
+    }
+}
+
+impl Settings {
+    /// Reads `station/station.toml`; a station without one has the defaults.
+    pub fn load(station: &Path) -> Result<Settings> {
+        let path = station.join("station.toml");
+        let text = match std::fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound && station.is_dir() => return Ok(Settings::default()),
+            Err(e) => {
+                return Err(Fault::read(&path, e)
+                    .next("make a station with sheetlight station new, or give its folder as --station"));
+            }
+        };
+        Settings::parse(&text).map_err(|e| e.at(path.display()))
+    }
+
+    pub fn parse(text: &str) -> Result<Settings> {
+        let settings: Settings = toml::from_str(text).map_err(|e| {
+            Fault::input(format!("is not a station file: {}", e.to_string().trim_end()))
+                .cause("a misspelt key or a value of the wrong type")
+                .next("compare it with docs/file-formats.md, or with what sheetlight station new writes")
+        })?;
+        settings.check()?;
+        Ok(settings)
+    }
+
+    pub fn check(&self) -> Result<()> {
+        let v = self.working_volume;
+        if !(v.near_mm > 0.0 && v.far_mm > v.near_mm && v.far_mm.is_finite()) {
+            return Err(Fault::input(format!(
+                "working_volume runs from near_mm = {} to far_mm = {}; 0 < near_mm < far_mm is needed",
+                v.near_mm, v.far_mm
+            ))
+            .cause("swapped, or metres instead of millimetres")
+            .next("give the camera's nearest and farthest working distance in millimetres"));
+        }
+        Ok(())
+    }
+
+    /// Writes `station/station.toml`.
+    pub fn store(&self, station: &Path) -> Result<()> {
+        std::fs::create_dir_all(station).map_err(|e| Fault::write(station, e))?;
+        let text = toml::to_string(self).expect("plain data");
+        crate::rig::write_atomically(&station.join("station.toml"), text.as_bytes())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn unknown_keys_and_swapped_volumes_are_refused() {
+        assert!(Settings::parse("name = 'a'").is_ok());
+        assert!(Settings::parse("nam = 'a'").unwrap_err().what.contains("nam"));
+        assert!(Settings::parse("[working_volume]\nnear_mm = 300\nfar_mm = 100").is_err());
+        let s = Settings { name: "x".into(), robot: Some(Convention::Denso), ..Settings::default() };
+        assert_eq!(Settings::parse(&toml::to_string(&s).unwrap()).unwrap(), s);
+    }
+}

@@ -1,0 +1,120 @@
+//! In: the `use` lines and paths of src/. Out: a failure for every import from a higher floor, and
+//! for every outside crate named away from its home (ARCHITECTURE.md).
+//! Frame and unit: none.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What each module may import, `fault` excepted, which everybody may.
+const MAY: &[(&str, &[&str])] = &[
+    ("fault", &[]),
+    ("geometry", &[]),
+    ("raster", &[]),
+    ("solve", &[]),
+    ("gpu", &[]),
+    ("camera", &["geometry"]),
+    ("robot", &["geometry"]),
+    ("recording", &["geometry", "raster", "robot"]),
+    ("rig", &["geometry", "camera"]),
+    ("simulate", &["geometry", "raster", "solve", "camera", "robot", "recording", "rig"]),
+    ("calibrate", &["geometry", "raster", "solve", "camera", "robot", "recording", "rig"]),
+    ("stages", &["geometry", "raster", "camera", "gpu"]),
+    ("scan", &["geometry", "raster", "solve", "gpu", "camera", "robot", "recording", "rig", "stages"]),
+    ("find", &["geometry", "raster", "solve", "gpu", "camera", "robot", "recording", "rig", "stages", "scan"]),
+    (
+        "station",
+        &[
+            "geometry", "raster", "solve", "gpu", "camera", "robot", "recording", "rig", "simulate", "calibrate", "stages",
+            "scan", "find",
+        ],
+    ),
+    (
+        "cli",
+        &[
+            "geometry", "raster", "solve", "gpu", "camera", "robot", "recording", "rig", "simulate", "calibrate", "stages",
+            "scan", "find", "station",
+        ],
+    ),
+];
+
+/// Outside crates with one home; named anywhere else they would spread.
+const HOMES: &[(&str, &str)] = &[("wgpu::", "gpu"), ("image::", "raster"), ("clap::", "cli"), ("indicatif::", "cli")];
+
+fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()) {
+        if entry.is_dir() {
+            sources(&entry, out);
+        } else if entry.extension().is_some_and(|e| e == "rs") {
+            out.push(entry);
+        }
+    }
+}
+
+/// The modules named by `crate::x` in one source, comments left out.
+fn imports(text: &str) -> Vec<String> {
+    let code = text.lines().map(|l| l.split("//").next().unwrap_or("")).collect::<Vec<_>>().join("\n");
+    let mut found = Vec::new();
+    for (at, _) in code.match_indices("crate::") {
+        let rest = &code[at + 7..];
+        match rest.strip_prefix('{') {
+            Some(group) => {
+                let mut depth = 0;
+                for part in group.split_inclusive([',', '{', '}']) {
+                    let name: String = part.trim_start().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+                    if depth == 0 && !name.is_empty() {
+                        found.push(name);
+                    }
+                    depth += i32::from(part.ends_with('{')) - i32::from(part.ends_with('}'));
+                    if depth < 0 {
+                        break;
+                    }
+                }
+            }
+            None => found.push(rest.chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()),
+        }
+    }
+    found
+}
+
+fn home_of(path: &Path, src: &Path) -> String {
+    let first = path.strip_prefix(src).unwrap().components().next().unwrap();
+    first.as_os_str().to_string_lossy().trim_end_matches(".rs").to_owned()
+}
+
+#[test]
+fn every_module_imports_only_from_lower_floors() {
+    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let may: BTreeMap<&str, &[&str]> = MAY.iter().copied().collect();
+    let mut files = Vec::new();
+    sources(&src, &mut files);
+    let mut faults = Vec::new();
+    for path in files {
+        let (module, text) = (home_of(&path, &src), std::fs::read_to_string(&path).unwrap());
+        if module == "lib" || module == "main" {
+            continue;
+        }
+        let allowed = may.get(module.as_str()).unwrap_or_else(|| panic!("{module} stands on no floor: add it to ARCHITECTURE.md and here"));
+        for import in imports(&text) {
+            if import != "fault" && import != module && !allowed.contains(&import.as_str()) {
+                faults.push(format!("{}: {module} imports {import}", path.display()));
+            }
+        }
+        for (vendor, home) in HOMES {
+            let named = text.lines().any(|l| {
+                let code = l.split("//").next().unwrap_or("");
+                code.match_indices(vendor).any(|(at, _)| !code[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':'))
+            });
+            if named && module != *home {
+                faults.push(format!("{}: {vendor} belongs to {home}", path.display()));
+            }
+        }
+    }
+    assert!(faults.is_empty(), "\n{}", faults.join("\n"));
+}
+
+#[test]
+fn imports_are_read_in_every_form() {
+    assert_eq!(imports("use crate::geometry::{Rigid, Vec3};"), ["geometry"]);
+    assert_eq!(imports("use crate::{camera::Intrinsics, rig::{Rig, Verdict}, scan};"), ["camera", "rig", "scan"]);
+    assert_eq!(imports("fn f() { crate::station::run() } // crate::cli"), ["station"]);
+}
