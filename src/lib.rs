@@ -18,3 +18,4 @@ pub mod scan;
 pub mod station;
 
 pub mod cli;
+pub mod calibrate;

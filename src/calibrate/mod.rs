@@ -1,0 +1,7 @@
+//! In: pictures' features, robot poses, laser peaks. Out: calibrations with covariance and verdict.
+//! Frame and unit: stated in each file; mm, rad, px.
+
+pub mod components;
+pub mod hand_eye;
+pub mod hand_eye_closed;
+pub mod measured_pose;
