@@ -14,8 +14,9 @@ pub mod recording;
 pub mod rig;
 pub mod robot;
 
+pub mod calibrate;
+
 pub mod scan;
 pub mod station;
 
 pub mod cli;
-pub mod calibrate;
