@@ -1,7 +1,11 @@
 //! In: pictures' features, robot poses, laser peaks. Out: calibrations with covariance and verdict.
 //! Frame and unit: stated in each file; mm, rad, px.
 
+pub mod boards;
 pub mod components;
 pub mod hand_eye;
 pub mod hand_eye_closed;
+pub mod homography;
 pub mod measured_pose;
+pub mod pose;
+pub mod projection;
