@@ -20,3 +20,4 @@ pub mod scan;
 pub mod station;
 
 pub mod cli;
+pub mod find;

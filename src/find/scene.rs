@@ -1,0 +1,200 @@
+//! In: pictures and height maps. Out: layers of numbers with missing cells, and their pyramids.
+//! Frame and unit: pixels, x right (along columns), y down (along rows), an integer is a cell's centre;
+//! values in grey levels (intensity) or mm (height).
+
+use crate::fault::{Fault, Result};
+use crate::raster::Image;
+
+/// What a layer's numbers are; a model edge is looked for in the layer of its own kind only.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Kind {
+    Intensity,
+    Height,
+}
+
+/// One map of numbers, row-major; NaN is missing and never makes an edge.
+#[derive(Clone, Debug)]
+pub struct Layer {
+    pub kind: Kind,
+    pub width: usize,
+    pub height: usize,
+    pub values: Vec<f32>,
+}
+
+/// What is searched: one or more layers of the same size.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    pub layers: Vec<Layer>,
+    /// Edge length of a cell in mm; `None` for a picture without scale.
+    pub mm_per_px: Option<f64>,
+}
+
+impl Layer {
+    /// Refuses sizes that do not fit and infinite values.
+    pub fn new(kind: Kind, width: usize, height: usize, values: Vec<f32>) -> Result<Layer> {
+        if values.len() != width * height || width == 0 || height == 0 {
+            return Err(Fault::input(format!("a map of {width}x{height} cells holds {} values", values.len()))
+                .cause("a truncated file")
+                .next("export the map again"));
+        }
+        if values.iter().any(|v| v.is_infinite()) {
+            return Err(Fault::input("a map holds an infinite value")
+                .cause("a failed division in the program that wrote it")
+                .next("write missing cells as NaN"));
+        }
+        Ok(Layer { kind, width, height, values })
+    }
+
+    pub fn from_image(image: &Image) -> Layer {
+        Layer {
+            kind: Kind::Intensity,
+            width: image.width as usize,
+            height: image.height as usize,
+            values: image.to_f32(),
+        }
+    }
+
+    /// Share of cells that hold a value.
+    pub fn coverage(&self) -> f64 {
+        self.values.iter().filter(|v| !v.is_nan()).count() as f64 / self.values.len() as f64
+    }
+
+    pub fn complete(&self) -> bool {
+        !self.values.iter().any(|v| v.is_nan())
+    }
+
+    /// Half the size: the mean of the valid cells of each 2x2 block, missing where fewer than two are
+    /// valid. Cell (x, y) has its centre at (2x + 0.5, 2y + 0.5) of the finer map.
+    pub fn halved(&self) -> Layer {
+        let (w, h) = ((self.width / 2).max(1), (self.height / 2).max(1));
+        let mut values = vec![f32::NAN; w * h];
+        for y in 0..h {
+            for x in 0..w {
+                let (mut sum, mut n) = (0.0, 0);
+                for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                    let (xx, yy) = ((2 * x + dx).min(self.width - 1), (2 * y + dy).min(self.height - 1));
+                    let v = self.values[yy * self.width + xx];
+                    if !v.is_nan() {
+                        sum += v;
+                        n += 1;
+                    }
+                }
+                if n >= 2 {
+                    values[y * w + x] = sum / n as f32;
+                }
+            }
+        }
+        Layer { kind: self.kind, width: w, height: h, values }
+    }
+
+    /// Cuts out `[x0, x1) x [y0, y1)`.
+    pub fn crop(&self, region: Region) -> Layer {
+        let (w, h) = (region.x1 - region.x0, region.y1 - region.y0);
+        let mut values = Vec::with_capacity(w * h);
+        for y in region.y0..region.y1 {
+            values.extend_from_slice(&self.values[y * self.width + region.x0..y * self.width + region.x1]);
+        }
+        Layer { kind: self.kind, width: w, height: h, values }
+    }
+}
+
+/// A rectangle of cells, `x1` and `y1` excluded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Region {
+    pub x0: usize,
+    pub y0: usize,
+    pub x1: usize,
+    pub y1: usize,
+}
+
+impl Region {
+    /// Refuses regions that are empty or reach beyond a map of `width` x `height`.
+    pub fn check(&self, width: usize, height: usize) -> Result<()> {
+        if self.x0 >= self.x1 || self.y0 >= self.y1 || self.x1 > width || self.y1 > height {
+            return Err(Fault::usage(format!(
+                "the region {} {} {} {} does not lie in the map of {width}x{height} cells",
+                self.x0, self.y0, self.x1, self.y1
+            ))
+            .cause("corners swapped, or numbers of another map")
+            .next("give x0 y0 x1 y1 in cells, x1 and y1 excluded"));
+        }
+        Ok(())
+    }
+}
+
+impl Scene {
+    pub fn new(layers: Vec<Layer>, mm_per_px: Option<f64>) -> Result<Scene> {
+        let Some(first) = layers.first() else {
+            return Err(Fault::input("a scene without layers").cause("neither height nor intensity was chosen"));
+        };
+        if layers.iter().any(|l| (l.width, l.height) != (first.width, first.height)) {
+            return Err(Fault::input("the layers of a scene differ in size")
+                .cause("height and intensity of two different scans")
+                .next("give maps of the same scan"));
+        }
+        Ok(Scene { layers, mm_per_px })
+    }
+    pub fn from_image(image: &Image) -> Scene {
+        Scene { layers: vec![Layer::from_image(image)], mm_per_px: None }
+    }
+    pub fn width(&self) -> usize {
+        self.layers[0].width
+    }
+    pub fn height(&self) -> usize {
+        self.layers[0].height
+    }
+    /// Level 0 is the scene itself; each further level has half the size.
+    pub fn pyramid(&self, levels: usize) -> Vec<Vec<Layer>> {
+        let mut out = vec![self.layers.clone()];
+        for _ in 1..levels {
+            let coarser = out.last().expect("never empty").iter().map(Layer::halved).collect();
+            out.push(coarser);
+        }
+        out
+    }
+    pub fn crop(&self, region: Region) -> Scene {
+        Scene { layers: self.layers.iter().map(|l| l.crop(region)).collect(), mm_per_px: self.mm_per_px }
+    }
+}
+
+/// A coordinate of level 0 seen on level `level`: (x + 1/2) / 2^level - 1/2.
+pub fn to_level(x: f64, level: usize) -> f64 {
+    (x + 0.5) / (1u64 << level) as f64 - 0.5
+}
+
+/// The inverse of [`to_level`].
+pub fn from_level(x: f64, level: usize) -> f64 {
+    (x + 0.5) * (1u64 << level) as f64 - 0.5
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halving_keeps_places_and_forgets_missing_cells() {
+        // A ramp: value = x; the halved map must hold x at its own cell centres.
+        let ramp: Vec<f32> = (0..64).map(|i| (i % 8) as f32).collect();
+        let fine = Layer::new(Kind::Height, 8, 8, ramp.clone()).unwrap();
+        let coarse = fine.halved();
+        for x in 0..4 {
+            assert_eq!(f64::from(coarse.values[x]), from_level(x as f64, 1));
+        }
+        let mut holes = ramp;
+        holes[0] = f32::NAN;
+        holes[1] = f32::NAN;
+        holes[8] = f32::NAN;
+        let coarse = Layer::new(Kind::Height, 8, 8, holes).unwrap().halved();
+        assert!(coarse.values[0].is_nan() && coarse.values[1] == 2.5);
+        assert!((to_level(from_level(3.25, 3), 3) - 3.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn regions_outside_the_map_are_refused() {
+        assert!(Region { x0: 2, y0: 0, x1: 9, y1: 4 }.check(8, 8).is_err());
+        assert!(Region { x0: 2, y0: 0, x1: 2, y1: 4 }.check(8, 8).is_err());
+        assert!(Region { x0: 2, y0: 0, x1: 8, y1: 4 }.check(8, 8).is_ok());
+    }
+}

@@ -1,0 +1,437 @@
+//! In: a scene, a shape model, what is allowed. Out: matches with score, runner-up, sigma and warnings,
+//! by a pyramid search over quantised directions, then directions, then least squares ([steger02]).
+//! Frame and unit: pixels of the scene, degrees in options, radians in poses.
+
+use super::coarse::{Coarse, STRIDE, Turn, turn_between};
+use super::gradient::{Field, slopes};
+use super::model::{ModelPoint, ShapeModel};
+use super::refine::{Pose, refine};
+use super::scene::{Kind, Scene, from_level, to_level};
+use crate::fault::{Fault, Result};
+use rayon::prelude::*;
+
+/// What is searched for.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SearchOptions {
+    /// First and last turn, degrees; the last not below the first, at most 360 apart. Default all.
+    pub angles_deg: [f64; 2],
+    /// Smallest and largest scale, 0.2 to 5. Default 1 alone.
+    pub scales: [f64; 2],
+    /// Least score, 0.1 to 1: the mean cosine between the model's and the scene's directions.
+    pub min_score: f64,
+    /// Most matches, 1 to 1000.
+    pub max_matches: usize,
+    /// Largest overlap of two matches, 0 to 1, as a share of the smaller one's box.
+    pub max_overlap: f64,
+    /// Takes dark-to-bright for bright-to-dark.
+    pub ignore_polarity: bool,
+    /// Weakest edge, in values per px of the layer; `None` for three times the noise.
+    pub min_contrast: Option<f64>,
+    /// A runner-up above this share of a match's score makes it ambiguous, 0.5 to 1.
+    pub ambiguous_at: f64,
+    /// Candidates carried from the coarsest level, 8 to 5000. More find weaker instances in clutter.
+    pub candidates: usize,
+}
+
+impl Default for SearchOptions {
+    fn default() -> Self {
+        SearchOptions {
+            angles_deg: [-180.0, 180.0],
+            scales: [1.0, 1.0],
+            min_score: 0.6,
+            max_matches: 1,
+            max_overlap: 0.5,
+            ignore_polarity: false,
+            min_contrast: None,
+            ambiguous_at: 0.9,
+            candidates: 200,
+        }
+    }
+}
+
+impl SearchOptions {
+    pub fn check(&self) -> Result<()> {
+        let bad = |what: String| Err(Fault::usage(what).next("correct the search options"));
+        let [a0, a1] = self.angles_deg;
+        if !(a0.is_finite() && a1.is_finite() && a1 >= a0 && a1 - a0 <= 360.0 + 1e-9) {
+            return bad(format!("angles_deg are {a0} to {a1}, wanted ascending and at most 360 apart"));
+        }
+        let [s0, s1] = self.scales;
+        if !(s0 >= 0.2 && s1 >= s0 && s1 <= 5.0) {
+            return bad(format!("scales are {s0} to {s1}, wanted ascending within 0.2 to 5"));
+        }
+        if !(0.1..=1.0).contains(&self.min_score) {
+            return bad(format!("min_score is {}, wanted 0.1 to 1", self.min_score));
+        }
+        if !(1..=1000).contains(&self.max_matches) {
+            return bad(format!("max_matches is {}, wanted 1 to 1000", self.max_matches));
+        }
+        if !(0.0..=1.0).contains(&self.max_overlap) {
+            return bad(format!("max_overlap is {}, wanted 0 to 1", self.max_overlap));
+        }
+        if self.min_contrast.is_some_and(|c| !(c > 0.0 && c.is_finite())) {
+            return bad("min_contrast must be above 0".into());
+        }
+        if !(0.5..=1.0).contains(&self.ambiguous_at) {
+            return bad(format!("ambiguous_at is {}, wanted 0.5 to 1", self.ambiguous_at));
+        }
+        if !(8..=5000).contains(&self.candidates) {
+            return bad(format!("candidates is {}, wanted 8 to 5000", self.candidates));
+        }
+        Ok(())
+    }
+}
+
+/// A found instance.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Match {
+    pub pose: Pose,
+    /// Mean cosine between directions; unseen and weak places count 0.
+    pub score: f64,
+    /// Share of the model's places whose slope could be known at all.
+    pub coverage: f64,
+    /// The best score of another pose in the same place (turned, or shifted by less than the part), 0 for none.
+    pub second_score: f64,
+    /// Standard deviations of x, y, angle and scale.
+    pub sigma_px: [f64; 2],
+    pub sigma_mm: Option<[f64; 2]>,
+    pub sigma_deg: f64,
+    pub sigma_scale: f64,
+    /// Edges that the least squares used, and the robust deviation from them, px.
+    pub edges: usize,
+    pub edge_rms_px: f64,
+    /// What fits almost as well, in words.
+    pub warning: Option<String>,
+}
+
+/// Directions of a level, unit length, 0 where weak or unseen.
+struct Directions {
+    kind: Kind,
+    field: Field,
+    threshold: f32,
+    unit: Vec<[f32; 2]>,
+}
+
+impl Directions {
+    fn new(kind: Kind, field: Field, threshold: f32) -> Directions {
+        let unit = field
+            .gx
+            .par_iter()
+            .zip(&field.gy)
+            .map(|(&gx, &gy)| {
+                let m = gx.hypot(gy);
+                if m > threshold && m > 0.0 { [gx / m, gy / m] } else { [0.0, 0.0] }
+            })
+            .collect();
+        Directions { kind, field, threshold, unit }
+    }
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    pose: Pose,
+    score: f64,
+}
+
+/// Finds the model in the scene, best first. An empty list is an answer: nothing scored above the least.
+pub fn find(scene: &Scene, model: &ShapeModel, options: &SearchOptions) -> Result<Vec<Match>> {
+    options.check()?;
+    for p in &model.levels[0] {
+        if !scene.layers.iter().any(|l| l.kind == p.kind) {
+            return Err(Fault::usage(format!("the model has {:?} edges, the scene has no such layer", p.kind))
+                .cause("a model of heights is searched in a picture, or the other way round")
+                .next("teach the model from a map of the same kind"));
+        }
+    }
+    // The strided grid needs a few columns and rows; a smaller map is searched on a finer level.
+    let most = (0..model.levels.len()).rev().find(|l| scene.width().min(scene.height()) >> l >= 8).unwrap_or(0);
+    let levels: Vec<Vec<Directions>> = scene
+        .pyramid(most + 1)
+        .into_iter()
+        .map(|layers| {
+            layers
+                .into_iter()
+                .map(|l| {
+                    let field = slopes(&l);
+                    let threshold = options.min_contrast.map_or_else(|| automatic(&field), |c| c as f32);
+                    Directions::new(l.kind, field, threshold)
+                })
+                .collect()
+        })
+        .collect();
+    let mut candidates = coarse_candidates(&levels[most], model, most, options);
+    for level in (0..=most).rev() {
+        let keep = if level == 0 { options.candidates.min(4 * options.max_matches + 24) } else { options.candidates };
+        candidates =
+            climb_all(&levels[level], &model.levels[level], level, candidates, model.radius, options, level == most);
+        let limit = options.min_score - if level == 0 { 0.05 } else { 0.12 };
+        candidates.retain(|c| c.score >= limit);
+        candidates = distinct(candidates, (1 << level) as f64, model.radius, keep);
+    }
+    Ok(finish(scene, &levels[0], model, candidates, options))
+}
+
+/// Three times the noise, but not below a thousandth of the layer's strong slopes: a noise-free picture
+/// has rounding errors for edges otherwise.
+fn automatic(field: &Field) -> f32 {
+    let step = (field.gx.len() / 20_000).max(1);
+    let mut m: Vec<f32> = (0..field.gx.len()).step_by(step).map(|i| field.magnitude(i)).collect();
+    let top = m.len() * 99 / 100;
+    let strong = *m.select_nth_unstable_by(top, f32::total_cmp).1;
+    // In a picture that is edges everywhere the lower quartile is no noise: a fifth of the strong slopes
+    // bounds it.
+    (3.0 * field.noise()).min(0.2 * strong).max(1e-3 * strong).max(1e-6)
+}
+
+fn turns(model: &ShapeModel, level: usize, options: &SearchOptions) -> Vec<Turn> {
+    // Half the spread window at the rim of the model.
+    let rim = (model.radius / (1u64 << level) as f64).max(4.0);
+    let step = (STRIDE as f64 * 0.4) / rim;
+    let [a0, a1] = options.angles_deg.map(f64::to_radians);
+    let full = a1 - a0 > std::f64::consts::TAU - step;
+    let n = ((a1 - a0) / step).ceil() as usize + usize::from(!full);
+    let [s0, s1] = options.scales;
+    let scale_step = 1.0 + step;
+    let m = ((s1 / s0).ln() / scale_step.ln()).ceil() as usize + 1;
+    let mut out = Vec::with_capacity(n * m);
+    for k in 0..m {
+        let scale = if m == 1 { s0 } else { s0 * (s1 / s0).powf(k as f64 / (m - 1) as f64) };
+        for i in 0..n.max(1) {
+            let span = if full { n } else { n.max(2) - 1 };
+            out.push(Turn { angle: a0 + (a1 - a0) * i as f64 / span as f64, scale });
+        }
+    }
+    out
+}
+
+fn coarse_candidates(
+    layers: &[Directions],
+    model: &ShapeModel,
+    level: usize,
+    options: &SearchOptions,
+) -> Vec<Candidate> {
+    let px = (1u64 << level) as f64;
+    let turns = turns(model, level, options);
+    let inputs: Vec<(Kind, &Field, f32)> = layers.iter().map(|d| (d.kind, &d.field, d.threshold)).collect();
+    let ignore = options.ignore_polarity || model.levels[level].iter().all(|p| p.either);
+    let coarse = Coarse::new(&inputs, ignore, (0.5 * model.radius / px) as usize);
+    let apart = 2.0 * (STRIDE as f64 * 0.5) / (model.radius / px).max(4.0);
+    // Spreading only raises a score, quantising costs up to a quarter of it.
+    let limit = (0.75 * (options.min_score - 0.1)).max(0.2) as f32;
+    coarse
+        .search(&model.levels[level], &turns, px, limit, options.candidates, apart)
+        .into_iter()
+        .map(|h| Candidate {
+            pose: Pose {
+                x: from_level(h.x, level),
+                y: from_level(h.y, level),
+                angle: turns[h.pose].angle,
+                scale: turns[h.pose].scale,
+            },
+            score: f64::from(h.score),
+        })
+        .collect()
+}
+
+/// Mean cosine between model and scene with the nearest cells of a level, and the share of places seen.
+fn score(layers: &[Directions], points: &[ModelPoint], level: usize, pose: &Pose, ignore: bool) -> (f64, f64) {
+    let (s, c) = pose.angle.sin_cos();
+    let shrink = 1.0 / (1u64 << level) as f64;
+    let (cx, cy) = (to_level(pose.x, level) + 0.5, to_level(pose.y, level) + 0.5);
+    let k = pose.scale * shrink;
+    let (mut sum, mut seen) = (0.0, 0);
+    for p in points {
+        let x = cx + k * (c * p.x - s * p.y);
+        let y = cy + k * (s * p.x + c * p.y);
+        if x < 0.0 || y < 0.0 {
+            continue;
+        }
+        let (ix, iy) = (x as usize, y as usize);
+        for d in layers {
+            if d.kind != p.kind || ix >= d.field.width || iy >= d.field.height {
+                continue;
+            }
+            let i = iy * d.field.width + ix;
+            seen += usize::from(d.field.seen[i]);
+            let [ux, uy] = d.unit[i];
+            let dot = f64::from(ux) * (c * p.gx - s * p.gy) + f64::from(uy) * (s * p.gx + c * p.gy);
+            sum += if ignore || p.either { dot.abs() } else { dot };
+        }
+    }
+    let n = points.len() as f64;
+    (sum / n, seen as f64 / n)
+}
+
+fn climb_all(
+    layers: &[Directions],
+    points: &[ModelPoint],
+    level: usize,
+    candidates: Vec<Candidate>,
+    radius: f64,
+    options: &SearchOptions,
+    first: bool,
+) -> Vec<Candidate> {
+    let px = (1u64 << level) as f64;
+    let scaling = options.scales[1] > options.scales[0];
+    let turn = 1.0 / (radius / px).max(4.0);
+    candidates
+        .into_par_iter()
+        .map(|c| {
+            let value = |p: &Pose| score(layers, points, level, p, options.ignore_polarity).0;
+            let mut best = Candidate { score: value(&c.pose), pose: c.pose };
+            if first {
+                // The coarse grid is STRIDE px wide and the turns as far apart: look around once.
+                for dy in -2..=2 {
+                    for dx in -2..=2 {
+                        for da in -1..=1 {
+                            let mut p = c.pose;
+                            p.x += f64::from(dx) * px;
+                            p.y += f64::from(dy) * px;
+                            p.angle += f64::from(da) * turn;
+                            let s = value(&p);
+                            if s > best.score {
+                                best = Candidate { pose: p, score: s };
+                            }
+                        }
+                    }
+                }
+            }
+            for _ in 0..12 {
+                let from = best;
+                for dy in -1..=1 {
+                    for dx in -1..=1 {
+                        for da in -1..=1 {
+                            let mut p = from.pose;
+                            p.x += f64::from(dx) * px;
+                            p.y += f64::from(dy) * px;
+                            p.angle += f64::from(da) * turn;
+                            let s = value(&p);
+                            if s > best.score {
+                                best = Candidate { pose: p, score: s };
+                            }
+                        }
+                    }
+                }
+                if scaling {
+                    for ds in [-1.0, 1.0] {
+                        let mut p = best.pose;
+                        p.scale = (p.scale * (1.0 + ds * turn)).clamp(options.scales[0], options.scales[1]);
+                        let s = value(&p);
+                        if s > best.score {
+                            best = Candidate { pose: p, score: s };
+                        }
+                    }
+                }
+                if best.score <= from.score {
+                    break;
+                }
+            }
+            best
+        })
+        .collect()
+}
+
+/// Best first, without candidates that climbed to the same pose.
+fn distinct(mut candidates: Vec<Candidate>, px: f64, radius: f64, most: usize) -> Vec<Candidate> {
+    candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
+    let mut kept: Vec<Candidate> = Vec::new();
+    for c in candidates {
+        if kept.len() < most && !kept.iter().any(|k| same(&k.pose, &c.pose, 2.5 * px, radius)) {
+            kept.push(c);
+        }
+    }
+    kept
+}
+
+/// True where two poses differ by less than `px` anywhere on the model.
+fn same(a: &Pose, b: &Pose, px: f64, radius: f64) -> bool {
+    (a.x - b.x).hypot(a.y - b.y) < px
+        && turn_between(a.angle, b.angle) * radius < 1.5 * px
+        && (a.scale / b.scale).ln().abs() * radius < 1.5 * px
+}
+
+fn finish(
+    scene: &Scene,
+    layers: &[Directions],
+    model: &ShapeModel,
+    candidates: Vec<Candidate>,
+    options: &SearchOptions,
+) -> Vec<Match> {
+    let points = &model.levels[0];
+    let fields: Vec<(Kind, &Field, f32)> = layers.iter().map(|d| (d.kind, &d.field, d.threshold)).collect();
+    let free_scale = options.scales[1] > options.scales[0];
+    let refined: Vec<_> = candidates
+        .par_iter()
+        .filter_map(|c| {
+            let r = refine(&fields, model, c.pose, free_scale, options.ignore_polarity, 8)?;
+            // A refinement that walks away was not standing on the edges that it was sent to.
+            if !same(&r.pose, &c.pose, 4.0, model.radius) {
+                return None;
+            }
+            let (s, coverage) = score(layers, points, 0, &r.pose, options.ignore_polarity);
+            Some((r, s.max(c.score), coverage))
+        })
+        .collect();
+    let mut order: Vec<usize> = (0..refined.len()).collect();
+    order.sort_by(|&a, &b| refined[b].1.total_cmp(&refined[a].1));
+    let mut out: Vec<(usize, Match)> = Vec::new();
+    for &i in &order {
+        let (r, s, coverage) = &refined[i];
+        if *s < options.min_score || out.len() == options.max_matches {
+            break;
+        }
+        if out.iter().any(|(_, m)| overlap(model, &m.pose, &r.pose) > options.max_overlap) {
+            continue;
+        }
+        let rival = order
+            .iter()
+            .filter(|&&k| k != i && !same(&refined[k].0.pose, &r.pose, 3.0, model.radius))
+            .filter(|&&k| overlap(model, &refined[k].0.pose, &r.pose) > options.max_overlap.max(0.2))
+            .max_by(|&&a, &&b| refined[a].1.total_cmp(&refined[b].1));
+        let second_score = rival.map_or(0.0, |&k| refined[k].1);
+        let warning = rival.filter(|_| second_score > options.ambiguous_at * s).map(|&k| {
+            let o = &refined[k].0.pose;
+            format!(
+                "a pose turned by {:.1} degrees and shifted by {:.1} px scores {second_score:.3} against {s:.3}",
+                turn_between(o.angle, r.pose.angle).to_degrees(),
+                (o.x - r.pose.x).hypot(o.y - r.pose.y)
+            )
+        });
+        let sd = |k: usize| r.covariance[(k, k)].max(0.0).sqrt();
+        out.push((
+            i,
+            Match {
+                pose: r.pose,
+                score: *s,
+                coverage: *coverage,
+                second_score,
+                sigma_px: [sd(0), sd(1)],
+                sigma_mm: scene.mm_per_px.map(|k| [sd(0) * k, sd(1) * k]),
+                sigma_deg: sd(2).to_degrees(),
+                sigma_scale: sd(3),
+                edges: r.used,
+                edge_rms_px: r.rms_px,
+                warning,
+            },
+        ));
+    }
+    out.into_iter().map(|m| m.1).collect()
+}
+
+/// Share of the smaller box that two turned boxes share, by sampling a 9x9 grid of one in the other.
+fn overlap(model: &ShapeModel, a: &Pose, b: &Pose) -> f64 {
+    let (small, large) = if a.scale <= b.scale { (a, b) } else { (b, a) };
+    let (s, c) = large.angle.sin_cos();
+    let mut inside = 0;
+    for iy in 0..9 {
+        for ix in 0..9 {
+            let local = |k: usize, i: i32| model.centre[k] + model.half_size[k] * (f64::from(i) - 4.0) / 4.5;
+            let (x, y) = small.point(local(0, ix), local(1, iy));
+            let (dx, dy) = ((x - large.x) / large.scale, (y - large.y) / large.scale);
+            let (lx, ly) = (c * dx + s * dy - model.centre[0], c * dy - s * dx - model.centre[1]);
+            inside += i32::from(lx.abs() <= model.half_size[0] && ly.abs() <= model.half_size[1]);
+        }
+    }
+    f64::from(inside) / 81.0
+}
