@@ -17,7 +17,8 @@ pub mod robot;
 pub mod calibrate;
 
 pub mod scan;
+
+pub mod find;
 pub mod station;
 
 pub mod cli;
-pub mod find;
