@@ -6,6 +6,7 @@
 pub mod fault;
 
 pub mod geometry;
+pub mod gpu;
 pub mod raster;
 pub mod solve;
 
@@ -22,3 +23,4 @@ pub mod find;
 pub mod station;
 
 pub mod cli;
+pub mod stages;

@@ -3,9 +3,11 @@
 
 mod file;
 mod image8;
+mod mask;
 
 pub use file::{Channel, decode, load, save_png};
 pub use image8::{Rgb, RgbImage};
+pub use mask::Mask;
 
 /// Grey levels, row-major.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,0 +1,23 @@
+// In: every listed tile and when it last changed. Out: a new list of those whose surroundings are still
+// changing. One sub-iteration reaches one pixel, so the list with its neighbours stays complete for the
+// next 8 (a tile's height). An empty list makes the dispatches that use it empty.
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<storage, read> all: array<u32>;
+@group(0) @binding(2) var<storage, read> list: array<u32>;
+@group(0) @binding(3) var<storage, read> stamps: array<u32>;
+@group(0) @binding(4) var<storage, read_write> listing: Listing;
+@group(0) @binding(5) var<storage, read_write> active_list: array<u32>;
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    for (var inside = u32(id.x < all[3]); inside > 0u; inside--) {
+        let tile = list[id.x];
+        for (var keep = u32(latest(tile) > frame.step); keep > 0u; keep--) {
+            let at = atomicAdd(&listing.count, 1u);
+            active_list[at] = tile;
+            for (var group = u32(at % 8u == 0u); group > 0u; group--) {
+                atomicAdd(&listing.groups, 1u);
+            }
+        }
+    }
+}

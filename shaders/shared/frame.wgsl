@@ -1,0 +1,60 @@
+// What every stage of the stripe chain knows: the size of the pictures, how they lie in memory, and
+// the settings. Pictures of one batch lie behind each other ("shots"). A picture's rows are padded to
+// whole tiles of 32 pixels by repeating the last pixel; masks hold one bit a pixel, one word a tile
+// row, and have their height padded to whole tiles of 8 rows with zeros.
+struct Frame {
+    width: u32,
+    height: u32,
+    // Words of one picture row, and of one picture.
+    pitch: u32,
+    shot_words: u32,
+    tiles_x: u32,
+    tiles_y: u32,
+    shots: u32,
+    // Threshold: window edge (odd), grey levels above the mean, absolute minimum.
+    size: u32,
+    offset: i32,
+    minimum: u32,
+    // Bit 0: list every tile (the plain path). Bit 1: a region of interest is given. Bit 2: Gaussian window.
+    flags: u32,
+    // Thinning: rule (0 Zhang-Suen, 1 Guo-Hall) and number of the sub-iteration.
+    rule: u32,
+    step: u32,
+    // Most skeleton pixels of a batch.
+    capacity: u32,
+    full_scale: u32,
+    reserved: u32,
+}
+
+// Pixels a word as a power of two: 2 for 8-bit pictures, 1 for 9 to 16 bits.
+override px_log2: u32 = 2u;
+
+// Arguments of an indirect dispatch with 8 invocations a tile and 64 a workgroup, and the list's length.
+struct Listing {
+    groups: atomic<u32>,
+    groups_y: u32,
+    groups_z: u32,
+    count: atomic<u32>,
+}
+
+// A tile in one word: 10 bits x, 12 bits y, 10 bits shot.
+fn tile_pack(x: u32, y: u32, shot: u32) -> u32 {
+    return x | (y << 10u) | (shot << 22u);
+}
+fn tile_x(tile: u32) -> u32 {
+    return tile & 1023u;
+}
+fn tile_y(tile: u32) -> u32 {
+    return (tile >> 10u) & 4095u;
+}
+fn tile_shot(tile: u32) -> u32 {
+    return tile >> 22u;
+}
+// Place of a tile in arrays that hold every tile.
+fn tile_index(tile: u32) -> u32 {
+    return (tile_shot(tile) * frame.tiles_y + tile_y(tile)) * frame.tiles_x + tile_x(tile);
+}
+// Place of a tile's row in a mask.
+fn mask_index(tile: u32, row: u32) -> u32 {
+    return ((tile_shot(tile) * frame.tiles_y + tile_y(tile)) * 8u + row) * frame.tiles_x + tile_x(tile);
+}

@@ -1,0 +1,30 @@
+// In: the thinned mask and the scanned counts. Out: its pixels as a list (x | y << 16, shot), in the order
+// of the tiles, always the same, cut at the list's capacity.
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<storage, read> listing: array<u32>;
+@group(0) @binding(2) var<storage, read> list: array<u32>;
+@group(0) @binding(3) var<storage, read> mask: array<u32>;
+@group(0) @binding(4) var<storage, read> starts: array<u32>;
+@group(0) @binding(5) var<storage, read> row_starts: array<u32>;
+@group(0) @binding(6) var<storage, read_write> points: array<vec2<u32>>;
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    let slot = id.x / 8u;
+    let row = id.x % 8u;
+    for (var inside = u32(slot < listing[3]); inside > 0u; inside--) {
+        let tile = list[slot];
+        let shot = tile_shot(tile);
+        var at = row_starts[shot * frame.tiles_y + tile_y(tile)] + starts[tile_index(tile)];
+        for (var above = 0u; above < row; above++) {
+            at += countOneBits(mask[mask_index(tile, above)]);
+        }
+        var bits = mask[mask_index(tile, row)];
+        let y = 8u * tile_y(tile) + row;
+        while bits != 0u && at < frame.capacity {
+            points[at] = vec2((32u * tile_x(tile) + countTrailingZeros(bits)) | (y << 16u), shot);
+            bits &= bits - 1u;
+            at += 1u;
+        }
+    }
+}

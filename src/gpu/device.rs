@@ -1,0 +1,365 @@
+//! In: the adapters of this machine. Out: one opened device, its buffers, its measured transfer rates.
+//! Frame and unit: bytes, GB/s (1e9 bytes).
+
+use crate::fault::{Fault, Result};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+/// The longest a single submission may take before the device counts as lost.
+const TIMEOUT: Duration = Duration::from_secs(60);
+
+/// What a person wants to know about an adapter.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct AdapterInfo {
+    pub name: String,
+    /// discrete GPU, integrated GPU, virtual GPU, CPU, other.
+    pub kind: String,
+    pub backend: String,
+    pub driver: String,
+    /// Largest buffer a stage can bind, bytes.
+    pub max_binding_bytes: u64,
+    /// Largest workgroup, invocations.
+    pub max_workgroup: u32,
+    pub storage_buffers_per_stage: u32,
+    /// GPU timestamps can be taken.
+    pub timestamps: bool,
+    /// Host and device share memory that stages can read where the host writes it.
+    pub unified_memory: bool,
+}
+
+/// A storage buffer on the device. `bytes` is what was asked for.
+#[derive(Clone, Debug)]
+pub struct Buffer {
+    pub(super) raw: wgpu::Buffer,
+    pub bytes: u64,
+}
+
+/// An opened GPU. Clones share it.
+#[derive(Clone)]
+pub struct Device {
+    pub(super) raw: wgpu::Device,
+    pub(super) queue: wgpu::Queue,
+    pub info: AdapterInfo,
+    /// Nanoseconds per timestamp tick, where the adapter has timestamps.
+    pub(super) tick_ns: Option<f32>,
+    lost: Arc<Mutex<Option<String>>>,
+    /// Bytes of all buffers made through this device.
+    allocated: Arc<std::sync::atomic::AtomicU64>,
+}
+
+fn instance() -> wgpu::Instance {
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = wgpu::Backends::PRIMARY;
+    // Every argument of an indirect dispatch is computed by our own stages and bounded there; wgpu's
+    // check costs an extra dispatch each (10 to 16 us instead of 1).
+    descriptor.flags = wgpu::InstanceFlags::empty();
+    wgpu::Instance::new(descriptor)
+}
+
+fn describe(adapter: &wgpu::Adapter) -> AdapterInfo {
+    let (info, limits, features) = (adapter.get_info(), adapter.limits(), adapter.features());
+    AdapterInfo {
+        name: info.name,
+        kind: match info.device_type {
+            wgpu::DeviceType::DiscreteGpu => "discrete GPU",
+            wgpu::DeviceType::IntegratedGpu => "integrated GPU",
+            wgpu::DeviceType::VirtualGpu => "virtual GPU",
+            wgpu::DeviceType::Cpu => "CPU",
+            wgpu::DeviceType::Other => "other",
+        }
+        .into(),
+        backend: info.backend.to_string(),
+        driver: format!("{} {}", info.driver, info.driver_info).trim().into(),
+        max_binding_bytes: limits.max_storage_buffer_binding_size,
+        max_workgroup: limits.max_compute_invocations_per_workgroup,
+        storage_buffers_per_stage: limits.max_storage_buffers_per_shader_stage,
+        timestamps: features.contains(TIMESTAMPS),
+        unified_memory: unified(&info.device_type, features),
+    }
+}
+
+const TIMESTAMPS: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY.union(wgpu::Features::TIMESTAMP_QUERY_INSIDE_PASSES);
+
+/// A discrete GPU may offer mappable storage as well, but over the bus: a copy to its own memory is
+/// better there.
+fn unified(kind: &wgpu::DeviceType, features: wgpu::Features) -> bool {
+    matches!(kind, wgpu::DeviceType::Cpu | wgpu::DeviceType::IntegratedGpu)
+        && features.contains(wgpu::Features::MAPPABLE_PRIMARY_BUFFERS)
+}
+
+/// Adapters of this machine, best first: discrete, integrated, virtual, software.
+pub fn adapters() -> Vec<AdapterInfo> {
+    sorted(&instance()).iter().map(describe).collect()
+}
+
+fn sorted(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
+    let mut all = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
+    all.sort_by_key(|a| match a.get_info().device_type {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Other => 3,
+        wgpu::DeviceType::Cpu => 4,
+    });
+    all
+}
+
+impl Device {
+    /// Opens the best adapter, or the one whose name holds the text of the environment variable
+    /// SHEETLIGHT_ADAPTER (any case).
+    pub fn open() -> Result<Device> {
+        let wanted = std::env::var("SHEETLIGHT_ADAPTER").ok().filter(|s| !s.is_empty());
+        Device::open_named(wanted.as_deref())
+    }
+
+    /// Opens the best adapter whose name holds `wanted`.
+    pub fn open_named(wanted: Option<&str>) -> Result<Device> {
+        let all = sorted(&instance());
+        let names: Vec<String> = all.iter().map(|a| a.get_info().name).collect();
+        let chosen = all
+            .into_iter()
+            .find(|a| wanted.is_none_or(|w| a.get_info().name.to_lowercase().contains(&w.to_lowercase())))
+            .ok_or_else(|| match wanted {
+                Some(w) if !names.is_empty() => {
+                    Fault::device(format!("no adapter's name holds '{w}'; there are: {}", names.join(", ")))
+                        .next("correct SHEETLIGHT_ADAPTER or unset it")
+                }
+                _ => Fault::device("0 Vulkan, Metal or DX12 adapters found, 1 needed")
+                    .cause("no GPU driver is installed")
+                    .next("install one (Debian: apt install mesa-vulkan-drivers), or run on the CPU twins"),
+            })?;
+        let info = describe(&chosen);
+        let offered = chosen.limits();
+        // Only what the stages use is raised above the portable defaults, to what the adapter has.
+        let limits = wgpu::Limits {
+            max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,
+            max_buffer_size: offered.max_buffer_size,
+            max_storage_buffers_per_shader_stage: offered.max_storage_buffers_per_shader_stage.min(16),
+            max_compute_workgroups_per_dimension: offered.max_compute_workgroups_per_dimension,
+            ..wgpu::Limits::downlevel_defaults()
+        };
+        let mut features = wgpu::Features::empty();
+        if info.timestamps {
+            features |= TIMESTAMPS;
+        }
+        if info.unified_memory {
+            features |= wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
+        }
+        let (raw, queue) = pollster::block_on(chosen.request_device(&wgpu::DeviceDescriptor {
+            label: Some("sheetlight"),
+            required_features: features,
+            required_limits: limits,
+            ..Default::default()
+        }))
+        .map_err(|e| {
+            Fault::device(format!("{}: the device cannot be opened: {e}", info.name))
+                .cause("the driver is broken or its memory is taken")
+                .next("run `sheetlight doctor`, or choose another adapter with SHEETLIGHT_ADAPTER")
+        })?;
+        let lost = Arc::new(Mutex::new(None::<String>));
+        let note = lost.clone();
+        raw.set_device_lost_callback(move |reason, message| {
+            note.lock().unwrap().get_or_insert(format!("{reason:?}: {message}"));
+        });
+        // Out of memory and driver errors surface here; a validation error is our bug and panics.
+        let note = lost.clone();
+        raw.on_uncaptured_error(Arc::new(move |e: wgpu::Error| match e {
+            wgpu::Error::Validation { .. } => panic!("{e}"),
+            e => {
+                note.lock().unwrap().get_or_insert(e.to_string());
+            }
+        }));
+        let tick_ns = info.timestamps.then(|| queue.get_timestamp_period());
+        Ok(Device { raw, queue, info, tick_ns, lost, allocated: Default::default() })
+    }
+
+    /// A zeroed storage buffer that stages, indirect dispatches and copies can use.
+    pub fn storage(&self, label: &str, bytes: u64) -> Result<Buffer> {
+        use wgpu::BufferUsages as U;
+        self.buffer(label, bytes, U::STORAGE | U::INDIRECT | U::UNIFORM | U::COPY_SRC | U::COPY_DST)
+    }
+    /// Where stages read what the host writes, on unified memory.
+    pub fn mapped_storage(&self, label: &str, bytes: u64) -> Result<Buffer> {
+        use wgpu::BufferUsages as U;
+        self.buffer(label, bytes, U::STORAGE | U::MAP_WRITE | U::COPY_SRC)
+    }
+    /// Written by the host, copied to a storage buffer.
+    pub fn upload_staging(&self, label: &str, bytes: u64) -> Result<Buffer> {
+        self.buffer(label, bytes, wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC)
+    }
+    /// Copied to from a storage buffer, read by the host.
+    pub fn readback_staging(&self, label: &str, bytes: u64) -> Result<Buffer> {
+        self.buffer(label, bytes, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST)
+    }
+
+    fn buffer(&self, label: &str, bytes: u64, usage: wgpu::BufferUsages) -> Result<Buffer> {
+        let limit = self.raw.limits().max_buffer_size;
+        let binding = self.info.max_binding_bytes;
+        let size = bytes.max(16).next_multiple_of(16);
+        if size > limit || (usage.contains(wgpu::BufferUsages::STORAGE) && size > binding) {
+            return Err(Fault::device(format!(
+                "buffer '{label}' needs {size} bytes, {} allows {}",
+                self.info.name,
+                limit.min(binding)
+            ))
+            .cause("the pictures, or the number of shots in one batch, are too large for this adapter")
+            .next("lower the shots per batch"));
+        }
+        self.allocated.fetch_add(size, std::sync::atomic::Ordering::Relaxed);
+        let raw = self.raw.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(label),
+            size,
+            usage,
+            mapped_at_creation: false,
+        });
+        self.alive()?;
+        Ok(Buffer { raw, bytes })
+    }
+
+    /// Bytes of all buffers made so far.
+    pub fn allocated_bytes(&self) -> u64 {
+        self.allocated.load(std::sync::atomic::Ordering::Relaxed)
+    }
+
+    /// Queues a write; it lands before the next submission.
+    pub fn write(&self, buffer: &Buffer, offset: u64, bytes: &[u8]) {
+        if bytes.len().is_multiple_of(4) {
+            self.queue.write_buffer(&buffer.raw, offset, bytes);
+        } else {
+            let mut padded = bytes.to_vec();
+            padded.resize(bytes.len().next_multiple_of(4), 0);
+            self.queue.write_buffer(&buffer.raw, offset, &padded);
+        }
+    }
+
+    /// Copies a storage buffer to the host; waits. For tests and self-tests, not for the shot path.
+    pub fn read(&self, buffer: &Buffer) -> Result<Vec<u8>> {
+        let staging = self.readback_staging("read", buffer.bytes)?;
+        let mut encoder = self.raw.create_command_encoder(&Default::default());
+        encoder.copy_buffer_to_buffer(&buffer.raw, 0, &staging.raw, 0, buffer.raw.size());
+        let at = self.queue.submit([encoder.finish()]);
+        let mapped = staging.map(wgpu::MapMode::Read, 0..buffer.raw.size());
+        self.wait(Some(at))?;
+        mapped.done()?;
+        let bytes = staging.view(0..buffer.raw.size())?[..buffer.bytes as usize].to_vec();
+        staging.raw.unmap();
+        Ok(bytes)
+    }
+
+    /// Waits for a submission, or for all of them.
+    pub(super) fn wait(&self, at: Option<wgpu::SubmissionIndex>) -> Result<()> {
+        self.raw
+            .poll(wgpu::PollType::Wait { submission_index: at, timeout: Some(TIMEOUT) })
+            .map_err(|e| Fault::device(format!("{}: no answer within {} s: {e}", self.info.name, TIMEOUT.as_secs())))?;
+        self.alive()
+    }
+    /// Runs the callbacks of what has finished; does not wait.
+    pub(super) fn poll(&self) -> Result<()> {
+        let _ = self.raw.poll(wgpu::PollType::Poll);
+        self.alive()
+    }
+
+    /// `Err` once the device was lost or ran out of memory.
+    pub fn alive(&self) -> Result<()> {
+        match &*self.lost.lock().unwrap() {
+            None => Ok(()),
+            Some(why) => Err(Fault::device(format!("{}: the device was lost: {}", self.info.name, why.trim()))
+                .cause("the driver crashed, the GPU was unplugged or reset, or its memory ran out")
+                .next("run the same command again; finished shots are kept")),
+        }
+    }
+
+    /// Ends the device on purpose, as a driver crash would; what follows must end in a clear error.
+    pub fn lose(&self) {
+        self.raw.destroy();
+        let _ = self.raw.poll(wgpu::PollType::Poll);
+        self.lost.lock().unwrap().get_or_insert("destroyed".into());
+    }
+
+    /// Measures how fast this machine moves `bytes` to the device and back; medians of nine.
+    pub fn measure_rates(&self, bytes: u64) -> Result<Rates> {
+        let data = vec![0x5au8; bytes as usize];
+        let target = self.storage("rate target", bytes)?;
+        let up = if self.info.unified_memory {
+            self.mapped_storage("rate upload", bytes)?
+        } else {
+            self.upload_staging("rate upload", bytes)?
+        };
+        let down = self.readback_staging("rate readback", bytes)?;
+        let (mut ups, mut downs) = (Vec::new(), Vec::new());
+        for _ in 0..9 {
+            let start = Instant::now();
+            let mapped = up.map(wgpu::MapMode::Write, 0..bytes);
+            self.wait(None)?;
+            mapped.done()?;
+            up.view_mut(0..bytes)?.copy_from_slice(&data);
+            up.raw.unmap();
+            if !self.info.unified_memory {
+                let mut encoder = self.raw.create_command_encoder(&Default::default());
+                encoder.copy_buffer_to_buffer(&up.raw, 0, &target.raw, 0, bytes);
+                let at = self.queue.submit([encoder.finish()]);
+                self.wait(Some(at))?;
+            }
+            ups.push(start.elapsed().as_secs_f64());
+            let start = Instant::now();
+            let mut encoder = self.raw.create_command_encoder(&Default::default());
+            encoder.copy_buffer_to_buffer(&target.raw, 0, &down.raw, 0, bytes);
+            self.queue.submit([encoder.finish()]);
+            let mapped = down.map(wgpu::MapMode::Read, 0..bytes);
+            self.wait(None)?;
+            mapped.done()?;
+            std::hint::black_box(down.view(0..bytes)?.to_vec());
+            down.raw.unmap();
+            downs.push(start.elapsed().as_secs_f64());
+        }
+        let median = |v: &mut Vec<f64>| {
+            v.sort_by(f64::total_cmp);
+            v[v.len() / 2]
+        };
+        Ok(Rates {
+            upload_gb_s: bytes as f64 / median(&mut ups) / 1e9,
+            readback_gb_s: bytes as f64 / median(&mut downs) / 1e9,
+        })
+    }
+}
+
+/// Transfer rates between host and device, 1e9 bytes a second.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Rates {
+    pub upload_gb_s: f64,
+    pub readback_gb_s: f64,
+}
+
+/// A mapping that was asked for; `done` after the device was polled.
+pub(super) struct Mapping(Arc<Mutex<Option<std::result::Result<(), wgpu::BufferAsyncError>>>>);
+
+impl Mapping {
+    pub(super) fn ready(&self) -> bool {
+        self.0.lock().unwrap().is_some()
+    }
+    pub(super) fn done(&self) -> Result<()> {
+        match &*self.0.lock().unwrap() {
+            Some(Ok(())) => Ok(()),
+            other => Err(Fault::device(format!("a buffer could not be mapped: {other:?}"))
+                .cause("the device was lost or its memory ran out")
+                .next("run the same command again; finished shots are kept")),
+        }
+    }
+}
+
+impl Buffer {
+    pub(super) fn map(&self, mode: wgpu::MapMode, range: std::ops::Range<u64>) -> Mapping {
+        let slot = Arc::new(Mutex::new(None));
+        let note = slot.clone();
+        self.raw.map_async(mode, range, move |r| *note.lock().unwrap() = Some(r));
+        Mapping(slot)
+    }
+    pub(super) fn view(&self, range: std::ops::Range<u64>) -> Result<wgpu::BufferView> {
+        self.raw.get_mapped_range(range).map_err(|e| Fault::device(format!("a mapped buffer cannot be read: {e}")))
+    }
+    pub(super) fn view_mut(&self, range: std::ops::Range<u64>) -> Result<wgpu::BufferViewMut> {
+        self.raw
+            .get_mapped_range_mut(range)
+            .map_err(|e| Fault::device(format!("a mapped buffer cannot be written: {e}")))
+    }
+}

@@ -1,0 +1,10 @@
+//! In: WGSL stages, bytes, and what depends on what. Out: the same bytes computed on a GPU, with timings.
+//! Frame and unit: none; knows no lasers. The only home of `wgpu`.
+
+mod device;
+mod recording;
+mod stage;
+
+pub use device::{AdapterInfo, Buffer, Device, Rates, adapters};
+pub use recording::{Dispatch, Recording, Replay, StageTime};
+pub use stage::{Access, Binding, Field, Pipeline, Stage, Workload, run_once};

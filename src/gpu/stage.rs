@@ -1,0 +1,169 @@
+//! In: one WGSL file with its bindings and uniform layout. Out: a compiled pipeline, and one run of it.
+//! Frame and unit: none.
+
+use super::{Buffer, Device};
+use crate::fault::Result;
+
+/// How a stage uses a binding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Access {
+    Uniform,
+    Read,
+    ReadWrite,
+}
+
+/// One binding of group 0; its place in `Stage::bindings` is its number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Binding {
+    pub name: &'static str,
+    pub access: Access,
+}
+
+/// One member of a uniform block: WGSL name and byte offset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Field {
+    pub name: &'static str,
+    pub offset: usize,
+}
+
+/// One shader with one entry point `main`. The shared texts are appended after the stage's own, so
+/// that line numbers in messages are those of its file.
+#[derive(Clone, Copy, Debug)]
+pub struct Stage {
+    /// The file is shaders/NAME.wgsl.
+    pub name: &'static str,
+    pub wgsl: &'static str,
+    pub shared: &'static [&'static str],
+    pub workgroup: [u32; 3],
+    pub bindings: &'static [Binding],
+    /// The uniform struct's WGSL name, members and size in bytes; every `Access::Uniform` binding has this type.
+    pub uniform: (&'static str, &'static [Field], usize),
+    /// Names of the `override` constants, which select a variant when the pipeline is built.
+    pub overrides: &'static [&'static str],
+}
+
+impl Stage {
+    /// Stage text with the shared texts after it.
+    pub fn source(&self) -> String {
+        std::iter::once(self.wgsl).chain(self.shared.iter().copied()).collect::<Vec<_>>().join("\n")
+    }
+
+    /// Workgroups that cover `invocations` in each direction.
+    pub fn groups(&self, invocations: [u32; 3]) -> [u32; 3] {
+        std::array::from_fn(|i| invocations[i].div_ceil(self.workgroup[i]))
+    }
+
+    /// Compiles the stage with its override constants.
+    pub fn pipeline(&self, device: &Device, overrides: &[(&str, f64)]) -> Result<Pipeline> {
+        let raw = &device.raw;
+        let module = raw.create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(self.name),
+            source: wgpu::ShaderSource::Wgsl(self.source().into()),
+        });
+        let entries: Vec<_> = self
+            .bindings
+            .iter()
+            .enumerate()
+            .map(|(i, b)| wgpu::BindGroupLayoutEntry {
+                binding: i as u32,
+                visibility: wgpu::ShaderStages::COMPUTE,
+                ty: wgpu::BindingType::Buffer {
+                    ty: match b.access {
+                        Access::Uniform => wgpu::BufferBindingType::Uniform,
+                        Access::Read => wgpu::BufferBindingType::Storage { read_only: true },
+                        Access::ReadWrite => wgpu::BufferBindingType::Storage { read_only: false },
+                    },
+                    has_dynamic_offset: false,
+                    min_binding_size: None,
+                },
+                count: None,
+            })
+            .collect();
+        let layout = raw
+            .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(self.name), entries: &entries });
+        let pipeline = raw.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(self.name),
+            layout: Some(&raw.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some(self.name),
+                bind_group_layouts: &[Some(&layout)],
+                immediate_size: 0,
+            })),
+            module: &module,
+            entry_point: Some("main"),
+            compilation_options: wgpu::PipelineCompilationOptions {
+                constants: overrides,
+                // No stage uses workgroup memory.
+                zero_initialize_workgroup_memory: false,
+            },
+            cache: None,
+        });
+        device.alive()?;
+        Ok(Pipeline { stage: *self, raw: pipeline, layout })
+    }
+}
+
+/// A compiled stage.
+#[derive(Clone, Debug)]
+pub struct Pipeline {
+    pub stage: Stage,
+    pub(super) raw: wgpu::ComputePipeline,
+    pub(super) layout: wgpu::BindGroupLayout,
+}
+
+impl Pipeline {
+    /// Binds buffers, or `(offset, size)` parts of them, in the order of the stage's list.
+    pub(super) fn bind(&self, device: &Device, buffers: &[(&Buffer, u64, u64)]) -> wgpu::BindGroup {
+        assert_eq!(buffers.len(), self.stage.bindings.len(), "{}: bindings", self.stage.name);
+        let entries: Vec<_> = buffers
+            .iter()
+            .enumerate()
+            .map(|(i, (b, offset, size))| wgpu::BindGroupEntry {
+                binding: i as u32,
+                resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                    buffer: &b.raw,
+                    offset: *offset,
+                    size: std::num::NonZero::new(*size),
+                }),
+            })
+            .collect();
+        device.raw.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some(self.stage.name),
+            layout: &self.layout,
+            entries: &entries,
+        })
+    }
+}
+
+/// What one run of one stage needs: bytes per binding (the uniform's too) and the workgroups.
+pub struct Workload<'a> {
+    pub overrides: &'a [(&'a str, f64)],
+    pub bindings: Vec<Vec<u8>>,
+    pub groups: [u32; 3],
+}
+
+/// Runs one stage once and returns the bytes of every binding afterwards. For tests and self-tests.
+pub fn run_once(device: &Device, stage: &Stage, load: &Workload) -> Result<Vec<Vec<u8>>> {
+    let pipeline = stage.pipeline(device, load.overrides)?;
+    let buffers = load
+        .bindings
+        .iter()
+        .zip(stage.bindings)
+        .map(|(bytes, b)| {
+            let buffer = device.storage(b.name, bytes.len() as u64)?;
+            device.write(&buffer, 0, bytes);
+            Ok(buffer)
+        })
+        .collect::<Result<Vec<_>>>()?;
+    let parts: Vec<_> = buffers.iter().map(|b| (b, 0, b.raw.size())).collect();
+    let group = pipeline.bind(device, &parts);
+    let mut encoder = device.raw.create_command_encoder(&Default::default());
+    {
+        let mut pass = encoder.begin_compute_pass(&Default::default());
+        pass.set_pipeline(&pipeline.raw);
+        pass.set_bind_group(0, &group, &[]);
+        pass.dispatch_workgroups(load.groups[0], load.groups[1], load.groups[2]);
+    }
+    let at = device.queue.submit([encoder.finish()]);
+    device.wait(Some(at))?;
+    buffers.iter().map(|b| device.read(b)).collect()
+}

@@ -1,0 +1,43 @@
+//! In: pictures, one picture of the ambient light. Out: the pictures without it.
+//! Frame and unit: grey levels; a saturated pixel stays saturated.
+
+use super::frame::{self, Frame, PX_LOG2, SHARED, frame_of};
+use crate::gpu::{Access::*, Binding, Stage};
+
+pub const STAGE: Stage = Stage {
+    name: "ambient",
+    wgsl: include_str!("../../shaders/ambient.wgsl"),
+    shared: &[SHARED],
+    workgroup: [64, 1, 1],
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "image", access: ReadWrite },
+        Binding { name: "ambient", access: Read },
+    ],
+    uniform: frame::UNIFORM,
+    overrides: &[PX_LOG2],
+};
+
+/// One invocation for 4 words of one shot.
+pub fn groups(f: &Frame) -> [u32; 3] {
+    STAGE.groups([f.shot_words / 4, f.shots, 1])
+}
+
+/// What is left of a pixel: never below 0, and a saturated one stays, its true value is not known.
+pub fn subtract(value: u32, ambient: u32, full_scale: u32) -> u32 {
+    if value >= full_scale { value } else { value.saturating_sub(ambient) }
+}
+
+pub fn twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
+    let f = frame_of(b);
+    let bits = 32 >> overrides[0].1 as u32;
+    let [_, image, ambient] = b else { unreachable!() };
+    for (v, a) in image.iter_mut().zip(ambient.iter().cycle().take((f.shot_words * f.shots) as usize)) {
+        let mut out = 0;
+        for shift in (0..32).step_by(bits) {
+            let px = |w: u32| w >> shift & ((1u64 << bits) - 1) as u32;
+            out |= subtract(px(*v), px(*a), f.full_scale) << shift;
+        }
+        *v = out;
+    }
+}

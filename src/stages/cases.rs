@@ -1,0 +1,283 @@
+//! In: pictures chosen to break things. Out: the buffers of every stage of the chain at the moment it
+//! runs, made by walking the chain on the CPU twins. Frame and unit: pixels, words.
+
+use super::entry::Case;
+use super::frame::{self, Frame, px_log2};
+use super::*;
+use crate::raster::Image;
+use std::collections::BTreeMap;
+
+/// Pictures of one batch with their settings.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    pub name: &'static str,
+    pub shots: Vec<Image>,
+    pub params: ThresholdParams,
+    pub thinning: Thinning,
+    pub flags: u32,
+    pub ambient: Option<Image>,
+}
+
+/// A small generator of repeatable noise (a permuted congruential generator would do no better here).
+pub struct Noise(pub u64);
+
+impl Noise {
+    pub fn next(&mut self) -> u32 {
+        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (self.0 >> 33) as u32
+    }
+    /// About normal, mean 0, sigma 1.
+    pub fn normal(&mut self) -> f64 {
+        (0..12).map(|_| f64::from(self.next() % 65536) / 65536.0).sum::<f64>() - 6.0
+    }
+}
+
+/// One curved Gaussian stripe of the given sigma on noise, with a few round reflections.
+pub fn stripe(width: u32, height: u32, bits: u8, sigma: f64, blobs: u32, seed: u64) -> Image {
+    let mut noise = Noise(seed);
+    let full = f64::from((1u32 << bits) - 1);
+    let spots: Vec<(f64, f64, f64)> = (0..blobs)
+        .map(|_| (f64::from(noise.next() % width), f64::from(noise.next() % height), 2.0 + f64::from(noise.next() % 8)))
+        .collect();
+    let mut px = Vec::with_capacity((width * height) as usize);
+    for y in 0..height {
+        for x in 0..width {
+            let t = f64::from(x) / f64::from(width);
+            let centre =
+                f64::from(height) * (0.5 + 0.2 * (5.0 * t + seed as f64).sin() + if t > 0.6 { 0.1 } else { 0.0 });
+            let d = (f64::from(y) - centre) / sigma;
+            let mut v = 0.7 * (-0.5 * d * d).exp();
+            for &(bx, by, r) in &spots {
+                let d2 = ((f64::from(x) - bx).powi(2) + (f64::from(y) - by).powi(2)) / (r * r);
+                if d2 < 9.0 {
+                    v += 0.9 * (-0.5 * d2).exp();
+                }
+            }
+            let read = 0.008 * noise.normal() + (0.0003 * v.max(0.0)).sqrt() * noise.normal();
+            px.push((full * (0.04 + v + read)).round().clamp(0.0, full) as u16);
+        }
+    }
+    image(width, height, bits, px)
+}
+
+/// Any picture from a function of the pixel.
+pub fn drawn(width: u32, height: u32, bits: u8, mut f: impl FnMut(u32, u32) -> u32) -> Image {
+    let px = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| f(x, y) as u16).collect();
+    image(width, height, bits, px)
+}
+
+fn image(width: u32, height: u32, bits: u8, px: Vec<u16>) -> Image {
+    if bits == 8 {
+        Image::from_u8(width, height, px.iter().map(|&v| v as u8).collect())
+    } else {
+        Image::from_u16(width, height, bits, px)
+    }
+}
+
+/// The pictures of the stage tests: real shapes, odd sizes, both depths, and adversarial ones.
+pub fn scenes() -> Vec<Scene> {
+    let base = Scene {
+        name: "",
+        shots: Vec::new(),
+        params: ThresholdParams::default(),
+        thinning: Thinning::ZhangSuen,
+        flags: 0,
+        ambient: None,
+    };
+    let p = |size, offset, minimum| ThresholdParams { size, offset, minimum, ..Default::default() };
+    let mut noise = Noise(7);
+    let mut grain = Noise(99);
+    vec![
+        Scene {
+            name: "two stripes of 641 x 479",
+            shots: vec![stripe(641, 479, 8, 2.5, 3, 1), stripe(641, 479, 8, 4.0, 0, 2)],
+            ..base.clone()
+        },
+        Scene {
+            name: "12 bits, Guo-Hall, ambient",
+            shots: vec![stripe(203, 150, 12, 3.0, 2, 3)],
+            params: p(25, 120, 300),
+            thinning: Thinning::GuoHall,
+            ambient: Some(drawn(203, 150, 12, |x, y| (x * 7 + y * 13) % 160)),
+            ..base.clone()
+        },
+        Scene {
+            name: "16 bits, saturated, window 101",
+            shots: vec![drawn(130, 90, 16, |x, y| if (x / 9 + y / 5) % 3 == 0 { 65535 } else { 40000 + x * 50 })],
+            params: p(101, 500, 0),
+            ..base.clone()
+        },
+        Scene {
+            name: "noise, every tile",
+            shots: vec![drawn(97, 61, 8, |_, _| noise.next() % 256)],
+            params: p(3, 0, 0),
+            flags: frame::ALL_TILES,
+            ..base.clone()
+        },
+        Scene {
+            name: "checkers",
+            shots: vec![drawn(160, 64, 8, |x, y| if (x + y) % 2 == 0 { 200 } else { 10 })],
+            params: p(5, -3, 0),
+            ..base.clone()
+        },
+        Scene {
+            name: "all bright, negative offset",
+            shots: vec![drawn(64, 40, 8, |_, _| 255)],
+            params: p(11, -1, 0),
+            ..base.clone()
+        },
+        Scene {
+            name: "stripes on tile borders, region of interest",
+            shots: vec![drawn(256, 128, 8, |x, y| if x % 32 < 2 || y % 8 == 7 { 220 } else { 20 })],
+            params: p(31, 20, 40),
+            flags: frame::HAS_ROI,
+            ..base.clone()
+        },
+        Scene {
+            name: "Gaussian window",
+            shots: vec![stripe(320, 200, 8, 3.0, 2, 5)],
+            params: ThresholdParams { window: Window::Gaussian, size: 31, offset: 6, minimum: 0 },
+            ..base.clone()
+        },
+        Scene {
+            name: "Gaussian window of 7 on deep noise",
+            shots: vec![drawn(70, 50, 10, |_, _| grain.next() % 1024)],
+            params: ThresholdParams { window: Window::Gaussian, size: 7, offset: 20, minimum: 30 },
+            ..base.clone()
+        },
+        Scene { name: "one pixel", shots: vec![drawn(1, 1, 8, |_, _| 9)], params: p(3, -1, 0), ..base },
+    ]
+}
+
+/// The cases of one stage over all scenes.
+pub fn of(stage: &str) -> Vec<Case> {
+    scenes().iter().flat_map(|s| Walk::new(s).run(stage)).collect()
+}
+
+/// The chain on the twins, buffer by buffer.
+pub struct Walk<'a> {
+    scene: &'a Scene,
+    pub frame: Frame,
+    pub buffers: BTreeMap<&'static str, Vec<u32>>,
+    captured: Vec<Case>,
+    wanted: &'a str,
+}
+
+impl<'a> Walk<'a> {
+    pub fn new(scene: &'a Scene) -> Walk<'a> {
+        let first = &scene.shots[0];
+        let mut f =
+            Frame::new(first.width, first.height, first.bits, scene.shots.len() as u32, &scene.params, scene.thinning)
+                .expect("scenes are valid");
+        f.flags |= scene.flags;
+        let pack = |images: &[Image]| {
+            let mut bytes = vec![0u8; f.image_bytes() * images.len()];
+            for (image, out) in images.iter().zip(bytes.chunks_exact_mut(f.image_bytes())) {
+                f.pack_image(image, out).expect("scenes are valid");
+            }
+            bytemuck::pod_collect_to_vec::<u8, u32>(&bytes)
+        };
+        let (tiles, rows) = (f.tiles() as usize, (f.tiles_y * f.shots) as usize);
+        let per_shot = (f.tiles_x * f.tiles_y * 8) as usize;
+        let weights = threshold::gaussian_weights(f.size).iter().map(|w| w.to_bits()).collect();
+        let header = listing::HEADER_WORDS as usize;
+        let buffers = BTreeMap::from([
+            ("image", pack(&scene.shots)),
+            ("ambient", pack(scene.ambient.as_slice())),
+            ("stats", vec![0; 8 * tiles]),
+            ("roi", (0..per_shot).map(|i| if i % 5 < 3 { 0x00ff_fff0 } else { 0 }).collect()),
+            ("even", vec![7; 8 * header]),
+            ("odd", vec![7; 8 * header]),
+            ("listing", vec![0, 1, 1, 0]),
+            ("list", vec![0; tiles]),
+            ("active", vec![0, 1, 1, 0]),
+            ("active_list", vec![0; tiles]),
+            ("weights", weights),
+            ("quads", vec![0; 8 * tiles]),
+            ("mask", vec![0; 8 * tiles]),
+            ("other_mask", vec![0; 8 * tiles]),
+            ("stamps", vec![0; tiles]),
+            ("counts", vec![0; tiles]),
+            ("starts", vec![0; tiles]),
+            ("rows", vec![0; rows]),
+            ("row_starts", vec![0; rows]),
+            ("header", vec![0; skeleton::HEADER + f.shots as usize + 1]),
+            ("points", vec![0; 2 * f.capacity as usize]),
+        ]);
+        Walk { scene, frame: f, buffers, captured: Vec::new(), wanted: "" }
+    }
+
+    fn step(
+        &mut self,
+        stage: &crate::gpu::Stage,
+        twin: fn(&mut [Vec<u32>], &[(&'static str, f64)]),
+        names: &[&'static str],
+        groups: [u32; 3],
+    ) {
+        let overrides = vec![(frame::PX_LOG2, f64::from(px_log2(self.scene.shots[0].bits)))];
+        let mut bindings = vec![bytemuck::cast_slice::<Frame, u32>(&[self.frame]).to_vec()];
+        bindings.extend(names.iter().map(|n| self.buffers[n].clone()));
+        if stage.name == self.wanted {
+            let name = format!("{}, sub-iteration {}", self.scene.name, self.frame.step);
+            self.captured.push(Case { name, overrides: overrides.clone(), bindings: bindings.clone(), groups });
+        }
+        twin(&mut bindings, &overrides);
+        for (name, words) in names.iter().zip(bindings.into_iter().skip(1)) {
+            self.buffers.insert(name, words);
+        }
+    }
+
+    /// Walks the chain; gives the cases of the stage of that name. An empty name runs the chain only.
+    pub fn run(&mut self, wanted: &'a str) -> Vec<Case> {
+        self.wanted = wanted;
+        let f = self.frame;
+        let listed = |b: &BTreeMap<&'static str, Vec<u32>>, list: &str| [(b[list][3] * 8).div_ceil(64).max(1), 1, 1];
+        if self.scene.ambient.is_some() {
+            self.step(&ambient::STAGE, ambient::twin, &["image", "ambient"], ambient::groups(&f));
+        }
+        self.step(&stats::STAGE, stats::twin, &["image", "stats"], stats::groups(&f));
+        self.step(&tiles::STAGE, tiles::twin, &["stats", "roi", "listing", "list"], tiles::groups(&f));
+        let all = listed(&self.buffers, "listing");
+        if f.flags & frame::GAUSSIAN != 0 {
+            let names = ["image", "listing", "list", "weights", "quads"];
+            self.step(&threshold::GAUSSIAN, threshold::stage_twin, &names, all);
+        } else {
+            self.step(&threshold::MEAN, threshold::stage_twin, &["image", "listing", "list", "quads"], all);
+        }
+        let names = ["listing", "list", "quads", "roi", "mask", "stamps"];
+        self.step(&threshold::GATHER, threshold::gather_twin, &names, all);
+        self.buffers.insert("active", self.buffers["listing"].clone());
+        self.buffers.insert("active_list", self.buffers["list"].clone());
+        while self.buffers["active"][3] > 0 {
+            for step in 0..8 {
+                self.frame.step = self.frame.step - self.frame.step % 8 + step;
+                let masks = if step % 2 == 0 { ["mask", "other_mask"] } else { ["other_mask", "mask"] };
+                let names = ["active", "active_list", masks[0], masks[1], "stamps"];
+                let groups = listed(&self.buffers, "active");
+                self.step(&thin::STAGE, thin::stage_twin, &names, groups);
+            }
+            self.frame.step += 1;
+            self.buffers.insert("active", vec![0, 1, 1, 0]);
+            let names = ["listing", "list", "stamps", "active", "active_list"];
+            self.step(&listing::COMPACT, listing::compact_twin, &names, all);
+        }
+        let stamps = self.buffers["stamps"].clone();
+        self.frame.step = self.frame.step.saturating_sub(6);
+        self.step(&listing::REBASE, listing::rebase_twin, &["listing", "list", "stamps"], all);
+        self.buffers.insert("stamps", stamps);
+        self.step(&skeleton::COUNT, skeleton::count_twin, &["listing", "list", "mask", "counts"], all);
+        let groups = skeleton::rows_groups(&f);
+        self.step(&skeleton::SCAN_ROWS, skeleton::scan_rows_twin, &["counts", "starts", "rows"], groups);
+        let names = ["rows", "listing", "active", "row_starts", "header"];
+        self.step(&skeleton::SCAN_SHOTS, skeleton::scan_shots_twin, &names, skeleton::shots_groups(&f));
+        let names = ["listing", "list", "mask", "starts", "row_starts", "points"];
+        self.step(&skeleton::STAGE, skeleton::stage_twin, &names, all);
+        if wanted == "clear" {
+            let names = ["listing", "list", "mask", "other_mask", "stamps", "counts"];
+            self.step(&listing::CLEAR, listing::clear_twin, &names, all);
+        }
+        self.frame.step = 1;
+        self.step(&listing::RESET, listing::reset_twin, &["even", "odd"], [1, 1, 1]);
+        std::mem::take(&mut self.captured)
+    }
+}

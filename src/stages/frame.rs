@@ -1,0 +1,183 @@
+//! In: the size and depth of the pictures, the settings. Out: the uniform block of the stripe stages and
+//! the layout of their buffers. Frame and unit: pixels, words of 32 bits.
+
+use super::{Thinning, ThresholdParams, Window};
+use crate::fault::{Fault, Result};
+use crate::gpu::Field;
+use crate::raster::{Image, Mask, Pixels};
+
+/// The WGSL struct of the same name, shaders/shared/frame.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Frame {
+    pub width: u32,
+    pub height: u32,
+    pub pitch: u32,
+    pub shot_words: u32,
+    pub tiles_x: u32,
+    pub tiles_y: u32,
+    pub shots: u32,
+    pub size: u32,
+    pub offset: i32,
+    pub minimum: u32,
+    pub flags: u32,
+    pub rule: u32,
+    pub step: u32,
+    pub capacity: u32,
+    pub full_scale: u32,
+    pub reserved: u32,
+}
+
+/// `Frame::flags`: list every tile, the plain path.
+pub const ALL_TILES: u32 = 1;
+/// `Frame::flags`: a region of interest is given.
+pub const HAS_ROI: u32 = 2;
+/// `Frame::flags`: the window is Gaussian.
+pub const GAUSSIAN: u32 = 4;
+
+/// Lists name and byte offset of a struct's members for the contract tests.
+#[macro_export]
+macro_rules! uniform_fields {
+    ($t:ty: $($f:ident),* $(,)?) => {
+        ( stringify!($t), &[$($crate::gpu::Field { name: stringify!($f), offset: std::mem::offset_of!($t, $f) }),*],
+          std::mem::size_of::<$t>() )
+    };
+}
+
+pub const UNIFORM: (&str, &[Field], usize) = uniform_fields!(Frame: width, height, pitch, shot_words, tiles_x,
+    tiles_y, shots, size, offset, minimum, flags, rule, step, capacity, full_scale, reserved);
+
+pub const SHARED: &str = include_str!("../../shaders/shared/frame.wgsl");
+pub const PIXELS: &str = include_str!("../../shaders/shared/pixels.wgsl");
+pub const ACTIVITY: &str = include_str!("../../shaders/shared/activity.wgsl");
+/// Selects 8-bit (2) or deeper (1) pictures; pixels a word as a power of two.
+pub const PX_LOG2: &str = "px_log2";
+
+pub fn px_log2(bits: u8) -> u32 {
+    if bits == 8 { 2 } else { 1 }
+}
+
+impl Frame {
+    /// The layout of `shots` pictures of one size and depth in one batch.
+    pub fn new(width: u32, height: u32, bits: u8, shots: u32, p: &ThresholdParams, rule: Thinning) -> Result<Frame> {
+        p.check()?;
+        // A tile packs its column into 10 bits, its row into 12, its shot into 10; a point its pixel into 16 + 16.
+        if !(1..=32 * 1023).contains(&width) || !(1..=8 * 4095).contains(&height) {
+            return Err(Fault::input(format!(
+                "a picture of {width} x {height} pixels, 1 x 1 to 32736 x 32760 are possible"
+            )));
+        }
+        if !(8..=16).contains(&bits) {
+            return Err(Fault::input(format!("pictures of {bits} bits, 8 to 16 are possible")));
+        }
+        if !(1..=1023).contains(&shots) {
+            return Err(Fault::usage(format!("{shots} shots in one batch, 1 to 1023 are possible")));
+        }
+        let (tiles_x, tiles_y) = (width.div_ceil(32), height.div_ceil(8));
+        let pitch = tiles_x * 32 >> px_log2(bits);
+        Ok(Frame {
+            width,
+            height,
+            pitch,
+            shot_words: pitch * height,
+            tiles_x,
+            tiles_y,
+            shots,
+            size: p.size,
+            offset: p.offset,
+            minimum: u32::from(p.minimum),
+            flags: if p.window == Window::Gaussian { GAUSSIAN } else { 0 },
+            rule: match rule {
+                Thinning::ZhangSuen => 0,
+                Thinning::GuoHall => 1,
+            },
+            step: 0,
+            // One pixel in ten is more than a scene with a stripe ever gives; a small picture keeps all.
+            capacity: (width * height / 10).max((width * height).min(32768)) * shots,
+            full_scale: (1 << bits) - 1,
+            reserved: 0,
+        })
+    }
+    pub fn tiles(&self) -> u32 {
+        self.tiles_x * self.tiles_y * self.shots
+    }
+    pub fn mask_words(&self) -> u32 {
+        self.tiles() * 8
+    }
+    pub fn image_bytes(&self) -> usize {
+        self.shot_words as usize * 4
+    }
+    pub fn rule(&self) -> Thinning {
+        if self.rule == 0 { Thinning::ZhangSuen } else { Thinning::GuoHall }
+    }
+    pub fn threshold(&self) -> ThresholdParams {
+        ThresholdParams {
+            window: if self.flags & GAUSSIAN != 0 { Window::Gaussian } else { Window::Mean },
+            size: self.size,
+            offset: self.offset,
+            minimum: self.minimum as u16,
+        }
+    }
+
+    /// Copies a picture into its place in a batch: rows padded to whole tiles with their last pixel.
+    /// `out` is `image_bytes()` long.
+    pub fn pack_image(&self, image: &Image, out: &mut [u8]) -> Result<()> {
+        let deep = matches!(image.pixels, Pixels::U16(_));
+        if (image.width, image.height) != (self.width, self.height) || u32::from(image.full_scale()) != self.full_scale
+        {
+            return Err(Fault::input(format!(
+                "a picture of {} x {} pixels, {} bits among pictures of {} x {} pixels, {} bits",
+                image.width,
+                image.height,
+                image.bits,
+                self.width,
+                self.height,
+                (self.full_scale + 1).ilog2()
+            ))
+            .cause("pictures of two cameras or exports lie in one folder")
+            .next("move them into a recording of their own"));
+        }
+        let bytes: &[u8] = match &image.pixels {
+            Pixels::U8(p) => p,
+            Pixels::U16(p) => bytemuck::cast_slice(p),
+        };
+        let (row, pitch, px) = (bytes.len() / self.height as usize, self.pitch as usize * 4, 1 + usize::from(deep));
+        if row == pitch {
+            out[..bytes.len()].copy_from_slice(bytes);
+            return Ok(());
+        }
+        for (from, to) in bytes.chunks_exact(row).zip(out.chunks_exact_mut(pitch)) {
+            to[..row].copy_from_slice(from);
+            let last = &from[row - px..];
+            to[row..].chunks_exact_mut(px).for_each(|p| p.copy_from_slice(last));
+        }
+        Ok(())
+    }
+
+    /// One shot's mask out of a batch's mask words.
+    pub fn unpack_mask(&self, words: &[u32], shot: u32) -> Mask {
+        let (rows, w) = (self.tiles_y as usize * 8, self.tiles_x as usize);
+        let from = shot as usize * rows * w;
+        Mask { width: self.width, height: self.height, words: words[from..from + self.height as usize * w].to_vec() }
+    }
+    /// A mask in the layout of one shot: height padded to whole tiles.
+    pub fn pack_mask(&self, mask: &Mask) -> Vec<u32> {
+        assert_eq!((mask.width, mask.height), (self.width, self.height));
+        let mut words = mask.words.clone();
+        words.resize((self.tiles_x * self.tiles_y * 8) as usize, 0);
+        words
+    }
+}
+
+/// Tile x, y, shot out of a list's word.
+pub fn tile_unpack(tile: u32) -> (u32, u32, u32) {
+    (tile & 1023, tile >> 10 & 4095, tile >> 22)
+}
+pub fn tile_pack(x: u32, y: u32, shot: u32) -> u32 {
+    x | y << 10 | shot << 22
+}
+
+/// The uniform's words in a twin's bindings, read as `Frame`.
+pub fn frame_of(bindings: &[Vec<u32>]) -> Frame {
+    *bytemuck::from_bytes(bytemuck::cast_slice(&bindings[0]))
+}

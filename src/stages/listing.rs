@@ -1,0 +1,139 @@
+//! In: lists of tiles and what became of them. Out: emptied, shortened, restarted lists: the stages
+//! reset, clear, compact and rebase. Frame and unit: tiles of 32 x 8 pixels.
+
+use super::frame::{self, ACTIVITY, Frame, PX_LOG2, SHARED, frame_of, tile_unpack};
+use crate::gpu::{Access::*, Binding, Stage};
+
+/// Words between the headers of two lists: 256 bytes, which every adapter can bind.
+pub const HEADER_WORDS: u32 = 64;
+
+pub const RESET: Stage = Stage {
+    name: "reset",
+    wgsl: include_str!("../../shaders/reset.wgsl"),
+    shared: &[SHARED],
+    workgroup: [64, 1, 1],
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "even", access: ReadWrite },
+        Binding { name: "odd", access: ReadWrite },
+    ],
+    uniform: frame::UNIFORM,
+    overrides: &[PX_LOG2],
+};
+
+pub const CLEAR: Stage = Stage {
+    name: "clear",
+    wgsl: include_str!("../../shaders/clear.wgsl"),
+    shared: &[SHARED],
+    workgroup: [64, 1, 1],
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "listing", access: Read },
+        Binding { name: "list", access: Read },
+        Binding { name: "mask", access: ReadWrite },
+        Binding { name: "other_mask", access: ReadWrite },
+        Binding { name: "stamps", access: ReadWrite },
+        Binding { name: "counts", access: ReadWrite },
+    ],
+    uniform: frame::UNIFORM,
+    overrides: &[PX_LOG2],
+};
+
+pub const COMPACT: Stage = Stage {
+    name: "compact",
+    wgsl: include_str!("../../shaders/compact.wgsl"),
+    shared: &[SHARED, ACTIVITY],
+    workgroup: [64, 1, 1],
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "all", access: Read },
+        Binding { name: "list", access: Read },
+        Binding { name: "stamps", access: Read },
+        Binding { name: "listing", access: ReadWrite },
+        Binding { name: "active_list", access: ReadWrite },
+    ],
+    uniform: frame::UNIFORM,
+    overrides: &[PX_LOG2],
+};
+
+pub const REBASE: Stage = Stage {
+    name: "rebase",
+    wgsl: include_str!("../../shaders/rebase.wgsl"),
+    shared: &[SHARED],
+    workgroup: [64, 1, 1],
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "listing", access: Read },
+        Binding { name: "list", access: Read },
+        Binding { name: "stamps", access: ReadWrite },
+    ],
+    uniform: frame::UNIFORM,
+    overrides: &[PX_LOG2],
+};
+
+/// Adds a tile: word 3 of the header counts, word 0 is the number of workgroups of 8 tiles.
+pub fn append(listing: &mut [u32], list: &mut [u32], tile: u32) {
+    list[listing[3] as usize] = tile;
+    listing[0] += u32::from(listing[3].is_multiple_of(8));
+    listing[3] += 1;
+}
+
+/// Place of a tile in arrays that hold every tile.
+pub fn tile_index(f: &Frame, tile: u32) -> usize {
+    let (x, y, shot) = tile_unpack(tile);
+    ((shot * f.tiles_y + y) * f.tiles_x + x) as usize
+}
+/// Place of a tile's row in a mask.
+pub fn mask_index(f: &Frame, tile: u32, row: u32) -> usize {
+    let (x, y, shot) = tile_unpack(tile);
+    (((shot * f.tiles_y + y) * 8 + row) * f.tiles_x + x) as usize
+}
+/// The latest stamp of a tile and its neighbours.
+pub fn latest(f: &Frame, stamps: &[u32], tile: u32) -> u32 {
+    let (x, y, shot) = tile_unpack(tile);
+    let near = |v: u32, n: u32| v.saturating_sub(1)..=(v + 1).min(n - 1);
+    near(y, f.tiles_y)
+        .flat_map(|ny| near(x, f.tiles_x).map(move |nx| (nx, ny)))
+        .map(|(nx, ny)| stamps[((shot * f.tiles_y + ny) * f.tiles_x + nx) as usize])
+        .max()
+        .unwrap()
+}
+
+pub fn reset_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+    let from = frame_of(b).step as usize;
+    for (k, header) in b[1].chunks_mut(HEADER_WORDS as usize).enumerate().filter(|(k, _)| *k >= from) {
+        debug_assert!(k < 64);
+        header[..4].copy_from_slice(&[0, 1, 1, 0]);
+    }
+    b[2].chunks_mut(HEADER_WORDS as usize).for_each(|h| h[..4].copy_from_slice(&[0, 1, 1, 0]));
+}
+
+pub fn clear_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+    let f = frame_of(b);
+    let [_, listing, list, mask, other, stamps, counts] = b else { unreachable!() };
+    for &tile in &list[..listing[3] as usize] {
+        for row in 0..8 {
+            mask[mask_index(&f, tile, row)] = 0;
+            other[mask_index(&f, tile, row)] = 0;
+        }
+        stamps[tile_index(&f, tile)] = 0;
+        counts[tile_index(&f, tile)] = 0;
+    }
+}
+
+pub fn compact_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+    let f = frame_of(b);
+    let [_, all, list, stamps, listing, active] = b else { unreachable!() };
+    for &tile in list[..all[3] as usize].iter().filter(|&&t| latest(&f, stamps, t) > f.step) {
+        append(listing, active, tile);
+    }
+}
+
+pub fn rebase_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+    let f = frame_of(b);
+    let [_, listing, list, stamps] = b else { unreachable!() };
+    for &tile in &list[..listing[3] as usize] {
+        let stamp = &mut stamps[tile_index(&f, tile)];
+        *stamp = if *stamp > f.step { 2 } else { 0 };
+    }
+}

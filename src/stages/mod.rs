@@ -1,0 +1,53 @@
+//! In: grey pictures of the stripe. Out: the steps that find it, each as a WGSL stage with its CPU twin.
+//! Frame and unit: image pixels (x right, y down, an integer is a pixel's centre), grey levels.
+
+pub mod ambient;
+pub mod cases;
+mod entry;
+pub mod frame;
+pub mod listing;
+pub mod skeleton;
+pub mod stats;
+pub mod thin;
+pub mod threshold;
+pub mod tiles;
+
+pub use entry::{Case, Entry, Verdict, differing_words, differing_words_unordered};
+pub use frame::Frame;
+pub use thin::Thinning;
+pub use threshold::{ThresholdParams, Window};
+
+const EXACT: &str = "whole numbers only: every word is the same";
+const UNORDERED: &str = "whole numbers only: the same set, in whatever order the GPU ran";
+
+/// Every stage, in the order of the chain; tests and the self-test of `sheetlight doctor` run over it.
+pub fn all() -> Vec<Entry> {
+    let exact = |stage, twin, cases| Entry { stage, twin, cases, compare: differing_words, limit: 0.0, reason: EXACT };
+    let unordered = |stage, twin, cases| Entry {
+        compare: differing_words_unordered,
+        reason: UNORDERED,
+        ..exact(stage, twin, cases)
+    };
+    vec![
+        exact(&listing::CLEAR, listing::clear_twin, || cases::of("clear")),
+        exact(&listing::RESET, listing::reset_twin, || cases::of("reset")),
+        exact(&ambient::STAGE, ambient::twin, || cases::of("ambient")),
+        exact(&stats::STAGE, stats::twin, || cases::of("stats")),
+        unordered(&tiles::STAGE, tiles::twin, || cases::of("tiles")),
+        exact(&threshold::MEAN, threshold::stage_twin, || cases::of("threshold")),
+        Entry {
+            compare: threshold::pixels_apart,
+            limit: 1.0,
+            reason: "f32 sums in another order; at most 1 pixel in 100,000 lies that near to its limit",
+            ..exact(&threshold::GAUSSIAN, threshold::stage_twin, || cases::of("threshold_gaussian"))
+        },
+        exact(&threshold::GATHER, threshold::gather_twin, || cases::of("gather")),
+        exact(&thin::STAGE, thin::stage_twin, || cases::of("thin")),
+        unordered(&listing::COMPACT, listing::compact_twin, || cases::of("compact")),
+        exact(&listing::REBASE, listing::rebase_twin, || cases::of("rebase")),
+        exact(&skeleton::COUNT, skeleton::count_twin, || cases::of("count")),
+        exact(&skeleton::SCAN_ROWS, skeleton::scan_rows_twin, || cases::of("scan_rows")),
+        exact(&skeleton::SCAN_SHOTS, skeleton::scan_shots_twin, || cases::of("scan_shots")),
+        exact(&skeleton::STAGE, skeleton::stage_twin, || cases::of("skeleton")),
+    ]
+}

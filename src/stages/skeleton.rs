@@ -1,0 +1,165 @@
+//! In: a thinned mask. Out: its lit pixels as a list, always in the same order.
+//! Frame and unit: pixels, packed x | y << 16.
+
+use super::frame::{self, Frame, PX_LOG2, SHARED, frame_of, tile_unpack};
+use super::listing::{mask_index, tile_index};
+use crate::gpu::{Access::*, Binding, Stage};
+use crate::raster::Mask;
+
+/// Width and height of the tiles that the stages work in, in pixels: one word wide.
+pub const TILE: (u32, u32) = (32, 8);
+
+pub fn pack(x: u32, y: u32) -> u32 {
+    x | y << 16
+}
+pub fn unpack(pixel: u32) -> (u32, u32) {
+    (pixel & 0xffff, pixel >> 16)
+}
+
+/// CPU twin: lit pixels tile by tile (rows of tiles from the top, tiles from the left), within a
+/// tile row by row. One tile is one unit of GPU work, hence this order and not the plain one.
+pub fn twin(mask: &Mask) -> Vec<u32> {
+    let words = mask.words_per_row();
+    let mut list = Vec::new();
+    for top in (0..mask.height).step_by(TILE.1 as usize) {
+        let bottom = (top + TILE.1).min(mask.height);
+        for i in 0..words {
+            for y in top..bottom {
+                let mut word = mask.words[y as usize * words + i];
+                while word != 0 {
+                    list.push(pack(32 * i as u32 + word.trailing_zeros(), y));
+                    word &= word - 1;
+                }
+            }
+        }
+    }
+    list
+}
+
+/// Lit pixels per listed tile.
+pub const COUNT: Stage = Stage {
+    name: "count",
+    wgsl: include_str!("../../shaders/count.wgsl"),
+    shared: &[SHARED],
+    workgroup: [64, 1, 1],
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "listing", access: Read },
+        Binding { name: "list", access: Read },
+        Binding { name: "mask", access: Read },
+        Binding { name: "counts", access: ReadWrite },
+    ],
+    uniform: frame::UNIFORM,
+    overrides: &[PX_LOG2],
+};
+
+/// Counts before each tile in its row of tiles.
+pub const SCAN_ROWS: Stage = Stage {
+    name: "scan_rows",
+    wgsl: include_str!("../../shaders/scan_rows.wgsl"),
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "counts", access: Read },
+        Binding { name: "starts", access: ReadWrite },
+        Binding { name: "rows", access: ReadWrite },
+    ],
+    ..COUNT
+};
+
+/// Counts before each row of tiles, and the header of the point list.
+pub const SCAN_SHOTS: Stage = Stage {
+    name: "scan_shots",
+    wgsl: include_str!("../../shaders/scan_shots.wgsl"),
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "rows", access: Read },
+        Binding { name: "listing", access: Read },
+        Binding { name: "active_listing", access: Read },
+        Binding { name: "row_starts", access: ReadWrite },
+        Binding { name: "header", access: ReadWrite },
+    ],
+    ..COUNT
+};
+
+/// The point list: (x | y << 16, shot).
+pub const STAGE: Stage = Stage {
+    name: "skeleton",
+    wgsl: include_str!("../../shaders/skeleton.wgsl"),
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "listing", access: Read },
+        Binding { name: "list", access: Read },
+        Binding { name: "mask", access: Read },
+        Binding { name: "starts", access: Read },
+        Binding { name: "row_starts", access: Read },
+        Binding { name: "points", access: ReadWrite },
+    ],
+    ..COUNT
+};
+
+/// Words of the point list's header before the shots' first points.
+pub const HEADER: usize = 8;
+
+pub fn rows_groups(f: &Frame) -> [u32; 3] {
+    SCAN_ROWS.groups([f.tiles_y * f.shots, 1, 1])
+}
+pub fn shots_groups(f: &Frame) -> [u32; 3] {
+    SCAN_SHOTS.groups([f.shots, 1, 1])
+}
+
+pub fn count_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+    let f = frame_of(b);
+    let [_, listing, list, mask, counts] = b else { unreachable!() };
+    for &tile in &list[..listing[3] as usize] {
+        counts[tile_index(&f, tile)] = (0..8).map(|r| mask[mask_index(&f, tile, r)].count_ones()).sum();
+    }
+}
+
+pub fn scan_rows_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+    let f = frame_of(b);
+    let [_, counts, starts, rows] = b else { unreachable!() };
+    for (y, row) in counts.chunks_exact(f.tiles_x as usize).enumerate() {
+        let mut sum = 0;
+        for (x, count) in row.iter().enumerate() {
+            starts[y * f.tiles_x as usize + x] = sum;
+            sum += count;
+        }
+        rows[y] = sum;
+    }
+}
+
+pub fn scan_shots_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+    let f = frame_of(b);
+    let [_, rows, listing, active, row_starts, header] = b else { unreachable!() };
+    let mut sum = 0;
+    for shot in 0..f.shots as usize {
+        header[HEADER + shot] = sum.min(f.capacity);
+        for y in 0..f.tiles_y as usize {
+            row_starts[shot * f.tiles_y as usize + y] = sum;
+            sum += rows[shot * f.tiles_y as usize + y];
+        }
+    }
+    let kept = sum.min(f.capacity);
+    header[..8].copy_from_slice(&[kept.div_ceil(64), 1, 1, kept, sum, listing[3], active[3], f.shots]);
+    header[HEADER + f.shots as usize] = kept;
+}
+
+pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+    let f = frame_of(b);
+    let [_, listing, list, mask, starts, row_starts, points] = b else { unreachable!() };
+    for &tile in &list[..listing[3] as usize] {
+        let (tx, ty, shot) = tile_unpack(tile);
+        let mut at = (row_starts[(shot * f.tiles_y + ty) as usize] + starts[tile_index(&f, tile)]) as usize;
+        for row in 0..8 {
+            let mut bits = mask[mask_index(&f, tile, row)];
+            while bits != 0 {
+                if at < f.capacity as usize {
+                    points[2 * at] = pack(32 * tx + bits.trailing_zeros(), 8 * ty + row);
+                    points[2 * at + 1] = shot;
+                }
+                bits &= bits - 1;
+                at += 1;
+            }
+        }
+    }
+}

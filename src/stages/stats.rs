@@ -1,0 +1,50 @@
+//! In: pictures. Out: per block of 16 x 8 pixels (sum, largest | smallest << 16, smallest row sum,
+//! smallest column sum). Frame and unit: pixels, grey levels.
+
+use super::frame::{self, Frame, PX_LOG2, SHARED, frame_of};
+use crate::gpu::{Access::*, Binding, Stage};
+
+pub const STAGE: Stage = Stage {
+    name: "stats",
+    wgsl: include_str!("../../shaders/stats.wgsl"),
+    shared: &[SHARED],
+    workgroup: [64, 1, 1],
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "image", access: Read },
+        Binding { name: "stats", access: ReadWrite },
+    ],
+    uniform: frame::UNIFORM,
+    overrides: &[PX_LOG2],
+};
+
+/// One invocation a block, two blocks a tile.
+pub fn groups(f: &Frame) -> [u32; 3] {
+    STAGE.groups([2 * f.tiles(), 1, 1])
+}
+
+/// Grey level at (x, y) of a shot in packed words; x may lie in the padding, y is clamped.
+pub fn padded_pixel(f: &Frame, image: &[u32], px_log2: u32, shot: u32, x: u32, y: u32) -> u32 {
+    let bits = 32 >> px_log2;
+    let at = shot * f.shot_words + y.min(f.height - 1) * f.pitch + (x >> px_log2);
+    image[at as usize] >> (x % (1 << px_log2) * bits) & ((1u64 << bits) - 1) as u32
+}
+
+pub fn twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
+    let f = frame_of(b);
+    let [_, image, stats] = b else { unreachable!() };
+    for (i, out) in stats.chunks_exact_mut(4).enumerate().take(2 * f.tiles() as usize) {
+        let (x, y) = (i as u32 % (2 * f.tiles_x), i as u32 / (2 * f.tiles_x));
+        let px = |c: u32, r: u32| {
+            let y_in_shot = y % f.tiles_y * 8 + r;
+            padded_pixel(&f, image, overrides[0].1 as u32, y / f.tiles_y, 16 * x + c, y_in_shot)
+        };
+        let rows: Vec<u32> = (0..8).map(|r| (0..16).map(|c| px(c, r)).sum()).collect();
+        let columns: Vec<u32> = (0..16).map(|c| (0..8).map(|r| px(c, r)).sum()).collect();
+        let all = || (0..8).flat_map(|r| (0..16).map(move |c| (c, r))).map(|(c, r)| px(c, r));
+        out[0] = rows.iter().sum();
+        out[1] = all().max().unwrap() | all().min().unwrap() << 16;
+        out[2] = *rows.iter().min().unwrap();
+        out[3] = *columns.iter().min().unwrap();
+    }
+}

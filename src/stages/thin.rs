@@ -1,0 +1,174 @@
+//! In: a mask. Out: the mask thinned to lines one pixel wide, nothing left to delete.
+//! Frame and unit: pixels. Zhang and Suen 1984 [zhang84], Guo and Hall 1989 [guo89], as OpenCV has them.
+
+use super::frame::{self, ACTIVITY, PX_LOG2, SHARED, frame_of, tile_unpack};
+use super::listing::{latest, mask_index, tile_index};
+use crate::gpu::{Access::*, Binding, Stage};
+use crate::raster::Mask;
+
+/// One sub-iteration over the listed tiles.
+pub const STAGE: Stage = Stage {
+    name: "thin",
+    wgsl: include_str!("../../shaders/thin.wgsl"),
+    shared: &[SHARED, ACTIVITY],
+    workgroup: [64, 1, 1],
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "listing", access: Read },
+        Binding { name: "list", access: Read },
+        Binding { name: "before", access: Read },
+        Binding { name: "after", access: ReadWrite },
+        Binding { name: "stamps", access: ReadWrite },
+    ],
+    uniform: frame::UNIFORM,
+    overrides: &[PX_LOG2],
+};
+
+/// The rule that decides which boundary pixels go.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Thinning {
+    #[default]
+    ZhangSuen,
+    GuoHall,
+}
+
+/// The eight neighbours of 32 pixels, clockwise from north: p2 to p9 of the papers.
+pub type Neighbours = [u32; 8];
+
+/// Pixels to delete in one sub-iteration, 32 at a time; `second` is its parity.
+#[inline]
+pub fn deletions(rule: Thinning, p: &Neighbours, second: bool) -> u32 {
+    let [p2, p3, p4, p5, p6, p7, p8, p9] = *p;
+    match rule {
+        Thinning::ZhangSuen => {
+            // A(p) = 1: exactly one step from dark to lit on the way round.
+            let (mut one, mut more) = (0, 0);
+            for i in 0..8 {
+                let step = !p[i] & p[(i + 1) % 8];
+                more |= one & step;
+                one |= step;
+            }
+            // 2 <= B(p) <= 6, counted with a chain of bit adders.
+            let (mut b0, mut b1, mut b2) = (0, 0, 0);
+            for &n in p {
+                let c0 = b0 & n;
+                b0 ^= n;
+                let c1 = b1 & c0;
+                b1 ^= c0;
+                b2 ^= c1; // 8 lit neighbours wrap to 0, which is refused as well
+            }
+            let at_least_two = b1 | b2;
+            let seven = b0 & b1 & b2;
+            let stays = if second { (p2 & p4 & p8) | (p2 & p6 & p8) } else { (p2 & p4 & p6) | (p4 & p6 & p8) };
+            one & !more & at_least_two & !seven & !stays
+        }
+        Thinning::GuoHall => {
+            let c = [!p2 & (p3 | p4), !p4 & (p5 | p6), !p6 & (p7 | p8), !p8 & (p9 | p2)];
+            let (mut one, mut more) = (0, 0);
+            for c in c {
+                more |= one & c;
+                one |= c;
+            }
+            let n1 = [p9 | p2, p3 | p4, p5 | p6, p7 | p8];
+            let n2 = [p2 | p3, p4 | p5, p6 | p7, p8 | p9];
+            // min(N1, N2) is 2 or 3: both at least 2, and not both 4.
+            let all = |n: [u32; 4]| n[0] & n[1] & n[2] & n[3];
+            let two = |n: [u32; 4]| (n[0] & n[1]) | (n[2] & n[3]) | ((n[0] | n[1]) & (n[2] | n[3]));
+            let stays = if second { (p2 | p3 | !p5) & p4 } else { (p6 | p7 | !p9) & p8 };
+            one & !more & two(n1) & two(n2) & !(all(n1) & all(n2)) & !stays
+        }
+    }
+}
+
+/// The neighbours of word `i` of the middle row; rows are (above, own, below).
+#[inline]
+pub fn neighbours(rows: [&[u32]; 3], i: usize) -> Neighbours {
+    let at = |r: usize, i: usize| rows[r].get(i).copied().unwrap_or(0);
+    let east = |r: usize| at(r, i) >> 1 | at(r, i + 1) << 31;
+    let west = |r: usize| at(r, i) << 1 | at(r, i.wrapping_sub(1)) >> 31;
+    [at(0, i), east(0), east(1), east(2), at(2, i), west(2), west(1), west(0)]
+}
+
+/// Bits of word `i` that may be deleted: OpenCV never touches the outermost rows and columns.
+#[inline]
+pub fn interior(width: u32, i: usize) -> u32 {
+    let first = 32 * i as u32;
+    let mut bits = if i == 0 { !1 } else { !0 };
+    // The last deletable pixel is width - 2.
+    let keep = (width - 1).saturating_sub(first);
+    if keep < 32 {
+        bits &= (1u32 << keep) - 1;
+    }
+    bits
+}
+
+/// CPU twin: sub-iterations until two in a row delete nothing. A row whose surroundings did not
+/// change in the last two is left alone, which cannot change the result: the same rule was applied
+/// to the same pixels before.
+pub fn twin(mask: &Mask, rule: Thinning) -> Mask {
+    let (h, words) = (mask.height as usize, mask.words_per_row());
+    let (mut now, mut next) = (mask.clone(), mask.clone());
+    if h < 3 || mask.width < 3 {
+        return now;
+    }
+    // The sub-iteration in which a row last changed, counted from 2 so that 0 means never.
+    let mut changed = vec![2usize; h];
+    let inside: Vec<u32> = (0..words).map(|i| interior(mask.width, i)).collect();
+    for step in 0.. {
+        let mut any = false;
+        let stamps = changed.clone();
+        for y in 1..h - 1 {
+            if stamps[y - 1].max(stamps[y]).max(stamps[y + 1]) < step + 1 {
+                continue;
+            }
+            let row = |y: usize| &now.words[y * words..(y + 1) * words];
+            let rows = [row(y - 1), row(y), row(y + 1)];
+            for i in 0..words {
+                let own = rows[1][i];
+                let left = if own == 0 {
+                    0
+                } else {
+                    own & !(deletions(rule, &neighbours(rows, i), step % 2 == 1) & inside[i])
+                };
+                next.words[y * words + i] = left;
+                if left != own {
+                    changed[y] = step + 3;
+                    any = true;
+                }
+            }
+        }
+        if !any && !stamps.iter().any(|&s| s == step + 2) {
+            return next;
+        }
+        std::mem::swap(&mut now, &mut next);
+    }
+    unreachable!("every sub-iteration but the last two deletes a pixel")
+}
+
+pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+    let f = frame_of(b);
+    let [_, listing, list, before, after, stamps] = b else { unreachable!() };
+    let former = stamps.clone();
+    let words = f.tiles_x as usize;
+    for &tile in list[..listing[3] as usize].iter().filter(|&&t| latest(&f, &former, t) > f.step) {
+        let (tx, ty, shot) = tile_unpack(tile);
+        for row in 0..8 {
+            let y = 8 * ty + row;
+            let own = mask_index(&f, tile, row);
+            if y == 0 || y + 1 >= f.height {
+                after[own] = before[own];
+                continue;
+            }
+            let top = (shot * f.tiles_y * 8) as usize;
+            let line = |y: u32| &before[(top + y as usize) * words..(top + y as usize + 1) * words];
+            // The row below the last tile does not exist; it is never reached, because y + 1 < height.
+            let p = neighbours([line(y - 1), line(y), line(y + 1)], tx as usize);
+            let gone = before[own] & deletions(f.rule(), &p, f.step % 2 == 1) & interior(f.width, tx as usize);
+            after[own] = before[own] & !gone;
+            if gone != 0 {
+                stamps[tile_index(&f, tile)] = f.step + 3;
+            }
+        }
+    }
+}

@@ -1,0 +1,285 @@
+//! In: a grey picture. Out: a mask, lit where a pixel is brighter than the mean of its surroundings.
+//! Frame and unit: pixels; offset and minimum in grey levels of the picture's own depth.
+
+use super::frame::{self, Frame, PIXELS, PX_LOG2, SHARED, frame_of, tile_unpack};
+use super::stats::padded_pixel;
+use crate::fault::{Fault, Result};
+use crate::gpu::{Access::*, Binding, Stage};
+use crate::raster::{Image, Mask};
+
+/// Mean window.
+pub const MEAN: Stage = Stage {
+    name: "threshold",
+    wgsl: include_str!("../../shaders/threshold.wgsl"),
+    shared: &[SHARED, PIXELS],
+    workgroup: [64, 1, 1],
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "image", access: Read },
+        Binding { name: "listing", access: Read },
+        Binding { name: "list", access: Read },
+        Binding { name: "quads", access: ReadWrite },
+    ],
+    uniform: frame::UNIFORM,
+    overrides: &[PX_LOG2],
+};
+
+/// Gaussian window.
+pub const GAUSSIAN: Stage = Stage {
+    name: "threshold_gaussian",
+    wgsl: include_str!("../../shaders/threshold_gaussian.wgsl"),
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "image", access: Read },
+        Binding { name: "listing", access: Read },
+        Binding { name: "list", access: Read },
+        Binding { name: "weights", access: Read },
+        Binding { name: "quads", access: ReadWrite },
+    ],
+    ..MEAN
+};
+
+/// Quads to words, cut to the picture and the region of interest.
+pub const GATHER: Stage = Stage {
+    name: "gather",
+    wgsl: include_str!("../../shaders/gather.wgsl"),
+    shared: &[SHARED],
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "listing", access: Read },
+        Binding { name: "list", access: Read },
+        Binding { name: "quads", access: Read },
+        Binding { name: "roi", access: Read },
+        Binding { name: "mask", access: ReadWrite },
+        Binding { name: "stamps", access: ReadWrite },
+    ],
+    ..MEAN
+};
+
+/// The mean that a pixel is compared with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Window {
+    /// Every pixel of the window counts the same.
+    #[default]
+    Mean,
+    /// Gaussian weights, sigma = 0.3 ((size - 1) / 2 - 1) + 0.8 px; the published 1-4-6-4-1 like
+    /// tables for sizes up to 9 (OpenCV's getGaussianKernel).
+    Gaussian,
+}
+
+/// A pixel is lit when `value > mean + offset` and `value >= minimum`; the mean over the window is
+/// rounded to a whole grey level and pixels beyond the border repeat the border's. With minimum 0
+/// and an 8-bit picture this is OpenCV's adaptiveThreshold with C = -offset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ThresholdParams {
+    /// Weights of the window.
+    pub window: Window,
+    /// Edge of the window, odd, 3..=101 px; at least three times the stripe's width, or the stripe hollows out.
+    pub size: u32,
+    /// How far above the mean a pixel must be, -65535..=65535 grey levels; larger finds less.
+    pub offset: i32,
+    /// Absolute minimum, 0..=65535 grey levels; above the background's noise it makes the search fast
+    /// and free of specks. 0 is off.
+    pub minimum: u16,
+}
+
+impl Default for ThresholdParams {
+    fn default() -> Self {
+        ThresholdParams { window: Window::Mean, size: 31, offset: 8, minimum: 0 }
+    }
+}
+
+impl ThresholdParams {
+    pub fn check(&self) -> Result<()> {
+        if self.size % 2 == 0 || !(3..=101).contains(&self.size) {
+            return Err(Fault::usage(format!("threshold size is {}, it must be odd and in 3..=101 px", self.size))
+                .next("choose an odd window about five times as wide as the stripe, e.g. 31"));
+        }
+        if !(-65535..=65535).contains(&self.offset) {
+            return Err(Fault::usage(format!(
+                "threshold offset is {}, it must be in -65535..=65535 grey levels",
+                self.offset
+            )));
+        }
+        Ok(())
+    }
+}
+
+/// Lit exactly when `value - offset > round(sum / n^2)`. Because n is odd the mean is never half way
+/// between two levels, so this is `n^2 (value - offset) > sum + (n^2 - 1) / 2` in whole numbers; the
+/// largest term, 101^2 * 131070, fits in 31 bits.
+#[inline]
+pub fn passes_mean(value: u32, sum: u32, p: &ThresholdParams) -> bool {
+    let area = (p.size * p.size) as i32;
+    area * (value as i32 - p.offset) > sum as i32 + (area - 1) / 2 && value >= u32::from(p.minimum)
+}
+
+/// CPU twin: the whole picture, pixel by pixel.
+pub fn twin(image: &Image, p: &ThresholdParams) -> Mask {
+    match p.window {
+        Window::Mean => mean(image, p),
+        Window::Gaussian => gaussian(image, p),
+    }
+}
+
+/// Running column sums, then a running sum along the row: four additions a pixel for any window.
+fn mean(image: &Image, p: &ThresholdParams) -> Mask {
+    let (w, h, r) = (image.width as usize, image.height as usize, (p.size / 2) as usize);
+    let mut mask = Mask::new(image.width, image.height);
+    let words = mask.words_per_row();
+    let rows = Rows::new(image);
+    let mut columns = vec![0u32; w];
+    let (mut entering, mut leaving) = (vec![0u32; w], vec![0u32; w]);
+    for i in 0..p.size as usize {
+        rows.copy(i.saturating_sub(r).min(h - 1), &mut entering);
+        columns.iter_mut().zip(&entering).for_each(|(c, &v)| *c += v);
+    }
+    let mut row = vec![0u32; w];
+    // Column sums with the border repeated on both sides: no clamping in the inner loop.
+    let mut wide = vec![0u32; w + 2 * r + 1];
+    for y in 0..h {
+        rows.copy(y, &mut row);
+        wide[..r].fill(columns[0]);
+        wide[r..r + w].copy_from_slice(&columns);
+        wide[r + w..].fill(columns[w - 1]);
+        let mut sum: u32 = wide[..2 * r].iter().sum();
+        let out = &mut mask.words[y * words..(y + 1) * words];
+        for x in 0..w {
+            sum += wide[x + 2 * r];
+            out[x / 32] |= u32::from(passes_mean(row[x], sum, p)) << (x % 32);
+            sum -= wide[x];
+        }
+        if y + 1 < h {
+            rows.copy((y + 1 + r).min(h - 1), &mut entering);
+            rows.copy(y.saturating_sub(r), &mut leaving);
+            for x in 0..w {
+                columns[x] = columns[x] + entering[x] - leaving[x];
+            }
+        }
+    }
+    mask
+}
+
+/// Weights of one axis of the Gaussian window, as OpenCV's getGaussianKernel with sigma 0 gives them.
+pub fn gaussian_weights(size: u32) -> Vec<f32> {
+    match size {
+        3 => return vec![0.25, 0.5, 0.25],
+        5 => return vec![0.0625, 0.25, 0.375, 0.25, 0.0625],
+        7 => return vec![0.03125, 0.109375, 0.21875, 0.28125, 0.21875, 0.109375, 0.03125],
+        9 => return [4.0f32, 13., 30., 51., 60., 51., 30., 13., 4.].map(|v| v / 256.0).to_vec(),
+        _ => {}
+    }
+    let r = f64::from(size / 2);
+    let sigma = 0.3 * (r - 1.0) + 0.8;
+    let raw: Vec<f64> = (0..size).map(|i| (-(f64::from(i) - r).powi(2) / (2.0 * sigma * sigma)).exp()).collect();
+    let sum: f64 = raw.iter().sum();
+    raw.iter().map(|v| (v / sum) as f32).collect()
+}
+
+/// Along the row first, then down the columns, both in f32 and in ascending order, as the shader does.
+fn gaussian(image: &Image, p: &ThresholdParams) -> Mask {
+    let (w, h, r) = (image.width as usize, image.height as usize, (p.size / 2) as usize);
+    let weights = gaussian_weights(p.size);
+    let rows = Rows::new(image);
+    let mut blurred = vec![0f32; w * h];
+    let mut row = vec![0u32; w];
+    let mut wide = vec![0f32; w + 2 * r];
+    for (y, out) in blurred.chunks_exact_mut(w).enumerate() {
+        rows.copy(y, &mut row);
+        for (i, v) in wide.iter_mut().enumerate() {
+            *v = row[i.saturating_sub(r).min(w - 1)] as f32;
+        }
+        for (k, &weight) in weights.iter().enumerate() {
+            out.iter_mut().zip(&wide[k..]).for_each(|(o, &v)| *o += weight * v);
+        }
+    }
+    let mut mask = Mask::new(image.width, image.height);
+    let words = mask.words_per_row();
+    let mut sums = vec![0f32; w];
+    for y in 0..h {
+        sums.fill(0.0);
+        for (k, &weight) in weights.iter().enumerate() {
+            let from = (y + k).saturating_sub(r).min(h - 1) * w;
+            sums.iter_mut().zip(&blurred[from..from + w]).for_each(|(s, &v)| *s += weight * v);
+        }
+        rows.copy(y, &mut row);
+        for x in 0..w {
+            let value = row[x] as i32;
+            let lit = value - p.offset > sums[x].round_ties_even() as i32 && value >= i32::from(p.minimum);
+            mask.words[y * words + x / 32] |= u32::from(lit) << (x % 32);
+        }
+    }
+    mask
+}
+
+/// Rows of a picture of either depth as u32.
+struct Rows<'a>(&'a Image);
+
+impl<'a> Rows<'a> {
+    fn new(image: &'a Image) -> Self {
+        Rows(image)
+    }
+    fn copy(&self, y: usize, out: &mut [u32]) {
+        use crate::raster::Pixels;
+        let w = out.len();
+        match &self.0.pixels {
+            Pixels::U8(p) => out.iter_mut().zip(&p[y * w..]).for_each(|(o, &v)| *o = u32::from(v)),
+            Pixels::U16(p) => out.iter_mut().zip(&p[y * w..]).for_each(|(o, &v)| *o = u32::from(v)),
+        }
+    }
+}
+
+/// The whole padded batch as pictures, shot by shot: what the stages see beyond the border is what the
+/// padding repeats.
+fn padded_shot(f: &Frame, image: &[u32], px_log2: u32, shot: u32) -> Image {
+    let (w, h) = (32 * f.tiles_x, 8 * f.tiles_y);
+    let px = (0..h).flat_map(|y| (0..w).map(move |x| (x, y)));
+    let px = px.map(|(x, y)| padded_pixel(f, image, px_log2, shot, x.min(f.width - 1), y) as u16);
+    Image { width: w, height: h, bits: 16, pixels: crate::raster::Pixels::U16(px.collect()) }
+}
+
+pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
+    let f = frame_of(b);
+    let quads = b.len() - 1;
+    let masks: Vec<Mask> =
+        (0..f.shots).map(|s| twin(&padded_shot(&f, &b[1], overrides[0].1 as u32, s), &f.threshold())).collect();
+    for slot in 0..b[2][3] as usize {
+        let (tx, ty, shot) = tile_unpack(b[3][slot]);
+        for q in 0..8 {
+            let lit = |r: u32, k: u32| masks[shot as usize].get(32 * tx + 4 * q + k, 8 * ty + r);
+            let bits = (0..32).filter(|&i| lit(i / 4, i % 4)).fold(0, |w, i| w | 1 << i);
+            b[quads][8 * slot + q as usize] = bits;
+        }
+    }
+}
+
+pub fn gather_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+    let f = frame_of(b);
+    let [_, listing, list, quads, roi, mask, stamps] = b else { unreachable!() };
+    for slot in 0..listing[3] as usize {
+        let tile = list[slot];
+        let (tx, ty, _) = tile_unpack(tile);
+        for row in 0..8 {
+            let y = 8 * ty + row;
+            let lit = |x: u32| quads[8 * slot + (x / 4) as usize] >> (4 * row + x % 4) & 1 == 1;
+            let inside = |x: u32| 32 * tx + x < f.width && y < f.height;
+            let mut bits = (0..32).filter(|&x| lit(x) && inside(x)).fold(0, |w, x| w | 1 << x);
+            if f.flags & frame::HAS_ROI != 0 {
+                bits &= roi[(y * f.tiles_x + tx) as usize];
+            }
+            mask[super::listing::mask_index(&f, tile, row)] = bits;
+            if bits != 0 {
+                stamps[super::listing::tile_index(&f, tile)] = 2;
+            }
+        }
+    }
+}
+
+/// Pixels of the quads that differ, per 100,000.
+pub fn pixels_apart(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
+    let (a, b) = (gpu.last().unwrap(), twin.last().unwrap());
+    let apart: u32 = a.iter().zip(b).map(|(a, b)| (a ^ b).count_ones()).sum();
+    f64::from(apart) * 1e5 / (a.len() as f64 * 32.0)
+}

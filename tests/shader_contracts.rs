@@ -1,0 +1,64 @@
+//! In: the shaders and what the Rust side says about them. Out: they agree: entry point, workgroup,
+//! bindings, byte layout, overrides; no shader without a stage. Frame and unit: bytes.
+
+use naga::{AddressSpace, StorageAccess, TypeInner};
+use sheetlight::gpu::Access;
+use sheetlight::stages;
+use std::collections::BTreeSet;
+
+#[test]
+fn every_shader_is_what_its_stage_says() {
+    for entry in stages::all() {
+        let (stage, source) = (entry.stage, entry.stage.source());
+        let module = naga::front::wgsl::parse_str(&source)
+            .unwrap_or_else(|e| panic!("{}: {}", stage.name, e.emit_to_string(&source)));
+        let mut validator =
+            naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
+        validator.validate(&module).unwrap_or_else(|e| panic!("{}: {e:?}", stage.name));
+        assert_eq!(module.entry_points.len(), 1, "{}", stage.name);
+        let main = &module.entry_points[0];
+        assert_eq!((main.name.as_str(), main.workgroup_size), ("main", stage.workgroup), "{}", stage.name);
+        let overrides: BTreeSet<_> = module.overrides.iter().filter_map(|(_, o)| o.name.as_deref()).collect();
+        assert_eq!(overrides, stage.overrides.iter().copied().collect(), "{}", stage.name);
+        let bound: Vec<_> = module.global_variables.iter().filter(|(_, g)| g.binding.is_some()).collect();
+        assert_eq!(bound.len(), stage.bindings.len(), "{}: bindings", stage.name);
+        for (_, global) in bound {
+            let at = global.binding.as_ref().unwrap();
+            let name = global.name.as_deref().unwrap();
+            let place = format!("{}: binding {name}", stage.name);
+            assert_eq!(at.group, 0, "{place}");
+            let said = stage.bindings[at.binding as usize];
+            assert_eq!(said.name, name, "{place}");
+            let access = match global.space {
+                AddressSpace::Uniform => Access::Uniform,
+                AddressSpace::Storage { access } if access.contains(StorageAccess::STORE) => Access::ReadWrite,
+                AddressSpace::Storage { .. } => Access::Read,
+                other => panic!("{place}: address space {other:?}"),
+            };
+            assert_eq!(said.access, access, "{place}");
+            if access == Access::Uniform {
+                let ty = &module.types[global.ty];
+                let TypeInner::Struct { members, span } = &ty.inner else { panic!("{place}: not a struct") };
+                let (struct_name, fields, size) = stage.uniform;
+                assert_eq!(ty.name.as_deref(), Some(struct_name), "{place}");
+                assert_eq!(*span as usize, size, "{place}: size");
+                let seen: Vec<_> = members.iter().map(|m| (m.name.as_deref().unwrap(), m.offset as usize)).collect();
+                let told: Vec<_> = fields.iter().map(|f| (f.name, f.offset)).collect();
+                assert_eq!(seen, told, "{place}");
+            }
+        }
+    }
+}
+
+#[test]
+fn no_shader_is_an_orphan() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
+    let files: BTreeSet<String> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|f| f.unwrap().path())
+        .filter(|p| p.extension().is_some_and(|e| e == "wgsl"))
+        .map(|p| p.file_stem().unwrap().to_string_lossy().into_owned())
+        .collect();
+    let stages: BTreeSet<String> = stages::all().iter().map(|e| e.stage.name.to_string()).collect();
+    assert_eq!(files, stages);
+}
