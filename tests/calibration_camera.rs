@@ -3,7 +3,7 @@
 
 use sheetlight::calibrate::boards::{FindOptions, find};
 use sheetlight::camera::Intrinsics;
-use sheetlight::geometry::{Board, Camera, Rigid, Vec2};
+use sheetlight::geometry::{Board, Camera, Rigid};
 use sheetlight::recording::Recording;
 use std::path::PathBuf;
 
@@ -34,31 +34,44 @@ fn truth(reference: &std::path::Path, set: &str) -> (Intrinsics, Vec<Rigid<Camer
     (camera, serde_json::from_value(t["camera_T_board"].clone()).unwrap())
 }
 
-#[test]
-fn corners_lie_where_the_truth_puts_them() {
-    let Some(reference) = reference() else { return };
-    let recording = Recording::open(&reference.join("rendered/inputs/public/intrinsics")).unwrap();
-    let (camera, poses) = truth(&reference, "intrinsics");
+/// Corner errors of a set against its truth: rms px, rms over reported sigma, corners in all.
+fn corner_errors(set: &str, reference: &std::path::Path) -> (f64, f64, Vec<usize>) {
+    let recording = Recording::open(&reference.join("rendered/inputs/public").join(set)).unwrap();
+    let (camera, poses) = truth(reference, set);
     let board = recording.meta.board.clone().unwrap();
     let features = board.features();
-    let (mut sum, mut n, mut normalised) = (0.0, 0.0, 0.0);
+    let (mut sum, mut normalised, mut counts) = (0.0, 0.0, Vec::new());
     for (frame, pose) in recording.meta.frames.iter().zip(&poses) {
         let image = recording.picture(frame.ambient.as_ref().unwrap()).unwrap();
         let view = find(&image, &board, &FindOptions::default()).unwrap();
-        assert_eq!(view.points.len(), 54);
-        let mut mean = Vec2::zeros();
         let mut own = 0.0;
         for p in &view.points {
             let e = p.pixel - camera.pixel_from_point(&pose.point(&features[p.feature_id])).unwrap();
             assert!(e.norm() < 0.5, "{:?} corner {}: {e:?}", frame.ambient, p.feature_id);
             own += e.norm_squared();
             normalised += e.norm_squared() / p.sigma_px.powi(2);
-            mean += e / 54.0;
-            n += 2.0;
         }
         sum += own;
-        eprintln!("{:?} rms {:.4} mean {:.4} {:.4}", frame.ambient, (own / 108.0).sqrt(), mean.x, mean.y);
+        let n = view.points.len();
+        let blur = view.points.iter().map(|p| p.sigma_px).sum::<f64>() / n as f64;
+        eprintln!("{:?}: {n} corners, rms {:.4} px, sigma {blur:.4}", frame.ambient, (own / (2 * n) as f64).sqrt());
+        counts.push(n);
     }
-    eprintln!("corners: rms {:.4} px, over sigma {:.3}", (sum / n).sqrt(), (normalised / n).sqrt());
-    assert!((sum / n).sqrt() < 0.05);
+    let n = 2.0 * counts.iter().sum::<usize>() as f64;
+    eprintln!("{set}: rms {:.4} px, over sigma {:.3}", (sum / n).sqrt(), (normalised / n).sqrt());
+    ((sum / n).sqrt(), (normalised / n).sqrt(), counts)
+}
+
+#[test]
+fn chessboard_corners_lie_where_the_truth_puts_them() {
+    let Some(reference) = reference() else { return };
+    let (rms, _, counts) = corner_errors("intrinsics", &reference);
+    assert!(counts.iter().all(|n| *n == 54) && rms < 0.015);
+}
+
+#[test]
+fn charuco_corners_lie_where_the_truth_puts_them() {
+    let Some(reference) = reference() else { return };
+    let (rms, _, counts) = corner_errors("intrinsics_charuco", &reference);
+    assert!(counts.len() == 16 && counts.iter().all(|n| *n >= 30) && rms < 0.03);
 }

@@ -9,3 +9,4 @@ pub mod homography;
 pub mod measured_pose;
 pub mod pose;
 pub mod projection;
+pub mod report;

@@ -80,17 +80,26 @@ impl Grid {
             return false;
         }
         for _ in 0..missing {
-            let predicted = self.labels().filter(|&(i, j)| self.at(i, j).is_none()).find_map(|(i, j)| {
-                let between = |di: isize, dj: isize| Some((self.at(i - di, j - dj)? + self.at(i + di, j + dj)?) / 2.0);
-                let beyond =
-                    |di: isize, dj: isize| Some(self.at(i + di, j + dj)? * 2.0 - self.at(i + 2 * di, j + 2 * dj)?);
-                let guess = [between(1, 0), between(0, 1), beyond(1, 0), beyond(-1, 0), beyond(0, 1), beyond(0, -1)];
-                Some((i, j, guess.into_iter().flatten().next()?))
-            });
+            let predicted = self
+                .labels()
+                .filter(|&(i, j)| self.at(i, j).is_none())
+                .find_map(|(i, j)| Some((i, j, self.predict(i, j)?)));
             let Some((i, j, p)) = predicted else { return false };
             self.corners[j as usize * self.columns + i as usize] = Some(p);
         }
         true
+    }
+    /// Where the neighbours put corner (i, j), known or not.
+    fn predict(&self, i: isize, j: isize) -> Option<Vec2> {
+        let between = |di: isize, dj: isize| Some((self.at(i - di, j - dj)? + self.at(i + di, j + dj)?) / 2.0);
+        let beyond = |di: isize, dj: isize| Some(self.at(i + di, j + dj)? * 2.0 - self.at(i + 2 * di, j + 2 * dj)?);
+        let guesses = [between(1, 0), between(0, 1), beyond(1, 0), beyond(-1, 0), beyond(0, 1), beyond(0, -1)];
+        guesses.into_iter().flatten().next()
+    }
+    /// Index and place of every unknown corner that has neighbours to be predicted from.
+    pub fn predicted(&self) -> Vec<(usize, Vec2)> {
+        let unknown = self.labels().filter(|&(i, j)| self.at(i, j).is_none());
+        unknown.filter_map(|(i, j)| Some((j as usize * self.columns + i as usize, self.predict(i, j)?))).collect()
     }
     /// Each known corner refined on the picture; those where the fit fails become unknown.
     pub fn refined(&self, grey: &Grey, window: &Window, band_px: f64) -> Vec<Option<Corner>> {

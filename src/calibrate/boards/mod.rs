@@ -2,6 +2,7 @@
 //! positions and sigmas, or a sentence that says why it was not found.
 //! Frame and unit: pixels (centres at integers); feature ids index `BoardSpec::features()`.
 
+mod charuco;
 mod chessboard;
 mod grid;
 pub mod refine;
@@ -78,6 +79,11 @@ pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<B
         BoardSpec::Chessboard { inner_corners, first_square, .. } => {
             chessboard::find(image, *inner_corners, first_square != "white", options)
         }
-        _ => Err(Fault::usage("this kind of board is not read yet")),
+        BoardSpec::Charuco { squares, square_mm, marker_mm, dictionary, .. } => {
+            let layout =
+                charuco::Layout { squares: *squares, square_mm: *square_mm, marker_mm: *marker_mm, dictionary };
+            charuco::find(image, &layout, options)
+        }
+        BoardSpec::Circles { .. } => Err(Fault::usage("this kind of board is not read yet")),
     }
 }
