@@ -17,10 +17,11 @@ pub mod robot;
 
 pub mod calibrate;
 
+pub mod stages;
+
 pub mod scan;
 
 pub mod find;
 pub mod station;
 
 pub mod cli;
-pub mod stages;

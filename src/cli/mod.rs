@@ -2,6 +2,7 @@
 //! Frame and unit: as the subcommands say; every number is printed with its unit.
 
 mod console;
+mod scan;
 mod station;
 
 pub use console::Console;
@@ -27,6 +28,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Scan(scan::Args),
     /// Make, show, import into or export from a station folder
     #[command(subcommand)]
     Station(station::Command),
@@ -34,6 +36,7 @@ enum Command {
 
 fn run(command: &Command, console: &Console) -> Result<()> {
     match command {
+        Command::Scan(a) => scan::run(a, console),
         Command::Station(c) => station::run(c, console),
     }
 }

@@ -2,9 +2,17 @@
 //! Frame and unit: clouds in the robot's base frame, height maps in a grid frame of their own; mm.
 
 mod cloud;
+mod engine;
+mod extraction;
 mod grid;
 mod heightmap;
+pub mod overlay;
+mod scanner;
+mod source;
 
 pub use cloud::{CloudFile, CloudPoint, CloudWriter, PointSource, read_cloud, write_cloud};
 pub use grid::{Accumulator, GridOptions, GridSpec, grid};
 pub use heightmap::HeightMap;
+pub use extraction::Extraction;
+pub use scanner::{Profile, Scanner, Where};
+pub use source::{BadShot, Format, RawFormat, RawSource, RecordingSource, Shot, Source};

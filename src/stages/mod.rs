@@ -3,11 +3,16 @@
 
 pub mod ambient;
 pub mod cases;
+pub mod choose;
 mod entry;
 pub mod frame;
+pub mod lengthen;
 pub mod listing;
+pub mod peak;
+pub mod point;
 pub mod skeleton;
 pub mod stats;
+pub mod support;
 pub mod thin;
 pub mod threshold;
 pub mod tiles;

@@ -15,6 +15,8 @@ pub struct Settings {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub robot: Option<Convention>,
     pub working_volume: WorkingVolume,
+    /// How the stripe is found; docs/file-formats.md lists every key.
+    pub extraction: crate::scan::Extraction,
 }
 
 /// Where parts can be: camera-frame depths between which the laser plane is believed.
@@ -69,7 +71,7 @@ impl Settings {
             .cause("swapped, or metres instead of millimetres")
             .next("give the camera's nearest and farthest working distance in millimetres"));
         }
-        Ok(())
+        self.extraction.check()
     }
 
     /// Writes `station/station.toml`.

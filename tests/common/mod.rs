@@ -46,7 +46,9 @@ pub fn score(reference: &Path, estimate: &Path, truth: &Path) -> Option<serde_js
                 Err(e) => e.to_string(),
             };
             assert!(std::env::var_os("CI").is_none(), "the scorer did not run: {why}");
-            eprintln!("\n*** SKIPPED: the scorer needs python3 with numpy, scipy and libigl (make python): {why} ***\n");
+            eprintln!(
+                "\n*** SKIPPED: the scorer needs python3 with numpy, scipy and libigl (make python): {why} ***\n"
+            );
             None
         }
     }

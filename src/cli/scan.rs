@@ -1,0 +1,146 @@
+//! In: a recording (or raw frames on standard input) and a station. Out: a scan folder: cloud, height
+//! map, overlays, figures, page.
+//! Frame and unit: base frame, mm.
+
+use super::Console;
+use crate::fault::{Fault, Result};
+use crate::raster::Channel;
+use crate::recording::{Recording, load_poses};
+use crate::rig::{Rig, hash_file, hash_text};
+use crate::scan::{GridOptions, RawFormat, RawSource, RecordingSource, Where};
+use crate::station::{ScanOptions, ScanReport, Settings};
+use std::path::{Path, PathBuf};
+
+/// Turn the shots of a recording into a point cloud and a height map
+///
+/// Writes into --out: cloud.ply and cloud.pcd (base frame, mm, with a standard deviation for each
+/// point), height.tif (float, mm, NaN where nothing was seen), height.png with its scale beside it,
+/// pictures to look at, overlays of a few shots, scan.json with every figure, and index.html.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sheetlight scan recordings/board7 --station cell3 --out scans/board7
+  ffmpeg -i shots.mkv -f rawvideo -pix_fmt gray - | sheetlight scan --raw 4096x3072:gray8 \\
+      --poses poses.csv --station cell3 --out scans/live")]
+pub struct Args {
+    /// Recording folder with meta.json; leave out with --raw
+    recording: Option<PathBuf>,
+    /// Station folder with the calibration
+    #[arg(long)]
+    station: PathBuf,
+    /// Folder for the results
+    #[arg(long)]
+    out: PathBuf,
+    /// Pose file: a name in the recording, or with --raw a path
+    #[arg(long)]
+    poses: Option<String>,
+    /// Raw frames on standard input: WIDTHxHEIGHT:gray8, gray10le, gray12le or gray16le
+    #[arg(long, value_parser = super::parse::<RawFormat>, conflicts_with = "recording", requires = "poses")]
+    raw: Option<RawFormat>,
+    /// Part of a colour picture to use: red, green, blue or luma
+    #[arg(long, default_value = "luma", value_parser = super::parse::<Channel>)]
+    channel: Channel,
+    /// Where the stages run: auto (GPU where there is one), gpu, or cpu (the twins)
+    #[arg(long, default_value = "auto", value_parser = super::parse::<Where>)]
+    on: Where,
+    /// Edge of a height map cell, mm [default: about 1.5 points a cell]
+    #[arg(long)]
+    cell_mm: Option<f64>,
+    /// Shots to draw with their peaks
+    #[arg(long, default_value_t = 6)]
+    overlays: usize,
+    /// Leave out shots that cannot be read, and list them
+    #[arg(long)]
+    skip_bad: bool,
+    /// Continue an interrupted scan into the same folder
+    #[arg(long)]
+    resume: bool,
+}
+
+pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let (settings, rig) = (Settings::load(&args.station)?, Rig::load(&args.station)?);
+    let options = ScanOptions {
+        out: args.out.clone(),
+        place: args.on,
+        extraction: settings.extraction.clone(),
+        grid: GridOptions { cell: args.cell_mm, ..GridOptions::default() },
+        depth_mm: [settings.working_volume.near_mm, settings.working_volume.far_mm],
+        overlays: args.overlays,
+        skip_bad: args.skip_bad,
+        resume: args.resume,
+    };
+    let bar = console.bar("scanning", 0);
+    let progress = |done: usize, total: Option<usize>| {
+        bar.set_length(total.unwrap_or(done) as u64);
+        bar.set_position(done as u64);
+    };
+    let report = match (&args.recording, args.raw) {
+        (Some(folder), None) => {
+            let mut recording = Recording::open(folder)?;
+            recording.channel = args.channel;
+            let id = identity(folder, &recording, args.poses.as_deref())?;
+            let open = |first| Ok(Box::new(RecordingSource::open(&recording, args.poses.as_deref(), first)?) as Box<_>);
+            crate::station::scan(&id, &folder.display().to_string(), open, &rig, &options, progress)?
+        }
+        (None, Some(raw)) => {
+            let file = load_poses(Path::new(args.poses.as_deref().expect("required by --raw")))?;
+            file.warnings.iter().for_each(|w| console.warn(w));
+            if args.resume {
+                return Err(
+                    Fault::usage("a pipe cannot be resumed").next("record the frames to a folder to be able to resume")
+                );
+            }
+            let open = |_| Ok(Box::new(RawSource::new(raw, std::io::stdin().lock(), file.poses)) as Box<_>);
+            crate::station::scan("pipe", "standard input", open, &rig, &options, progress)?
+        }
+        _ => {
+            return Err(
+                Fault::usage("nothing to scan").next("give a recording folder, or --raw with frames on standard input")
+            );
+        }
+    };
+    bar.finish_and_clear();
+    console.result(&report, &summary(&report, &args.out));
+    Ok(())
+}
+
+/// What a resumed scan must have in common with the interrupted one.
+fn identity(folder: &Path, recording: &Recording, poses: Option<&str>) -> Result<String> {
+    let meta = hash_file(&folder.join("meta.json"))?;
+    let poses: Vec<[f64; 16]> = recording.poses(poses)?.iter().map(|p| p.to_rows()).collect();
+    let text = serde_json::to_string(&(meta, poses, recording.channel)).expect("plain data");
+    Ok(hash_text(text.as_bytes()))
+}
+
+fn summary(r: &ScanReport, out: &Path) -> String {
+    let mut s = format!(
+        "{} points from {} shots of {}x{} in {:.1} s ({:.1} shots/s, {})\n",
+        r.points, r.shots, r.image.width, r.image.height, r.seconds, r.shots_per_second, r.ran_on
+    );
+    s += &format!("each point good to {:.3} mm (median standard deviation)\n", r.median_sigma_mm);
+    let all: u64 = r.peaks.values().sum();
+    for (fate, n) in &r.peaks {
+        s += &format!("  {:>9} peaks {fate} ({:.2} %)\n", n, 100.0 * *n as f64 / all.max(1) as f64);
+    }
+    if !r.dark_shots.is_empty() {
+        s += &format!(
+            "  {} shots without a stripe: {:?}\n",
+            r.dark_shots.len(),
+            &r.dark_shots[..r.dark_shots.len().min(12)]
+        );
+    }
+    for (name, why) in &r.skipped {
+        s += &format!("  left out {name}: {why}\n");
+    }
+    if let Some(h) = &r.height_map {
+        s += &format!(
+            "height map {}x{} cells of {:.3} mm, {:.1} % covered, z {:.2} to {:.2} mm\n",
+            h.width,
+            h.height,
+            h.cell_mm,
+            100.0 * h.coverage,
+            h.z_low_mm,
+            h.z_high_mm
+        );
+    }
+    s + &format!("see {}", out.join("index.html").display())
+}

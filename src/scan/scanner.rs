@@ -1,0 +1,260 @@
+//! In: shots in order, a calibrated rig, settings. Out: their profiles in order: peaks with their fate,
+//! points with their standard deviation.
+//! Frame and unit: points in the base frame, mm (docs/math.md, Stripe peak; the paper's eq. 5 and 6).
+
+use super::engine::{Engine, Measured, Optical};
+use super::{CloudPoint, Extraction, Format, Shot};
+use crate::camera::Intrinsics;
+use crate::fault::{Fault, Result};
+use crate::geometry::{Base, Camera, Flange, Plane, Rigid, Vec3};
+use crate::rig::Rig;
+use crate::stages::peak::{Peak, SATURATED, Stripe};
+use crate::stages::point::{self, Optics};
+use crate::stages::support::{self, Support};
+
+/// Where the stages run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Where {
+    /// On the GPU where there is one, else on the CPU twins, which give the same results.
+    #[default]
+    Auto,
+    Gpu,
+    Cpu,
+}
+
+impl std::str::FromStr for Where {
+    type Err = String;
+    fn from_str(s: &str) -> std::result::Result<Where, String> {
+        match s {
+            "auto" => Ok(Where::Auto),
+            "gpu" => Ok(Where::Gpu),
+            "cpu" => Ok(Where::Cpu),
+            _ => Err(format!("unknown place '{s}': auto, gpu or cpu")),
+        }
+    }
+}
+
+/// What one shot came to.
+#[derive(Clone, Debug)]
+pub struct Profile {
+    pub shot: u32,
+    /// Every peak, the rejected ones with their reason.
+    pub peaks: Vec<Peak>,
+    /// One point a kept peak.
+    pub points: Vec<CloudPoint>,
+}
+
+/// Shots looked at for the stripe's width before the first profile leaves.
+const MEASURED_SHOTS: usize = 8;
+
+/// The life of a shot from picture to points, a few shots at a time; memory does not grow with the scan.
+pub struct Scanner {
+    engine: Engine,
+    camera_from_flange: Rigid<Camera, Flange>,
+    optics: Optics,
+    /// Where the laser plane meets the optical axis, or comes closest to it; camera frame, mm.
+    anchor: Vec3,
+    extraction: Extraction,
+    /// Held until the stripe is measured.
+    waiting: Vec<Shot>,
+    stripe: Option<Stripe>,
+    support: Option<Support>,
+    /// Poses of shots that the engine works on, oldest first.
+    poses: std::collections::VecDeque<(u32, Rigid<Base, Flange>)>,
+    up: Vec3,
+}
+
+impl Scanner {
+    /// `stripe` is what an earlier part of the same scan measured, if this one is resumed.
+    /// Refused: a rig without camera, laser plane or hand-eye; another picture shape than the camera's.
+    pub fn new(
+        rig: &Rig,
+        format: Format,
+        extraction: &Extraction,
+        depth_mm: [f64; 2],
+        place: Where,
+        stripe: Option<Stripe>,
+    ) -> Result<Scanner> {
+        extraction.check()?;
+        let camera = camera_for(&rig.need_camera()?.value, format)?;
+        let laser = rig.need_laser_plane()?.value;
+        let flange_from_camera = rig.need_hand_eye()?.value;
+        let optics = Optics::new(&camera, &laser);
+        let optical = Optical { camera, laser, depth_mm };
+        Ok(Scanner {
+            engine: Engine::new(format, &optical, extraction, place)?,
+            camera_from_flange: flange_from_camera.inverse(),
+            optics,
+            anchor: anchor(&laser, depth_mm),
+            extraction: extraction.clone(),
+            waiting: Vec::new(),
+            stripe,
+            support: None,
+            poses: Default::default(),
+            up: Vec3::z(),
+        })
+    }
+
+    /// Takes the next shot. Profiles become ready some shots later.
+    pub fn push(&mut self, shot: Shot) -> Result<()> {
+        self.waiting.push(shot);
+        if self.stripe.is_some() || self.waiting.len() >= MEASURED_SHOTS || !self.extraction.measure_stripe {
+            self.release()?;
+        }
+        Ok(())
+    }
+
+    /// Profiles that are done, in order.
+    pub fn ready(&mut self) -> Result<Vec<Profile>> {
+        self.collect(false)
+    }
+
+    /// All that is still under way, after the last shot.
+    pub fn finish(&mut self) -> Result<Vec<Profile>> {
+        self.release()?;
+        let mut done = self.collect(true)?;
+        if let Some(last) = self.support.as_mut().and_then(Support::finish) {
+            done.push(self.profile(last));
+        }
+        Ok(done)
+    }
+
+    /// The stripe's width and speckle, once measured or assumed; a resumed scan needs them.
+    pub fn stripe(&self) -> Option<Stripe> {
+        self.stripe
+    }
+
+    /// Towards the camera at the first shot, base frame.
+    pub fn up_in_base(&self) -> Vec3 {
+        self.up
+    }
+
+    /// Adapter and driver, or "CPU twins".
+    pub fn ran_on(&self) -> String {
+        self.engine.ran_on()
+    }
+
+    fn release(&mut self) -> Result<()> {
+        if self.waiting.is_empty() {
+            return Ok(());
+        }
+        if self.support.is_none() {
+            let assumed = Stripe { width_px: self.extraction.peak.width_px, speckle: self.extraction.peak.speckle };
+            let stripe = match self.stripe {
+                Some(s) => s,
+                None if self.extraction.measure_stripe => {
+                    let images: Vec<_> = self.waiting.iter().map(|s| &s.image).collect();
+                    self.engine.measure(&images)?.unwrap_or(assumed)
+                }
+                None => assumed,
+            };
+            self.stripe = Some(stripe);
+            self.engine.set_stripe(&stripe)?;
+            let base_from_camera = self.waiting[0].base_from_flange * self.camera_from_flange.inverse();
+            self.up = -base_from_camera.direction(&Vec3::z());
+            let [nx, ny, _] = self.optics.normal.map(f64::from);
+            let along = Vec3::new(ny, -nx, 0.0).try_normalize(1e-9).unwrap_or(Vec3::x());
+            let axis = base_from_camera.direction(&along);
+            self.support = Some(Support::new(self.extraction.support, stripe.width_px, &axis));
+        }
+        for shot in std::mem::take(&mut self.waiting) {
+            self.poses.push_back((shot.index, shot.base_from_flange));
+            self.engine.submit(shot.index, &shot.image)?;
+        }
+        Ok(())
+    }
+
+    fn collect(&mut self, all: bool) -> Result<Vec<Profile>> {
+        let mut done = Vec::new();
+        for Measured { shot, mut peaks } in self.engine.collect(all)? {
+            let (index, base_from_flange) = self.poses.pop_front().expect("one pose a shot submitted");
+            assert_eq!(index, shot, "the engine keeps the order");
+            let base_from_camera = base_from_flange * self.camera_from_flange.inverse();
+            let points = point::points(&mut peaks, &self.optics, &base_from_camera);
+            let profile = support::Profile {
+                shot,
+                peaks,
+                points,
+                anchor: base_from_camera.point(&self.anchor),
+                pitch: (self.anchor.z / f64::from(self.optics.pinhole[0])) as f32,
+            };
+            let judged = self.support.as_mut().and_then(|s| s.push(profile));
+            done.extend(judged.map(|p| self.profile(p)));
+        }
+        Ok(done)
+    }
+
+    fn profile(&self, judged: support::Profile) -> Profile {
+        let width = self.stripe.map_or(1.0, |s| s.width_px);
+        let limit = self.extraction.choose.uncertain * width;
+        let points = judged
+            .peaks
+            .iter()
+            .zip(&judged.points)
+            .filter(|(k, _)| k.kept())
+            .map(|(k, p)| CloudPoint {
+                position: p.position,
+                sigma_mm: p.sigma_mm,
+                intensity: k.amplitude,
+                quality: quality(k, limit),
+                shot: judged.shot,
+                u: k.u,
+                v: k.v,
+            })
+            .collect();
+        Profile { shot: judged.shot, peaks: judged.peaks, points }
+    }
+}
+
+/// The part of the allowed standard deviation that a peak leaves unused; halved where it is saturated.
+fn quality(k: &Peak, limit_px: f32) -> f32 {
+    let spare = (1.0 - k.sigma_px / limit_px).clamp(0.0, 1.0);
+    if k.flags & SATURATED != 0 { 0.5 * spare } else { spare }
+}
+
+/// The calibrated camera at the recording's resolution: the same one, or the same lens and field of view.
+fn camera_for(camera: &Intrinsics, format: Format) -> Result<Intrinsics> {
+    let (w, h) = (format.width, format.height);
+    let stretch = (f64::from(w) / f64::from(camera.width)) / (f64::from(h) / f64::from(camera.height));
+    if (stretch - 1.0).abs() > 1e-3 {
+        return Err(Fault::input(format!(
+            "pictures are {w}x{h}, the camera was calibrated at {}x{}",
+            camera.width, camera.height
+        ))
+        .cause("another camera, or a region of interest set in the camera")
+        .next("calibrate with pictures of the same kind, or record with the full sensor"));
+    }
+    Ok(camera.scaled_to(w, h))
+}
+
+fn anchor(laser: &Plane<Camera>, depth_mm: [f64; 2]) -> Vec3 {
+    // A sheet that runs along the optical axis never meets it: its foot at the middle depth serves.
+    let z = laser.offset / laser.normal.z;
+    let middle = 0.5 * (depth_mm[0] + depth_mm[1]);
+    if z.is_finite() && z > 0.5 * depth_mm[0] && z < 2.0 * depth_mm[1] {
+        return Vec3::new(0.0, 0.0, z);
+    }
+    let p = Vec3::new(0.0, 0.0, middle);
+    p - laser.normal * laser.distance(&p)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn another_picture_shape_is_refused() {
+        let camera = Intrinsics {
+            fx: 600.0,
+            fy: 600.0,
+            cx: 320.0,
+            cy: 240.0,
+            skew: 0.0,
+            distortion: [0.0; 5],
+            width: 640,
+            height: 480,
+        };
+        assert!(camera_for(&camera, Format { width: 4096, height: 3072, bits: 8 }).is_ok());
+        assert!(camera_for(&camera, Format { width: 640, height: 512, bits: 8 }).is_err());
+    }
+}

@@ -1,0 +1,273 @@
+//! In: a recording folder, or raw frames on a pipe with a pose file. Out: shots in order, decoded
+//! ahead on other threads, a bounded number of them in memory.
+//! Frame and unit: poses are base_from_flange, mm; pictures in grey levels of the sensor's depth.
+
+use crate::fault::{Fault, Result};
+use crate::geometry::{Base, Flange, Rigid};
+use crate::raster::Image;
+use crate::recording::Recording;
+use rayon::prelude::*;
+use std::io::Read;
+use std::sync::mpsc::{Receiver, sync_channel};
+
+/// A picture of the stripe with the robot pose that it was taken at.
+#[derive(Clone, Debug)]
+pub struct Shot {
+    /// Place in the recording, from 0.
+    pub index: u32,
+    pub name: String,
+    pub image: Image,
+    pub base_from_flange: Rigid<Base, Flange>,
+}
+
+/// A shot that could not be had, with the reason; the next one may be fine.
+#[derive(Clone, Debug)]
+pub struct BadShot {
+    pub index: u32,
+    pub name: String,
+    pub fault: Fault,
+}
+
+/// Size and depth of every shot of a source.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Format {
+    pub width: u32,
+    pub height: u32,
+    pub bits: u8,
+}
+
+/// Where shots come from: a folder, a pipe, a camera.
+pub trait Source {
+    fn format(&self) -> Format;
+    /// Number of shots still to come, where that is known.
+    fn remaining(&self) -> Option<usize>;
+    /// The next shot, in order; `None` at the end.
+    fn next(&mut self) -> Option<std::result::Result<Shot, BadShot>>;
+}
+
+/// Shots decoded ahead: enough for two threads to stay busy, 200 MB at 12 MP.
+const AHEAD: usize = 8;
+
+/// A recording folder as a source.
+pub struct RecordingSource {
+    format: Format,
+    remaining: usize,
+    shots: Receiver<std::result::Result<Shot, BadShot>>,
+}
+
+impl RecordingSource {
+    /// Starts decoding at shot `first`. `poses` names the pose file where meta.json does not.
+    /// Refused: no laser pictures, a pose index outside the pose file.
+    pub fn open(recording: &Recording, poses: Option<&str>, first: usize) -> Result<RecordingSource> {
+        let meta = &recording.meta;
+        let poses = recording.poses(poses)?;
+        let mut jobs = Vec::new();
+        for (i, frame) in meta.frames.iter().enumerate() {
+            let Some(name) = &frame.laser else { continue };
+            let pose = frame.pose.ok_or_else(|| {
+                Fault::input(format!("frame {i} ({name}) has no pose"))
+                    .cause("the recording was made without a robot")
+                    .next("add \"pose\" to each frame of meta.json")
+            })?;
+            let Some(base_from_flange) = poses.get(pose) else {
+                return Err(Fault::input(format!(
+                    "frame {i} ({name}) needs pose {pose}, the pose file has {}",
+                    poses.len()
+                ))
+                .cause("the pose file was cut short, or belongs to another recording")
+                .next("record the poses again, or leave the frames without poses out of meta.json"));
+            };
+            jobs.push((jobs.len() as u32, name.clone(), *base_from_flange));
+        }
+        if jobs.is_empty() {
+            return Err(Fault::input(format!("{}: has no picture with the laser on", recording.folder.display()))
+                .cause("a board recording, not a scan")
+                .next("give a recording whose frames name 'laser' pictures"));
+        }
+        let jobs = jobs.split_off(first.min(jobs.len()));
+        let format = Format { width: meta.image.width, height: meta.image.height, bits: meta.image.bits };
+        let (send, shots) = sync_channel(AHEAD);
+        let (remaining, recording) = (jobs.len(), recording.clone());
+        std::thread::spawn(move || {
+            for chunk in jobs.chunks(AHEAD / 2) {
+                let decoded: Vec<_> = chunk
+                    .par_iter()
+                    .map(|(index, name, pose)| match recording.picture(name) {
+                        Ok(image) => Ok(Shot { index: *index, name: name.clone(), image, base_from_flange: *pose }),
+                        Err(fault) => Err(BadShot { index: *index, name: name.clone(), fault }),
+                    })
+                    .collect();
+                for shot in decoded {
+                    // The scan ended early and dropped the receiver: nothing is left to do.
+                    if send.send(shot).is_err() {
+                        return;
+                    }
+                }
+            }
+        });
+        Ok(RecordingSource { format, remaining, shots })
+    }
+}
+
+impl Source for RecordingSource {
+    fn format(&self) -> Format {
+        self.format
+    }
+    fn remaining(&self) -> Option<usize> {
+        Some(self.remaining)
+    }
+    fn next(&mut self) -> Option<std::result::Result<Shot, BadShot>> {
+        let shot = self.shots.recv().ok()?;
+        self.remaining -= 1;
+        Some(shot)
+    }
+}
+
+/// Pixel layouts of `ffmpeg -f rawvideo` that carry one grey channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RawFormat {
+    pub format: Format,
+}
+
+impl std::str::FromStr for RawFormat {
+    type Err = String;
+    /// `4096x3072:gray8`, `gray10le`, `gray12le` or `gray16le`.
+    fn from_str(s: &str) -> std::result::Result<RawFormat, String> {
+        let help = || format!("'{s}' is not like 4096x3072:gray8 (or gray10le, gray12le, gray16le)");
+        let (size, layout) = s.split_once(':').ok_or_else(help)?;
+        let (w, h) = size.split_once('x').ok_or_else(help)?;
+        let (width, height) = (w.parse::<u32>().map_err(|_| help())?, h.parse::<u32>().map_err(|_| help())?);
+        let bits = match layout {
+            "gray8" | "gray" => 8,
+            "gray10le" => 10,
+            "gray12le" => 12,
+            "gray16le" => 16,
+            _ => return Err(help()),
+        };
+        if !(1..=65535).contains(&width) || !(1..=65535).contains(&height) {
+            return Err(format!("{width}x{height} is outside 1x1..65535x65535"));
+        }
+        Ok(RawFormat { format: Format { width, height, bits } })
+    }
+}
+
+/// Raw frames from a reader, one pose each.
+pub struct RawSource<R: Read> {
+    format: Format,
+    reader: R,
+    poses: Vec<Rigid<Base, Flange>>,
+    next: usize,
+    ended: bool,
+}
+
+impl<R: Read> RawSource<R> {
+    pub fn new(raw: RawFormat, reader: R, poses: Vec<Rigid<Base, Flange>>) -> RawSource<R> {
+        RawSource { format: raw.format, reader, poses, next: 0, ended: false }
+    }
+
+    /// Reads one frame: `Ok(None)` at a clean end, an error where the pipe ends inside a frame.
+    fn frame(&mut self) -> Result<Option<Image>> {
+        let Format { width, height, bits } = self.format;
+        let pixels = width as usize * height as usize;
+        let mut bytes = vec![0u8; pixels * if bits > 8 { 2 } else { 1 }];
+        let mut have = 0;
+        while have < bytes.len() {
+            match self.reader.read(&mut bytes[have..]) {
+                Ok(0) if have == 0 => return Ok(None),
+                Ok(0) => {
+                    return Err(Fault::input(format!(
+                        "the pipe ended after {have} of {} bytes of a frame",
+                        bytes.len()
+                    ))
+                    .cause("another frame size or pixel layout than the one given, or the sender stopped")
+                    .next("compare --raw with the sender's size and pixel format"));
+                }
+                Ok(n) => have += n,
+                Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
+                Err(e) => return Err(Fault::input(format!("the pipe failed: {e}")).next("start the sender again")),
+            }
+        }
+        if bits == 8 {
+            return Ok(Some(Image::from_u8(width, height, bytes)));
+        }
+        let levels: Vec<u16> = bytes.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
+        let (largest, limit) = (levels.iter().copied().max().unwrap_or(0), ((1u32 << bits) - 1) as u16);
+        if largest > limit {
+            return Err(Fault::input(format!("a frame holds the level {largest}, above {limit} of {bits} bits"))
+                .cause("big-endian data, or another depth")
+                .next("compare --raw with the sender's pixel format"));
+        }
+        Ok(Some(Image::from_u16(width, height, bits, levels)))
+    }
+}
+
+impl<R: Read> Source for RawSource<R> {
+    fn format(&self) -> Format {
+        self.format
+    }
+    fn remaining(&self) -> Option<usize> {
+        Some(self.poses.len() - self.next)
+    }
+    fn next(&mut self) -> Option<std::result::Result<Shot, BadShot>> {
+        if self.ended {
+            return None;
+        }
+        let index = self.next as u32;
+        let name = format!("frame {index}");
+        let bad = |fault| Some(Err(BadShot { index, name: name.clone(), fault }));
+        let image = match self.frame() {
+            Ok(Some(image)) => image,
+            Ok(None) => {
+                self.ended = true;
+                return None;
+            }
+            Err(fault) => {
+                self.ended = true;
+                return bad(fault);
+            }
+        };
+        let Some(&base_from_flange) = self.poses.get(self.next) else {
+            self.ended = true;
+            return bad(Fault::input(format!("frame {index} has no pose, the pose file has {}", self.poses.len()))
+                .cause("more frames than poses")
+                .next("record one pose a frame"));
+        };
+        self.next += 1;
+        Some(Ok(Shot { index, name, image, base_from_flange }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn poses(n: usize) -> Vec<Rigid<Base, Flange>> {
+        vec![Rigid::identity(); n]
+    }
+
+    #[test]
+    fn raw_formats_are_read_and_refused() {
+        assert_eq!(
+            "641x479:gray12le".parse::<RawFormat>().unwrap().format,
+            Format { width: 641, height: 479, bits: 12 }
+        );
+        for wrong in ["641x479", "641:gray8", "0x4:gray8", "4x4:rgb24", "4x70000:gray8"] {
+            assert!(wrong.parse::<RawFormat>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_pipe_gives_its_frames_and_says_where_it_broke() {
+        let raw: RawFormat = "2x2:gray10le".parse().unwrap();
+        let bytes: Vec<u8> = [1u16, 2, 3, 1023, 5, 6, 7, 8, 9].iter().flat_map(|v| v.to_le_bytes()).collect();
+        let mut source = RawSource::new(raw, bytes.as_slice(), poses(3));
+        assert_eq!(source.next().unwrap().unwrap().image, Image::from_u16(2, 2, 10, vec![1, 2, 3, 1023]));
+        assert_eq!(source.next().unwrap().unwrap().index, 1);
+        assert!(source.next().unwrap().unwrap_err().fault.what.contains("2 of 8 bytes"));
+        assert!(source.next().is_none());
+        let too_bright: Vec<u8> = [1024u16; 4].iter().flat_map(|v| v.to_le_bytes()).collect();
+        assert!(RawSource::new(raw, too_bright.as_slice(), poses(1)).next().unwrap().is_err());
+        let mut short = RawSource::new("2x2:gray8".parse().unwrap(), [0u8; 8].as_slice(), poses(1));
+        assert!(short.next().unwrap().is_ok() && short.next().unwrap().unwrap_err().fault.what.contains("no pose"));
+    }
+}

@@ -1,0 +1,116 @@
+//! In: a picture with a stripe and its skeleton. Out: the stripe's width and speckle contrast, from the light itself.
+//! Frame and unit: Gaussian sigma in px; speckle is a ratio. docs/math.md, Stripe peak (6).
+
+use super::{Grey, Peak, PeakParams, Setup, View, fit};
+use crate::raster::{Image, Pixels};
+
+/// What laser and lens make of a stripe: constant over a scan.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stripe {
+    /// Gaussian sigma of the profile, px.
+    pub width_px: f32,
+    /// Standard deviation over mean of the stripe's light from pixel to pixel.
+    pub speckle: f32,
+}
+
+/// Skeleton pixels looked at, spread over the picture; the median of 400 is good to 6 % of the spread.
+const SAMPLES: usize = 400;
+/// Fewer than this many usable peaks say nothing.
+const FEWEST: usize = 20;
+
+/// Width and speckle of the stripe in one picture; `None` where there is too little of it.
+/// Start: half the pixels above half maximum. Then three rounds of fitting with the medians of the round before.
+pub fn measure(image: &Image, skeleton: &[u32], p: &PeakParams) -> Option<Stripe> {
+    let step = (skeleton.len() / SAMPLES).max(1);
+    let sample: Vec<(i32, i32)> =
+        skeleton.iter().step_by(step).map(|&q| ((q & 0xffff) as i32, (q >> 16) as i32)).collect();
+    let mut stripe = Stripe { width_px: half_maximum(image, &sample)?.clamp(0.4, 12.0), speckle: p.speckle };
+    for _ in 0..3 {
+        let setup = Setup::new(image, &p.with(&stripe));
+        let (width, height) = (setup.width, setup.height);
+        let fits = match &image.pixels {
+            Pixels::U8(pixels) => fits(View { pixels, width, height }, &sample, &setup),
+            Pixels::U16(pixels) => fits(View { pixels, width, height }, &sample, &setup),
+        };
+        if fits.len() < FEWEST {
+            return None;
+        }
+        let width_px = median(fits.iter().map(|f| f.0).collect());
+        // Trimmed: the worst tenth are edges and double stripes, not speckle.
+        let mut ratios: Vec<(f32, f32)> = fits.iter().map(|f| (f.1, f.2)).collect();
+        ratios.sort_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)));
+        ratios.truncate(ratios.len() * 9 / 10);
+        let (excess, light) = ratios.iter().fold((0.0, 0.0), |s, r| (s.0 + r.0 / r.1, s.1 + 1.0));
+        let contrast2: f32 = excess / light;
+        stripe =
+            Stripe { width_px: width_px.clamp(0.4, 12.0), speckle: contrast2.clamp(0.0, 1.0).sqrt() };
+    }
+    Some(stripe)
+}
+
+/// Width, excess of the squared residuals over read and shot noise, and squared light, of the peaks that can be
+/// believed: clipped light hides all three, and a spot of one pixel is a hot pixel.
+fn fits<G: Grey>(image: G, sample: &[(i32, i32)], s: &Setup) -> Vec<(f32, f32, f32)> {
+    sample
+        .iter()
+        .filter_map(|&(x, y)| {
+            let k = fit::gaussian(image, x, y, s);
+            let usable = k.flags == 0 && k.snr > 10.0 && (0.4 * s.s0..2.5 * s.s0).contains(&k.width_px);
+            let (excess, light) = if usable { excess(image, x, y, &k, s)? } else { return None };
+            Some((k.width_px, excess, light))
+        })
+        .collect()
+}
+
+/// Sums over the window of residual² minus the noise that is no speckle, and of light². Three fitted numbers have
+/// eaten part of the noise, most where the light is: pixel by pixel the share that is left is 1 - leverage.
+fn excess<G: Grey>(image: G, x: i32, y: i32, k: &Peak, s: &Setup) -> Option<(f32, f32)> {
+    let n = (k.normal_u, k.normal_v);
+    let m = (k.u - x as f32) * n.0 + (k.v - y as f32) * n.1;
+    let row = |d: f32| {
+        let z = (d - m) / k.width_px;
+        let shape = (-0.5 * z * z).exp();
+        let light = k.amplitude * shape;
+        let quiet = s.read2 + s.gain * (light + k.background);
+        let j = nalgebra::Vector3::new(shape, light * z / k.width_px, light * z * z / k.width_px);
+        (j, light, quiet, quiet + s.speckle2 * light * light)
+    };
+    let mut normal = nalgebra::Matrix3::zeros();
+    fit::window(image, (x, y), n, m, s, |d, weight, _| {
+        let (j, _, _, variance) = row(d);
+        normal += j * j.transpose() * (weight / variance);
+    });
+    let inverse = normal.try_inverse()?;
+    let (mut excess, mut sum) = (0f32, 0f32);
+    fit::window(image, (x, y), n, m, s, |d, weight, level| {
+        let (j, light, quiet, variance) = row(d);
+        let left = (1.0 - weight / variance * (inverse * j).dot(&j)).max(0.0);
+        let residual = level - k.background - light;
+        excess += weight * (residual * residual - left * quiet);
+        sum += weight * left * light * light;
+    });
+    (sum > 0.0).then_some((excess, sum))
+}
+
+/// Median over the sample of the pixels above half of the local maximum, along the shorter image axis, as a sigma.
+fn half_maximum(image: &Image, sample: &[(i32, i32)]) -> Option<f32> {
+    let (w, h) = (image.width as i32, image.height as i32);
+    let at = |x: i32, y: i32| f32::from(image.get(x.clamp(0, w - 1) as u32, y.clamp(0, h - 1) as u32));
+    let mut widths: Vec<f32> = Vec::new();
+    for &(x, y) in sample {
+        let top = (-1..=1).flat_map(|j| (-1..=1).map(move |i| at(x + i, y + j))).fold(0f32, f32::max);
+        let run = |dx: i32, dy: i32| {
+            (1..60).take_while(|&k| at(x + k * dx, y + k * dy) > 0.5 * top).count()
+                + (1..60).take_while(|&k| at(x - k * dx, y - k * dy) > 0.5 * top).count()
+                + 1
+        };
+        widths.push(run(1, 0).min(run(0, 1)) as f32);
+    }
+    (widths.len() >= FEWEST).then(|| median(widths) / 2.355)
+}
+
+fn median(mut values: Vec<f32>) -> f32 {
+    values.sort_by(f32::total_cmp);
+    values[values.len() / 2]
+}

@@ -1,0 +1,89 @@
+//! In: a picture, a skeleton pixel, the expected stripe. Out: peaks by centre of gravity and by derivatives.
+//! Frame and unit: offsets from the skeleton pixel, px; grey levels.
+
+use super::fit::{background, direction, guess, window};
+use super::{Grey, Peak, SATURATED, Setup};
+
+/// Centre of gravity of the light above the background, within three widths of a first guess.
+pub(super) fn centroid<G: Grey>(image: G, x: i32, y: i32, s: &Setup) -> Peak {
+    let n = direction(image, x, y, s);
+    let base = background(image, x, y, n.0, n.1, s);
+    let (m0, _) = guess(image, (x, y), n, base, s);
+    let (mut sum, mut first, mut second, mut noise, mut top) = (0f32, 0f32, 0f32, 0f32, 0f32);
+    let mut saturated = false;
+    window(image, (x, y), n, m0, s, |d, weight, level| {
+        let light = weight * (level - base);
+        sum += light;
+        first += light * d;
+        second += light * (d * d);
+        top = top.max(level - base);
+        saturated |= level >= s.full_scale;
+        let e = weight * (d - m0);
+        let lit = (level - base).max(0.0);
+        noise += (e * e) * (s.read2 + s.gain * level + s.speckle2 * (lit * lit));
+    });
+    let m = if sum > 0.0 { (first / sum).clamp(m0 - 2.0 * s.s0, m0 + 2.0 * s.s0) } else { m0 };
+    let width = (second / sum.max(1e-6) - m * m).max(0.0).sqrt();
+    finish(x, y, n, m, top.max(1.0), base, width, noise.sqrt() / sum.max(1e-6), saturated, s)
+}
+
+/// Steger's line point: second-order Taylor expansion of the picture smoothed with a Gaussian of sigma
+/// width / √3 or more, which is where the response to a bar has one maximum ([steger98] sec. 2.2).
+pub(super) fn derivative<G: Grey>(image: G, x: i32, y: i32, s: &Setup) -> Peak {
+    let n = direction(image, x, y, s);
+    let base = background(image, x, y, n.0, n.1, s);
+    let sigma = (s.s0 / 3f32.sqrt()).max(0.8);
+    let (r, inverse) = ((3.5 * sigma).ceil() as i32, 1.0 / (sigma * sigma));
+    let (mut d1, mut d2, mut smooth, mut noise) = (0f32, 0f32, 0f32, 0f32);
+    let (mut top, mut saturated) = (0f32, false);
+    for j in -r..=r {
+        for i in -r..=r {
+            let level = image.at(x + i, y + j);
+            let d = i as f32 * n.0 + j as f32 * n.1;
+            let kernel = (-0.5 * inverse * (i * i + j * j) as f32).exp();
+            let first = kernel * d * inverse;
+            // Derivatives along the normal only: there the expansion is one-dimensional.
+            d1 += first * (level - base);
+            d2 += kernel * (d * d * inverse - 1.0) * inverse * (level - base);
+            smooth += kernel * (level - base);
+            let lit = (level - base).max(0.0);
+            noise += (first * first) * (s.read2 + s.gain * level + s.speckle2 * (lit * lit));
+            if i.abs().max(j.abs()) <= 1 {
+                top = top.max(level - base);
+            }
+            saturated |= level >= s.full_scale;
+        }
+    }
+    let m = if d2 < 0.0 { (-d1 / d2).clamp(-2.0 * s.s0, 2.0 * s.s0) } else { 0.0 };
+    // For a Gaussian line the curvature over the value of the smoothed profile is -1 / (w² + sigma²).
+    let width = (smooth / (-d2).max(1e-6) - sigma * sigma).max(0.0).sqrt();
+    finish(x, y, n, m, top.max(1.0), base, width, noise.sqrt() / (-d2).max(1e-6), saturated, s)
+}
+
+#[allow(clippy::too_many_arguments)]
+fn finish(
+    x: i32,
+    y: i32,
+    (nx, ny): (f32, f32),
+    m: f32,
+    amplitude: f32,
+    base: f32,
+    width: f32,
+    sigma: f32,
+    saturated: bool,
+    s: &Setup,
+) -> Peak {
+    Peak {
+        u: x as f32 + m * nx,
+        v: y as f32 + m * ny,
+        normal_u: nx,
+        normal_v: ny,
+        amplitude,
+        background: base,
+        width_px: width,
+        sigma_px: sigma,
+        snr: amplitude / (s.read2 + s.gain * base).sqrt(),
+        flags: if saturated { SATURATED } else { 0 },
+        ..Peak::default()
+    }
+}

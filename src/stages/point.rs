@@ -1,0 +1,121 @@
+//! In: chosen peaks, the camera, the laser plane, the shot's pose. Out: points with their standard deviation.
+//! Frame and unit: the frame that the given transform leads to (base or grid), mm. docs/math.md, Stripe peak (7), (8).
+
+use super::peak::{Peak, Reject};
+use crate::camera::Intrinsics;
+use crate::geometry::{Camera, Frame, Plane, Rigid, Vec2};
+
+/// A point of the profile, 4 words; not a number where the peak was refused.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Point {
+    /// mm
+    pub position: [f32; 3],
+    /// Standard deviation along the direction in which the point moves with the stripe's centre, mm; from the
+    /// peak's own noise, not from calibration or robot.
+    pub sigma_mm: f32,
+}
+
+impl Point {
+    pub const NONE: Point = Point { position: [f32::NAN; 3], sigma_mm: f32::NAN };
+}
+
+/// Camera and laser plane as the stage uses them: f32, the camera's frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Optics {
+    /// fx, fy, cx, cy, skew; px.
+    pub pinhole: [f32; 5],
+    /// k1, k2, p1, p2, k3.
+    pub distortion: [f32; 5],
+    /// normal · X = offset, mm; the offset is positive.
+    pub normal: [f32; 3],
+    pub offset: f32,
+}
+
+impl Optics {
+    pub fn new(camera: &Intrinsics, laser: &Plane<Camera>) -> Optics {
+        let laser = if laser.offset < 0.0 { laser.flipped() } else { *laser };
+        Optics {
+            pinhole: [camera.fx, camera.fy, camera.cx, camera.cy, camera.skew].map(|v| v as f32),
+            distortion: camera.distortion.map(|v| v as f32),
+            normal: [laser.normal.x as f32, laser.normal.y as f32, laser.normal.z as f32],
+            offset: laser.offset as f32,
+        }
+    }
+    /// Unit image direction in which the stripe moves with depth: the plane's normal without its z component.
+    pub fn across(&self) -> [f32; 2] {
+        let [x, y, _] = self.normal;
+        let l = (x * x + y * y).sqrt();
+        if l > 1e-6 { [x / l, y / l] } else { [0.0, 1.0] }
+    }
+}
+
+/// Newton steps of the lens inversion. The first error is the distortion itself, at most 0.2; each step squares it,
+/// so five leave less than 1e-6 px for every lens whose distortion is monotonic over the picture.
+const NEWTON: u32 = 5;
+
+/// CPU twin: one point per peak; peaks without a point get [`Reject::NoPoint`].
+pub fn points<To: Frame>(peaks: &mut [Peak], optics: &Optics, to_from_camera: &Rigid<To, Camera>) -> Vec<Point> {
+    let r = to_from_camera.rotation.map(|v| v as f32);
+    let t = to_from_camera.translation.map(|v| v as f32);
+    peaks
+        .iter_mut()
+        .map(|k| {
+            if !k.kept() {
+                return Point::NONE;
+            }
+            let Some((p, sigma_mm)) = camera_point(k, optics) else {
+                k.refuse(Reject::NoPoint);
+                return Point::NONE;
+            };
+            let row = |i: usize| (r[(i, 0)] * p[0] + r[(i, 1)] * p[1]) + (r[(i, 2)] * p[2] + t[i]);
+            Point { position: [row(0), row(1), row(2)], sigma_mm }
+        })
+        .collect()
+}
+
+/// The viewing ray's foot on the laser plane, camera frame, and its standard deviation; mm.
+pub fn camera_point(k: &Peak, o: &Optics) -> Option<([f32; 3], f32)> {
+    let [fx, fy, cx, cy, skew] = o.pinhole;
+    let yd = (k.v - cy) / fy;
+    let xd = (k.u - cx - skew * yd) / fx;
+    let (x, y) = undistort(xd, yd, &o.distortion)?;
+    let [nx, ny, nz] = o.normal;
+    let slope = nx * x + (ny * y + nz);
+    let z = o.offset / slope;
+    if !(slope > 1e-6 && z < 1e6) {
+        return None;
+    }
+    // One pixel along the peak's normal: dx, dy of the ray, dz from the plane.
+    let (dx, dy) = (k.normal_u / fx, k.normal_v / fy);
+    let dz = -z * (nx * dx + ny * dy) / slope;
+    let (ex, ey) = (dz * x + z * dx, dz * y + z * dy);
+    let per_px = (ex * ex + (ey * ey + dz * dz)).sqrt();
+    Some(([x * z, y * z, z], per_px * k.sigma_px))
+}
+
+/// Inverse Brown-Conrady by Newton's method; `None` beyond the picture of a lens that folds over.
+pub fn undistort(xd: f32, yd: f32, &[k1, k2, p1, p2, k3]: &[f32; 5]) -> Option<(f32, f32)> {
+    let (mut x, mut y) = (xd, yd);
+    let mut det = 1.0;
+    for _ in 0..NEWTON {
+        let r2 = x * x + y * y;
+        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+        let bend = k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2);
+        let ex = (x * radial - xd) + (2.0 * p1 * (x * y) + p2 * (r2 + 2.0 * (x * x)));
+        let ey = (y * radial - yd) + (p1 * (r2 + 2.0 * (y * y)) + 2.0 * p2 * (x * y));
+        let a = (radial + 2.0 * (x * x) * bend) + (2.0 * p1 * y + 6.0 * p2 * x);
+        let b = 2.0 * (x * y) * bend + (2.0 * p1 * x + 2.0 * p2 * y);
+        let d = (radial + 2.0 * (y * y) * bend) + (6.0 * p1 * y + 2.0 * p2 * x);
+        det = a * d - b * b;
+        x -= (d * ex - b * ey) / det;
+        y -= (a * ey - b * ex) / det;
+    }
+    (det > 0.0 && x.is_finite() && y.is_finite()).then_some((x, y))
+}
+
+/// The image of the part of the laser plane within a depth range: lit there is where the laser can be.
+pub fn plane_in_view(camera: &Intrinsics, laser: &Plane<Camera>, x: u32, y: u32) -> Option<f64> {
+    let ray = camera.ray_from_pixel(&Vec2::new(f64::from(x), f64::from(y)))?;
+    Some(ray.meet(laser)?.z)
+}

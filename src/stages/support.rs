@@ -1,0 +1,167 @@
+//! In: the points of shot after shot. Out: the same shots one later, points without neighbours in the shots before
+//! and after marked. Frame and unit: base frame, mm. A surface goes on from shot to shot; a reflection does not: it
+//! moves otherwise than the light that made it, and a speck stays in the picture while the robot moves.
+
+use super::peak::{Peak, Reject};
+use super::point::Point;
+use crate::fault::{Fault, Result};
+use crate::geometry::Vec3;
+
+/// How much of a neighbourhood a point needs. A point on a flat surface has, in each of the two neighbouring shots, a
+/// chord of points within the radius; support is the number found over the number expected there.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SupportParams {
+    /// Whether points are judged by their neighbours at all.
+    pub on: bool,
+    /// Half of the chord on a neighbouring shot's line, 0.01..=10 mm: what a point may be wrong by and still be
+    /// useful; smaller removes more at corners.
+    pub radius_mm: f32,
+    /// How much farther than the distance of the shots a neighbour may lie, 1..=3; 1.2 is a slope of 33 degrees.
+    pub slope: f32,
+    /// Support that a peak of the right width needs, 0..=1.
+    pub clean: f32,
+    /// Support that any other peak needs, 0..=1.
+    pub doubtful: f32,
+    /// Widths over the stripe's that count as right.
+    pub right_width: [f32; 2],
+}
+
+impl Default for SupportParams {
+    fn default() -> Self {
+        SupportParams { on: true, radius_mm: 0.3, slope: 1.2, clean: 0.1, doubtful: 0.45, right_width: [0.88, 1.22] }
+    }
+}
+
+impl SupportParams {
+    pub fn check(&self) -> Result<()> {
+        for (name, value, low, high) in [
+            ("radius_mm", self.radius_mm, 0.01, 10.0),
+            ("slope", self.slope, 1.0, 3.0),
+            ("clean", self.clean, 0.0, 1.0),
+            ("doubtful", self.doubtful, 0.0, 1.0),
+            ("right_width[0]", self.right_width[0], 0.0, 1.0),
+            ("right_width[1]", self.right_width[1], 1.0, 3.0),
+        ] {
+            if !(low..=high).contains(&value) {
+                return Err(Fault::usage(format!("support {name} is {value}, it must be in {low}..={high}")));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// One shot: peaks and their points, entry by entry.
+#[derive(Clone, Debug)]
+pub struct Profile {
+    pub shot: u32,
+    pub peaks: Vec<Peak>,
+    pub points: Vec<Point>,
+    /// Where the laser plane meets the optical axis at this shot, base frame: the distance of two shots.
+    pub anchor: Vec3,
+    /// Distance of neighbouring points along the stripe at the anchor, mm.
+    pub pitch: f32,
+}
+
+/// A kept point and its place along the line.
+#[derive(Clone, Copy)]
+struct Site {
+    along: f32,
+    position: [f32; 3],
+}
+
+struct Held {
+    profile: Profile,
+    /// Kept points, sorted along the line.
+    sites: Vec<Site>,
+}
+
+/// Holds three shots at a time, whatever the length of the scan.
+pub struct Support {
+    params: SupportParams,
+    /// The stripe's Gaussian sigma, px.
+    width_px: f32,
+    /// Direction along the laser line, base frame; only orders the points, so the first shot's serves the scan.
+    axis: [f32; 3],
+    before: Option<Held>,
+    now: Option<Held>,
+}
+
+impl Support {
+    /// `axis`: unit vector along the laser line, base frame.
+    pub fn new(params: SupportParams, width_px: f32, axis: &Vec3) -> Support {
+        Support { params, width_px, axis: [axis.x as f32, axis.y as f32, axis.z as f32], before: None, now: None }
+    }
+    /// Takes a shot and gives the one before it, judged.
+    pub fn push(&mut self, profile: Profile) -> Option<Profile> {
+        let sites = self.sites(&profile);
+        self.turn(Some(Held { profile, sites }))
+    }
+    /// Gives the last shot, judged.
+    pub fn finish(&mut self) -> Option<Profile> {
+        self.turn(None)
+    }
+    fn turn(&mut self, after: Option<Held>) -> Option<Profile> {
+        let now = std::mem::replace(&mut self.now, after);
+        let mut done = now?;
+        if self.params.on {
+            let others: Vec<&Held> = self.before.iter().chain(self.now.iter()).collect();
+            judge(&mut done.profile, &others, self.width_px, &self.axis, &self.params);
+        }
+        let out = done.profile.clone();
+        self.before = Some(done);
+        Some(out)
+    }
+    fn sites(&self, profile: &Profile) -> Vec<Site> {
+        let mut sites: Vec<Site> = (profile.peaks.iter().zip(&profile.points))
+            .filter(|(k, _)| k.kept())
+            .map(|(_, p)| Site { along: dot(&self.axis, &p.position), position: p.position })
+            .collect();
+        sites.sort_by(|a, b| a.along.total_cmp(&b.along));
+        sites
+    }
+}
+
+fn dot(a: &[f32; 3], b: &[f32; 3]) -> f32 {
+    a[0] * b[0] + (a[1] * b[1] + a[2] * b[2])
+}
+
+fn judge(profile: &mut Profile, others: &[&Held], width_px: f32, axis: &[f32; 3], p: &SupportParams) {
+    // Per neighbour: reach and the points expected within it.
+    let reaches: Vec<(f32, f32)> = others
+        .iter()
+        .map(|o| {
+            let step = (o.profile.anchor - profile.anchor).norm() as f32;
+            let reach2 = p.radius_mm * p.radius_mm + p.slope * p.slope * step * step;
+            (reach2.sqrt(), 2.0 * (reach2 - step * step).sqrt() / profile.pitch)
+        })
+        .collect();
+    let expected: f32 = reaches.iter().map(|r| r.1).sum();
+    if others.is_empty() || expected <= 0.0 {
+        return;
+    }
+    for (k, point) in profile.peaks.iter_mut().zip(&profile.points).filter(|(k, _)| k.kept()) {
+        let ratio = k.width_px / width_px;
+        let clean = ratio >= p.right_width[0] && ratio <= p.right_width[1];
+        let need = (if clean { p.clean } else { p.doubtful }) * expected;
+        let along = dot(axis, &point.position);
+        let found: usize = others
+            .iter()
+            .zip(&reaches)
+            .map(|(o, &(reach, _))| {
+                let from = o.sites.partition_point(|s| s.along < along - reach);
+                o.sites[from..]
+                    .iter()
+                    .take_while(|s| s.along <= along + reach)
+                    .filter(|s| {
+                        let d = [0, 1, 2].map(|i| s.position[i] - point.position[i]);
+                        dot(&d, &d) <= reach * reach
+                    })
+                    .count()
+            })
+            .sum();
+        if (found as f32) < need {
+            k.refuse(Reject::Unsupported);
+        }
+    }
+}

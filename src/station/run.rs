@@ -1,0 +1,244 @@
+//! In: a source of shots, a calibrated rig, an output folder. Out: the scan folder — cloud, height
+//! map, overlays, figures — written so that a crash loses nothing that was done.
+//! Frame and unit: cloud in the base frame, height map in its grid frame; mm (docs/file-formats.md).
+
+use super::progress::{Checkpoint, Lock};
+use crate::fault::{Fault, Result};
+use crate::rig::Rig;
+use crate::scan::{BadShot, CloudPoint, CloudWriter, Extraction, GridOptions, Profile, Scanner, Source, Where};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// How a scan is run.
+#[derive(Clone, Debug)]
+pub struct ScanOptions {
+    /// Folder for the results; made where it is missing.
+    pub out: PathBuf,
+    /// GPU, CPU twins, or the GPU where there is one.
+    pub place: Where,
+    pub extraction: Extraction,
+    pub grid: GridOptions,
+    /// Nearest and farthest camera depth believed, mm.
+    pub depth_mm: [f64; 2],
+    /// Shots to draw with their kept and rejected peaks, evenly spread; 0 for none.
+    pub overlays: usize,
+    /// Leave out shots that cannot be read instead of stopping; they are listed in scan.json.
+    pub skip_bad: bool,
+    /// Continue an interrupted scan of the same recording with the same rig and settings.
+    pub resume: bool,
+}
+
+/// What a scan came to; scan.json holds it.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+pub struct ScanReport {
+    pub format: u32,
+    pub program: String,
+    pub created: String,
+    pub units: String,
+    pub frame: String,
+    pub recording: String,
+    /// [`Rig::fingerprint`] of the calibration used.
+    pub rig_fingerprint: String,
+    /// Adapter and driver, or "CPU twins".
+    pub ran_on: String,
+    pub image: crate::scan::Format,
+    pub shots: usize,
+    pub points: u64,
+    /// Peaks by fate: kept, and rejected by reason.
+    pub peaks: BTreeMap<String, u64>,
+    /// Shots without a single kept peak.
+    pub dark_shots: Vec<u32>,
+    /// Shots left out, with the reason.
+    pub skipped: Vec<(String, String)>,
+    /// Median over the points of the standard deviation that each carries, mm.
+    pub median_sigma_mm: f64,
+    /// Width (px) and speckle of the stripe, measured in the first shots or as set.
+    pub stripe: Option<crate::stages::peak::Stripe>,
+    pub seconds: f64,
+    pub shots_per_second: f64,
+    pub settings: Extraction,
+    pub height_map: Option<HeightMapFigures>,
+}
+
+/// The height map's figures.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+pub struct HeightMapFigures {
+    pub width: u32,
+    pub height: u32,
+    pub cell_mm: f64,
+    /// Share of the cells that hold a height.
+    pub coverage: f64,
+    /// Heights between which 98 % of the cells lie, mm above the grid's plane.
+    pub z_low_mm: f64,
+    pub z_high_mm: f64,
+}
+
+/// Points and shots between two checkpoints: what a crash can cost.
+const CHECKPOINT_SHOTS: usize = 64;
+
+/// Runs a scan from the first shot to the last file. `id` names the recording (a hash of its
+/// meta.json and poses), so that a resumed scan cannot continue another one; `open` gives the source
+/// from a shot on; `progress` is told (shots done, shots in all).
+pub fn scan(
+    id: &str,
+    label: &str,
+    open: impl FnOnce(usize) -> Result<Box<dyn Source>>,
+    rig: &Rig,
+    options: &ScanOptions,
+    mut progress: impl FnMut(usize, Option<usize>),
+) -> Result<ScanReport> {
+    options.grid.check()?;
+    std::fs::create_dir_all(&options.out).map_err(|e| Fault::write(&options.out, e))?;
+    let _lock = Lock::take(&options.out)?;
+    let cloud_path = options.out.join("cloud.ply");
+    let settings = serde_json::to_string(&options.extraction).expect("plain data");
+    let identity = crate::rig::hash_text(format!("{id} {} {settings}", rig.fingerprint()).as_bytes());
+    let former = Checkpoint::load(&options.out)?.filter(|_| options.resume);
+    let mut state = match former {
+        Some(c) if c.identity == identity => c,
+        Some(_) => {
+            return Err(Fault::usage("the interrupted scan was of another recording, rig or settings")
+                .cause("something was changed since")
+                .next("scan again without --resume, or into another folder"));
+        }
+        None => Checkpoint::new(identity),
+    };
+    let mut cloud = if state.shots > 0 {
+        CloudWriter::resume(&cloud_path, state.points)?
+    } else {
+        CloudWriter::create(&cloud_path)?
+    };
+    // A resumed scan reads the last finished shot again, because points are judged by the shots around them.
+    let mut repeated = state.shots.min(1);
+    let mut source = open(state.shots - repeated)?;
+    let total = source.remaining().map(|n| n + state.shots - repeated);
+    let mut scanner =
+        Scanner::new(rig, source.format(), &options.extraction, options.depth_mm, options.place, state.stripe)?;
+    let mut overlays = Overlays::new(&options.out, options.overlays, total)?;
+    let started = Instant::now();
+    let first = state.shots;
+
+    let mut ended = false;
+    while !ended {
+        match source.next() {
+            Some(Ok(shot)) => scanner.push(overlays.keep(shot))?,
+            Some(Err(bad)) if options.skip_bad => state.skipped.push(described(bad)),
+            Some(Err(bad)) => {
+                // What was done stays done: the next run can resume here. The last shot is not taken: it
+                // still waits to be judged by its neighbour.
+                for profile in scanner.ready()?.iter().skip(repeated) {
+                    take(profile, &mut cloud, &mut state, &mut overlays)?;
+                }
+                state.stripe = scanner.stripe();
+                state.save(&options.out, &mut cloud)?;
+                return Err(bad
+                    .fault
+                    .at(bad.name)
+                    .next("repair the shot and run again with --resume, or leave it out with --skip-bad"));
+            }
+            None => ended = true,
+        }
+        let ready = if ended { scanner.finish()? } else { scanner.ready()? };
+        for profile in &ready {
+            if repeated > 0 {
+                repeated -= 1;
+                continue;
+            }
+            take(profile, &mut cloud, &mut state, &mut overlays)?;
+            if state.shots.is_multiple_of(CHECKPOINT_SHOTS) {
+                state.stripe = scanner.stripe();
+                state.save(&options.out, &mut cloud)?;
+            }
+        }
+        progress(state.shots, total);
+    }
+    let points = cloud.finish()?;
+    let seconds = started.elapsed().as_secs_f64();
+    let height_map =
+        super::products::write(&options.out, &cloud_path, points, &options.grid, rig, scanner.up_in_base())?;
+    let report = ScanReport {
+        format: 1,
+        program: format!("sheetlight {}", env!("CARGO_PKG_VERSION")),
+        created: jiff::Timestamp::now().to_string(),
+        units: "mm".into(),
+        frame: "base".into(),
+        recording: label.into(),
+        rig_fingerprint: rig.fingerprint(),
+        ran_on: scanner.ran_on(),
+        image: source.format(),
+        shots: state.shots,
+        points,
+        peaks: state.peaks.clone(),
+        dark_shots: state.dark.clone(),
+        skipped: state.skipped.clone(),
+        median_sigma_mm: state.median_sigma(),
+        stripe: scanner.stripe(),
+        seconds,
+        shots_per_second: (state.shots - first) as f64 / seconds.max(1e-9),
+        settings: options.extraction.clone(),
+        height_map,
+    };
+    let text = serde_json::to_string_pretty(&report).expect("plain data");
+    crate::rig::write_atomically(&options.out.join("scan.json"), text.as_bytes())?;
+    Checkpoint::remove(&options.out)?;
+    Ok(report)
+}
+
+fn described(bad: BadShot) -> (String, String) {
+    (bad.name, bad.fault.what)
+}
+
+fn take(profile: &Profile, cloud: &mut CloudWriter, state: &mut Checkpoint, overlays: &mut Overlays) -> Result<()> {
+    cloud.append(&profile.points)?;
+    overlays.draw(profile)?;
+    state.add(profile);
+    Ok(())
+}
+
+/// Draws a few shots, evenly spread; holds a picture only from its arrival until its profile is there.
+struct Overlays {
+    folder: PathBuf,
+    every: usize,
+    held: BTreeMap<u32, crate::raster::Image>,
+}
+
+impl Overlays {
+    fn new(out: &Path, count: usize, total: Option<usize>) -> Result<Overlays> {
+        let folder = out.join("overlays");
+        if count > 0 {
+            std::fs::create_dir_all(&folder).map_err(|e| Fault::write(&folder, e))?;
+        }
+        // Of a pipe of unknown length every 100th shot is drawn.
+        let every = if count == 0 { usize::MAX } else { total.map_or(100, |n| n.div_ceil(count)).max(1) };
+        Ok(Overlays { folder, every, held: BTreeMap::new() })
+    }
+    fn keep(&mut self, shot: crate::scan::Shot) -> crate::scan::Shot {
+        if self.every != usize::MAX && shot.index as usize % self.every == self.every / 2 {
+            self.held.insert(shot.index, shot.image.clone());
+        }
+        shot
+    }
+    fn draw(&mut self, profile: &Profile) -> Result<()> {
+        let Some(image) = self.held.remove(&profile.shot) else { return Ok(()) };
+        let path = self.folder.join(format!("shot_{:05}.png", profile.shot));
+        crate::scan::overlay::draw(&image, &profile.peaks).save_png(&path)
+    }
+}
+
+/// Reads `scan.json` of a finished scan.
+pub fn load_report(scan: &Path) -> Result<ScanReport> {
+    let path = scan.join("scan.json");
+    let text = std::fs::read_to_string(&path)
+        .map_err(|e| Fault::read(&path, e).next("give the folder that sheetlight scan --out wrote"))?;
+    serde_json::from_str(&text).map_err(|e| {
+        Fault::input(format!("{}: is not a scan's report: {e}", path.display()))
+            .cause("another version, or edited by hand")
+            .next("scan again")
+    })
+}
+
+/// The points of a finished scan, streamed.
+pub fn cloud_of(scan: &Path) -> Result<Vec<CloudPoint>> {
+    crate::scan::read_cloud(&scan.join("cloud.ply"))
+}
