@@ -16,6 +16,7 @@ pub mod rig;
 pub mod robot;
 
 pub mod calibrate;
+pub mod simulate;
 
 pub mod stages;
 

@@ -1,0 +1,225 @@
+//! In: a station, a scene and the camera's pose in it. Out: the light that the sheet or the pointer
+//! sends into each pixel: beams are followed to the surface, once more by mirrors, and to the camera.
+//! Frame and unit: scene frame, mm; grey as share of full scale, before noise.
+
+use super::scene::{Hit, Scene};
+use super::station::Station;
+use crate::geometry::{Camera, Frame, Rigid, Vec3};
+
+/// The frame of a scene file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct InScene;
+impl Frame for InScene {
+    const NAME: &'static str = "scene";
+}
+
+/// A grey picture in the making.
+#[derive(Clone, Debug)]
+pub struct Canvas {
+    pub width: u32,
+    pub height: u32,
+    pub pixels: Vec<f32>,
+}
+
+impl Canvas {
+    pub fn new(width: u32, height: u32) -> Canvas {
+        Canvas { width, height, pixels: vec![0.0; width as usize * height as usize] }
+    }
+
+    /// Adds `energy`, spread by a Gaussian of `sigma` px about (u, v). The pixel's own area is part of
+    /// `sigma`: a box of one pixel adds 1/12 px².
+    fn splat(&mut self, u: f64, v: f64, energy: f64, sigma: f64) {
+        let reach = (3.5 * sigma).ceil() as i64;
+        let (u0, v0) = (u.round() as i64, v.round() as i64);
+        if u0 + reach < 0 || v0 + reach < 0 || u0 - reach >= self.width.into() || v0 - reach >= self.height.into() {
+            return;
+        }
+        const MOST: usize = 256;
+        let n = ((2 * reach + 1) as usize).min(MOST);
+        let (mut wu, mut wv) = ([0f32; MOST], [0f32; MOST]);
+        let k = -0.5 / (sigma * sigma);
+        for i in 0..n {
+            let d = i as f64 - reach as f64;
+            wu[i] = (k * (d + u0 as f64 - u).powi(2)).exp() as f32;
+            wv[i] = (k * (d + v0 as f64 - v).powi(2)).exp() as f32;
+        }
+        let total: f32 = wu[..n].iter().sum::<f32>() * wv[..n].iter().sum::<f32>();
+        let scale = energy as f32 / total;
+        for (j, wv) in wv[..n].iter().enumerate() {
+            let y = v0 - reach + j as i64;
+            if y < 0 || y >= self.height.into() {
+                continue;
+            }
+            let row = y * i64::from(self.width);
+            for (i, wu) in wu[..n].iter().enumerate() {
+                let x = u0 - reach + i as i64;
+                if x >= 0 && x < self.width.into() {
+                    self.pixels[(row + x) as usize] += scale * wu * wv;
+                }
+            }
+        }
+    }
+}
+
+/// One surface point on the middle of the sheet that the camera sees.
+#[derive(Clone, Copy, Debug)]
+pub struct LitPoint {
+    /// Scene frame.
+    pub point: Vec3,
+    /// Pixel.
+    pub u: f64,
+    pub v: f64,
+}
+
+/// One moment: a station whose camera stands somewhere in a scene.
+pub struct View<'a> {
+    pub station: &'a Station,
+    pub scene: &'a Scene,
+    pub scene_from_camera: Rigid<InScene, Camera>,
+}
+
+/// Beyond this nothing is lit or seen, mm.
+const FAR: f64 = 2000.0;
+
+impl View<'_> {
+    fn sigma_px(&self) -> f64 {
+        (self.station.blur_px().powi(2) + 1.0 / 12.0).sqrt()
+    }
+
+    /// The sheet's light in every pixel, and the visible points of its middle.
+    pub fn sheet(&self, canvas: &mut Canvas) -> Vec<LitPoint> {
+        let (s, laser) = (self.station, &self.station.laser);
+        let source = self.scene_from_camera.point(&laser.source);
+        let [axis, normal] = [laser.axis, laser.normal].map(|d| self.scene_from_camera.direction(&d));
+        let side = normal.cross(&axis);
+        let reach = laser.half_fan_deg.to_radians().tan();
+        let pixel = s.working_distance / s.camera.fx;
+        let source_distance = (laser.source - Vec3::new(0.0, 0.0, s.working_distance)).norm();
+        // A third of a pixel between beams, along and across: the blur hides the raster.
+        let along = (2.0 * reach * source_distance / pixel * 3.0).ceil() as usize;
+        let across = (4.0 * laser.waist_radius / pixel * 3.0).ceil() as usize | 1;
+        let gain = self.sheet_gain();
+        let mut middle = Vec::new();
+        for i in 0..along {
+            let slope = reach * (2.0 * (i as f64 + 0.5) / along as f64 - 1.0);
+            let direction = (axis + side * slope).normalize();
+            // Equal steps of tan φ; the power per angle falls off towards the edges of the fan.
+            let dphi = 2.0 * reach / along as f64 / (1.0 + slope * slope);
+            let power = gain * dphi * (1.0 - 0.35 * (slope / reach).powi(2));
+            let Some(centre) = self.scene.hit(&source, &direction, FAR) else { continue };
+            let radius = laser.radius(centre.t);
+            let mut total = 0.0;
+            let weight = |k: usize| {
+                let x = 2.0 * (2.0 * (k as f64 + 0.5) / across as f64 - 1.0);
+                (x, (-2.0 * x * x).exp())
+            };
+            (0..across).for_each(|k| total += weight(k).1);
+            for k in 0..across {
+                let (x, w) = weight(k);
+                let start = source + normal * (x * radius);
+                let hit = if x == 0.0 { Some(centre) } else { self.scene.hit(&start, &direction, FAR) };
+                let Some(hit) = hit else { continue };
+                let seen = self.deposit(canvas, &hit, &direction, power * w / total);
+                if let (true, Some((u, v))) = (x.abs() < 1e-12, seen) {
+                    middle.push(LitPoint { point: hit.point, u, v });
+                }
+            }
+        }
+        middle
+    }
+
+    /// The pointer's light; returns the middle of the spot where the camera sees it.
+    pub fn spot(&self, canvas: &mut Canvas) -> Option<LitPoint> {
+        let (s, pointer) = (self.station, &self.station.pointer);
+        let source = self.scene_from_camera.point(&pointer.source);
+        let axis = self.scene_from_camera.direction(&pointer.axis);
+        let centre = self.scene.hit(&source, &axis, FAR)?;
+        let radius = pointer.radius(centre.t);
+        let side = axis.cross(&Vec3::new(0.3, 0.5, 0.8)).normalize();
+        let up = axis.cross(&side);
+        let pixel = centre.t / s.camera.fx;
+        let n = (4.0 * radius / pixel * 3.0).ceil() as usize | 1;
+        let place = |k: usize| 2.0 * (2.0 * (k as f64 + 0.5) / n as f64 - 1.0);
+        let total: f64 = (0..n).map(|k| (-2.0 * place(k).powi(2)).exp()).sum::<f64>().powi(2);
+        let gain = self.spot_gain();
+        let mut middle = None;
+        for i in 0..n {
+            for j in 0..n {
+                let (x, y) = (place(i), place(j));
+                let start = source + (side * x + up * y) * radius;
+                let Some(hit) = self.scene.hit(&start, &axis, FAR) else { continue };
+                let weight = (-2.0 * (x * x + y * y)).exp() / total;
+                let seen = self.deposit(canvas, &hit, &axis, gain * weight);
+                if let (true, Some((u, v))) = (x.abs() < 1e-12 && y.abs() < 1e-12, seen) {
+                    middle = Some(LitPoint { point: hit.point, u, v });
+                }
+            }
+        }
+        middle
+    }
+
+    /// Lets a beam's power fall on a surface, and the mirrored share of it on the next one.
+    fn deposit(&self, canvas: &mut Canvas, hit: &Hit, direction: &Vec3, power: f64) -> Option<(f64, f64)> {
+        let pixel = self.glow(canvas, hit, direction, power);
+        let mirror = hit.material.mirror;
+        if mirror > 0.0 {
+            let onward = direction - hit.normal * (2.0 * direction.dot(&hit.normal));
+            let start = hit.point + hit.normal * 1e-4;
+            if let Some(second) = self.scene.hit(&start, &onward, FAR) {
+                self.glow(canvas, &second, &onward, power * mirror);
+            }
+        }
+        pixel
+    }
+
+    /// What the lens collects of the light that a lit point throws back: albedo (and gloss) times the
+    /// cosine at the surface, times the lens's solid angle.
+    fn glow(&self, canvas: &mut Canvas, hit: &Hit, direction: &Vec3, power: f64) -> Option<(f64, f64)> {
+        let eye = self.scene_from_camera.translation;
+        let way = eye - hit.point;
+        let distance = way.norm();
+        let to_eye = way / distance;
+        let cosine = hit.normal.dot(&to_eye);
+        if cosine <= 0.0 {
+            return None;
+        }
+        let in_camera = self.scene_from_camera.inverse().point(&hit.point);
+        let px = self.station.camera.pixel_from_point(&in_camera)?;
+        let (w, h) = (f64::from(self.station.camera.width), f64::from(self.station.camera.height));
+        if !(px.x > -20.0 && px.y > -20.0 && px.x < w + 20.0 && px.y < h + 20.0) {
+            return None;
+        }
+        if !self.scene.clear(&(hit.point + hit.normal * 1e-4), &eye) {
+            return None;
+        }
+        let m = hit.material;
+        let mirrored = direction - hit.normal * (2.0 * direction.dot(&hit.normal));
+        let gloss = m.gloss * mirrored.dot(&to_eye).max(0.0).powf(m.gloss_exponent);
+        let off_axis = in_camera.z / distance;
+        let energy = power * (m.albedo + gloss) * cosine * off_axis / (distance * distance);
+        canvas.splat(px.x, px.y, energy, self.sigma_px());
+        Some((px.x, px.y))
+    }
+
+    /// Scales power so that the stripe on a white plate across the axis at the working distance
+    /// peaks at `laser_white` of full scale: energy per column = peak · √(2π) · σ.
+    fn sheet_gain(&self) -> f64 {
+        let (s, laser) = (self.station, &self.station.laser);
+        let z = s.working_distance;
+        let range = (Vec3::new(0.0, 0.0, z) - laser.source).norm();
+        // The sheet's plane cuts the plate at an angle: its width grows by 1 / |n · plate's in-plane normal|.
+        let width = laser.radius(range) / 2.0 / laser.normal.xy().norm().max(0.05) * s.camera.fy / z;
+        let sigma = width.hypot(self.sigma_px());
+        let angle_per_column = z / s.camera.fx / range;
+        s.sensor.laser_white * (2.0 * std::f64::consts::PI).sqrt() * sigma * z * z / angle_per_column
+    }
+
+    /// The same for the pointer's spot: energy = peak · 2π · σ².
+    fn spot_gain(&self) -> f64 {
+        let s = self.station;
+        let z = s.working_distance;
+        let width = s.pointer.radius(z) / 2.0 * s.camera.fy / z;
+        let sigma = width.hypot(self.sigma_px());
+        s.sensor.laser_white * 2.0 * std::f64::consts::PI * sigma * sigma * z * z
+    }
+}

@@ -1,0 +1,22 @@
+//! In: a scene file, a design, a seed. Out: recordings of a station whose truth is known: pictures,
+//! poses, calibration and the exact surface to measure errors against.
+//! Frame and unit: scene, base, flange, camera, part; mm. Independent of the scanner: it never reads a peak.
+
+mod light;
+mod pattern;
+mod picture;
+mod plan;
+mod scene;
+mod solid;
+pub mod station;
+mod truth;
+mod write;
+
+pub use light::{Canvas, InScene, LitPoint, View};
+pub use pattern::{is_black, plate};
+pub use picture::{expose, hot_pixels};
+pub use plan::{Views, above, base_from_scene, board_views, flange, reported, scan};
+pub use scene::{CutSpec, Hit, Material, PartSpec, Scene, SceneSpec, ShapeSpec, SolidSpec, part_pose};
+pub use station::{LineLaser, Pointer, Sensor, Station};
+pub use truth::{CloudErrors, PartTruth, Truth, TruthFile};
+pub use write::{DEFAULT_SCENE, Set, SimulateOptions, Simulated, simulate};

@@ -1,0 +1,169 @@
+//! In: light per pixel. Out: the sensor's picture: room light, blur, speckle, shot and read noise, hot
+//! pixels, saturation, grey steps.
+//! Frame and unit: pixels; grey levels of the sensor's depth.
+
+use super::light::{Canvas, View};
+use super::station::Sensor;
+use crate::geometry::{Vec2, Vec3};
+use crate::raster::Image;
+use rand::Rng;
+use rand_distr::{Distribution, Gamma, StandardNormal};
+use rand_pcg::Pcg64;
+
+impl View<'_> {
+    /// Grey of a pixel under room light that comes from above at a slant, as share of white.
+    fn room_light(&self, u: f64, v: f64) -> f32 {
+        let Some(ray) = self.station.camera.ray_from_pixel(&Vec2::new(u, v)) else { return 0.0 };
+        let eye = self.scene_from_camera.translation;
+        let direction = self.scene_from_camera.direction(&ray.direction);
+        let Some(hit) = self.scene.hit(&eye, &direction, 2000.0) else { return 0.02 };
+        let lamp = self.scene_from_camera.direction(&Vec3::new(-0.35, -0.25, -0.9)).normalize();
+        let shade = 0.55 + 0.45 * hit.normal.dot(&lamp).max(0.0);
+        // cos⁴ of the angle to the axis: natural vignetting of a lens.
+        (hit.material.albedo * shade * ray.direction.z.powi(4)) as f32
+    }
+
+    /// Room light in every pixel with `samples`² rays a pixel, blurred by the lens.
+    pub fn ambient(&self, samples: u32) -> Canvas {
+        let camera = &self.station.camera;
+        let mut canvas = Canvas::new(camera.width, camera.height);
+        let offsets: Vec<f64> = (0..samples).map(|i| (f64::from(i) + 0.5) / f64::from(samples) - 0.5).collect();
+        for (i, pixel) in canvas.pixels.iter_mut().enumerate() {
+            let (x, y) = ((i as u32 % camera.width) as f64, (i as u32 / camera.width) as f64);
+            let sum: f32 = offsets
+                .iter()
+                .flat_map(|dy| offsets.iter().map(move |dx| (dx, dy)))
+                .map(|(dx, dy)| self.room_light(x + dx, y + dy))
+                .sum();
+            *pixel = sum / (samples * samples) as f32;
+        }
+        blur(&mut canvas, self.station.blur_px());
+        canvas
+    }
+
+    /// Room light from one ray every few pixels, interpolated: enough for the faint leak through a
+    /// laser's filter.
+    pub fn faint_ambient(&self) -> Canvas {
+        let camera = &self.station.camera;
+        let step = (camera.width / 160).max(1);
+        let (nx, ny) = (camera.width.div_ceil(step) + 1, camera.height.div_ceil(step) + 1);
+        let knots: Vec<f32> =
+            (0..nx * ny).map(|i| self.room_light(f64::from((i % nx) * step), f64::from((i / nx) * step))).collect();
+        let mut canvas = Canvas::new(camera.width, camera.height);
+        let scale = 1.0 / step as f32;
+        for (y, row) in canvas.pixels.chunks_exact_mut(camera.width as usize).enumerate() {
+            let (j, fy) = (y as u32 / step, (y as u32 % step) as f32 * scale);
+            let (above, below) = (&knots[(j * nx) as usize..], &knots[((j + 1) * nx) as usize..]);
+            for (x, pixel) in row.iter_mut().enumerate() {
+                let (i, fx) = (x / step as usize, (x as u32 % step) as f32 * scale);
+                let top = above[i] + fx * (above[i + 1] - above[i]);
+                let bottom = below[i] + fx * (below[i + 1] - below[i]);
+                *pixel = top + fy * (bottom - top);
+            }
+        }
+        canvas
+    }
+}
+
+/// Gaussian blur, separable, edges repeated.
+pub fn blur(canvas: &mut Canvas, sigma: f64) {
+    let reach = (3.0 * sigma).ceil() as usize;
+    let mut kernel: Vec<f32> =
+        (0..=2 * reach).map(|i| (-0.5 * ((i as f64 - reach as f64) / sigma).powi(2)).exp() as f32).collect();
+    let total: f32 = kernel.iter().sum();
+    kernel.iter_mut().for_each(|k| *k /= total);
+    let (w, h) = (canvas.width as usize, canvas.height as usize);
+    let mut line = Vec::new();
+    for row in canvas.pixels.chunks_exact_mut(w) {
+        line.clear();
+        line.extend(std::iter::repeat_n(row[0], reach).chain(row.iter().copied()));
+        line.extend(std::iter::repeat_n(row[w - 1], reach));
+        for (pixel, window) in row.iter_mut().zip(line.windows(kernel.len())) {
+            *pixel = window.iter().zip(&kernel).map(|(a, b)| a * b).sum();
+        }
+    }
+    let before = canvas.pixels.clone();
+    for (y, row) in canvas.pixels.chunks_exact_mut(w).enumerate() {
+        row.fill(0.0);
+        for (i, k) in kernel.iter().enumerate() {
+            let from = (y + i).saturating_sub(reach).min(h - 1) * w;
+            row.iter_mut().zip(&before[from..from + w]).for_each(|(pixel, b)| *pixel += k * b);
+        }
+    }
+}
+
+/// Hot pixels of a sensor: place and extra grey as share of full scale; the same in every picture.
+pub fn hot_pixels(sensor: &Sensor, pixels: usize, rng: &mut Pcg64) -> Vec<(usize, f32)> {
+    let count = (sensor.hot_per_million * pixels as f64 / 1e6).round() as usize;
+    (0..count).map(|_| (rng.random_range(0..pixels), rng.random_range(0.02f32..0.5))).collect()
+}
+
+/// Turns light (share of full scale) into grey levels. `laser` has speckle, `room` has none.
+pub fn expose(
+    sensor: &Sensor,
+    laser: &Canvas,
+    room: &Canvas,
+    room_gain: f32,
+    hot: &[(usize, f32)],
+    rng: &mut Pcg64,
+) -> Image {
+    let speckle = (sensor.speckle > 0.0).then(|| {
+        let grains = 1.0 / (sensor.speckle * sensor.speckle);
+        Gamma::new(grains as f32, (1.0 / grains) as f32).expect("positive")
+    });
+    let well = sensor.full_well_e as f32;
+    let read = (sensor.read_noise_e * sensor.read_noise_e) as f32;
+    let full = ((1u32 << sensor.bits) - 1) as f32;
+    let mut light: Vec<f32> = laser
+        .pixels
+        .iter()
+        .zip(&room.pixels)
+        .map(|(&l, &r)| match &speckle {
+            Some(gamma) if l > 1e-4 => l * gamma.sample(rng) + r * room_gain,
+            _ => l + r * room_gain,
+        })
+        .collect();
+    hot.iter().for_each(|&(i, extra)| light[i] += extra);
+    let mut grey = |l: f32| {
+        let electrons = l * well;
+        let noise: f32 = StandardNormal.sample(rng);
+        ((electrons + noise * (electrons + read).sqrt()) / well * full + 0.5).clamp(0.0, full)
+    };
+    if sensor.bits == 8 {
+        Image::from_u8(laser.width, laser.height, light.into_iter().map(|l| grey(l) as u8).collect())
+    } else {
+        Image::from_u16(laser.width, laser.height, sensor.bits, light.into_iter().map(|l| grey(l) as u16).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+
+    #[test]
+    fn noise_has_the_stated_size() {
+        let sensor = Sensor { hot_per_million: 0.0, bits: 12, ..Sensor::default() };
+        let mut flat = Canvas::new(200, 200);
+        flat.pixels.fill(0.5);
+        let none = Canvas::new(200, 200);
+        let picture = expose(&sensor, &none, &flat, 1.0, &[], &mut Pcg64::seed_from_u64(1));
+        let grey = picture.to_f32();
+        let mean = grey.iter().sum::<f32>() / 4e4;
+        let variance = grey.iter().map(|g| (g - mean).powi(2)).sum::<f32>() / 4e4;
+        // 5000 electrons: shot noise 70.7, read noise 20, together 73.5 of 10,000 = 30.1 of 4095.
+        assert!((mean - 2047.5).abs() < 1.0, "{mean}");
+        assert!((variance.sqrt() - 30.1).abs() < 0.5, "{}", variance.sqrt());
+    }
+
+    #[test]
+    fn blur_keeps_the_light() {
+        let mut canvas = Canvas::new(41, 31);
+        canvas.pixels[15 * 41 + 20] = 1.0;
+        blur(&mut canvas, 1.5);
+        assert!((canvas.pixels.iter().sum::<f32>() - 1.0).abs() < 1e-5);
+        let spread: f32 = (0..41).map(|x| (x as f32 - 20.0).powi(2) * canvas.pixels[15 * 41 + x]).sum();
+        let row: f32 = canvas.pixels[15 * 41..16 * 41].iter().sum();
+        assert!((spread / row - 2.25).abs() < 0.06, "{}", spread / row);
+    }
+}

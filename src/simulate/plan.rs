@@ -1,0 +1,106 @@
+//! In: a station, a scene or board, a seed. Out: where the robot stands for each picture of a recording.
+//! Frame and unit: base, flange, camera, board, scene; mm. Every pose is reproducible from the seed.
+
+use super::light::InScene;
+use super::scene::Scene;
+use super::station::Station;
+use crate::geometry::{Base, Board, Camera, Flange, Mat3, Rigid, Vec2, Vec3, exp};
+use crate::recording::BoardSpec;
+use rand::Rng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+
+/// Where the scene stands before the robot: turned by up to 15 degrees, tilted by up to 2.
+pub fn base_from_scene(station: &Station) -> Rigid<Base, InScene> {
+    let mut rng = station.rng("base_from_scene", 0);
+    let mut within = |by: f64| rng.random_range(-by..by);
+    let turn = exp(&Vec3::new(0.0, 0.0, within(0.26)));
+    let tilt = exp(&Vec3::new(within(0.035), within(0.035), 0.0));
+    Rigid::new(tilt * turn, Vec3::new(460.0 + within(30.0), -100.0 + within(30.0), 65.0 + within(20.0)))
+}
+
+/// Camera above a place of the scene, looking straight down, image x along the scene's x.
+pub fn above(x: f64, y: f64, z: f64) -> Rigid<InScene, Camera> {
+    Rigid::new(Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0)), Vec3::new(x, y, z))
+}
+
+/// A straight pass over the scene's region along y in equal steps. The sheet meets the optical axis
+/// at the scene's focus height; the pass is longer than the region by what the heights shift it.
+pub fn scan(station: &Station, scene: &Scene, shots: usize) -> Vec<Rigid<InScene, Camera>> {
+    let [x0, y0, x1, y1] = scene.spec.region_mm;
+    let height = scene.spec.focus_height_mm + station.working_distance;
+    let (from, to) = (y0 - 1.0, y1 + 1.0);
+    (0..shots)
+        .map(|i| above((x0 + x1) / 2.0, from + (to - from) * i as f64 / (shots.max(2) - 1) as f64, height))
+        .collect()
+}
+
+/// The robot's pose for a camera pose.
+pub fn flange(station: &Station, base_from_camera: &Rigid<Base, Camera>) -> Rigid<Base, Flange> {
+    *base_from_camera * station.flange_from_camera.inverse()
+}
+
+/// What the robot reports: the true pose with an independent error of `mm` and `deg`, 1 sigma per axis.
+pub fn reported(pose: &Rigid<Base, Flange>, mm: f64, deg: f64, rng: &mut Pcg64) -> Rigid<Base, Flange> {
+    let mut normal = |sigma: f64| {
+        let n: f64 = StandardNormal.sample(rng);
+        n * sigma
+    };
+    let w: [f64; 3] = std::array::from_fn(|_| normal(deg.to_radians()));
+    let t: [f64; 3] = std::array::from_fn(|_| normal(mm));
+    Rigid::new(exp(&Vec3::from(w)) * pose.rotation, pose.translation + Vec3::from(t))
+}
+
+/// What is asked of the pose of a board before the camera.
+#[derive(Clone, Copy, Debug)]
+pub struct Views {
+    pub count: usize,
+    /// Distance of the board's middle, mm.
+    pub near: f64,
+    pub far: f64,
+    /// Largest tilt out of the image plane, degrees.
+    pub tilt_deg: f64,
+    /// Largest turn in the image plane, degrees.
+    pub turn_deg: f64,
+    /// Whether every feature must be in the picture.
+    pub whole: bool,
+}
+
+/// Board poses that cover the image and the range of tilts; rejection sampling, seeded.
+pub fn board_views(station: &Station, board: &BoardSpec, views: &Views, purpose: &str) -> Vec<Rigid<Camera, Board>> {
+    let features = board.features();
+    let centre = features.iter().sum::<Vec3>() / features.len() as f64;
+    let camera = &station.camera;
+    let (w, h) = (f64::from(camera.width), f64::from(camera.height));
+    let edge = 0.03 * w;
+    (0..views.count)
+        .map(|i| {
+            let mut rng = station.rng(purpose, i as u64);
+            // The picture's middle third is left a little as the tries go on, so that a board that
+            // only just fits is still placed.
+            for attempt in 0..4000 {
+                let spread = 1.0 - f64::from(attempt) / 4000.0;
+                let mut within = |by: f64| rng.random_range(-by..=by);
+                let px = Vec2::new(w / 2.0 + within(0.45 * w) * spread, h / 2.0 + within(0.45 * h) * spread);
+                let azimuth = within(std::f64::consts::PI);
+                let tilt = within(views.tilt_deg).to_radians();
+                let turn = within(views.turn_deg).to_radians();
+                let z = rng.random_range(views.near..=views.far);
+                let Some(ray) = camera.ray_from_pixel(&px) else { continue };
+                let rotation = exp(&(Vec3::new(azimuth.cos(), azimuth.sin(), 0.0) * tilt)) * exp(&(Vec3::z() * turn));
+                let pose: Rigid<Camera, Board> =
+                    Rigid::new(rotation, ray.direction * (z / ray.direction.z) - rotation * centre);
+                let inside = |p: &Vec3| {
+                    camera
+                        .pixel_from_point(&pose.point(p))
+                        .is_some_and(|q| q.x > edge && q.y > edge && q.x < w - edge && q.y < h - edge)
+                };
+                if !views.whole || features.iter().all(inside) {
+                    return pose;
+                }
+            }
+            // Frontal, in the middle, as far as asked: the most that can be done for a large board.
+            Rigid::new(Mat3::identity(), Vec3::new(0.0, 0.0, views.far) - centre)
+        })
+        .collect()
+}

@@ -1,0 +1,420 @@
+//! In: a scene file (TOML) of blocks, cylinders, balls, boards and parts. Out: what rays hit and with
+//! which material, and how far a measured point is from the nearest surface.
+//! Frame and unit: scene frame, z up, mm; the file's keys are in docs/file-formats.md, Scene file.
+
+use super::pattern;
+use super::solid::{Body, Shape};
+use crate::fault::{Fault, Result};
+use crate::geometry::{Part, Rigid, Vec3};
+use crate::recording::BoardSpec;
+use std::path::Path;
+
+/// Content of a scene file.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SceneSpec {
+    /// Shown in reports and written to truth.json.
+    pub name: String,
+    /// What the scan covers: x0, y0, x1, y1, mm.
+    pub region_mm: [f64; 4],
+    /// Height that the sheet meets on the optical axis, mm: the middle of the part's heights.
+    #[serde(default)]
+    pub focus_height_mm: f64,
+    #[serde(default)]
+    pub solid: Vec<SolidSpec>,
+    #[serde(default)]
+    pub part: Vec<PartSpec>,
+}
+
+/// Solids that belong together, in a frame of their own that truth.json reports.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PartSpec {
+    pub name: String,
+    /// The part's origin in the scene, mm.
+    pub at_mm: [f64; 3],
+    /// Turn about z, degrees.
+    #[serde(default)]
+    pub turn_deg: f64,
+    /// Then tilts about the scene's x and y, degrees.
+    #[serde(default)]
+    pub tilt_deg: [f64; 2],
+    #[serde(default)]
+    pub solid: Vec<SolidSpec>,
+}
+
+/// A convex shape with cut-outs. `at_mm` is the middle of its top face.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SolidSpec {
+    pub shape: ShapeSpec,
+    pub at_mm: [f64; 3],
+    #[serde(default)]
+    pub turn_deg: f64,
+    #[serde(default)]
+    pub material: Material,
+    #[serde(default)]
+    pub cut: Vec<CutSpec>,
+    /// Copies [along x, along y] ...
+    #[serde(default = "one")]
+    pub repeat: [u32; 2],
+    /// ... this far apart, centred on `at_mm`.
+    #[serde(default)]
+    pub pitch_mm: [f64; 2],
+}
+
+/// A cut-out; `at_mm` is the middle of its opening in the solid's frame.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CutSpec {
+    pub shape: ShapeSpec,
+    #[serde(default)]
+    pub at_mm: [f64; 3],
+    #[serde(default = "one")]
+    pub repeat: [u32; 2],
+    #[serde(default)]
+    pub pitch_mm: [f64; 2],
+}
+
+fn one() -> [u32; 2] {
+    [1, 1]
+}
+
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum ShapeSpec {
+    /// Size x, y, z.
+    Block {
+        size_mm: [f64; 3],
+    },
+    /// A block whose top falls by `drop_mm` from its -x to its +x side.
+    Wedge {
+        size_mm: [f64; 3],
+        drop_mm: f64,
+    },
+    Cylinder {
+        diameter_mm: f64,
+        depth_mm: f64,
+    },
+    /// A frustum: a funnel as a cut-out.
+    Cone {
+        top_mm: f64,
+        bottom_mm: f64,
+        depth_mm: f64,
+    },
+    Ball {
+        diameter_mm: f64,
+    },
+}
+
+/// How a surface throws light back.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Material {
+    /// Diffuse share, 0..=1.
+    pub albedo: f64,
+    /// Share thrown back as by a mirror, 0..=1; gives false stripes on what stands beside it.
+    pub mirror: f64,
+    /// Strength of the gloss seen by the camera, 0..=20, relative to a white matte surface ...
+    pub gloss: f64,
+    /// ... and its Phong exponent, 1..=500: larger is narrower.
+    pub gloss_exponent: f64,
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        Material { albedo: 0.6, mirror: 0.0, gloss: 0.0, gloss_exponent: 40.0 }
+    }
+}
+
+impl ShapeSpec {
+    fn build(&self) -> Result<Shape> {
+        let block =
+            |s: [f64; 3], drop| (Shape::Block { half: [s[0] / 2.0, s[1] / 2.0], depth: s[2], drop }, s.to_vec());
+        let (shape, sizes) = match *self {
+            ShapeSpec::Block { size_mm } => block(size_mm, 0.0),
+            ShapeSpec::Wedge { size_mm, drop_mm } => {
+                let (shape, mut sizes) = block(size_mm, drop_mm);
+                sizes.extend([drop_mm, size_mm[2] - drop_mm]);
+                (shape, sizes)
+            }
+            ShapeSpec::Cylinder { diameter_mm: d, depth_mm: depth } => {
+                (Shape::Cone { top: d / 2.0, bottom: d / 2.0, depth }, vec![d, depth])
+            }
+            ShapeSpec::Cone { top_mm, bottom_mm, depth_mm: depth } => {
+                (Shape::Cone { top: top_mm / 2.0, bottom: bottom_mm / 2.0, depth }, vec![top_mm, bottom_mm, depth])
+            }
+            ShapeSpec::Ball { diameter_mm: d } => (Shape::Ball { radius: d / 2.0 }, vec![d]),
+        };
+        match sizes.iter().find(|s| !(1e-3..=1e5).contains(*s)) {
+            Some(bad) => Err(Fault::input(format!("a {self:?} has a size of {bad} mm, allowed 0.001..=100000"))
+                .cause("a missing or negative size in the scene file")
+                .next("correct the shape")),
+            None => Ok(shape),
+        }
+    }
+}
+
+/// Places of the copies, centred on the origin.
+fn copies(repeat: [u32; 2], pitch: [f64; 2]) -> impl Iterator<Item = Vec3> {
+    let offset = move |i: u32, axis: usize| (f64::from(i) - f64::from(repeat[axis] - 1) / 2.0) * pitch[axis];
+    (0..repeat[1]).flat_map(move |j| (0..repeat[0]).map(move |i| Vec3::new(offset(i, 0), offset(j, 1), 0.0)))
+}
+
+/// A body at its place, with a ball around it that most rays miss.
+#[derive(Clone, Debug)]
+struct Placed {
+    body: Body,
+    /// Scene from body.
+    rotation: crate::geometry::Mat3,
+    at: Vec3,
+    centre: Vec3,
+    radius: f64,
+    material: Material,
+    /// A printed pattern on the top face; board frame = x right, y down, z into the board.
+    print: Option<Print>,
+    /// Index into `Scene::bodies`' owners: whether it belongs to a part.
+    part: Option<usize>,
+}
+
+#[derive(Clone, Debug)]
+struct Print {
+    board: BoardSpec,
+    /// Board coordinates of the middle of the top face.
+    middle: [f64; 2],
+    black: f64,
+}
+
+/// Surface that a ray met.
+#[derive(Clone, Copy, Debug)]
+pub struct Hit {
+    /// Along the ray, mm.
+    pub t: f64,
+    pub point: Vec3,
+    /// Outward, of unit length.
+    pub normal: Vec3,
+    pub material: Material,
+}
+
+/// A scene ready for rays.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    pub spec: SceneSpec,
+    bodies: Vec<Placed>,
+}
+
+impl SceneSpec {
+    pub fn load(path: &Path) -> Result<SceneSpec> {
+        let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+        SceneSpec::parse(&text).map_err(|e| e.at(path.display()))
+    }
+    pub fn parse(text: &str) -> Result<SceneSpec> {
+        let spec: SceneSpec = toml::from_str(text).map_err(|e| {
+            Fault::input(format!("is not a scene file: {e}"))
+                .cause("a misspelt key or a missing size")
+                .next("compare it with docs/file-formats.md, Scene file")
+        })?;
+        let [x0, y0, x1, y1] = spec.region_mm;
+        if !(x1 - x0 > 0.1 && y1 - y0 > 0.1) {
+            return Err(Fault::input(format!("region_mm {:?} spans less than 0.1 mm", spec.region_mm))
+                .next("give x0, y0, x1, y1 with x0 < x1 and y0 < y1"));
+        }
+        Ok(spec)
+    }
+}
+
+impl PartSpec {
+    pub fn scene_from_part(&self) -> (crate::geometry::Mat3, Vec3) {
+        let axis = |v: Vec3, deg: f64| crate::geometry::exp(&(v * deg.to_radians()));
+        let r = axis(Vec3::y(), self.tilt_deg[1]) * axis(Vec3::x(), self.tilt_deg[0]) * axis(Vec3::z(), self.turn_deg);
+        (r, Vec3::from(self.at_mm))
+    }
+}
+
+impl Scene {
+    pub fn new(spec: SceneSpec) -> Result<Scene> {
+        let mut bodies = Vec::new();
+        let world = (crate::geometry::Mat3::identity(), Vec3::zeros());
+        for solid in &spec.solid {
+            place(&mut bodies, solid, &world, None)?;
+        }
+        for (i, part) in spec.part.iter().enumerate() {
+            for solid in &part.solid {
+                place(&mut bodies, solid, &part.scene_from_part(), Some(i)).map_err(|e| e.at(&part.name))?;
+            }
+        }
+        if bodies.is_empty() {
+            return Err(Fault::input(format!("the scene '{}' holds nothing", spec.name)).next("add a [[solid]]"));
+        }
+        Ok(Scene { spec, bodies })
+    }
+
+    /// A calibration board alone, in the board's own frame turned so that the scene's z comes out
+    /// of the board: scene x = board x, scene y = -board y, scene z = -board z.
+    pub fn of_board(board: &BoardSpec, white: f64, black: f64) -> Scene {
+        let [x0, y0, x1, y1] = pattern::plate(board);
+        let spec = SceneSpec {
+            name: "board".into(),
+            region_mm: [x0, -y1, x1, -y0],
+            focus_height_mm: 0.0,
+            solid: vec![],
+            part: vec![],
+        };
+        let middle = [(x0 + x1) / 2.0, (y0 + y1) / 2.0];
+        let half = [(x1 - x0) / 2.0, (y1 - y0) / 2.0];
+        let at = Vec3::new(middle[0], -middle[1], 0.0);
+        let placed = Placed {
+            body: Body { shape: Shape::Block { half, depth: 3.0, drop: 0.0 }, cuts: vec![] },
+            rotation: crate::geometry::Mat3::identity(),
+            at,
+            centre: at,
+            radius: half[0].hypot(half[1]) + 3.0,
+            material: Material { albedo: white, ..Material::default() },
+            print: Some(Print { board: board.clone(), middle, black }),
+            part: None,
+        };
+        Scene { spec, bodies: vec![placed] }
+    }
+
+    /// First surface along `o + t d`, t in 0..far; `d` of unit length.
+    pub fn hit(&self, o: &Vec3, d: &Vec3, far: f64) -> Option<Hit> {
+        let mut best: Option<(f64, Vec3, usize)> = None;
+        for (i, b) in self.bodies.iter().enumerate() {
+            let limit = best.map_or(far, |(t, ..)| t);
+            if let Some((t, n)) = b.hit(o, d).filter(|(t, _)| *t < limit) {
+                best = Some((t, n, i));
+            }
+        }
+        best.map(|(t, normal, i)| {
+            let (b, point) = (&self.bodies[i], o + d * t);
+            Hit { t, point, normal: b.rotation * normal, material: b.material_at(&point) }
+        })
+    }
+
+    /// True when nothing stands between two points (their own surfaces excepted).
+    pub fn clear(&self, from: &Vec3, to: &Vec3) -> bool {
+        let way = to - from;
+        let length = way.norm();
+        let d = way / length;
+        !self.bodies.iter().any(|b| b.hit(from, &d).is_some_and(|(t, _)| t < length - 1e-4))
+    }
+
+    /// Distance of a scene-frame point from the nearest surface, mm (see [`Body::distance`]).
+    pub fn distance(&self, p: &Vec3) -> f64 {
+        self.bodies.iter().map(|b| b.body.distance(&b.to_body(p))).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The part that a scene-frame point is nearest to, when it is nearer than to anything else.
+    pub fn part_near(&self, p: &Vec3) -> Option<usize> {
+        let key = |b: &&Placed| b.body.distance(&b.to_body(p));
+        self.bodies.iter().min_by(|a, b| key(a).total_cmp(&key(b))).and_then(|b| b.part)
+    }
+}
+
+fn place(
+    out: &mut Vec<Placed>,
+    solid: &SolidSpec,
+    frame: &(crate::geometry::Mat3, Vec3),
+    part: Option<usize>,
+) -> Result<()> {
+    let m = solid.material;
+    let ranges = [(m.albedo, 1.0), (m.mirror, 1.0), (m.gloss, 20.0), (m.gloss_exponent, 500.0)];
+    if let Some((value, most)) = ranges.iter().find(|(v, most)| !(0.0..=*most).contains(v)) {
+        return Err(Fault::input(format!("a material holds {value}, allowed 0..={most}")).next("correct the material"));
+    }
+    if solid.repeat.contains(&0) || solid.cut.iter().any(|c| c.repeat.contains(&0)) {
+        return Err(Fault::input("repeat holds 0, at least 1 needed").next("leave repeat out for a single one"));
+    }
+    let shape = solid.shape.build()?;
+    let mut cuts = Vec::new();
+    for cut in &solid.cut {
+        let shape = cut.shape.build()?;
+        cuts.extend(copies(cut.repeat, cut.pitch_mm).map(|c| (shape, c + Vec3::from(cut.at_mm))));
+    }
+    let turn = crate::geometry::exp(&(Vec3::z() * solid.turn_deg.to_radians()));
+    let (half, depth) = shape.bounds();
+    for copy in copies(solid.repeat, solid.pitch_mm) {
+        let rotation = frame.0 * turn;
+        let at = frame.0 * (Vec3::from(solid.at_mm) + copy) + frame.1;
+        out.push(Placed {
+            body: Body { shape, cuts: cuts.clone() },
+            rotation,
+            at,
+            centre: at - rotation * Vec3::new(0.0, 0.0, depth / 2.0),
+            radius: Vec3::new(half[0], half[1], depth / 2.0).norm() + 1e-3,
+            material: m,
+            print: None,
+            part,
+        });
+    }
+    Ok(())
+}
+
+impl Placed {
+    fn to_body(&self, p: &Vec3) -> Vec3 {
+        self.rotation.tr_mul(&(p - self.at))
+    }
+    fn hit(&self, o: &Vec3, d: &Vec3) -> Option<(f64, Vec3)> {
+        let m = o - self.centre;
+        let along = m.dot(d);
+        if m.norm_squared() - along * along > self.radius * self.radius || along > self.radius {
+            return None;
+        }
+        self.body.hit(&self.to_body(o), &self.rotation.tr_mul(d))
+    }
+    fn material_at(&self, p: &Vec3) -> Material {
+        let Some(print) = &self.print else { return self.material };
+        let q = self.to_body(p);
+        let black = q.z > -1e-3 && pattern::is_black(&print.board, q.x + print.middle[0], -q.y + print.middle[1]);
+        Material { albedo: if black { print.black } else { self.material.albedo }, ..self.material }
+    }
+}
+
+/// A part's place with the scene taken as the base: multiply by base_from_scene for the truth.
+pub fn part_pose<S: crate::geometry::Frame>(part: &PartSpec) -> Rigid<S, Part> {
+    let (r, t) = part.scene_from_part();
+    Rigid::new(r, t)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = r#"
+        name = "test"
+        region_mm = [-20, -20, 20, 20]
+        [[solid]]
+        shape = { block = { size_mm = [60, 60, 2] } }
+        at_mm = [0, 0, 0]
+        [[part]]
+        name = "socket"
+        at_mm = [3, 4, 5]
+        turn_deg = 90
+        [[part.solid]]
+        shape = { block = { size_mm = [20, 10, 5] } }
+        at_mm = [0, 0, 0]
+        [[part.solid.cut]]
+        shape = { cylinder = { diameter_mm = 1, depth_mm = 2 } }
+        repeat = [3, 2]
+        pitch_mm = [2.54, 7.62]
+    "#;
+
+    #[test]
+    fn repeated_holes_are_where_the_file_puts_them() {
+        let scene = Scene::new(SceneSpec::parse(TEXT).unwrap()).unwrap();
+        // Part (2.54, 3.81) turned by 90 degrees is (-3.81, 2.54) about the part's origin.
+        let hit = scene.hit(&Vec3::new(3.0 - 3.81, 4.0 + 2.54, 50.0), &-Vec3::z(), 1e9).unwrap();
+        assert!((hit.point.z - 3.0).abs() < 1e-12);
+        assert_eq!(scene.part_near(&hit.point), Some(0));
+        assert!((scene.distance(&Vec3::new(3.0, 4.0, 5.1)) - 0.1).abs() < 1e-12);
+        assert!(!scene.clear(&Vec3::new(-9.0, 4.0, 0.5), &Vec3::new(15.0, 4.0, 0.5)));
+        assert!(scene.clear(&Vec3::new(-9.0, 4.0, 0.5), &Vec3::new(-9.0, 4.0, 50.0)));
+    }
+
+    #[test]
+    fn unknown_keys_and_senseless_sizes_are_refused() {
+        assert!(SceneSpec::parse(&TEXT.replace("turn_deg", "turn")).is_err());
+        let spec = SceneSpec::parse(&TEXT.replace("diameter_mm = 1", "diameter_mm = -1")).unwrap();
+        assert!(Scene::new(spec).unwrap_err().what.contains("-1 mm"));
+    }
+}

@@ -1,0 +1,276 @@
+//! In: a design and a seed. Out: one specimen of the station — camera, sensor, sheet of light, pointer,
+//! hand-eye — whose every number is known.
+//! Frame and unit: camera and flange frames, mm, rad; pixels; grey levels as shares of full scale.
+
+use crate::camera::Intrinsics;
+use crate::fault::{Fault, Result};
+use crate::geometry::{Camera, Flange, Plane, Ray, Rigid, Vec3, exp};
+use crate::rig::{Calibration, Covariance, HandEye, Quality, Rig, Verdict};
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64;
+use std::path::Path;
+
+/// A sheet of light from a (virtual) point source: a Gaussian beam across the sheet.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LineLaser {
+    pub source: Vec3,
+    /// Middle of the fan, in the sheet's plane, of unit length.
+    pub axis: Vec3,
+    /// Normal of the sheet, of unit length.
+    pub normal: Vec3,
+    pub half_fan_deg: f64,
+    /// 1/e² radius across the sheet at the waist, mm ...
+    pub waist_radius: f64,
+    /// ... which lies this far from the source, mm.
+    pub waist_distance: f64,
+    pub wavelength_nm: f64,
+}
+
+/// A round Gaussian beam.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pointer {
+    pub source: Vec3,
+    pub axis: Vec3,
+    pub waist_radius: f64,
+    pub waist_distance: f64,
+    pub wavelength_nm: f64,
+}
+
+/// 1/e² radius of a Gaussian beam at a distance from its source, mm.
+fn beam_radius(waist: f64, waist_distance: f64, wavelength_nm: f64, distance: f64) -> f64 {
+    let rayleigh = std::f64::consts::PI * waist * waist / (wavelength_nm * 1e-6);
+    waist * (1.0 + ((distance - waist_distance) / rayleigh).powi(2)).sqrt()
+}
+
+impl LineLaser {
+    pub fn radius(&self, distance: f64) -> f64 {
+        beam_radius(self.waist_radius, self.waist_distance, self.wavelength_nm, distance)
+    }
+    pub fn plane(&self) -> Plane<Camera> {
+        Plane::new(self.normal, self.normal.dot(&self.source)).expect("of unit length")
+    }
+}
+
+impl Pointer {
+    pub fn radius(&self, distance: f64) -> f64 {
+        beam_radius(self.waist_radius, self.waist_distance, self.wavelength_nm, distance)
+    }
+    pub fn ray(&self) -> Ray<Camera> {
+        Ray::new(self.source, self.axis).expect("of unit length")
+    }
+}
+
+/// What turns light into grey levels.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Sensor {
+    /// Grey depth, 8..=16.
+    pub bits: u8,
+    /// Optical blur, 1 sigma, px of a 640-px-wide picture, 0.2..=5; scales with the width.
+    pub blur_px: f64,
+    /// Electrons at full scale, 500..=1e6: sets the shot noise.
+    pub full_well_e: f64,
+    /// Read noise, electrons, 0..=1000.
+    pub read_noise_e: f64,
+    /// Speckle contrast per pixel, 0..=0.6 (0 = none).
+    pub speckle: f64,
+    /// Room light that leaks into laser pictures: grey of a white surface as share of full scale, 0..=0.9.
+    pub ambient_leak: f64,
+    /// Grey of a white surface in ambient pictures, share of full scale, 0.05..=0.98.
+    pub ambient_white: f64,
+    /// Peak of the stripe on a white matte surface at the working distance, share of full scale, 0.02..=20.
+    pub laser_white: f64,
+    /// Hot pixels per million, 0..=10000.
+    pub hot_per_million: f64,
+}
+
+impl Default for Sensor {
+    fn default() -> Self {
+        Sensor {
+            bits: 8,
+            blur_px: 0.75,
+            full_well_e: 10_000.0,
+            read_noise_e: 20.0,
+            speckle: 0.12,
+            ambient_leak: 0.01,
+            ambient_white: 0.78,
+            laser_white: 0.95,
+            hot_per_million: 20.0,
+        }
+    }
+}
+
+impl Sensor {
+    pub fn check(&self) -> Result<()> {
+        let limits = [
+            ("bits", f64::from(self.bits), 8.0, 16.0),
+            ("blur_px", self.blur_px, 0.2, 5.0),
+            ("full_well_e", self.full_well_e, 500.0, 1e6),
+            ("read_noise_e", self.read_noise_e, 0.0, 1000.0),
+            ("speckle", self.speckle, 0.0, 0.6),
+            ("ambient_leak", self.ambient_leak, 0.0, 0.9),
+            ("ambient_white", self.ambient_white, 0.05, 0.98),
+            ("laser_white", self.laser_white, 0.02, 20.0),
+            ("hot_per_million", self.hot_per_million, 0.0, 1e4),
+        ];
+        match limits.iter().find(|(_, v, low, high)| !(*low..=*high).contains(v)) {
+            Some((name, v, low, high)) => {
+                Err(Fault::usage(format!("sensor {name} is {v}, allowed {low}..={high}")).next("correct the option"))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+/// One specimen of the station.
+#[derive(Clone, Debug)]
+pub struct Station {
+    pub camera: Intrinsics,
+    pub sensor: Sensor,
+    pub flange_from_camera: HandEye,
+    pub laser: LineLaser,
+    pub pointer: Pointer,
+    /// Distance that scans are taken at: where the sheet crosses the optical axis, mm.
+    pub working_distance: f64,
+    pub seed: u64,
+}
+
+impl Station {
+    /// The design: a 5.08 mm lens on 8.3 µm pixels, the laser 77 mm below the camera at 28 degrees,
+    /// the pointer 40 mm beside it; the flange 94 mm behind the camera.
+    pub fn design() -> Station {
+        Station::built(&mut |x, _| x, 0)
+    }
+
+    /// A specimen as it comes from the workshop: every design value off by up to a few per cent,
+    /// another specimen for every seed.
+    pub fn random(seed: u64) -> Station {
+        let mut rng = Pcg64::seed_from_u64(seed ^ 0x57a7_1011);
+        Station::built(&mut |x, by| x + by * rng.random_range(-1.0..1.0), seed)
+    }
+
+    fn built(off: &mut impl FnMut(f64, f64) -> f64, seed: u64) -> Station {
+        let f = off(611.6, 30.0);
+        let camera = Intrinsics {
+            fx: f,
+            fy: f * off(1.0, 0.002),
+            cx: off(319.5, 8.0),
+            cy: off(239.5, 8.0),
+            skew: 0.0,
+            distortion: [off(-0.11, 0.03), off(0.08, 0.03), off(0.0, 8e-4), off(0.0, 8e-4), off(-0.015, 0.01)],
+            width: 640,
+            height: 480,
+        };
+        // The sheet crosses the optical axis at the working distance; the source lies below the image.
+        let (baseline, angle, roll) = (off(77.0, 4.0), off(28.0, 2.0).to_radians(), off(0.0, 1.5).to_radians());
+        let working_distance = off(155.0, 4.0);
+        let source = Vec3::new(off(0.0, 3.0), baseline, working_distance - baseline / angle.tan());
+        let axis = Vec3::new(0.0, -angle.sin(), angle.cos());
+        let normal = exp(&(axis * roll)) * Vec3::new(0.0, angle.cos(), angle.sin());
+        let laser = LineLaser {
+            source,
+            axis,
+            normal,
+            half_fan_deg: 33.0,
+            waist_radius: off(0.21, 0.02),
+            waist_distance: off(170.0, 8.0),
+            wavelength_nm: 650.0,
+        };
+        let spot = Vec3::new(off(41.0, 2.0), off(9.0, 3.0), off(12.0, 2.0));
+        let aim = Vec3::new(off(0.0, 3.0), off(3.0, 2.0), off(190.0, 8.0));
+        let pointer = Pointer {
+            source: spot,
+            axis: (aim - spot).normalize(),
+            waist_radius: 0.5,
+            waist_distance: 150.0,
+            wavelength_nm: 650.0,
+        };
+        let quarter = off(-91.0, 4.0).to_radians();
+        let tilt = Vec3::new(off(0.0, 0.02), off(0.0, 0.02), 0.0);
+        let flange_from_camera: Rigid<Flange, Camera> = Rigid::new(
+            exp(&tilt) * exp(&(Vec3::z() * quarter)),
+            Vec3::new(off(-46.0, 6.0), off(1.0, 5.0), off(94.0, 6.0)),
+        );
+        Station { camera, sensor: Sensor::default(), flange_from_camera, laser, pointer, working_distance, seed }
+    }
+
+    /// The same lens on a sensor with other pixels: the width spans the same angle, rows are added or
+    /// cut off evenly above and below.
+    pub fn with_size(mut self, width: u32, height: u32) -> Station {
+        let scaled_height = f64::from(self.camera.height) * f64::from(width) / f64::from(self.camera.width);
+        let scale = f64::from(width) / f64::from(self.camera.width);
+        self.camera.fx *= scale;
+        self.camera.fy *= scale;
+        self.camera.skew *= scale;
+        self.camera.cx = (self.camera.cx + 0.5) * scale - 0.5;
+        self.camera.cy = (self.camera.cy + 0.5) * scale - 0.5 + (f64::from(height) - scaled_height) / 2.0;
+        (self.camera.width, self.camera.height) = (width, height);
+        self
+    }
+
+    /// Optical blur on this sensor, 1 sigma, px.
+    pub fn blur_px(&self) -> f64 {
+        self.sensor.blur_px * f64::from(self.camera.width) / 640.0
+    }
+
+    /// Writes the true values as the calibration of a station folder; an independent random stream
+    /// for everything that is drawn later is [`Station::rng`].
+    pub fn store(&self, folder: &Path) -> Result<()> {
+        let quality = Quality {
+            verdict: Verdict::Good,
+            reasons: vec!["true values of a simulated station".into()],
+            advice: vec![],
+            figures: Default::default(),
+            per_picture: vec![],
+        };
+        let none = |names: &[&str]| Covariance::new(names, &nalgebra::DMatrix::zeros(names.len(), names.len()));
+        let camera = none(&["fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"]);
+        let plane = none(&["nx", "ny", "nz", "offset_mm"]);
+        let pointer = none(&["ox_mm", "oy_mm", "oz_mm", "dx", "dy", "dz"]);
+        let hand_eye = none(&["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"]);
+        Rig::store(folder, &Calibration::new("camera", "camera", self.camera, camera, quality.clone()))?;
+        Rig::store(folder, &Calibration::new("laser_plane", "camera", self.laser.plane(), plane, quality.clone()))?;
+        Rig::store(folder, &Calibration::new("pointer", "camera", self.pointer.ray(), pointer, quality.clone()))?;
+        let hand_eye = Calibration::new("hand_eye", "flange", self.flange_from_camera, hand_eye, quality);
+        Rig::store(folder, &hand_eye).map(|_| ())
+    }
+
+    /// A random stream of its own for each purpose, so that adding one does not change the others.
+    pub fn rng(&self, purpose: &str, index: u64) -> Pcg64 {
+        let mut seed = self.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ index.wrapping_mul(0xd1b5_4a32_d192_ed03);
+        for byte in purpose.bytes() {
+            seed = (seed ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+        }
+        Pcg64::seed_from_u64(seed)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sheet_crosses_the_axis_at_the_working_distance() {
+        for seed in 0..50 {
+            let s = Station::random(seed);
+            let p = Ray::new(Vec3::zeros(), Vec3::z()).unwrap().meet(&s.laser.plane()).unwrap();
+            // Roll turns the sheet about the fan's axis, which passes x = source.x, not 0.
+            assert!((p.z - s.working_distance).abs() < 0.5, "{} {}", p.z, s.working_distance);
+            s.camera.check().unwrap();
+            s.sensor.check().unwrap();
+        }
+        assert_ne!(Station::random(1).camera, Station::random(2).camera);
+        assert_eq!(Station::random(3).camera, Station::random(3).camera);
+    }
+
+    #[test]
+    fn a_stored_station_is_the_same_rig() {
+        let dir = tempfile::tempdir().unwrap();
+        let s = Station::random(7);
+        s.store(dir.path()).unwrap();
+        let rig = Rig::load(dir.path()).unwrap();
+        assert_eq!(rig.need_camera().unwrap().value, s.camera);
+        assert!(rig.need_laser_plane().unwrap().value.distance(&s.laser.source).abs() < 1e-9);
+        assert!(rig.need_hand_eye().unwrap().value.difference(&s.flange_from_camera).1 < 1e-9);
+    }
+}

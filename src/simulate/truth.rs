@@ -1,0 +1,161 @@
+//! In: `truth.json` of a simulated recording. Out: the exact surface and poses, and how far measured
+//! points are from them.
+//! Frame and unit: base frame, mm; keys named `A_T_b` map coordinates in frame b to frame A.
+
+use super::light::InScene;
+use super::scene::{Scene, SceneSpec, part_pose};
+use super::station::Station;
+use crate::camera::Intrinsics;
+use crate::fault::{Fault, Result};
+use crate::geometry::{Base, Board, Camera, Part, Plane, Ray, Rigid, Vec3};
+use crate::rig::HandEye;
+use std::path::Path;
+
+/// Content of `truth.json` (docs/file-formats.md).
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TruthFile {
+    pub set: String,
+    pub units: String,
+    pub seed: u64,
+    pub intrinsics: Intrinsics,
+    #[serde(rename = "flange_T_camera")]
+    pub flange_from_camera: HandEye,
+    pub laser_plane_camera: Plane<Camera>,
+    pub laser_source_camera_mm: Vec3,
+    pub pointer_camera: Ray<Camera>,
+    #[serde(rename = "base_T_scene", default, skip_serializing_if = "Option::is_none")]
+    pub base_from_scene: Option<Rigid<Base, InScene>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scene: Option<SceneSpec>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub parts: Vec<PartTruth>,
+    #[serde(rename = "base_T_board", default, skip_serializing_if = "Option::is_none")]
+    pub base_from_board: Option<Rigid<Base, Board>>,
+    #[serde(rename = "camera_T_board", default, skip_serializing_if = "Vec::is_empty")]
+    pub camera_from_board: Vec<Rigid<Camera, Board>>,
+    /// Distances of the pointer's plate along the optical axis.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub distances_mm: Vec<f64>,
+    /// Errors of the reported poses, 1 sigma per axis.
+    pub pose_noise_mm: f64,
+    pub pose_noise_deg: f64,
+}
+
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PartTruth {
+    pub name: String,
+    #[serde(rename = "base_T_part")]
+    pub base_from_part: Rigid<Base, Part>,
+}
+
+impl TruthFile {
+    /// What is true of the station alone; the caller adds what the set shows.
+    pub fn of(station: &Station, set: &str) -> TruthFile {
+        TruthFile {
+            set: set.into(),
+            units: "mm".into(),
+            seed: station.seed,
+            intrinsics: station.camera,
+            flange_from_camera: station.flange_from_camera,
+            laser_plane_camera: station.laser.plane(),
+            laser_source_camera_mm: station.laser.source,
+            pointer_camera: station.pointer.ray(),
+            base_from_scene: None,
+            scene: None,
+            parts: vec![],
+            base_from_board: None,
+            camera_from_board: vec![],
+            distances_mm: vec![],
+            pose_noise_mm: 0.0,
+            pose_noise_deg: 0.0,
+        }
+    }
+
+    /// The same with a scene and its parts.
+    pub fn with_scene(mut self, scene: &Scene, base_from_scene: Rigid<Base, InScene>) -> TruthFile {
+        let name = |p: &super::scene::PartSpec| p.name.clone();
+        self.parts = scene
+            .spec
+            .part
+            .iter()
+            .map(|p| PartTruth { name: name(p), base_from_part: base_from_scene * part_pose::<InScene>(p) })
+            .collect();
+        self.scene = Some(scene.spec.clone());
+        self.base_from_scene = Some(base_from_scene);
+        self
+    }
+}
+
+/// The exact surface of a simulated scan.
+#[derive(Clone, Debug)]
+pub struct Truth {
+    pub file: TruthFile,
+    scene: Scene,
+    scene_from_base: Rigid<InScene, Base>,
+}
+
+/// How far a cloud is from the truth, mm.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+pub struct CloudErrors {
+    pub points: usize,
+    /// Root mean square, median, 95th percentile and largest distance from the nearest surface.
+    pub rms_mm: f64,
+    pub median_mm: f64,
+    pub p95_mm: f64,
+    pub largest_mm: f64,
+    /// Root mean square of the points within 1 mm, and the share beyond.
+    pub rms_without_outliers_mm: f64,
+    pub outliers_share: f64,
+}
+
+impl Truth {
+    pub fn load(path: &Path) -> Result<Truth> {
+        let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+        let strange = |what: String| {
+            Fault::input(format!("{}: {what}", path.display()))
+                .cause("not the truth.json of a simulated scan")
+                .next("give the truth.json beside the scan's meta.json")
+        };
+        let file: TruthFile = serde_json::from_str(&text).map_err(|e| strange(format!("cannot be read: {e}")))?;
+        let (Some(spec), Some(pose)) = (file.scene.clone(), file.base_from_scene) else {
+            return Err(strange("holds no scene".into()));
+        };
+        Ok(Truth { scene: Scene::new(spec)?, scene_from_base: pose.inverse(), file })
+    }
+
+    /// Distance of a base-frame point from the nearest surface, mm: exact on faces, a lower bound
+    /// beside the edges of cut-outs.
+    pub fn distance(&self, in_base: &Vec3) -> f64 {
+        self.scene.distance(&self.scene_from_base.point(in_base))
+    }
+
+    /// Name of the part that a base-frame point is nearest to.
+    pub fn part_near(&self, in_base: &Vec3) -> Option<&str> {
+        let i = self.scene.part_near(&self.scene_from_base.point(in_base))?;
+        Some(&self.scene.spec.part[i].name)
+    }
+
+    /// Errors of a cloud; points that are not finite are not counted.
+    pub fn errors(&self, points: impl Iterator<Item = [f32; 3]>) -> CloudErrors {
+        let finite = points.filter(|p| p.iter().all(|x| x.is_finite()));
+        let mut d: Vec<f64> = finite.map(|p| self.distance(&Vec3::from(p.map(f64::from)))).collect();
+        if d.is_empty() {
+            return CloudErrors::default();
+        }
+        d.sort_unstable_by(f64::total_cmp);
+        let rms = |d: &[f64]| (d.iter().map(|x| x * x).sum::<f64>() / d.len().max(1) as f64).sqrt();
+        let near = d.partition_point(|x| *x <= 1.0);
+        let at = |q: f64| d[((d.len() - 1) as f64 * q).round() as usize];
+        CloudErrors {
+            points: d.len(),
+            rms_mm: rms(&d),
+            median_mm: at(0.5),
+            p95_mm: at(0.95),
+            largest_mm: at(1.0),
+            rms_without_outliers_mm: rms(&d[..near]),
+            outliers_share: (d.len() - near) as f64 / d.len() as f64,
+        }
+    }
+}

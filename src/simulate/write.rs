@@ -1,0 +1,464 @@
+//! In: what to simulate (sets, scene, seed, noise). Out: recording folders, each with `truth.json`, and
+//! a station folder with the true calibration.
+//! Frame and unit: the recording format of docs/file-formats.md, mm.
+
+use super::light::{Canvas, InScene, View};
+use super::picture::{expose, hot_pixels};
+use super::plan::{self, Views};
+use super::scene::{Scene, SceneSpec};
+use super::station::{Sensor, Station};
+use super::truth::TruthFile;
+use crate::fault::{Fault, Result};
+use crate::geometry::{Base, Board, Camera, Flange, Mat3, Rigid, Vec3};
+use crate::raster::{Image, save_png};
+use crate::recording::{AmbientRef, Beam, BoardSpec, FrameRef, ImageSpec, Meta, save_poses};
+use crate::rig::write_atomically;
+use rayon::prelude::*;
+use std::path::{Path, PathBuf};
+
+/// One kind of recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Set {
+    /// The sheet passed over the scene.
+    Scan,
+    /// A chessboard in many poses, for the camera.
+    Intrinsics,
+    /// A chessboard fixed in the base frame, seen from many robot poses.
+    Handeye,
+    /// The stripe on two chessboards in many poses.
+    Laserplane,
+    /// The pointer's spot on a chessboard in many poses.
+    PointerCal,
+    /// The pointer's spot on a plate across the optical axis, 70 to 290 mm away.
+    Pointer,
+    /// The pointer's spot on the scene from several robot poses, for the surface normal.
+    Surface,
+}
+
+impl Set {
+    pub const ALL: [Set; 7] =
+        [Set::Scan, Set::Intrinsics, Set::Handeye, Set::Laserplane, Set::PointerCal, Set::Pointer, Set::Surface];
+    pub fn name(self) -> &'static str {
+        match self {
+            Set::Scan => "scan",
+            Set::Intrinsics => "intrinsics",
+            Set::Handeye => "handeye",
+            Set::Laserplane => "laserplane",
+            Set::PointerCal => "pointer_cal",
+            Set::Pointer => "pointer",
+            Set::Surface => "surface",
+        }
+    }
+}
+
+impl std::str::FromStr for Set {
+    type Err = String;
+    fn from_str(s: &str) -> std::result::Result<Set, String> {
+        Set::ALL
+            .into_iter()
+            .find(|x| x.name() == s)
+            .ok_or_else(|| format!("unknown set '{s}': {}", Set::ALL.map(Set::name).join(", ")))
+    }
+}
+
+/// The scene that is simulated when no other is named: a circuit board with parts.
+pub const DEFAULT_SCENE: &str = include_str!("../../data/scenes/board.toml");
+
+/// What to simulate.
+#[derive(Clone, Debug)]
+pub struct SimulateOptions {
+    pub sets: Vec<Set>,
+    /// A scene file; the built-in board with parts when not given.
+    pub scene: Option<PathBuf>,
+    /// 0 is the design itself, every other number another specimen, scene pose and noise.
+    pub seed: u64,
+    /// Sensor size, px, 64..=8192 each.
+    pub width: u32,
+    pub height: u32,
+    pub sensor: Sensor,
+    /// Shots of a scan, 2..=100000.
+    pub shots: usize,
+    /// Errors of the reported robot poses, 1 sigma per axis, mm 0..=10 and degrees 0..=5.
+    pub pose_noise_mm: f64,
+    pub pose_noise_deg: f64,
+}
+
+impl Default for SimulateOptions {
+    fn default() -> Self {
+        SimulateOptions {
+            sets: vec![Set::Scan],
+            scene: None,
+            seed: 1,
+            width: 640,
+            height: 480,
+            sensor: Sensor::default(),
+            shots: 200,
+            pose_noise_mm: 0.0,
+            pose_noise_deg: 0.0,
+        }
+    }
+}
+
+impl SimulateOptions {
+    pub fn check(&self) -> Result<()> {
+        self.sensor.check()?;
+        let limits = [
+            ("width", f64::from(self.width), 64.0, 8192.0),
+            ("height", f64::from(self.height), 64.0, 8192.0),
+            ("shots", self.shots as f64, 2.0, 1e5),
+            ("pose noise in mm", self.pose_noise_mm, 0.0, 10.0),
+            ("pose noise in degrees", self.pose_noise_deg, 0.0, 5.0),
+            ("the number of sets", self.sets.len() as f64, 1.0, 100.0),
+        ];
+        match limits.iter().find(|(_, v, low, high)| !(*low..=*high).contains(v)) {
+            Some((name, v, low, high)) => {
+                Err(Fault::usage(format!("{name} is {v}, allowed {low}..={high}")).next("correct the option"))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// The specimen that these options describe.
+    pub fn station(&self) -> Station {
+        let mut station = if self.seed == 0 { Station::design() } else { Station::random(self.seed) };
+        station.sensor = self.sensor;
+        station.with_size(self.width, self.height)
+    }
+
+    /// Scales every source of noise: 0 is a noiseless sensor, 1 the default, 2 twice the noise.
+    pub fn with_noise(mut self, factor: f64) -> SimulateOptions {
+        let s = &mut self.sensor;
+        s.read_noise_e *= factor;
+        s.speckle *= factor;
+        s.hot_per_million *= factor;
+        s.full_well_e = (s.full_well_e / (factor * factor).max(1e-6)).clamp(500.0, 1e6);
+        self
+    }
+}
+
+/// What was written.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Simulated {
+    pub station: PathBuf,
+    /// Name of the set, its folder, its pictures.
+    pub recordings: Vec<(String, PathBuf, usize)>,
+}
+
+/// Writes the recordings and the station under `out`; `progress(done, of)` counts pictures.
+pub fn simulate(out: &Path, options: &SimulateOptions, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<Simulated> {
+    options.check()?;
+    let station = options.station();
+    let spec = match &options.scene {
+        Some(path) => SceneSpec::load(path)?,
+        None => SceneSpec::parse(DEFAULT_SCENE)?,
+    };
+    let scene = Scene::new(spec)?;
+    let folder = out.join("station");
+    std::fs::create_dir_all(&folder).map_err(|e| Fault::write(&folder, e))?;
+    station.store(&folder)?;
+    let plans: Vec<Plan> = options.sets.iter().map(|set| Plan::new(*set, &station, &scene, options)).collect();
+    let total = plans.iter().map(|p| p.shots.iter().map(Shot::pictures).sum::<usize>()).sum();
+    let done = std::sync::atomic::AtomicUsize::new(0);
+    let count = || progress(1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed), total);
+    let mut recordings = Vec::new();
+    for plan in &plans {
+        let folder = out.join(plan.set.name());
+        let pictures = plan.write(&folder, &station, options, &count)?;
+        recordings.push((plan.set.name().to_owned(), folder, pictures));
+    }
+    Ok(Simulated { station: folder, recordings })
+}
+
+/// What stands before the camera in one moment, and which pictures are taken.
+struct Shot {
+    scene_from_camera: Rigid<InScene, Camera>,
+    /// Index into the plan's scenes.
+    scene: usize,
+    laser: Option<Beam>,
+    ambient: bool,
+    board: Option<usize>,
+}
+
+impl Shot {
+    fn pictures(&self) -> usize {
+        usize::from(self.laser.is_some()) + usize::from(self.ambient)
+    }
+}
+
+struct Plan {
+    set: Set,
+    scenes: Vec<Scene>,
+    boards: Vec<BoardSpec>,
+    shots: Vec<Shot>,
+    /// True robot poses, one a shot; none for sets without a robot.
+    poses: Vec<Rigid<Base, Flange>>,
+    truth: TruthFile,
+}
+
+fn chessboard(columns: u32, rows: u32, square_mm: f64, border_mm: f64) -> BoardSpec {
+    BoardSpec::Chessboard { inner_corners: [columns, rows], square_mm, border_mm, first_square: "black".into() }
+}
+
+/// A board's scene has its z out of the board, the board's own z goes into it.
+fn scene_from_board() -> Rigid<InScene, Board> {
+    Rigid::new(Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0)), Vec3::zeros())
+}
+
+impl Plan {
+    fn new(set: Set, station: &Station, scene: &Scene, options: &SimulateOptions) -> Plan {
+        let truth = TruthFile::of(station, set.name());
+        let mut plan = Plan { set, scenes: vec![], boards: vec![], shots: vec![], poses: vec![], truth };
+        let z = station.working_distance;
+        match set {
+            Set::Scan | Set::Surface => {
+                let base_from_scene = plan::base_from_scene(station);
+                plan.truth = plan.truth.with_scene(scene, base_from_scene);
+                plan.scenes = vec![scene.clone()];
+                let cameras = match set {
+                    Set::Scan => plan::scan(station, scene, options.shots),
+                    _ => surface_views(station, scene),
+                };
+                for (i, camera) in cameras.iter().enumerate() {
+                    let laser = Some(if set == Set::Scan { Beam::Line } else { Beam::Pointer });
+                    let ambient = set == Set::Scan && i == cameras.len() / 2;
+                    plan.shots.push(Shot { scene_from_camera: *camera, scene: 0, laser, ambient, board: None });
+                    plan.poses.push(plan::flange(station, &(base_from_scene * *camera)));
+                }
+            }
+            Set::Intrinsics => {
+                let views =
+                    Views { count: 20, near: 1.1 * z, far: 2.0 * z, tilt_deg: 40.0, turn_deg: 25.0, whole: true };
+                plan.show_boards(station, vec![chessboard(9, 6, 15.0, 9.0)], &views, None);
+            }
+            Set::Handeye => {
+                let views =
+                    Views { count: 16, near: 1.2 * z, far: 2.0 * z, tilt_deg: 35.0, turn_deg: 80.0, whole: true };
+                plan.show_boards(station, vec![chessboard(9, 6, 15.0, 9.0)], &views, None);
+                let base_from_board: Rigid<Base, Board> =
+                    Rigid::from_vectors(&Vec3::new(3.1, 0.02, 0.03), Vec3::new(470.0, -80.0, 60.0));
+                plan.truth.base_from_board = Some(base_from_board);
+                let robot = |v: &Rigid<Camera, Board>| plan::flange(station, &(base_from_board * v.inverse()));
+                plan.poses = plan.truth.camera_from_board.iter().map(robot).collect();
+            }
+            Set::Laserplane => {
+                let views =
+                    Views { count: 14, near: 0.75 * z, far: 1.35 * z, tilt_deg: 30.0, turn_deg: 15.0, whole: true };
+                let boards = vec![chessboard(9, 6, 8.0, 6.0), chessboard(8, 5, 10.0, 6.0)];
+                plan.show_boards(station, boards, &views, Some(Beam::Line));
+            }
+            Set::PointerCal => {
+                let views =
+                    Views { count: 12, near: 0.7 * z, far: 1.85 * z, tilt_deg: 20.0, turn_deg: 10.0, whole: true };
+                plan.show_boards(station, vec![chessboard(9, 6, 8.0, 6.0)], &views, Some(Beam::Pointer));
+            }
+            Set::Pointer => {
+                let plate = SceneSpec::parse(
+                    "name = 'plate'\nregion_mm = [-400, -400, 400, 400]\n[[solid]]\nshape = { block = { size_mm = [900, 900, 5] } }\nat_mm = [0, 0, 0]",
+                );
+                plan.scenes = vec![Scene::new(plate.expect("well formed")).expect("one solid")];
+                plan.truth.distances_mm = (0..23).map(|i| 70.0 + 10.0 * f64::from(i)).collect();
+                let shot = |distance: &f64| Shot {
+                    scene_from_camera: plan::above(0.0, 0.0, *distance),
+                    scene: 0,
+                    laser: Some(Beam::Pointer),
+                    ambient: false,
+                    board: None,
+                };
+                plan.shots = plan.truth.distances_mm.iter().map(shot).collect();
+            }
+        }
+        plan
+    }
+
+    /// Boards in free poses, one after another; with a beam each pose is seen by room light and by laser.
+    fn show_boards(&mut self, station: &Station, boards: Vec<BoardSpec>, views: &Views, laser: Option<Beam>) {
+        self.scenes = boards.iter().map(|b| Scene::of_board(b, 0.85, 0.06)).collect();
+        let each = Views { count: views.count / boards.len(), ..*views };
+        for (i, board) in boards.iter().enumerate() {
+            for pose in plan::board_views(station, board, &each, &format!("{} {i}", self.set.name())) {
+                let scene_from_camera = scene_from_board() * pose.inverse();
+                let board = laser.map(|_| i);
+                self.shots.push(Shot { scene_from_camera, scene: i, laser, ambient: true, board });
+                self.truth.camera_from_board.push(pose);
+            }
+        }
+        self.boards = boards;
+    }
+
+    fn meta(&self, station: &Station) -> Meta {
+        let single = self.boards.len() == 1 && matches!(self.set, Set::Intrinsics | Set::Handeye);
+        let beam = self.shots.first().and_then(|s| s.laser);
+        let mut meta = Meta {
+            format: 1,
+            set: self.set.name().into(),
+            units: "mm".into(),
+            image: ImageSpec {
+                width: station.camera.width,
+                height: station.camera.height,
+                bits: station.sensor.bits,
+                channels: 1,
+                response: "linear".into(),
+                pixel_centre: "integer coordinates".into(),
+            },
+            beam,
+            board: single.then(|| self.boards[0].clone()),
+            boards: if single { vec![] } else { self.boards.clone() },
+            ambient: None,
+            frames: vec![],
+            pose_file: None,
+            pose_files: Default::default(),
+            part: None,
+            model: None,
+            target: None,
+            distance_definition: None,
+        };
+        for (i, shot) in self.shots.iter().enumerate() {
+            // A scan has one picture in room light for the whole recording, not one a frame.
+            let lone = self.set == Set::Scan;
+            let pose = (!self.poses.is_empty()).then_some(i);
+            if shot.ambient && lone {
+                meta.ambient = Some(AmbientRef { file: "ambient.png".into(), pose });
+            }
+            meta.frames.push(FrameRef {
+                laser: shot.laser.map(|_| format!("laser_{i:04}.png")),
+                ambient: (shot.ambient && !lone).then(|| format!("ambient_{i:04}.png")),
+                pose,
+                board: shot.board,
+            });
+        }
+        match self.set {
+            Set::Handeye => {
+                meta.pose_files.insert("poses_exact".into(), "encoder readings without error".into());
+                meta.pose_files.insert("poses_noisy".into(), "readings with the errors of a real arm".into());
+            }
+            Set::Pointer => {
+                meta.target = Some("matte flat plate perpendicular to the optical axis".into());
+                meta.distance_definition =
+                    Some("camera_z: distance from the camera centre to the plate along the optical axis".into());
+            }
+            Set::Scan => meta.target = Some(self.scenes[0].spec.name.clone()),
+            _ => {}
+        }
+        if !self.poses.is_empty() && self.set != Set::Handeye {
+            meta.pose_file = Some("poses".into());
+        }
+        meta
+    }
+
+    fn write(
+        &self,
+        folder: &Path,
+        station: &Station,
+        options: &SimulateOptions,
+        count: &(dyn Fn() + Sync),
+    ) -> Result<usize> {
+        std::fs::create_dir_all(folder).map_err(|e| Fault::write(folder, e))?;
+        let pixels = station.camera.width as usize * station.camera.height as usize;
+        let hot = hot_pixels(&station.sensor, pixels, &mut station.rng("hot", 0));
+        let visible: Vec<Vec<Vec3>> = self
+            .shots
+            .par_iter()
+            .enumerate()
+            .map(|(i, shot)| self.take(i, shot, folder, station, &hot, count))
+            .collect::<Result<_>>()?;
+        let mut truth = self.truth.clone();
+        let (mm, deg) = match self.set {
+            // The noisy poses of a hand-eye recording are those of a real arm.
+            Set::Handeye if options.pose_noise_mm == 0.0 && options.pose_noise_deg == 0.0 => (0.05, 0.02),
+            _ => (options.pose_noise_mm, options.pose_noise_deg),
+        };
+        (truth.pose_noise_mm, truth.pose_noise_deg) = (mm, deg);
+        if !self.poses.is_empty() {
+            let mut rng = station.rng("pose noise", self.set as u64);
+            let noisy: Vec<_> = self.poses.iter().map(|p| plan::reported(p, mm, deg, &mut rng)).collect();
+            let (exact, shown) = match self.set {
+                Set::Handeye => ("poses_exact.json", "poses_noisy.json"),
+                _ => ("poses_true.json", "poses.json"),
+            };
+            save_poses(&folder.join(exact), &self.poses)?;
+            save_poses(&folder.join(shown), &noisy)?;
+        }
+        if let (Set::Scan, Some(base_from_scene)) = (self.set, truth.base_from_scene) {
+            let points: Vec<Vec3> = visible.iter().flatten().map(|p| base_from_scene.point(p)).collect();
+            write_atomically(&folder.join("visible.ply"), &points_ply(&points))?;
+        }
+        let json = |value: serde_json::Result<String>| value.expect("plain data").into_bytes();
+        write_atomically(&folder.join("truth.json"), &json(serde_json::to_string_pretty(&truth)))?;
+        // Last, so that a folder with a meta.json is complete.
+        write_atomically(&folder.join("meta.json"), &json(serde_json::to_string_pretty(&self.meta(station))))?;
+        Ok(self.shots.iter().map(Shot::pictures).sum())
+    }
+
+    /// Takes one shot's pictures; returns the stripe's points that are bright enough to be measured.
+    fn take(
+        &self,
+        i: usize,
+        shot: &Shot,
+        folder: &Path,
+        station: &Station,
+        hot: &[(usize, f32)],
+        count: &(dyn Fn() + Sync),
+    ) -> Result<Vec<Vec3>> {
+        let view = View { station, scene: &self.scenes[shot.scene], scene_from_camera: shot.scene_from_camera };
+        let (w, h) = (station.camera.width, station.camera.height);
+        let sensor = &station.sensor;
+        let save = |name: String, picture: Image| save_png(&picture, &folder.join(name)).map(|()| count());
+        if shot.ambient {
+            // 3 x 3 rays a pixel at 640; a finer sensor's own pixels sample the edges.
+            let room = view.ambient(if w > 1600 { 1 } else { 3 });
+            let mut rng = station.rng(self.set.name(), 2 * i as u64);
+            let gain = sensor.ambient_white as f32;
+            let picture = expose(sensor, &Canvas::new(w, h), &room, gain, hot, &mut rng);
+            save(if self.set == Set::Scan { "ambient.png".into() } else { format!("ambient_{i:04}.png") }, picture)?;
+        }
+        let Some(beam) = shot.laser else { return Ok(vec![]) };
+        let mut light = Canvas::new(w, h);
+        let middle = match beam {
+            Beam::Line => view.sheet(&mut light),
+            Beam::Pointer => view.spot(&mut light).into_iter().collect(),
+        };
+        let room = if sensor.ambient_leak > 0.0 { view.faint_ambient() } else { Canvas::new(w, h) };
+        let mut rng = station.rng(self.set.name(), 2 * i as u64 + 1);
+        let picture = expose(sensor, &light, &room, sensor.ambient_leak as f32, hot, &mut rng);
+        save(format!("laser_{i:04}.png"), picture)?;
+        let bright = |u: f64, v: f64| {
+            let (x, y) = (u.round(), v.round());
+            let inside = x >= 0.0 && y >= 0.0 && x < f64::from(w) && y < f64::from(h);
+            // 6 % of full scale: about 15 of 255 grey levels.
+            inside && light.pixels[y as usize * w as usize + x as usize] > 0.06
+        };
+        Ok(middle.iter().filter(|p| bright(p.u, p.v)).map(|p| p.point).collect())
+    }
+}
+
+/// Five places of the scene's region, seen by the pointer from the working distance with a slight tilt.
+fn surface_views(station: &Station, scene: &Scene) -> Vec<Rigid<InScene, Camera>> {
+    let [x0, y0, x1, y1] = scene.spec.region_mm;
+    let at = |fx: f64, fy: f64| (x0 + fx * (x1 - x0), y0 + fy * (y1 - y0));
+    let beam = station.pointer.ray();
+    [(0.06, 0.06), (0.94, 0.08), (0.92, 0.94), (0.07, 0.93), (0.5, 0.03)]
+        .iter()
+        .enumerate()
+        .map(|(i, &(fx, fy))| {
+            let (x, y) = at(fx, fy);
+            let z = station.working_distance * (0.95 + 0.03 * i as f64);
+            // Where the beam is at that depth, so that the spot and not the axis meets the place.
+            let spot = beam.at((z - beam.origin.z) / beam.direction.z);
+            plan::above(x - spot.x, y + spot.y, z)
+        })
+        .collect()
+}
+
+/// A point list as binary PLY (x y z, float32).
+fn points_ply(points: &[Vec3]) -> Vec<u8> {
+    let mut out = format!(
+        "ply\nformat binary_little_endian 1.0\ncomment units mm, base frame\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\nend_header\n",
+        points.len()
+    )
+    .into_bytes();
+    for p in points {
+        p.iter().for_each(|x| out.extend((*x as f32).to_le_bytes()));
+    }
+    out
+}
