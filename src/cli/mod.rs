@@ -3,6 +3,7 @@
 
 mod console;
 mod scan;
+mod simulate;
 mod station;
 
 pub use console::Console;
@@ -29,6 +30,8 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Scan(scan::Args),
+    /// Simulate a station with known truth: recordings, poses, true calibration
+    Simulate(simulate::Args),
     /// Make, show, import into or export from a station folder
     #[command(subcommand)]
     Station(station::Command),
@@ -37,6 +40,7 @@ enum Command {
 fn run(command: &Command, console: &Console) -> Result<()> {
     match command {
         Command::Scan(a) => scan::run(a, console),
+        Command::Simulate(a) => simulate::run(a, console),
         Command::Station(c) => station::run(c, console),
     }
 }

@@ -7,7 +7,7 @@ use super::scene::{Scene, SceneSpec, part_pose};
 use super::station::Station;
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
-use crate::geometry::{Base, Board, Camera, Part, Plane, Ray, Rigid, Vec3};
+use crate::geometry::{Base, Board, Camera, Part, Plane, Rigid, Vec3};
 use crate::rig::HandEye;
 use std::path::Path;
 
@@ -23,7 +23,7 @@ pub struct TruthFile {
     pub flange_from_camera: HandEye,
     pub laser_plane_camera: Plane<Camera>,
     pub laser_source_camera_mm: Vec3,
-    pub pointer_camera: Ray<Camera>,
+    pub pointer_camera: PointerTruth,
     #[serde(rename = "base_T_scene", default, skip_serializing_if = "Option::is_none")]
     pub base_from_scene: Option<Rigid<Base, InScene>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -40,6 +40,14 @@ pub struct TruthFile {
     /// Errors of the reported poses, 1 sigma per axis.
     pub pose_noise_mm: f64,
     pub pose_noise_deg: f64,
+}
+
+/// The pointer's beam: a point on it, mm, and its direction.
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PointerTruth {
+    pub origin: Vec3,
+    pub direction: Vec3,
 }
 
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
@@ -61,7 +69,7 @@ impl TruthFile {
             flange_from_camera: station.flange_from_camera,
             laser_plane_camera: station.laser.plane(),
             laser_source_camera_mm: station.laser.source,
-            pointer_camera: station.pointer.ray(),
+            pointer_camera: PointerTruth { origin: station.pointer.source, direction: station.pointer.axis },
             base_from_scene: None,
             scene: None,
             parts: vec![],
