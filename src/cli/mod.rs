@@ -2,6 +2,7 @@
 //! Frame and unit: as the subcommands say; every number is printed with its unit.
 
 mod console;
+mod doctor;
 mod scan;
 mod simulate;
 mod station;
@@ -29,6 +30,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Doctor(doctor::Args),
     Scan(scan::Args),
     /// Simulate a station with known truth: recordings, poses, true calibration
     Simulate(simulate::Args),
@@ -39,6 +41,7 @@ enum Command {
 
 fn run(command: &Command, console: &Console) -> Result<()> {
     match command {
+        Command::Doctor(a) => doctor::run(a, console),
         Command::Scan(a) => scan::run(a, console),
         Command::Simulate(a) => simulate::run(a, console),
         Command::Station(c) => station::run(c, console),
