@@ -1,0 +1,99 @@
+//! In: a board's layout and a point on it. Out: whether the point lies on the board, and how far
+//! it is from the next edge of the print.
+//! Frame and unit: board frame, mm.
+
+use crate::recording::BoardSpec;
+
+/// Distance inside the board's outline, mm; negative outside.
+pub fn inside(board: &BoardSpec, x: f64, y: f64) -> f64 {
+    let [x0, y0, x1, y1] = outline(board);
+    (x - x0).min(x1 - x).min(y - y0).min(y1 - y)
+}
+
+/// The outline [x low, y low, x high, y high], border included.
+pub fn outline(board: &BoardSpec) -> [f64; 4] {
+    match board {
+        BoardSpec::Chessboard { inner_corners: [nx, ny], square_mm: s, border_mm: b, .. } => {
+            [-s - b, -s - b, f64::from(*nx) * s + b, f64::from(*ny) * s + b]
+        }
+        BoardSpec::Charuco { squares: [nx, ny], square_mm: s, border_mm: b, .. } => {
+            [-b, -b, f64::from(*nx) * s + b, f64::from(*ny) * s + b]
+        }
+        BoardSpec::Circles { dots: [nx, ny], pitch_mm: p, diameter_mm: d, asymmetric, border_mm: b } => {
+            let columns = if *asymmetric { f64::from(2 * nx - 1) } else { f64::from(nx - 1) };
+            let r = d / 2.0 + b;
+            [-r, -r, columns * p + r, f64::from(ny - 1) * p + r]
+        }
+    }
+}
+
+/// Distance to the nearest border between dark and bright print, mm: a stripe or spot across such
+/// a border is pulled towards the bright side.
+pub fn to_print_edge(board: &BoardSpec, x: f64, y: f64) -> f64 {
+    match board {
+        BoardSpec::Chessboard { inner_corners: [nx, ny], square_mm: s, .. } => {
+            let (u, v) = (x / s, y / s);
+            to_lines(u, v, -1.0, f64::from(*nx), -1.0, f64::from(*ny)) * s
+        }
+        BoardSpec::Charuco { squares: [nx, ny], square_mm: s, marker_mm, .. } => {
+            let (u, v) = (x / s, y / s);
+            let (nx, ny) = (f64::from(*nx), f64::from(*ny));
+            let square = to_lines(u, v, 0.0, nx, 0.0, ny) * s;
+            let on_board = u > 0.0 && v > 0.0 && u < nx && v < ny;
+            let white = (u.floor() as i64 + v.floor() as i64).rem_euclid(2) == 1;
+            if on_board && white {
+                // The marker's own cells are all edges: only the rim around it is plain.
+                let (a, b) = ((u.fract() - 0.5).abs(), (v.fract() - 0.5).abs());
+                square.min((a.max(b) * s - marker_mm / 2.0).max(0.0))
+            } else {
+                square
+            }
+        }
+        BoardSpec::Circles { diameter_mm, .. } => board
+            .features()
+            .iter()
+            .map(|c| ((x - c.x).hypot(y - c.y) - diameter_mm / 2.0).abs())
+            .fold(f64::INFINITY, f64::min),
+    }
+}
+
+/// Distance to the lines of the unit grid inside a rectangle, and to the rectangle itself from outside.
+fn to_lines(u: f64, v: f64, u0: f64, u1: f64, v0: f64, v1: f64) -> f64 {
+    let outside = (u0 - u).max(u - u1).max(0.0).hypot((v0 - v).max(v - v1).max(0.0));
+    if outside > 0.0 {
+        return outside;
+    }
+    (u - u.round()).abs().min((v - v.round()).abs())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn edges_of_a_chessboard() {
+        let b = BoardSpec::Chessboard {
+            inner_corners: [9, 6],
+            square_mm: 10.0,
+            border_mm: 7.0,
+            first_square: "black".into(),
+        };
+        assert_eq!(outline(&b), [-17.0, -17.0, 97.0, 67.0]);
+        assert!((to_print_edge(&b, 5.0, 3.0) - 3.0).abs() < 1e-12);
+        assert!((to_print_edge(&b, -14.0, 20.0) - 4.0).abs() < 1e-12);
+        assert!(inside(&b, -18.0, 0.0) < 0.0 && (inside(&b, 95.0, 20.0) - 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_marker_has_no_plain_place() {
+        let b = BoardSpec::Charuco {
+            squares: [14, 10],
+            square_mm: 10.0,
+            marker_mm: 7.0,
+            dictionary: "DICT_5X5_250".into(),
+            border_mm: 0.0,
+        };
+        assert_eq!(to_print_edge(&b, 15.0, 5.0), 0.0);
+        assert!((to_print_edge(&b, 5.0, 5.0) - 5.0).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,298 @@
+//! In: random stations with a known laser plane. Out: whether the calibration's errors are what it
+//! says they are, near the bound, and whether wrong pictures and reflections are found.
+//! Frame and unit: camera frame, mm, px.
+
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
+use rand::{Rng, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+use sheetlight::calibrate::laser_plane::{LaserPlaneFit, LaserPlaneOptions, PeakUse, StripePeak, StripeView, solve};
+use sheetlight::calibrate::measured_pose::{SeenBoard, changed, measure};
+use sheetlight::camera::Intrinsics;
+use sheetlight::geometry::{Board, Camera, Plane, Rigid, Vec2, Vec3, exp};
+use sheetlight::recording::BoardSpec;
+
+fn gauss(rng: &mut Pcg64, sigma: f64) -> f64 {
+    let z: f64 = StandardNormal.sample(rng);
+    z * sigma
+}
+
+fn between(rng: &mut Pcg64, low: f64, high: f64) -> f64 {
+    low + (high - low) * rng.random::<f64>()
+}
+
+struct Station {
+    camera: Intrinsics,
+    plane: Plane<Camera>,
+    boards: Vec<Rigid<Camera, Board>>,
+    spec: BoardSpec,
+}
+
+fn station(rng: &mut Pcg64, count: usize) -> Station {
+    let f = between(rng, 550.0, 700.0);
+    let camera = Intrinsics {
+        fx: f,
+        fy: f,
+        cx: between(rng, 310.0, 330.0),
+        cy: between(rng, 230.0, 250.0),
+        skew: 0.0,
+        distortion: [between(rng, -0.12, 0.0), between(rng, 0.0, 0.08), 0.0, 0.0, 0.0],
+        width: 640,
+        height: 480,
+    };
+    let normal = Vec3::new(gauss(rng, 0.03), 0.88 + gauss(rng, 0.02), 0.47 + gauss(rng, 0.02)).normalize();
+    let plane = Plane::new(normal, normal.z * between(rng, 145.0, 165.0)).unwrap();
+    let spec =
+        BoardSpec::Chessboard { inner_corners: [9, 6], square_mm: 10.0, border_mm: 7.0, first_square: "black".into() };
+    let boards = (0..count)
+        .map(|_| {
+            let turn = exp(&Vec3::new(0.0, 0.0, between(rng, -0.3, 0.3)))
+                * exp(&Vec3::new(between(rng, -0.5, 0.5), between(rng, -0.5, 0.5), 0.0));
+            let z = between(rng, 120.0, 210.0);
+            let y = (plane.offset - plane.normal.z * z) / plane.normal.y;
+            Rigid::new(turn, Vec3::new(gauss(rng, 4.0), y + gauss(rng, 5.0), z) - turn * Vec3::new(40.0, 25.0, 0.0))
+        })
+        .collect();
+    Station { camera, plane, boards, spec }
+}
+
+/// The stripe's true pixels on a board, one a pixel or so.
+fn stripe(s: &Station, plane: &Plane<Camera>, pose: &Rigid<Camera, Board>) -> Vec<Vec2> {
+    let normal: Vec3 = pose.rotation.column(2).into();
+    let along = plane.normal.cross(&normal).normalize();
+    let m = nalgebra::Matrix3::from_rows(&[plane.normal.transpose(), normal.transpose(), along.transpose()]);
+    let foot = m.try_inverse().unwrap() * Vec3::new(plane.offset, normal.dot(&pose.translation), 0.0);
+    let middle = foot + along * along.dot(&(pose.translation - foot));
+    (-200..=200)
+        .filter_map(|k| {
+            let p = middle + along * (f64::from(k) * 0.6);
+            let q = s.camera.pixel_from_point(&p)?;
+            ((0.0..639.0).contains(&q.x) && (0.0..479.0).contains(&q.y)).then_some(q)
+        })
+        .collect()
+}
+
+fn views(rng: &mut Pcg64, s: &Station, believed: &Intrinsics, corner_px: f64, peak_px: f64) -> Vec<StripeView> {
+    let points = s.spec.features();
+    s.boards
+        .iter()
+        .enumerate()
+        .map(|(i, pose)| {
+            let pixels = points
+                .iter()
+                .map(|p| {
+                    s.camera.pixel_from_point(&pose.point(p)).unwrap()
+                        + Vec2::new(gauss(rng, corner_px), gauss(rng, corner_px))
+                })
+                .collect();
+            let seen = SeenBoard { name: format!("picture {i}"), points: points.clone(), pixels };
+            let peaks = stripe(s, &s.plane, pose)
+                .into_iter()
+                .map(|p| StripePeak {
+                    pixel: p + Vec2::new(gauss(rng, peak_px), gauss(rng, peak_px)),
+                    sigma_px: peak_px,
+                    width_px: 1.3,
+                })
+                .collect();
+            StripeView { pose: measure(&seen, believed, pose).unwrap(), board: s.spec.clone(), peaks }
+        })
+        .collect()
+}
+
+fn run(
+    s: &Station,
+    v: &[StripeView],
+    covariance: &SMatrix<f64, 9, 9>,
+    corner_px: f64,
+) -> sheetlight::fault::Result<LaserPlaneFit> {
+    solve(v, &s.camera, covariance, corner_px, &LaserPlaneOptions::default())
+}
+
+/// Two directions of tilt and the offset: the three numbers that a plane has.
+fn three(truth: &Plane<Camera>) -> DMatrix<f64> {
+    let a = truth.normal.cross(&Vec3::x()).normalize();
+    let b = truth.normal.cross(&a);
+    DMatrix::from_row_slice(3, 4, &[a.x, a.y, a.z, 0.0, b.x, b.y, b.z, 0.0, 0.0, 0.0, 0.0, 1.0])
+}
+
+fn error(found: &Plane<Camera>, truth: &Plane<Camera>) -> DVector<f64> {
+    let n = found.normal - truth.normal;
+    three(truth) * DVector::from_vec(vec![n.x, n.y, n.z, found.offset - truth.offset])
+}
+
+/// Cramer-Rao bound of plane and all board poses together from corner and peak pixels, by numerical
+/// derivatives of the predicted pixels.
+fn bound(s: &Station, fit: &LaserPlaneFit, corner_px: f64, peak_px: f64) -> DMatrix<f64> {
+    let t = three(&s.plane);
+    let mut information = DMatrix::<f64>::zeros(3, 3);
+    let points = s.spec.features();
+    for (v, pose) in s.boards.iter().enumerate() {
+        let moved = |d: &[f64; 9]| {
+            let n = s.plane.normal
+                + Vec3::new(t[(0, 0)], t[(0, 1)], t[(0, 2)]) * d[0]
+                + Vec3::new(t[(1, 0)], t[(1, 1)], t[(1, 2)]) * d[1];
+            let plane = Plane::<Camera>::new(n.normalize(), s.plane.offset + d[2]).unwrap();
+            let turn = exp(&Vec3::new(d[6], d[7], d[8]));
+            let pose: Rigid<Camera, Board> =
+                Rigid::new(turn * pose.rotation, turn * pose.translation + Vec3::new(d[3], d[4], d[5]));
+            (plane, pose)
+        };
+        let truth_pixels = stripe(s, &s.plane, pose);
+        let corners = |d: &[f64; 9]| -> Vec<f64> {
+            let (_, pose) = moved(d);
+            points
+                .iter()
+                .flat_map(|p| {
+                    let q = s.camera.pixel_from_point(&pose.point(p)).unwrap() / corner_px;
+                    [q.x, q.y]
+                })
+                .collect()
+        };
+        // A peak's residual is its pixel distance from the predicted stripe: linear interpolation
+        // between the predicted points nearest to it.
+        let across = |d: &[f64; 9]| -> Vec<f64> {
+            let (plane, pose) = moved(d);
+            let line = stripe(s, &plane, &pose);
+            truth_pixels
+                .iter()
+                .zip(&fit.uses[v])
+                .filter(|(_, u)| **u == PeakUse::Used)
+                .map(|(p, _)| {
+                    let i = (0..line.len())
+                        .min_by(|&a, &b| (line[a] - p).norm().total_cmp(&(line[b] - p).norm()))
+                        .unwrap()
+                        .clamp(1, line.len() - 2);
+                    let along = (line[i + 1] - line[i - 1]).normalize();
+                    let q = p - line[i];
+                    (along.x * q.y - along.y * q.x) / peak_px
+                })
+                .collect()
+        };
+        let all = |d: &[f64; 9]| {
+            let mut r = corners(d);
+            r.extend(across(d));
+            DVector::from_vec(r)
+        };
+        let rows = all(&[0.0; 9]).len();
+        let mut j = DMatrix::<f64>::zeros(rows, 9);
+        for c in 0..9 {
+            let h = if c == 2 || (3..6).contains(&c) { 1e-3 } else { 1e-5 };
+            let (mut a, mut b) = ([0.0; 9], [0.0; 9]);
+            (a[c], b[c]) = (h, -h);
+            j.set_column(c, &((all(&a) - all(&b)) / (2.0 * h)));
+        }
+        let h = j.transpose() * j;
+        let local = h.view((3, 3), (6, 6)).into_owned().try_inverse().unwrap();
+        let mixed = h.view((0, 3), (3, 6)).into_owned();
+        information += h.view((0, 0), (3, 3)).into_owned() - &mixed * local * mixed.transpose();
+    }
+    information.try_inverse().unwrap()
+}
+
+#[test]
+fn errors_are_what_the_report_says_and_near_the_bound() {
+    let (mut over_sigma, mut over_bound) = ([0.0; 3], [0.0; 3]);
+    let levels = [(0.02, 0.03), (0.05, 0.05), (0.1, 0.05), (0.03, 0.2)];
+    for k in 0..100 {
+        let rng = &mut Pcg64::seed_from_u64(100 + k);
+        let s = station(rng, 10);
+        let (corner, peak) = levels[k as usize % 4];
+        let v = views(rng, &s, &s.camera, corner, peak);
+        let found = run(&s, &v, &SMatrix::zeros(), corner).unwrap();
+        assert!(found.views.iter().all(|v| v.used), "station {k}: good pictures were left out");
+        let e = error(&found.plane, &s.plane);
+        let c = three(&s.plane) * &found.covariance * three(&s.plane).transpose();
+        let b = bound(&s, &found, corner, peak);
+        for i in 0..3 {
+            over_sigma[i] += e[i] * e[i] / c[(i, i)] / 100.0;
+            over_bound[i] += e[i] * e[i] / b[(i, i)] / 100.0;
+        }
+    }
+    let (s, b) = (over_sigma.map(f64::sqrt), over_bound.map(f64::sqrt));
+    println!("error over sigma {s:.3?}, over bound {b:.3?}");
+    assert!(s.iter().all(|x| (0.8..=1.25).contains(x)), "over sigma {s:?}");
+    assert!((b.iter().map(|x| x * x).sum::<f64>() / 3.0).sqrt() <= 1.15, "over bound {b:?}");
+}
+
+#[test]
+fn the_cameras_uncertainty_reaches_the_report() {
+    let sigma = [0.3, 0.3, 0.2, 0.2, 1e-3, 1e-3, 1e-4, 1e-4, 1e-3];
+    let covariance = SMatrix::<f64, 9, 9>::from_diagonal(&SVector::from(sigma).map(|s: f64| s * s));
+    let (mut over, mut exact) = ([0.0; 3], [0.0; 3]);
+    for k in 0..100 {
+        let rng = &mut Pcg64::seed_from_u64(900 + k);
+        let s = station(rng, 10);
+        let believed = changed(&s.camera, &SVector::from_fn(|i, _| gauss(rng, sigma[i])));
+        let v = views(rng, &s, &believed, 0.03, 0.05);
+        let found = solve(&v, &believed, &covariance, 0.03, &LaserPlaneOptions::default()).unwrap();
+        let e = error(&found.plane, &s.plane);
+        let t = three(&s.plane);
+        let (c, x) = (&t * &found.covariance * t.transpose(), &t * &found.covariance_camera_exact * t.transpose());
+        for i in 0..3 {
+            over[i] += e[i] * e[i] / c[(i, i)] / 100.0;
+            exact[i] += e[i] * e[i] / x[(i, i)] / 100.0;
+        }
+    }
+    let over = over.map(f64::sqrt);
+    println!("with the camera's part {over:.3?}, without {:.2?}", exact.map(f64::sqrt));
+    assert!(over.iter().all(|x| (0.8..=1.25).contains(x)), "{over:?}");
+    assert!(exact.iter().sum::<f64>().sqrt() > 5.0, "the test must be able to fail");
+}
+
+#[test]
+fn a_board_that_moved_between_its_two_pictures_is_named() {
+    for k in 0..20 {
+        let rng = &mut Pcg64::seed_from_u64(300 + k);
+        let s = station(rng, 10);
+        let mut v = views(rng, &s, &s.camera, 0.03, 0.05);
+        let bad = k as usize % 10;
+        let mut shifted = s.boards[bad];
+        shifted.translation += Vec3::new(0.0, 0.0, if k % 2 == 0 { 2.0 } else { 0.3 });
+        v[bad].peaks = stripe(&s, &s.plane, &shifted)
+            .into_iter()
+            .map(|p| StripePeak { pixel: p + Vec2::new(0.0, gauss(rng, 0.05)), sigma_px: 0.05, width_px: 1.3 })
+            .collect();
+        let found = run(&s, &v, &SMatrix::zeros(), 0.03).unwrap();
+        let out: Vec<usize> = (0..10).filter(|&i| !found.views[i].used).collect();
+        assert_eq!(out, [bad], "seed {k}");
+        let e = error(&found.plane, &s.plane);
+        let c = three(&s.plane) * &found.covariance * three(&s.plane).transpose();
+        assert!((0..3).all(|i| e[i].abs() < 4.5 * c[(i, i)].sqrt()), "seed {k}: {e}");
+    }
+}
+
+#[test]
+fn reflections_on_and_beside_the_board_do_not_enter() {
+    let rng = &mut Pcg64::seed_from_u64(5);
+    let s = station(rng, 8);
+    let mut v = views(rng, &s, &s.camera, 0.03, 0.05);
+    let clean = run(&s, &v, &SMatrix::zeros(), 0.03).unwrap();
+    for view in &mut v {
+        let wrong: Vec<StripePeak> = (0..80)
+            .map(|_| StripePeak {
+                pixel: Vec2::new(between(rng, 5.0, 634.0), between(rng, 5.0, 474.0)),
+                sigma_px: 0.05,
+                width_px: 1.3,
+            })
+            .collect();
+        view.peaks.extend(wrong);
+    }
+    let found = run(&s, &v, &SMatrix::zeros(), 0.03).unwrap();
+    assert!(found.views.iter().all(|v| v.used));
+    let e = error(&found.plane, &clean.plane);
+    let c = three(&s.plane) * &clean.covariance * three(&s.plane).transpose();
+    assert!((0..3).all(|i| e[i].abs() < 0.7 * c[(i, i)].sqrt()), "{e}");
+}
+
+#[test]
+fn stripes_on_one_line_are_refused() {
+    let rng = &mut Pcg64::seed_from_u64(6);
+    let mut s = station(rng, 5);
+    let one = s.boards[0];
+    s.boards.iter_mut().for_each(|b| *b = one);
+    let v = views(rng, &s, &s.camera, 0.03, 0.05);
+    match run(&s, &v, &SMatrix::zeros(), 0.03) {
+        Err(_) => {}
+        Ok(f) => assert!(f.depth_spread < 0.5 && f.board_spread < 0.01, "depth {} mm", f.depth_spread),
+    }
+}
