@@ -107,7 +107,12 @@ fn pairs(rng: &mut Pcg64, s: &Station, noise: Noise, believed: &Intrinsics) -> V
                         + Vec2::new(gauss(rng, noise.px), gauss(rng, noise.px))
                 })
                 .collect();
-            let seen = SeenBoard { name: format!("picture {i}"), points: s.points.clone(), pixels };
+            let seen = SeenBoard {
+                name: format!("picture {i}"),
+                points: s.points.clone(),
+                pixels,
+                sigmas_px: vec![1.0; s.points.len()],
+            };
             Pair { near_from_far: read(rng, s, pose, noise), seen: measure(&seen, believed, &true_board).unwrap() }
         })
         .collect()

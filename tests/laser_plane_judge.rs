@@ -85,7 +85,12 @@ fn views(rng: &mut Pcg64, s: &Station, believed: &Intrinsics, corner_px: f64, pe
                         + Vec2::new(gauss(rng, corner_px), gauss(rng, corner_px))
                 })
                 .collect();
-            let seen = SeenBoard { name: format!("picture {i}"), points: points.clone(), pixels };
+            let seen = SeenBoard {
+                name: format!("picture {i}"),
+                points: points.clone(),
+                pixels,
+                sigmas_px: vec![1.0; points.len()],
+            };
             let peaks = stripe(s, &s.plane, pose)
                 .into_iter()
                 .map(|p| StripePeak {

@@ -4,7 +4,7 @@
 
 use super::components::Components;
 use super::hand_eye_closed::{Agreement, Chain, Far, Near, Pair, agree};
-use super::measured_pose::{pooled_sigma_px, step_between};
+use super::measured_pose::{pooled_factor, step_between};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Camera, Mat3, Rigid, Vec3, exp, skew};
 use crate::solve::{LmOptions, Problem, Residuals, Stop, lm};
@@ -77,12 +77,12 @@ impl HandEyeOptions {
     }
 }
 
-/// Standard deviations of the robot's reported poses and of the features.
+/// Standard deviations of the robot's reported poses per axis, and the factor of the features' sigmas.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     pub robot_mm: f64,
     pub robot_rad: f64,
-    pub feature_px: f64,
+    pub feature_factor: f64,
 }
 
 /// Where the flange is, as the noise of its pose moves the board in the picture.
@@ -177,7 +177,7 @@ fn robot_parts(flange: &Vec3) -> [Matrix6<f64>; 2] {
 
 fn step_covariance(chain: &Chain, pair: &Pair, noise: &Noise, mount: Mount) -> Matrix6<f64> {
     let [t, r] = robot_parts(&mount.flange(chain, &pair.near_from_far));
-    pair.seen.covariance(noise.feature_px) + t * noise.robot_mm.powi(2) + r * noise.robot_rad.powi(2)
+    pair.seen.covariance(noise.feature_factor) + t * noise.robot_mm.powi(2) + r * noise.robot_rad.powi(2)
 }
 
 /// The refinement: the robot's true poses are eliminated in closed form, which leaves whitened
@@ -246,7 +246,7 @@ fn components(pairs: &[&Pair], chain: &Chain, noise: &Noise, given: &Given, o: &
         let at = 6 * i;
         model.residual.rows_mut(at, 6).copy_from(&e);
         model.jacobian.view_mut((at, 0), (6, 12)).copy_from(&j);
-        let mut known = pair.seen.covariance(noise.feature_px);
+        let mut known = pair.seen.covariance(noise.feature_factor);
         let [t, r] = robot_parts(&mount.flange(chain, &pair.near_from_far));
         for (k, (part, given)) in
             [(t, o.robot_sigma_mm), (r, o.robot_sigma_deg.map(f64::to_radians))].into_iter().enumerate()
@@ -355,7 +355,7 @@ pub fn solve(
         robot_mm: o.robot_sigma_mm.unwrap_or(scatter),
         // The scatter of the board's corners seen as a rotation over the board's distance.
         robot_rad: o.robot_sigma_deg.map_or(scatter / mean(seen.iter().map(|s| s.centre().norm())), f64::to_radians),
-        feature_px: pooled_sigma_px(&seen),
+        feature_factor: pooled_factor(&seen),
     };
     let mut used = agreement.agreeing.clone();
     let mut chain = agreement.chain;

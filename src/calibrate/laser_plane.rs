@@ -269,13 +269,14 @@ fn refused(what: String) -> Fault {
         .next("show the board at five or more distances and tilts, the stripe right across it")
 }
 
-/// Fits the laser plane. `feature_sigma_px` is the sigma of a board feature's coordinate,
+/// Fits the laser plane. `feature_factor` makes the stated sigmas of the boards' features true
+/// ([`super::measured_pose::pooled_factor`]),
 /// `camera_covariance` that of the camera's parameters.
 pub fn solve(
     views: &[StripeView],
     camera: &Intrinsics,
     camera_covariance: &SMatrix<f64, 9, 9>,
-    feature_sigma_px: f64,
+    feature_factor: f64,
     o: &LaserPlaneOptions,
 ) -> Result<LaserPlaneFit> {
     o.check()?;
@@ -291,7 +292,7 @@ pub fn solve(
     let mut data = Data {
         peaks: Vec::new(),
         measured: views.iter().map(|v| v.pose.camera_from_board).collect(),
-        roots: views.iter().map(|v| root(&v.pose, feature_sigma_px)).collect::<Result<_>>()?,
+        roots: views.iter().map(|v| root(&v.pose, feature_factor)).collect::<Result<_>>()?,
     };
     let first = majority(&peaks, &data.measured, o)?;
     let mut used = vec![true; views.len()];

@@ -2,13 +2,18 @@
 //! a measurement: its information and how it moves with the camera's parameters.
 //! Frame and unit: camera_from_board, mm; features in px (docs/math.md, Board pose (1) to (4)).
 
+use super::boards::BoardView;
+use super::pose::board_pose;
+use super::projection::project;
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Board, Camera, Mat3, Rigid, Vec2, Vec3, exp, log, skew};
+use crate::recording::BoardSpec;
 use crate::solve::{LmOptions, Loss, Problem, Residuals, Stop, lm};
-use nalgebra::{Matrix2x3, Matrix6, SMatrix, SVector, Vector6};
+use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 
-/// Names of the camera's parameters in the order used for sensitivities and covariances.
+/// Names of the camera's parameters in the order used for sensitivities and covariances: those of
+/// [`super::projection::NAMES`] without the skew, which no station of ours has.
 pub const INTRINSIC_NAMES: [&str; 9] = ["fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"];
 
 /// Change of six pose numbers by the nine camera parameters.
@@ -27,6 +32,21 @@ pub struct SeenBoard {
     pub points: Vec<Vec3>,
     /// px.
     pub pixels: Vec<Vec2>,
+    /// Standard deviation of each pixel coordinate up to one common factor, px.
+    pub sigmas_px: Vec<f64>,
+}
+
+impl SeenBoard {
+    /// The features that a detector found.
+    pub fn from_view(name: &str, board: &BoardSpec, view: &BoardView) -> SeenBoard {
+        let features = board.features();
+        SeenBoard {
+            name: name.to_owned(),
+            points: view.points.iter().map(|p| features[p.feature_id]).collect(),
+            pixels: view.points.iter().map(|p| p.pixel).collect(),
+            sigmas_px: view.points.iter().map(|p| p.sigma_px.max(1e-3)).collect(),
+        }
+    }
 }
 
 /// The pose of a board in one picture, with everything later solvers need from its pixels.
@@ -34,15 +54,15 @@ pub struct SeenBoard {
 pub struct MeasuredPose {
     pub name: String,
     pub camera_from_board: Rigid<Camera, Board>,
-    /// Sum of JᵀJ over the features, per px²: a step s from the optimum raises the sum of squared
-    /// pixel residuals by sᵀ·information·s.
+    /// A step s from the optimum raises the sum of squared residuals, in units of the features'
+    /// stated sigmas, by sᵀ·information·s.
     pub information: Matrix6<f64>,
     /// Step of the pose per unit of each camera parameter.
     pub by_intrinsics: ByIntrinsics,
     /// rms of the feature residuals per coordinate, px.
     pub rms_px: f64,
-    /// Robust sigma of one coordinate, px.
-    pub sigma_px: f64,
+    /// What the residuals say about the stated sigmas: the factor that makes them true.
+    pub sigma_factor: f64,
     /// Coordinates minus the six of the pose.
     pub freedom: f64,
     /// Corners of the features' bounding box on the board, and its centre: board frame, mm.
@@ -70,9 +90,10 @@ impl MeasuredPose {
     pub fn centre(&self) -> Vec3 {
         self.camera_from_board.point(&self.landmarks[4])
     }
-    /// Covariance of a step for features with this sigma.
-    pub fn covariance(&self, sigma_px: f64) -> Matrix6<f64> {
-        self.information.try_inverse().unwrap_or_else(|| Matrix6::from_element(f64::INFINITY)) * sigma_px * sigma_px
+    /// Covariance of a step, the features' sigmas being this factor times the stated ones.
+    pub fn covariance(&self, sigma_factor: f64) -> Matrix6<f64> {
+        let inverse = self.information.try_inverse().unwrap_or_else(|| Matrix6::from_element(f64::INFINITY));
+        inverse * (sigma_factor * sigma_factor)
     }
 }
 
@@ -90,38 +111,6 @@ pub fn moved(pose: &Rigid<Camera, Board>, s: &[f64]) -> Rigid<Camera, Board> {
     Rigid::new(e * pose.rotation, e * pose.translation + Vec3::new(s[0], s[1], s[2]))
 }
 
-/// d(pixel)/d(camera-frame point) in px per mm; `None` behind the camera.
-pub fn pixel_by_point(camera: &Intrinsics, p: &Vec3) -> Option<Matrix2x3<f64>> {
-    if p.z <= 0.0 {
-        return None;
-    }
-    let n = Vec2::new(p.x / p.z, p.y / p.z);
-    let k = nalgebra::Matrix2::new(camera.fx, camera.skew, 0.0, camera.fy);
-    let perspective = Matrix2x3::new(1.0, 0.0, -n.x, 0.0, 1.0, -n.y) / p.z;
-    Some(k * camera.distort_jacobian(&n) * perspective)
-}
-
-/// d(pixel)/d(fx fy cx cy k1 k2 p1 p2 k3) at a camera-frame point.
-pub fn pixel_by_intrinsics(camera: &Intrinsics, p: &Vec3) -> SMatrix<f64, 2, 9> {
-    let (x, y) = (p.x / p.z, p.y / p.z);
-    let d = camera.distort(&Vec2::new(x, y));
-    let r2 = x * x + y * y;
-    let lens = [
-        [x * r2, y * r2],
-        [x * r2 * r2, y * r2 * r2],
-        [2.0 * x * y, r2 + 2.0 * y * y],
-        [r2 + 2.0 * x * x, 2.0 * x * y],
-        [x * r2 * r2 * r2, y * r2 * r2 * r2],
-    ];
-    let mut j = SMatrix::<f64, 2, 9>::zeros();
-    (j[(0, 0)], j[(1, 1)], j[(0, 2)], j[(1, 3)]) = (d.x, d.y, 1.0, 1.0);
-    for (i, [a, b]) in lens.iter().enumerate() {
-        j[(0, 4 + i)] = camera.fx * a + camera.skew * b;
-        j[(1, 4 + i)] = camera.fy * b;
-    }
-    j
-}
-
 struct PoseProblem<'a> {
     seen: &'a SeenBoard,
     camera: &'a Intrinsics,
@@ -136,10 +125,11 @@ impl Problem for PoseProblem<'_> {
         moved(state, step)
     }
     fn residuals(&self, state: &Self::State, out: &mut Residuals) -> Option<()> {
-        for (point, pixel) in self.seen.points.iter().zip(&self.seen.pixels) {
+        for ((point, pixel), sigma) in self.seen.points.iter().zip(&self.seen.pixels).zip(&self.seen.sigmas_px) {
             let p = state.point(point);
-            let r = self.camera.pixel_from_point(&p)? - pixel;
-            let j = pixel_by_point(self.camera, &p)? * point_by_step(&p);
+            let at = project(self.camera, &p)?;
+            let r = (at.pixel - pixel) / *sigma;
+            let j = at.by_point * point_by_step(&p) / *sigma;
             out.group(r.as_slice(), &[0, 1, 2, 3, 4, 5], j.transpose().as_slice());
         }
         Some(())
@@ -156,7 +146,8 @@ pub fn point_by_step(p: &Vec3) -> SMatrix<f64, 3, 6> {
 
 /// Refines a board's pose by its pixels and measures how well it is known.
 pub fn measure(seen: &SeenBoard, camera: &Intrinsics, start: &Rigid<Camera, Board>) -> Result<MeasuredPose> {
-    if seen.points.len() != seen.pixels.len() || seen.points.len() < 4 {
+    let same = seen.points.len() == seen.pixels.len() && seen.points.len() == seen.sigmas_px.len();
+    if !same || seen.points.len() < 4 {
         return Err(Fault::input(format!(
             "{}: {} board points with {} pixels, at least 4 pairs are needed",
             seen.name,
@@ -175,14 +166,15 @@ pub fn measure(seen: &SeenBoard, camera: &Intrinsics, start: &Rigid<Camera, Boar
             .next("leave this picture out"));
     }
     let pose = found.state;
-    let mut information = Matrix6::zeros();
-    let mut mixed = ByIntrinsics::zeros();
-    for (point, weight) in seen.points.iter().zip(&found.weights) {
-        let p = pose.point(point);
-        let by_point = pixel_by_point(camera, &p).expect("in front of the camera at the solution");
-        let j = by_point * point_by_step(&p);
-        information += j.transpose() * j * *weight;
-        mixed += j.transpose() * pixel_by_intrinsics(camera, &p) * *weight;
+    let (mut information, mut mixed, mut squares) = (Matrix6::zeros(), ByIntrinsics::zeros(), 0.0);
+    for (i, weight) in found.weights.iter().enumerate() {
+        let p = pose.point(&seen.points[i]);
+        let at = project(camera, &p).expect("in front of the camera at the solution");
+        let j = at.by_point * point_by_step(&p);
+        let w = weight / (seen.sigmas_px[i] * seen.sigmas_px[i]);
+        information += j.transpose() * j * w;
+        mixed += j.transpose() * at.by_intrinsics.fixed_columns::<9>(0) * w;
+        squares += (at.pixel - seen.pixels[i]).norm_squared();
     }
     let inverse = information.try_inverse().ok_or_else(|| {
         Fault::refused(format!("{}: the board's pose is not determined by its pixels", seen.name))
@@ -194,8 +186,8 @@ pub fn measure(seen: &SeenBoard, camera: &Intrinsics, start: &Rigid<Camera, Boar
         camera_from_board: pose,
         information,
         by_intrinsics: -(inverse * mixed),
-        rms_px: found.rms,
-        sigma_px: found.sigma0,
+        rms_px: (squares / (2.0 * seen.points.len() as f64)).sqrt(),
+        sigma_factor: found.sigma0,
         freedom: found.freedom,
         landmarks: landmarks(&seen.points),
     })
@@ -215,10 +207,16 @@ fn landmarks(points: &[Vec3]) -> [Vec3; 5] {
     ]
 }
 
-/// One sigma for all pictures: their residuals pooled by degrees of freedom, px.
-pub fn pooled_sigma_px(poses: &[MeasuredPose]) -> f64 {
+/// Finds the pose of a board from the features that a detector found, and measures it.
+pub fn measure_view(name: &str, camera: &Intrinsics, board: &BoardSpec, view: &BoardView) -> Result<MeasuredPose> {
+    let start = board_pose(camera, board, view).map_err(|e| e.at(name))?;
+    measure(&SeenBoard::from_view(name, board, view), camera, &start.camera_from_board)
+}
+
+/// One factor for all pictures: their residuals pooled by degrees of freedom.
+pub fn pooled_factor(poses: &[MeasuredPose]) -> f64 {
     let (sum, freedom) =
-        poses.iter().fold((0.0, 0.0), |(s, f), p| (s + p.sigma_px * p.sigma_px * p.freedom, f + p.freedom));
+        poses.iter().fold((0.0, 0.0), |(s, f), p| (s + p.sigma_factor * p.sigma_factor * p.freedom, f + p.freedom));
     if freedom > 0.0 { (sum / freedom).sqrt() } else { f64::NAN }
 }
 

@@ -1,17 +1,17 @@
 //! In: pictures' features, robot poses, laser peaks. Out: calibrations with covariance and verdict.
 //! Frame and unit: stated in each file; mm, rad, px.
 
+pub mod board_print;
 pub mod boards;
 pub mod components;
 pub mod hand_eye;
 pub mod hand_eye_closed;
 pub mod homography;
-pub mod board_print;
-pub mod components;
-pub mod hand_eye;
-pub mod hand_eye_closed;
 pub mod laser_plane;
 pub mod measured_pose;
+pub mod pointer;
+pub mod pointer_range;
 pub mod pose;
 pub mod projection;
 pub mod report;
+pub mod spot;

@@ -1,0 +1,267 @@
+//! In: a spot's centre, the camera, the beam and their joint covariance. Out: distance and point with
+//! their sigmas; from three or more points the surface's normal and a tool pose square to it.
+//! Frame and unit: camera and base frame, mm, rad (docs/math.md, Pointer (6) to (9); the paper's eq. 3, 4).
+
+use super::measured_pose::changed;
+use crate::camera::Intrinsics;
+use crate::fault::{Fault, Result};
+use crate::geometry::{Base, Camera, Flange, Mat3, Ray, Rigid, Tool, Vec2, Vec3, fit_plane, skew};
+use nalgebra::{DMatrix, Matrix2, SMatrix, SVector};
+
+/// Derivatives of a point by what it was computed from: beam (6), camera (9).
+pub type ByRig = SMatrix<f64, 3, 15>;
+
+/// A point that the pointer touched.
+#[derive(Clone, Debug)]
+pub struct Ranged {
+    /// Distance from the beam's origin along the beam, mm.
+    pub along_beam: f64,
+    pub along_beam_sigma: f64,
+    /// Distance from the camera along its optical axis, mm.
+    pub along_axis: f64,
+    pub along_axis_sigma: f64,
+    /// Camera frame, mm.
+    pub point: Vec3,
+    /// mm²; spot, beam and camera together.
+    pub covariance: Mat3,
+    /// The part that belongs to this spot alone.
+    pub covariance_spot: Mat3,
+    /// How the point follows the beam and the camera, which all points share.
+    pub by_rig: ByRig,
+    /// Distance of the spot from the beam's image, px, and in sigmas.
+    pub off_beam_px: f64,
+    pub off_beam_sigmas: f64,
+}
+
+/// The beam's point whose pixel is nearest to the spot's, in units of the spot's sigma: the viewing
+/// ray and the beam meet only up to noise. `joint` is the pointer's 15x15 covariance.
+pub fn range(
+    pixel: &Vec2,
+    covariance: &Matrix2<f64>,
+    camera: &Intrinsics,
+    beam: &Ray<Camera>,
+    joint: &SMatrix<f64, 15, 15>,
+) -> Result<Ranged> {
+    let lost = || {
+        Fault::refused(format!("the spot at {:.1} {:.1} px has no point on the beam", pixel.x, pixel.y))
+            .cause("a reflection, or the pointer was moved since it was calibrated")
+            .next("calibrate the pointer again, or leave this picture out")
+    };
+    let whitener = covariance.cholesky().and_then(|c| c.l().try_inverse()).ok_or_else(|| {
+        Fault::input(format!("the spot's covariance {covariance} is none")).next("measure the spot again")
+    })?;
+    let s = nearest(pixel, &whitener, camera, beam).ok_or_else(lost)?;
+    // Derivatives of the solution by everything it depends on, by differences of the solution itself.
+    let at = |p: &Vec2, d: &SVector<f64, 15>| -> Option<(f64, Vec3)> {
+        let camera = changed(camera, &d.fixed_rows::<9>(6).into_owned());
+        let beam = Ray::new(beam.origin + Vec3::new(d[0], d[1], d[2]), beam.direction + Vec3::new(d[3], d[4], d[5]))?;
+        let s = nearest(p, &whitener, &camera, &beam)?;
+        Some((s, beam.at(s)))
+    };
+    let zero = SVector::<f64, 15>::zeros();
+    let mut by_spot = SMatrix::<f64, 4, 2>::zeros();
+    for c in 0..2 {
+        let mut e = Vec2::zeros();
+        e[c] = 1e-3;
+        let (a, b) = (at(&(pixel + e), &zero).ok_or_else(lost)?, at(&(pixel - e), &zero).ok_or_else(lost)?);
+        by_spot.set_column(c, &(stack(&a) - stack(&b)).scale(1.0 / 2e-3));
+    }
+    let mut by_rig = SMatrix::<f64, 4, 15>::zeros();
+    for c in 0..15 {
+        let h = match c {
+            0..=2 => 1e-3,
+            3..=5 => 1e-6,
+            6..=9 => 1e-2,
+            _ => 1e-5,
+        };
+        let mut d = zero;
+        d[c] = h;
+        let (a, b) = (at(pixel, &d).ok_or_else(lost)?, at(pixel, &-d).ok_or_else(lost)?);
+        by_rig.set_column(c, &(stack(&a) - stack(&b)).scale(1.0 / (2.0 * h)));
+    }
+    let own = by_spot * covariance * by_spot.transpose();
+    let all = own + by_rig * joint * by_rig.transpose();
+    let point = beam.at(s);
+    let off = camera.pixel_from_point(&point).ok_or_else(lost)? - pixel;
+    Ok(Ranged {
+        along_beam: s,
+        along_beam_sigma: all[(0, 0)].max(0.0).sqrt(),
+        along_axis: point.z,
+        along_axis_sigma: all[(3, 3)].max(0.0).sqrt(),
+        point,
+        covariance: all.fixed_view::<3, 3>(1, 1).into(),
+        covariance_spot: own.fixed_view::<3, 3>(1, 1).into(),
+        by_rig: by_rig.fixed_view::<3, 15>(1, 0).into(),
+        off_beam_px: off.norm(),
+        off_beam_sigmas: (whitener * off).norm(),
+    })
+}
+
+fn stack((s, p): &(f64, Vec3)) -> SVector<f64, 4> {
+    SVector::from([*s, p.x, p.y, p.z])
+}
+
+/// Gauss-Newton along the beam from the closed-form triangulation.
+fn nearest(pixel: &Vec2, whitener: &Matrix2<f64>, camera: &Intrinsics, beam: &Ray<Camera>) -> Option<f64> {
+    // Nearest approach of viewing ray and beam in space.
+    let v = camera.ray_from_pixel(pixel)?.direction;
+    let (d, o) = (beam.direction, beam.origin);
+    let (b, c, e) = (d.dot(&v), d.dot(&o), v.dot(&o));
+    let mut s = (b * e - c) / (1.0 - b * b);
+    for _ in 0..30 {
+        let p = beam.at(s);
+        let at = super::projection::project(camera, &p)?;
+        let r = whitener * (at.pixel - pixel);
+        let j = whitener * at.by_point * d;
+        let step = -j.dot(&r) / j.norm_squared();
+        if !step.is_finite() {
+            return None;
+        }
+        s += step;
+        if step.abs() < 1e-10 {
+            break;
+        }
+    }
+    (beam.at(s).z > 0.0).then_some(s)
+}
+
+/// A ranged point in the base frame, its shared parts kept apart.
+#[derive(Clone, Debug)]
+pub struct BasePoint {
+    pub point: Vec3,
+    /// mm²; everything.
+    pub covariance: Mat3,
+    /// The part of this shot alone: spot and robot.
+    pub own: Mat3,
+    /// How it follows beam, camera (15) and hand-eye (6), which all points share.
+    pub shared: SMatrix<f64, 3, 21>,
+    /// Where the camera was: the side of the surface that is outside.
+    pub camera: Vec3,
+}
+
+/// The robot's noise per axis that an error budget takes over from the hand-eye calibration.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct RobotNoise {
+    pub mm: f64,
+    pub rad: f64,
+}
+
+/// The paper's eq. 4: the point in the base frame, with the hand-eye's and the robot's uncertainty.
+/// `shared` is the covariance of beam and camera (15) and hand-eye (6).
+pub fn to_base(
+    ranged: &Ranged,
+    base_from_flange: &Rigid<Base, Flange>,
+    flange_from_camera: &Rigid<Flange, Camera>,
+    shared: &SMatrix<f64, 21, 21>,
+    robot: &RobotNoise,
+) -> BasePoint {
+    let turned = flange_from_camera.rotation * ranged.point;
+    let in_flange = turned + flange_from_camera.translation;
+    let base_from_camera = *base_from_flange * *flange_from_camera;
+    let r = base_from_camera.rotation;
+    let mut j = SMatrix::<f64, 3, 21>::zeros();
+    j.fixed_view_mut::<3, 15>(0, 0).copy_from(&(r * ranged.by_rig));
+    j.fixed_view_mut::<3, 3>(0, 15).copy_from(&base_from_flange.rotation);
+    j.fixed_view_mut::<3, 3>(0, 18).copy_from(&(-base_from_flange.rotation * skew(&turned)));
+    let arm = skew(&(base_from_flange.rotation * in_flange));
+    let own = r * ranged.covariance_spot * r.transpose()
+        + Mat3::identity() * robot.mm.powi(2)
+        + arm * arm.transpose() * robot.rad.powi(2);
+    BasePoint {
+        point: base_from_camera.point(&ranged.point),
+        covariance: own + j * shared * j.transpose(),
+        own,
+        shared: j,
+        camera: base_from_camera.translation,
+    }
+}
+
+/// A surface through ranged points.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    /// Of unit length, towards the camera; base frame.
+    pub normal: Vec3,
+    /// Mean of the points, mm.
+    pub centre: Vec3,
+    /// Uncertainty of the normal's direction: the ellipse's axes, rad, larger first.
+    pub tilt_sigma: [f64; 2],
+    /// Uncertainty of the height at the centre, mm.
+    pub height_sigma: f64,
+    /// rms distance of the points from the plane, mm; 0 for three points.
+    pub rms: f64,
+    /// The tool square to the surface: z out of the surface, x along the flange's x as far as that
+    /// is possible, origin at the centre.
+    pub base_from_tool: Rigid<Base, Tool>,
+}
+
+/// The plane through three or more points, weighted by their own noise, with the uncertainty that
+/// they share propagated on top. `x` is the direction wanted for the tool's x axis (base frame).
+pub fn surface(points: &[BasePoint], shared: &SMatrix<f64, 21, 21>, x: &Vec3) -> Result<Surface> {
+    let weak = |what: String| {
+        Fault::refused(what)
+            .cause("a surface's tilt needs three spots that do not lie on a line")
+            .next("touch three places of the surface that are as far apart as the part allows")
+    };
+    let n = points.len();
+    if n < 3 {
+        return Err(weak(format!("{n} points, 3 are needed")));
+    }
+    let at: Vec<Vec3> = points.iter().map(|p| p.point).collect();
+    let centre = at.iter().sum::<Vec3>() / n as f64;
+    let plane = fit_plane::<Base>(&at).ok_or_else(|| weak("the points lie on a line".into()))?.0;
+    let mut normal = plane.normal;
+    let outside = points.iter().map(|p| p.camera).sum::<Vec3>() / n as f64 - centre;
+    if normal.dot(&outside) < 0.0 {
+        normal = -normal;
+    }
+    // Two rounds: the weights depend on the normal.
+    let (mut covariance, mut residuals) = (Mat3::zeros(), vec![0.0; n]);
+    for _ in 0..3 {
+        let axis = if normal.x.abs() < 0.7 { Vec3::x() } else { Vec3::y() };
+        let a = normal.cross(&axis).normalize();
+        let b = normal.cross(&a);
+        // Height = h + p·a-coordinate + q·b-coordinate.
+        let (mut h, mut g) = (Mat3::zeros(), Vec3::zeros());
+        let rows: Vec<Vec3> = at.iter().map(|p| Vec3::new((p - centre).dot(&a), (p - centre).dot(&b), 1.0)).collect();
+        let weights: Vec<f64> =
+            points.iter().map(|p| 1.0 / (normal.transpose() * p.own * normal)[0].max(1e-12)).collect();
+        for i in 0..n {
+            let z = (at[i] - centre).dot(&normal);
+            h += rows[i] * rows[i].transpose() * weights[i];
+            g += rows[i] * (z * weights[i]);
+        }
+        let inverse = h.try_inverse().ok_or_else(|| weak("the points lie on a line".into()))?;
+        let s = inverse * g;
+        for i in 0..n {
+            residuals[i] = (at[i] - centre).dot(&normal) - rows[i].dot(&s);
+        }
+        // Of the three numbers with respect to the shared parameters.
+        let mut j = SMatrix::<f64, 3, 21>::zeros();
+        for i in 0..n {
+            j += rows[i] * weights[i] * (normal.transpose() * points[i].shared);
+        }
+        let j = inverse * j;
+        covariance = inverse + j * shared * j.transpose();
+        normal = (normal - a * s.x - b * s.y).normalize();
+    }
+    let tilt: Matrix2<f64> = covariance.fixed_view::<2, 2>(0, 0).into();
+    let e = tilt.symmetric_eigenvalues();
+    let along = x - normal * normal.dot(x);
+    let x = if along.norm() > 1e-6 { along.normalize() } else { normal.cross(&Vec3::y()).normalize() };
+    let rotation = Mat3::from_columns(&[x, normal.cross(&x), normal]);
+    Ok(Surface {
+        normal,
+        centre,
+        tilt_sigma: [e.max().max(0.0).sqrt(), e.min().max(0.0).sqrt()],
+        height_sigma: covariance[(2, 2)].max(0.0).sqrt(),
+        rms: (residuals.iter().map(|r| r * r).sum::<f64>() / n as f64).sqrt(),
+        base_from_tool: Rigid::new(rotation, centre),
+    })
+}
+
+/// The joint covariance of beam and camera from a pointer's calibration file. A file that knows only
+/// the beam (imported values) counts the camera's part as nothing.
+pub fn joint_covariance(covariance: &crate::rig::Covariance) -> SMatrix<f64, 15, 15> {
+    let m: DMatrix<f64> = covariance.to_matrix();
+    SMatrix::from_fn(|i, j| if i < m.nrows() && j < m.ncols() { m[(i, j)] } else { 0.0 })
+}
