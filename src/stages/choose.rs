@@ -14,6 +14,11 @@ pub struct ChooseParams {
     pub narrowest: f32,
     /// Largest profile sigma over the stripe's, 1..=3. Two stripes that run together have 1.5 and more.
     pub widest: f32,
+    /// Profile sigma over the stripe's, 0..=1, below which a peak may be a spot cut by an edge; and the amplitude over
+    /// the strongest nearby, 0..=1, that it then needs. What is left of a cut spot has lost width and light at once,
+    /// and its centre is off the sheet's centre by up to a beam radius.
+    pub cut_width: f32,
+    pub cut_amplitude: f32,
     /// Largest standard deviation of a centre over the stripe's sigma, 0.01..=2.
     pub uncertain: f32,
     /// Largest angle between a stripe and the image of a surface that faces the camera, 0..=90 degrees. Beyond it the
@@ -31,7 +36,9 @@ impl Default for ChooseParams {
         ChooseParams {
             faintest: 8.0,
             narrowest: 0.71,
-            widest: 2.0,
+            widest: 1.7,
+            cut_width: 0.88,
+            cut_amplitude: 0.4,
             uncertain: 0.43,
             steepest_deg: 70.0,
             echo: 0.12,
@@ -46,6 +53,8 @@ impl ChooseParams {
             ("faintest", self.faintest, 0.0, 255.0),
             ("narrowest", self.narrowest, 0.0, 1.0),
             ("widest", self.widest, 1.0, 3.0),
+            ("cut_width", self.cut_width, 0.0, 1.0),
+            ("cut_amplitude", self.cut_amplitude, 0.0, 1.0),
             ("uncertain", self.uncertain, 0.01, 2.0),
             ("steepest_deg", self.steepest_deg, 0.0, 90.0),
             ("echo", self.echo, 0.0, 1.0),
@@ -72,7 +81,8 @@ pub struct Scene {
     pub across: [f32; 2],
 }
 
-/// CPU twin, two passes as on the GPU: each peak by itself and the strongest of each line, then the echoes.
+/// CPU twin, two passes as on the GPU: each peak by itself and the strongest of each line, then those that are
+/// weak beside another.
 pub fn choose(peaks: &mut [Peak], scene: &Scene, p: &ChooseParams) {
     let scale = scene.full_scale / 255.0;
     let upright = p.steepest_deg.to_radians().cos();
@@ -95,6 +105,8 @@ pub fn choose(peaks: &mut [Peak], scene: &Scene, p: &ChooseParams) {
         let top = strongest[at.saturating_sub(reach)..=last].iter().fold(0f32, |a, &b| a.max(b));
         if k.amplitude < p.echo * top {
             k.refuse(Reject::Echo);
+        } else if k.width_px < p.cut_width * scene.width_px && k.amplitude < p.cut_amplitude * top {
+            k.refuse(Reject::Narrow);
         }
     }
 }

@@ -23,13 +23,27 @@ pub struct SupportParams {
     pub clean: f32,
     /// Support that any other peak needs, 0..=1.
     pub doubtful: f32,
+    /// Share of the amplitude, 0..=10, by which the level beside a peak may exceed the shot's usual level there.
+    /// A reflection lies in the glow of what it reflects.
+    pub haze: f32,
+    /// Support that a peak in such a glow needs, 0..=1.
+    pub hazy: f32,
     /// Widths over the stripe's that count as right.
     pub right_width: [f32; 2],
 }
 
 impl Default for SupportParams {
     fn default() -> Self {
-        SupportParams { on: true, radius_mm: 0.3, slope: 1.2, clean: 0.1, doubtful: 0.45, right_width: [0.88, 1.22] }
+        SupportParams {
+            on: true,
+            radius_mm: 0.3,
+            slope: 1.2,
+            clean: 0.1,
+            doubtful: 0.45,
+            haze: 0.05,
+            hazy: 0.7,
+            right_width: [0.88, 1.22],
+        }
     }
 }
 
@@ -40,6 +54,8 @@ impl SupportParams {
             ("slope", self.slope, 1.0, 3.0),
             ("clean", self.clean, 0.0, 1.0),
             ("doubtful", self.doubtful, 0.0, 1.0),
+            ("haze", self.haze, 0.0, 10.0),
+            ("hazy", self.hazy, 0.0, 1.0),
             ("right_width[0]", self.right_width[0], 0.0, 1.0),
             ("right_width[1]", self.right_width[1], 1.0, 3.0),
         ] {
@@ -140,10 +156,19 @@ fn judge(profile: &mut Profile, others: &[&Held], width_px: f32, axis: &[f32; 3]
     if others.is_empty() || expected <= 0.0 {
         return;
     }
+    let usual = usual_background(&profile.peaks);
     for (k, point) in profile.peaks.iter_mut().zip(&profile.points).filter(|(k, _)| k.kept()) {
         let ratio = k.width_px / width_px;
         let clean = ratio >= p.right_width[0] && ratio <= p.right_width[1];
-        let need = (if clean { p.clean } else { p.doubtful }) * expected;
+        let hazy = k.background - usual > p.haze * k.amplitude;
+        let need = expected
+            * if hazy {
+                p.hazy
+            } else if clean {
+                p.clean
+            } else {
+                p.doubtful
+            };
         let along = dot(axis, &point.position);
         let found: usize = others
             .iter()
@@ -164,4 +189,14 @@ fn judge(profile: &mut Profile, others: &[&Held], width_px: f32, axis: &[f32; 3]
             k.refuse(Reject::Unsupported);
         }
     }
+}
+
+/// Median level beside the kept peaks: room light, which is no sign of a reflection.
+fn usual_background(peaks: &[Peak]) -> f32 {
+    let mut levels: Vec<f32> = peaks.iter().filter(|k| k.kept()).map(|k| k.background).collect();
+    if levels.is_empty() {
+        return 0.0;
+    }
+    let middle = levels.len() / 2;
+    *levels.select_nth_unstable_by(middle, f32::total_cmp).1
 }

@@ -87,7 +87,7 @@ pub struct ThresholdParams {
 
 impl Default for ThresholdParams {
     fn default() -> Self {
-        ThresholdParams { window: Window::Mean, size: 31, offset: 8, minimum: 0 }
+        ThresholdParams { window: Window::Mean, size: 31, offset: 4, minimum: 7 }
     }
 }
 

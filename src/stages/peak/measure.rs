@@ -43,8 +43,7 @@ pub fn measure(image: &Image, skeleton: &[u32], p: &PeakParams) -> Option<Stripe
         ratios.truncate(ratios.len() * 9 / 10);
         let (excess, light) = ratios.iter().fold((0.0, 0.0), |s, r| (s.0 + r.0 / r.1, s.1 + 1.0));
         let contrast2: f32 = excess / light;
-        stripe =
-            Stripe { width_px: width_px.clamp(0.4, 12.0), speckle: contrast2.clamp(0.0, 1.0).sqrt() };
+        stripe = Stripe { width_px: width_px.clamp(0.4, 12.0), speckle: contrast2.clamp(0.0, 1.0).sqrt() };
     }
     Some(stripe)
 }
