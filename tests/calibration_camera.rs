@@ -1,11 +1,17 @@
 //! In: the reference pictures with their truth. Out: how well boards are found and cameras calibrated.
 //! Frame and unit: pixels, mm. Needs SHEETLIGHT_REFERENCE; says so loudly where it is missing.
 
-use sheetlight::calibrate::boards::{FindOptions, find};
+use sheetlight::calibrate::boards::{BoardPoint, BoardView, FindOptions, find};
+use sheetlight::calibrate::camera::{CameraOptions, calibrate};
+use sheetlight::calibrate::intrinsics::{Lens, Observation, SolveOptions, solve};
 use sheetlight::camera::Intrinsics;
-use sheetlight::geometry::{Board, Camera, Rigid};
-use sheetlight::recording::Recording;
+use sheetlight::geometry::{Board, Camera, Mat3, Rigid, Vec2, orthonormalise};
+use sheetlight::raster::Channel;
+use sheetlight::recording::{BoardSpec, Recording};
+use sheetlight::rig::Verdict;
+use sheetlight::solve::Loss;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 fn reference() -> Option<PathBuf> {
     let found = std::env::var_os("SHEETLIGHT_REFERENCE").map(PathBuf::from).filter(|p| p.is_dir());
@@ -74,4 +80,128 @@ fn charuco_corners_lie_where_the_truth_puts_them() {
     let Some(reference) = reference() else { return };
     let (rms, _, counts) = corner_errors("intrinsics_charuco", &reference);
     assert!(counts.len() == 16 && counts.iter().all(|n| *n >= 30) && rms < 0.03);
+}
+
+fn golden(side: &str) -> (Vec<Observation>, serde_json::Value) {
+    let all: serde_json::Value = serde_json::from_str(include_str!("data/opencv_corners.json")).unwrap();
+    let set = all["sets"][side].clone();
+    let board =
+        BoardSpec::Chessboard { inner_corners: [9, 6], square_mm: 1.0, border_mm: 0.0, first_square: "black".into() };
+    let features = Arc::new(board.features());
+    let names: Vec<String> = serde_json::from_value(set["names"].clone()).unwrap();
+    let corners: Vec<Vec<[f64; 2]>> = serde_json::from_value(set["corners"].clone()).unwrap();
+    let pictures = names
+        .into_iter()
+        .zip(corners)
+        .map(|(name, c)| {
+            let point = |(feature_id, p): (usize, &[f64; 2])| BoardPoint {
+                feature_id,
+                // OpenCV's corners are single precision.
+                pixel: Vec2::new(f64::from(p[0] as f32), f64::from(p[1] as f32)),
+                sigma_px: 0.1,
+            };
+            let points = c.iter().enumerate().map(point).collect();
+            Observation { name, features: features.clone(), view: BoardView { points, ambiguous: false } }
+        })
+        .collect();
+    (pictures, set)
+}
+
+fn as_opencv() -> SolveOptions {
+    SolveOptions { lens: Lens::Five, skew: false, loss: Loss::Squares, weigh: false }
+}
+
+#[test]
+fn on_the_same_corners_the_solve_equals_opencv() {
+    for side in ["left", "right"] {
+        let (pictures, set) = golden(side);
+        let solved = solve(&pictures, 640, 480, &as_opencv()).unwrap();
+        let k = solved.intrinsics;
+        let want = |name: &str| set[name].as_f64().unwrap();
+        assert!((solved.rms_px - want("rms_px")).abs() < 1e-6, "{} {}", solved.rms_px, want("rms_px"));
+        for (ours, name) in [(k.fx, "fx"), (k.fy, "fy"), (k.cx, "cx"), (k.cy, "cy")] {
+            assert!((ours - want(name)).abs() < 1e-3, "{side} {name}: {ours} {}", want(name));
+        }
+        for (i, ours) in k.distortion.iter().enumerate() {
+            assert!((ours - set["k1_k2_p1_p2_k3"][i].as_f64().unwrap()).abs() < 1e-4, "{side} distortion {i}");
+        }
+        let sigma = solved.covariance.unwrap()[(0, 0)].sqrt();
+        assert!((sigma / want("sigma_fx") - 1.0).abs() < 0.02, "{sigma} {}", want("sigma_fx"));
+    }
+}
+
+#[test]
+fn all_photographs_hold_their_board_and_fit_better_than_opencvs_best_corners() {
+    let Some(reference) = reference() else { return };
+    let board =
+        BoardSpec::Chessboard { inner_corners: [9, 6], square_mm: 1.0, border_mm: 0.0, first_square: "black".into() };
+    let features = Arc::new(board.features());
+    for (side, bar) in [("left", 0.195), ("right", 0.207)] {
+        let (golden, _) = golden(side);
+        let pictures: Vec<Observation> = golden
+            .iter()
+            .map(|g| {
+                let path = reference.join("camera/opencv_chessboard").join(&g.name);
+                let image = sheetlight::raster::load(&path, Channel::Luma, 8).unwrap();
+                let view = find(&image, &board, &FindOptions::default()).unwrap_or_else(|e| panic!("{}: {e}", g.name));
+                // The same board as OpenCV's, not another one in the background.
+                let all = || view.points.iter().zip(&g.view.points);
+                let far = all().map(|(a, b)| (a.pixel - b.pixel).norm()).fold(0.0, f64::max);
+                let turned = view.points.iter().zip(g.view.points.iter().rev());
+                let far_turned = turned.map(|(a, b)| (a.pixel - b.pixel).norm()).fold(0.0, f64::max);
+                assert!(far.min(far_turned) < 2.0, "{}: {far} {far_turned} px", g.name);
+                Observation { name: g.name.clone(), features: features.clone(), view }
+            })
+            .collect();
+        assert_eq!(pictures.len(), 13);
+        for (name, options) in [("as OpenCV", as_opencv()), ("default", SolveOptions::default())] {
+            let solved = solve(&pictures, 640, 480, &options).unwrap();
+            eprintln!(
+                "{side} {name}: rms {:.4} px, noise ratio {:.2}, {:?}",
+                solved.rms_px, solved.sigma0, solved.intrinsics
+            );
+            assert!(solved.rms_px <= bar || name == "default", "{side}: {} px", solved.rms_px);
+        }
+    }
+}
+
+/// Rms displacement of viewing rays over the image after the best rotation, px.
+fn ray_error(found: &Intrinsics, truth: &Intrinsics) -> f64 {
+    let mut pairs = Vec::new();
+    for y in (0..480).step_by(8) {
+        for x in (0..640).step_by(8) {
+            let px = Vec2::new(f64::from(x), f64::from(y));
+            pairs.push((found.ray_from_pixel(&px).unwrap().direction, truth.ray_from_pixel(&px).unwrap().direction));
+        }
+    }
+    let m = pairs.iter().map(|(f, t)| t * f.transpose()).sum::<Mat3>();
+    let r = orthonormalise(&m);
+    let sum: f64 = pairs
+        .iter()
+        .map(|(f, t)| (truth.pixel_from_point(&(r * f)).unwrap() - truth.pixel_from_point(t).unwrap()).norm_squared())
+        .sum();
+    (sum / pairs.len() as f64).sqrt()
+}
+
+#[test]
+fn rendered_cameras_are_recovered() {
+    let Some(reference) = reference() else { return };
+    for (set, bar) in [("intrinsics", 0.08), ("intrinsics_charuco", 0.10)] {
+        let recording = Recording::open(&reference.join("rendered/inputs/public").join(set)).unwrap();
+        let result = calibrate(&recording, &CameraOptions::default(), &|_, _| ()).unwrap();
+        let (truth, _) = truth(&reference, set);
+        let k = result.calibration.value;
+        let error = ray_error(&k, &truth);
+        let q = &result.calibration.quality;
+        eprintln!("{set}: rays {error:.4} px; {k:?}\n{q:#?}");
+        let c = &result.calibration.covariance;
+        for (ours, true_value, name) in
+            [(k.fx, truth.fx, "fx_px"), (k.cx, truth.cx, "cx_px"), (k.distortion[0], truth.distortion[0], "k1")]
+        {
+            eprintln!("{name}: {:.2} sigmas", (ours - true_value) / c.sigma(name).unwrap());
+        }
+        assert_eq!(result.used.len(), 16);
+        assert!(error <= bar, "{set}: {error} px");
+        assert_eq!(q.verdict, Verdict::Good);
+    }
 }

@@ -3,11 +3,14 @@
 
 pub mod board_print;
 pub mod boards;
+pub mod camera;
 pub mod components;
 pub mod hand_eye;
 pub mod hand_eye_closed;
 pub mod homography;
 pub mod laser_plane;
+pub mod intrinsics;
+pub mod intrinsics_quality;
 pub mod measured_pose;
 pub mod pointer;
 pub mod pointer_range;
@@ -15,3 +18,4 @@ pub mod pose;
 pub mod projection;
 pub mod report;
 pub mod spot;
+pub mod zhang;

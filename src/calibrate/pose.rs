@@ -76,7 +76,11 @@ impl Problem for OneBoard<'_> {
 /// # Errors
 /// Fewer than 4 points, points on a line, or points that fit no pose in front of the camera.
 pub fn board_pose(intrinsics: &Intrinsics, board: &BoardSpec, view: &BoardView) -> Result<BoardPose> {
-    let features = board.features();
+    pose_of_points(intrinsics, &board.features(), view)
+}
+
+/// [`board_pose`] with the features' positions (mm, board frame, z = 0) given directly.
+pub fn pose_of_points(intrinsics: &Intrinsics, features: &[Vec3], view: &BoardView) -> Result<BoardPose> {
     let weak = |what: String| {
         Fault::refused(what).cause("too little of the board was seen").next("show more of the board in this picture")
     };

@@ -155,11 +155,11 @@ fn why_not(layout: &Layout<'_>, span: f64, reason: &str) -> Fault {
     let [c, r] = layout.squares;
     let wanted = format!("fewer than {FEWEST} corners of the {c}x{r} ChArUco board were found");
     if span < 0.06 {
-        return Fault::input(format!("{wanted}: grey levels span {:.1} % of full scale, 6 % are needed", span * 100.0))
+        return Fault::refused(format!("{wanted}: grey levels span {:.1} % of full scale, 6 % are needed", span * 100.0))
             .cause("too dark, too bright, or the lens is covered")
             .next("adjust the exposure so that white squares reach half of full scale");
     }
-    Fault::input(if reason.is_empty() { wanted } else { format!("{wanted} ({reason})") })
+    Fault::refused(if reason.is_empty() { wanted } else { format!("{wanted} ({reason})") })
         .cause("the board is out of view or out of focus, its markers are smaller than 15 px, or the description names another dictionary or size")
         .next("look at the picture and compare the printed board with its description")
 }

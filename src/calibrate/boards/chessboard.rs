@@ -126,12 +126,12 @@ fn nearest_to_top_left(grid: Grid, corners: &[Corner], quarters: bool) -> Grid {
 fn why_not(best: Option<&Grid>, columns: usize, rows: usize, span: f64, grey: &Grey) -> Fault {
     let wanted = format!("no chessboard of {columns}x{rows} inner corners was found");
     if span < 0.06 {
-        return Fault::input(format!("{wanted}: grey levels span {:.1} % of full scale, 6 % are needed", span * 100.0))
+        return Fault::refused(format!("{wanted}: grey levels span {:.1} % of full scale, 6 % are needed", span * 100.0))
             .cause("too dark, too bright, or the lens is covered")
             .next("adjust the exposure so that white squares reach half of full scale");
     }
     let Some(grid) = best.filter(|g| g.count() >= 9) else {
-        return Fault::input(format!("{wanted}, nor any other lattice of at least 9 corners"))
+        return Fault::refused(format!("{wanted}, nor any other lattice of at least 9 corners"))
             .cause("the board is out of view, out of focus, too small (squares below 8 px) or badly lit")
             .next("look at the picture: the whole board must be in view and sharp");
     };
@@ -144,16 +144,16 @@ fn why_not(best: Option<&Grid>, columns: usize, rows: usize, span: f64, grey: &G
         p.x < border || p.y < border || p.x > grey.width as f64 - border || p.y > grey.height as f64 - border
     });
     if grid.count() == c * r && c * r >= wc * wr && !cut {
-        return Fault::input(seen)
+        return Fault::refused(seen)
             .cause("wrong board size given")
             .next(format!("if the board has {c}x{r} inner corners, say so in its description"));
     }
     if cut {
-        return Fault::input(format!("{seen} and touches the picture's edge"))
+        return Fault::refused(format!("{seen} and touches the picture's edge"))
             .cause("the board is cut off")
             .next("keep the whole chessboard in view, or use a ChArUco board, which may be partly seen");
     }
-    Fault::input(format!("{seen}, squares of {pitch:.0} px"))
+    Fault::refused(format!("{seen}, squares of {pitch:.0} px"))
         .cause("part of the board is covered, glares or is blurred, or a wrong board size was given")
         .next("check the board's description, the light and the focus")
 }
