@@ -1,12 +1,14 @@
 // In: the quads of the threshold. Out: the mask, one word a tile row, inside the picture and the region
-// of interest only; tiles with a lit pixel are stamped as changed, so that thinning starts there.
+// of interest only, twice: `mask` is thinned, `lit` stays. Tiles with a lit pixel are stamped as changed,
+// so that thinning starts there.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> listing: array<u32>;
 @group(0) @binding(2) var<storage, read> list: array<u32>;
 @group(0) @binding(3) var<storage, read> quads: array<u32>;
 @group(0) @binding(4) var<storage, read> roi: array<u32>;
 @group(0) @binding(5) var<storage, read_write> mask: array<u32>;
-@group(0) @binding(6) var<storage, read_write> stamps: array<u32>;
+@group(0) @binding(6) var<storage, read_write> lit: array<u32>;
+@group(0) @binding(7) var<storage, read_write> stamps: array<u32>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -26,7 +28,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     for (var once = u32(slot < listing[3]); once > 0u; once--) {
         mask[mask_index(tile, row)] = bits;
-        for (var lit = u32(bits != 0u); lit > 0u; lit--) {
+        lit[mask_index(tile, row)] = bits;
+        for (var some = u32(bits != 0u); some > 0u; some--) {
             stamps[tile_index(tile)] = 2u;
         }
     }

@@ -164,7 +164,7 @@ impl Device {
         // Out of memory and driver errors surface here; a validation error is our bug and panics.
         let note = lost.clone();
         raw.on_uncaptured_error(Arc::new(move |e: wgpu::Error| match e {
-            wgpu::Error::Validation { .. } => panic!("{e}"),
+            wgpu::Error::Validation { .. } if note.lock().unwrap().is_none() => panic!("{e}"),
             e => {
                 note.lock().unwrap().get_or_insert(e.to_string());
             }
@@ -182,6 +182,11 @@ impl Device {
     pub fn mapped_storage(&self, label: &str, bytes: u64) -> Result<Buffer> {
         use wgpu::BufferUsages as U;
         self.buffer(label, bytes, U::STORAGE | U::MAP_WRITE | U::COPY_SRC)
+    }
+    /// Where the host reads what stages wrote, on unified memory.
+    pub fn readable_storage(&self, label: &str, bytes: u64) -> Result<Buffer> {
+        use wgpu::BufferUsages as U;
+        self.buffer(label, bytes, U::STORAGE | U::MAP_READ | U::COPY_SRC)
     }
     /// Written by the host, copied to a storage buffer.
     pub fn upload_staging(&self, label: &str, bytes: u64) -> Result<Buffer> {

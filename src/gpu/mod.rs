@@ -3,8 +3,10 @@
 
 mod device;
 mod recording;
+mod ring;
 mod stage;
 
 pub use device::{AdapterInfo, Buffer, Device, Rates, adapters};
 pub use recording::{Dispatch, Recording, Replay, StageTime};
+pub use ring::{Ring, RingSizes, Slot};
 pub use stage::{Access, Binding, Field, Pipeline, Stage, Workload, run_once};

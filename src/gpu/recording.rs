@@ -115,21 +115,23 @@ impl Replay {
         Ok(Replay { device: device.clone(), queries, labels: Vec::new() })
     }
 
-    /// Copies `before`, runs the recording, copies `after`: each copy is (from, its offset, to, its offset, bytes).
+    /// Copies `before`, runs the recordings, copies `after`: each copy is (from, its offset, to, its offset, bytes).
     pub(super) fn submit(
         &mut self,
         before: &[(&Buffer, u64, &Buffer, u64, u64)],
-        recording: &Recording,
+        recordings: &[&Recording],
         after: &[(&Buffer, u64, &Buffer, u64, u64)],
     ) -> Result<wgpu::SubmissionIndex> {
         let mut encoder = self.device.raw.create_command_encoder(&Default::default());
         for (from, at, to, to_at, bytes) in before {
             encoder.copy_buffer_to_buffer(&from.raw, *at, &to.raw, *to_at, *bytes);
         }
-        let timed = self.queries.as_ref().filter(|_| recording.steps.len() < QUERIES as usize);
+        let steps = || recordings.iter().flat_map(|r| &r.steps);
+        let n = steps().count() as u32;
+        let timed = self.queries.as_ref().filter(|_| n < QUERIES);
         {
             let mut pass = encoder.begin_compute_pass(&Default::default());
-            for (i, step) in recording.steps.iter().enumerate() {
+            for (i, step) in steps().enumerate() {
                 if let Some((set, ..)) = timed {
                     pass.write_timestamp(set, i as u32);
                 }
@@ -141,15 +143,14 @@ impl Replay {
                 }
             }
             if let Some((set, ..)) = timed {
-                pass.write_timestamp(set, recording.steps.len() as u32);
+                pass.write_timestamp(set, n);
             }
         }
         if let Some((set, resolve, staging)) = timed {
-            let n = recording.steps.len() as u32 + 1;
-            encoder.resolve_query_set(set, 0..n, &resolve.raw, 0);
-            encoder.copy_buffer_to_buffer(&resolve.raw, 0, &staging.raw, 0, u64::from(n) * 8);
+            encoder.resolve_query_set(set, 0..n + 1, &resolve.raw, 0);
+            encoder.copy_buffer_to_buffer(&resolve.raw, 0, &staging.raw, 0, u64::from(n + 1) * 8);
             self.labels.clear();
-            self.labels.extend(recording.steps.iter().map(|s| s.label));
+            self.labels.extend(steps().map(|s| s.label));
         }
         for (from, at, to, to_at, bytes) in after {
             encoder.copy_buffer_to_buffer(&from.raw, *at, &to.raw, *to_at, *bytes);

@@ -186,8 +186,8 @@ impl<'a> Walk<'a> {
             ("ambient", pack(scene.ambient.as_slice())),
             ("stats", vec![0; 8 * tiles]),
             ("roi", (0..per_shot).map(|i| if i % 5 < 3 { 0x00ff_fff0 } else { 0 }).collect()),
-            ("even", vec![7; 8 * header]),
-            ("odd", vec![7; 8 * header]),
+            ("first", vec![7; 4]),
+            ("all_active", vec![7; 8 * header]),
             ("listing", vec![0, 1, 1, 0]),
             ("list", vec![0; tiles]),
             ("active", vec![0, 1, 1, 0]),
@@ -196,6 +196,7 @@ impl<'a> Walk<'a> {
             ("quads", vec![0; 8 * tiles]),
             ("mask", vec![0; 8 * tiles]),
             ("other_mask", vec![0; 8 * tiles]),
+            ("lit", vec![0; 8 * tiles]),
             ("stamps", vec![0; tiles]),
             ("counts", vec![0; tiles]),
             ("starts", vec![0; tiles]),
@@ -244,7 +245,7 @@ impl<'a> Walk<'a> {
         } else {
             self.step(&threshold::MEAN, threshold::stage_twin, &["image", "listing", "list", "quads"], all);
         }
-        let names = ["listing", "list", "quads", "roi", "mask", "stamps"];
+        let names = ["listing", "list", "quads", "roi", "mask", "lit", "stamps"];
         self.step(&threshold::GATHER, threshold::gather_twin, &names, all);
         self.buffers.insert("active", self.buffers["listing"].clone());
         self.buffers.insert("active_list", self.buffers["list"].clone());
@@ -273,11 +274,11 @@ impl<'a> Walk<'a> {
         let names = ["listing", "list", "mask", "starts", "row_starts", "points"];
         self.step(&skeleton::STAGE, skeleton::stage_twin, &names, all);
         if wanted == "clear" {
-            let names = ["listing", "list", "mask", "other_mask", "stamps", "counts"];
+            let names = ["listing", "list", "mask", "other_mask", "lit", "stamps", "counts"];
             self.step(&listing::CLEAR, listing::clear_twin, &names, all);
         }
         self.frame.step = 1;
-        self.step(&listing::RESET, listing::reset_twin, &["even", "odd"], [1, 1, 1]);
+        self.step(&listing::RESET, listing::reset_twin, &["first", "all_active"], [1, 1, 1]);
         std::mem::take(&mut self.captured)
     }
 }

@@ -119,39 +119,49 @@ impl Frame {
         }
     }
 
-    /// Copies a picture into its place in a batch: rows padded to whole tiles with their last pixel.
-    /// `out` is `image_bytes()` long.
-    pub fn pack_image(&self, image: &Image, out: &mut [u8]) -> Result<()> {
-        let deep = matches!(image.pixels, Pixels::U16(_));
-        if (image.width, image.height) != (self.width, self.height) || u32::from(image.full_scale()) != self.full_scale
-        {
-            return Err(Fault::input(format!(
-                "a picture of {} x {} pixels, {} bits among pictures of {} x {} pixels, {} bits",
-                image.width,
-                image.height,
-                image.bits,
-                self.width,
-                self.height,
-                (self.full_scale + 1).ilog2()
-            ))
-            .cause("pictures of two cameras or exports lie in one folder")
-            .next("move them into a recording of their own"));
-        }
-        let bytes: &[u8] = match &image.pixels {
-            Pixels::U8(p) => p,
-            Pixels::U16(p) => bytemuck::cast_slice(p),
+    /// Hands a picture to `put` piece by piece (byte offset in the shot, bytes): rows padded to whole
+    /// tiles with their last pixel.
+    pub fn put_image(&self, image: &Image, put: &mut dyn FnMut(usize, &[u8])) -> Result<()> {
+        self.accept(image)?;
+        let (bytes, px): (&[u8], usize) = match &image.pixels {
+            Pixels::U8(p) => (p, 1),
+            Pixels::U16(p) => (bytemuck::cast_slice(p), 2),
         };
-        let (row, pitch, px) = (bytes.len() / self.height as usize, self.pitch as usize * 4, 1 + usize::from(deep));
+        let (row, pitch) = (self.width as usize * px, self.pitch as usize * 4);
         if row == pitch {
-            out[..bytes.len()].copy_from_slice(bytes);
+            put(0, bytes);
             return Ok(());
         }
-        for (from, to) in bytes.chunks_exact(row).zip(out.chunks_exact_mut(pitch)) {
-            to[..row].copy_from_slice(from);
-            let last = &from[row - px..];
-            to[row..].chunks_exact_mut(px).for_each(|p| p.copy_from_slice(last));
+        let mut padding = [0u8; 64];
+        for (y, from) in bytes.chunks_exact(row).enumerate() {
+            padding.chunks_exact_mut(px).for_each(|p| p.copy_from_slice(&from[row - px..]));
+            put(y * pitch, from);
+            put(y * pitch + row, &padding[..pitch - row]);
         }
         Ok(())
+    }
+
+    /// As `put_image`, into a slice of `image_bytes()`.
+    pub fn pack_image(&self, image: &Image, out: &mut [u8]) -> Result<()> {
+        self.put_image(image, &mut |at, bytes| out[at..at + bytes.len()].copy_from_slice(bytes))
+    }
+
+    fn accept(&self, image: &Image) -> Result<()> {
+        let full = u32::from(image.full_scale());
+        if (image.width, image.height, full) == (self.width, self.height, self.full_scale) {
+            return Ok(());
+        }
+        Err(Fault::input(format!(
+            "a picture of {} x {} pixels, {} bits among pictures of {} x {} pixels, {} bits",
+            image.width,
+            image.height,
+            image.bits,
+            self.width,
+            self.height,
+            (self.full_scale + 1).ilog2()
+        ))
+        .cause("pictures of two cameras or exports lie in one folder")
+        .next("move them into a recording of their own"))
     }
 
     /// One shot's mask out of a batch's mask words.

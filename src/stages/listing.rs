@@ -14,8 +14,8 @@ pub const RESET: Stage = Stage {
     workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
-        Binding { name: "even", access: ReadWrite },
-        Binding { name: "odd", access: ReadWrite },
+        Binding { name: "first", access: ReadWrite },
+        Binding { name: "others", access: ReadWrite },
     ],
     uniform: frame::UNIFORM,
     overrides: &[PX_LOG2],
@@ -32,6 +32,7 @@ pub const CLEAR: Stage = Stage {
         Binding { name: "list", access: Read },
         Binding { name: "mask", access: ReadWrite },
         Binding { name: "other_mask", access: ReadWrite },
+        Binding { name: "lit", access: ReadWrite },
         Binding { name: "stamps", access: ReadWrite },
         Binding { name: "counts", access: ReadWrite },
     ],
@@ -101,8 +102,7 @@ pub fn latest(f: &Frame, stamps: &[u32], tile: u32) -> u32 {
 
 pub fn reset_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let from = frame_of(b).step as usize;
-    for (k, header) in b[1].chunks_mut(HEADER_WORDS as usize).enumerate().filter(|(k, _)| *k >= from) {
-        debug_assert!(k < 64);
+    for header in b[1].chunks_mut(HEADER_WORDS as usize).skip(from) {
         header[..4].copy_from_slice(&[0, 1, 1, 0]);
     }
     b[2].chunks_mut(HEADER_WORDS as usize).for_each(|h| h[..4].copy_from_slice(&[0, 1, 1, 0]));
@@ -110,11 +110,12 @@ pub fn reset_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
 
 pub fn clear_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
-    let [_, listing, list, mask, other, stamps, counts] = b else { unreachable!() };
+    let [_, listing, list, mask, other, lit, stamps, counts] = b else { unreachable!() };
     for &tile in &list[..listing[3] as usize] {
         for row in 0..8 {
             mask[mask_index(&f, tile, row)] = 0;
             other[mask_index(&f, tile, row)] = 0;
+            lit[mask_index(&f, tile, row)] = 0;
         }
         stamps[tile_index(&f, tile)] = 0;
         counts[tile_index(&f, tile)] = 0;

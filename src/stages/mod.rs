@@ -4,12 +4,14 @@
 pub mod ambient;
 pub mod cases;
 pub mod choose;
+pub mod chain;
 mod entry;
 pub mod frame;
 pub mod lengthen;
 pub mod listing;
 pub mod peak;
 pub mod point;
+mod recorded;
 pub mod skeleton;
 pub mod stats;
 pub mod support;

@@ -51,6 +51,7 @@ pub const GATHER: Stage = Stage {
         Binding { name: "quads", access: Read },
         Binding { name: "roi", access: Read },
         Binding { name: "mask", access: ReadWrite },
+        Binding { name: "lit", access: ReadWrite },
         Binding { name: "stamps", access: ReadWrite },
     ],
     ..MEAN
@@ -257,7 +258,7 @@ pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
 
 pub fn gather_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
-    let [_, listing, list, quads, roi, mask, stamps] = b else { unreachable!() };
+    let [_, listing, list, quads, roi, mask, kept, stamps] = b else { unreachable!() };
     for slot in 0..listing[3] as usize {
         let tile = list[slot];
         let (tx, ty, _) = tile_unpack(tile);
@@ -270,6 +271,7 @@ pub fn gather_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
                 bits &= roi[(y * f.tiles_x + tx) as usize];
             }
             mask[super::listing::mask_index(&f, tile, row)] = bits;
+            kept[super::listing::mask_index(&f, tile, row)] = bits;
             if bits != 0 {
                 stamps[super::listing::tile_index(&f, tile)] = 2;
             }

@@ -1,0 +1,228 @@
+//! In: pictures, a batch at a time. Out: the skeleton pixels of each, from the GPU, in order.
+//! Frame and unit: pixels. The pruned chain: statistics, tile list, threshold, thinning, list.
+
+use super::frame::{ALL_TILES, HAS_ROI};
+use super::recorded::{Pipelines, Shared};
+use super::{Frame, Thinning, ThresholdParams, skeleton};
+use crate::fault::{Fault, Result};
+use crate::gpu::{Device, Recording, Replay, Ring, RingSizes, StageTime};
+use crate::raster::{Image, Mask};
+use std::collections::VecDeque;
+
+/// What a chain is built for.
+#[derive(Clone, Debug)]
+pub struct ChainConfig {
+    /// Picture size, px.
+    pub width: u32,
+    pub height: u32,
+    /// Depth of the pictures, 8..=16.
+    pub bits: u8,
+    /// Pictures in one batch, 1..=64; small pictures want many, a dispatch costs as much as 100,000 pixels.
+    pub shots: u32,
+    /// Batches in flight, 1..=8.
+    pub slots: usize,
+    pub threshold: ThresholdParams,
+    pub thinning: Thinning,
+    /// Prove tiles dark before looking at them. Off is the plain path: the same result, slower.
+    pub prune: bool,
+    /// Pixels that are looked at; `None` for all.
+    pub region: Option<Mask>,
+    /// Subtracted from every picture.
+    pub ambient: Option<Image>,
+    /// Take GPU timestamps of every stage.
+    pub timed: bool,
+}
+
+impl ChainConfig {
+    pub fn new(width: u32, height: u32, bits: u8) -> ChainConfig {
+        ChainConfig {
+            width,
+            height,
+            bits,
+            shots: ChainConfig::shots_for(width, height),
+            slots: 3,
+            threshold: ThresholdParams::default(),
+            thinning: Thinning::default(),
+            prune: true,
+            region: None,
+            ambient: None,
+            timed: false,
+        }
+    }
+    /// Batch that hides the fixed cost: about 5 megapixels, 1 to 16 shots.
+    pub fn shots_for(width: u32, height: u32) -> u32 {
+        (5_000_000 / (width * height).max(1)).clamp(1, 16)
+    }
+}
+
+/// The chain on one GPU for one kind of picture.
+pub struct Chain {
+    pub frame: Frame,
+    device: Device,
+    ring: Ring,
+    replay: Replay,
+    /// First run and further rounds of thinning, per place of the ring.
+    first: Vec<Recording>,
+    again: Vec<Recording>,
+    /// Further rounds that every batch gets; grows when stripes are wider than they reach.
+    rounds: usize,
+    tags: VecDeque<u64>,
+    shots_in: VecDeque<u32>,
+    shared: Shared,
+}
+
+/// What one batch came to.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Batch {
+    /// The tag given at submission.
+    pub tag: u64,
+    /// Skeleton pixels x | y << 16, and the shot within the batch.
+    pub points: Vec<[u32; 2]>,
+    /// First point of every shot, and the end.
+    pub starts: Vec<u32>,
+    /// Skeleton pixels found; more than `points` holds when the list was full.
+    pub found: u32,
+    /// Tiles that were looked at closely.
+    pub listed_tiles: u32,
+}
+
+impl Batch {
+    /// Skeleton pixels of one shot.
+    pub fn pixels(&self, shot: usize) -> impl Iterator<Item = u32> {
+        self.points[self.starts[shot] as usize..self.starts[shot + 1] as usize].iter().map(|p| p[0])
+    }
+}
+
+impl Chain {
+    pub fn new(device: &Device, config: &ChainConfig) -> Result<Chain> {
+        if !(1..=64).contains(&config.shots) || !(1..=8).contains(&config.slots) {
+            return Err(Fault::usage(format!(
+                "{} shots a batch and {} batches in flight; 1 to 64 and 1 to 8 are possible",
+                config.shots, config.slots
+            )));
+        }
+        let mut frame =
+            Frame::new(config.width, config.height, config.bits, config.shots, &config.threshold, config.thinning)?;
+        frame.flags |= if config.prune { 0 } else { ALL_TILES };
+        frame.flags |= if config.region.is_some() { HAS_ROI } else { 0 };
+        let shared = Shared::new(device, &frame, config)?;
+        let ring = Ring::new(
+            device,
+            RingSizes {
+                slots: config.slots,
+                input: u64::from(frame.shot_words) * 4 * u64::from(frame.shots),
+                header: 4 * (skeleton::HEADER as u64 + u64::from(frame.shots) + 1),
+                output: u64::from(frame.capacity) * 8,
+            },
+        )?;
+        let pipelines = Pipelines::new(device, config)?;
+        let thinning = shared.thinning(device, &pipelines);
+        let (mut first_runs, mut again) = (Vec::new(), Vec::new());
+        for slot in &ring.slots {
+            let mut first = shared.front(device, &frame, &pipelines, &slot.input);
+            first.append(&thinning);
+            let back = shared.back(device, &frame, &pipelines, &slot.header, &slot.output);
+            first.append(&back);
+            first_runs.push(first);
+            let mut round = shared.restart(device, &pipelines);
+            round.append(&thinning);
+            round.append(&back);
+            again.push(round);
+        }
+        Ok(Chain {
+            frame,
+            device: device.clone(),
+            replay: Replay::new(device, config.timed)?,
+            ring,
+            first: first_runs,
+            again,
+            rounds: 0,
+            tags: VecDeque::new(),
+            shots_in: VecDeque::new(),
+            shared,
+        })
+    }
+
+    pub fn device(&self) -> &Device {
+        &self.device
+    }
+    /// A batch can be submitted without waiting for one to finish.
+    pub fn has_room(&self) -> bool {
+        self.ring.has_room()
+    }
+    pub fn in_flight(&self) -> usize {
+        self.ring.in_flight()
+    }
+    /// Dispatches of one batch.
+    pub fn dispatches(&self) -> usize {
+        self.first[0].len()
+    }
+
+    /// Starts a batch of 1 to `shots` pictures. Call `collect` first when there is no room.
+    pub fn submit(&mut self, tag: u64, images: &[&Image]) -> Result<()> {
+        assert!((1..=self.frame.shots as usize).contains(&images.len()), "1 to {} pictures a batch", self.frame.shots);
+        let (frame, bytes) = (self.frame, self.frame.image_bytes());
+        let at = self.ring.fill(|put| {
+            for (i, image) in images.iter().enumerate() {
+                frame.put_image(image, &mut |at, piece| put(i * bytes + at, piece))?;
+            }
+            // What an unfilled place held before must not be found again.
+            let dark = [0u8; 4096];
+            for from in (images.len() * bytes..frame.shots as usize * bytes).step_by(dark.len()) {
+                put(from, &dark[..dark.len().min(frame.shots as usize * bytes - from)]);
+            }
+            Ok(())
+        })?;
+        self.run(at, true)?;
+        self.tags.push_back(tag);
+        self.shots_in.push_back(images.len() as u32);
+        Ok(())
+    }
+
+    /// The oldest batch if it is done; waits for it if asked. `None` when nothing is under way, or not done.
+    pub fn collect(&mut self, wait: bool) -> Result<Option<Batch>> {
+        let header = loop {
+            let Some((at, bytes)) = self.ring.oldest(wait)? else { return Ok(None) };
+            let header: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
+            if header[6] == 0 {
+                break header;
+            }
+            // Some stripe takes more than the recorded sub-iterations. Another batch may have used the masks
+            // since: this one starts over with more rounds, and so do all that follow.
+            self.rounds = 2 * self.rounds + 1;
+            self.run(at, false)?;
+        };
+        let shots = self.shots_in.pop_front().expect("as many as batches") as usize;
+        let kept = header[skeleton::HEADER + shots];
+        let points = self.ring.finish(u64::from(kept) * 8, |bytes| bytemuck::pod_collect_to_vec(bytes))?;
+        Ok(Some(Batch {
+            tag: self.tags.pop_front().expect("as many as batches"),
+            points,
+            starts: header[skeleton::HEADER..=skeleton::HEADER + shots].to_vec(),
+            found: header[4],
+            listed_tiles: header[5],
+        }))
+    }
+
+    fn run(&mut self, at: usize, upload: bool) -> Result<()> {
+        let mut work = vec![&self.first[at]];
+        work.extend(std::iter::repeat_n(&self.again[at], self.rounds));
+        self.ring.run(at, &mut self.replay, &work, upload)
+    }
+
+    /// The thinned mask of a shot of the batch that ran last; for tests and pictures, not for the shot path.
+    pub fn mask(&self, shot: u32) -> Result<Mask> {
+        let words: Vec<u32> = bytemuck::pod_collect_to_vec(&self.device.read(&self.shared.mask)?);
+        Ok(self.frame.unpack_mask(&words, shot))
+    }
+    /// As `mask`, before thinning.
+    pub fn lit(&self, shot: u32) -> Result<Mask> {
+        let words: Vec<u32> = bytemuck::pod_collect_to_vec(&self.device.read(&self.shared.lit)?);
+        Ok(self.frame.unpack_mask(&words, shot))
+    }
+
+    /// GPU time of every step of the last submitted batch; empty unless `timed` and the adapter can.
+    pub fn times(&self) -> Result<Vec<StageTime>> {
+        self.replay.times()
+    }
+}

@@ -1,0 +1,223 @@
+//! In: the layout of a batch. Out: the chain's dispatches as recordings, and the buffers they share.
+//! Frame and unit: bytes, words. Order and reasons: docs/math.md, Stripe stages.
+
+use super::chain::ChainConfig;
+use super::frame::{PX_LOG2, px_log2};
+use super::{Frame, Window, ambient, listing, skeleton, stats, thin, threshold, tiles};
+use crate::fault::Result;
+use crate::gpu::{Buffer, Device, Pipeline, Recording};
+
+/// Sub-iterations in one submission; a stripe 50 px wide takes 52. Wider ones go further rounds.
+const STEPS: u32 = 56;
+/// Sub-iterations between two shortenings of the tile list: what a change can travel in them stays within
+/// the neighbouring tiles, which are 8 px high.
+const STRIDE: u32 = 8;
+/// Bytes from one uniform block, or one list's header, to the next; every adapter can bind there.
+const STEP_BYTES: u64 = 256;
+
+/// Buffers that all batches use one after the other.
+pub struct Shared {
+    uniforms: Buffer,
+    stats: Buffer,
+    roi: Buffer,
+    first: Buffer,
+    active: Buffer,
+    list: Buffer,
+    active_list: Buffer,
+    weights: Buffer,
+    quads: Buffer,
+    pub mask: Buffer,
+    other_mask: Buffer,
+    pub lit: Buffer,
+    stamps: Buffer,
+    counts: Buffer,
+    starts: Buffer,
+    rows: Buffer,
+    row_starts: Buffer,
+    ambient: Option<Buffer>,
+}
+
+/// The chain's stages, compiled.
+pub struct Pipelines {
+    clear: Pipeline,
+    reset: Pipeline,
+    ambient: Pipeline,
+    stats: Pipeline,
+    tiles: Pipeline,
+    threshold: Pipeline,
+    gather: Pipeline,
+    thin: Pipeline,
+    compact: Pipeline,
+    rebase: Pipeline,
+    count: Pipeline,
+    scan_rows: Pipeline,
+    scan_shots: Pipeline,
+    skeleton: Pipeline,
+}
+
+impl Pipelines {
+    pub fn new(device: &Device, config: &ChainConfig) -> Result<Pipelines> {
+        let overrides = [(PX_LOG2, f64::from(px_log2(config.bits)))];
+        let build = |stage: &crate::gpu::Stage| stage.pipeline(device, &overrides);
+        Ok(Pipelines {
+            clear: build(&listing::CLEAR)?,
+            reset: build(&listing::RESET)?,
+            ambient: build(&ambient::STAGE)?,
+            stats: build(&stats::STAGE)?,
+            tiles: build(&tiles::STAGE)?,
+            threshold: build(match config.threshold.window {
+                Window::Mean => &threshold::MEAN,
+                Window::Gaussian => &threshold::GAUSSIAN,
+            })?,
+            gather: build(&threshold::GATHER)?,
+            thin: build(&thin::STAGE)?,
+            compact: build(&listing::COMPACT)?,
+            rebase: build(&listing::REBASE)?,
+            count: build(&skeleton::COUNT)?,
+            scan_rows: build(&skeleton::SCAN_ROWS)?,
+            scan_shots: build(&skeleton::SCAN_SHOTS)?,
+            skeleton: build(&skeleton::STAGE)?,
+        })
+    }
+}
+
+type Part<'a> = (&'a Buffer, u64, u64);
+
+fn whole(b: &Buffer) -> Part<'_> {
+    (b, 0, b.bytes.max(16).next_multiple_of(16))
+}
+
+impl Shared {
+    pub fn new(device: &Device, f: &Frame, config: &ChainConfig) -> Result<Shared> {
+        let words = |label: &str, n: u32| device.storage(label, 4 * u64::from(n));
+        let uniforms = device.storage("uniforms", STEP_BYTES * u64::from(STEPS + 1))?;
+        for step in 0..=STEPS {
+            device.write(&uniforms, STEP_BYTES * u64::from(step), bytemuck::bytes_of(&Frame { step, ..*f }));
+        }
+        let roi = words("region", config.region.as_ref().map_or(4, |_| f.tiles_x * f.tiles_y * 8))?;
+        if let Some(region) = &config.region {
+            device.write(&roi, 0, bytemuck::cast_slice(&f.pack_mask(region)));
+        }
+        let weights = words("weights", f.size)?;
+        device.write(&weights, 0, bytemuck::cast_slice(&threshold::gaussian_weights(f.size)));
+        let ambient = match &config.ambient {
+            None => None,
+            Some(image) => {
+                let buffer = words("ambient", f.shot_words)?;
+                let mut bytes = vec![0; f.image_bytes()];
+                f.pack_image(image, &mut bytes).map_err(|e| e.at("ambient picture"))?;
+                device.write(&buffer, 0, &bytes);
+                Some(buffer)
+            }
+        };
+        let rows = f.tiles_y * f.shots;
+        Ok(Shared {
+            uniforms,
+            stats: words("stats", 8 * f.tiles())?,
+            roi,
+            first: words("first list's header", listing::HEADER_WORDS)?,
+            active: words("other lists' headers", listing::HEADER_WORDS * STEPS / STRIDE)?,
+            list: words("list", f.tiles())?,
+            active_list: words("active list", f.tiles())?,
+            weights,
+            quads: words("quads", f.mask_words())?,
+            mask: words("mask", f.mask_words())?,
+            other_mask: words("other mask", f.mask_words())?,
+            lit: words("lit", f.mask_words())?,
+            stamps: words("stamps", f.tiles())?,
+            counts: words("counts", f.tiles())?,
+            starts: words("starts", f.tiles())?,
+            rows: words("rows", rows)?,
+            row_starts: words("row starts", rows)?,
+            ambient,
+        })
+    }
+
+    /// The uniform block of a sub-iteration.
+    fn step(&self, step: u32) -> Part<'_> {
+        (&self.uniforms, STEP_BYTES * u64::from(step), size_of::<Frame>() as u64)
+    }
+    /// The header of the list of all tiles.
+    fn all(&self) -> Part<'_> {
+        (&self.first, 0, 16)
+    }
+    /// The header of the list after `n` shortenings, n >= 1.
+    fn shortened(&self, n: u32) -> Part<'_> {
+        (&self.active, STEP_BYTES * u64::from(n - 1), 16)
+    }
+
+    /// From the pictures to the mask.
+    pub fn front(&self, device: &Device, f: &Frame, p: &Pipelines, image: &Buffer) -> Recording {
+        let mut r = Recording::default();
+        let zero = self.step(0);
+        let all = (&self.first, 0);
+        let masks = [whole(&self.mask), whole(&self.other_mask), whole(&self.lit)];
+        let [mask, other, lit] = masks;
+        let clear = [zero, self.all(), whole(&self.list), mask, other, lit, whole(&self.stamps), whole(&self.counts)];
+        r.indirect(device, &p.clear, &clear, all);
+        r.dispatch_parts(device, &p.reset, &[zero, whole(&self.first), whole(&self.active)], [1, 1, 1]);
+        if let Some(a) = &self.ambient {
+            r.dispatch_parts(device, &p.ambient, &[zero, whole(image), whole(a)], ambient::groups(f));
+        }
+        r.dispatch_parts(device, &p.stats, &[zero, whole(image), whole(&self.stats)], stats::groups(f));
+        let tiles = [zero, whole(&self.stats), whole(&self.roi), self.all(), whole(&self.list)];
+        r.dispatch_parts(device, &p.tiles, &tiles, tiles::groups(f));
+        let mut bindings = vec![zero, whole(image), self.all(), whole(&self.list)];
+        if p.threshold.stage.name == threshold::GAUSSIAN.name {
+            bindings.push(whole(&self.weights));
+        }
+        bindings.push(whole(&self.quads));
+        r.indirect(device, &p.threshold, &bindings, all);
+        let (list, quads, roi) = (whole(&self.list), whole(&self.quads), whole(&self.roi));
+        r.indirect(device, &p.gather, &[zero, self.all(), list, quads, roi, mask, lit, whole(&self.stamps)], all);
+        r
+    }
+
+    /// One round of thinning: all recorded sub-iterations; those after the last change are empty.
+    pub fn thinning(&self, device: &Device, p: &Pipelines) -> Recording {
+        let mut r = Recording::default();
+        let stamps = whole(&self.stamps);
+        for step in 0..STEPS {
+            let n = step / STRIDE;
+            let (header, list, args) = match n {
+                0 => (self.all(), &self.list, (&self.first, 0)),
+                n => (self.shortened(n), &self.active_list, (&self.active, self.shortened(n).1)),
+            };
+            let (from, to) =
+                if step % 2 == 0 { (&self.mask, &self.other_mask) } else { (&self.other_mask, &self.mask) };
+            let bindings = [self.step(step), header, whole(list), whole(from), whole(to), stamps];
+            r.indirect(device, &p.thin, &bindings, args);
+            if (step + 1) % STRIDE == 0 {
+                let short = self.shortened(n + 1);
+                let list = whole(&self.list);
+                let bindings = [self.step(step + 1), self.all(), list, stamps, short, whole(&self.active_list)];
+                r.indirect(device, &p.compact, &bindings, (&self.first, 0));
+            }
+        }
+        r
+    }
+
+    /// Between two rounds of thinning.
+    pub fn restart(&self, device: &Device, p: &Pipelines) -> Recording {
+        let mut r = Recording::default();
+        let rebase = [self.step(STEPS), self.all(), whole(&self.list), whole(&self.stamps)];
+        r.indirect(device, &p.rebase, &rebase, (&self.first, 0));
+        r.dispatch_parts(device, &p.reset, &[self.step(1), whole(&self.first), whole(&self.active)], [1, 1, 1]);
+        r
+    }
+
+    /// From the thinned mask to the list of points.
+    pub fn back(&self, device: &Device, f: &Frame, p: &Pipelines, header: &Buffer, points: &Buffer) -> Recording {
+        let mut r = Recording::default();
+        let (zero, list, mask) = (self.step(0), whole(&self.list), whole(&self.mask));
+        let all = (&self.first, 0);
+        r.indirect(device, &p.count, &[zero, self.all(), list, mask, whole(&self.counts)], all);
+        let (starts, rows) = (whole(&self.starts), whole(&self.rows));
+        r.dispatch_parts(device, &p.scan_rows, &[zero, whole(&self.counts), starts, rows], skeleton::rows_groups(f));
+        let (last, row_starts) = (self.shortened(STEPS / STRIDE), whole(&self.row_starts));
+        let shots = [zero, rows, self.all(), last, row_starts, whole(header)];
+        r.dispatch_parts(device, &p.scan_shots, &shots, skeleton::shots_groups(f));
+        r.indirect(device, &p.skeleton, &[zero, self.all(), list, mask, starts, row_starts, whole(points)], all);
+        r
+    }
+}

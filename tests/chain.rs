@@ -1,0 +1,172 @@
+//! In: random and adversarial pictures in batches. Out: the pruned chain, the plain chain and the plain
+//! definition give the same masks and the same points. Frame and unit: pixels.
+
+use sheetlight::gpu::Device;
+use sheetlight::raster::{Image, Mask};
+use sheetlight::stages::cases::{self, Noise, drawn, stripe};
+use sheetlight::stages::chain::{Chain, ChainConfig};
+use sheetlight::stages::{Thinning, ThresholdParams, Window, frame, skeleton, thin, threshold};
+
+fn device() -> Option<Device> {
+    match Device::open() {
+        Ok(d) => Some(d),
+        Err(e) if std::env::var_os("SHEETLIGHT_REQUIRE_GPU").is_some() => panic!("{e}"),
+        Err(e) => {
+            eprintln!("SKIPPED, no GPU adapter: {e}");
+            None
+        }
+    }
+}
+
+fn expected(image: &Image, c: &ChainConfig) -> (Mask, Vec<u32>) {
+    let mut lit = threshold::twin(image, &c.threshold);
+    if let Some(region) = &c.region {
+        lit.intersect(region);
+    }
+    let thinned = thin::twin(&lit, c.thinning);
+    let list = skeleton::twin(&thinned);
+    (thinned, list)
+}
+
+/// Sends all pictures through, several batches in flight, and compares every one.
+fn check(device: &Device, name: &str, config: &ChainConfig, images: &[Image]) -> u32 {
+    let mut chain = Chain::new(device, config).unwrap();
+    let batches: Vec<&[Image]> = images.chunks(config.shots as usize).collect();
+    let (mut next, mut done, mut listed) = (0, 0, 0);
+    while done < batches.len() {
+        while next < batches.len() && chain.has_room() {
+            chain.submit(next as u64, &batches[next].iter().collect::<Vec<_>>()).unwrap();
+            next += 1;
+        }
+        let batch = chain.collect(true).unwrap().unwrap();
+        assert_eq!(batch.tag, done as u64, "{name}: order");
+        listed += batch.listed_tiles;
+        for (i, image) in batches[done].iter().enumerate() {
+            let (_, list) = expected(image, config);
+            assert!(batch.pixels(i).eq(list.iter().copied()), "{name}, batch {done}, shot {i}: points");
+        }
+        done += 1;
+    }
+    let last = batches[done - 1];
+    chain.submit(0, &last.iter().collect::<Vec<_>>()).unwrap();
+    chain.collect(true).unwrap();
+    for (i, image) in last.iter().enumerate() {
+        assert!(chain.mask(i as u32).unwrap() == expected(image, config).0, "{name}: last mask, shot {i}");
+    }
+    listed
+}
+
+#[test]
+fn pruned_plain_and_definition_agree() {
+    let Some(device) = device() else { return };
+    for scene in cases::scenes() {
+        if scene.ambient.is_some() {
+            continue;
+        }
+        let first = &scene.shots[0];
+        let mut config = ChainConfig::new(first.width, first.height, first.bits);
+        config.shots = scene.shots.len() as u32;
+        config.threshold = scene.params;
+        config.thinning = scene.thinning;
+        if scene.flags & frame::HAS_ROI != 0 {
+            config.region = Some(Mask::from_fn(first.width, first.height, |x, y| x % 50 > 9 && y > 20));
+        }
+        // The same pictures twice, so that what the first batch left behind would show in the second.
+        let images: Vec<Image> = scene.shots.iter().chain(&scene.shots).cloned().collect();
+        let pruned = check(&device, scene.name, &config, &images);
+        config.prune = false;
+        let plain = check(&device, scene.name, &config, &images);
+        assert!(pruned <= plain, "{}", scene.name);
+    }
+}
+
+#[test]
+fn one_stripe_lists_few_tiles() {
+    let Some(device) = device() else { return };
+    let mut config = ChainConfig::new(1280, 960, 8);
+    config.shots = 1;
+    let image = stripe(1280, 960, 8, 2.5, 2, 9);
+    let listed = check(&device, "one stripe", &config, &[image]);
+    let tiles = 40 * 120;
+    assert!(listed * 10 < tiles, "{listed} of {tiles} tiles listed: the proof of darkness has become weak");
+}
+
+#[test]
+fn random_pictures_and_settings() {
+    let Some(device) = device() else { return };
+    let mut noise = Noise(2024);
+    for round in 0..24 {
+        let (w, h) = (1 + noise.next() % 150, 1 + noise.next() % 90);
+        let bits = [8, 8, 10, 12, 16][noise.next() as usize % 5];
+        let full = (1u32 << bits) - 1;
+        let mut config = ChainConfig::new(w, h, bits);
+        config.shots = 1 + noise.next() % 3;
+        config.thinning = if noise.next() % 2 == 0 { Thinning::ZhangSuen } else { Thinning::GuoHall };
+        let size = 3 + 2 * (noise.next() % 50);
+        let offset = (noise.next() % (full / 4 + 2)) as i32 - (full / 16) as i32;
+        let minimum = (noise.next() % 3 * (full / 5)) as u16;
+        config.threshold = ThresholdParams { window: Window::Mean, size, offset, minimum };
+        let images: Vec<Image> = (0..5)
+            .map(|_| {
+                let (kind, level, cell) = (noise.next() % 4, noise.next() % (full + 1), 1 + noise.next() % 12);
+                let mut grain = Noise(u64::from(noise.next()));
+                drawn(w, h, bits, |x, y| match kind {
+                    0 => grain.next() % (full + 1),
+                    1 => full * u32::from((x / cell + y / cell) % 2 == 0),
+                    2 => level.saturating_sub(grain.next() % (full / 8)).max(full * u32::from(x % 40 == y % 40)),
+                    _ => (level + x * full / w.max(1)) % (full + 1),
+                })
+            })
+            .collect();
+        check(&device, &format!("round {round}: {w} x {h}, {bits} bits, {:?}", config.threshold), &config, &images);
+    }
+}
+
+#[test]
+fn stripes_of_any_width_end_as_lines() {
+    let Some(device) = device() else { return };
+    let mut config = ChainConfig::new(400, 300, 8);
+    config.shots = 1;
+    config.threshold = ThresholdParams { size: 3, offset: -1, ..Default::default() };
+    // With offset -1 everything is lit; the region cuts a blob 200 px high out of it.
+    config.region = Some(Mask::from_fn(400, 300, |x, y| (40..360).contains(&x) && (50..250).contains(&y)));
+    let flat = drawn(400, 300, 8, |_, _| 90);
+    for rule in [Thinning::ZhangSuen, Thinning::GuoHall] {
+        config.thinning = rule;
+        check(&device, &format!("{rule:?}"), &config, &[flat.clone(), flat.clone(), flat.clone(), flat.clone()]);
+    }
+}
+
+#[test]
+fn ambient_light_is_subtracted() {
+    let Some(device) = device() else { return };
+    let ambient = drawn(200, 120, 8, |x, y| if (60..100).contains(&x) && y > 70 { 130 } else { 12 });
+    let image = stripe(200, 120, 8, 2.0, 0, 4);
+    let sum = drawn(200, 120, 8, |x, y| (u32::from(image.get(x, y)) + u32::from(ambient.get(x, y))).min(255));
+    let mut config = ChainConfig::new(200, 120, 8);
+    config.shots = 1;
+    let clean = drawn(200, 120, 8, |x, y| {
+        let (v, a) = (u32::from(sum.get(x, y)), u32::from(ambient.get(x, y)));
+        if v == 255 { v } else { v.saturating_sub(a) }
+    });
+    let (_, list) = expected(&clean, &config);
+    config.ambient = Some(ambient);
+    let mut chain = Chain::new(&device, &config).unwrap();
+    chain.submit(0, &[&sum]).unwrap();
+    assert!(chain.collect(true).unwrap().unwrap().pixels(0).eq(list));
+}
+
+#[test]
+fn a_lost_device_ends_in_an_error() {
+    let Some(device) = device() else { return };
+    let image = stripe(64, 48, 8, 2.0, 0, 1);
+    let mut config = ChainConfig::new(64, 48, 8);
+    config.shots = 1;
+    let mut chain = Chain::new(&device, &config).unwrap();
+    chain.submit(0, &[&image]).unwrap();
+    assert!(chain.collect(true).unwrap().is_some());
+    device.lose();
+    let error = chain.submit(1, &[&image]).and_then(|()| chain.collect(true)).unwrap_err();
+    assert_eq!(error.kind, sheetlight::fault::Kind::Device);
+    assert!(error.what.contains("lost"), "{error}");
+}
