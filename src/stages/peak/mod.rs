@@ -223,7 +223,8 @@ impl Setup {
             read2: p.read_noise * p.read_noise * scale * scale,
             gain: p.gain * scale,
             speckle2: p.speckle * p.speckle,
-            along_factor: 1.0 / (radius * radius),
+            // One line across the stripe needs no fading.
+            along_factor: if p.along > 0.0 { 1.0 / (radius * radius) } else { 0.0 },
             stride_along,
             // Whole steps, so that the skeleton pixel's own column is among them.
             reach_along: (radius / stride_along as f32).floor() as i32 * stride_along,

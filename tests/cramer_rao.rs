@@ -1,0 +1,179 @@
+//! In: simulated Gaussian stripes with shot and read noise. Out: noise and bias of the found centres against the
+//! Cramer-Rao bound, as a table. Frame and unit: pixels across the stripe; grey levels of an 8-bit picture.
+
+use rand::SeedableRng;
+use rand_distr::{Distribution, Normal};
+use sheetlight::raster::Image;
+use sheetlight::stages::peak::{Method, PeakParams, measure, peaks};
+use sheetlight::stages::{Thinning, ThresholdParams, skeleton, thin, threshold};
+
+/// Sensor of the simulation: read noise, grey levels per photo-electron, dark level; rounding adds 1/12.
+const READ: f64 = 0.64;
+const GAIN: f64 = 0.05;
+const DARK: f64 = 4.0;
+const WIDTH: u32 = 1600;
+const HEIGHT: u32 = 120;
+
+/// A straight stripe: its centre is v = 60 + slope (u - 800) + phase.
+#[derive(Clone, Copy)]
+struct Stripe {
+    sigma: f64,
+    peak: f64,
+    slope: f64,
+}
+
+impl Stripe {
+    /// Signed distance of a place from the line.
+    fn across(&self, u: f64, v: f64, phase: f64) -> f64 {
+        (v - 60.0 - self.slope * (u - 800.0) - phase) / (1.0 + self.slope * self.slope).sqrt()
+    }
+    fn light(&self, d: f64) -> f64 {
+        self.peak * (-0.5 * (d / self.sigma).powi(2)).exp()
+    }
+    fn variance(&self, light: f64) -> f64 {
+        READ * READ + 1.0 / 12.0 + GAIN * (light + DARK)
+    }
+    fn picture(&self, phase: f64, rng: &mut rand_pcg::Pcg64) -> Image {
+        let normal = Normal::new(0.0, 1.0).unwrap();
+        let mut pixels = Vec::with_capacity((WIDTH * HEIGHT) as usize);
+        for v in 0..HEIGHT {
+            for u in 0..WIDTH {
+                let level = self.light(self.across(f64::from(u), f64::from(v), phase)) + DARK;
+                let noise = (READ * READ + GAIN * level).sqrt() * normal.sample(rng);
+                pixels.push((level + noise).round().clamp(0.0, 255.0) as u8);
+            }
+        }
+        Image::from_u8(WIDTH, HEIGHT, pixels)
+    }
+    /// Least standard deviation of an unbiased centre whose light is weighted along the stripe by `weight(t)`:
+    /// sum(w² F) / sum(w F)², F the Fisher information of a pixel; for one line of pixels, w = 1, the
+    /// Cramer-Rao bound itself. Amplitude and width are even, the centre is odd: not knowing them costs nothing.
+    fn bound(&self, phase: f64, weight: impl Fn(i32, f64) -> f64) -> f64 {
+        let l = (1.0 + self.slope * self.slope).sqrt();
+        let (mut top, mut bottom) = (0.0, 0.0);
+        for i in -40..=40i32 {
+            for j in -50..=50i32 {
+                let d = (f64::from(j) - self.slope * f64::from(i) - phase) / l;
+                let w = weight(i, (f64::from(i) + self.slope * f64::from(j)) / l);
+                let light = self.light(d);
+                let fisher = (light * d / (self.sigma * self.sigma)).powi(2) / self.variance(light);
+                top += w * w * fisher;
+                bottom += w * fisher;
+            }
+        }
+        top.sqrt() / bottom
+    }
+}
+
+/// Standard deviation and mean of the error across the stripe, over the columns of some pictures.
+fn errors(stripe: &Stripe, method: Method, along: f32, pictures: u64) -> (f64, f64) {
+    let (mut n, mut sum, mut square) = (0.0, 0.0, 0.0);
+    for k in 0..pictures {
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(k);
+        let phase = k as f64 / pictures as f64;
+        let image = stripe.picture(phase, &mut rng);
+        let size = ((24.0 * stripe.sigma) as u32 | 1).clamp(31, 101);
+        let lit = threshold::twin(&image, &ThresholdParams { size, ..Default::default() });
+        let list = skeleton::twin(&thin::twin(&lit, Thinning::ZhangSuen));
+        let start = PeakParams { method, along, read_noise: 0.7, gain: GAIN as f32, ..PeakParams::default() };
+        let found = measure(&image, &list, &start).expect("a clean stripe is measured");
+        for p in peaks(&image, &list, 0, &start.with(&found)) {
+            let (u, v) = (f64::from(p.u), f64::from(p.v));
+            let d = stripe.across(u, v, phase);
+            // Ends of the stripe, and specks of noise that passed the threshold.
+            if (40.0..f64::from(WIDTH) - 40.0).contains(&u) && d.abs() < 2.0 * stripe.sigma {
+                n += 1.0;
+                sum += d;
+                square += d * d;
+            }
+        }
+    }
+    assert!(n > 0.9 * pictures as f64 * f64::from(WIDTH - 80), "{n} peaks");
+    let mean = sum / n;
+    ((square / n - mean * mean).sqrt(), mean)
+}
+
+const SIGMAS: [f64; 4] = [1.5, 2.0, 3.0, 4.0];
+const PEAKS: [f64; 4] = [30.0, 60.0, 120.0, 240.0];
+
+#[test]
+fn centres_are_as_good_as_the_light_allows() {
+    println!("stripe centre, sd / bound (bias px); one line, then averaged along the stripe, then two other methods");
+    println!("sigma px  peak grey  bound px  one line         along           centroid  derivative");
+    let mut faults = Vec::new();
+    for sigma in SIGMAS {
+        for peak in PEAKS {
+            let stripe = Stripe { sigma, peak, slope: 0.03 };
+            let one = stripe.bound(0.3, |i, _| f64::from(u8::from(i == 0)));
+            let radius = 2.4 * sigma;
+            let stride = ((0.7 * sigma) as i32).max(1);
+            let wide = stripe.bound(0.3, |i, t| {
+                if i % stride == 0 { (1.0 - (t / radius).powi(2)).max(0.0).powi(2) } else { 0.0 }
+            });
+            let (sd_one, bias_one) = errors(&stripe, Method::Gaussian, 0.0, 3);
+            let (sd_wide, bias_wide) = errors(&stripe, Method::Gaussian, 1.0, 3);
+            let centroid = errors(&stripe, Method::Centroid, 0.0, 1).0 / one;
+            let derivative = errors(&stripe, Method::Derivative, 0.0, 1).0 / one;
+            println!(
+                "{sigma:8.1} {peak:10.0} {one:9.4}  {:5.3} ({bias_one:+.4})  {:5.3} ({bias_wide:+.4})  {centroid:8.2} {derivative:11.2}",
+                sd_one / one,
+                sd_wide / wide
+            );
+            for (what, ratio, bias) in [("one line", sd_one / one, bias_one), ("along", sd_wide / wide, bias_wide)] {
+                if ratio > 1.10 || ratio < 0.9 || bias.abs() > 0.01 {
+                    faults.push(format!("sigma {sigma}, peak {peak}, {what}: sd {ratio:.3} bounds, bias {bias:.4} px"));
+                }
+            }
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+#[test]
+fn a_sloping_stripe_is_as_good() {
+    for slope in [0.4, 1.0] {
+        let stripe = Stripe { sigma: 2.0, peak: 120.0, slope };
+        let one = stripe.bound(0.3, |i, _| f64::from(u8::from(i == 0)));
+        // Only the part inside the picture; one line is a column here, which cuts the stripe at an angle.
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(5);
+        let image = stripe.picture(0.3, &mut rng);
+        let lit = threshold::twin(&image, &ThresholdParams { size: 49, ..Default::default() });
+        let list = skeleton::twin(&thin::twin(&lit, Thinning::ZhangSuen));
+        let start = PeakParams { along: 0.0, gain: GAIN as f32, ..PeakParams::default() };
+        let found = measure(&image, &list, &start).expect("a clean stripe is measured");
+        let d: Vec<f64> = peaks(&image, &list, 0, &start.with(&found))
+            .iter()
+            .filter(|p| (12.0..108.0).contains(&p.v))
+            .map(|p| stripe.across(f64::from(p.u), f64::from(p.v), 0.3))
+            .filter(|d| d.abs() < 2.0)
+            .collect();
+        let mean = d.iter().sum::<f64>() / d.len() as f64;
+        let sd = (d.iter().map(|e| (e - mean).powi(2)).sum::<f64>() / d.len() as f64).sqrt();
+        println!("slope {slope}: {} peaks, sd {:.3} bounds, bias {mean:+.4} px", d.len(), sd / one);
+        // Few columns fit: the estimate of sd itself is good to 1 / sqrt(2 n).
+        let spread = 3.0 / (2.0 * d.len() as f64).sqrt();
+        assert!(d.len() > 60 && sd / one < 1.10 + spread && mean.abs() < 3.0 * one / (d.len() as f64).sqrt() + 0.01);
+    }
+}
+
+#[test]
+fn the_stated_standard_deviation_is_the_true_one() {
+    for (sigma, peak) in [(1.5, 60.0), (3.0, 120.0)] {
+        let stripe = Stripe { sigma, peak, slope: 0.03 };
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(9);
+        let image = stripe.picture(0.6, &mut rng);
+        let size = ((24.0 * sigma) as u32 | 1).max(31);
+        let lit = threshold::twin(&image, &ThresholdParams { size, ..Default::default() });
+        let list = skeleton::twin(&thin::twin(&lit, Thinning::ZhangSuen));
+        let start = PeakParams { gain: GAIN as f32, ..PeakParams::default() };
+        let found = measure(&image, &list, &start).unwrap();
+        let pulls: Vec<f64> = peaks(&image, &list, 0, &start.with(&found))
+            .iter()
+            .filter(|p| (40.0..f64::from(WIDTH) - 40.0).contains(&f64::from(p.u)) && p.snr > 10.0)
+            .map(|p| stripe.across(f64::from(p.u), f64::from(p.v), 0.6) / f64::from(p.sigma_px))
+            .collect();
+        let rms = (pulls.iter().map(|p| p * p).sum::<f64>() / pulls.len() as f64).sqrt();
+        println!("sigma {sigma} px, peak {peak}: error over stated sigma {rms:.3} rms");
+        assert!((0.85..1.15).contains(&rms), "{rms}");
+    }
+}
