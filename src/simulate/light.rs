@@ -223,3 +223,81 @@ impl View<'_> {
         s.sensor.laser_white * 2.0 * std::f64::consts::PI * sigma * sigma * z * z
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::{SceneSpec, Sensor, above};
+
+    fn plate(tilt: f64) -> Scene {
+        let text = format!(
+            "name = 'plate'\nregion_mm = [-90, -60, 90, 60]\n[[part]]\nname = 'p'\nat_mm = [0, 0, 0]\ntilt_deg = [{tilt}, 4]\n\
+             [[part.solid]]\nshape = {{ block = {{ size_mm = [400, 400, 5] }} }}\nat_mm = [0, 0, 0]\nmaterial = {{ albedo = 1 }}"
+        );
+        Scene::new(SceneSpec::parse(&text).unwrap()).unwrap()
+    }
+
+    /// The light's centroid in a column is where the plane of the sheet meets the plate, as the lens
+    /// shows it: worked out here by the camera's own equations, without following beams.
+    #[test]
+    fn the_stripe_lies_where_the_sheet_meets_the_plate() {
+        for (seed, tilt) in [(0, 0.0), (3, 8.0), (11, -10.0)] {
+            let station = Station::random(seed);
+            let scene = plate(tilt);
+            let scene_from_camera = above(3.0, -2.0, station.working_distance);
+            let view = View { station: &station, scene: &scene, scene_from_camera };
+            let mut canvas = Canvas::new(640, 480);
+            view.sheet(&mut canvas);
+            let mut worst = 0f64;
+            for u in (40..600).step_by(7) {
+                let (mut sum, mut moment) = (0.0, 0.0);
+                for v in 0..480 {
+                    let g = f64::from(canvas.pixels[v * 640 + u]);
+                    (sum, moment) = (sum + g, moment + g * v as f64);
+                }
+                assert!(sum > 0.1, "column {u} is dark");
+                let v = moment / sum;
+                let ray = station.camera.ray_from_pixel(&crate::geometry::Vec2::new(u as f64, v)).unwrap();
+                let p = ray.meet(&station.laser.plane()).unwrap();
+                worst = worst.max(scene.distance(&scene_from_camera.point(&p)));
+            }
+            // 2 µm at 155 mm is 0.008 px: what is left is the beam's change of width over its own depth.
+            assert!(worst < 0.002, "seed {seed}: {worst} mm");
+        }
+    }
+
+    #[test]
+    fn the_stripe_on_white_peaks_at_the_stated_grey() {
+        for width in [640, 1920] {
+            let mut station = Station::design().with_size(width, width * 3 / 4);
+            station.sensor = Sensor { laser_white: 0.8, ..Sensor::default() };
+            let scene = plate(0.0);
+            let view =
+                View { station: &station, scene: &scene, scene_from_camera: above(0.0, 0.0, station.working_distance) };
+            let mut canvas = Canvas::new(width, width * 3 / 4);
+            view.sheet(&mut canvas);
+            let column: Vec<f64> =
+                (0..canvas.height).map(|v| f64::from(canvas.pixels[(v * width + width / 2) as usize])).collect();
+            let top = (1..column.len() - 1).max_by(|&a, &b| column[a].total_cmp(&column[b])).unwrap();
+            // The peak lies between pixels: the parabola through three logarithms is exact for a Gaussian.
+            let [a, b, c] = [column[top - 1].ln(), column[top].ln(), column[top + 1].ln()];
+            let peak = (b - (a - c).powi(2) / (8.0 * (a - 2.0 * b + c))).exp();
+            assert!((peak - 0.8).abs() < 0.02, "{width}: {peak}");
+        }
+    }
+
+    #[test]
+    fn walls_throw_shadows_for_laser_and_camera() {
+        let text = "name = 'wall'\nregion_mm = [-9, -9, 9, 9]\n[[solid]]\nshape = { block = { size_mm = [300, 300, 5] } }\nat_mm = [0, 0, 0]\n\
+                    [[solid]]\nshape = { block = { size_mm = [20, 4, 12] } }\nat_mm = [0, -6, 12]";
+        let station = Station::design();
+        let scene = Scene::new(SceneSpec::parse(text).unwrap()).unwrap();
+        let view =
+            View { station: &station, scene: &scene, scene_from_camera: above(0.0, 0.0, station.working_distance) };
+        let lit = view.sheet(&mut Canvas::new(640, 480));
+        // The laser stands at -y of the scene: the wall keeps its light from the floor behind it.
+        let floor =
+            |x0: f64, x1: f64| lit.iter().filter(|p| p.point.z < 0.1 && p.point.x > x0 && p.point.x < x1).count();
+        assert!(floor(15.0, 30.0) > 50 && floor(-9.0, 9.0) == 0, "{} {}", floor(15.0, 30.0), floor(-9.0, 9.0));
+    }
+}

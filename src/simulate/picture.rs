@@ -11,31 +11,46 @@ use rand_distr::{Distribution, Gamma, StandardNormal};
 use rand_pcg::Pcg64;
 
 impl View<'_> {
-    /// Grey of a pixel under room light that comes from above at a slant, as share of white.
-    fn room_light(&self, u: f64, v: f64) -> f32 {
-        let Some(ray) = self.station.camera.ray_from_pixel(&Vec2::new(u, v)) else { return 0.0 };
+    /// Grey of a viewing direction (ideal normalised coordinates) under room light that comes from
+    /// above at a slant, as share of white.
+    fn room_light(&self, n: &Vec2) -> f32 {
+        let along = Vec3::new(n.x, n.y, 1.0).normalize();
         let eye = self.scene_from_camera.translation;
-        let direction = self.scene_from_camera.direction(&ray.direction);
+        let direction = self.scene_from_camera.direction(&along);
         let Some(hit) = self.scene.hit(&eye, &direction, 2000.0) else { return 0.02 };
         let lamp = self.scene_from_camera.direction(&Vec3::new(-0.35, -0.25, -0.9)).normalize();
         let shade = 0.55 + 0.45 * hit.normal.dot(&lamp).max(0.0);
         // cos⁴ of the angle to the axis: natural vignetting of a lens.
-        (hit.material.albedo * shade * ray.direction.z.powi(4)) as f32
+        (hit.material.albedo * shade * along.z.powi(4)) as f32
     }
 
-    /// Room light in every pixel with `samples`² rays a pixel, blurred by the lens.
+    /// Viewing directions at the corners between pixels, one row of them.
+    fn corners(&self, row: u32) -> Vec<Option<Vec2>> {
+        let camera = &self.station.camera;
+        let v = f64::from(row) - 0.5;
+        (0..=camera.width).map(|x| camera.normalised_from_pixel(&Vec2::new(f64::from(x) - 0.5, v))).collect()
+    }
+
+    /// Room light in every pixel with `samples`² rays a pixel, blurred by the lens. Within a pixel the
+    /// lens is straight to 1e-6 px, so the rays lie between those of its corners.
     pub fn ambient(&self, samples: u32) -> Canvas {
         let camera = &self.station.camera;
         let mut canvas = Canvas::new(camera.width, camera.height);
-        let offsets: Vec<f64> = (0..samples).map(|i| (f64::from(i) + 0.5) / f64::from(samples) - 0.5).collect();
-        for (i, pixel) in canvas.pixels.iter_mut().enumerate() {
-            let (x, y) = ((i as u32 % camera.width) as f64, (i as u32 / camera.width) as f64);
-            let sum: f32 = offsets
-                .iter()
-                .flat_map(|dy| offsets.iter().map(move |dx| (dx, dy)))
-                .map(|(dx, dy)| self.room_light(x + dx, y + dy))
-                .sum();
-            *pixel = sum / (samples * samples) as f32;
+        let places: Vec<f64> = (0..samples).map(|i| (f64::from(i) + 0.5) / f64::from(samples)).collect();
+        let mut below = self.corners(0);
+        for (y, row) in canvas.pixels.chunks_exact_mut(camera.width as usize).enumerate() {
+            let above = std::mem::replace(&mut below, self.corners(y as u32 + 1));
+            for (x, pixel) in row.iter_mut().enumerate() {
+                let (Some(a), Some(b), Some(c), Some(d)) = (above[x], above[x + 1], below[x], below[x + 1]) else {
+                    continue;
+                };
+                let mut sum = 0.0;
+                for fy in &places {
+                    let (left, right) = (a + (c - a) * *fy, b + (d - b) * *fy);
+                    sum += places.iter().map(|fx| self.room_light(&(left + (right - left) * *fx))).sum::<f32>();
+                }
+                *pixel = sum / (samples * samples) as f32;
+            }
         }
         blur(&mut canvas, self.station.blur_px());
         canvas
@@ -47,8 +62,9 @@ impl View<'_> {
         let camera = &self.station.camera;
         let step = (camera.width / 160).max(1);
         let (nx, ny) = (camera.width.div_ceil(step) + 1, camera.height.div_ceil(step) + 1);
-        let knots: Vec<f32> =
-            (0..nx * ny).map(|i| self.room_light(f64::from((i % nx) * step), f64::from((i / nx) * step))).collect();
+        let knot = |i: u32| Vec2::new(f64::from((i % nx) * step), f64::from((i / nx) * step));
+        let light = |px: Vec2| camera.normalised_from_pixel(&px).map_or(0.0, |n| self.room_light(&n));
+        let knots: Vec<f32> = (0..nx * ny).map(|i| light(knot(i))).collect();
         let mut canvas = Canvas::new(camera.width, camera.height);
         let scale = 1.0 / step as f32;
         for (y, row) in canvas.pixels.chunks_exact_mut(camera.width as usize).enumerate() {

@@ -2,10 +2,11 @@
 //! Frame and unit: base, flange, camera, board, scene; mm. Every pose is reproducible from the seed.
 
 use super::light::InScene;
+use super::pattern::{is_black, plate};
 use super::scene::Scene;
 use super::station::Station;
-use crate::geometry::{Base, Board, Camera, Flange, Mat3, Rigid, Vec2, Vec3, exp};
-use crate::recording::BoardSpec;
+use crate::geometry::{Base, Board, Camera, Flange, Mat3, Plane, Ray, Rigid, Vec2, Vec3, exp};
+use crate::recording::{Beam, BoardSpec};
 use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
@@ -66,20 +67,43 @@ pub struct Views {
     pub whole: bool,
 }
 
+/// Whether a beam falls on a board where it can be measured: the sheet's middle well inside the
+/// plate, the pointer on an even patch, because print under the spot moves its centroid.
+fn useful(station: &Station, board: &BoardSpec, pose: &Rigid<Camera, Board>, beam: Beam) -> bool {
+    let plane = pose.plane(&Plane::<Board>::new(Vec3::z(), 0.0).expect("unit normal"));
+    let ray = match beam {
+        Beam::Line => Ray::new(station.laser.source, station.laser.axis),
+        Beam::Pointer => Some(station.pointer.ray()),
+    };
+    let Some(p) = ray.and_then(|r| r.meet(&plane)) else { return false };
+    let p = pose.inverse().point(&p);
+    let [x0, y0, x1, y1] = plate(board);
+    let margin = if beam == Beam::Line { 0.2 * (y1 - y0) } else { 2.0 };
+    let inside = p.x > x0 + margin && p.x < x1 - margin && p.y > y0 + margin && p.y < y1 - margin;
+    let around = |i: u32| Vec2::new(p.x, p.y) + 1.6 * Vec2::new(f64::from(i).cos(), f64::from(i).sin());
+    inside && (beam == Beam::Line || (0..12).map(around).all(|q| !is_black(board, q.x, q.y)))
+}
+
 /// Board poses that cover the image and the range of tilts; rejection sampling, seeded.
-pub fn board_views(station: &Station, board: &BoardSpec, views: &Views, purpose: &str) -> Vec<Rigid<Camera, Board>> {
+pub fn board_views(
+    station: &Station,
+    board: &BoardSpec,
+    views: &Views,
+    beam: Option<Beam>,
+    purpose: &str,
+) -> Vec<Rigid<Camera, Board>> {
     let features = board.features();
     let centre = features.iter().sum::<Vec3>() / features.len() as f64;
     let camera = &station.camera;
     let (w, h) = (f64::from(camera.width), f64::from(camera.height));
-    let edge = 0.03 * w;
+    let edge = 0.02 * w;
     (0..views.count)
         .map(|i| {
             let mut rng = station.rng(purpose, i as u64);
             // The picture's middle third is left a little as the tries go on, so that a board that
             // only just fits is still placed.
-            for attempt in 0..4000 {
-                let spread = 1.0 - f64::from(attempt) / 4000.0;
+            for attempt in 0..20_000 {
+                let spread = 1.0 - f64::from(attempt) / 20_000.0;
                 let mut within = |by: f64| rng.random_range(-by..=by);
                 let px = Vec2::new(w / 2.0 + within(0.45 * w) * spread, h / 2.0 + within(0.45 * h) * spread);
                 let azimuth = within(std::f64::consts::PI);
@@ -95,7 +119,8 @@ pub fn board_views(station: &Station, board: &BoardSpec, views: &Views, purpose:
                         .pixel_from_point(&pose.point(p))
                         .is_some_and(|q| q.x > edge && q.y > edge && q.x < w - edge && q.y < h - edge)
                 };
-                if !views.whole || features.iter().all(inside) {
+                let lit = beam.is_none_or(|b| useful(station, board, &pose, b));
+                if lit && (!views.whole || features.iter().all(inside)) {
                     return pose;
                 }
             }

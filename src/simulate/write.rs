@@ -276,7 +276,7 @@ impl Plan {
         self.scenes = boards.iter().map(|b| Scene::of_board(b, 0.85, 0.06)).collect();
         let each = Views { count: views.count / boards.len(), ..*views };
         for (i, board) in boards.iter().enumerate() {
-            for pose in plan::board_views(station, board, &each, &format!("{} {i}", self.set.name())) {
+            for pose in plan::board_views(station, board, &each, laser, &format!("{} {i}", self.set.name())) {
                 let scene_from_camera = scene_from_board() * pose.inverse();
                 let board = laser.map(|_| i);
                 self.shots.push(Shot { scene_from_camera, scene: i, laser, ambient: true, board });
