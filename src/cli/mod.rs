@@ -2,6 +2,7 @@
 //! Frame and unit: as the subcommands say; every number is printed with its unit.
 
 mod console;
+mod demo;
 mod doctor;
 mod scan;
 mod simulate;
@@ -30,6 +31,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Demo(demo::Args),
     Doctor(doctor::Args),
     Scan(scan::Args),
     /// Simulate a station with known truth: recordings, poses, true calibration
@@ -41,6 +43,7 @@ enum Command {
 
 fn run(command: &Command, console: &Console) -> Result<()> {
     match command {
+        Command::Demo(a) => demo::run(a, console),
         Command::Doctor(a) => doctor::run(a, console),
         Command::Scan(a) => scan::run(a, console),
         Command::Simulate(a) => simulate::run(a, console),

@@ -98,28 +98,19 @@ fn from_colour(picture: &image::DynamicImage, channel: Channel, bits: u8, width:
 
 /// Writes a grey image as PNG, 8 or 16 bits.
 pub fn save_png(image: &Image, path: &Path) -> Result<()> {
-    let done = match &image.pixels {
-        Pixels::U8(p) => image::save_buffer_with_format(
-            path,
-            p,
-            image.width,
-            image.height,
-            image::ExtendedColorType::L8,
-            image::ImageFormat::Png,
-        ),
-        Pixels::U16(p) => image::save_buffer_with_format(
-            path,
-            bytemuck::cast_slice(p),
-            image.width,
-            image.height,
-            image::ExtendedColorType::L16,
-            image::ImageFormat::Png,
-        ),
+    std::fs::write(path, png(image)).map_err(|e| Fault::write(path, e))
+}
+
+/// The bytes of a grey image as PNG, 8 or 16 bits.
+pub fn png(image: &Image) -> Vec<u8> {
+    let mut out = std::io::Cursor::new(Vec::new());
+    let (bytes, colour): (&[u8], _) = match &image.pixels {
+        Pixels::U8(p) => (p, image::ExtendedColorType::L8),
+        Pixels::U16(p) => (bytemuck::cast_slice(p), image::ExtendedColorType::L16),
     };
-    done.map_err(|e| match e {
-        image::ImageError::IoError(e) => Fault::write(path, e),
-        e => Fault::output(format!("{}: cannot be written: {e}", path.display())),
-    })
+    image::write_buffer_with_format(&mut out, bytes, image.width, image.height, colour, image::ImageFormat::Png)
+        .expect("memory takes every picture");
+    out.into_inner()
 }
 
 #[cfg(test)]

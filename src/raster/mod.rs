@@ -1,12 +1,17 @@
 //! In: picture files and raw sensor bytes. Out: grey images of 8 to 16 bits, rows without padding.
 //! Frame and unit: pixels, x to the right, y down, (0, 0) is the centre of the top left pixel; grey levels.
 
+pub mod colour;
 mod file;
+mod float;
 mod image8;
+mod text;
 mod mask;
 
-pub use file::{Channel, decode, load, save_png};
+pub use file::{Channel, decode, load, png, save_png};
+pub use float::{float_tiff, read_float_tiff};
 pub use image8::{Rgb, RgbImage};
+pub use text::text_width;
 pub use mask::Mask;
 
 /// Grey levels, row-major.

@@ -299,14 +299,15 @@ impl Scene {
         !self.bodies.iter().any(|b| b.hit(from, &d).is_some_and(|(t, _)| t < length - 1e-4))
     }
 
-    /// Distance of a scene-frame point from the nearest surface, mm (see [`Body::distance`]).
+    /// Unsigned distance of a scene-frame point from the nearest surface, mm (see [`Body::distance`]).
+    /// Surfaces that lie inside another body do not count.
     pub fn distance(&self, p: &Vec3) -> f64 {
-        self.bodies.iter().map(|b| b.body.distance(&b.to_body(p))).fold(f64::INFINITY, f64::min)
+        self.bodies.iter().map(|b| b.body.distance(&b.to_body(p))).fold(f64::INFINITY, f64::min).abs()
     }
 
     /// The part that a scene-frame point is nearest to, when it is nearer than to anything else.
     pub fn part_near(&self, p: &Vec3) -> Option<usize> {
-        let key = |b: &&Placed| b.body.distance(&b.to_body(p));
+        let key = |b: &&Placed| b.body.distance(&b.to_body(p)).abs();
         self.bodies.iter().min_by(|a, b| key(a).total_cmp(&key(b))).and_then(|b| b.part)
     }
 }

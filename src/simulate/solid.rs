@@ -209,12 +209,12 @@ impl Body {
         (at.0 > SKIN && at.0 < outer.leave.0 - SKIN).then_some(at)
     }
 
-    /// Unsigned distance of a point from the body's surface: exact on faces and inside openings up
-    /// to the nearest edge, a lower bound beside the edges of cut-outs.
+    /// Signed distance of a point from the body's surface, negative inside: exact on faces and inside
+    /// openings up to the nearest edge, a lower bound beside the edges of cut-outs.
     pub fn distance(&self, p: &Vec3) -> f64 {
         let outer = self.shape.distance(p);
         let cut = |(s, place): &(Shape, Vec3)| -s.distance_with(&(p - place), place.z >= -SKIN);
-        self.cuts.iter().map(cut).fold(outer, f64::max).abs()
+        self.cuts.iter().map(cut).fold(outer, f64::max)
     }
 }
 
@@ -259,7 +259,7 @@ mod tests {
                 Body { shape: Shape::Ball { radius: 5.0 }, cuts: vec![] },
             ] {
                 if let Some((t, n)) = shape.hit(&o, &d) {
-                    prop_assert!(shape.distance(&(o + d * t)) < 1e-9, "{shape:?} {t}");
+                    prop_assert!(shape.distance(&(o + d * t)).abs() < 1e-9, "{shape:?} {t}");
                     prop_assert!(n.dot(&d) < 1e-12, "{shape:?} {n}");
                 } else {
                     let inside = (0..400).any(|i| {

@@ -144,11 +144,11 @@ impl Truth {
         let i = self.scene.part_near(&self.scene_from_base.point(in_base))?;
         Some(&self.scene.spec.part[i].name)
     }
+}
 
-    /// Errors of a cloud; points that are not finite are not counted.
-    pub fn errors(&self, points: impl Iterator<Item = [f32; 3]>) -> CloudErrors {
-        let finite = points.filter(|p| p.iter().all(|x| x.is_finite()));
-        let mut d: Vec<f64> = finite.map(|p| self.distance(&Vec3::from(p.map(f64::from)))).collect();
+impl CloudErrors {
+    /// Figures of distances from the surface, mm.
+    pub fn of(mut d: Vec<f64>) -> CloudErrors {
         if d.is_empty() {
             return CloudErrors::default();
         }
@@ -165,5 +165,37 @@ impl Truth {
             rms_without_outliers_mm: rms(&d[..near]),
             outliers_share: (d.len() - near) as f64 / d.len() as f64,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_of_known_distances() {
+        let e = CloudErrors::of(vec![0.1, 0.1, 0.1, 0.1, 3.0]);
+        assert!((e.rms_without_outliers_mm - 0.1).abs() < 1e-12 && (e.outliers_share - 0.2).abs() < 1e-12);
+        assert_eq!((e.points, e.median_mm, e.largest_mm), (5, 0.1, 3.0));
+    }
+
+    #[test]
+    fn a_written_truth_measures_the_same_surface() {
+        let station = Station::random(4);
+        let scene = Scene::new(SceneSpec::parse(crate::simulate::DEFAULT_SCENE).unwrap()).unwrap();
+        let pose = crate::simulate::base_from_scene(&station);
+        let file = TruthFile::of(&station, "scan").with_scene(&scene, pose);
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("truth.json");
+        std::fs::write(&path, serde_json::to_string(&file).unwrap()).unwrap();
+        let truth = Truth::load(&path).unwrap();
+        // Bare board, and a tenth of a millimetre above it.
+        for (z, want) in [(0.0, 0.0), (0.1, 0.1)] {
+            let p = pose.point(&Vec3::new(0.0, -30.0, z));
+            assert!((truth.distance(&p) - want).abs() < 1e-9);
+        }
+        assert_eq!(truth.file.parts.len(), scene.spec.part.len());
+        let led = &truth.file.parts[0];
+        assert_eq!(truth.part_near(&led.base_from_part.point(&Vec3::new(7.0, 7.6, -0.01))), Some("led"));
     }
 }

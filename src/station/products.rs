@@ -6,7 +6,7 @@ use super::run::HeightMapFigures;
 use crate::fault::Result;
 use crate::geometry::Vec3;
 use crate::rig::Rig;
-use crate::scan::{CloudFile, GridOptions, grid};
+use crate::scan::{CloudFile, GridOptions, grid, write_pcd};
 use std::path::Path;
 
 /// Writes everything that is derived from the cloud; `None` where there are too few points for a map.
@@ -24,7 +24,8 @@ pub fn write(
     let source = CloudFile::open(cloud)?;
     let map = grid(&source, &GridOptions { up, ..options.clone() })?;
     let (low, high) = map.quantiles(0.01, 0.99).unwrap_or((f32::NAN, f32::NAN));
-    let _ = out;
+    map.save(out)?;
+    write_pcd(&out.join("cloud.pcd"), &source, points)?;
     Ok(Some(HeightMapFigures {
         width: map.width,
         height: map.height,

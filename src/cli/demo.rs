@@ -1,0 +1,101 @@
+//! In: nothing but a folder. Out: a simulated station, its scan through the whole chain, the errors
+//! against the truth, and one page that shows all of it.
+//! Frame and unit: base frame, mm.
+
+use super::Console;
+use crate::fault::{Fault, Result};
+use crate::recording::Recording;
+use crate::rig::Rig;
+use crate::scan::{GridOptions, RecordingSource, Where};
+use crate::simulate::{SimulateOptions, simulate};
+use crate::station::{Judged, ScanOptions, ScanReport, Settings, judge};
+use std::path::PathBuf;
+
+/// Simulate a station with a board full of parts, scan it, and show how good the scan is
+///
+/// Needs no camera, robot or GPU. Leaves in --out: simulated/ (the pictures, poses and calibration that
+/// a real station would have given) and the scan: cloud, height map, overlays, errors, index.html.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Folder for everything
+    #[arg(long, default_value = "demo")]
+    out: PathBuf,
+    /// Another specimen of the station, another noise
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Shots of the pass over the board
+    #[arg(long, default_value_t = 320)]
+    shots: usize,
+    /// Sensor width, px; the height is three quarters of it
+    #[arg(long, default_value_t = 640)]
+    width: u32,
+    /// Where the stages run: auto (GPU where there is one), gpu, or cpu (the twins)
+    #[arg(long, default_value = "auto", value_parser = super::parse::<Where>)]
+    on: Where,
+}
+
+#[derive(serde::Serialize)]
+struct Demo {
+    page: PathBuf,
+    scan: ScanReport,
+    errors: Judged,
+}
+
+pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let options = SimulateOptions {
+        seed: args.seed,
+        shots: args.shots,
+        width: args.width,
+        height: args.width * 3 / 4,
+        ..SimulateOptions::default()
+    };
+    console.say(format!("simulating a station: {} shots of {}x{}", options.shots, options.width, options.height));
+    let bar = console.bar("simulating", 0);
+    let made = simulate(&args.out.join("simulated"), &options, &|n, of| {
+        bar.set_length(of as u64);
+        bar.set_position(n as u64);
+    })?;
+    bar.finish_and_clear();
+    Settings { name: "demo".into(), ..Settings::default() }.store(&made.station)?;
+    let folder = made.recordings.first().map(|(_, folder, _)| folder.clone());
+    let folder = folder.ok_or_else(|| Fault::output("nothing was simulated"))?;
+    let out = args.out.clone();
+    let (settings, rig) = (Settings::load(&made.station)?, Rig::load(&made.station)?);
+    let scan = ScanOptions {
+        out: out.clone(),
+        place: args.on,
+        extraction: settings.extraction.clone(),
+        grid: GridOptions::default(),
+        depth_mm: [settings.working_volume.near_mm, settings.working_volume.far_mm],
+        overlays: 4,
+        skip_bad: false,
+        resume: false,
+    };
+    console.say("scanning it through the whole chain");
+    let bar = console.bar("scanning", options.shots as u64);
+    let recording = Recording::open(&folder)?;
+    let open = |first| Ok(Box::new(RecordingSource::open(&recording, None, first)?) as Box<_>);
+    let report = crate::station::scan("demo", "a simulated board with parts", open, &rig, &scan, |done, _| {
+        bar.set_position(done as u64)
+    })?;
+    bar.finish_and_clear();
+    console.say("comparing every point with the truth");
+    let errors = judge(&out, &folder.join("truth.json"))?;
+    let page = out.join("index.html");
+    let e = &errors.cloud;
+    let text = format!(
+        "{} points from {} shots in {:.1} s on {}\n\
+         true distance from the surface: median {:.4} mm, rms {:.4} mm, {:.3} % beyond 1 mm\n\
+         open {}",
+        report.points,
+        report.shots,
+        report.seconds,
+        report.ran_on,
+        e.median_mm,
+        e.rms_without_outliers_mm,
+        100.0 * e.outliers_share,
+        page.display()
+    );
+    console.result(&Demo { page, scan: report, errors }, &text);
+    Ok(())
+}
