@@ -157,7 +157,7 @@ mod tests {
             .map(|row| row.iter().map(|p| if p[0] > 0 { '#' } else { '.' }).collect())
             .collect();
         assert_eq!(rows[0], "..#...............");
-        assert_eq!(rows[6], ".###...##...#.....");
+        assert_eq!(rows[6], ".###....#...#.....");
         assert_eq!(text_width("1,µ", 2), 36);
     }
 }

@@ -103,10 +103,19 @@ fn load<T: DeserializeOwned>(station: &Path, kind: &str) -> Result<Option<Calibr
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
     use std::io::Write;
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = tempfile::NamedTempFile::new_in(folder).map_err(|e| Fault::write(path, e))?;
+    let mut file = named_temporary(folder).map_err(|e| Fault::write(path, e))?;
     file.write_all(bytes).and_then(|()| file.as_file().sync_all()).map_err(|e| Fault::write(path, e))?;
     file.persist(path).map_err(|e| Fault::write(path, e.error))?;
     Ok(())
+}
+
+/// A temporary file that others may read as they may read any other result: temporary files are private
+/// by default, and stay so when they are renamed.
+pub fn named_temporary(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(folder)
 }
 
 #[cfg(test)]

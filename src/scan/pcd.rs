@@ -23,7 +23,7 @@ struct Record {
 /// Writes `path` under a temporary name and renames it when it is complete.
 pub fn write_pcd(path: &Path, source: &(impl PointSource + ?Sized), count: u64) -> Result<()> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let file = tempfile::NamedTempFile::new_in(folder).map_err(|e| Fault::write(path, e))?;
+    let file = crate::rig::named_temporary(folder).map_err(|e| Fault::write(path, e))?;
     let failed = |e: pcd_rs::Error| Fault::write(path, std::io::Error::other(e.to_string()));
     let init = WriterInit {
         width: count,
