@@ -289,3 +289,62 @@ fn the_order_of_the_samples_does_not_matter() {
         assert!(e.amax() < 1e-6, "{e}");
     }
 }
+
+/// What is wrong must be said in words: the fault's text holds `word`.
+fn refused(s: &Station, p: &[Pair], word: &str) {
+    match run(s, p, &SMatrix::zeros()) {
+        Ok(f) => panic!("accepted; the robot scatters by {:?}", f.noise),
+        Err(e) => assert!(e.to_string().contains(word), "'{word}' is not in: {e}"),
+    }
+}
+
+#[test]
+fn wrong_input_is_refused_with_its_name() {
+    for seed in 0..5 {
+        let rng = &mut Pcg64::seed_from_u64(80 + seed);
+        let s = station(rng, Mount::EyeInHand, 12);
+        let good = pairs(rng, &s, LEVELS[1], &s.camera);
+        let with_poses = |f: &dyn Fn(usize) -> Rigid<Near, Far>| -> Vec<Pair> {
+            (0..12).map(|i| Pair { near_from_far: f(i), seen: good[i].seen.clone() }).collect()
+        };
+        refused(&s, &with_poses(&|i| good[11 - i].near_from_far), "reverse order");
+        refused(&s, &with_poses(&|i| good[(i + 1) % 12].near_from_far), "1 places earlier");
+        let metres = |t: &Rigid<Near, Far>| {
+            let p = t.inverse();
+            Rigid::<Far, Near>::new(p.rotation, p.translation / 1000.0).inverse()
+        };
+        refused(&s, &with_poses(&|i| metres(&good[i].near_from_far)), "metres");
+        let inverted = |t: &Rigid<Near, Far>| Rigid::new(t.inverse().rotation, t.inverse().translation);
+        refused(&s, &with_poses(&|i| inverted(&good[i].near_from_far)), "inverted");
+        refused(&s, &with_poses(&|i| good[if i == 5 { 4 } else { i }].near_from_far), "duplicate");
+        let mut shuffled: Vec<usize> = (0..12).collect();
+        shuffled.shuffle(rng);
+        refused(&s, &with_poses(&|i| good[shuffled[i]].near_from_far), "do not belong together");
+    }
+}
+
+#[test]
+fn a_single_axis_and_a_wrong_board_are_refused() {
+    let rng = &mut Pcg64::seed_from_u64(90);
+    let mut s = station(rng, Mount::EyeInHand, 10);
+    let p = pairs(rng, &s, LEVELS[0], &s.camera);
+    // Squares 3 % smaller than stated.
+    let mut small = p.clone();
+    for pair in &mut small {
+        let t = pair.seen.camera_from_board;
+        pair.seen.camera_from_board = Rigid::new(t.rotation, t.translation * 1.03);
+    }
+    refused(&s, &small, "square");
+    let first = s.truth.expected(&s.poses[0]);
+    let axis = Vec3::new(0.3, 0.2, 0.9).normalize();
+    s.poses = (0..10)
+        .map(|i| {
+            let turn: Rigid<Camera, Camera> = Rigid::from_vectors(&(axis * (f64::from(i) * 0.1 - 0.45)), Vec3::zeros());
+            let centre = first.point(&Vec3::new(60.0, 37.5, 0.0));
+            let about: Rigid<Camera, Camera> = Rigid::new(turn.rotation, centre - turn.rotation * centre);
+            s.truth.near_from_camera * (about * first) * s.truth.far_from_board.inverse()
+        })
+        .collect();
+    let p = pairs(rng, &s, LEVELS[0], &s.camera);
+    refused(&s, &p, "one axis");
+}

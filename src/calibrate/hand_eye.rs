@@ -3,6 +3,7 @@
 //! Frame and unit: see `hand_eye_closed`; mm, rad (docs/math.md, Hand-eye (1) to (9)).
 
 use super::components::Components;
+use super::hand_eye_checks as checks;
 use super::hand_eye_closed::{Agreement, Chain, Far, Near, Pair, agree};
 use super::measured_pose::{pooled_factor, step_between};
 use crate::fault::{Fault, Result};
@@ -322,11 +323,39 @@ fn fit(
     Ok((chain, covariance, cost, noise))
 }
 
+/// d(12 unknowns)/d(camera): the boards' poses move with the camera, and the fit follows them.
+fn by_camera(
+    pairs: &[&Pair],
+    chain: &Chain,
+    covariance: &DMatrix<f64>,
+    noise: &Noise,
+    mount: Mount,
+) -> Option<SMatrix<f64, 12, 9>> {
+    let mut cross = SMatrix::<f64, 12, 9>::zeros();
+    for pair in pairs {
+        let (_, j) = jacobian(chain, pair);
+        cross += j.transpose() * step_covariance(chain, pair, noise, mount).try_inverse()? * pair.seen.by_intrinsics;
+    }
+    let c: SMatrix<f64, 12, 12> = covariance.fixed_view::<12, 12>(0, 0).into();
+    Some(c * cross)
+}
+
+/// A fit that pairs are judged by.
+struct Judge<'a> {
+    chain: &'a Chain,
+    covariance: &'a DMatrix<f64>,
+    noise: &'a Noise,
+    given: &'a Given,
+    by_camera: SMatrix<f64, 12, 9>,
+}
+
 /// Squared Mahalanobis distance of a pair from a chain that was fitted with or without it.
-fn distance2(chain: &Chain, pair: &Pair, covariance: &DMatrix<f64>, noise: &Noise, given: &Given, used: bool) -> f64 {
+fn distance2(judge: &Judge<'_>, pair: &Pair, used: bool) -> f64 {
+    let Judge { chain, covariance, noise, given, by_camera } = judge;
     let (e, j) = jacobian(chain, pair);
-    let by_camera = pair.seen.by_intrinsics * given.camera * pair.seen.by_intrinsics.transpose();
-    let own = step_covariance(chain, pair, noise, given.mount) + by_camera;
+    // What the camera's error leaves after the fit has followed it.
+    let left = j * by_camera - pair.seen.by_intrinsics;
+    let own = step_covariance(chain, pair, noise, given.mount) + left * given.camera * left.transpose();
     let fitted = {
         let c: SMatrix<f64, 12, 12> = covariance.fixed_view::<12, 12>(0, 0).into();
         j * c * j.transpose()
@@ -347,8 +376,10 @@ pub fn solve(
     o: &HandEyeOptions,
 ) -> Result<HandEyeFit> {
     o.check()?;
+    checks::before(pairs, o)?;
     let given = Given { mount, camera: *camera };
-    let agreement = start(pairs, o)?;
+    let mispaired = |_| checks::explain(pairs, "pictures and robot poses do not belong together".into(), o);
+    let agreement = start(pairs, o).map_err(mispaired)?;
     let seen: Vec<_> = pairs.iter().map(|p| p.seen.clone()).collect();
     let scatter = agreement.spread.max(1e-3);
     let mut noise = Noise {
@@ -363,9 +394,11 @@ pub fn solve(
     let mut rounds = 0;
     loop {
         let chosen: Vec<&Pair> = used.iter().map(|&i| &pairs[i]).collect();
-        (chain, covariance, cost, noise) = fit(&chosen, &chain, noise, &given, o)?;
+        (chain, covariance, cost, noise) = fit(&chosen, &chain, noise, &given, o).map_err(mispaired)?;
         rounds += 1;
-        let keeps = |i: usize| distance2(&chain, &pairs[i], &covariance, &noise, &given, used.contains(&i)) <= o.gate;
+        let by_camera = by_camera(&chosen, &chain, &covariance, &noise, mount).ok_or_else(undetermined)?;
+        let judge = Judge { chain: &chain, covariance: &covariance, noise: &noise, given: &given, by_camera };
+        let keeps = |i: usize| distance2(&judge, &pairs[i], used.contains(&i)) <= o.gate;
         let next: Vec<usize> = (0..pairs.len()).filter(|&i| keeps(i)).collect();
         if next == used || rounds == 10 || next.len() < o.min_pairs {
             break;
@@ -373,13 +406,9 @@ pub fn solve(
         used = next;
     }
     let chosen: Vec<&Pair> = used.iter().map(|&i| &pairs[i]).collect();
-    let mut cross = SMatrix::<f64, 12, 9>::zeros();
-    for pair in &chosen {
-        let (_, j) = jacobian(&chain, pair);
-        let inverse = step_covariance(&chain, pair, &noise, mount).try_inverse().ok_or_else(undetermined)?;
-        cross += j.transpose() * inverse * pair.seen.by_intrinsics;
-    }
-    let by_camera = &covariance * DMatrix::from_column_slice(12, 9, cross.as_slice());
+    let by_camera = by_camera(&chosen, &chain, &covariance, &noise, mount).ok_or_else(undetermined)?;
+    let judge = Judge { chain: &chain, covariance: &covariance, noise: &noise, given: &given, by_camera };
+    let by_camera = DMatrix::from_column_slice(12, 9, by_camera.as_slice());
     let camera = DMatrix::from_column_slice(9, 9, camera.as_slice());
     let whole = &covariance + &by_camera * camera * by_camera.transpose();
     let residuals = pairs
@@ -393,7 +422,7 @@ pub fn solve(
             PairResidual {
                 name: pair.seen.name.clone(),
                 used: used.contains(&i),
-                distance2: distance2(&chain, pair, &covariance, &noise, &given, used.contains(&i)),
+                distance2: distance2(&judge, pair, used.contains(&i)),
                 px: pair.seen.displacement_px(&inside, model),
                 mm: pair.seen.displacement(&inside),
                 holdout_px: outside.map_or(f64::INFINITY, |t| pair.seen.displacement_px(&t, model)),
@@ -402,7 +431,7 @@ pub fn solve(
         })
         .collect();
     let freedom = (used.len() * 6) as f64 - 12.0;
-    Ok(HandEyeFit {
+    let fit = HandEyeFit {
         chain,
         covariance: whole,
         covariance_camera_exact: covariance,
@@ -410,7 +439,9 @@ pub fn solve(
         pairs: residuals,
         chi2: cost / freedom.max(1.0),
         start: agreement,
-    })
+    };
+    checks::after(pairs, &fit, o)?;
+    Ok(fit)
 }
 
 /// The closed form in an order that does not depend on the recording's.
