@@ -8,6 +8,7 @@ pub mod components;
 pub mod hand_eye;
 pub mod hand_eye_checks;
 pub mod hand_eye_closed;
+pub mod hand_eye_report;
 pub mod homography;
 pub mod laser_plane;
 pub mod intrinsics;

@@ -1,6 +1,7 @@
 //! In: the command line. Out: one library call a subcommand, its result on stdout, talk on stderr.
 //! Frame and unit: as the subcommands say; every number is printed with its unit.
 
+mod calibrate;
 mod console;
 mod demo;
 mod doctor;
@@ -32,6 +33,9 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Demo(demo::Args),
+    /// Calibrate a station's camera, laser plane, pointer or hand-eye from a recording
+    #[command(subcommand)]
+    Calibrate(calibrate::Command),
     Doctor(doctor::Args),
     Scan(scan::Args),
     /// Simulate a station with known truth: recordings, poses, true calibration
@@ -44,6 +48,7 @@ enum Command {
 fn run(command: &Command, console: &Console) -> Result<()> {
     match command {
         Command::Demo(a) => demo::run(a, console),
+        Command::Calibrate(c) => calibrate::run(c, console),
         Command::Doctor(a) => doctor::run(a, console),
         Command::Scan(a) => scan::run(a, console),
         Command::Simulate(a) => simulate::run(a, console),

@@ -3,6 +3,8 @@
 
 mod judge;
 mod page;
+mod board_views;
+mod calibrate_hand_eye;
 mod products;
 mod progress;
 mod run;
@@ -10,6 +12,8 @@ mod settings;
 mod values;
 
 pub use judge::{Judged, judge};
+pub use board_views::{Boards, FrameBoard, boards};
+pub use calibrate_hand_eye::{Calibrated, HandEyeResult, HandEyeRun, calibrate_hand_eye};
 pub use run::{HeightMapFigures, ScanOptions, ScanReport, cloud_of, load_report, scan};
 pub use settings::{Settings, WorkingVolume};
 pub use values::Values;

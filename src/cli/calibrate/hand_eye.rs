@@ -1,0 +1,85 @@
+//! In: a recording of a board with robot poses. Out: the camera on the flange (or in the base).
+//! Frame and unit: flange_T_camera or base_T_camera; mm, degrees.
+
+use super::super::Console;
+use super::finish;
+use crate::calibrate::hand_eye::{HandEyeOptions, Mount};
+use crate::calibrate::limits::Limits;
+use crate::fault::Result;
+use crate::geometry::{Frame, Rigid};
+use crate::recording::Recording;
+use crate::rig::Rig;
+use crate::robot::Convention;
+use crate::station::{HandEyeResult, HandEyeRun, calibrate_hand_eye};
+use std::path::PathBuf;
+
+/// Find the camera's pose on the flange from pictures of a fixed board and the robot's poses
+///
+/// Pictures and poses are adjusted together: pixels weigh by their noise, poses by the robot's, which
+/// is estimated. Pairs that do not belong together are found and named. The result says how far a
+/// point at the working distance is to be trusted, and each pose is predicted by the others.
+#[derive(clap::Args)]
+#[command(after_help = "Example:
+  sheetlight calibrate hand-eye recordings/handeye --poses poses_noisy --station cell3")]
+pub struct Args {
+    /// Recording folder: one board that stands still, a picture and a pose per frame
+    recording: PathBuf,
+    /// Station folder with the camera's calibration
+    #[arg(long)]
+    station: PathBuf,
+    /// Pose file of the recording, without extension [default: the one meta.json names]
+    #[arg(long)]
+    poses: Option<String>,
+    /// The camera stands still and the flange carries the board
+    #[arg(long)]
+    eye_to_hand: bool,
+    /// Sigma of the robot's position per axis, mm [default: estimated]
+    #[arg(long)]
+    robot_sigma_mm: Option<f64>,
+    /// Sigma of the robot's orientation per axis, degrees [default: estimated]
+    #[arg(long)]
+    robot_sigma_deg: Option<f64>,
+    /// Distance at which the expected error is stated, mm
+    #[arg(long, default_value_t = 160.0)]
+    working_mm: f64,
+}
+
+pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let recording = Recording::open(&args.recording)?;
+    let rig = Rig::load(&args.station)?;
+    let run = HandEyeRun {
+        poses: args.poses.clone(),
+        mount: if args.eye_to_hand { Mount::EyeToHand } else { Mount::EyeInHand },
+        solver: HandEyeOptions {
+            robot_sigma_mm: args.robot_sigma_mm,
+            robot_sigma_deg: args.robot_sigma_deg,
+            ..HandEyeOptions::default()
+        },
+        limits: Limits { working_mm: [args.working_mm, args.working_mm], ..Limits::default() },
+    };
+    let bar = console.bar("boards", 0);
+    let progress = |done: usize, all: usize| {
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+    };
+    let result = calibrate_hand_eye(&recording, &rig, &run, &progress)?;
+    bar.finish_and_clear();
+    match result {
+        HandEyeResult::OnFlange(c) => {
+            let text = described("camera on the flange", &c.calibration.value);
+            finish(&args.station, &c.calibration, &c.page, &text, console)
+        }
+        HandEyeResult::InBase(c) => {
+            let text = described("camera in the base", &c.calibration.value);
+            finish(&args.station, &c.calibration, &c.page, &text, console)
+        }
+    }
+}
+
+fn described<A: Frame, B: Frame>(what: &str, pose: &Rigid<A, B>) -> String {
+    let n = Convention::Denso.write(pose);
+    format!(
+        "{what}: {:.4} {:.4} {:.4} mm, RX {:.4} RY {:.4} RZ {:.4} degrees (R = Rz·Ry·Rx)",
+        n[0], n[1], n[2], n[3], n[4], n[5]
+    )
+}

@@ -1,0 +1,57 @@
+//! In: a recording and a station. Out: one calibration, stored in the station with its report.
+//! Frame and unit: mm, rad, px; each file names its frames.
+
+mod hand_eye;
+
+use super::Console;
+use crate::calibrate::report::Page;
+use crate::fault::Result;
+use crate::rig::{Calibration, Rig, Verdict};
+use serde::Serialize;
+use std::path::Path;
+
+#[derive(clap::Subcommand)]
+pub enum Command {
+    HandEye(hand_eye::Args),
+}
+
+pub fn run(command: &Command, console: &Console) -> Result<()> {
+    match command {
+        Command::HandEye(a) => hand_eye::run(a, console),
+    }
+}
+
+/// Stores a calibration and its page beside it, and says what it came to.
+fn finish<T: Serialize>(
+    station: &Path,
+    calibration: &Calibration<T>,
+    page: &Page,
+    value: &str,
+    console: &Console,
+) -> Result<()> {
+    let path = Rig::store(station, calibration)?;
+    let html = station.join("calibration").join(format!("{}.html", calibration.kind));
+    page.save(&html)?;
+    let q = &calibration.quality;
+    let mut text = format!("{value}\nverdict: {}\n", q.verdict.words());
+    for r in &q.reasons {
+        text += &format!("  {r}\n");
+    }
+    for a in &q.advice {
+        text += &format!("  next: {a}\n");
+    }
+    let show = |text: &mut String, head: &str, keys: &[&str]| {
+        let found: Vec<String> = keys.iter().filter_map(|k| q.figures.get(*k).map(|v| format!("{k} {v:.4}"))).collect();
+        if !found.is_empty() {
+            *text += &format!("{head:13} {}\n", found.join(", "));
+        }
+    };
+    show(&mut text, "fit:", &["rms_px", "rms_mm"]);
+    show(&mut text, "verification:", &["holdout_rms_px", "holdout_rms_mm"]);
+    text += &format!("stored {}\nreport {}", path.display(), html.display());
+    console.result(calibration, &text);
+    if q.verdict == Verdict::BadlyDetermined {
+        console.warn("badly determined: see the reasons before using it");
+    }
+    Ok(())
+}

@@ -1,0 +1,85 @@
+//! In: the pictures of a recording that show boards, and a calibrated camera. Out: the boards' poses
+//! as measurements, and by name why a picture has none.
+//! Frame and unit: camera_from_board, mm.
+
+use crate::calibrate::boards::{FindOptions, find};
+use crate::calibrate::measured_pose::{MeasuredPose, measure_view};
+use crate::camera::Intrinsics;
+use crate::fault::{Fault, Result};
+use crate::recording::{BoardSpec, FrameRef, Recording};
+use rayon::prelude::*;
+
+/// The board in one frame of a recording.
+#[derive(Clone, Debug)]
+pub struct FrameBoard {
+    /// Index into the recording's frames.
+    pub frame: usize,
+    pub board: BoardSpec,
+    pub pose: MeasuredPose,
+    /// The board looks the same after a turn: only its plane is known, not its origin.
+    pub ambiguous: bool,
+}
+
+/// The frames with boards, and the pictures without, each with the reason.
+#[derive(Clone, Debug, Default)]
+pub struct Boards {
+    pub found: Vec<FrameBoard>,
+    pub missing: Vec<(String, String)>,
+}
+
+/// Finds and measures the board in every frame's ambient picture. Refused: a recording without
+/// boards or ambient pictures, another picture size than the camera's.
+pub fn boards(recording: &Recording, camera: &Intrinsics, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<Boards> {
+    let meta = &recording.meta;
+    if (meta.image.width, meta.image.height) != (camera.width, camera.height) {
+        return Err(Fault::input(format!(
+            "{}: pictures of {}x{}, the camera was calibrated at {}x{}",
+            recording.folder.display(),
+            meta.image.width,
+            meta.image.height,
+            camera.width,
+            camera.height
+        ))
+        .cause("another camera, another resolution, or a cropped picture")
+        .next("calibrate the camera at this resolution"));
+    }
+    let frames: Vec<(usize, &FrameRef, &str)> =
+        meta.frames.iter().enumerate().filter_map(|(i, f)| Some((i, f, f.ambient.as_deref()?))).collect();
+    if frames.is_empty() {
+        return Err(Fault::input(format!("{}: no frame has an 'ambient' picture", recording.folder.display()))
+            .cause("boards are found in pictures taken in room light, the laser off")
+            .next("record an ambient picture with each frame"));
+    }
+    let done = std::sync::atomic::AtomicUsize::new(0);
+    let each: Vec<(String, Result<FrameBoard>)> = frames
+        .par_iter()
+        .map(|(index, frame, name)| {
+            let one = || {
+                let board = meta.board_of(frame).ok_or_else(|| {
+                    Fault::input("meta.json describes no board for it")
+                        .next("describe the board under 'board' or 'boards'")
+                })?;
+                let view = find(&recording.picture(name)?, board, &FindOptions::default())?;
+                let pose = measure_view(name, camera, board, &view)?;
+                Ok(FrameBoard { frame: *index, board: board.clone(), pose, ambiguous: view.ambiguous })
+            };
+            let result = one();
+            progress(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1, frames.len());
+            (name.to_string(), result)
+        })
+        .collect();
+    let mut out = Boards::default();
+    for (name, result) in each {
+        match result {
+            Ok(found) => out.found.push(found),
+            Err(fault) => out.missing.push((name, fault.to_string())),
+        }
+    }
+    if out.found.is_empty() {
+        let (name, why) = &out.missing[0];
+        return Err(Fault::input(format!("no board was found in any of {} pictures; {name}: {why}", frames.len()))
+            .cause("a wrong board size in meta.json, too little contrast, or the board cut off")
+            .next("compare meta.json's board with the real one and look at the pictures"));
+    }
+    Ok(out)
+}

@@ -1,0 +1,110 @@
+//! In: a recording of a fixed board with robot poses, a station with a camera. Out: the hand-eye
+//! calibration, its report, and the files it came from.
+//! Frame and unit: flange_from_camera (eye in hand) or base_from_camera (eye to hand); mm, rad.
+
+use super::board_views::boards;
+use crate::calibrate::hand_eye::{HandEyeOptions, Mount, solve};
+use crate::calibrate::hand_eye_closed::Pair;
+use crate::calibrate::hand_eye_report::{covariance, judge, page};
+use crate::calibrate::limits::Limits;
+use crate::calibrate::measured_pose::intrinsic_covariance;
+use crate::calibrate::report::Page;
+use crate::fault::{Fault, Result};
+use crate::geometry::{Base, Camera, Flange, Rigid};
+use crate::recording::Recording;
+use crate::rig::{Calibration, HandEye, Rig, hash_text};
+
+/// How [`calibrate_hand_eye`] is run.
+#[derive(Clone, Debug)]
+pub struct HandEyeRun {
+    /// Name of the pose file in the recording; `None`: the one that meta.json names.
+    pub poses: Option<String>,
+    pub mount: Mount,
+    pub solver: HandEyeOptions,
+    pub limits: Limits,
+}
+
+/// What a calibration command leaves: the record to be stored, the page to be read.
+pub struct Calibrated<T> {
+    pub calibration: Calibration<T>,
+    pub page: Page,
+    /// Pictures that could not be used, with the reason.
+    pub missing: Vec<(String, String)>,
+}
+
+/// Where the camera sits.
+pub enum HandEyeResult {
+    OnFlange(Calibrated<HandEye>),
+    InBase(Calibrated<Rigid<Base, Camera>>),
+}
+
+/// Calibrates the hand-eye transform from a recording of one board that stands still (eye in hand)
+/// or is carried by the flange (eye to hand). `progress` is told (pictures done, pictures in all).
+pub fn calibrate_hand_eye(
+    recording: &Recording,
+    rig: &Rig,
+    run: &HandEyeRun,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<HandEyeResult> {
+    run.limits.check()?;
+    run.solver.check()?;
+    let camera = rig.need_camera()?;
+    let poses = recording.poses(run.poses.as_deref())?;
+    let seen = boards(recording, &camera.value, progress)?;
+    if let Some(b) = seen.found.iter().find(|b| b.ambiguous) {
+        return Err(Fault::refused(format!("{}: the board looks the same after half a turn", b.pose.name))
+            .cause("its corners are even by even: where its origin is cannot be told from one picture")
+            .next(
+                "use a board with an odd number of corners one way and an even number the other, or a ChArUco board",
+            ));
+    }
+    let mut pairs = Vec::new();
+    for b in &seen.found {
+        let index = recording.meta.frames[b.frame].pose.unwrap_or(b.frame);
+        let pose: &Rigid<Base, Flange> = poses.get(index).ok_or_else(|| {
+            Fault::input(format!("{}: asks for pose {index}, the pose file has {}", b.pose.name, poses.len()))
+                .cause("the pose file belongs to another recording, or ends early")
+                .next("export the poses of all pictures again")
+        })?;
+        let (r, t) = match run.mount {
+            Mount::EyeInHand => (pose.inverse().rotation, pose.inverse().translation),
+            Mount::EyeToHand => (pose.rotation, pose.translation),
+        };
+        pairs.push(Pair { near_from_far: Rigid::new(r, t), seen: b.pose.clone() });
+    }
+    let fit = solve(&pairs, run.mount, &intrinsic_covariance(&camera.covariance), &camera.value, &run.solver)?;
+    let mut quality = judge(&fit, &pairs, &run.limits);
+    quality.reasons.extend(seen.missing.iter().map(|(name, why)| format!("{name} was not used: {}", first_line(why))));
+    let x = fit.chain.near_from_camera;
+    let pose_name = run.poses.clone().or(recording.meta.pose_file.clone()).unwrap_or_default();
+    let sources = |c: &mut std::collections::BTreeMap<String, String>| -> Result<()> {
+        c.insert("meta.json".into(), crate::rig::hash_file(&recording.folder.join("meta.json"))?);
+        let rows: Vec<[f64; 16]> = poses.iter().map(|p| p.to_rows()).collect();
+        c.insert(format!("poses {pose_name}"), hash_text(serde_json::to_string(&rows).expect("numbers").as_bytes()));
+        c.insert("camera.json".into(), hash_text(serde_json::to_string(camera).expect("plain data").as_bytes()));
+        for b in &seen.found {
+            c.insert(b.pose.name.clone(), crate::rig::hash_file(&recording.folder.join(&b.pose.name))?);
+        }
+        Ok(())
+    };
+    Ok(match run.mount {
+        Mount::EyeInHand => {
+            let page = page(&fit, &pairs, &quality, "flange");
+            let value = HandEye::new(x.rotation, x.translation);
+            let mut calibration = Calibration::new("hand_eye", "flange_T_camera", value, covariance(&fit), quality);
+            sources(&mut calibration.inputs)?;
+            HandEyeResult::OnFlange(Calibrated { calibration, page, missing: seen.missing })
+        }
+        Mount::EyeToHand => {
+            let page = page(&fit, &pairs, &quality, "base");
+            let value = Rigid::<Base, Camera>::new(x.rotation, x.translation);
+            let mut calibration = Calibration::new("base_camera", "base_T_camera", value, covariance(&fit), quality);
+            sources(&mut calibration.inputs)?;
+            HandEyeResult::InBase(Calibrated { calibration, page, missing: seen.missing })
+        }
+    })
+}
+
+pub(super) fn first_line(text: &str) -> &str {
+    text.lines().next().unwrap_or("")
+}
