@@ -43,6 +43,9 @@ pub struct Grid {
 #[serde(deny_unknown_fields)]
 pub struct Shape {
     pub kind: Form,
+    /// A name by which constructions refer to it: `name`, or `name[column,row]` in a grid, from 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// rectangle, circle, arc: mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub centre: Option<[f64; 2]>,
@@ -97,6 +100,8 @@ struct Contour {
     search: bool,
     measure: bool,
     extent: f64,
+    shape: usize,
+    element: usize,
 }
 
 /// A place on an edge of the drawing.
@@ -115,6 +120,9 @@ pub struct EdgeSample {
     pub extent: f64,
     pub search: bool,
     pub measure: bool,
+    /// Index of the shape, and of the element of its grid (row by row).
+    pub shape: usize,
+    pub element: usize,
 }
 
 /// A level surface: union of the high shapes less the low ones at one height.
@@ -202,22 +210,58 @@ impl Drawing {
                     };
                     let either = c.inside == Inside::Either;
                     let (extent, search, measure) = (c.extent, c.search, c.measure && c.closed && !either);
-                    out.push(EdgeSample {
-                        x,
-                        y,
-                        nx: sign * rx,
-                        ny: sign * ry,
-                        z: c.z,
-                        either,
-                        extent,
-                        search,
-                        measure,
-                    });
+                    out.push(EdgeSample { x, y, nx: sign * rx, ny: sign * ry, z: c.z, either, extent, search, measure, shape: c.shape, element: c.element });
                 }
                 carry -= length;
             }
         }
         out
+    }
+
+    /// Nominal centre of `name` or `name[column,row]`, with the indices of its shape and element.
+    pub fn named(&self, reference: &str) -> Result<(usize, usize, [f64; 2])> {
+        let unknown = |why: String| {
+            let names: Vec<&str> = self.shape.iter().filter_map(|s| s.name.as_deref()).collect();
+            Fault::input(format!("'{reference}' names no shape: {why}"))
+                .cause("a misspelt name, or an element outside its grid")
+                .next(format!("named shapes are: {}", names.join(", ")))
+        };
+        let (name, element) = match reference.split_once('[') {
+            None => (reference, None),
+            Some((name, rest)) => {
+                let numbers: Vec<u32> =
+                    rest.trim_end_matches(']').split(',').filter_map(|n| n.trim().parse().ok()).collect();
+                let [column, row] = numbers[..] else { return Err(unknown("wanted name[column,row]".into())) };
+                (name, Some([column, row]))
+            }
+        };
+        let found = self.shape.iter().position(|s| s.name.as_deref() == Some(name));
+        let index = found.ok_or_else(|| unknown("no shape has that name".into()))?;
+        let s = &self.shape[index];
+        let count = s.grid.map_or([1, 1], |g| g.count);
+        let [column, row] = element.unwrap_or([1, 1]);
+        if element.is_none() && count != [1, 1] {
+            return Err(unknown(format!("it is a grid of {} x {}, name an element", count[0], count[1])));
+        }
+        if column < 1 || row < 1 || column > count[0] || row > count[1] {
+            return Err(unknown(format!("its grid has {} x {} elements", count[0], count[1])));
+        }
+        let element = ((row - 1) * count[0] + column - 1) as usize;
+        Ok((index, element, self.centre_of(index, element)))
+    }
+
+    /// Nominal centre of an element of a shape.
+    pub fn centre_of(&self, shape: usize, element: usize) -> [f64; 2] {
+        let s = &self.shape[shape];
+        let points = s.outline().0;
+        let n = points.len() as f64;
+        let own = s.centre.unwrap_or([
+            points.iter().map(|p| p[0]).sum::<f64>() / n,
+            points.iter().map(|p| p[1]).sum::<f64>() / n,
+        ]);
+        let Some(g) = s.grid else { return own };
+        let at = [element as u32 % g.count[0], element as u32 / g.count[0]];
+        std::array::from_fn(|k| own[k] + (f64::from(at[k]) - 0.5 * f64::from(g.count[k] - 1)) * g.pitch[k])
     }
 
     /// Smallest box around all edges: x0, y0, x1, y1.
@@ -236,7 +280,7 @@ impl Drawing {
 
     fn contours(&self) -> Vec<Contour> {
         let mut out = Vec::new();
-        for s in &self.shape {
+        for (shape, s) in self.shape.iter().enumerate() {
             let (base, closed) = s.outline();
             let g = s.grid.unwrap_or(Grid { count: [1, 1], pitch: [0.0, 0.0] });
             let extent = base
@@ -255,6 +299,8 @@ impl Drawing {
                         search: s.search,
                         measure: s.measure,
                         extent,
+                        shape,
+                        element: (iy * g.count[0] + ix) as usize,
                     });
                 }
             }

@@ -34,7 +34,7 @@ pub struct ShapeModel {
 }
 
 /// How a model is made.
-#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ModelOptions {
     /// Weakest edge of a region that enters, as a share of its 95th percentile. 0.02 to 1. Low takes

@@ -101,6 +101,8 @@ pub struct Match {
     /// Edges that the least squares used, and the robust deviation from them, px.
     pub edges: usize,
     pub edge_rms_px: f64,
+    /// Other poses in the same place with their scores, best first, at most eight.
+    pub rivals: Vec<(Pose, f64)>,
     /// What fits almost as well, in words.
     pub warning: Option<String>,
 }
@@ -384,14 +386,17 @@ fn finish(
         if out.iter().any(|(_, m)| overlap(model, &m.pose, &r.pose) > options.max_overlap) {
             continue;
         }
-        let rival = order
-            .iter()
-            .filter(|&&k| k != i && !same(&refined[k].0.pose, &r.pose, 3.0, model.radius))
-            .filter(|&&k| overlap(model, &refined[k].0.pose, &r.pose) > options.max_overlap.max(0.2))
-            .max_by(|&&a, &&b| refined[a].1.total_cmp(&refined[b].1));
-        let second_score = rival.map_or(0.0, |&k| refined[k].1);
-        let warning = rival.filter(|_| second_score > options.ambiguous_at * s).map(|&k| {
-            let o = &refined[k].0.pose;
+        let mut rivals: Vec<(Pose, f64)> = Vec::new();
+        for &k in &order {
+            let (o, score, _) = &refined[k];
+            let elsewhere = rivals.iter().map(|r| &r.0).chain([&r.pose]).all(|p| !same(p, &o.pose, 3.0, model.radius));
+            if rivals.len() < 8 && elsewhere && overlap(model, &o.pose, &r.pose) > options.max_overlap.max(0.2) {
+                rivals.push((o.pose, *score));
+            }
+        }
+        let rival = rivals.first().copied();
+        let second_score = rival.map_or(0.0, |r| r.1);
+        let warning = rival.filter(|_| second_score > options.ambiguous_at * s).map(|(o, _)| {
             format!(
                 "a pose turned by {:.1} degrees and shifted by {:.1} px scores {second_score:.3} against {s:.3}",
                 turn_between(o.angle, r.pose.angle).to_degrees(),
@@ -412,6 +417,7 @@ fn finish(
                 sigma_scale: sd(3),
                 edges: r.used,
                 edge_rms_px: r.rms_px,
+                rivals,
                 warning,
             },
         ));

@@ -1,0 +1,206 @@
+//! In: a measured pose with its covariance, the calibrations of the rig, the robot's repeatability.
+//! Out: the error budget: what each of them adds to the insertion pose, and the sum
+//! (docs/math.md, Insertion (5)). Frame and unit: the part's own axes; mm, degrees; one standard deviation.
+
+use super::measure::Measured;
+use super::points::Ordered;
+use super::recipe::RobotSpec;
+use crate::geometry::{Base, Camera, Mat3, Rigid, Vec2, Vec3};
+use crate::rig::{Covariance, Rig};
+use nalgebra::{DMatrix, Matrix6, SMatrix};
+
+/// One line of the budget.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Term {
+    pub name: &'static str,
+    /// x, y, z of the part, mm; `None` where the source does not know its uncertainty.
+    pub sigma_mm: Option<[f64; 3]>,
+    pub sigma_deg: Option<[f64; 3]>,
+    /// Where the number comes from, or why there is none.
+    pub note: String,
+}
+
+/// The budget and its sum over the terms that are known.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Budget {
+    pub terms: Vec<Term>,
+    pub sigma_mm: [f64; 3],
+    pub sigma_deg: [f64; 3],
+    /// False where a term is unknown: the sum is then a lower bound.
+    pub complete: bool,
+    #[serde(skip)]
+    pub covariance: Matrix6<f64>,
+}
+
+/// Adds up the budget. `rig` may be missing or have imported values of unknown uncertainty.
+pub fn budget(points: &Ordered, measured: &Measured, rig: Option<&Rig>, robot: &RobotSpec) -> Budget {
+    let mut covariance = measured.covariance;
+    let mut terms = vec![peak_noise(points, measured), term("match", &measured.covariance, "edges and surfaces of the part, peak noise included".into())];
+    let mut complete = true;
+    let geometry = rig.and_then(|r| Geometry::at(points, measured, r));
+    for (name, part) in [("laser plane", laser_plane(geometry.as_ref(), rig)), ("hand-eye", hand_eye(geometry.as_ref(), rig))] {
+        match part {
+            Ok((c, note)) => {
+                covariance += c;
+                terms.push(term(name, &c, note));
+            }
+            Err(note) => {
+                complete = false;
+                terms.push(Term { name, sigma_mm: None, sigma_deg: None, note });
+            }
+        }
+    }
+    let (p, r) = (robot.sigma_mm.powi(2), robot.sigma_deg.to_radians().powi(2));
+    let c = Matrix6::from_diagonal(&nalgebra::Vector6::new(p, p, p, r, r, r));
+    covariance += c;
+    terms.push(term("robot", &c, "repeatability, from the recipe".into()));
+    let [sigma_mm, sigma_deg] = sigmas(&covariance);
+    Budget { terms, sigma_mm, sigma_deg, complete, covariance }
+}
+
+fn sigmas(c: &Matrix6<f64>) -> [[f64; 3]; 2] {
+    let sd = |k: usize| c[(k, k)].max(0.0).sqrt();
+    [[sd(0), sd(1), sd(2)], [sd(3), sd(4), sd(5)].map(f64::to_degrees)]
+}
+
+fn term(name: &'static str, c: &Matrix6<f64>, note: String) -> Term {
+    let [mm, deg] = sigmas(c);
+    Term { name, sigma_mm: Some(mm), sigma_deg: Some(deg), note }
+}
+
+/// What the peaks' own sigmas alone would give; part of the match, shown beside it.
+fn peak_noise(points: &Ordered, measured: &Measured) -> Term {
+    let mut s: Vec<f32> = points.sigma.iter().copied().filter(|s| s.is_finite() && *s > 0.0).collect();
+    if s.is_empty() {
+        return Term { name: "peak noise", sigma_mm: None, sigma_deg: None, note: "the cloud holds no sigma".into() };
+    }
+    let middle = s.len() / 2;
+    let one = f64::from(*s.select_nth_unstable_by(middle, f32::total_cmp).1);
+    let (edge, surface) = (one / (measured.edges as f64).sqrt(), one / (measured.surface_points as f64).sqrt());
+    Term {
+        name: "peak noise",
+        sigma_mm: Some([edge, edge, surface]),
+        sigma_deg: None,
+        note: format!("median {one:.4} mm a point; contained in the match"),
+    }
+}
+
+/// How the camera stood when the middle of the part was scanned.
+struct Geometry {
+    base_from_camera: Rigid<Base, Camera>,
+    /// Middle of the part in the camera frame.
+    target: Vec3,
+    part_from_base: Mat3,
+}
+
+impl Geometry {
+    /// From the points of the shot through the part's middle: seen in the camera by their pixels and
+    /// the laser plane, and in the base frame by the scan.
+    fn at(points: &Ordered, measured: &Measured, rig: &Rig) -> Option<Geometry> {
+        let (camera, plane) = (rig.camera.as_ref()?.value, rig.laser_plane.as_ref()?.value);
+        let origin = measured.base_from_part.translation;
+        let nearest = (0..points.points.len())
+            .min_by(|&a, &b| (points.points[a] - origin).norm().total_cmp(&(points.points[b] - origin).norm()))?;
+        let row = points.row[nearest];
+        let (mut seen, mut known) = (vec![], vec![]);
+        for i in (0..points.points.len()).filter(|&i| points.row[i] == row) {
+            let px = points.pixel[i];
+            if let Some(p) = camera.ray_from_pixel(&Vec2::new(f64::from(px[0]), f64::from(px[1]))).and_then(|r| r.meet(&plane)) {
+                seen.push(p);
+                known.push(points.points[i]);
+            }
+        }
+        let base_from_camera = align(&seen, &known)?;
+        Some(Geometry {
+            target: base_from_camera.inverse().point(&origin),
+            base_from_camera,
+            part_from_base: measured.base_from_part.rotation.transpose(),
+        })
+    }
+    /// Rotates a covariance given over (translation, rotation) in base axes into part axes.
+    fn in_part(&self, c: &Matrix6<f64>) -> Matrix6<f64> {
+        let mut r = Matrix6::zeros();
+        r.fixed_view_mut::<3, 3>(0, 0).copy_from(&self.part_from_base);
+        r.fixed_view_mut::<3, 3>(3, 3).copy_from(&self.part_from_base);
+        r * c * r.transpose()
+    }
+}
+
+/// The rotation and translation that bring `from` to `to`; `None` where they do not determine it.
+fn align(from: &[Vec3], to: &[Vec3]) -> Option<Rigid<Base, Camera>> {
+    if from.len() < 10 {
+        return None;
+    }
+    let mean = |v: &[Vec3]| v.iter().sum::<Vec3>() / v.len() as f64;
+    let (a, b) = (mean(from), mean(to));
+    let m = from.iter().zip(to).map(|(p, q)| (q - b) * (p - a).transpose()).sum::<Mat3>();
+    let s = m.singular_values();
+    // Points on one line leave a turn about it open.
+    if s[1] < 1e-6 * s[0] {
+        return None;
+    }
+    // Points of one shot lie in a plane: the third axis follows from the other two.
+    let svd = m.svd(true, true);
+    let (u, vt) = (svd.u?, svd.v_t?);
+    let d = (u * vt).determinant().signum();
+    let rotation = u * Mat3::from_diagonal(&Vec3::new(1.0, 1.0, d)) * vt;
+    let t = Rigid::new(rotation, b - rotation * a);
+    let rms = (from.iter().zip(to).map(|(p, q)| (t.point(p) - q).norm_squared()).sum::<f64>() / from.len() as f64).sqrt();
+    // The cloud was made with these very values; more than float rounding means another calibration.
+    (rms < 0.2).then_some(t)
+}
+
+type Part = std::result::Result<(Matrix6<f64>, String), String>;
+
+const NO_GEOMETRY: &str = "unknown: the scan does not fit the station's calibration, or none was given";
+
+fn laser_plane(geometry: Option<&Geometry>, rig: Option<&Rig>) -> Part {
+    let (Some(g), Some(plane)) = (geometry, rig.and_then(|r| r.laser_plane.as_ref())) else {
+        return Err(NO_GEOMETRY.into());
+    };
+    let c = square(&plane.covariance, 4).ok_or("unknown: the calibration has no covariance (imported values)")?;
+    let n = plane.value.normal;
+    let ray = g.target.normalize();
+    let slope = n.dot(&ray);
+    // P = ray * offset / (n . ray): dP = ray * (d offset - P . dn) / (n . ray).
+    let mut j = SMatrix::<f64, 6, 4>::zeros();
+    let direction = g.base_from_camera.direction(&ray) / slope;
+    for k in 0..3 {
+        let column = direction * -g.target[k];
+        j.fixed_view_mut::<3, 1>(0, k).copy_from(&column);
+    }
+    j.fixed_view_mut::<3, 1>(0, 3).copy_from(&direction);
+    // A tilt of the plane by dn tilts what is scanned by up to |dn| / |slope| about n x dn.
+    for k in 0..3 {
+        let mut e = Vec3::zeros();
+        e[k] = 1.0;
+        let turn = g.base_from_camera.direction(&n.cross(&e));
+        j.fixed_view_mut::<3, 1>(3, k).copy_from(&turn);
+    }
+    let c4 = SMatrix::<f64, 4, 4>::from_fn(|i, k| c[(i, k)]);
+    let shift = (j * c4 * j.transpose()).fixed_view::<3, 3>(0, 0).trace().max(0.0).sqrt();
+    Ok((g.in_part(&(j * c4 * j.transpose())), format!("{shift:.4} mm at {:.0} mm from the camera", g.target.norm())))
+}
+
+fn hand_eye(geometry: Option<&Geometry>, rig: Option<&Rig>) -> Part {
+    let (Some(g), Some(hand_eye)) = (geometry, rig.and_then(|r| r.hand_eye.as_ref())) else {
+        return Err(NO_GEOMETRY.into());
+    };
+    let c = square(&hand_eye.covariance, 6).ok_or("unknown: the calibration has no covariance (imported values)")?;
+    // R = exp(w) R0, so a camera point moves by dt + w x (R0 p) in the flange frame.
+    let x = hand_eye.value;
+    let base_from_flange = g.base_from_camera.rotation * x.rotation.transpose();
+    let lever = crate::geometry::skew(&(x.rotation * g.target));
+    let mut j = Matrix6::zeros();
+    j.fixed_view_mut::<3, 3>(0, 0).copy_from(&base_from_flange);
+    j.fixed_view_mut::<3, 3>(0, 3).copy_from(&(base_from_flange * -lever));
+    j.fixed_view_mut::<3, 3>(3, 3).copy_from(&base_from_flange);
+    let c6 = Matrix6::from_fn(|i, k| c[(i, k)]);
+    let moved = j * c6 * j.transpose();
+    let shift = moved.fixed_view::<3, 3>(0, 0).trace().max(0.0).sqrt();
+    Ok((g.in_part(&moved), format!("{shift:.4} mm at {:.0} mm from the camera", g.target.norm())))
+}
+
+fn square(c: &Covariance, n: usize) -> Option<DMatrix<f64>> {
+    (c.matrix.len() == n && c.matrix.iter().all(|r| r.len() == n)).then(|| c.to_matrix())
+}

@@ -1,0 +1,330 @@
+//! In: a scan's points, a recipe, optionally the rig's calibrations. Out: where the tool goes, how sure
+//! that is and why, or a refusal: no pose leaves with a failed gate.
+//! Frame and unit: base frame; mm, degrees; sigmas along the part's own axes.
+
+use super::budget::{Budget, budget};
+use super::construct::{Built, build, features};
+use super::measure::{Measured, localise, measure};
+use super::model::ShapeModel;
+use super::points::Ordered;
+use super::recipe::{Gates, Recipe};
+use super::refine::Pose;
+use super::scene::{Kind, Layer, Scene};
+use super::search::{Match, find};
+use super::verdict::{Agreement, TurnVote, judge, vote};
+use crate::fault::{Fault, Result};
+use crate::geometry::{Base, Grid, Part, Rigid, Tool, Vec3};
+use crate::rig::Rig;
+use crate::robot::Convention;
+use crate::scan::{CloudPoint, GridOptions, HeightMap, grid};
+
+/// What else is known about a scan.
+#[derive(Clone, Debug)]
+pub struct LocateOptions {
+    /// Direction towards the camera in the base frame, unit length not needed. Default z.
+    pub up: Vec3,
+    /// Notation of the poses for the robot. Default the 4x4 matrix.
+    pub robot: Convention,
+}
+
+impl Default for LocateOptions {
+    fn default() -> Self {
+        LocateOptions { up: Vec3::z(), robot: Convention::Matrix }
+    }
+}
+
+/// One gate: what was seen against the limit.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Gate {
+    pub name: &'static str,
+    pub value: f64,
+    pub limit: f64,
+    pub passed: bool,
+}
+
+/// A pose for the robot.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct RobotPose {
+    pub base_from_tool: Rigid<Base, Tool>,
+    pub convention: &'static str,
+    pub labels: &'static [&'static str],
+    pub numbers: Vec<f64>,
+}
+
+/// The poses of one insertion.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Poses {
+    pub insertion: RobotPose,
+    pub approach: RobotPose,
+    pub retract: RobotPose,
+}
+
+/// Everything that was found out. `poses` is there only where every gate was passed.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Report {
+    pub recipe: String,
+    pub passed: bool,
+    /// Which gates failed, in words; empty when passed.
+    pub reasons: Vec<String>,
+    pub poses: Option<Poses>,
+    /// 3 sigma in the plane and of the turn within the recipe's tolerance.
+    pub within_tolerance: bool,
+    pub tolerance_mm: f64,
+    pub tolerance_deg: f64,
+    pub sigma_mm: [f64; 3],
+    pub sigma_deg: [f64; 3],
+    pub budget: Budget,
+    pub gates: Vec<Gate>,
+    pub base_from_part: Rigid<Base, Part>,
+    pub found: Match,
+    pub agreement: Agreement,
+    pub turns: Vec<TurnVote>,
+    pub constructions: Vec<Built>,
+    /// Distance between the two-pin construction and the lattice fit, mm.
+    pub disagreement_mm: Option<f64>,
+    pub edges: usize,
+    pub edge_rms_mm: f64,
+    pub surface_points: usize,
+    pub surface_rms_mm: f64,
+    pub growth_mm: [f64; 2],
+    pub notes: Vec<String>,
+    #[serde(skip)]
+    pub map: HeightMap,
+}
+
+/// Finds the part of a recipe in a cloud. A part that is not there, or that is seen too badly to be
+/// measured, is a `Fault`; one that was measured but misses a gate is a report without poses.
+pub fn locate(cloud: &[CloudPoint], recipe: &Recipe, rig: Option<&Rig>, options: &LocateOptions) -> Result<Report> {
+    recipe.check()?;
+    let drawing = recipe.drawing();
+    let points = Ordered::new(cloud)?;
+    let map = grid(cloud, &GridOptions { cell: Some(recipe.cell_mm), up: options.up, ..GridOptions::default() })?;
+    let scene = scene_of(&map, &recipe.layers)?;
+    let model = model_of(recipe, &scene)?;
+    let mut search = recipe.search;
+    search.max_matches = search.max_matches.max(3);
+    search.min_score = search.min_score.min(recipe.gates.min_score);
+    let matches = find(&scene, &model, &search)?;
+    let Some(best) = matches.first().cloned() else {
+        return Err(Fault::refused(format!(
+            "'{}' was not found: nothing scores {:.2} or more",
+            recipe.name, search.min_score
+        ))
+        .cause("the part is not there, is another one, is hidden, or lies outside the scan")
+        .next("look at the height map of the scan; scan the part again, or teach it anew"));
+    };
+    let mut notes = Vec::new();
+    if matches.len() > 1 {
+        notes.push(format!(
+            "{} places look like the part, scores {}; the best was taken",
+            matches.len(),
+            matches.iter().map(|m| format!("{:.3}", m.score)).collect::<Vec<_>>().join(" ")
+        ));
+    }
+    let start = lift(&best.pose, &map, &points, recipe);
+    let gate = recipe.measure.height_gate_mm;
+    let mut measured = measure(&points, &drawing, start, &recipe.measure)?;
+    let mut turns = vote(&points, &drawing, &measured.base_from_part, recipe.alike_turns, gate);
+    if let Some(t) = turns.iter().find(|t| t.told() == Some(false)) {
+        notes.push(format!(
+            "turned by {:.0} degrees: {} of {} points where the turns differ say so",
+            t.rival_deg,
+            t.votes_against,
+            t.votes_for + t.votes_against
+        ));
+        let back: Rigid<Part, Part> = Rigid::from_vectors(&Vec3::new(0.0, 0.0, t.rival_deg.to_radians()), Vec3::zeros());
+        measured = measure(&points, &drawing, measured.base_from_part * back, &recipe.measure)?;
+        turns = vote(&points, &drawing, &measured.base_from_part, recipe.alike_turns, gate);
+    }
+    let agreement = judge(&points, &drawing, &measured, gate);
+    let seen = features(&measured.observations, measured.growth);
+    let mut constructions = Vec::new();
+    for c in &recipe.construction {
+        // One construction that cannot be built does not hinder the others, unless it is the one used.
+        let earlier: Vec<_> = recipe.construction.iter().take_while(|o| o.name != c.name).cloned().collect();
+        let usable: Vec<_> = earlier.into_iter().filter(|e| constructions.iter().any(|b: &Built| b.name == e.name)).collect();
+        match build(&[usable, vec![c.clone()]].concat(), &drawing, &seen) {
+            Ok(mut all) => constructions.push(all.pop().expect("one was asked for")),
+            Err(e) if recipe.insertion.construction == c.name => return Err(e),
+            Err(e) => notes.push(e.what),
+        }
+    }
+    Ok(conclude(recipe, rig, options, &points, map, best, measured, agreement, turns, constructions, notes))
+}
+
+/// The layers of a height map that a recipe wants.
+pub fn scene_of(map: &HeightMap, layers: &[Kind]) -> Result<Scene> {
+    let (w, h) = (map.width as usize, map.height as usize);
+    let layers = layers
+        .iter()
+        .map(|kind| Layer::new(*kind, w, h, if *kind == Kind::Height { map.z.clone() } else { map.intensity.clone() }))
+        .collect::<Result<Vec<_>>>()?;
+    Scene::new(layers, Some(map.cell))
+}
+
+fn model_of(recipe: &Recipe, scene: &Scene) -> Result<ShapeModel> {
+    let mm = scene.mm_per_px.unwrap_or(recipe.cell_mm);
+    let mut models = recipe
+        .layers
+        .iter()
+        .map(|kind| ShapeModel::from_drawing(&recipe.drawing(), mm, *kind, &recipe.model))
+        .collect::<Result<Vec<_>>>()?;
+    let mut model = models.remove(0);
+    for other in models {
+        for (mine, theirs) in model.levels.iter_mut().zip(other.levels) {
+            mine.extend(theirs);
+        }
+    }
+    Ok(model)
+}
+
+/// A match in the map as a pose in the base frame: its height is the most frequent one of the points on
+/// the drawing's first face.
+fn lift(pose: &Pose, map: &HeightMap, points: &Ordered, recipe: &Recipe) -> Rigid<Base, Part> {
+    const BIN: f64 = 0.1;
+    let flat: Rigid<Grid, Part> = Rigid::from_vectors(
+        &Vec3::new(0.0, 0.0, pose.angle),
+        Vec3::new((pose.x + 0.5) * map.cell, (pose.y + 0.5) * map.cell, 0.0),
+    );
+    let base_from_part = map.base_from_grid * flat;
+    let drawing = recipe.drawing();
+    let faces = drawing.faces();
+    let face = &faces[0];
+    let mut bins = std::collections::BTreeMap::<i64, usize>::new();
+    for q in localise(points, &drawing, &base_from_part).iter().flatten() {
+        if face.material(q.x, q.y) {
+            *bins.entry(((q.z - face.z) / BIN).floor() as i64).or_default() += 1;
+        }
+    }
+    // Three neighbouring bins, so that a tilted face is not split.
+    let weight = |k: i64| (k - 1..=k + 1).filter_map(|b| bins.get(&b)).sum::<usize>();
+    let best = bins.keys().copied().max_by_key(|&k| weight(k)).unwrap_or(0);
+    base_from_part * Rigid::from_vectors(&Vec3::zeros(), Vec3::new(0.0, 0.0, (best as f64 + 0.5) * BIN))
+}
+
+#[allow(clippy::too_many_arguments)]
+fn conclude(
+    recipe: &Recipe,
+    rig: Option<&Rig>,
+    options: &LocateOptions,
+    points: &Ordered,
+    map: HeightMap,
+    found: Match,
+    measured: Measured,
+    agreement: Agreement,
+    turns: Vec<TurnVote>,
+    constructions: Vec<Built>,
+    notes: Vec<String>,
+) -> Report {
+    let spec = &recipe.insertion;
+    let budget = budget(points, &measured, rig, &recipe.robot);
+    let named = |name: &Option<String>| constructions.iter().find(|b| Some(&b.name) == name.as_ref());
+    let disagreement_mm = named(&spec.two_pin).zip(named(&spec.lattice)).map(|(a, b)| {
+        (a.deviation_mm[0] - b.deviation_mm[0]).hypot(a.deviation_mm[1] - b.deviation_mm[1])
+    });
+    let gates = gates(&recipe.gates, &found, recipe, &budget, &agreement, &turns, disagreement_mm);
+    let reasons: Vec<String> = gates
+        .iter()
+        .filter(|g| !g.passed)
+        .map(|g| format!("{} is {:.3}, limit {:.3}", g.name, g.value, g.limit))
+        .collect();
+    // The construction's deviation moves the part pose in its plane.
+    let moved = constructions.iter().find(|b| b.name == spec.construction).map_or_else(Rigid::identity, |b| {
+        let turn = b.deviation_deg.unwrap_or(0.0).to_radians();
+        let (s, c) = turn.sin_cos();
+        let (x, y) = (b.nominal.x, b.nominal.y);
+        Rigid::<Part, Part>::from_vectors(
+            &Vec3::new(0.0, 0.0, turn),
+            Vec3::new(b.measured.x - (c * x - s * y), b.measured.y - (s * x + c * y), 0.0),
+        )
+    });
+    let part_from_tool: Rigid<Part, Tool> =
+        Rigid::from_vectors(&Vec3::new(0.0, 0.0, spec.turn_deg.to_radians()), Vec3::from(spec.offset_mm));
+    let base_from_tool = measured.base_from_part * moved * part_from_tool;
+    let above = |mm: f64| base_from_tool * Rigid::<Tool, Tool>::from_vectors(&Vec3::zeros(), Vec3::new(0.0, 0.0, mm));
+    let write = |pose: Rigid<Base, Tool>| RobotPose {
+        base_from_tool: pose,
+        convention: options.robot.name(),
+        labels: options.robot.labels(),
+        numbers: options.robot.write(&pose),
+    };
+    let passed = reasons.is_empty();
+    let plane_sigma = budget.sigma_mm[0].max(budget.sigma_mm[1]);
+    let turn_sigma = budget.sigma_deg.iter().copied().fold(0.0, f64::max);
+    Report {
+        recipe: recipe.name.clone(),
+        passed,
+        reasons,
+        poses: passed.then(|| Poses {
+            insertion: write(base_from_tool),
+            approach: write(above(spec.approach_mm)),
+            retract: write(above(spec.retract_mm)),
+        }),
+        within_tolerance: 3.0 * plane_sigma <= spec.tolerance_mm && 3.0 * turn_sigma <= spec.tolerance_deg,
+        tolerance_mm: spec.tolerance_mm,
+        tolerance_deg: spec.tolerance_deg,
+        sigma_mm: budget.sigma_mm,
+        sigma_deg: budget.sigma_deg,
+        budget,
+        gates,
+        base_from_part: measured.base_from_part,
+        found,
+        agreement,
+        turns,
+        constructions,
+        disagreement_mm,
+        edges: measured.edges,
+        edge_rms_mm: measured.edge_rms,
+        surface_points: measured.surface_points,
+        surface_rms_mm: measured.surface_rms,
+        growth_mm: measured.growth,
+        notes,
+        map,
+    }
+}
+
+fn gates(
+    g: &Gates,
+    found: &Match,
+    recipe: &Recipe,
+    budget: &Budget,
+    agreement: &Agreement,
+    turns: &[TurnVote],
+    disagreement: Option<f64>,
+) -> Vec<Gate> {
+    let least = |name, value, limit| Gate { name, value, limit, passed: value >= limit };
+    let most = |name, value: f64, limit| Gate { name, value, limit, passed: value <= limit };
+    let margin = 1.0 - rival_score(found, recipe) / found.score.max(1e-9);
+    let mut out = vec![
+        least("score", found.score, g.min_score),
+        least("margin", margin, g.min_margin),
+        least("coverage", agreement.coverage, g.min_coverage),
+        least("agreement", agreement.agreement, g.min_agreement),
+        least("edges seen", agreement.edges, g.min_edges),
+        most("sigma_mm", budget.sigma_mm.iter().copied().fold(0.0, f64::max), g.max_sigma_mm),
+        most("sigma_deg", budget.sigma_deg.iter().copied().fold(0.0, f64::max), g.max_sigma_deg),
+    ];
+    if let Some(d) = disagreement {
+        out.push(most("disagreement_mm", d, g.max_disagreement_mm));
+    }
+    if g.turn_must_be_told {
+        for t in turns {
+            let share = t.votes_for as f64 / (t.votes_for + t.votes_against).max(1) as f64;
+            out.push(Gate { name: "turn told", value: share, limit: 0.8, passed: t.told() == Some(true) });
+        }
+    }
+    out
+}
+
+/// The best rival that is not one of the part's alike turns: those are told apart by the points.
+fn rival_score(found: &Match, recipe: &Recipe) -> f64 {
+    let alike = |pose: &Pose| {
+        (1..recipe.alike_turns).any(|k| {
+            let turn = std::f64::consts::TAU * f64::from(k) / f64::from(recipe.alike_turns);
+            let d = super::coarse::turn_between(pose.angle - found.pose.angle, turn);
+            let shift = (pose.x - found.pose.x).hypot(pose.y - found.pose.y) * recipe.cell_mm;
+            d < 3f64.to_radians() && shift < 1.0
+        })
+    };
+    found.rivals.iter().filter(|r| !alike(&r.0)).map(|r| r.1).fold(0.0, f64::max)
+}
