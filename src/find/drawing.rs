@@ -74,9 +74,13 @@ pub struct Shape {
     /// Used by the search for the part. Default true.
     #[serde(default = "yes")]
     pub search: bool,
-    /// Used when the pose is measured on the points. Default true.
+    /// Its edges are measured on the points. Default true.
     #[serde(default = "yes")]
     pub measure: bool,
+    /// Its edges locate the part. False for what is measured by itself only, such as contacts whose
+    /// springs and lips blur their edges. Default true.
+    #[serde(default = "yes")]
+    pub locates: bool,
 }
 
 fn yes() -> bool {
@@ -99,6 +103,7 @@ struct Contour {
     z: f64,
     search: bool,
     measure: bool,
+    locates: bool,
     extent: f64,
     shape: usize,
     element: usize,
@@ -120,6 +125,7 @@ pub struct EdgeSample {
     pub extent: f64,
     pub search: bool,
     pub measure: bool,
+    pub locates: bool,
     /// Index of the shape, and of the element of its grid (row by row).
     pub shape: usize,
     pub element: usize,
@@ -210,7 +216,7 @@ impl Drawing {
                     };
                     let either = c.inside == Inside::Either;
                     let (extent, search, measure) = (c.extent, c.search, c.measure && c.closed && !either);
-                    out.push(EdgeSample { x, y, nx: sign * rx, ny: sign * ry, z: c.z, either, extent, search, measure, shape: c.shape, element: c.element });
+                    out.push(EdgeSample { x, y, nx: sign * rx, ny: sign * ry, z: c.z, either, extent, search, measure, shape: c.shape, element: c.element, locates: c.locates });
                 }
                 carry -= length;
             }
@@ -298,6 +304,7 @@ impl Drawing {
                         z: s.z_mm,
                         search: s.search,
                         measure: s.measure,
+                        locates: s.locates,
                         extent,
                         shape,
                         element: (iy * g.count[0] + ix) as usize,

@@ -58,6 +58,8 @@ pub struct Observation {
     pub row: u32,
     pub shape: usize,
     pub element: usize,
+    /// Took part in locating the part.
+    pub locates: bool,
     pub weight: f64,
 }
 
@@ -254,7 +256,8 @@ fn surface_ends(
     options: &MeasureOptions,
     gate: f64,
 ) -> (Vec<Observation>, [f64; 2]) {
-    let mut found: Vec<(Observation, f64)> = Vec::new();
+    let mut found: Vec<(Observation, f64, usize)> = Vec::new();
+    let mut last_steps: [Vec<f64>; 4] = Default::default();
     let mut steps: [Vec<f64>; 2] = [vec![], vec![]];
     let stride = shot_stride(points);
     for (i, q) in local.iter().enumerate() {
@@ -264,7 +267,7 @@ fn surface_ends(
                 continue;
             }
             let (row, column) = (i64::from(points.row[i]), i64::from(points.column[i]));
-            for (axis, dr, dc) in [(0, 0, 1), (0, 0, -1), (1, 1, 0), (1, -1, 0)] {
+            for (side, (axis, dr, dc)) in [(0, 0, 1), (0, 0, -1), (1, 1, 0), (1, -1, 0)].into_iter().enumerate() {
                 let (next, before) = ((row + dr, column + dc), (row - dr, column - dc));
                 if !points.covers(next.0, next.1) || !consecutive(points, row, dr, stride) {
                     continue;
@@ -300,28 +303,39 @@ fn surface_ends(
                     row: points.row[i],
                     shape: 0,
                     element: 0,
+                    locates: true,
                     weight: 1.0,
                 };
-                found.push((template, face.z));
+                last_steps[side].push(length);
+                found.push((template, face.z, side));
             }
         }
     }
-    let step = steps.map(|mut s| {
+    let median = |mut s: Vec<f64>| {
         if s.is_empty() {
             return 0.0;
         }
         let middle = s.len() / 2;
         *s.select_nth_unstable_by(middle, f64::total_cmp).1
-    });
+    };
+    let step = steps.map(median);
+    // The last sample is lit in part, so its place lies back from the sheet's: by less on the side where
+    // a wall below the edge still shows, by more on the side of the shadow. The usual last step of a
+    // side is therefore the ruler for that side, not the step between full samples.
+    let rulers = last_steps.map(median);
     let observations = found
         .into_iter()
-        .filter_map(|(o, z)| {
-            // Neighbours jump where the last sample shows a wall; the common step is the better ruler.
-            let reach = step[o.axis] * (0.5 + o.residual);
+        .filter_map(|(o, z, side)| {
+            let reach = rulers[side] * (0.5 + o.residual);
             let (x, y) = (o.x + o.nx * reach, o.y + o.ny * reach);
-            let s = edges.nearest(x, y, gate, |s| s.z == z && s.nx * o.nx + s.ny * o.ny > 0.85)?;
+            // The nearest edge of any direction: at a corner or beside a hole none is taken for another.
+            let s = edges.nearest(x, y, gate, |s| s.z == z)?;
+            if s.nx * o.nx + s.ny * o.ny < 0.85 {
+                return None;
+            }
             let residual = (x - s.x) * s.nx + (y - s.y) * s.ny;
-            Some(Observation { x, y, residual, nx: s.nx, ny: s.ny, shape: s.shape, element: s.element, ..o })
+            let (shape, element, locates) = (s.shape, s.element, s.locates);
+            Some(Observation { x, y, residual, nx: s.nx, ny: s.ny, shape, element, locates, ..o })
         })
         .collect();
     (observations, step)
@@ -355,11 +369,12 @@ struct InPlane {
 }
 
 fn fit_edges(mut observations: Vec<Observation>, step: &[f64; 2], options: &MeasureOptions) -> Result<InPlane> {
-    let axes = [0, 1].map(|a| observations.iter().filter(|o| o.axis == a).count());
-    if observations.len() < MIN_EDGES {
+    let axes = [0, 1].map(|a| observations.iter().filter(|o| o.locates && o.axis == a).count());
+    let locating = axes[0] + axes[1];
+    if locating < MIN_EDGES {
         return Err(Fault::refused(format!(
             "{} ends of surfaces lie at the drawn edges ({} along the stripe, {} from shot to shot), at least {MIN_EDGES} are needed",
-            observations.len(),
+            locating,
             axes[0],
             axes[1]
         ))
@@ -368,6 +383,7 @@ fn fit_edges(mut observations: Vec<Observation>, step: &[f64; 2], options: &Meas
     }
     let rows: Vec<(SVector<f64, 5>, f64, u32)> = observations
         .iter()
+        .filter(|o| o.locates)
         .map(|o| {
             let mut j = SVector::<f64, 5>::zeros();
             j[0] = o.nx;
@@ -382,7 +398,7 @@ fn fit_edges(mut observations: Vec<Observation>, step: &[f64; 2], options: &Meas
             .cause("only edges of one direction are seen")
             .next("scan more of the part")
     })?;
-    for (o, w) in observations.iter_mut().zip(&fit.weights) {
+    for (o, w) in observations.iter_mut().filter(|o| o.locates).zip(&fit.weights) {
         o.weight = *w;
     }
     let mut covariance: Matrix3<f64> = fit.covariance.fixed_view::<3, 3>(0, 0).into();
@@ -390,7 +406,8 @@ fn fit_edges(mut observations: Vec<Observation>, step: &[f64; 2], options: &Meas
     let bias = options.edge_bias * step[0].max(step[1]);
     covariance[(0, 0)] += bias * bias;
     covariance[(1, 1)] += bias * bias;
-    let span = observations.iter().map(|o| o.x * o.x + o.y * o.y).sum::<f64>() / observations.len() as f64;
+    let far = observations.iter().filter(|o| o.locates).map(|o| o.x * o.x + o.y * o.y);
+    let span = far.sum::<f64>() / locating as f64;
     covariance[(2, 2)] += bias * bias / span.max(1.0);
     Ok(InPlane {
         step: fit.step.fixed_rows::<3>(0).into(),
