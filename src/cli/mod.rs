@@ -5,6 +5,7 @@ mod calibrate;
 mod console;
 mod demo;
 mod doctor;
+mod find;
 mod scan;
 mod simulate;
 mod station;
@@ -37,6 +38,7 @@ enum Command {
     #[command(subcommand)]
     Calibrate(calibrate::Command),
     Doctor(doctor::Args),
+    Find(find::Args),
     Scan(scan::Args),
     /// Simulate a station with known truth: recordings, poses, true calibration
     Simulate(simulate::Args),
@@ -50,6 +52,7 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Demo(a) => demo::run(a, console),
         Command::Calibrate(c) => calibrate::run(c, console),
         Command::Doctor(a) => doctor::run(a, console),
+        Command::Find(a) => find::run(a, console),
         Command::Scan(a) => scan::run(a, console),
         Command::Simulate(a) => simulate::run(a, console),
         Command::Station(c) => station::run(c, console),

@@ -97,20 +97,10 @@ impl Geometry {
     /// From the points of the shot through the part's middle: seen in the camera by their pixels and
     /// the laser plane, and in the base frame by the scan.
     fn at(points: &Ordered, measured: &Measured, rig: &Rig) -> Option<Geometry> {
-        let (camera, plane) = (rig.camera.as_ref()?.value, rig.laser_plane.as_ref()?.value);
         let origin = measured.base_from_part.translation;
         let nearest = (0..points.points.len())
             .min_by(|&a, &b| (points.points[a] - origin).norm().total_cmp(&(points.points[b] - origin).norm()))?;
-        let row = points.row[nearest];
-        let (mut seen, mut known) = (vec![], vec![]);
-        for i in (0..points.points.len()).filter(|&i| points.row[i] == row) {
-            let px = points.pixel[i];
-            if let Some(p) = camera.ray_from_pixel(&Vec2::new(f64::from(px[0]), f64::from(px[1]))).and_then(|r| r.meet(&plane)) {
-                seen.push(p);
-                known.push(points.points[i]);
-            }
-        }
-        let base_from_camera = align(&seen, &known)?;
+        let base_from_camera = camera_at(points, points.row[nearest], rig)?;
         Some(Geometry {
             target: base_from_camera.inverse().point(&origin),
             base_from_camera,
@@ -124,6 +114,26 @@ impl Geometry {
         r.fixed_view_mut::<3, 3>(3, 3).copy_from(&self.part_from_base);
         r * c * r.transpose()
     }
+}
+
+/// Where the camera stood for one row of points.
+fn camera_at(points: &Ordered, row: u32, rig: &Rig) -> Option<Rigid<Base, Camera>> {
+    let (camera, plane) = (rig.camera.as_ref()?.value, rig.laser_plane.as_ref()?.value);
+    let (mut seen, mut known) = (vec![], vec![]);
+    for i in (0..points.points.len()).filter(|&i| points.row[i] == row) {
+        let px = Vec2::new(f64::from(points.pixel[i][0]), f64::from(points.pixel[i][1]));
+        if let Some(p) = camera.ray_from_pixel(&px).and_then(|r| r.meet(&plane)) {
+            seen.push(p);
+            known.push(points.points[i]);
+        }
+    }
+    align(&seen, &known)
+}
+
+/// Direction towards the camera during the scan, base frame; `None` where the rig does not fit the scan.
+pub fn towards_camera(points: &Ordered, rig: &Rig) -> Option<Vec3> {
+    let middle = points.row[points.row.len() / 2];
+    camera_at(points, middle, rig).map(|c| -c.direction(&Vec3::z()))
 }
 
 /// The rotation and translation that bring `from` to `to`; `None` where they do not determine it.

@@ -74,7 +74,7 @@ pub struct Feature {
 }
 
 /// A shape needs so many edges in each of two directions to be measured by itself.
-const MIN_EDGES: usize = 3;
+const MIN_EDGES: usize = 2;
 
 /// Measures every element of every named closed shape that is seen well enough, by least squares on its
 /// own edges with the surface growth that the whole part showed.
@@ -97,7 +97,7 @@ pub fn features(observations: &[Observation], growth: [f64; 2]) -> BTreeMap<(usi
         }
         // Edges of one side only leave the offset across them open.
         let eigen = a.symmetric_eigenvalues();
-        if eigen.min() < 0.15 * eigen.max() {
+        if eigen.min() < 0.1 * eigen.max() {
             continue;
         }
         let Some(inverse) = a.try_inverse() else { continue };

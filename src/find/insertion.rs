@@ -2,7 +2,7 @@
 //! that is and why, or a refusal: no pose leaves with a failed gate.
 //! Frame and unit: base frame; mm, degrees; sigmas along the part's own axes.
 
-use super::budget::{Budget, budget};
+use super::budget::{Budget, budget, towards_camera};
 use super::construct::{Built, build, features};
 use super::measure::{Measured, localise, measure};
 use super::model::ShapeModel;
@@ -21,15 +21,16 @@ use crate::scan::{CloudPoint, GridOptions, HeightMap, grid};
 /// What else is known about a scan.
 #[derive(Clone, Debug)]
 pub struct LocateOptions {
-    /// Direction towards the camera in the base frame, unit length not needed. Default z.
-    pub up: Vec3,
+    /// Direction towards the camera in the base frame, unit length not needed. By default where the
+    /// rig's camera stood, without a rig z.
+    pub up: Option<Vec3>,
     /// Notation of the poses for the robot. Default the 4x4 matrix.
     pub robot: Convention,
 }
 
 impl Default for LocateOptions {
     fn default() -> Self {
-        LocateOptions { up: Vec3::z(), robot: Convention::Matrix }
+        LocateOptions { up: None, robot: Convention::Matrix }
     }
 }
 
@@ -98,7 +99,8 @@ pub fn locate(cloud: &[CloudPoint], recipe: &Recipe, rig: Option<&Rig>, options:
     recipe.check()?;
     let drawing = recipe.drawing();
     let points = Ordered::new(cloud)?;
-    let map = grid(cloud, &GridOptions { cell: Some(recipe.cell_mm), up: options.up, ..GridOptions::default() })?;
+    let up = options.up.or_else(|| rig.and_then(|r| towards_camera(&points, r))).unwrap_or_else(Vec3::z);
+    let map = grid(cloud, &GridOptions { cell: Some(recipe.cell_mm), up, ..GridOptions::default() })?;
     let scene = scene_of(&map, &recipe.layers)?;
     let model = model_of(recipe, &scene)?;
     let mut search = recipe.search;

@@ -10,6 +10,7 @@ pub mod gradient;
 pub mod insertion;
 pub mod measure;
 pub mod model;
+pub mod picture;
 pub mod points;
 pub mod recipe;
 pub mod refine;

@@ -87,7 +87,7 @@ impl SearchOptions {
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Match {
     pub pose: Pose,
-    /// Mean cosine between directions; unseen and weak places count 0.
+    /// Mean cosine between directions over the places that are not missing; weak places count 0.
     pub score: f64,
     /// Share of the model's places whose slope could be known at all.
     pub coverage: f64,
@@ -237,12 +237,14 @@ fn coarse_candidates(
 }
 
 /// Mean cosine between model and scene with the nearest cells of a level, and the share of places seen.
+/// Places on missing cells do not count (a shadow says nothing about an edge), but at least half of the
+/// model's places do; places outside the scene and without contrast count as misses.
 fn score(layers: &[Directions], points: &[ModelPoint], level: usize, pose: &Pose, ignore: bool) -> (f64, f64) {
     let (s, c) = pose.angle.sin_cos();
     let shrink = 1.0 / (1u64 << level) as f64;
     let (cx, cy) = (to_level(pose.x, level) + 0.5, to_level(pose.y, level) + 0.5);
     let k = pose.scale * shrink;
-    let (mut sum, mut seen) = (0.0, 0);
+    let (mut sum, mut seen, mut missing) = (0.0, 0, 0);
     for p in points {
         let x = cx + k * (c * p.x - s * p.y);
         let y = cy + k * (s * p.x + c * p.y);
@@ -256,13 +258,14 @@ fn score(layers: &[Directions], points: &[ModelPoint], level: usize, pose: &Pose
             }
             let i = iy * d.field.width + ix;
             seen += usize::from(d.field.seen[i]);
+            missing += usize::from(!d.field.seen[i]);
             let [ux, uy] = d.unit[i];
             let dot = f64::from(ux) * (c * p.gx - s * p.gy) + f64::from(uy) * (s * p.gx + c * p.gy);
             sum += if ignore || p.either { dot.abs() } else { dot };
         }
     }
     let n = points.len() as f64;
-    (sum / n, seen as f64 / n)
+    (sum / (n - missing as f64).max(0.5 * n), seen as f64 / n)
 }
 
 fn climb_all(
