@@ -6,6 +6,7 @@ mod console;
 mod demo;
 mod doctor;
 mod find;
+mod range;
 mod scan;
 mod simulate;
 mod station;
@@ -39,6 +40,7 @@ enum Command {
     Calibrate(calibrate::Command),
     Doctor(doctor::Args),
     Find(find::Args),
+    Range(range::Args),
     Scan(scan::Args),
     /// Simulate a station with known truth: recordings, poses, true calibration
     Simulate(simulate::Args),
@@ -53,6 +55,7 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Calibrate(c) => calibrate::run(c, console),
         Command::Doctor(a) => doctor::run(a, console),
         Command::Find(a) => find::run(a, console),
+        Command::Range(a) => range::run(a, console),
         Command::Scan(a) => scan::run(a, console),
         Command::Simulate(a) => simulate::run(a, console),
         Command::Station(c) => station::run(c, console),

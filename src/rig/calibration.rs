@@ -80,7 +80,8 @@ pub type HandEye = Rigid<Flange, Camera>;
 ///
 /// Covariance parameters by kind: camera `fx_px fy_px cx_px cy_px k1 k2 p1 p2 k3`; laser plane
 /// `nx ny nz offset_mm` (rank 3, along the tangent of the unit normal); pointer
-/// `ox_mm oy_mm oz_mm dx dy dz` (rank 4); hand-eye see [`HandEye`].
+/// `ox_mm oy_mm oz_mm dx dy dz` (rank 4), then the camera's nine, because the beam was found with that
+/// camera and a range needs both; hand-eye see [`HandEye`].
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration<T> {

@@ -2,6 +2,8 @@
 //! Frame and unit: mm, rad, px; each file names its frames.
 
 mod hand_eye;
+mod laser_plane;
+mod pointer;
 
 use super::Console;
 use crate::calibrate::report::Page;
@@ -13,11 +15,15 @@ use std::path::Path;
 #[derive(clap::Subcommand)]
 pub enum Command {
     HandEye(hand_eye::Args),
+    LaserPlane(laser_plane::Args),
+    Pointer(pointer::Args),
 }
 
 pub fn run(command: &Command, console: &Console) -> Result<()> {
     match command {
         Command::HandEye(a) => hand_eye::run(a, console),
+        Command::LaserPlane(a) => laser_plane::run(a, console),
+        Command::Pointer(a) => pointer::run(a, console),
     }
 }
 

@@ -1,0 +1,63 @@
+//! In: a recording of boards with the stripe on them. Out: the laser plane.
+//! Frame and unit: camera frame, mm.
+
+use super::super::Console;
+use super::finish;
+use crate::calibrate::laser_plane::LaserPlaneOptions;
+use crate::calibrate::limits::Limits;
+use crate::fault::Result;
+use crate::recording::Recording;
+use crate::rig::Rig;
+use crate::scan::Where;
+use crate::station::{LaserPlaneRun, Settings, calibrate_laser_plane};
+use std::path::PathBuf;
+
+/// Find the laser plane from pictures of the stripe on boards
+///
+/// Each frame has an ambient picture, which gives the board's pose, and a laser picture of the same
+/// pose. The stripe is found as in a scan; only what lies on the board and away from the print's edges
+/// counts. The camera's calibration is held; its uncertainty is carried over.
+#[derive(clap::Args)]
+#[command(after_help = "Example:
+  sheetlight calibrate laser-plane recordings/laserplane --station cell3")]
+pub struct Args {
+    /// Recording folder: an ambient and a laser picture per frame
+    recording: PathBuf,
+    /// Station folder with the camera's calibration
+    #[arg(long)]
+    station: PathBuf,
+    /// Nearest working distance for the expected error, mm
+    #[arg(long, default_value_t = 110.0)]
+    near_mm: f64,
+    /// Farthest working distance for the expected error, mm
+    #[arg(long, default_value_t = 210.0)]
+    far_mm: f64,
+    /// Where the stages run: auto (GPU where there is one), gpu, or cpu (the twins)
+    #[arg(long, default_value = "auto", value_parser = super::super::parse::<Where>)]
+    on: Where,
+}
+
+pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let recording = Recording::open(&args.recording)?;
+    let (settings, rig) = (Settings::load(&args.station)?, Rig::load(&args.station)?);
+    let run = LaserPlaneRun {
+        solver: LaserPlaneOptions::default(),
+        limits: Limits { working_mm: [args.near_mm, args.far_mm], ..Limits::default() },
+        extraction: settings.extraction.clone(),
+        depth_mm: [settings.working_volume.near_mm, settings.working_volume.far_mm],
+        place: args.on,
+    };
+    let bar = console.bar("boards", 0);
+    let progress = |done: usize, all: usize| {
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+    };
+    let c = calibrate_laser_plane(&recording, &rig, &run, &progress)?;
+    bar.finish_and_clear();
+    let p = c.calibration.value;
+    let text = format!(
+        "laser plane: normal {:.6} {:.6} {:.6}, offset {:.4} mm (camera frame)",
+        p.normal.x, p.normal.y, p.normal.z, p.offset
+    );
+    finish(&args.station, &c.calibration, &c.page, &text, console)
+}

@@ -1,0 +1,57 @@
+//! In: a recording of boards with the pointer's spot on them. Out: the beam.
+//! Frame and unit: camera frame, mm.
+
+use super::super::Console;
+use super::finish;
+use crate::calibrate::limits::Limits;
+use crate::calibrate::pointer::PointerOptions;
+use crate::calibrate::spot::SpotOptions;
+use crate::fault::Result;
+use crate::recording::Recording;
+use crate::rig::Rig;
+use crate::station::{PointerRun, calibrate_pointer};
+use std::path::PathBuf;
+
+/// Find the laser pointer's beam from pictures of its spot on boards
+///
+/// Each frame has an ambient picture, which gives the board's pose, and a laser picture of the same
+/// pose. The camera's calibration is held; its uncertainty is carried over.
+#[derive(clap::Args)]
+#[command(after_help = "Example:
+  sheetlight calibrate pointer recordings/pointer_cal --station cell3")]
+pub struct Args {
+    /// Recording folder: an ambient and a laser picture per frame
+    recording: PathBuf,
+    /// Station folder with the camera's calibration
+    #[arg(long)]
+    station: PathBuf,
+    /// Nearest working distance for the expected error, mm
+    #[arg(long, default_value_t = 70.0)]
+    near_mm: f64,
+    /// Farthest working distance for the expected error, mm
+    #[arg(long, default_value_t = 290.0)]
+    far_mm: f64,
+}
+
+pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let recording = Recording::open(&args.recording)?;
+    let rig = Rig::load(&args.station)?;
+    let run = PointerRun {
+        spots: SpotOptions::default(),
+        solver: PointerOptions::default(),
+        limits: Limits { working_mm: [args.near_mm, args.far_mm], ..Limits::default() },
+    };
+    let bar = console.bar("boards", 0);
+    let progress = |done: usize, all: usize| {
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+    };
+    let c = calibrate_pointer(&recording, &rig, &run, &progress)?;
+    bar.finish_and_clear();
+    let (o, d) = (c.calibration.value.origin, c.calibration.value.direction);
+    let text = format!(
+        "pointer: through {:.4} {:.4} {:.4} mm along {:.7} {:.7} {:.7} (camera frame)",
+        o.x, o.y, o.z, d.x, d.y, d.z
+    );
+    finish(&args.station, &c.calibration, &c.page, &text, console)
+}

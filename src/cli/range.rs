@@ -1,0 +1,74 @@
+//! In: pictures of the pointer's spot. Out: distances, points, and the normal of the surface.
+//! Frame and unit: camera and base frame; mm, degrees.
+
+use super::Console;
+use crate::fault::Result;
+use crate::recording::Recording;
+use crate::rig::Rig;
+use crate::robot::Convention;
+use crate::station::{RangeReport, RangeRun, Settings, measure_range};
+use std::path::PathBuf;
+
+/// Measure distances with the laser pointer
+///
+/// Prints for each picture the distance along the beam and along the optical axis with its standard
+/// deviation; with robot poses and a hand-eye calibration also the point in the base frame. With
+/// --surface the shots are taken to be of one plane: its normal and the tool pose square to it follow.
+#[derive(clap::Args)]
+#[command(after_help = "Example:
+  sheetlight range recordings/pointer --station cell3 --json > distances.json")]
+pub struct Args {
+    /// Recording folder with a laser picture per frame
+    recording: PathBuf,
+    /// Station folder with camera and pointer calibrations
+    #[arg(long)]
+    station: PathBuf,
+    /// Pose file of the recording, without extension [default: the one meta.json names]
+    #[arg(long)]
+    poses: Option<String>,
+    /// The shots are of one plane surface: work out its normal (needs poses and hand-eye)
+    #[arg(long)]
+    surface: bool,
+}
+
+pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let recording = Recording::open(&args.recording)?;
+    let (settings, rig) = (Settings::load(&args.station)?, Rig::load(&args.station)?);
+    let run = RangeRun { poses: args.poses.clone(), one_surface: args.surface, ..RangeRun::default() };
+    let report = measure_range(&recording, &rig, &run)?;
+    console.result(&report, &table(&report, settings.robot.unwrap_or(Convention::Matrix)));
+    Ok(())
+}
+
+fn table(r: &RangeReport, robot: Convention) -> String {
+    let mut s = String::from("picture             along beam mm      along axis mm      point in camera mm\n");
+    for d in &r.distances {
+        let [x, y, z] = d.point_camera_mm;
+        s += &format!(
+            "{:16} {:9.3} ± {:.3}  {:9.3} ± {:.3}  {x:9.3} {y:9.3} {z:9.3}",
+            d.picture, d.along_beam_mm, d.along_beam_sigma_mm, d.along_axis_mm, d.along_axis_sigma_mm
+        );
+        if let (Some([x, y, z]), Some([a, b, c])) = (d.point_base_mm, d.point_base_sigma_mm) {
+            s += &format!("  base {x:.3} {y:.3} {z:.3} ± {a:.3} {b:.3} {c:.3}");
+        }
+        s.push('\n');
+    }
+    for (name, why) in &r.missing {
+        s += &format!("{name:16} no distance: {why}\n");
+    }
+    if let Some(f) = &r.surface {
+        let [x, y, z] = f.normal;
+        s += &format!(
+            "surface normal {x:.6} {y:.6} {z:.6} (base), known to {:.4} by {:.4} degrees; points within {:.4} mm rms\n",
+            f.tilt_sigma_deg[0], f.tilt_sigma_deg[1], f.rms_mm
+        );
+        let pose: Vec<String> = robot
+            .labels()
+            .iter()
+            .zip(robot.write(&f.base_from_tool))
+            .map(|(label, v)| format!("{label} {v:.4}"))
+            .collect();
+        s += &format!("tool square to it ({}): {}\n", robot.name(), pose.join(", "));
+    }
+    s
+}

@@ -1,0 +1,199 @@
+//! In: pictures of the pointer's spot on any surface, a station with camera and pointer, perhaps robot
+//! poses and a hand-eye calibration. Out: distances and points with sigmas, and the surface's normal.
+//! Frame and unit: camera and base frame; mm, rad.
+
+use super::calibrate_hand_eye::first_line;
+use crate::calibrate::pointer_range::{
+    BasePoint, Ranged, RobotNoise, Surface, joint_covariance, range, surface, to_base,
+};
+use crate::calibrate::spot::{Spot, SpotOptions, SpotPicture, find_spots, hot_pixels};
+use crate::fault::{Fault, Result};
+use crate::geometry::{Mat3, Rigid, Tool, Vec3};
+use crate::recording::Recording;
+use crate::rig::Rig;
+use nalgebra::SMatrix;
+
+/// How [`measure_range`] is run.
+#[derive(Clone, Debug)]
+pub struct RangeRun {
+    pub spots: SpotOptions,
+    /// Pose file of the recording; `None`: the one that meta.json names, if any.
+    pub poses: Option<String>,
+    /// A spot farther than this from the beam's image is no spot of this beam, sigmas; 3..=100.
+    pub max_off_beam: f64,
+    /// The shots are all of one plane surface: work out its normal.
+    pub one_surface: bool,
+}
+
+impl Default for RangeRun {
+    fn default() -> Self {
+        RangeRun { spots: SpotOptions::default(), poses: None, max_off_beam: 12.0, one_surface: false }
+    }
+}
+
+/// One measured distance.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Distance {
+    pub picture: String,
+    /// Distance from the beam's origin along the beam, and its sigma, mm.
+    pub along_beam_mm: f64,
+    pub along_beam_sigma_mm: f64,
+    /// Distance from the camera along the optical axis, and its sigma, mm.
+    pub along_axis_mm: f64,
+    pub along_axis_sigma_mm: f64,
+    pub point_camera_mm: [f64; 3],
+    pub point_camera_sigma_mm: [f64; 3],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub point_base_mm: Option<[f64; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub point_base_sigma_mm: Option<[f64; 3]>,
+    pub spot_px: [f64; 2],
+    pub spot_sigma_px: [f64; 2],
+    pub off_beam_px: f64,
+}
+
+/// The surface through three or more points, base frame.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct SurfaceFound {
+    pub normal: [f64; 3],
+    pub centre_mm: [f64; 3],
+    /// Axes of the normal's uncertainty, degrees.
+    pub tilt_sigma_deg: [f64; 2],
+    pub height_sigma_mm: f64,
+    pub rms_mm: f64,
+    /// z out of the surface, x along the flange's x as seen at the first shot, origin at the centre.
+    #[serde(rename = "base_T_tool")]
+    pub base_from_tool: Rigid<crate::geometry::Base, Tool>,
+}
+
+/// What [`measure_range`] found.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct RangeReport {
+    pub distances: Vec<Distance>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub surface: Option<SurfaceFound>,
+    /// Pictures without a distance, with the reason.
+    pub missing: Vec<(String, String)>,
+}
+
+/// Measures a distance in every frame that has a `laser` picture.
+pub fn measure_range(recording: &Recording, rig: &Rig, run: &RangeRun) -> Result<RangeReport> {
+    if !(3.0..=100.0).contains(&run.max_off_beam) {
+        return Err(Fault::usage(format!("max_off_beam is {}, 3 to 100 sigmas are allowed", run.max_off_beam)));
+    }
+    let (camera, pointer) = (rig.need_camera()?, rig.need_pointer()?);
+    let joint = joint_covariance(&pointer.covariance);
+    let has_poses = run.poses.is_some() || recording.meta.pose_file.is_some();
+    let poses = if has_poses { Some(recording.poses(run.poses.as_deref())?) } else { None };
+    if run.one_surface && poses.is_none() {
+        return Err(Fault::usage("a surface's normal needs the robot's poses")
+            .next("name the pose file with --poses, or measure without --surface"));
+    }
+    let base = match (&poses, run.one_surface) {
+        (Some(p), true) => Some((p, rig.need_hand_eye()?)),
+        (Some(p), false) => rig.hand_eye.as_ref().map(|h| (p, h)),
+        (None, _) => None,
+    };
+    let mut shared = SMatrix::<f64, 21, 21>::zeros();
+    shared.fixed_view_mut::<15, 15>(0, 0).copy_from(&joint);
+    let mut robot = RobotNoise::default();
+    if let Some((_, h)) = base {
+        if h.covariance.parameters.len() == 6 {
+            shared.fixed_view_mut::<6, 6>(15, 15).copy_from(&h.covariance.to_matrix());
+        }
+        let figure = |k: &str| h.quality.figures.get(k).copied().unwrap_or(0.0);
+        robot = RobotNoise { mm: figure("robot_sigma_mm"), rad: figure("robot_sigma_deg").to_radians() };
+    }
+    let frames: Vec<_> =
+        recording.meta.frames.iter().enumerate().filter_map(|(i, f)| Some((i, f, f.laser.as_deref()?))).collect();
+    let images = frames.iter().map(|f| recording.picture(f.2)).collect::<Result<Vec<_>>>()?;
+    let hot = hot_pixels(&images.iter().collect::<Vec<_>>());
+    let asked: Vec<SpotPicture<'_>> =
+        frames.iter().zip(&images).map(|(f, laser)| SpotPicture { name: f.2, laser, ambient: None }).collect();
+    let mut out = RangeReport { distances: Vec::new(), surface: None, missing: Vec::new() };
+    let mut points: Vec<BasePoint> = Vec::new();
+    let mut first_x = None;
+    for ((index, frame, name), spot) in frames.iter().zip(find_spots(&asked, &hot, &run.spots)?) {
+        let found = spot.and_then(|s| {
+            let r = range(&s.pixel, &s.covariance, &camera.value, &pointer.value, &joint)?;
+            on_beam(&r, run.max_off_beam).map(|()| (s, r))
+        });
+        let (spot, ranged) = match found {
+            Ok(f) => f,
+            Err(fault) => {
+                out.missing.push((name.to_string(), first_line(&fault.to_string()).to_owned()));
+                continue;
+            }
+        };
+        let mut in_base = None;
+        if let Some((poses, hand_eye)) = base {
+            let k = frame.pose.unwrap_or(*index);
+            let pose = poses.get(k).ok_or_else(|| {
+                Fault::input(format!("{name}: asks for pose {k}, the pose file has {}", poses.len()))
+                    .cause("the pose file belongs to another recording, or ends early")
+                    .next("export the poses of all pictures again")
+            })?;
+            first_x.get_or_insert(Vec3::from(pose.rotation.column(0)));
+            let p = to_base(&ranged, pose, &hand_eye.value, &shared, &robot);
+            in_base = Some(p.clone());
+            points.push(p);
+        }
+        out.distances.push(row(name, &spot, &ranged, in_base.as_ref()));
+    }
+    if out.distances.is_empty() {
+        let (name, why) = out.missing.first().cloned().unwrap_or_default();
+        return Err(Fault::refused(format!("no distance could be measured; {name}: {why}"))
+            .cause("the pointer was off, or it is not the one that was calibrated")
+            .next("look at the pictures"));
+    }
+    if run.one_surface {
+        let s = surface(&points, &shared, &first_x.unwrap_or(Vec3::x()))?;
+        out.surface = Some(describe(&s));
+    }
+    Ok(out)
+}
+
+fn on_beam(r: &Ranged, limit: f64) -> Result<()> {
+    // A beam can be wrong by its calibration, too: a pixel is forgiven.
+    if r.off_beam_sigmas > limit && r.off_beam_px > 1.0 {
+        return Err(Fault::refused(format!(
+            "the spot is {:.1} px ({:.0} sigmas) beside the beam's image, limit {limit} sigmas",
+            r.off_beam_px, r.off_beam_sigmas
+        ))
+        .cause("a reflection, or the pointer was moved")
+        .next("calibrate the pointer again if all pictures say so"));
+    }
+    Ok(())
+}
+
+fn sigmas(c: &Mat3) -> [f64; 3] {
+    [0, 1, 2].map(|i| c[(i, i)].max(0.0).sqrt())
+}
+
+fn row(name: &str, spot: &Spot, r: &Ranged, base: Option<&BasePoint>) -> Distance {
+    Distance {
+        picture: name.to_owned(),
+        along_beam_mm: r.along_beam,
+        along_beam_sigma_mm: r.along_beam_sigma,
+        along_axis_mm: r.along_axis,
+        along_axis_sigma_mm: r.along_axis_sigma,
+        point_camera_mm: r.point.into(),
+        point_camera_sigma_mm: sigmas(&r.covariance),
+        point_base_mm: base.map(|b| b.point.into()),
+        point_base_sigma_mm: base.map(|b| sigmas(&b.covariance)),
+        spot_px: spot.pixel.into(),
+        spot_sigma_px: [spot.covariance[(0, 0)].sqrt(), spot.covariance[(1, 1)].sqrt()],
+        off_beam_px: r.off_beam_px,
+    }
+}
+
+fn describe(s: &Surface) -> SurfaceFound {
+    SurfaceFound {
+        normal: s.normal.into(),
+        centre_mm: s.centre.into(),
+        tilt_sigma_deg: s.tilt_sigma.map(f64::to_degrees),
+        height_sigma_mm: s.height_sigma,
+        rms_mm: s.rms,
+        base_from_tool: s.base_from_tool,
+    }
+}
