@@ -23,7 +23,8 @@ struct Frame {
     // Most skeleton pixels of a batch.
     capacity: u32,
     full_scale: u32,
-    reserved: u32,
+    // Ends of skeletons: most pixels added, and from bit 16 on the share of brightness in 4096ths.
+    lengthen: u32,
 }
 
 // Pixels a word as a power of two: 2 for 8-bit pictures, 1 for 9 to 16 bits.

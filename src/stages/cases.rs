@@ -149,6 +149,74 @@ pub fn scenes() -> Vec<Scene> {
     ]
 }
 
+/// The cases of one of the stages after the skeleton, with every method: the scenes with a stripe. The others are noise
+/// and edges, on which a fit ends anywhere.
+pub fn peaks(stage: &str) -> Vec<Case> {
+    scenes().iter().filter(|s| s.name.contains("stripe")).flat_map(|s| peak_cases(s, stage)).collect()
+}
+
+fn peak_cases(scene: &Scene, wanted: &str) -> Vec<Case> {
+    let mut walk = Walk::new(scene);
+    walk.run("");
+    let (f, bits) = (walk.frame, scene.shots[0].bits);
+    let mut cases = Vec::new();
+    for method in [peak::Method::Gaussian, peak::Method::Centroid, peak::Method::Derivative] {
+        let p = peak::PeakParams { method, width_px: 3.0, speckle: 0.05, ..Default::default() };
+        let choice = choose::ChooseParams { echo: 0.4, ..Default::default() };
+        let frame = peak::PeakFrame::new((f.width, f.height, bits), f.shots, &p, &choice, [0.1, 0.995]);
+        let header = walk.buffers["header"].clone();
+        let n = header[3] as usize;
+        let groups = [(n as u32).div_ceil(64).max(1), 1, 1];
+        let frame_words = bytemuck::cast_slice::<peak::PeakFrame, u32>(&[frame]).to_vec();
+        let mut step = |stage: &crate::gpu::Stage,
+                        twin: fn(&mut [Vec<u32>], &[(&'static str, f64)]),
+                        bindings: &mut Vec<Vec<u32>>,
+                        groups: [u32; 3]| {
+            let all = [(frame::PX_LOG2, f64::from(px_log2(bits))), (peak::METHOD, method.number())];
+            let overrides: Vec<_> = all.into_iter().filter(|o| stage.overrides.contains(&o.0)).collect();
+            if stage.name == wanted {
+                let name = format!("{}, {method:?}", scene.name);
+                cases.push(Case { name, overrides: overrides.clone(), bindings: bindings.clone(), groups });
+            }
+            twin(bindings, &overrides);
+        };
+        let (image, points) = (walk.buffers["image"].clone(), walk.buffers["points"][..2 * n.max(1)].to_vec());
+        let mut b = vec![frame_words.clone(), image, header.clone(), points, vec![0; 12 * n.max(1)]];
+        step(&peak::STAGE, peak::stage_twin, &mut b, groups);
+        let peaks = b.pop().expect("the peaks");
+        let mut b = vec![frame_words.clone(), vec![7; frame.entries as usize]];
+        step(&choose::LINES, choose::lines_twin, &mut b, choose::lines_groups(&frame));
+        let mut b = vec![frame_words.clone(), header.clone(), peaks, b.pop().expect("the lines")];
+        step(&choose::STRONGEST, choose::strongest_twin, &mut b, groups);
+        let (strongest, peaks) = (b.pop().expect("the strongest"), b.pop().expect("the peaks"));
+        let mut b = vec![frame_words, header.clone(), strongest, peaks];
+        step(&choose::STAGE, choose::stage_twin, &mut b, groups);
+        let rig = point::PointFrame::new(&optics(f.width, f.height));
+        let poses = (0..f.shots).flat_map(|i| pose(i).map(f32::to_bits)).collect();
+        let words = bytemuck::cast_slice::<point::PointFrame, u32>(&[rig]).to_vec();
+        let mut b = vec![words, header, poses, b.pop().expect("the peaks"), vec![0; 4 * n.max(1)]];
+        step(&point::STAGE, point::stage_twin, &mut b, groups);
+    }
+    cases
+}
+
+/// A camera of 55 degrees with a common lens, a sheet that crosses its axis at 155 mm.
+fn optics(width: u32, height: u32) -> point::Optics {
+    let f = 0.96 * width as f32;
+    point::Optics {
+        pinhole: [f, f, 0.49 * width as f32, 0.51 * height as f32, 0.0],
+        distortion: [-0.118, 0.086, 0.00062, -0.00041, -0.017],
+        normal: [-0.0192, 0.8828, 0.4694],
+        offset: 72.15,
+    }
+}
+
+/// A turned pose some way off the base, another one a shot.
+fn pose(shot: u32) -> [f32; 12] {
+    let (s, c) = (0.3 + 0.1 * shot as f32).sin_cos();
+    [c, -s, 0.0, 420.0, s, c, 0.0, -60.0 + shot as f32, 0.0, 0.0, 1.0, 310.0]
+}
+
 /// The cases of one stage over all scenes.
 pub fn of(stage: &str) -> Vec<Case> {
     scenes().iter().flat_map(|s| Walk::new(s).run(stage)).collect()
@@ -198,6 +266,7 @@ impl<'a> Walk<'a> {
             ("other_mask", vec![0; 8 * tiles]),
             ("lit", vec![0; 8 * tiles]),
             ("stamps", vec![0; tiles]),
+            ("long", vec![0; 8 * tiles]),
             ("counts", vec![0; tiles]),
             ("starts", vec![0; tiles]),
             ("rows", vec![0; rows]),
@@ -205,6 +274,7 @@ impl<'a> Walk<'a> {
             ("header", vec![0; skeleton::HEADER + f.shots as usize + 1]),
             ("points", vec![0; 2 * f.capacity as usize]),
         ]);
+        f.lengthen = lengthen::LengthenParams::default().word(3.0);
         Walk { scene, frame: f, buffers, captured: Vec::new(), wanted: "" }
     }
 
@@ -266,6 +336,9 @@ impl<'a> Walk<'a> {
         self.frame.step = self.frame.step.saturating_sub(6);
         self.step(&listing::REBASE, listing::rebase_twin, &["listing", "list", "stamps"], all);
         self.buffers.insert("stamps", stamps);
+        self.step(&lengthen::COPY, lengthen::copy_twin, &["listing", "list", "mask", "long"], all);
+        let names = ["image", "listing", "list", "mask", "lit", "long"];
+        self.step(&lengthen::STAGE, lengthen::stage_twin, &names, all);
         self.step(&skeleton::COUNT, skeleton::count_twin, &["listing", "list", "mask", "counts"], all);
         let groups = skeleton::rows_groups(&f);
         self.step(&skeleton::SCAN_ROWS, skeleton::scan_rows_twin, &["counts", "starts", "rows"], groups);

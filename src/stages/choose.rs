@@ -1,8 +1,9 @@
 //! In: the peaks of one shot. Out: the same peaks, those not believed marked with the reason.
 //! Frame and unit: image pixels; grey levels of the picture's depth; widths relative to the stripe's.
 
-use super::peak::{Peak, Reject};
+use super::peak::{Peak, PeakFrame, PeakParams, Reject, SHARED, UNIFORM, frame_of};
 use crate::fault::{Fault, Result};
+use crate::gpu::{Access::*, Binding, Stage};
 
 /// What a peak of the laser looks like, against reflections, glints, hot pixels and mixed spots.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -81,50 +82,133 @@ pub struct Scene {
     pub across: [f32; 2],
 }
 
+impl Scene {
+    fn frame(&self, p: &ChooseParams) -> PeakFrame {
+        let bits = (self.full_scale as u32 + 1).ilog2() as u8;
+        let peak = PeakParams { width_px: self.width_px, ..PeakParams::default() };
+        PeakFrame::new((self.width, self.height, bits), 1, &peak, p, self.across)
+    }
+}
+
 /// CPU twin, two passes as on the GPU: each peak by itself and the strongest of each line, then those that are
 /// weak beside another.
 pub fn choose(peaks: &mut [Peak], scene: &Scene, p: &ChooseParams) {
-    let scale = scene.full_scale / 255.0;
-    let upright = p.steepest_deg.to_radians().cos();
-    // Lines across the stripe are image columns, or rows where the laser lies the other way.
-    let columns = scene.across[1].abs() >= scene.across[0].abs();
-    let line = |k: &Peak| if columns { k.pixel & 0xffff } else { k.pixel >> 16 } as usize;
-    let mut strongest = vec![0f32; if columns { scene.width } else { scene.height } as usize];
+    let frame = scene.frame(p);
+    let mut strongest = vec![0u32; frame.lines as usize];
     for k in peaks.iter_mut() {
-        let why = alone(k, scene, p, scale, upright);
+        let why = alone(k, &frame);
         k.refuse(why);
         if k.kept() {
-            let s = &mut strongest[line(k)];
-            *s = s.max(k.amplitude);
+            let s = &mut strongest[line(k, &frame)];
+            *s = (*s).max(k.amplitude.to_bits());
         }
     }
-    let reach = (p.echo_reach * scene.width_px + 0.5).floor() as usize;
     for k in peaks.iter_mut() {
-        let at = line(k);
-        let last = (at + reach).min(strongest.len() - 1);
-        let top = strongest[at.saturating_sub(reach)..=last].iter().fold(0f32, |a, &b| a.max(b));
-        if k.amplitude < p.echo * top {
-            k.refuse(Reject::Echo);
-        } else if k.width_px < p.cut_width * scene.width_px && k.amplitude < p.cut_amplitude * top {
-            k.refuse(Reject::Narrow);
+        beside(k, &strongest, line(k, &frame), 0, &frame);
+    }
+}
+
+/// The line across the stripe that a peak lies on.
+fn line(k: &Peak, f: &PeakFrame) -> usize {
+    (if f.columns != 0 { k.pixel & 0xffff } else { k.pixel >> 16 }) as usize
+}
+
+/// The tests that need no other peak.
+fn alone(k: &Peak, f: &PeakFrame) -> Reject {
+    let across = k.normal_u * f.across_u + k.normal_v * f.across_v;
+    if k.amplitude < f.faintest {
+        Reject::Faint
+    } else if k.width_px < f.narrowest {
+        Reject::Narrow
+    } else if k.width_px > f.widest {
+        Reject::Wide
+    } else if !(k.sigma_px <= f.uncertain) {
+        Reject::Uncertain
+    } else if across.abs() < f.upright {
+        Reject::Steep
+    } else {
+        Reject::Kept
+    }
+}
+
+/// The tests against the strongest peak of the lines nearby; the shot's lines start at `from`. Amplitudes are
+/// positive, so their bits are in the order of their values.
+fn beside(k: &mut Peak, strongest: &[u32], at: usize, from: usize, f: &PeakFrame) {
+    let reach = f.echo_reach as usize;
+    let low = at.saturating_sub(reach).max(from);
+    let high = (at + reach).min(from + f.lines as usize - 1);
+    let top = f32::from_bits(strongest[low..=high].iter().fold(0, |a, &b| a.max(b)));
+    if k.amplitude < f.echo * top {
+        k.refuse(Reject::Echo);
+    } else if k.width_px < f.cut_width && k.amplitude < f.cut_amplitude * top {
+        k.refuse(Reject::Narrow);
+    }
+}
+
+/// Empties the list of the strongest peaks.
+pub const LINES: Stage = Stage {
+    name: "lines",
+    wgsl: include_str!("../../shaders/lines.wgsl"),
+    shared: &[SHARED],
+    workgroup: [64, 1, 1],
+    bindings: &[Binding { name: "frame", access: Uniform }, Binding { name: "strongest", access: ReadWrite }],
+    uniform: UNIFORM,
+    overrides: &[],
+};
+
+/// Judges each peak by itself and notes the strongest of each line.
+pub const STRONGEST: Stage = Stage {
+    name: "strongest",
+    wgsl: include_str!("../../shaders/strongest.wgsl"),
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "header", access: Read },
+        Binding { name: "peaks", access: ReadWrite },
+        Binding { name: "strongest", access: ReadWrite },
+    ],
+    ..LINES
+};
+
+/// Judges each peak beside the strongest of the lines nearby.
+pub const STAGE: Stage = Stage {
+    name: "choose",
+    wgsl: include_str!("../../shaders/choose.wgsl"),
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "header", access: Read },
+        Binding { name: "strongest", access: Read },
+        Binding { name: "peaks", access: ReadWrite },
+    ],
+    ..LINES
+};
+
+/// Workgroups that empty the list.
+pub fn lines_groups(f: &PeakFrame) -> [u32; 3] {
+    LINES.groups([f.entries, 1, 1])
+}
+
+pub fn lines_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+    let f = frame_of(b);
+    b[1][..f.entries as usize].fill(0);
+}
+
+pub fn strongest_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+    let f = frame_of(b);
+    let [_, header, peaks, strongest] = b else { unreachable!() };
+    for k in bytemuck::cast_slice_mut::<u32, Peak>(peaks).iter_mut().take(header[3] as usize) {
+        k.refuse(alone(k, &f));
+        if k.kept() {
+            let s = &mut strongest[(k.shot * f.lines) as usize + line(k, &f)];
+            *s = (*s).max(k.amplitude.to_bits());
         }
     }
 }
 
-/// The tests that need no other peak.
-fn alone(k: &Peak, scene: &Scene, p: &ChooseParams, scale: f32, upright: f32) -> Reject {
-    let across = k.normal_u * scene.across[0] + k.normal_v * scene.across[1];
-    if k.amplitude < p.faintest * scale {
-        Reject::Faint
-    } else if k.width_px < p.narrowest * scene.width_px {
-        Reject::Narrow
-    } else if k.width_px > p.widest * scene.width_px {
-        Reject::Wide
-    } else if !(k.sigma_px <= p.uncertain * scene.width_px) {
-        Reject::Uncertain
-    } else if across.abs() < upright {
-        Reject::Steep
-    } else {
-        Reject::Kept
+pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+    let f = frame_of(b);
+    let [_, header, strongest, peaks] = b else { unreachable!() };
+    for k in bytemuck::cast_slice_mut::<u32, Peak>(peaks).iter_mut().take(header[3] as usize) {
+        let from = (k.shot * f.lines) as usize;
+        beside(k, strongest, from + line(k, &f), from, &f);
     }
 }

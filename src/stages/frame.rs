@@ -25,7 +25,7 @@ pub struct Frame {
     pub step: u32,
     pub capacity: u32,
     pub full_scale: u32,
-    pub reserved: u32,
+    pub lengthen: u32,
 }
 
 /// `Frame::flags`: list every tile, the plain path.
@@ -44,8 +44,10 @@ macro_rules! uniform_fields {
     };
 }
 
+pub(crate) use uniform_fields;
+
 pub const UNIFORM: (&str, &[Field], usize) = uniform_fields!(Frame: width, height, pitch, shot_words, tiles_x,
-    tiles_y, shots, size, offset, minimum, flags, rule, step, capacity, full_scale, reserved);
+    tiles_y, shots, size, offset, minimum, flags, rule, step, capacity, full_scale, lengthen);
 
 pub const SHARED: &str = include_str!("../../shaders/shared/frame.wgsl");
 pub const PIXELS: &str = include_str!("../../shaders/shared/pixels.wgsl");
@@ -95,7 +97,7 @@ impl Frame {
             // One pixel in ten is more than a scene with a stripe ever gives; a small picture keeps all.
             capacity: (width * height / 10).max((width * height).min(32768)) * shots,
             full_scale: (1 << bits) - 1,
-            reserved: 0,
+            lengthen: 0,
         })
     }
     pub fn tiles(&self) -> u32 {

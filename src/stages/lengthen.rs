@@ -1,7 +1,10 @@
 //! In: a picture, its lit pixels and their skeleton. Out: the skeleton with its ends carried to the edge of the surface.
 //! Frame and unit: pixels; brightness is compared with the stripe's own, so no grey level is set here.
 
+use super::frame::{self, PIXELS, PX_LOG2, SHARED, frame_of, tile_unpack};
+use super::listing::mask_index;
 use crate::fault::{Fault, Result};
+use crate::gpu::{Access::*, Binding, Stage};
 use crate::raster::{Image, Mask};
 
 /// Thinning eats a lit streak from its ends as it does from its sides, so a skeleton stops short of the edge by half
@@ -32,16 +35,16 @@ impl LengthenParams {
         }
         Ok(())
     }
-    /// Most pixels added to an end of a stripe this wide.
-    pub fn pixels(&self, width_px: f32) -> i32 {
-        (self.reach * width_px).round() as i32
+    /// The setting as the stage takes it: most pixels added, and from bit 16 on the share in 4096ths.
+    pub fn word(&self, width_px: f32) -> u32 {
+        (self.reach * width_px).round() as u32 | ((4096.0 * self.share).round() as u32) << 16
     }
 }
 
 /// CPU twin.
 pub fn twin(image: &Image, lit: &Mask, skeleton: &Mask, width_px: f32, p: &LengthenParams) -> Mask {
     let (w, h) = (image.width as i32, image.height as i32);
-    let reach = p.pixels(width_px);
+    let setting = p.word(width_px);
     let mut out = skeleton.clone();
     let words = skeleton.words_per_row();
     for (k, &word) in skeleton.words.iter().enumerate() {
@@ -53,26 +56,48 @@ pub fn twin(image: &Image, lit: &Mask, skeleton: &Mask, width_px: f32, p: &Lengt
             if x < 3 || y < 3 || x >= w - 3 || y >= h - 3 {
                 continue;
             }
-            let Some((ax, ay)) = outward(skeleton, x, y) else { continue };
-            let limit = p.share * nine(image, x, y);
-            for t in 1..=reach {
-                let a = x + (t as f32 * ax + 0.5).floor() as i32;
-                let b = y + (t as f32 * ay + 0.5).floor() as i32;
-                let inside = a >= 1 && b >= 1 && a < w - 1 && b < h - 1;
-                if !inside || !lit.get(a as u32, b as u32) || nine(image, a, b) < limit {
-                    break;
-                }
-                out.set(a as u32, b as u32);
-            }
+            let get = |x: i32, y: i32| skeleton.get(x as u32, y as u32);
+            let level = |x: i32, y: i32| u32::from(image.get(x as u32, y as u32));
+            let lit = |x: i32, y: i32| lit.get(x as u32, y as u32);
+            carry(x, y, (w, h), setting, get, lit, level, |a, b| out.set(a as u32, b as u32));
         }
     }
     out
 }
 
+/// Adds the pixels beyond one end, if the pixel is an end.
+#[allow(clippy::too_many_arguments)]
+fn carry(
+    x: i32,
+    y: i32,
+    (w, h): (i32, i32),
+    setting: u32,
+    skeleton: impl Fn(i32, i32) -> bool,
+    lit: impl Fn(i32, i32) -> bool,
+    level: impl Fn(i32, i32) -> u32,
+    mut add: impl FnMut(i32, i32),
+) {
+    let Some((ax, ay)) = outward(skeleton, x, y) else { return };
+    let (reach, share) = ((setting & 0xffff) as i32, setting >> 16);
+    // Sum of the 3x3 pixels around one; 9 * 65535 * 4096 needs 32 bits.
+    let nine = |x: i32, y: i32| -> u32 {
+        (-1..=1).flat_map(|j| (-1..=1).map(move |i| (i, j))).map(|(i, j)| level(x + i, y + j)).sum()
+    };
+    let limit = share * nine(x, y);
+    for t in 1..=reach {
+        let a = x + (t as f32 * ax + 0.5).floor() as i32;
+        let b = y + (t as f32 * ay + 0.5).floor() as i32;
+        if a < 1 || b < 1 || a >= w - 1 || b >= h - 1 || !lit(a, b) || 4096 * nine(a, b) < limit {
+            return;
+        }
+        add(a, b);
+    }
+}
+
 /// The direction off the end of a line, of unit length; `None` where the pixel is no end. An end has its one or two
 /// neighbours on one side.
-fn outward(skeleton: &Mask, x: i32, y: i32) -> Option<(f32, f32)> {
-    let lit = |i: i32, j: i32| i32::from(skeleton.get((x + i) as u32, (y + j) as u32));
+fn outward(skeleton: impl Fn(i32, i32) -> bool, x: i32, y: i32) -> Option<(f32, f32)> {
+    let lit = |i: i32, j: i32| i32::from(skeleton(x + i, y + j));
     let (mut n, mut sx, mut sy) = (0, 0, 0);
     for j in -1..=1 {
         for i in -1..=1 {
@@ -98,13 +123,92 @@ fn outward(skeleton: &Mask, x: i32, y: i32) -> Option<(f32, f32)> {
     (length > 0.0).then(|| (ax / length, ay / length))
 }
 
-/// Sum of the 3x3 pixels around one.
-fn nine(image: &Image, x: i32, y: i32) -> f32 {
-    let mut sum = 0u32;
-    for j in -1..=1 {
-        for i in -1..=1 {
-            sum += u32::from(image.get((x + i) as u32, (y + j) as u32));
+/// Copies the listed tiles of the skeleton, to be added to.
+pub const COPY: Stage = Stage {
+    name: "skeleton_copy",
+    wgsl: include_str!("../../shaders/skeleton_copy.wgsl"),
+    shared: &[SHARED],
+    workgroup: [64, 1, 1],
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "listing", access: Read },
+        Binding { name: "list", access: Read },
+        Binding { name: "mask", access: Read },
+        Binding { name: "long", access: ReadWrite },
+    ],
+    uniform: frame::UNIFORM,
+    overrides: &[PX_LOG2],
+};
+
+/// Adds the ends. Only lit pixels are added, so they lie in listed tiles.
+pub const STAGE: Stage = Stage {
+    name: "lengthen",
+    wgsl: include_str!("../../shaders/lengthen.wgsl"),
+    shared: &[SHARED, PIXELS],
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "image", access: Read },
+        Binding { name: "listing", access: Read },
+        Binding { name: "list", access: Read },
+        Binding { name: "mask", access: Read },
+        Binding { name: "lit", access: Read },
+        Binding { name: "long", access: ReadWrite },
+    ],
+    ..COPY
+};
+
+pub fn copy_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+    let f = frame_of(b);
+    let [_, listing, list, mask, long] = b else { unreachable!() };
+    for &tile in &list[..listing[3] as usize] {
+        for row in 0..8 {
+            long[mask_index(&f, tile, row)] = mask[mask_index(&f, tile, row)];
         }
     }
-    sum as f32
+}
+
+pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
+    let f = frame_of(b);
+    let px_log2 = overrides.iter().find(|o| o.0 == PX_LOG2).map_or(2, |o| o.1 as u32);
+    let [_, image, listing, list, mask, lit, long] = b else { unreachable!() };
+    for &tile in &list[..listing[3] as usize] {
+        let (tx, ty, shot) = tile_unpack(tile);
+        let place = |x: i32, y: i32| {
+            let row = shot * f.tiles_y * 8 + y as u32;
+            ((row * f.tiles_x + x as u32 / 32) as usize, x as u32 % 32)
+        };
+        let bit = |words: &[u32], x: i32, y: i32| {
+            let (at, shift) = place(x, y);
+            words[at] >> shift & 1 == 1
+        };
+        let level = |x: i32, y: i32| {
+            let bits = 32 >> px_log2;
+            let word = image[(shot * f.shot_words + y as u32 * f.pitch + (x as u32 >> px_log2)) as usize];
+            word >> ((x as u32 & ((1 << px_log2) - 1)) * bits) & ((1u32 << bits) - 1)
+        };
+        let (w, h) = (f.width as i32, f.height as i32);
+        for row in 0..8 {
+            let mut bits = mask[mask_index(&f, tile, row)];
+            while bits != 0 {
+                let (x, y) = ((32 * tx + bits.trailing_zeros()) as i32, (8 * ty + row) as i32);
+                bits &= bits - 1;
+                if x < 3 || y < 3 || x >= w - 3 || y >= h - 3 {
+                    continue;
+                }
+                carry(
+                    x,
+                    y,
+                    (w, h),
+                    f.lengthen,
+                    |x, y| bit(mask, x, y),
+                    |x, y| bit(lit, x, y),
+                    level,
+                    |a, b| {
+                        let (at, shift) = place(a, b);
+                        long[at] |= 1 << shift;
+                    },
+                );
+            }
+        }
+    }
 }

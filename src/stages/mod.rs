@@ -56,5 +56,22 @@ pub fn all() -> Vec<Entry> {
         exact(&skeleton::SCAN_ROWS, skeleton::scan_rows_twin, || cases::of("scan_rows")),
         exact(&skeleton::SCAN_SHOTS, skeleton::scan_shots_twin, || cases::of("scan_shots")),
         exact(&skeleton::STAGE, skeleton::stage_twin, || cases::of("skeleton")),
+        exact(&lengthen::COPY, lengthen::copy_twin, || cases::of("skeleton_copy")),
+        exact(&lengthen::STAGE, lengthen::stage_twin, || cases::of("lengthen")),
+        Entry {
+            compare: peak::apart,
+            limit: 1.0,
+            reason: "exp differs by some ulps, and a fit may stop one step earlier: position 0.01 px or 0.01 sigma, width 1 %",
+            ..exact(&peak::STAGE, peak::stage_twin, || cases::peaks("peak"))
+        },
+        exact(&choose::LINES, choose::lines_twin, || cases::peaks("lines")),
+        exact(&choose::STRONGEST, choose::strongest_twin, || cases::peaks("strongest")),
+        exact(&choose::STAGE, choose::stage_twin, || cases::peaks("choose")),
+        Entry {
+            compare: point::apart,
+            limit: 1.0,
+            reason: "f32 with or without fused multiply-add: 1 um, stated sigma 1 %",
+            ..exact(&point::STAGE, point::stage_twin, || cases::peaks("point"))
+        },
     ]
 }

@@ -1,11 +1,11 @@
 //! In: a picture, a skeleton pixel, the expected stripe. Out: the maximum-likelihood Gaussian profile across it.
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels. docs/math.md, Stripe peak (1) to (5).
 
-use super::{Grey, Peak, SATURATED, Setup};
+use super::{Grey, Peak, PeakFrame, SATURATED};
 
 /// Direction across the stripe: the strongest eigenvector of the structure tensor, with differences over one
 /// stripe width so that noise of single pixels does not turn it (docs/math.md, Stripe peak (1)).
-pub(super) fn direction<G: Grey>(image: G, x: i32, y: i32, s: &Setup) -> (f32, f32) {
+pub(super) fn direction<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> (f32, f32) {
     let edge = (s.reach + 1) as f32;
     let scale = 1.0 / (edge * edge);
     let (mut xx, mut xy, mut yy) = (0f32, 0f32, 0f32);
@@ -37,9 +37,9 @@ pub(super) fn direction<G: Grey>(image: G, x: i32, y: i32, s: &Setup) -> (f32, f
 }
 
 /// Level beside the stripe, 4 to 6 widths out: the darker side, because a second stripe lights one side only.
-pub(super) fn background<G: Grey>(image: G, x: i32, y: i32, nx: f32, ny: f32, s: &Setup) -> f32 {
-    let from = (4.0 * s.s0).round() as i32;
-    let to = from + ((2.0 * s.s0).round() as i32).max(2);
+pub(super) fn background<G: Grey>(image: G, x: i32, y: i32, nx: f32, ny: f32, s: &PeakFrame) -> f32 {
+    let from = (4.0 * s.s0 + 0.5).floor() as i32;
+    let to = from + ((2.0 * s.s0 + 0.5).floor() as i32).max(2);
     let (mut low, mut high, mut n) = (0f32, 0f32, 0f32);
     let mut q = from;
     while q <= to {
@@ -63,7 +63,7 @@ pub(super) fn window<G: Grey>(
     (x, y): (i32, i32),
     (nx, ny): (f32, f32),
     m0: f32,
-    s: &Setup,
+    s: &PeakFrame,
     mut visit: impl FnMut(f32, f32, f32),
 ) {
     // Walk along the image axis that is nearer to the stripe.
@@ -89,7 +89,7 @@ pub(super) fn window<G: Grey>(
 }
 
 /// First guess of offset and amplitude: centre of gravity and sum above the background.
-pub(super) fn guess<G: Grey>(image: G, at: (i32, i32), n: (f32, f32), background: f32, s: &Setup) -> (f32, f32) {
+pub(super) fn guess<G: Grey>(image: G, at: (i32, i32), n: (f32, f32), background: f32, s: &PeakFrame) -> (f32, f32) {
     let (mut sum, mut moment, mut square) = (0f32, 0f32, 0f32);
     window(image, at, n, 0.0, s, |d, weight, level| {
         // A window of 1.5 widths: neighbours of the stripe shall not pull.
@@ -105,7 +105,7 @@ pub(super) fn guess<G: Grey>(image: G, at: (i32, i32), n: (f32, f32), background
 
 /// Fisher scoring of amplitude, offset and width. Variance of a pixel: read noise + gain · level + speckle² · light².
 /// A saturated pixel says only "at least this bright": it pulls while the model is below it and is silent above.
-pub(super) fn gaussian<G: Grey>(image: G, x: i32, y: i32, s: &Setup) -> Peak {
+pub(super) fn gaussian<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak {
     let (nx, ny) = direction(image, x, y, s);
     let base = background(image, x, y, nx, ny, s);
     let (m0, mut a) = guess(image, (x, y), (nx, ny), base, s);
@@ -126,24 +126,24 @@ pub(super) fn gaussian<G: Grey>(image: G, x: i32, y: i32, s: &Setup) -> Peak {
             let shape = (-0.5 * (z * z)).exp();
             let model = a * shape;
             let full = level >= s.full_scale;
-            any = any || full;
+            any = any || (full && weight > 0.0);
             let silent = full && model + base >= level;
             let residual = level - base - model;
             let quiet = s.read2 + s.gain * (model + base);
             let believed = if silent { 0.0 } else { weight };
-            let precision = believed / (quiet + s.speckle2 * (model * model));
+            let certainty = believed / (quiet + s.speckle2 * (model * model));
             let jm = model * (z * inverse);
             let jw = jm * z;
-            h00 += precision * (shape * shape);
-            h01 += precision * (shape * jm);
-            h02 += precision * (shape * jw);
-            h11 += precision * (jm * jm);
-            h12 += precision * (jm * jw);
-            h22 += precision * (jw * jw);
-            g0 += precision * (shape * residual);
-            g1 += precision * (jm * residual);
-            g2 += precision * (jw * residual);
-            sum += precision * (residual * residual);
+            h00 += certainty * (shape * shape);
+            h01 += certainty * (shape * jm);
+            h02 += certainty * (shape * jw);
+            h11 += certainty * (jm * jm);
+            h12 += certainty * (jm * jw);
+            h22 += certainty * (jw * jw);
+            g0 += certainty * (shape * residual);
+            g1 += certainty * (jm * residual);
+            g2 += certainty * (jw * residual);
+            sum += certainty * (residual * residual);
             sum_weight += believed;
             sum_square += believed * believed;
         });
@@ -170,7 +170,7 @@ pub(super) fn gaussian<G: Grey>(image: G, x: i32, y: i32, s: &Setup) -> Peak {
         spread = sum_square / pixels;
         saturated = any;
         step += 1;
-        if dm.abs() < 5e-3 * s.s0 && dw.abs() < 2e-2 * s.s0 && da.abs() < 2e-2 * a {
+        if dm.abs() < 2e-3 * s.s0 && dw.abs() < 5e-3 * s.s0 && da.abs() < 5e-3 * a {
             break;
         }
     }

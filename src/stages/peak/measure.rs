@@ -1,8 +1,9 @@
 //! In: a picture with a stripe and its skeleton. Out: the stripe's width and speckle contrast, from the light itself.
 //! Frame and unit: Gaussian sigma in px; speckle is a ratio. docs/math.md, Stripe peak (6).
 
-use super::{Grey, Peak, PeakParams, Setup, View, fit};
+use super::{Grey, Peak, PeakFrame, PeakParams, View, fit};
 use crate::raster::{Image, Pixels};
+use crate::stages::choose::ChooseParams;
 
 /// What laser and lens make of a stripe: constant over a scan.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -27,7 +28,13 @@ pub fn measure(image: &Image, skeleton: &[u32], p: &PeakParams) -> Option<Stripe
         skeleton.iter().step_by(step).map(|&q| ((q & 0xffff) as i32, (q >> 16) as i32)).collect();
     let mut stripe = Stripe { width_px: half_maximum(image, &sample)?.clamp(0.4, 12.0), speckle: p.speckle };
     for _ in 0..3 {
-        let setup = Setup::new(image, &p.with(&stripe));
+        let setup = PeakFrame::new(
+            (image.width, image.height, image.bits),
+            1,
+            &p.with(&stripe),
+            &ChooseParams::default(),
+            [0.0, 1.0],
+        );
         let (width, height) = (setup.width, setup.height);
         let fits = match &image.pixels {
             Pixels::U8(pixels) => fits(View { pixels, width, height }, &sample, &setup),
@@ -50,7 +57,7 @@ pub fn measure(image: &Image, skeleton: &[u32], p: &PeakParams) -> Option<Stripe
 
 /// Width, excess of the squared residuals over read and shot noise, and squared light, of the peaks that can be
 /// believed: clipped light hides all three, and a spot of one pixel is a hot pixel.
-fn fits<G: Grey>(image: G, sample: &[(i32, i32)], s: &Setup) -> Vec<(f32, f32, f32)> {
+fn fits<G: Grey>(image: G, sample: &[(i32, i32)], s: &PeakFrame) -> Vec<(f32, f32, f32)> {
     sample
         .iter()
         .filter_map(|&(x, y)| {
@@ -64,7 +71,7 @@ fn fits<G: Grey>(image: G, sample: &[(i32, i32)], s: &Setup) -> Vec<(f32, f32, f
 
 /// Sums over the window of residual² minus the noise that is no speckle, and of light². Three fitted numbers have
 /// eaten part of the noise, most where the light is: pixel by pixel the share that is left is 1 - leverage.
-fn excess<G: Grey>(image: G, x: i32, y: i32, k: &Peak, s: &Setup) -> Option<(f32, f32)> {
+fn excess<G: Grey>(image: G, x: i32, y: i32, k: &Peak, s: &PeakFrame) -> Option<(f32, f32)> {
     let n = (k.normal_u, k.normal_v);
     let m = (k.u - x as f32) * n.0 + (k.v - y as f32) * n.1;
     let row = |d: f32| {

@@ -2,10 +2,10 @@
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels.
 
 use super::fit::{background, direction, guess, window};
-use super::{Grey, Peak, SATURATED, Setup};
+use super::{Grey, Peak, PeakFrame, SATURATED};
 
 /// Centre of gravity of the light above the background, within three widths of a first guess.
-pub(super) fn centroid<G: Grey>(image: G, x: i32, y: i32, s: &Setup) -> Peak {
+pub(super) fn centroid<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak {
     let n = direction(image, x, y, s);
     let base = background(image, x, y, n.0, n.1, s);
     let (m0, _) = guess(image, (x, y), n, base, s);
@@ -16,8 +16,10 @@ pub(super) fn centroid<G: Grey>(image: G, x: i32, y: i32, s: &Setup) -> Peak {
         sum += light;
         first += light * d;
         second += light * (d * d);
-        top = top.max(level - base);
-        saturated |= level >= s.full_scale;
+        if weight > 0.0 {
+            top = top.max(level - base);
+            saturated |= level >= s.full_scale;
+        }
         let e = weight * (d - m0);
         let lit = (level - base).max(0.0);
         noise += (e * e) * (s.read2 + s.gain * level + s.speckle2 * (lit * lit));
@@ -29,16 +31,20 @@ pub(super) fn centroid<G: Grey>(image: G, x: i32, y: i32, s: &Setup) -> Peak {
 
 /// Steger's line point: second-order Taylor expansion of the picture smoothed with a Gaussian of sigma
 /// width / √3 or more, which is where the response to a bar has one maximum ([steger98] sec. 2.2).
-pub(super) fn derivative<G: Grey>(image: G, x: i32, y: i32, s: &Setup) -> Peak {
+pub(super) fn derivative<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak {
     let n = direction(image, x, y, s);
     let base = background(image, x, y, n.0, n.1, s);
+    // The expansion holds within half a pixel: it starts at the pixel nearest to the centre of gravity.
+    let (m0, _) = guess(image, (x, y), n, base, s);
+    let (dx, dy) = ((m0 * n.0 + 0.5).floor() as i32, (m0 * n.1 + 0.5).floor() as i32);
+    let (cx, cy) = (x + dx, y + dy);
     let sigma = (s.s0 / 3f32.sqrt()).max(0.8);
     let (r, inverse) = ((3.5 * sigma).ceil() as i32, 1.0 / (sigma * sigma));
     let (mut d1, mut d2, mut smooth, mut noise) = (0f32, 0f32, 0f32, 0f32);
     let (mut top, mut saturated) = (0f32, false);
     for j in -r..=r {
         for i in -r..=r {
-            let level = image.at(x + i, y + j);
+            let level = image.at(cx + i, cy + j);
             let d = i as f32 * n.0 + j as f32 * n.1;
             let kernel = (-0.5 * inverse * (i * i + j * j) as f32).exp();
             let first = kernel * d * inverse;
@@ -54,10 +60,10 @@ pub(super) fn derivative<G: Grey>(image: G, x: i32, y: i32, s: &Setup) -> Peak {
             saturated |= level >= s.full_scale;
         }
     }
-    let m = if d2 < 0.0 { (-d1 / d2).clamp(-2.0 * s.s0, 2.0 * s.s0) } else { 0.0 };
+    let m = if d2 < 0.0 { (-d1 / d2).clamp(-s.s0, s.s0) } else { 0.0 };
     // For a Gaussian line the curvature over the value of the smoothed profile is -1 / (w² + sigma²).
     let width = (smooth / (-d2).max(1e-6) - sigma * sigma).max(0.0).sqrt();
-    finish(x, y, n, m, top.max(1.0), base, width, noise.sqrt() / (-d2).max(1e-6), saturated, s)
+    finish(cx, cy, n, m, top.max(1.0), base, width, noise.sqrt() / (-d2).max(1e-6), saturated, s)
 }
 
 #[allow(clippy::too_many_arguments)]
@@ -71,7 +77,7 @@ fn finish(
     width: f32,
     sigma: f32,
     saturated: bool,
-    s: &Setup,
+    s: &PeakFrame,
 ) -> Peak {
     Peak {
         u: x as f32 + m * nx,

@@ -3,13 +3,19 @@
 //! Frame and unit: image pixels (an integer is a pixel's centre), grey levels of the picture's depth.
 
 mod fit;
+mod frame;
 mod measure;
 mod methods;
+mod stage;
 
+pub use frame::{PeakFrame, UNIFORM};
 pub use measure::{Stripe, measure};
+pub(super) use stage::frame_of;
+pub use stage::{METHOD, SHARED, STAGE, apart, stage_twin};
 
 use crate::fault::{Fault, Result};
 use crate::raster::{Image, Pixels};
+use crate::stages::choose::ChooseParams;
 use rayon::prelude::*;
 
 /// How the centre across the stripe is found.
@@ -183,60 +189,6 @@ impl Peak {
     }
 }
 
-/// Sizes and noise figures that follow from the settings, computed once; also the shader's uniform.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Setup {
-    pub width: i32,
-    pub height: i32,
-    /// Expected sigma of the profile, px.
-    pub s0: f32,
-    pub full_scale: f32,
-    /// Variance of read noise; grey levels squared.
-    pub read2: f32,
-    /// Variance per grey level.
-    pub gain: f32,
-    pub speckle2: f32,
-    /// 1 / R², px⁻²; the weight along the stripe is (1 - t² / R²)², close to a Gaussian of sigma R / 2.4.
-    pub along_factor: f32,
-    /// Half window along the stripe, px, and its step: a wide stripe has light to spare.
-    pub reach_along: i32,
-    pub stride_along: i32,
-    /// Half window of the direction, px, its step and the lag of its differences.
-    pub reach: i32,
-    pub stride: i32,
-    pub lag: i32,
-    pub steps: u32,
-    pub method: Method,
-}
-
-impl Setup {
-    pub fn new(image: &Image, p: &PeakParams) -> Setup {
-        let scale = f32::from(image.full_scale()) / 255.0;
-        let s0 = p.width_px;
-        let radius = 2.4 * (p.along * s0).max(0.05);
-        let stride_along = (0.7 * s0).floor().max(1.0) as i32;
-        Setup {
-            width: image.width as i32,
-            height: image.height as i32,
-            s0,
-            full_scale: f32::from(image.full_scale()),
-            read2: p.read_noise * p.read_noise * scale * scale,
-            gain: p.gain * scale,
-            speckle2: p.speckle * p.speckle,
-            // One line across the stripe needs no fading.
-            along_factor: if p.along > 0.0 { 1.0 / (radius * radius) } else { 0.0 },
-            stride_along,
-            // Whole steps, so that the skeleton pixel's own column is among them.
-            reach_along: (radius / stride_along as f32).floor() as i32 * stride_along,
-            reach: (3.0 * s0).ceil() as i32,
-            stride: (0.7 * s0).floor().max(1.0) as i32,
-            lag: s0.round().max(1.0) as i32,
-            steps: p.steps,
-            method: p.method,
-        }
-    }
-}
-
 /// Grey levels with the border repeated, as f32.
 pub(crate) trait Grey: Copy + Sync {
     fn at(&self, x: i32, y: i32) -> f32;
@@ -259,28 +211,22 @@ impl<T: Copy + Sync + Into<f32>> Grey for View<'_, T> {
 
 /// CPU twin: one peak per skeleton pixel, in the order given. `skeleton` is packed x | y << 16.
 pub fn peaks(image: &Image, skeleton: &[u32], shot: u32, p: &PeakParams) -> Vec<Peak> {
-    let setup = Setup::new(image, p);
-    let (width, height) = (setup.width, setup.height);
-    match &image.pixels {
-        Pixels::U8(pixels) => each(View { pixels, width, height }, skeleton, shot, &setup),
-        Pixels::U16(pixels) => each(View { pixels, width, height }, skeleton, shot, &setup),
-    }
+    let size = (image.width, image.height, image.bits);
+    let frame = PeakFrame::new(size, 1, p, &ChooseParams::default(), [0.0, 1.0]);
+    let (width, height) = (frame.width, frame.height);
+    let each = |pixel: u32| match &image.pixels {
+        Pixels::U8(pixels) => one(View { pixels, width, height }, pixel, shot, &frame, p.method),
+        Pixels::U16(pixels) => one(View { pixels, width, height }, pixel, shot, &frame, p.method),
+    };
+    skeleton.par_iter().with_min_len(256).map(|&pixel| each(pixel)).collect()
 }
 
-fn each<G: Grey>(image: G, skeleton: &[u32], shot: u32, setup: &Setup) -> Vec<Peak> {
-    skeleton
-        .par_iter()
-        .with_min_len(256)
-        .map(|&pixel| {
-            let (x, y) = ((pixel & 0xffff) as i32, (pixel >> 16) as i32);
-            let mut peak = match setup.method {
-                Method::Gaussian => fit::gaussian(image, x, y, setup),
-                Method::Centroid => methods::centroid(image, x, y, setup),
-                Method::Derivative => methods::derivative(image, x, y, setup),
-            };
-            peak.pixel = pixel;
-            peak.shot = shot;
-            peak
-        })
-        .collect()
+fn one<G: Grey>(image: G, pixel: u32, shot: u32, frame: &PeakFrame, method: Method) -> Peak {
+    let (x, y) = ((pixel & 0xffff) as i32, (pixel >> 16) as i32);
+    let peak = match method {
+        Method::Gaussian => fit::gaussian(image, x, y, frame),
+        Method::Centroid => methods::centroid(image, x, y, frame),
+        Method::Derivative => methods::derivative(image, x, y, frame),
+    };
+    Peak { pixel, shot, ..peak }
 }

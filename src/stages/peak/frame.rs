@@ -1,0 +1,118 @@
+//! In: the pictures' layout, the settings of peaks and their choice. Out: the uniform block of the stages peak, lines,
+//! strongest and choose, every size worked out once. Frame and unit: pixels, grey levels of the picture's depth.
+
+use super::PeakParams;
+use crate::gpu::Field;
+use crate::stages::choose::ChooseParams;
+use crate::stages::frame::px_log2;
+
+/// The WGSL struct of the same name, shaders/shared/peaks.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct PeakFrame {
+    pub width: i32,
+    pub height: i32,
+    /// Words of one picture row, and of one picture.
+    pub pitch: u32,
+    pub shot_words: u32,
+    /// Expected sigma of the profile, px.
+    pub s0: f32,
+    pub full_scale: f32,
+    /// Variance of read noise; grey levels squared.
+    pub read2: f32,
+    /// Variance per grey level.
+    pub gain: f32,
+    pub speckle2: f32,
+    /// 1 / R², px⁻²; the weight along the stripe is (1 - t² / R²)², close to a Gaussian of sigma R / 2.4.
+    pub along_factor: f32,
+    /// Half window along the stripe, px, and its step: a wide stripe has light to spare.
+    pub reach_along: i32,
+    pub stride_along: i32,
+    /// Half window of the direction, px, its step and the lag of its differences.
+    pub reach: i32,
+    pub stride: i32,
+    pub lag: i32,
+    pub steps: u32,
+    /// Limits of the choice: grey levels, px, px, px, cosine.
+    pub faintest: f32,
+    pub narrowest: f32,
+    pub widest: f32,
+    pub uncertain: f32,
+    pub upright: f32,
+    pub across_u: f32,
+    pub across_v: f32,
+    pub cut_width: f32,
+    pub cut_amplitude: f32,
+    pub echo: f32,
+    /// Half window of lines, px.
+    pub echo_reach: i32,
+    /// Lines across the stripe in one picture; 1 where they are columns, 0 where they are rows.
+    pub lines: u32,
+    pub columns: u32,
+    /// Entries of the strongest peaks' list, all shots.
+    pub entries: u32,
+    pub reserved_0: u32,
+    pub reserved_1: u32,
+}
+
+pub const UNIFORM: (&str, &[Field], usize) = crate::stages::frame::uniform_fields!(PeakFrame: width, height, pitch, shot_words, s0, full_scale,
+    read2, gain, speckle2, along_factor, reach_along, stride_along, reach, stride, lag, steps, faintest, narrowest,
+    widest, uncertain, upright, across_u, across_v, cut_width, cut_amplitude, echo, echo_reach, lines, columns, entries,
+    reserved_0, reserved_1);
+
+impl PeakFrame {
+    /// `across`: unit image direction of depth ([`crate::stages::point::Optics::across`]).
+    pub fn new(
+        (width, height, bits): (u32, u32, u8),
+        shots: u32,
+        p: &PeakParams,
+        c: &ChooseParams,
+        across: [f32; 2],
+    ) -> PeakFrame {
+        let full_scale = ((1u32 << bits) - 1) as f32;
+        let scale = full_scale / 255.0;
+        let s0 = p.width_px;
+        let radius = 2.4 * (p.along * s0).max(0.05);
+        let stride_along = (0.7 * s0).floor().max(1.0) as i32;
+        let pitch = (width.div_ceil(32) * 32) >> px_log2(bits);
+        // Lines across the stripe are image columns, or rows where the laser lies the other way.
+        let columns = across[1].abs() >= across[0].abs();
+        let lines = if columns { width } else { height };
+        PeakFrame {
+            width: width as i32,
+            height: height as i32,
+            pitch,
+            shot_words: pitch * height,
+            s0,
+            full_scale,
+            read2: p.read_noise * p.read_noise * scale * scale,
+            gain: p.gain * scale,
+            speckle2: p.speckle * p.speckle,
+            // One line across the stripe needs no fading.
+            along_factor: if p.along > 0.0 { 1.0 / (radius * radius) } else { 0.0 },
+            // Whole steps, so that the skeleton pixel's own line is among them.
+            reach_along: (radius / stride_along as f32).floor() as i32 * stride_along,
+            stride_along,
+            reach: (3.0 * s0).ceil() as i32,
+            stride: (0.7 * s0).floor().max(1.0) as i32,
+            lag: s0.round().max(1.0) as i32,
+            steps: p.steps,
+            faintest: c.faintest * scale,
+            narrowest: c.narrowest * s0,
+            widest: c.widest * s0,
+            uncertain: c.uncertain * s0,
+            upright: c.steepest_deg.to_radians().cos(),
+            across_u: across[0],
+            across_v: across[1],
+            cut_width: c.cut_width * s0,
+            cut_amplitude: c.cut_amplitude,
+            echo: c.echo,
+            echo_reach: (c.echo_reach * s0 + 0.5).floor() as i32,
+            lines,
+            columns: u32::from(columns),
+            entries: lines * shots,
+            reserved_0: 0,
+            reserved_1: 0,
+        }
+    }
+}

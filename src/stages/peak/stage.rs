@@ -1,0 +1,111 @@
+//! In: the bindings of the peak stage as words. Out: the same bindings with the peaks filled in, by the CPU twin.
+//! Frame and unit: words; peaks in pixels and grey levels.
+
+use super::{Grey, Method, Peak, PeakFrame, frame, one};
+use crate::gpu::{Access::*, Binding, Stage};
+use crate::stages::frame::PX_LOG2;
+use rayon::prelude::*;
+
+/// Selects the method when the pipeline is built: 0 Gaussian, 1 centroid, 2 derivative.
+pub const METHOD: &str = "peak_method";
+
+pub const SHARED: &str = include_str!("../../../shaders/shared/peaks.wgsl");
+
+pub const STAGE: Stage = Stage {
+    name: "peak",
+    wgsl: include_str!("../../../shaders/peak.wgsl"),
+    shared: &[SHARED],
+    workgroup: [64, 1, 1],
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "image", access: Read },
+        Binding { name: "header", access: Read },
+        Binding { name: "points", access: Read },
+        Binding { name: "peaks", access: ReadWrite },
+    ],
+    uniform: frame::UNIFORM,
+    overrides: &[PX_LOG2, METHOD],
+};
+
+impl Method {
+    /// The value of the override [`METHOD`].
+    pub fn number(self) -> f64 {
+        match self {
+            Method::Gaussian => 0.0,
+            Method::Centroid => 1.0,
+            Method::Derivative => 2.0,
+        }
+    }
+}
+
+/// One picture of a batch, as packed for the GPU.
+#[derive(Clone, Copy)]
+struct Packed<'a> {
+    words: &'a [u32],
+    pitch: i32,
+    width: i32,
+    height: i32,
+    px_log2: u32,
+}
+
+impl Grey for Packed<'_> {
+    #[inline(always)]
+    fn at(&self, x: i32, y: i32) -> f32 {
+        let (x, y) = (x.clamp(0, self.width - 1), y.clamp(0, self.height - 1));
+        let bits = 32 >> self.px_log2;
+        let place = x as u32 & ((1 << self.px_log2) - 1);
+        let word = self.words[(y * self.pitch + (x >> self.px_log2)) as usize];
+        (word >> (place * bits) & ((1u32 << bits) - 1)) as f32
+    }
+}
+
+/// The peak frame's words in a twin's bindings.
+pub(crate) fn frame_of(b: &[Vec<u32>]) -> PeakFrame {
+    *bytemuck::from_bytes(bytemuck::cast_slice(&b[0]))
+}
+
+pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
+    let f = frame_of(b);
+    let value = |name: &str| overrides.iter().find(|o| o.0 == name).map_or(0.0, |o| o.1) as u32;
+    let px_log2 = value(PX_LOG2);
+    let method = [Method::Gaussian, Method::Centroid, Method::Derivative][value(METHOD) as usize];
+    let [_, image, header, points, peaks] = b else { unreachable!() };
+    let found: Vec<Peak> = points[..2 * header[3] as usize]
+        .par_chunks_exact(2)
+        .map(|p| {
+            let from = (p[1] * f.shot_words) as usize;
+            let words = &image[from..from + f.shot_words as usize];
+            let view = Packed { words, pitch: f.pitch as i32, width: f.width, height: f.height, px_log2 };
+            one(view, p[0], p[1], &f, method)
+        })
+        .collect();
+    let words: &[u32] = bytemuck::cast_slice(&found);
+    peaks[..words.len()].copy_from_slice(words);
+}
+
+/// Largest difference of two lists of peaks, in units of what is allowed for each number: position 0.01 px or a hundredth
+/// of its own sigma (what the light does not determine, rounding decides), width 1 %, stated sigma 2 %, amplitude and background 0.5 % or a hundredth of a grey level; everything else exact.
+pub fn apart(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
+    let (a, b) = (gpu.last().expect("peaks"), twin.last().expect("peaks"));
+    let (a, b): (&[Peak], &[Peak]) = (bytemuck::cast_slice(a), bytemuck::cast_slice(b));
+    let near = |x: f32, y: f32, relative: f32, least: f32| {
+        f64::from((x - y).abs() / (relative * x.abs().max(y.abs())).max(least))
+    };
+    a.iter().zip(b).fold(if a.len() == b.len() { 0.0 } else { f64::INFINITY }, |worst, (a, b)| {
+        let same = a.flags == b.flags && a.pixel == b.pixel && a.shot == b.shot;
+        let place = (0.01 * a.sigma_px.max(b.sigma_px)).max(0.01);
+        let d = [
+            near(a.u, b.u, 0.0, place),
+            near(a.v, b.v, 0.0, place),
+            near(a.normal_u, b.normal_u, 0.0, 1e-3),
+            near(a.normal_v, b.normal_v, 0.0, 1e-3),
+            near(a.amplitude, b.amplitude, 5e-3, 0.01),
+            near(a.background, b.background, 5e-3, 0.01),
+            near(a.width_px, b.width_px, 0.01, 1e-3),
+            near(a.sigma_px, b.sigma_px, 0.02, 1e-3),
+            near(a.snr, b.snr, 5e-3, 0.01),
+        ];
+        let numbers = d.into_iter().fold(worst, |w, d| if d.is_nan() { f64::INFINITY } else { w.max(d) });
+        if same { numbers } else { f64::INFINITY }
+    })
+}
