@@ -66,7 +66,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let row = id.x % 8u;
     for (var inside = u32(slot < listing[3]); inside > 0u; inside--) {
         let tile = list[slot];
-        for (var run = u32(latest(tile) > frame.step); run > 0u; run--) {
+        for (var run = u32(stamps[tile_index(tile)] > frame.step); run > 0u; run--) {
             let x = tile_x(tile);
             let y = 8u * tile_y(tile) + row;
             let rows = 8u * frame.tiles_y;
@@ -102,8 +102,21 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             deletable = select(0u, deletable, y > 0u && y + 1u < frame.height);
             gone &= here & deletable;
             after[own] = here & ~gone;
+            // A change wakes its own tile, and a neighbour only where it touches it.
             for (var changed = u32(gone != 0u); changed > 0u; changed--) {
-                stamps[tile_index(tile)] = frame.step + 3u;
+                let at = tile_index(tile);
+                let stamp = frame.step + 3u;
+                stamps[at] = stamp;
+                let to_left = select(0u, 1u, (gone & 1u) != 0u && x > 0u);
+                let to_right = select(0u, 1u, (gone >> 31u) != 0u && x + 1u < pitch);
+                stamps[at - to_left] = stamp;
+                stamps[at + to_right] = stamp;
+                let up_row = select(0u, pitch, row == 0u && y > 0u);
+                let down_row = select(0u, pitch, row == 7u && y + 1u < rows);
+                let beside = at - up_row + down_row;
+                stamps[beside] = stamp;
+                stamps[beside - to_left] = stamp;
+                stamps[beside + to_right] = stamp;
             }
         }
     }

@@ -9,84 +9,75 @@
 @group(0) @binding(3) var<storage, read_write> listing: Listing;
 @group(0) @binding(4) var<storage, read_write> list: array<u32>;
 
-// Statistics of block (x, y) of a shot; a block outside the picture repeats the border's pixels.
-fn block(x: i32, y: i32, shot: u32) -> vec4<u32> {
+// What a column of blocks gives to a window: the least sum of the window's rows over one block's width, and
+// the least sum of the window's rows over one column of pixels. Rows of blocks up to full_y away are covered
+// whole by the window of every pixel of the block, the rest_y rows that remain come from those up to reach_y.
+// Blocks outside the picture repeat the border's pixels.
+fn column_bound(x: i32, y: i32, shot: u32, full_y: i32, reach_y: i32, rest_y: u32) -> vec2<u32> {
     let blocks_x = i32(2u * frame.tiles_x);
     let blocks_y = i32(frame.tiles_y);
     let cx = clamp(x, 0, blocks_x - 1);
-    let cy = clamp(y, 0, blocks_y - 1);
-    let s = stats[(i32(shot) * blocks_y + cy) * blocks_x + cx];
-    let least = s.y >> 16u;
     let beside = x != cx;
-    let above = y != cy;
-    let sum = select(select(s.x, 16u * s.w, beside), select(8u * s.z, 128u * least, beside), above);
-    let row = select(s.z, 16u * least, beside);
-    let column = select(s.w, 8u * least, above);
-    return vec4(sum, s.y, row, column);
+    let base = i32(shot) * blocks_y;
+    var sum = 0u;
+    var columns = 0u;
+    var row = 0xffffffffu;
+    var least = 0xffffffffu;
+    for (var dy = -reach_y; dy <= reach_y; dy++) {
+        let cy = clamp(y + dy, 0, blocks_y - 1);
+        let s = stats[(base + cy) * blocks_x + cx];
+        let above = y + dy != cy;
+        let small = s.y >> 16u;
+        let block_row = select(s.z, small << 4u, beside);
+        let block_column = select(s.w, small << 3u, above);
+        let block_sum = select(select(s.x, s.w << 4u, beside), block_row << 3u, above);
+        let whole = abs(dy) <= full_y;
+        sum += select(0u, block_sum, whole);
+        columns += select(0u, block_column, whole);
+        row = min(row, select(block_row, 0xffffffffu, whole));
+        least = min(least, select(small, 0xffffffffu, whole));
+    }
+    return vec2(sum + rest_y * row, columns + rest_y * least);
 }
 
-// Lower bound on the sum of every window whose centre lies in the block.
-fn bound(x: i32, y: i32, shot: u32, go: bool) -> u32 {
+// Lower bounds on the sums of all windows whose centre lies in the left, and in the right block of a tile.
+fn bounds(x: i32, y: i32, shot: u32, go: bool) -> vec2<u32> {
     let r = i32(frame.size / 2u);
     let n = i32(frame.size);
-    // Blocks up to full_* away are covered whole by every such window, blocks up to reach_* in part.
     let full_x = select(-1, (r - 15) / 16, r >= 15);
     let full_y = select(-1, (r - 7) / 8, r >= 7);
     let reach_x = (r + 15) / 16;
     let reach_y = (r + 7) / 8;
-    let rest_x = u32(n - 16 * (2 * full_x + 1) * i32(full_x >= 0));
-    let rest_y = u32(n - 8 * (2 * full_y + 1) * i32(full_y >= 0));
-    var sum = 0u;
-    for (var dx = -full_x; dx <= select(-full_x - 1, full_x, go); dx++) {
-        for (var dy = -full_y; dy <= full_y; dy++) {
-            sum += block(x + dx, y + dy, shot).x;
-        }
-        var row = 0xffffffffu;
-        for (var dy = full_y + 1; dy <= reach_y; dy++) {
-            row = min(row, min(block(x + dx, y + dy, shot).z, block(x + dx, y - dy, shot).z));
-        }
-        sum += rest_y * row;
+    let rest_x = u32(n - select(0, 16 * (2 * full_x + 1), full_x >= 0));
+    let rest_y = u32(n - select(0, 8 * (2 * full_y + 1), full_y >= 0));
+    var sums = vec2(0u);
+    var columns = vec2(0xffffffffu);
+    for (var dx = -reach_x; dx <= select(-reach_x - 1, reach_x + 1, go); dx++) {
+        let column = column_bound(x + dx, y, shot, full_y, reach_y, rest_y);
+        let away = vec2(abs(dx), abs(dx - 1));
+        let whole = away <= vec2(full_x);
+        let part = away <= vec2(reach_x) & !whole;
+        sums += select(vec2(0u), vec2(column.x), whole);
+        columns = min(columns, select(vec2(0xffffffffu), vec2(column.y), part));
     }
-    for (var dy = -full_y; dy <= select(-full_y - 1, full_y, go); dy++) {
-        var column = 0xffffffffu;
-        for (var dx = full_x + 1; dx <= reach_x; dx++) {
-            column = min(column, min(block(x + dx, y + dy, shot).w, block(x - dx, y + dy, shot).w));
-        }
-        sum += rest_x * column;
-    }
-    var least = 0xffffu;
-    for (var dy = full_y + 1; dy <= select(full_y, reach_y, go); dy++) {
-        for (var dx = full_x + 1; dx <= reach_x; dx++) {
-            let a = min(block(x + dx, y + dy, shot).y, block(x - dx, y + dy, shot).y);
-            let b = min(block(x + dx, y - dy, shot).y, block(x - dx, y - dy, shot).y);
-            least = min(least, min(a, b) >> 16u);
-        }
-    }
-    return sum + rest_x * rest_y * least;
+    return sums + vec2(rest_x) * columns;
 }
 
-// Smallest pixel of all blocks that a window can touch: bounds any weighted mean.
+// Smallest pixel of all blocks that a window of the tile can touch: bounds any weighted mean.
 fn darkest(x: i32, y: i32, shot: u32, go: bool) -> u32 {
     let r = i32(frame.size / 2u);
     let reach_x = (r + 15) / 16;
     let reach_y = (r + 7) / 8;
+    let blocks_x = i32(2u * frame.tiles_x);
+    let blocks_y = i32(frame.tiles_y);
     var least = 0xffffu;
     for (var dy = -reach_y; dy <= select(-reach_y - 1, reach_y, go); dy++) {
-        for (var dx = -reach_x; dx <= reach_x; dx++) {
-            least = min(least, block(x + dx, y + dy, shot).y >> 16u);
+        let row = (i32(shot) * blocks_y + clamp(y + dy, 0, blocks_y - 1)) * blocks_x;
+        for (var dx = -reach_x; dx <= reach_x + 1; dx++) {
+            least = min(least, stats[row + clamp(x + dx, 0, blocks_x - 1)].y >> 16u);
         }
     }
     return least;
-}
-
-fn may_be_lit(x: i32, y: i32, shot: u32, wanted: bool) -> bool {
-    let largest = i32(block(x, y, shot).y & 0xffffu);
-    let bright = wanted && largest >= i32(frame.minimum);
-    let area = i32(frame.size * frame.size);
-    if (frame.flags & 4u) != 0u {
-        return bright && largest - frame.offset > i32(darkest(x, y, shot, bright));
-    }
-    return bright && area * (largest - frame.offset) > i32(bound(x, y, shot, bright)) + (area - 1) / 2;
 }
 
 @compute @workgroup_size(64)
@@ -103,8 +94,16 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     }
     let inside = id.x < tiles && (wanted != 0u || (frame.flags & 2u) == 0u);
     let all = (frame.flags & 1u) != 0u;
-    let lit = may_be_lit(i32(2u * x), i32(y), shot, inside && !all)
-        || may_be_lit(i32(2u * x) + 1, i32(y), shot, inside && !all);
+    let gaussian = (frame.flags & 4u) != 0u;
+    let block = row * 2u * frame.tiles_x + 2u * x;
+    let largest = vec2<i32>(vec2(stats[block].y, stats[block + 1u].y) & vec2(0xffffu));
+    let bright = largest >= vec2(i32(frame.minimum));
+    let go = inside && !all && any(bright);
+    let area = i32(frame.size * frame.size);
+    let mean = vec2<i32>(bounds(i32(2u * x), i32(y), shot, go && !gaussian)) + vec2((area - 1) / 2);
+    let over_mean = area * (largest - vec2(frame.offset)) > mean;
+    let over_any = largest - vec2(frame.offset) > vec2(i32(darkest(i32(2u * x), i32(y), shot, go && gaussian)));
+    let lit = any(select(over_mean, over_any, vec2(gaussian)) & bright);
     for (var once = u32(inside && (lit || all)); once > 0u; once--) {
         let at = atomicAdd(&listing.count, 1u);
         list[at] = tile_pack(x, y, shot);

@@ -22,6 +22,8 @@ pub mod stages;
 
 pub mod scan;
 
+pub mod bench;
+
 pub mod find;
 pub mod station;
 

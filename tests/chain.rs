@@ -85,6 +85,8 @@ fn one_stripe_lists_few_tiles() {
     let Some(device) = device() else { return };
     let mut config = ChainConfig::new(1280, 960, 8);
     config.shots = 1;
+    // Four sigmas above the background noise, as OpenCV defines it.
+    config.threshold = ThresholdParams { size: 31, offset: 8, minimum: 0, ..Default::default() };
     let image = stripe(1280, 960, 8, 2.5, 2, 9);
     let listed = check(&device, "one stripe", &config, &[image]);
     let tiles = 40 * 120;

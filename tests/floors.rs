@@ -20,6 +20,7 @@ const MAY: &[(&str, &[&str])] = &[
     ("calibrate", &["geometry", "raster", "solve", "camera", "robot", "recording", "rig"]),
     ("stages", &["geometry", "raster", "camera", "gpu"]),
     ("scan", &["geometry", "raster", "solve", "gpu", "camera", "robot", "recording", "rig", "stages"]),
+    ("bench", &["raster", "gpu", "stages", "scan"]),
     ("find", &["geometry", "raster", "solve", "gpu", "camera", "robot", "recording", "rig", "stages", "scan"]),
     (
         "station",
@@ -32,7 +33,7 @@ const MAY: &[(&str, &[&str])] = &[
         "cli",
         &[
             "geometry", "raster", "solve", "gpu", "camera", "robot", "recording", "rig", "simulate", "calibrate", "stages",
-            "scan", "find", "station",
+            "scan", "bench", "find", "station",
         ],
     ),
 ];

@@ -2,6 +2,7 @@
 //! Frame and unit: as the subcommands say; every number is printed with its unit.
 
 mod calibrate;
+mod bench;
 mod console;
 mod demo;
 mod doctor;
@@ -38,6 +39,7 @@ enum Command {
     /// Calibrate a station's camera, laser plane, pointer or hand-eye from a recording
     #[command(subcommand)]
     Calibrate(calibrate::Command),
+    Bench(bench::Args),
     Doctor(doctor::Args),
     Find(find::Args),
     Range(range::Args),
@@ -53,6 +55,7 @@ fn run(command: &Command, console: &Console) -> Result<()> {
     match command {
         Command::Demo(a) => demo::run(a, console),
         Command::Calibrate(c) => calibrate::run(c, console),
+        Command::Bench(a) => bench::run(a, console),
         Command::Doctor(a) => doctor::run(a, console),
         Command::Find(a) => find::run(a, console),
         Command::Range(a) => range::run(a, console),

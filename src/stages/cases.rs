@@ -262,6 +262,7 @@ impl<'a> Walk<'a> {
             ("active_list", vec![0; tiles]),
             ("weights", weights),
             ("quads", vec![0; 8 * tiles]),
+            ("columns", vec![0; 256 * tiles]),
             ("mask", vec![0; 8 * tiles]),
             ("other_mask", vec![0; 8 * tiles]),
             ("lit", vec![0; 8 * tiles]),
@@ -312,11 +313,13 @@ impl<'a> Walk<'a> {
         if f.flags & frame::GAUSSIAN != 0 {
             let names = ["image", "listing", "list", "weights", "quads"];
             self.step(&threshold::GAUSSIAN, threshold::stage_twin, &names, all);
+            let names = ["listing", "list", "quads", "roi", "mask", "lit", "stamps"];
+            self.step(&threshold::GATHER, threshold::gather_twin, &names, all);
         } else {
-            self.step(&threshold::MEAN, threshold::stage_twin, &["image", "listing", "list", "quads"], all);
+            self.step(&threshold::COLUMNS, threshold::columns_twin, &["image", "listing", "list", "columns"], all);
+            let names = ["image", "listing", "list", "columns", "roi", "mask", "lit", "stamps"];
+            self.step(&threshold::MEAN, threshold::mean_twin, &names, all);
         }
-        let names = ["listing", "list", "quads", "roi", "mask", "lit", "stamps"];
-        self.step(&threshold::GATHER, threshold::gather_twin, &names, all);
         self.buffers.insert("active", self.buffers["listing"].clone());
         self.buffers.insert("active_list", self.buffers["list"].clone());
         while self.buffers["active"][3] > 0 {

@@ -3,8 +3,8 @@
 
 pub mod ambient;
 pub mod cases;
-pub mod choose;
 pub mod chain;
+pub mod choose;
 mod entry;
 pub mod frame;
 pub mod lengthen;
@@ -41,7 +41,8 @@ pub fn all() -> Vec<Entry> {
         exact(&ambient::STAGE, ambient::twin, || cases::of("ambient")),
         exact(&stats::STAGE, stats::twin, || cases::of("stats")),
         unordered(&tiles::STAGE, tiles::twin, || cases::of("tiles")),
-        exact(&threshold::MEAN, threshold::stage_twin, || cases::of("threshold")),
+        exact(&threshold::COLUMNS, threshold::columns_twin, || cases::of("columns")),
+        exact(&threshold::MEAN, threshold::mean_twin, || cases::of("threshold")),
         Entry {
             compare: threshold::pixels_apart,
             limit: 1.0,

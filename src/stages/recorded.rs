@@ -25,7 +25,8 @@ pub struct Shared {
     list: Buffer,
     active_list: Buffer,
     weights: Buffer,
-    quads: Buffer,
+    /// Column sums of the mean window, or the Gaussian window's quads.
+    sums: Buffer,
     pub mask: Buffer,
     other_mask: Buffer,
     pub lit: Buffer,
@@ -45,7 +46,8 @@ pub struct Pipelines {
     stats: Pipeline,
     tiles: Pipeline,
     threshold: Pipeline,
-    gather: Pipeline,
+    /// Before the mean window's threshold its column sums; after the Gaussian one's the words of the mask.
+    spread: Pipeline,
     thin: Pipeline,
     compact: Pipeline,
     rebase: Pipeline,
@@ -69,7 +71,10 @@ impl Pipelines {
                 Window::Mean => &threshold::MEAN,
                 Window::Gaussian => &threshold::GAUSSIAN,
             })?,
-            gather: build(&threshold::GATHER)?,
+            spread: build(match config.threshold.window {
+                Window::Mean => &threshold::COLUMNS,
+                Window::Gaussian => &threshold::GATHER,
+            })?,
             thin: build(&thin::STAGE)?,
             compact: build(&listing::COMPACT)?,
             rebase: build(&listing::REBASE)?,
@@ -111,6 +116,7 @@ impl Shared {
             }
         };
         let rows = f.tiles_y * f.shots;
+        let gaussian = config.threshold.window == Window::Gaussian;
         Ok(Shared {
             uniforms,
             stats: words("stats", 8 * f.tiles())?,
@@ -120,7 +126,7 @@ impl Shared {
             list: words("list", f.tiles())?,
             active_list: words("active list", f.tiles())?,
             weights,
-            quads: words("quads", f.mask_words())?,
+            sums: words("sums", f.tiles() * if gaussian { 8 } else { 256 })?,
             mask: words("mask", f.mask_words())?,
             other_mask: words("other mask", f.mask_words())?,
             lit: words("lit", f.mask_words())?,
@@ -162,14 +168,15 @@ impl Shared {
         r.dispatch_parts(device, &p.stats, &[zero, whole(image), whole(&self.stats)], stats::groups(f));
         let tiles = [zero, whole(&self.stats), whole(&self.roi), self.all(), whole(&self.list)];
         r.dispatch_parts(device, &p.tiles, &tiles, tiles::groups(f));
-        let mut bindings = vec![zero, whole(image), self.all(), whole(&self.list)];
+        let (list, sums, roi) = (whole(&self.list), whole(&self.sums), whole(&self.roi));
+        let (image, stamps) = (whole(image), whole(&self.stamps));
         if p.threshold.stage.name == threshold::GAUSSIAN.name {
-            bindings.push(whole(&self.weights));
+            r.indirect(device, &p.threshold, &[zero, image, self.all(), list, whole(&self.weights), sums], all);
+            r.indirect(device, &p.spread, &[zero, self.all(), list, sums, roi, mask, lit, stamps], all);
+        } else {
+            r.indirect(device, &p.spread, &[zero, image, self.all(), list, sums], all);
+            r.indirect(device, &p.threshold, &[zero, image, self.all(), list, sums, roi, mask, lit, stamps], all);
         }
-        bindings.push(whole(&self.quads));
-        r.indirect(device, &p.threshold, &bindings, all);
-        let (list, quads, roi) = (whole(&self.list), whole(&self.quads), whole(&self.roi));
-        r.indirect(device, &p.gather, &[zero, self.all(), list, quads, roi, mask, lit, whole(&self.stamps)], all);
         r
     }
 

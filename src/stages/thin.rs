@@ -1,8 +1,8 @@
 //! In: a mask. Out: the mask thinned to lines one pixel wide, nothing left to delete.
 //! Frame and unit: pixels. Zhang and Suen 1984 [zhang84], Guo and Hall 1989 [guo89], as OpenCV has them.
 
-use super::frame::{self, ACTIVITY, PX_LOG2, SHARED, frame_of, tile_unpack};
-use super::listing::{latest, mask_index, tile_index};
+use super::frame::{self, PX_LOG2, SHARED, frame_of, tile_unpack};
+use super::listing::{mask_index, tile_index};
 use crate::gpu::{Access::*, Binding, Stage};
 use crate::raster::Mask;
 
@@ -10,7 +10,7 @@ use crate::raster::Mask;
 pub const STAGE: Stage = Stage {
     name: "thin",
     wgsl: include_str!("../../shaders/thin.wgsl"),
-    shared: &[SHARED, ACTIVITY],
+    shared: &[SHARED],
     workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
@@ -151,7 +151,7 @@ pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let [_, listing, list, before, after, stamps] = b else { unreachable!() };
     let former = stamps.clone();
     let words = f.tiles_x as usize;
-    for &tile in list[..listing[3] as usize].iter().filter(|&&t| latest(&f, &former, t) > f.step) {
+    for &tile in list[..listing[3] as usize].iter().filter(|&&t| former[tile_index(&f, t)] > f.step) {
         let (tx, ty, shot) = tile_unpack(tile);
         for row in 0..8 {
             let y = 8 * ty + row;
@@ -166,8 +166,17 @@ pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
             let p = neighbours([line(y - 1), line(y), line(y + 1)], tx as usize);
             let gone = before[own] & deletions(f.rule(), &p, f.step % 2 == 1) & interior(f.width, tx as usize);
             after[own] = before[own] & !gone;
+            // A change wakes its own tile, and a neighbour only where it touches it.
+            let near = |first: bool, last: bool, at: u32, n: u32| {
+                let from = if first && at > 0 { at - 1 } else { at };
+                from..=if last && at + 1 < n { at + 1 } else { at }
+            };
             if gone != 0 {
-                stamps[tile_index(&f, tile)] = f.step + 3;
+                for y in near(row == 0, row == 7, ty, f.tiles_y) {
+                    for x in near(gone & 1 == 1, gone >> 31 == 1, tx, f.tiles_x) {
+                        stamps[((shot * f.tiles_y + y) * f.tiles_x + x) as usize] = f.step + 3;
+                    }
+                }
             }
         }
     }

@@ -47,21 +47,17 @@ pub fn bound(f: &Frame, stats: &[u32], x: i32, y: i32, shot: u32) -> u32 {
     let (full_x, full_y) = (full(16), full(8));
     let (reach_x, reach_y) = ((r + 15) / 16, (r + 7) / 8);
     let partial = |full: i32, reach: i32| (-reach..=reach).filter(move |d| d.abs() > full);
-    let mut sum = 0;
-    for dx in -full_x..=full_x {
-        sum += (-full_y..=full_y).map(|dy| block(f, stats, x + dx, y + dy, shot)[0]).sum::<u32>();
-        let row = partial(full_y, reach_y).map(|dy| block(f, stats, x + dx, y + dy, shot)[3]).min().unwrap();
-        sum += rest(8, full_y) * row;
-    }
-    for dy in -full_y..=full_y {
-        let column = partial(full_x, reach_x).map(|dx| block(f, stats, x + dx, y + dy, shot)[4]).min().unwrap();
-        sum += rest(16, full_x) * column;
-    }
-    let corners = partial(full_y, reach_y).flat_map(|dy| partial(full_x, reach_x).map(move |dx| (dx, dy)));
-    let least = corners.map(|(dx, dy)| block(f, stats, x + dx, y + dy, shot)[2]).min().unwrap();
-    sum + rest(16, full_x) * rest(8, full_y) * least
+    // Sum over a block's width, and over one column of pixels, of the window's rows in the blocks at dx.
+    let column = |dx: i32, of: usize, edge: usize| {
+        let whole: u32 = (-full_y..=full_y).map(|dy| block(f, stats, x + dx, y + dy, shot)[of]).sum();
+        let rest_row = partial(full_y, reach_y).map(|dy| block(f, stats, x + dx, y + dy, shot)[edge]).min().unwrap();
+        whole + rest(8, full_y) * rest_row
+    };
+    let whole: u32 = (-full_x..=full_x).map(|dx| column(dx, 0, 3)).sum();
+    whole + rest(16, full_x) * partial(full_x, reach_x).map(|dx| column(dx, 4, 2)).min().unwrap()
 }
 
+/// Block x of a tile (its left one is even).
 fn may_be_lit(f: &Frame, stats: &[u32], x: i32, y: i32, shot: u32) -> bool {
     let [_, largest, ..] = block(f, stats, x, y, shot);
     let reach = |edge: i32| ((f.size / 2) as i32 + edge - 1) / edge;
@@ -69,8 +65,8 @@ fn may_be_lit(f: &Frame, stats: &[u32], x: i32, y: i32, shot: u32) -> bool {
         return false;
     }
     if f.flags & GAUSSIAN != 0 {
-        let near = (-reach(8)..=reach(8)).flat_map(|dy| (-reach(16)..=reach(16)).map(move |dx| (dx, dy)));
-        let darkest = near.map(|(dx, dy)| block(f, stats, x + dx, y + dy, shot)[2]).min().unwrap();
+        let near = (-reach(8)..=reach(8)).flat_map(|dy| (-reach(16)..=reach(16) + 1).map(move |dx| (dx, dy)));
+        let darkest = near.map(|(dx, dy)| block(f, stats, x / 2 * 2 + dx, y + dy, shot)[2]).min().unwrap();
         return largest as i32 - f.offset > darkest as i32;
     }
     let area = (f.size * f.size) as i32;

@@ -1,0 +1,227 @@
+"""In: pictures made here. Out: how long OpenCV's chain, a column centroid, a Steger chain and Sheetlight take
+for the same pictures, in turns within one run, and whether Sheetlight's masks are OpenCV's, pixel for pixel.
+Unit: milliseconds a shot, medians over the rounds; ratios are medians of the rounds' ratios.
+
+    make bench-peers            (or: python compare.py --sheetlight target/release/sheetlight)
+"""
+import argparse, json, os, subprocess, sys, time
+import cv2
+import numba
+import numpy as np
+
+SIZE, OFFSET = 31, 8
+LENS = np.array([-0.118, 0.086, 0.00062, -0.00041, -0.017])
+
+
+def pictures(width, height, count, scene):
+    """Curved Gaussian stripe, shot and read noise, a few reflections."""
+    out = []
+    x = np.arange(width)
+    y = np.arange(height)[:, None]
+    for seed in range(count):
+        rng = np.random.default_rng(seed)
+        sigma = 6.0 if scene == "thick" else 2.5
+        centre = height * (0.5 + 0.2 * np.sin(5 * x / width + seed)) + np.where(x > 0.6 * width, 0.1 * height, 0)
+        v = 170 * np.exp(-0.5 * ((y - centre) / sigma) ** 2)
+        for _ in range(60 if scene == "reflections" else 3):
+            bx, by, r = rng.integers(width), rng.integers(height), rng.uniform(2, 10)
+            v += 220 * np.exp(-0.5 * ((x - bx) ** 2 + (y - by) ** 2) / r**2) if width * height < 2e6 else 0
+            if width * height >= 2e6:
+                x0, x1, y0, y1 = max(bx - 40, 0), bx + 40, max(by - 40, 0), by + 40
+                v[y0:y1, x0:x1] += 220 * np.exp(
+                    -0.5 * ((x[x0:x1] - bx) ** 2 + (y[y0:y1] - by) ** 2) / r**2)
+        noise = 7.0 if scene == "noise" else 2.0
+        v += 10 + (20 if scene == "noise" else 0)
+        v += rng.standard_normal(v.shape) * np.sqrt(noise**2 + 0.05 * v)
+        out.append(np.clip(np.rint(v), 0, 255).astype(np.uint8))
+    return out
+
+
+def camera(width, height):
+    return np.array([[0.96 * width, 0, width / 2], [0, 0.96 * width, height / 2], [0, 0, 1.0]])
+
+
+def plane(rays):
+    """Rays to points on a fixed laser plane, mm."""
+    normal, offset = np.array([0.0, 0.8, 0.6]), 90.0
+    return rays * (offset / (rays @ normal))[:, None]
+
+
+def opencv(image, k):
+    lit = cv2.adaptiveThreshold(image, 255, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY, SIZE, -OFFSET)
+    thin = cv2.ximgproc.thinning(lit, thinningType=cv2.ximgproc.THINNING_ZHANGSUEN)
+    px = cv2.findNonZero(thin)
+    rays = cv2.undistortPoints(px.astype(np.float32), k, LENS).reshape(-1, 2)
+    points = plane(np.column_stack([rays, np.ones(len(rays))]))
+    return lit, thin, points
+
+
+@numba.njit(cache=True, parallel=True)
+def centroid(image, least):
+    height, width = image.shape
+    out = np.zeros(width)
+    blocks = (width + 63) // 64
+    for b in numba.prange(blocks):
+        x0, x1 = b * 64, min(b * 64 + 64, width)
+        best = np.zeros(64, np.int64)
+        at = np.zeros(64, np.int64)
+        for y in range(height):
+            for x in range(x0, x1):
+                v = image[y, x]
+                if v > best[x - x0]:
+                    best[x - x0] = v
+                    at[x - x0] = y
+        for x in range(x0, x1):
+            s, m = 0.0, 0.0
+            if best[x - x0] >= least:
+                for y in range(max(at[x - x0] - 8, 0), min(at[x - x0] + 9, height)):
+                    s += image[y, x]
+                    m += float(image[y, x]) * y
+                out[x] = m / s
+    return out
+
+
+@numba.njit(cache=True, parallel=True)
+def ridge(gx, gy, gxx, gxy, gyy, least):
+    """Steger 1998: sub-pixel zero of the derivative across the stripe."""
+    height, width = gx.shape
+    out = np.zeros((height, width), np.uint8)
+    for y in numba.prange(1, height - 1):
+        for x in range(1, width - 1):
+            a, b, c = gxx[y, x], gxy[y, x], gyy[y, x]
+            d = 0.5 * (a - c)
+            q = np.sqrt(d * d + b * b)
+            low = 0.5 * (a + c) - q
+            if low > -least:
+                continue
+            nx, ny = b, low - a
+            l = np.sqrt(nx * nx + ny * ny)
+            if l == 0:
+                continue
+            nx, ny = nx / l, ny / l
+            t = -(gx[y, x] * nx + gy[y, x] * ny) / low
+            if abs(t * nx) <= 0.5 and abs(t * ny) <= 0.5:
+                out[y, x] = 1
+    return out
+
+
+def steger(image, sigma=2.5):
+    f = cv2.GaussianBlur(image.astype(np.float32), (0, 0), sigma)
+    gx, gy = cv2.Sobel(f, cv2.CV_32F, 1, 0, scale=1 / 8), cv2.Sobel(f, cv2.CV_32F, 0, 1, scale=1 / 8)
+    gxx, gyy = cv2.Sobel(f, cv2.CV_32F, 2, 0, scale=1 / 4), cv2.Sobel(f, cv2.CV_32F, 0, 2, scale=1 / 4)
+    gxy = cv2.Sobel(f, cv2.CV_32F, 1, 1, scale=1 / 4)
+    return cv2.findNonZero(ridge(gx, gy, gxx, gxy, gyy, 4.0))
+
+
+@numba.njit(cache=True)
+def plain_read(words):
+    s = np.uint64(0)
+    for w in words:
+        s += w
+    return s
+
+
+class Sheetlight:
+    def __init__(self, program, images, batch):
+        height, width = images[0].shape
+        self.shape = (height, width)
+        self.pipe = subprocess.Popen([program, "bench", "--peer-pipe"], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        setup = dict(width=width, height=height, count=len(images), shots_per_batch=batch, size=SIZE, offset=OFFSET)
+        self.pipe.stdin.write(json.dumps(setup).encode() + b"\n")
+        for image in images:
+            self.pipe.stdin.write(image.tobytes())
+        self.pipe.stdin.flush()
+        self.adapter = json.loads(self.pipe.stdout.readline())["ready"]
+
+    def ask(self, command):
+        self.pipe.stdin.write(json.dumps(command).encode() + b"\n")
+        self.pipe.stdin.flush()
+
+    def run(self, times):
+        self.ask({"run": times})
+        return json.loads(self.pipe.stdout.readline())
+
+    def masks(self, i):
+        self.ask({"masks": i})
+        n = self.shape[0] * self.shape[1]
+        read = lambda: np.frombuffer(self.pipe.stdout.read(n), np.uint8).reshape(self.shape)
+        return read(), read()
+
+    def close(self):
+        self.ask("quit")
+        self.pipe.wait()
+
+
+def clock(f, times=1):
+    wall, cpu = time.perf_counter(), time.process_time()
+    for _ in range(times):
+        f()
+    return (time.perf_counter() - wall) * 1e3 / times, (time.process_time() - cpu) * 1e3 / times
+
+
+def compare(program, width, height, scene, rounds):
+    count = 16 if width * height < 5e5 else 4 if width * height < 5e6 else 2
+    batch = 16 if width * height < 5e5 else 4 if width * height < 5e6 else 1
+    images = pictures(width, height, count, scene)
+    k = camera(width, height)
+    ours = Sheetlight(program, images, batch)
+    wrong_lit = wrong_thin = 0
+    for i, image in enumerate(images[:2]):
+        lit, thin, _ = opencv(image, k)
+        our_lit, our_thin = ours.masks(i)
+        wrong_lit += int(np.count_nonzero(lit != our_lit))
+        wrong_thin += int(np.count_nonzero(thin != our_thin))
+    centroid(images[0], 40), steger(images[0]), plain_read(images[0].view(np.uint64).ravel())
+    times = {n: [] for n in ["opencv", "centroid", "steger", "sheetlight", "sheetlight_cpu", "read"]}
+    turns = max(1, int(100 / (count * (width * height / 1e6) + 1)))
+    for r in range(rounds):
+        image = images[r % count]
+        words = image.view(np.uint64).ravel()
+        times["opencv"].append(clock(lambda: opencv(image, k))[0])
+        answer = ours.run(turns)
+        times["sheetlight"].append(answer["wall_s"] * 1e3 / answer["shots"])
+        times["sheetlight_cpu"].append(answer["cpu_s"] * 1e3 / answer["shots"])
+        times["centroid"].append(clock(lambda: centroid(image, 40), 3)[0])
+        times["steger"].append(clock(lambda: steger(image))[0])
+        times["read"].append(clock(lambda: plain_read(words), 10)[1])
+    ours.close()
+    median = {n: float(np.median(t)) for n, t in times.items()}
+    ratio = lambda a, b: float(np.median(np.array(times[a]) / np.array(times[b])))
+    return dict(
+        size=f"{width}x{height}", scene=scene, batch=batch, rounds=rounds, ms=median, adapter=ours.adapter,
+        opencv_over_ours=ratio("opencv", "sheetlight"), steger_over_ours=ratio("steger", "sheetlight"),
+        centroid_over_ours=ratio("centroid", "sheetlight"), cpu_over_plain_read=ratio("sheetlight_cpu", "read"),
+        lit_pixels_apart=wrong_lit, skeleton_pixels_apart=wrong_thin)
+
+
+def main():
+    here = os.path.dirname(os.path.abspath(__file__))
+    p = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    p.add_argument("--sheetlight", default=os.path.join(here, "../../target/release/sheetlight"))
+    p.add_argument("--size", action="append", help="WIDTHxHEIGHT, may be repeated")
+    p.add_argument("--scene", action="append", choices=["stripe", "thick", "noise", "reflections"])
+    p.add_argument("--rounds", type=int, default=7)
+    p.add_argument("--save", help="file for the figures as JSON")
+    args = p.parse_args()
+    rows = []
+    print(f"{'size':10} {'scene':12} {'OpenCV':>9} {'Steger':>9} {'centroid':>9} {'ours':>9} {'our CPU':>9} {'read':>7}"
+          f" {'OpenCV/ours':>12} {'CPU/read':>9}  masks")
+    for size in args.size or ["640x480", "1280x960", "4096x3072", "5120x5120"]:
+        width, height = map(int, size.split("x"))
+        for scene in args.scene or ["stripe"]:
+            r = compare(args.sheetlight, width, height, scene, args.rounds)
+            rows.append(r)
+            m = r["ms"]
+            same = "identical" if r["lit_pixels_apart"] + r["skeleton_pixels_apart"] == 0 else \
+                f"DIFFER in {r['lit_pixels_apart']} lit, {r['skeleton_pixels_apart']} skeleton pixels"
+            print(f"{size:10} {scene:12} {m['opencv']:9.2f} {m['steger']:9.2f} {m['centroid']:9.2f}"
+                  f" {m['sheetlight']:9.3f} {m['sheetlight_cpu']:9.3f} {m['read']:7.3f}"
+                  f" {r['opencv_over_ours']:11.1f}x {r['cpu_over_plain_read']:8.1f}x  {same}", flush=True)
+    if args.save:
+        with open(args.save, "w") as f:
+            json.dump(rows, f, indent=1)
+    sys.exit(any(r["lit_pixels_apart"] + r["skeleton_pixels_apart"] for r in rows))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,12 @@
+//! In: picture sizes and scenes. Out: how fast the chain is on this machine, stage by stage, against what
+//! its memory and its upload path could carry. Frame and unit: seconds, pixels, bytes, 1e9 bytes a second.
+
+mod machine;
+mod peer;
+mod run;
+mod scenes;
+
+pub use machine::{Ceilings, cpu_seconds, peak_memory_bytes};
+pub use peer::serve;
+pub use run::{BenchOptions, Latency, Report, Row, Stage, run, table};
+pub use scenes::{Scene, pictures};

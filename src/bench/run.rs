@@ -1,0 +1,301 @@
+//! In: options. Out: one row a size and scene: time a shot, throughput, shares of the ceilings, latency,
+//! memory, stage times. Frame and unit: as the fields say.
+
+use super::machine::{self, Ceilings};
+use super::scenes::{Scene, pictures};
+use crate::fault::{Fault, Result};
+use crate::gpu::{AdapterInfo, Device};
+use crate::raster::Image;
+use crate::stages::chain::{Chain, ChainConfig};
+use crate::stages::{ThresholdParams, Window};
+use std::collections::VecDeque;
+use std::time::Instant;
+
+/// What is measured.
+#[derive(Clone, Debug)]
+pub struct BenchOptions {
+    /// Picture sizes, px.
+    pub sizes: Vec<(u32, u32)>,
+    pub scenes: Vec<Scene>,
+    /// Seconds a row runs, 0.1..=600; longer is steadier.
+    pub seconds: f64,
+}
+
+impl Default for BenchOptions {
+    fn default() -> Self {
+        BenchOptions {
+            sizes: vec![(640, 480), (1280, 960), (4096, 3072), (5120, 5120)],
+            scenes: Scene::ALL.to_vec(),
+            seconds: 2.0,
+        }
+    }
+}
+
+impl BenchOptions {
+    pub fn check(&self) -> Result<()> {
+        if !(0.1..=600.0).contains(&self.seconds) {
+            return Err(Fault::usage(format!("{} seconds a row, 0.1 to 600 are possible", self.seconds)));
+        }
+        if self.sizes.is_empty() || self.scenes.is_empty() {
+            return Err(Fault::usage("0 sizes or 0 scenes to measure, 1 or more needed"));
+        }
+        Ok(())
+    }
+}
+
+/// GPU time of one stage, all its dispatches of a batch together, a shot.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Stage {
+    pub name: String,
+    pub ms_per_shot: f64,
+    pub dispatches: usize,
+}
+
+/// Time from handing over a single shot until its points are there, nothing else under way.
+#[derive(Clone, Copy, Debug, serde::Serialize)]
+pub struct Latency {
+    pub p50_ms: f64,
+    pub p99_ms: f64,
+}
+
+/// One size and scene.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Row {
+    pub width: u32,
+    pub height: u32,
+    pub scene: Scene,
+    pub shots_per_batch: u32,
+    pub shots: usize,
+    /// Wall time a shot, median over the batches in steady state.
+    pub ms_per_shot: f64,
+    pub shots_per_s: f64,
+    pub mpx_per_s: f64,
+    /// CPU time of all threads a shot; on a software adapter the GPU's work is in it.
+    pub cpu_ms_per_shot: Option<f64>,
+    /// That, against one thread reading the same bytes once.
+    pub cpu_over_plain_read: Option<f64>,
+    /// Bytes that the stages move a pixel, from the buffers' sizes and the listed tiles.
+    pub bytes_per_px: f64,
+    /// Share of the memory ceiling (all threads) and of the upload ceiling that is reached.
+    pub share_of_memory: f64,
+    pub share_of_upload: Option<f64>,
+    pub points_per_shot: f64,
+    /// Share of the tiles that could not be proven dark.
+    pub listed: f64,
+    pub latency: Latency,
+    pub gpu_memory_mb: f64,
+    pub host_peak_mb: Option<f64>,
+    pub stages: Vec<Stage>,
+}
+
+/// Everything that one run of the bench tells.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Report {
+    pub version: &'static str,
+    pub adapter: AdapterInfo,
+    pub threads: usize,
+    pub ceilings: Ceilings,
+    pub rows: Vec<Row>,
+}
+
+/// Measures on the given device. `progress` hears the row that begins.
+pub fn run(device: &Device, options: &BenchOptions, mut progress: impl FnMut(&str)) -> Result<Report> {
+    options.check()?;
+    let ceilings = Ceilings::measure(Some(device))?;
+    let mut rows = Vec::new();
+    for &(width, height) in &options.sizes {
+        for &scene in &options.scenes {
+            progress(&format!("{width}x{height}, {}", scene.name()));
+            rows.push(row(device, width, height, scene, options, &ceilings)?);
+        }
+    }
+    let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
+    Ok(Report { version: env!("CARGO_PKG_VERSION"), adapter: device.info.clone(), threads, ceilings, rows })
+}
+
+/// OpenCV's definition, four sigmas above the scenes' background noise.
+const THRESHOLD: ThresholdParams = ThresholdParams { window: Window::Mean, size: 31, offset: 8, minimum: 0 };
+
+/// Percentile of times in seconds, as ms.
+fn percentile(times: &mut [f64], p: f64) -> f64 {
+    times.sort_by(f64::total_cmp);
+    1e3 * times[((times.len() - 1) as f64 * p).round() as usize]
+}
+
+fn row(
+    device: &Device,
+    width: u32,
+    height: u32,
+    scene: Scene,
+    options: &BenchOptions,
+    ceilings: &Ceilings,
+) -> Result<Row> {
+    let before = device.allocated_bytes();
+    let config = ChainConfig { threshold: THRESHOLD, ..ChainConfig::new(width, height, 8) };
+    let images = pictures(scene, width, height, (2 * config.shots).min(16).max(3));
+    let refs: Vec<&Image> = images.iter().collect();
+    let batch_of =
+        |n: usize| -> Vec<&Image> { (0..config.shots as usize).map(|i| refs[(n + i) % refs.len()]).collect() };
+    let mut chain = Chain::new(device, &config)?;
+    let gpu_memory = device.allocated_bytes() - before;
+    // Compiles every pipeline and touches every page.
+    for n in 0..3 {
+        chain.submit(n, &batch_of(n as usize))?;
+    }
+    while chain.collect(true)?.is_some() {}
+
+    let (mut n, mut shots, mut points, mut listed) = (0usize, 0usize, 0usize, 0u64);
+    let mut per_batch = Vec::new();
+    let cpu = machine::cpu_seconds();
+    let start = Instant::now();
+    let mut last = start;
+    while start.elapsed().as_secs_f64() < options.seconds || per_batch.len() < 5 {
+        while chain.has_room() {
+            chain.submit(n as u64, &batch_of(n))?;
+            n += 1;
+        }
+        let batch = chain.collect(true)?.expect("under way");
+        shots += config.shots as usize;
+        points += batch.points.len();
+        listed += u64::from(batch.listed_tiles);
+        per_batch.push(last.elapsed().as_secs_f64());
+        last = Instant::now();
+    }
+    while chain.collect(true)?.is_some() {
+        shots += config.shots as usize;
+    }
+    let cpu_ms = cpu.and_then(|c| Some(1e3 * (machine::cpu_seconds()? - c) / shots as f64));
+    let batches = per_batch.len() as f64;
+    let ms_per_shot = percentile(&mut per_batch, 0.5) / f64::from(config.shots);
+
+    let mut single = Chain::new(device, &ChainConfig { shots: 1, slots: 1, ..config.clone() })?;
+    single.submit(0, &refs[..1])?;
+    single.collect(true)?;
+    let mut waits = Vec::new();
+    let start = Instant::now();
+    while start.elapsed().as_secs_f64() < options.seconds / 2.0 || waits.len() < 5 {
+        let one = Instant::now();
+        single.submit(0, &refs[waits.len() % refs.len()..][..1])?;
+        single.collect(true)?;
+        waits.push(one.elapsed().as_secs_f64());
+    }
+    let latency = Latency { p50_ms: percentile(&mut waits.clone(), 0.5), p99_ms: percentile(&mut waits, 0.99) };
+    drop(single);
+
+    let px = f64::from(width) * f64::from(height);
+    let tiles = f64::from(chain.frame.tiles());
+    let listed = listed as f64 / batches / tiles;
+    // Written at upload, read once by the statistics; 32 bytes a tile of them written and read by 3 x 5 blocks
+    // out of the cache; a listed tile's surroundings and masks.
+    let bytes_per_px = 2.0 + 64.0 / 256.0 + listed * (62.0 * 38.0 / 256.0 + 1.0);
+    let mpx = px / (ms_per_shot * 1e3);
+    let gb_s = mpx * 1e6 * bytes_per_px / 1e9;
+    Ok(Row {
+        width,
+        height,
+        scene,
+        shots_per_batch: config.shots,
+        shots,
+        ms_per_shot,
+        shots_per_s: 1e3 / ms_per_shot,
+        mpx_per_s: mpx,
+        cpu_ms_per_shot: cpu_ms,
+        cpu_over_plain_read: cpu_ms.map(|ms| ms * 1e-3 / (px / (ceilings.read_gb_s * 1e9))),
+        bytes_per_px,
+        share_of_memory: gb_s / ceilings.read_all_gb_s,
+        share_of_upload: ceilings.upload_gb_s.map(|u| mpx * 1e6 / 1e9 / u),
+        points_per_shot: points as f64 / (batches * f64::from(config.shots)),
+        listed,
+        latency,
+        gpu_memory_mb: gpu_memory as f64 / 1e6,
+        host_peak_mb: machine::peak_memory_bytes().map(|b| b as f64 / 1e6),
+        stages: stage_times(device, &config, &batch_of(0))?,
+    })
+}
+
+/// GPU timestamps of one batch, the median of five, summed over the dispatches of a stage.
+fn stage_times(device: &Device, config: &ChainConfig, batch: &[&Image]) -> Result<Vec<Stage>> {
+    let mut chain = Chain::new(device, &ChainConfig { timed: true, ..config.clone() })?;
+    let mut runs = VecDeque::new();
+    for _ in 0..6 {
+        chain.submit(0, batch)?;
+        chain.collect(true)?;
+        runs.push_back(chain.times()?);
+    }
+    runs.pop_front();
+    let mut stages: Vec<Stage> = Vec::new();
+    for i in 0..runs[0].len() {
+        let mut times: Vec<f64> = runs.iter().map(|r| r[i].seconds).collect();
+        let ms = percentile(&mut times, 0.5) / f64::from(config.shots);
+        let name = runs[0][i].label;
+        match stages.iter_mut().find(|s| s.name == name) {
+            Some(s) => {
+                s.ms_per_shot += ms;
+                s.dispatches += 1;
+            }
+            None => stages.push(Stage { name: name.into(), ms_per_shot: ms, dispatches: 1 }),
+        }
+    }
+    Ok(stages)
+}
+
+/// The report as a table that a person reads.
+pub fn table(report: &Report) -> String {
+    use std::fmt::Write;
+    let mut out = String::new();
+    let c = &report.ceilings;
+    let a = &report.adapter;
+    let _ = writeln!(out, "{} ({}), {}, {} threads", a.name, a.kind, a.driver, report.threads);
+    let _ = writeln!(
+        out,
+        "plain read {:.1} GB/s on one thread, {:.1} on all; upload {:.1}, readback {:.1} GB/s",
+        c.read_gb_s,
+        c.read_all_gb_s,
+        c.upload_gb_s.unwrap_or(f64::NAN),
+        c.readback_gb_s.unwrap_or(f64::NAN)
+    );
+    let _ = writeln!(
+        out,
+        "{:11} {:16} {:>5} {:>8} {:>8} {:>8} {:>8} {:>7} {:>7} {:>7} {:>7} {:>8} {:>8}",
+        "size",
+        "scene",
+        "batch",
+        "ms/shot",
+        "shots/s",
+        "Mpx/s",
+        "CPU ms",
+        "x read",
+        "memory",
+        "upload",
+        "tiles",
+        "p50 ms",
+        "p99 ms"
+    );
+    for r in &report.rows {
+        let _ = writeln!(
+            out,
+            "{:11} {:16} {:>5} {:>8.3} {:>8.1} {:>8.0} {:>8.2} {:>7.1} {:>6.1}% {:>6.1}% {:>6.1}% {:>8.2} {:>8.2}",
+            format!("{}x{}", r.width, r.height),
+            r.scene.name(),
+            r.shots_per_batch,
+            r.ms_per_shot,
+            r.shots_per_s,
+            r.mpx_per_s,
+            r.cpu_ms_per_shot.unwrap_or(f64::NAN),
+            r.cpu_over_plain_read.unwrap_or(f64::NAN),
+            100.0 * r.share_of_memory,
+            100.0 * r.share_of_upload.unwrap_or(f64::NAN),
+            100.0 * r.listed,
+            r.latency.p50_ms,
+            r.latency.p99_ms
+        );
+    }
+    for r in &report.rows {
+        let _ = write!(out, "{}x{} {}: GPU ms a shot:", r.width, r.height, r.scene.name());
+        for s in &r.stages {
+            let _ = write!(out, " {} {:.3}", s.name, s.ms_per_shot);
+        }
+        let _ = writeln!(out);
+    }
+    out
+}

@@ -1,0 +1,50 @@
+//! In: a size and the name of a scene. Out: pictures of it, the same on every machine.
+//! Frame and unit: pixels, grey levels.
+
+use crate::raster::Image;
+use crate::stages::cases::{Noise, drawn, stripe};
+
+/// What the pictures show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Scene {
+    /// One curved stripe, sigma 2.5 px, a few reflections, read and shot noise.
+    OneStripe,
+    /// The same, sigma 6 px.
+    ThickStripe,
+    /// A stripe in noise so dense that a tenth of all pixels is lit.
+    NoiseHeavy,
+    /// A stripe and 60 bright spots.
+    ReflectionHeavy,
+}
+
+impl Scene {
+    pub const ALL: [Scene; 4] = [Scene::OneStripe, Scene::ThickStripe, Scene::NoiseHeavy, Scene::ReflectionHeavy];
+    pub fn name(self) -> &'static str {
+        match self {
+            Scene::OneStripe => "one stripe",
+            Scene::ThickStripe => "thick stripe",
+            Scene::NoiseHeavy => "noise-heavy",
+            Scene::ReflectionHeavy => "reflection-heavy",
+        }
+    }
+}
+
+/// `count` different 8-bit pictures of a scene.
+pub fn pictures(scene: Scene, width: u32, height: u32, count: u32) -> Vec<Image> {
+    (0..u64::from(count))
+        .map(|seed| match scene {
+            Scene::OneStripe => stripe(width, height, 8, 2.5, 3, seed),
+            Scene::ThickStripe => stripe(width, height, 8, 6.0, 3, seed),
+            Scene::ReflectionHeavy => stripe(width, height, 8, 2.5, 60, seed),
+            Scene::NoiseHeavy => {
+                let clean = stripe(width, height, 8, 2.5, 3, seed);
+                let mut noise = Noise(seed + 100);
+                // Sigma 7 levels: an offset of 8 levels is passed by about a tenth of the pixels.
+                drawn(width, height, 8, |x, y| {
+                    (f64::from(clean.get(x, y)) + 20.0 + 7.0 * noise.normal()).round().clamp(0.0, 255.0) as u32
+                })
+            }
+        })
+        .collect()
+}
