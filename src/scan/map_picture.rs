@@ -108,9 +108,10 @@ fn span(values: &[f32], what: Shown) -> (f32, f32) {
     }
     sorted.sort_unstable_by(f32::total_cmp);
     let at = |q: f64| sorted[((sorted.len() - 1) as f64 * q).round() as usize];
-    let low = if what == Shown::Height { at(0.005) } else { 0.0 };
-    let high = at(0.995);
-    (low, if high > low { high } else { low + 1.0 })
+    let (low, high) = (if what == Shown::Height { at(0.005) } else { 0.0 }, at(0.995));
+    let high = if high > low { high } else { low + 1.0 };
+    // The lowest tenth of the colours is nearly black: a plate that fills the map shall not be lost in it.
+    (if what == Shown::Height { low - 0.12 * (high - low) } else { low }, high)
 }
 
 fn shaded(c: Rgb, light: f32) -> Rgb {

@@ -21,16 +21,17 @@ pub fn colour(fate: Reject) -> Rgb {
     }
 }
 
-/// Rows kept above and below the outermost peaks, px.
-const MARGIN: i64 = 24;
+/// Rows shown above and below the outermost peaks, px.
+const MARGIN: i64 = 40;
 /// The picture is enlarged by whole steps until it is at least this wide, px.
 const WIDE: u32 = 1200;
 const LEGEND: i64 = 30;
 
-/// Draws all peaks, the kept ones last. Rows far from any peak are cut off; the picture is shown with
-/// a square-root curve, because reflections are faint.
+/// Draws all peaks, the kept ones last. Only rows around the kept peaks are shown (around all of them
+/// where none was kept), with a square-root curve, because reflections are faint.
 pub fn draw(image: &Image, peaks: &[Peak]) -> RgbImage {
-    let rows = peaks.iter().map(|k| k.v.round() as i64);
+    let any_kept = peaks.iter().any(Peak::kept);
+    let rows = peaks.iter().filter(|k| k.kept() || !any_kept).map(|k| k.v.round() as i64);
     let height = i64::from(image.height);
     let middle = height / 2;
     let top = (rows.clone().min().unwrap_or(middle) - MARGIN).clamp(0, height - 1);
@@ -85,9 +86,9 @@ mod tests {
         let echo = peak(300.25, 120.0, 0);
         let picture = draw(&image, &[echo, peak(100.0, 100.0, 0)]);
         assert_eq!(picture.width, 1280);
-        // Rows 76..=144 are shown, twice enlarged; u 300.25 is at (300.75 * 2 - 0.5).
-        assert_eq!(picture.height as i64, (144 - 76 + 1) * 2 + LEGEND);
-        let row = (120 - 76) * 2;
+        // Rows 60..=160 are shown, twice enlarged; u 300.25 is at (300.75 * 2 - 0.5).
+        assert_eq!(picture.height as i64, (160 - 60 + 1) * 2 + LEGEND);
+        let row = (120 - 60) * 2;
         let lit = |x: i64| [row, row + 1].iter().any(|y| picture.pixels[(y * 1280 + x) as usize][1] > 100);
         assert!(lit(601) && !lit(590));
         assert_eq!(draw(&image, &[]).width, 1280);

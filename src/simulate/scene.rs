@@ -3,7 +3,7 @@
 //! Frame and unit: scene frame, z up, mm; the file's keys are in docs/file-formats.md, Scene file.
 
 use super::pattern;
-use super::solid::{Body, Shape};
+use super::solid::{Body, Cut, Shape};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Part, Rigid, Vec3};
 use crate::recording::BoardSpec;
@@ -70,6 +70,9 @@ pub struct CutSpec {
     pub shape: ShapeSpec,
     #[serde(default)]
     pub at_mm: [f64; 3],
+    /// Turn about z, degrees.
+    #[serde(default)]
+    pub turn_deg: f64,
     #[serde(default = "one")]
     pub repeat: [u32; 2],
     #[serde(default)]
@@ -330,7 +333,8 @@ fn place(
     let mut cuts = Vec::new();
     for cut in &solid.cut {
         let shape = cut.shape.build()?;
-        cuts.extend(copies(cut.repeat, cut.pitch_mm).map(|c| (shape, c + Vec3::from(cut.at_mm))));
+        let at = |c: Vec3| Cut::new(shape, c + Vec3::from(cut.at_mm), cut.turn_deg);
+        cuts.extend(copies(cut.repeat, cut.pitch_mm).map(at));
     }
     let turn = crate::geometry::exp(&(Vec3::z() * solid.turn_deg.to_radians()));
     let (half, depth) = shape.bounds();

@@ -171,12 +171,39 @@ fn narrow(s: &mut Span, a: f64, b: f64, c: f64, normal: impl Fn(f64) -> Vec3) ->
     s.enter.0 < s.leave.0
 }
 
-/// A convex shape with convex cut-outs, each at a place of its own.
+/// A cut-out at a place of its own.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cut {
+    pub shape: Shape,
+    /// Middle of the opening in the body's frame.
+    pub at: Vec3,
+    /// Cosine and sine of the turn about z.
+    pub turn: (f64, f64),
+}
+
+impl Cut {
+    pub fn new(shape: Shape, at: Vec3, turn_deg: f64) -> Cut {
+        let (sin, cos) = turn_deg.to_radians().sin_cos();
+        Cut { shape, at, turn: (cos, sin) }
+    }
+    fn turned(&self, v: &Vec3, sign: f64) -> Vec3 {
+        let (c, s) = (self.turn.0, sign * self.turn.1);
+        Vec3::new(c * v.x - s * v.y, s * v.x + c * v.y, v.z)
+    }
+    fn span(&self, o: &Vec3, d: &Vec3) -> Option<Span> {
+        self.shape.span(&self.turned(&(o - self.at), -1.0), &self.turned(d, -1.0))
+    }
+    /// Signed distance; an opening in the body's top goes on upwards.
+    fn distance(&self, p: &Vec3) -> f64 {
+        self.shape.distance_with(&self.turned(&(p - self.at), -1.0), self.at.z >= -SKIN)
+    }
+}
+
+/// A convex shape with convex cut-outs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Body {
     pub shape: Shape,
-    /// Shape and the middle of its opening in the body's frame.
-    pub cuts: Vec<(Shape, Vec3)>,
+    pub cuts: Vec<Cut>,
 }
 
 /// Distances below this are the surface that the ray starts on, mm.
@@ -194,11 +221,11 @@ impl Body {
         // Cut-outs are few and each is left once, so this ends.
         for _ in 0..=self.cuts.len() {
             let mut moved = false;
-            for (shape, place) in &self.cuts {
-                let Some(s) = shape.span(&(o - place), d) else { continue };
+            for cut in &self.cuts {
+                let Some(s) = cut.span(o, d) else { continue };
                 let inside = s.enter.0 <= at.0 + SKIN || (at.0 <= SKIN && s.enter.0 <= SKIN);
                 if inside && s.leave.0 > at.0 + SKIN && (at.0 > SKIN || s.leave.0 > SKIN) {
-                    at = (s.leave.0, -s.leave.1);
+                    at = (s.leave.0, -cut.turned(&s.leave.1, 1.0));
                     moved = true;
                 }
             }
@@ -213,8 +240,7 @@ impl Body {
     /// openings up to the nearest edge, a lower bound beside the edges of cut-outs.
     pub fn distance(&self, p: &Vec3) -> f64 {
         let outer = self.shape.distance(p);
-        let cut = |(s, place): &(Shape, Vec3)| -s.distance_with(&(p - place), place.z >= -SKIN);
-        self.cuts.iter().map(cut).fold(outer, f64::max)
+        self.cuts.iter().map(|c| -c.distance(p)).fold(outer, f64::max)
     }
 }
 
@@ -227,8 +253,9 @@ mod tests {
         Body {
             shape: Shape::Block { half: [10.0, 6.0], depth: 4.0, drop: 0.0 },
             cuts: vec![
-                (Shape::Cone { top: 0.8, bottom: 0.4, depth: 2.0 }, Vec3::new(3.0, 1.0, 0.0)),
-                (Shape::Block { half: [2.0, 1.0], depth: 1.5, drop: 0.0 }, Vec3::new(-5.0, 0.0, 0.0)),
+                Cut::new(Shape::Cone { top: 0.8, bottom: 0.4, depth: 2.0 }, Vec3::new(3.0, 1.0, 0.0), 0.0),
+                Cut::new(Shape::Block { half: [2.0, 1.0], depth: 1.5, drop: 0.0 }, Vec3::new(-5.0, 0.0, 0.0), 0.0),
+                Cut::new(Shape::Block { half: [2.0, 1.0], depth: 9.0, drop: 0.0 }, Vec3::new(9.5, 5.5, 0.0), 45.0),
             ],
         }
     }
@@ -240,6 +267,8 @@ mod tests {
         assert_eq!(down(3.0, 1.0), Some((-2.0, 1.0)));
         assert_eq!(down(-5.5, 0.5), Some((-1.5, 1.0)));
         assert_eq!(down(10.5, 0.0), None);
+        // The corner is cut off through and through.
+        assert_eq!(down(9.6, 5.6), None);
         // Air over a hole is not on the surface.
         assert!((socket().distance(&Vec3::new(-5.0, 0.0, 0.0)) - 1.0).abs() < 1e-12);
         // The wall of a slot, from inside.
@@ -264,7 +293,7 @@ mod tests {
                 } else {
                     let inside = (0..400).any(|i| {
                         let p = o + d * (0.1 * f64::from(i));
-                        shape.shape.distance(&p) < -0.01 && shape.cuts.iter().all(|(s, c)| s.distance(&(p - c)) > 0.01)
+                        shape.shape.distance(&p) < -0.01 && shape.cuts.iter().all(|c| c.distance(&p) > 0.01)
                     });
                     prop_assert!(!inside, "{shape:?} missed");
                 }

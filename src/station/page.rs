@@ -12,7 +12,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 /// Points in the 3-D view; every k-th of the cloud.
-const VIEW_POINTS: u64 = 60_000;
+const VIEW_POINTS: u64 = 120_000;
 
 /// Writes `index.html` beside the scan's other files.
 pub fn save(scan: &Path, judged: Option<&Judged>) -> Result<PathBuf> {
@@ -72,7 +72,7 @@ fn head(body: &mut String, r: &ScanReport, judged: Option<&Judged>) {
         let _ = write!(body, "<div class=\"card\"><b>{}</b><span>{}</span></div>", escape(&value), escape(what));
     };
     card(thousands(r.points), "points");
-    card(format!("{} × {}×{}", r.shots, r.image.width, r.image.height), "shots, full resolution");
+    card(r.shots.to_string(), &format!("shots of {}×{}, full resolution", r.image.width, r.image.height));
     card(format!("{:.3} mm", r.median_sigma_mm), "standard deviation of a point (median, as stated by the scan)");
     if let Some(j) = judged {
         card(format!("{:.3} mm", j.cloud.median_mm), "true distance from the surface (median)");
@@ -216,6 +216,7 @@ fn view(body: &mut String, scan: &Path, map: &HeightMap) -> Result<()> {
     let cloud = CloudFile::open(&scan.join("cloud.ply"))?;
     let grid_from_base = map.base_from_grid.inverse();
     let (low, high) = map.quantiles(0.005, 0.995).unwrap_or((0.0, 1.0));
+    let low = low - 0.12 * (high - low);
     let middle = Vec3::new(0.5 * f64::from(map.width) * map.cell, 0.5 * f64::from(map.height) * map.cell, 0.0);
     let every = cloud.count().div_ceil(VIEW_POINTS).max(1);
     let (mut bytes, mut i) = (Vec::new(), 0u64);
@@ -245,11 +246,11 @@ fn view(body: &mut String, scan: &Path, map: &HeightMap) -> Result<()> {
 
 const VIEWER: &str = r#"
 (()=>{const raw=Uint8Array.from(atob(B),c=>c.charCodeAt(0)),P=new Int16Array(raw.buffer),n=P.length/3,c=document.getElementById('view'),g=c.getContext('2d');
-let yaw=-0.5,pitch=0.95,zoom=1,reach=1;for(let i=0;i<n;i++)reach=Math.max(reach,Math.hypot(P[3*i],P[3*i+1]));
-function draw(){const w=c.width,h=c.height,im=g.createImageData(w,h),d=im.data,z=new Float32Array(w*h).fill(-1e9),s=0.62*w*zoom/(2*reach),cy=Math.cos(yaw),sy=Math.sin(yaw),cp=Math.cos(pitch),sp=Math.sin(pitch);
+let yaw=-0.35,pitch=0.85,zoom=1,reach=1;for(let i=0;i<n;i++)reach=Math.max(reach,Math.hypot(P[3*i],P[3*i+1]));
+function draw(){const w=c.width,h=c.height,im=g.createImageData(w,h),d=im.data,z=new Float32Array(w*h).fill(-1e9),s=0.98*w*zoom/(2*reach),cy=Math.cos(yaw),sy=Math.sin(yaw),cp=Math.cos(pitch),sp=Math.sin(pitch);
 for(let i=0;i<w*h;i++){d[4*i]=18;d[4*i+1]=20;d[4*i+2]=24;d[4*i+3]=255}
 for(let i=0;i<n;i++){const x=P[3*i],y=P[3*i+1],t=P[3*i+2],a=cy*x-sy*y,b=sy*x+cy*y,u=Math.round(w/2+s*a),v=Math.round(h/2-s*(b*cp+t*sp)),k=t*cp-b*sp,f=Math.max(0,Math.min(1,(t*0.02-LOW)/(HIGH-LOW))),q=MAP[Math.round(31*f)];
-for(let e=0;e<2;e++)for(let j=0;j<2;j++){const X=u+e,Y=v+j;if(X<0||Y<0||X>=w||Y>=h)continue;const o=Y*w+X;if(k>z[o]){z[o]=k;d[4*o]=q[0];d[4*o+1]=q[1];d[4*o+2]=q[2]}}}
+const r=s>0.08?3:2;for(let e=0;e<r;e++)for(let j=0;j<r;j++){const X=u+e,Y=v+j;if(X<0||Y<0||X>=w||Y>=h)continue;const o=Y*w+X;if(k>z[o]){z[o]=k;d[4*o]=q[0];d[4*o+1]=q[1];d[4*o+2]=q[2]}}}
 g.putImageData(im,0,0)}
 let last=null;c.onpointerdown=e=>{last=[e.clientX,e.clientY];c.setPointerCapture(e.pointerId)};c.onpointerup=()=>last=null;
 c.onpointermove=e=>{if(!last)return;yaw+=(e.clientX-last[0])*0.006;pitch=Math.max(0,Math.min(1.57,pitch+(e.clientY-last[1])*0.006));last=[e.clientX,e.clientY];draw()};
