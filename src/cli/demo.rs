@@ -4,11 +4,12 @@
 
 use super::Console;
 use crate::fault::{Fault, Result};
+use crate::find::Recipe;
 use crate::recording::Recording;
 use crate::rig::Rig;
 use crate::scan::{GridOptions, RecordingSource, Where};
 use crate::simulate::{SimulateOptions, simulate};
-use crate::station::{Judged, ScanOptions, ScanReport, Settings, judge};
+use crate::station::{FoundPart, Judged, ScanOptions, ScanReport, Settings, judge, judge_parts};
 use std::path::PathBuf;
 
 /// Simulate a station with a board full of parts, scan it, and show how good the scan is
@@ -34,11 +35,19 @@ pub struct Args {
     on: Where,
 }
 
+/// The tasks that the simulated board holds the parts of.
+const RECIPES: [&str; 3] = [
+    include_str!("../../data/recipes/led.toml"),
+    include_str!("../../data/recipes/osc.toml"),
+    include_str!("../../data/recipes/flash.toml"),
+];
+
 #[derive(serde::Serialize)]
 struct Demo {
     page: PathBuf,
     scan: ScanReport,
     errors: Judged,
+    parts: Vec<FoundPart>,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
@@ -79,23 +88,36 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         bar.set_position(done as u64)
     })?;
     bar.finish_and_clear();
-    console.say("comparing every point with the truth");
-    let errors = judge(&out, &folder.join("truth.json"))?;
+    console.say("finding the parts, comparing every point with the truth");
+    let truth = folder.join("truth.json");
+    let recipes = RECIPES.iter().map(|text| Recipe::parse(text)).collect::<Result<Vec<_>>>()?;
+    let parts = judge_parts(&out, &made.station, &truth, &recipes)?;
+    let errors = judge(&out, &truth, &parts)?;
     let page = out.join("index.html");
     let e = &errors.cloud;
-    let text = format!(
+    let mut text = format!(
         "{} points from {} shots in {:.1} s on {}\n\
-         true distance from the surface: median {:.4} mm, rms {:.4} mm, {:.3} % beyond 1 mm\n\
-         open {}",
+         true distance from the surface: median {:.4} mm, rms {:.4} mm, {:.3} % beyond 1 mm\n",
         report.points,
         report.shots,
         report.seconds,
         report.ran_on,
         e.median_mm,
         e.rms_without_outliers_mm,
-        100.0 * e.outliers_share,
-        page.display()
+        100.0 * e.outliers_share
     );
-    console.result(&Demo { page, scan: report, errors }, &text);
+    for p in &parts {
+        text += &match (p.passed, p.error_mm, p.error_deg) {
+            (true, Some([x, y, z]), Some(deg)) => format!(
+                "{}: insertion pose {:.3} mm in the plane, {:.3} mm in height, {deg:.3} degrees from the truth\n",
+                p.title,
+                x.hypot(y),
+                z.abs()
+            ),
+            _ => format!("{}: no pose: {}\n", p.title, p.reasons.join("; ")),
+        };
+    }
+    text += &format!("open {}", page.display());
+    console.result(&Demo { page, scan: report, errors, parts }, &text);
     Ok(())
 }

@@ -2,6 +2,7 @@
 //! all and by part, a histogram and a map of them.
 //! Frame and unit: base frame, mm.
 
+use super::judge_parts::FoundPart;
 use crate::fault::Result;
 use crate::geometry::Vec3;
 use crate::scan::{CloudFile, HeightMap, PointSource};
@@ -29,8 +30,8 @@ pub const HISTOGRAM_STEP: f64 = 0.01;
 const HISTOGRAM_BINS: usize = 21;
 
 /// Compares a scan folder with `truth.json` and writes `errors.json`, `error_picture.png` and a new
-/// page into it.
-pub fn judge(scan: &Path, truth: &Path) -> Result<Judged> {
+/// page, which shows the `found` parts too, into it.
+pub fn judge(scan: &Path, truth: &Path, found: &[FoundPart]) -> Result<Judged> {
     let truth = Truth::load(truth)?;
     let cloud = CloudFile::open(&scan.join("cloud.ply"))?;
     let mut parts: BTreeMap<String, Vec<f64>> = BTreeMap::new();
@@ -66,7 +67,7 @@ pub fn judge(scan: &Path, truth: &Path) -> Result<Judged> {
     }
     let text = serde_json::to_string_pretty(&judged).expect("plain numbers");
     crate::rig::write_atomically(&scan.join("errors.json"), text.as_bytes())?;
-    super::page::save(scan, Some(&judged))?;
+    super::page::save(scan, Some(&judged), found)?;
     Ok(judged)
 }
 

@@ -2,6 +2,7 @@
 //! Frame and unit: millimetres; each file names its frames.
 
 mod judge;
+mod judge_parts;
 mod page;
 mod board_views;
 mod calibrate_hand_eye;
@@ -16,6 +17,7 @@ mod settings;
 mod values;
 
 pub use judge::{Judged, judge};
+pub use judge_parts::{FoundPart, judge_parts};
 pub use board_views::{Boards, FrameBoard, boards};
 pub use calibrate_hand_eye::{Calibrated, HandEyeResult, HandEyeRun, calibrate_hand_eye};
 pub use find::find_part;

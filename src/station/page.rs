@@ -3,6 +3,7 @@
 //! Frame and unit: points of the view in the grid frame, mm.
 
 use super::judge::{HISTOGRAM_STEP, Judged};
+use super::judge_parts::FoundPart;
 use super::run::{ScanReport, load_report};
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec3;
@@ -15,7 +16,7 @@ use std::path::{Path, PathBuf};
 const VIEW_POINTS: u64 = 120_000;
 
 /// Writes `index.html` beside the scan's other files.
-pub fn save(scan: &Path, judged: Option<&Judged>) -> Result<PathBuf> {
+pub fn save(scan: &Path, judged: Option<&Judged>, found: &[FoundPart]) -> Result<PathBuf> {
     let report = load_report(scan)?;
     let map = HeightMap::load(scan).ok();
     let mut body = String::new();
@@ -36,6 +37,7 @@ pub fn save(scan: &Path, judged: Option<&Judged>) -> Result<PathBuf> {
     if let Some(j) = judged {
         errors(&mut body, scan, j)?;
     }
+    parts(&mut body, scan, found)?;
     shots(&mut body, scan)?;
     peaks(&mut body, &report);
     if map.is_some() {
@@ -135,6 +137,36 @@ fn errors(body: &mut String, scan: &Path, j: &Judged) -> Result<()> {
     row("everything", &j.cloud);
     j.by_part.iter().for_each(|(name, e)| row(name, e));
     body.push_str("</table><p class=\"small\">rms without the points beyond 1 mm. Exact on faces; beside the edges of holes the distance is a lower bound.</p></section>");
+    Ok(())
+}
+
+fn parts(body: &mut String, scan: &Path, found: &[FoundPart]) -> Result<()> {
+    if found.is_empty() {
+        return Ok(());
+    }
+    body.push_str(
+        "<section><h2>Parts found, and where the robot inserts</h2><table><tr><th>part</th><th>pose</th>\
+         <th>error x mm</th><th>error y mm</th><th>error z mm</th><th>error degrees</th><th>stated sigma x y z mm</th></tr>",
+    );
+    for f in found {
+        let error = f.error_mm.map_or("<td>-</td>".repeat(3), |e| e.map(|x| format!("<td>{x:+.3}</td>")).concat());
+        let degrees = f.error_deg.map_or("-".into(), |d| format!("{d:.3}"));
+        let pose = if f.passed { "given".into() } else { format!("refused: {}", f.reasons.join("; ")) };
+        let _ = write!(
+            body,
+            "<tr><td>{}</td><td class=\"left\">{}</td>{error}<td>{degrees}</td><td>{:.3} {:.3} {:.3}</td></tr>",
+            escape(&f.title),
+            escape(&pose),
+            f.sigma_mm[0],
+            f.sigma_mm[1],
+            f.sigma_mm[2]
+        );
+    }
+    body.push_str("</table>");
+    for f in found.iter().filter(|f| !f.picture.is_empty()) {
+        body.push_str(&picture(scan, &f.picture, &f.title)?);
+    }
+    body.push_str("</section>");
     Ok(())
 }
 
