@@ -15,12 +15,17 @@ pub struct Slot {
     /// Small results with the size of the large ones; written by the stages.
     pub header: Buffer,
     header_staging: Buffer,
-    /// Large results, of which only the first part is brought back.
-    pub output: Buffer,
-    output_staging: Option<Buffer>,
+    /// Large results, of each of which only the first part is brought back.
+    pub outputs: Vec<Output>,
     mapping: Option<Mapping>,
     /// The submission that works on this place.
     at: Option<wgpu::SubmissionIndex>,
+}
+
+/// One large result, and where the host reads it when memory is not shared.
+pub struct Output {
+    pub buffer: Buffer,
+    staging: Option<Buffer>,
 }
 
 /// Batches in flight, oldest first; no buffer is made after the start.
@@ -29,20 +34,18 @@ pub struct Ring {
     pub slots: Vec<Slot>,
     free: VecDeque<usize>,
     busy: VecDeque<usize>,
-    /// Bytes of the output that are copied with the header where memory is not shared.
-    eager: u64,
 }
 
 /// Sizes of a ring in bytes.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct RingSizes {
     pub slots: usize,
     pub input: u64,
     pub header: u64,
-    pub output: u64,
+    pub outputs: Vec<u64>,
 }
 
-/// Output brought back at once from a device with its own memory: 1 MiB is 40 us over PCIe 4.
+/// Part of each output brought back at once from a device with its own memory: 1 MiB is 40 us over PCIe 4.
 const EAGER: u64 = 1 << 20;
 
 impl Ring {
@@ -56,11 +59,14 @@ impl Ring {
             } else {
                 (device.upload_staging("input staging", sizes.input)?, device.storage("input", sizes.input)?)
             };
-            let output = if unified {
-                device.readable_storage("output", sizes.output)?
-            } else {
-                device.storage("output", sizes.output)?
-            };
+            let outputs = sizes.outputs.iter().map(|&bytes| match unified {
+                true => Ok(Output { buffer: device.readable_storage("output", bytes)?, staging: None }),
+                false => Ok(Output {
+                    buffer: device.storage("output", bytes)?,
+                    staging: Some(device.readback_staging("output staging", bytes)?),
+                }),
+            });
+            let outputs = outputs.collect::<Result<Vec<_>>>()?;
             let slot = Slot {
                 mapping: Some(upload.map(wgpu::MapMode::Write, 0..sizes.input)),
                 at: None,
@@ -68,18 +74,12 @@ impl Ring {
                 input,
                 header: device.storage("header", sizes.header)?,
                 header_staging: device.readback_staging("header staging", sizes.header)?,
-                output,
-                output_staging: if unified {
-                    None
-                } else {
-                    Some(device.readback_staging("output staging", sizes.output)?)
-                },
+                outputs,
             };
             slots.push(slot);
         }
         device.wait(None)?;
-        let eager = sizes.output.min(EAGER);
-        Ok(Ring { device: device.clone(), free: (0..sizes.slots).collect(), busy: VecDeque::new(), slots, eager })
+        Ok(Ring { device: device.clone(), free: (0..sizes.slots).collect(), busy: VecDeque::new(), slots })
     }
 
     /// Batches under way.
@@ -123,16 +123,13 @@ impl Ring {
         let slot = &mut self.slots[at];
         let before = [(&slot.upload, 0, &slot.input, 0, slot.upload.raw.size())];
         let header = (&slot.header, 0, &slot.header_staging, 0, slot.header.raw.size());
-        let copies = if upload && slot.output_staging.is_some() { &before[..] } else { &[] };
-        match &slot.output_staging {
-            Some(staging) => {
-                slot.at =
-                    Some(replay.submit(copies, recordings, &[header, (&slot.output, 0, staging, 0, self.eager)])?);
-            }
-            None => {
-                slot.at = Some(replay.submit(copies, recordings, &[header])?);
-            }
+        let separate = slot.outputs.iter().any(|o| o.staging.is_some());
+        let copies = if upload && separate { &before[..] } else { &[] };
+        let mut after = vec![header];
+        for o in &slot.outputs {
+            after.extend(o.staging.as_ref().map(|staging| (&o.buffer, 0, staging, 0, o.buffer.bytes.min(EAGER))));
         }
+        slot.at = Some(replay.submit(copies, recordings, &after)?);
         slot.mapping = Some(slot.header_staging.map(wgpu::MapMode::Read, 0..slot.header.raw.size()));
         Ok(())
     }
@@ -154,20 +151,22 @@ impl Ring {
         Ok(Some((at, header)))
     }
 
-    /// Gives the first `bytes` of the oldest place's output to `read` and frees the place.
-    pub fn finish<T>(&mut self, bytes: u64, read: impl FnOnce(&[u8]) -> T) -> Result<T> {
+    /// Gives the first `bytes[i]` bytes of each output of the oldest place to `read` and frees the place.
+    pub fn finish(&mut self, bytes: &[u64], mut read: impl FnMut(usize, &[u8])) -> Result<()> {
         let at = self.busy.pop_front().expect("a place is busy");
         let (device, slot) = (&self.device, &mut self.slots[at]);
-        let source = slot.output_staging.as_ref().unwrap_or(&slot.output);
-        if slot.output_staging.is_some() && bytes > self.eager {
-            let rest = (bytes - self.eager).next_multiple_of(4);
-            let mut encoder = device.raw.create_command_encoder(&Default::default());
-            encoder.copy_buffer_to_buffer(&slot.output.raw, self.eager, &source.raw, self.eager, rest);
-            device.queue.submit([encoder.finish()]);
-        }
-        let out = if bytes == 0 {
-            read(&[])
-        } else {
+        for (i, (output, &bytes)) in slot.outputs.iter().zip(bytes).enumerate() {
+            let source = output.staging.as_ref().unwrap_or(&output.buffer);
+            if bytes == 0 {
+                read(i, &[]);
+                continue;
+            }
+            if output.staging.is_some() && bytes > EAGER {
+                let rest = (bytes - EAGER).next_multiple_of(4);
+                let mut encoder = device.raw.create_command_encoder(&Default::default());
+                encoder.copy_buffer_to_buffer(&output.buffer.raw, EAGER, &source.raw, EAGER, rest);
+                device.queue.submit([encoder.finish()]);
+            }
             let size = bytes.next_multiple_of(8);
             let mapping = source.map(wgpu::MapMode::Read, 0..size);
             device.poll()?;
@@ -176,14 +175,13 @@ impl Ring {
             }
             mapping.done()?;
             let view = source.view(0..size)?;
-            let out = read(&view[..bytes as usize]);
+            read(i, &view[..bytes as usize]);
             drop(view);
             source.raw.unmap();
-            out
-        };
+        }
         slot.mapping = Some(slot.upload.map(wgpu::MapMode::Write, 0..slot.upload.bytes));
         device.poll()?;
         self.free.push_back(at);
-        Ok(out)
+        Ok(())
     }
 }

@@ -1,24 +1,38 @@
-//! In: pictures in order. Out: their peaks, chosen, in the same order; on the GPU, or on the CPU twins.
-//! Frame and unit: pixels; grey levels.
+//! In: pictures in order with their poses. Out: their peaks, chosen, and their points, in the same order; on the GPU
+//! or on the CPU twins, with the same results.
+//! Frame and unit: peaks in pixels and grey levels, points in the poses' frame, mm.
 
 use super::{Extraction, Format, Where};
 use crate::camera::Intrinsics;
 use crate::fault::Result;
 use crate::geometry::{Camera, Plane};
+use crate::gpu::Device;
 use crate::raster::{Image, Mask};
+use crate::stages::chain::{Batch, Chain, ChainConfig};
 use crate::stages::choose::{self, Scene};
+use crate::stages::measured::Measure;
 use crate::stages::peak::{self, Peak, Stripe};
-use crate::stages::point::{Optics, plane_in_view};
-use crate::stages::{lengthen, skeleton, thin, threshold};
+use crate::stages::point::{self, Optics, Point, plane_in_view};
+use crate::stages::{ThresholdParams, lengthen, skeleton, thin, threshold};
 use rayon::prelude::*;
+use std::collections::VecDeque;
 
-/// The peaks of one shot.
+/// The peaks of one shot and their points, entry by entry.
 pub struct Measured {
     pub shot: u32,
     pub peaks: Vec<Peak>,
+    pub points: Vec<Point>,
 }
 
-/// What the engine needs to know of the rig: where in the picture the laser can be.
+/// One picture to work on.
+struct Job {
+    shot: u32,
+    image: Image,
+    /// base_from_camera as [`point::pose_words`].
+    pose: [f32; 12],
+}
+
+/// What the engine needs to know of the rig: where in the picture the laser can be, and where its points lie.
 pub struct Optical {
     pub camera: Intrinsics,
     pub laser: Plane<Camera>,
@@ -26,103 +40,198 @@ pub struct Optical {
     pub depth_mm: [f64; 2],
 }
 
-/// The per-pixel work.
+/// The per-pixel work of a scan.
 pub struct Engine {
     format: Format,
     region: Mask,
-    across: [f32; 2],
+    optics: Optics,
     extraction: Extraction,
     width_px: f32,
-    pending: Vec<(u32, Image)>,
+    pending: Vec<Job>,
+    /// `None` runs the twins.
+    device: Option<Device>,
+    /// Built when the stripe is known, because its sizes follow from the stripe.
+    chain: Option<Chain>,
+    /// Shots of the batches under way, oldest first.
+    batches: VecDeque<Vec<u32>>,
+    done: Vec<Measured>,
+    cut: u64,
 }
 
 /// Least window of the threshold in stripe sigmas: the stripe fills a sixth of it, so the mean stays that
 /// of the surroundings and the flanks stay lit.
 const WINDOW_WIDTHS: f32 = 24.0;
-/// Shots worked on together.
-const BATCH: usize = 4;
+/// Shots that the twins work on together.
+const TWIN_BATCH: usize = 4;
+/// Of pictures above this size three are enough to measure the stripe: each has thousands of peaks.
+const LARGE_PIXELS: u32 = 2_000_000;
 
 impl Engine {
-    pub fn new(format: Format, optical: &Optical, extraction: &Extraction, _place: Where) -> Result<Engine> {
+    /// Refused: `Where::Gpu` on a machine without one.
+    pub fn new(format: Format, optical: &Optical, extraction: &Extraction, place: Where) -> Result<Engine> {
+        let device = match place {
+            Where::Cpu => None,
+            Where::Gpu => Some(Device::open()?),
+            // The twins give the same results, so a machine without a GPU is no error.
+            Where::Auto => Device::open().ok(),
+        };
+        let mut extraction = extraction.clone();
+        extraction.threshold = for_depth(extraction.threshold, format.bits);
         Ok(Engine {
             format,
             region: region(format, optical),
-            across: Optics::new(&optical.camera, &optical.laser).across(),
-            extraction: extraction.clone(),
+            optics: Optics::new(&optical.camera, &optical.laser),
             width_px: extraction.peak.width_px,
+            extraction,
             pending: Vec::new(),
+            device,
+            chain: None,
+            batches: VecDeque::new(),
+            done: Vec::new(),
+            cut: 0,
         })
     }
 
+    /// Skeleton pixels that found no room in the GPU's list: more than a tenth of the picture.
+    pub fn cut(&self) -> u64 {
+        self.cut
+    }
+
+    /// Adapter and driver, or "CPU twins".
     pub fn ran_on(&self) -> String {
-        "CPU twins".into()
+        match &self.device {
+            Some(d) => format!("{}, {}", d.info.name, d.info.driver),
+            None => "CPU twins".into(),
+        }
     }
 
     /// Width and speckle of the stripe, the median over some pictures; `None` where none shows enough of it.
-    pub fn measure(&self, images: &[&Image]) -> Result<Option<Stripe>> {
+    pub fn measure(&self, images: &[&Image]) -> Option<Stripe> {
+        let few = self.format.width * self.format.height > LARGE_PIXELS && images.len() > 3;
+        let step = if few { images.len() / 3 } else { 1 };
+        let images: Vec<_> = images.iter().step_by(step).collect();
         let mut found: Vec<Stripe> = images
             .par_iter()
-            .filter_map(|image| peak::measure(image, &self.skeleton(image).1, &self.extraction.peak))
+            .filter_map(|image| peak::measure(image, &self.skeleton(image), &self.extraction.peak))
             .collect();
-        if found.is_empty() {
-            return Ok(None);
-        }
         let middle = found.len() / 2;
-        let width_px =
-            *found.iter().map(|s| s.width_px).collect::<Vec<_>>().select_nth_unstable_by(middle, f32::total_cmp).1;
         found.sort_by(|a, b| a.speckle.total_cmp(&b.speckle));
-        Ok(Some(Stripe { width_px, speckle: found[middle].speckle }))
+        let speckle = found.get(middle)?.speckle;
+        found.sort_by(|a, b| a.width_px.total_cmp(&b.width_px));
+        Some(Stripe { width_px: found[middle].width_px, speckle })
     }
 
-    /// Takes over a measured stripe: the sizes of the fit, and the least window of the threshold.
+    /// Takes over a stripe: the sizes of the fit, the least window of the threshold; builds the GPU's chain.
     pub fn set_stripe(&mut self, stripe: &Stripe) -> Result<()> {
         self.width_px = stripe.width_px;
         let window = (WINDOW_WIDTHS * stripe.width_px) as u32 | 1;
         self.extraction.threshold.size = self.extraction.threshold.size.max(window.min(101));
         self.extraction.peak = self.extraction.peak.with(stripe);
-        self.extraction.peak.check()
+        self.extraction.peak.check()?;
+        self.build()
     }
 
-    pub fn submit(&mut self, shot: u32, image: &Image) -> Result<()> {
-        self.pending.push((shot, image.clone()));
+    /// The GPU's chain for the present settings, if there is a GPU.
+    fn build(&mut self) -> Result<()> {
+        let Some(device) = &self.device else { return Ok(()) };
+        let (e, f) = (&self.extraction, self.format);
+        let config = ChainConfig {
+            threshold: e.threshold,
+            thinning: e.thinning,
+            region: Some(self.region.clone()),
+            lengthen: e.lengthen.word(self.width_px),
+            measure: Some(Measure { peak: e.peak, choose: e.choose, optics: self.optics }),
+            ..ChainConfig::new(f.width, f.height, f.bits)
+        };
+        self.chain = Some(Chain::new(device, &config)?);
         Ok(())
     }
 
+    /// Takes a picture; `pose` is base_from_camera as [`point::pose_words`].
+    pub fn submit(&mut self, shot: u32, image: Image, pose: [f32; 12]) -> Result<()> {
+        self.pending.push(Job { shot, image, pose });
+        let full = self.chain.as_ref().map_or(TWIN_BATCH, |c| c.frame.shots as usize);
+        if self.pending.len() >= full { self.start() } else { Ok(()) }
+    }
+
+    /// Shots that are done, in order; with `all` waits for everything under way.
     pub fn collect(&mut self, all: bool) -> Result<Vec<Measured>> {
-        if !all && self.pending.len() < BATCH {
-            return Ok(Vec::new());
+        if all && !self.pending.is_empty() {
+            self.start()?;
         }
-        let batch = std::mem::take(&mut self.pending);
-        Ok(batch.par_iter().map(|(shot, image)| Measured { shot: *shot, peaks: self.peaks(*shot, image) }).collect())
+        while let Some(batch) = self.chain.as_mut().map(|c| c.collect(all)).transpose()?.flatten() {
+            self.take(batch);
+        }
+        Ok(std::mem::take(&mut self.done))
     }
 
-    fn skeleton(&self, image: &Image) -> (Mask, Vec<u32>) {
+    /// Works on what is pending: on the GPU it is started, on the twins it is done.
+    fn start(&mut self) -> Result<()> {
+        if self.chain.is_none() {
+            self.build()?;
+        }
+        let jobs = std::mem::take(&mut self.pending);
+        let Some(chain) = &mut self.chain else {
+            let done: Vec<_> = jobs.par_iter().map(|job| self.twins(job)).collect();
+            self.done.extend(done);
+            return Ok(());
+        };
+        let waited = if chain.has_room() { None } else { chain.collect(true)? };
+        let images: Vec<_> = jobs.iter().map(|j| &j.image).collect();
+        let poses: Vec<_> = jobs.iter().map(|j| j.pose).collect();
+        chain.submit_posed(u64::from(jobs[0].shot), &images, &poses)?;
+        self.batches.push_back(jobs.iter().map(|j| j.shot).collect());
+        waited.into_iter().for_each(|batch| self.take(batch));
+        Ok(())
+    }
+
+    /// Splits a batch into its shots.
+    fn take(&mut self, batch: Batch) {
+        let shots = self.batches.pop_front().expect("one list a batch");
+        self.cut += u64::from(batch.found) - batch.peaks.len() as u64;
+        for (i, shot) in shots.into_iter().enumerate() {
+            let part = batch.starts[i] as usize..batch.starts[i + 1] as usize;
+            let mut peaks = batch.peaks[part.clone()].to_vec();
+            // The GPU counts within the batch.
+            peaks.iter_mut().for_each(|k| k.shot = shot);
+            self.done.push(Measured { shot, peaks, points: batch.spots[part].to_vec() });
+        }
+    }
+
+    fn skeleton(&self, image: &Image) -> Vec<u32> {
         let mut lit = threshold::twin(image, &self.extraction.threshold);
-        lit.words.iter_mut().zip(&self.region.words).for_each(|(l, r)| *l &= r);
+        lit.intersect(&self.region);
         let thin = thin::twin(&lit, self.extraction.thinning);
-        let long = lengthen::twin(image, &lit, &thin, self.width_px, &self.extraction.lengthen);
-        let list = skeleton::twin(&long);
-        (lit, list)
+        skeleton::twin(&lengthen::twin(image, &lit, &thin, self.width_px, &self.extraction.lengthen))
     }
 
-    fn peaks(&self, shot: u32, image: &Image) -> Vec<Peak> {
-        let (_, list) = self.skeleton(image);
-        let mut peaks = peak::peaks(image, &list, shot, &self.extraction.peak);
+    fn twins(&self, job: &Job) -> Measured {
+        let mut peaks = peak::peaks(&job.image, &self.skeleton(&job.image), job.shot, &self.extraction.peak);
         let scene = Scene {
             width: self.format.width,
             height: self.format.height,
-            full_scale: f32::from(image.full_scale()),
+            full_scale: f32::from(job.image.full_scale()),
             width_px: self.width_px,
-            across: self.across,
+            across: self.optics.across(),
         };
         choose::choose(&mut peaks, &scene, &self.extraction.choose);
-        peaks
+        let points = point::posed(&mut peaks, &self.optics, &job.pose);
+        Measured { shot: job.shot, peaks, points }
     }
+}
+
+/// Grey levels are set for 8 bits and hold for every depth.
+fn for_depth(p: ThresholdParams, bits: u8) -> ThresholdParams {
+    let shift = bits - 8;
+    ThresholdParams { offset: p.offset << shift, minimum: ((u32::from(p.minimum) << shift).min(0xffff)) as u16, ..p }
 }
 
 /// Pixels at which the laser plane lies within the believed depths; others are neither processed nor believed.
 fn region(format: Format, o: &Optical) -> Mask {
-    Mask::from_fn(format.width, format.height, |x, y| {
+    let inside = |x: u32, y: u32| {
         plane_in_view(&o.camera, &o.laser, x, y).is_some_and(|z| (o.depth_mm[0]..=o.depth_mm[1]).contains(&z))
-    })
+    };
+    let rows: Vec<Mask> =
+        (0..format.height).into_par_iter().map(|y| Mask::from_fn(format.width, 1, |x, _| inside(x, y))).collect();
+    Mask { width: format.width, height: format.height, words: rows.into_iter().flat_map(|r| r.words).collect() }
 }

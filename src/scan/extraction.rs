@@ -1,7 +1,7 @@
 //! In: nothing. Out: all settings of the way from picture to points, one group a step.
 //! Frame and unit: each field says; sizes are in stripe widths where the physics scales with the stripe.
 
-use crate::fault::Result;
+use crate::fault::{Fault, Result};
 use crate::stages::choose::ChooseParams;
 use crate::stages::lengthen::LengthenParams;
 use crate::stages::peak::PeakParams;
@@ -15,6 +15,7 @@ pub struct Extraction {
     /// Measure the stripe's width and speckle in the first shots and take the window of the threshold
     /// and the sizes of the fit from them. Off: the numbers below are used as they stand.
     pub measure_stripe: bool,
+    /// Offset and minimum in grey levels of an 8-bit picture; deeper ones scale them.
     pub threshold: ThresholdParams,
     pub thinning: Thinning,
     pub lengthen: LengthenParams,
@@ -27,7 +28,8 @@ impl Default for Extraction {
     fn default() -> Extraction {
         Extraction {
             measure_stripe: true,
-            threshold: ThresholdParams::default(),
+            // A peak fainter than 8 levels is not believed, so a pixel darker than that need not be looked at.
+            threshold: ThresholdParams { minimum: 8, ..ThresholdParams::default() },
             thinning: Thinning::default(),
             lengthen: LengthenParams::default(),
             peak: PeakParams::default(),
@@ -40,6 +42,13 @@ impl Default for Extraction {
 impl Extraction {
     pub fn check(&self) -> Result<()> {
         self.threshold.check()?;
+        if !(-255..=255).contains(&self.threshold.offset) || self.threshold.minimum > 255 {
+            return Err(Fault::usage(format!(
+                "threshold offset {} and minimum {} are for 8-bit pictures: -255..=255 and 0..=255",
+                self.threshold.offset, self.threshold.minimum
+            ))
+            .next("give them in 8-bit levels; deeper pictures scale them"));
+        }
         self.lengthen.check()?;
         self.peak.check()?;
         self.choose.check()?;

@@ -14,12 +14,12 @@ mod scanner;
 mod source;
 
 pub use cloud::{CloudFile, CloudPoint, CloudWriter, PointSource, read_cloud, write_cloud};
+pub use engine::{Engine, Measured, Optical};
+pub use extraction::Extraction;
 pub use grid::{Accumulator, GridOptions, GridSpec, grid};
 pub use heightmap::HeightMap;
 pub use map_files::MapScale;
 pub use map_picture::{MapPlace, Shown};
 pub use pcd::write_pcd;
-pub use engine::{Engine, Measured, Optical};
-pub use extraction::Extraction;
 pub use scanner::{Profile, Scanner, Where};
 pub use source::{BadShot, Format, RawFormat, RawSource, RecordingSource, Shot, Source};

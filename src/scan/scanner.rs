@@ -60,7 +60,7 @@ pub struct Scanner {
     stripe: Option<Stripe>,
     support: Option<Support>,
     /// Poses of shots that the engine works on, oldest first.
-    poses: std::collections::VecDeque<(u32, Rigid<Base, Flange>)>,
+    poses: std::collections::VecDeque<(u32, Rigid<Base, Camera>)>,
     up: Vec3,
 }
 
@@ -129,6 +129,11 @@ impl Scanner {
         self.up
     }
 
+    /// Skeleton pixels that found no room in the GPU's list.
+    pub fn cut(&self) -> u64 {
+        self.engine.cut()
+    }
+
     /// Adapter and driver, or "CPU twins".
     pub fn ran_on(&self) -> String {
         self.engine.ran_on()
@@ -144,7 +149,7 @@ impl Scanner {
                 Some(s) => s,
                 None if self.extraction.measure_stripe => {
                     let images: Vec<_> = self.waiting.iter().map(|s| &s.image).collect();
-                    self.engine.measure(&images)?.unwrap_or(assumed)
+                    self.engine.measure(&images).unwrap_or(assumed)
                 }
                 None => assumed,
             };
@@ -158,19 +163,18 @@ impl Scanner {
             self.support = Some(Support::new(self.extraction.support, stripe.width_px, &axis));
         }
         for shot in std::mem::take(&mut self.waiting) {
-            self.poses.push_back((shot.index, shot.base_from_flange));
-            self.engine.submit(shot.index, &shot.image)?;
+            let base_from_camera = shot.base_from_flange * self.camera_from_flange.inverse();
+            self.poses.push_back((shot.index, base_from_camera));
+            self.engine.submit(shot.index, shot.image, point::pose_words(&base_from_camera))?;
         }
         Ok(())
     }
 
     fn collect(&mut self, all: bool) -> Result<Vec<Profile>> {
         let mut done = Vec::new();
-        for Measured { shot, mut peaks } in self.engine.collect(all)? {
-            let (index, base_from_flange) = self.poses.pop_front().expect("one pose a shot submitted");
+        for Measured { shot, peaks, points } in self.engine.collect(all)? {
+            let (index, base_from_camera) = self.poses.pop_front().expect("one pose a shot submitted");
             assert_eq!(index, shot, "the engine keeps the order");
-            let base_from_camera = base_from_flange * self.camera_from_flange.inverse();
-            let points = point::points(&mut peaks, &self.optics, &base_from_camera);
             let profile = support::Profile {
                 shot,
                 peaks,

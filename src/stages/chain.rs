@@ -2,6 +2,9 @@
 //! Frame and unit: pixels. The pruned chain: statistics, tile list, threshold, thinning, list.
 
 use super::frame::{ALL_TILES, HAS_ROI};
+use super::measured::{Measure, Measuring, POSE_BYTES};
+use super::peak::Peak;
+use super::point::Point;
 use super::recorded::{Pipelines, Shared};
 use super::{Frame, Thinning, ThresholdParams, skeleton};
 use crate::fault::{Fault, Result};
@@ -29,6 +32,10 @@ pub struct ChainConfig {
     pub region: Option<Mask>,
     /// Subtracted from every picture.
     pub ambient: Option<Image>,
+    /// How far the ends of lines are carried on ([`super::lengthen::LengthenParams::word`]); 0 is not at all.
+    pub lengthen: u32,
+    /// Peaks, their choice and points for every skeleton pixel; `None` ends with the pixels.
+    pub measure: Option<Measure>,
     /// Take GPU timestamps of every stage.
     pub timed: bool,
 }
@@ -46,6 +53,8 @@ impl ChainConfig {
             prune: true,
             region: None,
             ambient: None,
+            lengthen: 0,
+            measure: None,
             timed: false,
         }
     }
@@ -69,15 +78,20 @@ pub struct Chain {
     tags: VecDeque<u64>,
     shots_in: VecDeque<u32>,
     shared: Shared,
+    /// Where the poses begin in the input, if points are wanted.
+    poses: Option<usize>,
 }
 
 /// What one batch came to.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Batch {
     /// The tag given at submission.
     pub tag: u64,
-    /// Skeleton pixels x | y << 16, and the shot within the batch.
+    /// Skeleton pixels x | y << 16, and the shot within the batch; empty where peaks are measured.
     pub points: Vec<[u32; 2]>,
+    /// One peak a skeleton pixel, and its point, where peaks are measured.
+    pub peaks: Vec<Peak>,
+    pub spots: Vec<Point>,
     /// First point of every shot, and the end.
     pub starts: Vec<u32>,
     /// Skeleton pixels found; more than `points` holds when the list was full.
@@ -104,15 +118,25 @@ impl Chain {
         let mut frame =
             Frame::new(config.width, config.height, config.bits, config.shots, &config.threshold, config.thinning)?;
         frame.flags |= if config.prune { 0 } else { ALL_TILES };
+        frame.lengthen = config.lengthen;
         frame.flags |= if config.region.is_some() { HAS_ROI } else { 0 };
         let shared = Shared::new(device, &frame, config)?;
+        let measuring = match &config.measure {
+            Some(m) => Some(Measuring::new(device, &frame, config.bits, m)?),
+            None => None,
+        };
+        // The poses lie behind the pictures, where every adapter can bind.
+        let poses = (frame.image_bytes() as u64 * u64::from(frame.shots)).next_multiple_of(256);
         let ring = Ring::new(
             device,
             RingSizes {
                 slots: config.slots,
-                input: u64::from(frame.shot_words) * 4 * u64::from(frame.shots),
+                input: poses + measuring.as_ref().map_or(0, |_| POSE_BYTES * u64::from(frame.shots)),
                 header: 4 * (skeleton::HEADER as u64 + u64::from(frame.shots) + 1),
-                output: u64::from(frame.capacity) * 8,
+                outputs: match &measuring {
+                    Some(_) => Measuring::output_bytes(&frame),
+                    None => vec![u64::from(frame.capacity) * 8],
+                },
             },
         )?;
         let pipelines = Pipelines::new(device, config)?;
@@ -121,7 +145,13 @@ impl Chain {
         for slot in &ring.slots {
             let mut first = shared.front(device, &frame, &pipelines, &slot.input);
             first.append(&thinning);
-            let back = shared.back(device, &frame, &pipelines, &slot.header, &slot.output);
+            let pixels = measuring.as_ref().map_or(&slot.outputs[0].buffer, |m| &m.pixels);
+            let mut back = shared.back(device, &frame, &pipelines, &slot.input, &slot.header, pixels);
+            if let Some(m) = &measuring {
+                let poses = (&slot.input, poses, POSE_BYTES * u64::from(frame.shots));
+                let [peaks, points] = [0, 1].map(|i| &slot.outputs[i].buffer);
+                back.append(&m.record(device, &slot.input, poses, &slot.header, peaks, points));
+            }
             first.append(&back);
             first_runs.push(first);
             let mut round = shared.restart(device, &pipelines);
@@ -140,6 +170,7 @@ impl Chain {
             tags: VecDeque::new(),
             shots_in: VecDeque::new(),
             shared,
+            poses: measuring.is_some().then_some(poses as usize),
         })
     }
 
@@ -160,8 +191,14 @@ impl Chain {
 
     /// Starts a batch of 1 to `shots` pictures. Call `collect` first when there is no room.
     pub fn submit(&mut self, tag: u64, images: &[&Image]) -> Result<()> {
+        self.submit_posed(tag, images, &[])
+    }
+
+    /// As `submit`, with the shots' poses ([`super::point::pose_words`]), which a chain that measures needs.
+    pub fn submit_posed(&mut self, tag: u64, images: &[&Image], poses: &[[f32; 12]]) -> Result<()> {
+        assert!(self.poses.is_none() || poses.len() == images.len(), "one pose a picture");
         assert!((1..=self.frame.shots as usize).contains(&images.len()), "1 to {} pictures a batch", self.frame.shots);
-        let (frame, bytes) = (self.frame, self.frame.image_bytes());
+        let (frame, bytes, behind) = (self.frame, self.frame.image_bytes(), self.poses);
         let at = self.ring.fill(|put| {
             for (i, image) in images.iter().enumerate() {
                 frame.put_image(image, &mut |at, piece| put(i * bytes + at, piece))?;
@@ -170,6 +207,9 @@ impl Chain {
             let dark = [0u8; 4096];
             for from in (images.len() * bytes..frame.shots as usize * bytes).step_by(dark.len()) {
                 put(from, &dark[..dark.len().min(frame.shots as usize * bytes - from)]);
+            }
+            if let Some(at) = behind {
+                put(at, bytemuck::cast_slice(poses));
             }
             Ok(())
         })?;
@@ -194,14 +234,24 @@ impl Chain {
         };
         let shots = self.shots_in.pop_front().expect("as many as batches") as usize;
         let kept = header[skeleton::HEADER + shots];
-        let points = self.ring.finish(u64::from(kept) * 8, |bytes| bytemuck::pod_collect_to_vec(bytes))?;
-        Ok(Some(Batch {
+        let mut batch = Batch {
             tag: self.tags.pop_front().expect("as many as batches"),
-            points,
             starts: header[skeleton::HEADER..=skeleton::HEADER + shots].to_vec(),
             found: header[4],
             listed_tiles: header[5],
-        }))
+            ..Batch::default()
+        };
+        let n = u64::from(kept);
+        if self.poses.is_some() {
+            let bytes = [n * size_of::<Peak>() as u64, n * size_of::<Point>() as u64];
+            self.ring.finish(&bytes, |i, bytes| match i {
+                0 => batch.peaks = bytemuck::pod_collect_to_vec(bytes),
+                _ => batch.spots = bytemuck::pod_collect_to_vec(bytes),
+            })?;
+        } else {
+            self.ring.finish(&[8 * n], |_, bytes| batch.points = bytemuck::pod_collect_to_vec(bytes))?;
+        }
+        Ok(Some(batch))
     }
 
     fn run(&mut self, at: usize, upload: bool) -> Result<()> {

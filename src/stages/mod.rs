@@ -9,6 +9,7 @@ mod entry;
 pub mod frame;
 pub mod lengthen;
 pub mod listing;
+pub mod measured;
 pub mod peak;
 pub mod point;
 mod recorded;

@@ -57,8 +57,12 @@ const NEWTON: u32 = 5;
 
 /// CPU twin: one point per peak; peaks without a point get [`Reject::NoPoint`].
 pub fn points<To: Frame>(peaks: &mut [Peak], optics: &Optics, to_from_camera: &Rigid<To, Camera>) -> Vec<Point> {
-    let pose = pose_words(to_from_camera);
-    peaks.iter_mut().map(|k| one(k, optics, &pose)).collect()
+    posed(peaks, optics, &pose_words(to_from_camera))
+}
+
+/// The same with the transform as [`pose_words`].
+pub fn posed(peaks: &mut [Peak], optics: &Optics, pose: &[f32; 12]) -> Vec<Point> {
+    peaks.iter_mut().map(|k| one(k, optics, pose)).collect()
 }
 
 fn one(k: &mut Peak, optics: &Optics, pose: &[f32; 12]) -> Point {

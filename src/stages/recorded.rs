@@ -3,7 +3,7 @@
 
 use super::chain::ChainConfig;
 use super::frame::{PX_LOG2, px_log2};
-use super::{Frame, Window, ambient, listing, skeleton, stats, thin, threshold, tiles};
+use super::{Frame, Window, ambient, lengthen, listing, skeleton, stats, thin, threshold, tiles};
 use crate::fault::Result;
 use crate::gpu::{Buffer, Device, Pipeline, Recording};
 
@@ -30,6 +30,7 @@ pub struct Shared {
     pub mask: Buffer,
     other_mask: Buffer,
     pub lit: Buffer,
+    long: Buffer,
     stamps: Buffer,
     counts: Buffer,
     starts: Buffer,
@@ -51,6 +52,8 @@ pub struct Pipelines {
     thin: Pipeline,
     compact: Pipeline,
     rebase: Pipeline,
+    copy: Pipeline,
+    lengthen: Pipeline,
     count: Pipeline,
     scan_rows: Pipeline,
     scan_shots: Pipeline,
@@ -78,6 +81,8 @@ impl Pipelines {
             thin: build(&thin::STAGE)?,
             compact: build(&listing::COMPACT)?,
             rebase: build(&listing::REBASE)?,
+            copy: build(&lengthen::COPY)?,
+            lengthen: build(&lengthen::STAGE)?,
             count: build(&skeleton::COUNT)?,
             scan_rows: build(&skeleton::SCAN_ROWS)?,
             scan_shots: build(&skeleton::SCAN_SHOTS)?,
@@ -86,9 +91,9 @@ impl Pipelines {
     }
 }
 
-type Part<'a> = (&'a Buffer, u64, u64);
+pub(super) type Part<'a> = (&'a Buffer, u64, u64);
 
-fn whole(b: &Buffer) -> Part<'_> {
+pub(super) fn whole(b: &Buffer) -> Part<'_> {
     (b, 0, b.bytes.max(16).next_multiple_of(16))
 }
 
@@ -130,6 +135,7 @@ impl Shared {
             mask: words("mask", f.mask_words())?,
             other_mask: words("other mask", f.mask_words())?,
             lit: words("lit", f.mask_words())?,
+            long: words("long", f.mask_words())?,
             stamps: words("stamps", f.tiles())?,
             counts: words("counts", f.tiles())?,
             starts: words("starts", f.tiles())?,
@@ -214,10 +220,27 @@ impl Shared {
     }
 
     /// From the thinned mask to the list of points.
-    pub fn back(&self, device: &Device, f: &Frame, p: &Pipelines, header: &Buffer, points: &Buffer) -> Recording {
+    pub fn back(
+        &self,
+        device: &Device,
+        f: &Frame,
+        p: &Pipelines,
+        image: &Buffer,
+        header: &Buffer,
+        points: &Buffer,
+    ) -> Recording {
         let mut r = Recording::default();
-        let (zero, list, mask) = (self.step(0), whole(&self.list), whole(&self.mask));
+        let (zero, list) = (self.step(0), whole(&self.list));
         let all = (&self.first, 0);
+        let mask = if f.lengthen == 0 {
+            whole(&self.mask)
+        } else {
+            let (thin, long) = (whole(&self.mask), whole(&self.long));
+            r.indirect(device, &p.copy, &[zero, self.all(), list, thin, long], all);
+            let bindings = [zero, whole(image), self.all(), list, thin, whole(&self.lit), long];
+            r.indirect(device, &p.lengthen, &bindings, all);
+            long
+        };
         r.indirect(device, &p.count, &[zero, self.all(), list, mask, whole(&self.counts)], all);
         let (starts, rows) = (whole(&self.starts), whole(&self.rows));
         r.dispatch_parts(device, &p.scan_rows, &[zero, whole(&self.counts), starts, rows], skeleton::rows_groups(f));

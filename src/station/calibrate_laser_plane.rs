@@ -4,13 +4,14 @@
 
 use super::board_views::{Boards, FrameBoard, boards};
 use super::calibrate_hand_eye::{Calibrated, first_line};
+use crate::stages::point;
 use crate::calibrate::laser_plane::{LaserPlaneFit, LaserPlaneOptions, StripePeak, StripeView, solve};
 use crate::calibrate::laser_plane_report::{covariance, judge, page};
 use crate::calibrate::limits::Limits;
 use crate::calibrate::measured_pose::{intrinsic_covariance, pooled_factor};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
-use crate::geometry::{Camera, Plane, Vec2, Vec3};
+use crate::geometry::{Rigid, Camera, Plane, Vec2, Vec3};
 use crate::raster::Image;
 use crate::recording::Recording;
 use crate::rig::{Calibration, Rig, hash_file, hash_text};
@@ -108,12 +109,13 @@ fn stripes(
     let optical = Optical { camera: *camera, laser: *laser, depth_mm };
     let mut engine = Engine::new(format, &optical, &run.extraction, run.place)?;
     if run.extraction.measure_stripe {
-        if let Some(stripe) = engine.measure(&images.iter().collect::<Vec<_>>())? {
+        if let Some(stripe) = engine.measure(&images.iter().collect::<Vec<_>>()) {
             engine.set_stripe(&stripe)?;
         }
     }
+    let camera_frame = point::pose_words(&Rigid::<crate::geometry::Camera, crate::geometry::Camera>::identity());
     for (i, image) in images.iter().enumerate() {
-        engine.submit(i as u32, image)?;
+        engine.submit(i as u32, image.clone(), camera_frame)?;
     }
     let mut out = vec![Vec::new(); images.len()];
     for measured in engine.collect(true)? {

@@ -157,6 +157,9 @@ pub fn scan(
     let seconds = started.elapsed().as_secs_f64();
     let height_map =
         super::products::write(&options.out, &cloud_path, points, &options.grid, rig, scanner.up_in_base())?;
+    if scanner.cut() > 0 {
+        state.peaks.insert("beyond the list: more than a tenth of a picture lit".into(), scanner.cut());
+    }
     let report = ScanReport {
         format: 1,
         program: format!("sheetlight {}", env!("CARGO_PKG_VERSION")),

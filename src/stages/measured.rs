@@ -1,0 +1,87 @@
+//! In: the point list of a batch, the settings of peaks and their choice, the rig, the shots' poses. Out: dispatches that
+//! turn it into chosen peaks and points. Frame and unit: pixels and grey levels; points in the poses' frame, mm.
+
+use super::frame::{PX_LOG2, px_log2};
+use super::peak::{self, Peak, PeakFrame, PeakParams};
+use super::point::{self, Optics, Point, PointFrame};
+use super::recorded::{Part, whole};
+use super::{Frame, choose, choose::ChooseParams};
+use crate::fault::Result;
+use crate::gpu::{Buffer, Device, Pipeline, Recording};
+
+/// What the chain does with the skeleton's pixels.
+#[derive(Clone, Debug)]
+pub struct Measure {
+    pub peak: PeakParams,
+    pub choose: ChooseParams,
+    pub optics: Optics,
+}
+
+/// Bytes of one shot's pose: three rows of rotation and translation.
+pub const POSE_BYTES: u64 = 48;
+
+/// Compiled stages and the buffers that all batches use one after the other.
+pub struct Measuring {
+    frame: PeakFrame,
+    uniform: Buffer,
+    rig: Buffer,
+    /// The skeleton's pixels.
+    pub pixels: Buffer,
+    strongest: Buffer,
+    peak: Pipeline,
+    lines: Pipeline,
+    strong: Pipeline,
+    choose: Pipeline,
+    point: Pipeline,
+}
+
+impl Measuring {
+    pub fn new(device: &Device, f: &Frame, bits: u8, m: &Measure) -> Result<Measuring> {
+        let frame = PeakFrame::new((f.width, f.height, bits), f.shots, &m.peak, &m.choose, m.optics.across());
+        let uniform = device.storage("peak frame", size_of::<PeakFrame>() as u64)?;
+        device.write(&uniform, 0, bytemuck::bytes_of(&frame));
+        let rig = device.storage("rig", size_of::<PointFrame>() as u64)?;
+        device.write(&rig, 0, bytemuck::bytes_of(&PointFrame::new(&m.optics)));
+        let depth = [(PX_LOG2, f64::from(px_log2(bits))), (peak::METHOD, m.peak.method.number())];
+        Ok(Measuring {
+            pixels: device.storage("skeleton pixels", 8 * u64::from(f.capacity))?,
+            strongest: device.storage("strongest", 4 * u64::from(frame.entries))?,
+            peak: peak::STAGE.pipeline(device, &depth)?,
+            lines: choose::LINES.pipeline(device, &[])?,
+            strong: choose::STRONGEST.pipeline(device, &[])?,
+            choose: choose::STAGE.pipeline(device, &[])?,
+            point: point::STAGE.pipeline(device, &[])?,
+            frame,
+            uniform,
+            rig,
+        })
+    }
+
+    /// Bytes of the two outputs, peaks and points, of a batch.
+    pub fn output_bytes(f: &Frame) -> Vec<u64> {
+        let n = u64::from(f.capacity);
+        vec![n * size_of::<Peak>() as u64, n * size_of::<Point>() as u64]
+    }
+
+    /// Dispatches from the pixel list to the points; their number is read from `header`.
+    pub fn record(
+        &self,
+        device: &Device,
+        image: &Buffer,
+        poses: Part,
+        header: &Buffer,
+        peaks: &Buffer,
+        points: &Buffer,
+    ) -> Recording {
+        let mut r = Recording::default();
+        let (uniform, head, peaks, strongest) =
+            (whole(&self.uniform), whole(header), whole(peaks), whole(&self.strongest));
+        let each = (header, 0);
+        r.indirect(device, &self.peak, &[uniform, whole(image), head, whole(&self.pixels), peaks], each);
+        r.dispatch_parts(device, &self.lines, &[uniform, strongest], choose::lines_groups(&self.frame));
+        r.indirect(device, &self.strong, &[uniform, head, peaks, strongest], each);
+        r.indirect(device, &self.choose, &[uniform, head, strongest, peaks], each);
+        r.indirect(device, &self.point, &[whole(&self.rig), head, poses, peaks, whole(points)], each);
+        r
+    }
+}
