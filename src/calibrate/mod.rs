@@ -20,6 +20,8 @@ pub mod pointer;
 pub mod pointer_range;
 pub mod pointer_report;
 pub mod pose;
+pub mod profile_files;
+pub mod profile_hand_eye;
 pub mod projection;
 pub mod report;
 pub mod spot;

@@ -2,6 +2,8 @@
 //! never guessed (docs/conventions.md has the table).
 //! Frame and unit: whatever frames the caller names; each convention states its own units.
 
+pub mod fanuc_tp;
+
 use crate::fault::{Fault, Result};
 use crate::geometry::{Frame, Mat3, Rigid, Vec3, exp, log, repair};
 

@@ -1,0 +1,123 @@
+//! In: random line-profile sensors on a flange, a ball, robot poses. Out: whether the sensor's pose
+//! comes with its true sigma and the ball's side is found, stated or refused, never guessed.
+//! Frame and unit: mm, rad.
+
+use rand::{Rng, SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+use sheetlight::calibrate::profile_files::Profile;
+use sheetlight::calibrate::profile_hand_eye::{BallOptions, Side, solve};
+use sheetlight::geometry::{Base, Flange, Mat3, Rigid, Sensor, Vec3, exp, log};
+
+fn gauss(rng: &mut Pcg64, sigma: f64) -> f64 {
+    let z: f64 = StandardNormal.sample(rng);
+    z * sigma
+}
+
+fn gauss3(rng: &mut Pcg64, sigma: f64) -> Vec3 {
+    Vec3::new(gauss(rng, sigma), gauss(rng, sigma), gauss(rng, sigma))
+}
+
+fn between(rng: &mut Pcg64, low: f64, high: f64) -> f64 {
+    low + (high - low) * rng.random::<f64>()
+}
+
+const RADIUS: f64 = 20.0;
+
+struct Rig {
+    sensor: Rigid<Flange, Sensor>,
+    ball: Vec3,
+}
+
+/// Profiles and reported poses. `heights`: range of the ball's centre over the profile plane, mm.
+fn scans(
+    rng: &mut Pcg64,
+    rig: &Rig,
+    count: usize,
+    heights: [f64; 2],
+    tilt: f64,
+    point_mm: f64,
+    robot_mm: f64,
+) -> (Vec<Profile>, Vec<Rigid<Base, Flange>>) {
+    let mut out = (Vec::new(), Vec::new());
+    for i in 0..count {
+        let q = Vec3::new(between(rng, -15.0, 15.0), between(rng, heights[0], heights[1]), between(rng, 140.0, 180.0));
+        let turn: Mat3 = exp(&gauss3(rng, tilt));
+        let base_from_sensor: Rigid<Base, Sensor> = Rigid::new(turn, rig.ball - turn * q);
+        let r = (RADIUS * RADIUS - q.y * q.y).sqrt();
+        let mut points = Vec::new();
+        for k in 0..160 {
+            // The upper side only, seen from z = 0.
+            let a = -1.2 + 2.4 * f64::from(k) / 159.0;
+            let s = r + gauss(rng, point_mm);
+            points.push([q.x + s * a.sin(), q.z - s * a.cos()]);
+        }
+        // A table under the ball.
+        for k in 0..30 {
+            points.push([f64::from(k) * 2.0 - 30.0, q.z + RADIUS + gauss(rng, point_mm)]);
+        }
+        out.0.push(Profile { name: format!("profile {i}"), points });
+        let pose = base_from_sensor * rig.sensor.inverse();
+        out.1.push(Rigid::new(pose.rotation, pose.translation + gauss3(rng, robot_mm)));
+    }
+    out
+}
+
+fn rig(rng: &mut Pcg64) -> Rig {
+    Rig { sensor: Rigid::from_vectors(&gauss3(rng, 1.0), gauss3(rng, 80.0)), ball: gauss3(rng, 300.0) }
+}
+
+#[test]
+fn the_sensors_pose_comes_with_its_true_sigma() {
+    let mut over = [0.0; 9];
+    for k in 0..100 {
+        let rng = &mut Pcg64::seed_from_u64(k);
+        let rig = rig(rng);
+        let (point, robot) = [(0.01, 0.02), (0.05, 0.02), (0.02, 0.1), (0.03, 0.05)][k as usize % 4];
+        let (profiles, poses) = scans(rng, &rig, 20, [-14.0, 14.0], 0.35, point, robot);
+        let found = solve(&profiles, &poses, &BallOptions::new(2.0 * RADIUS)).unwrap();
+        let w = log(&(found.flange_from_sensor.rotation * rig.sensor.rotation.transpose()));
+        let t = found.flange_from_sensor.translation - rig.sensor.translation;
+        let p = found.ball - rig.ball;
+        for (i, e) in [t.x, t.y, t.z, w.x, w.y, w.z, p.x, p.y, p.z].into_iter().enumerate() {
+            over[i] += e * e / found.covariance[(i, i)] / 100.0;
+        }
+    }
+    let over = over.map(f64::sqrt);
+    println!("error over sigma {over:.3?}");
+    assert!(over.iter().all(|x| (0.8..=1.25).contains(x)), "{over:?}");
+}
+
+#[test]
+fn the_side_is_found_stated_or_refused() {
+    for k in 0..10 {
+        let rng = &mut Pcg64::seed_from_u64(50 + k);
+        let rig = rig(rng);
+        let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
+        let side = if k % 2 == 0 { Side::Plus } else { Side::Minus };
+        let mut heights = [sign * 4.0, sign * 15.0];
+        heights.sort_by(f64::total_cmp);
+        let (profiles, poses) = scans(rng, &rig, 20, heights, 0.35, 0.02, 0.02);
+        let found = solve(&profiles, &poses, &BallOptions::new(2.0 * RADIUS)).unwrap();
+        assert_eq!(found.side, side, "seed {k}, margin {}", found.side_margin);
+        assert!((found.flange_from_sensor.translation - rig.sensor.translation).norm() < 0.2);
+        let stated = BallOptions { side: Some(side), ..BallOptions::new(2.0 * RADIUS) };
+        let again = solve(&profiles, &poses, &stated).unwrap();
+        assert!((again.ball - found.ball).norm() < 1e-3);
+    }
+}
+
+#[test]
+fn turns_about_nothing_are_refused_and_a_wrong_pair_is_named() {
+    let rng = &mut Pcg64::seed_from_u64(9);
+    let rig = rig(rng);
+    let (profiles, poses) = scans(rng, &rig, 20, [-14.0, 14.0], 0.0, 0.02, 0.02);
+    assert!(solve(&profiles, &poses, &BallOptions::new(2.0 * RADIUS)).is_err());
+    let (profiles, mut poses) = scans(rng, &rig, 20, [-14.0, 14.0], 0.35, 0.02, 0.02);
+    poses[7].translation.x += 3.0;
+    let found = solve(&profiles, &poses, &BallOptions::new(2.0 * RADIUS)).unwrap();
+    let out: Vec<usize> = (0..20).filter(|&i| !found.profiles[i].used).collect();
+    assert_eq!(out, [7]);
+    assert!(solve(&profiles, &poses[1..], &BallOptions::new(2.0 * RADIUS)).is_err());
+    assert!(solve(&profiles, &poses, &BallOptions::new(RADIUS)).is_err(), "a wrong diameter");
+}
