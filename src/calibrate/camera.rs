@@ -110,7 +110,7 @@ fn no_board() -> Fault {
         .next("describe the board in meta.json; sheetlight board writes such a description")
 }
 
-/// A picture whose residuals, over its corners' sigmas, are this many times the median picture's is
+/// A picture whose typical residual, over its corners' sigmas, is this many times the median picture's is
 /// set aside.
 const OUTLIER_PICTURE: f64 = 3.5;
 
@@ -151,11 +151,10 @@ pub fn from_observations(
     Ok(CameraResult { calibration, used: pictures, solved, left_out, hold_out_px, worst })
 }
 
-/// Rms of a picture's residuals over the corners' sigmas.
-fn normalised_rms(o: &Observation, residuals: &[(Vec2, f64)]) -> f64 {
-    let sum: f64 =
-        o.view.points.iter().zip(residuals).map(|(p, (r, _))| (r.norm() / p.sigma_px.hypot(0.01)).powi(2)).sum();
-    (sum / residuals.len().max(1) as f64).sqrt()
+/// Typical residual of a picture over its corners' sigmas; single wrong corners do not count.
+fn typical_misfit(o: &Observation, residuals: &[(Vec2, f64)]) -> f64 {
+    let lengths = o.view.points.iter().zip(residuals).map(|(p, (r, _))| r.norm() / p.sigma_px.hypot(0.01));
+    crate::solve::robust_scale(&mut lengths.collect::<Vec<f64>>(), 2)
 }
 
 /// Index of the picture that fits worst and how many times worse than the median picture.
@@ -163,7 +162,7 @@ fn worst_picture(pictures: &[Observation], solved: &Solved) -> Option<(usize, f6
     if pictures.len() < 4 {
         return None;
     }
-    let all: Vec<f64> = pictures.iter().zip(&solved.residuals).map(|(o, r)| normalised_rms(o, r)).collect();
+    let all: Vec<f64> = pictures.iter().zip(&solved.residuals).map(|(o, r)| typical_misfit(o, r)).collect();
     let mut sorted = all.clone();
     sorted.sort_by(f64::total_cmp);
     let median = sorted[sorted.len() / 2].max(1e-9);

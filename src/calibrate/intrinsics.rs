@@ -38,6 +38,20 @@ pub enum Lens {
     None,
 }
 
+impl std::str::FromStr for Lens {
+    type Err = String;
+    fn from_str(s: &str) -> std::result::Result<Lens, String> {
+        match s {
+            "evidence" => Ok(Lens::Evidence),
+            "five" => Ok(Lens::Five),
+            "four" => Ok(Lens::Four),
+            "one" => Ok(Lens::One),
+            "none" => Ok(Lens::None),
+            _ => Err(format!("unknown lens '{s}': evidence, five, four, one or none")),
+        }
+    }
+}
+
 impl Lens {
     fn held(self) -> &'static [usize] {
         match self {

@@ -4,6 +4,7 @@
 pub mod board_print;
 pub mod boards;
 pub mod camera;
+pub mod camera_report;
 pub mod components;
 pub mod hand_eye;
 pub mod hand_eye_checks;

@@ -1,8 +1,9 @@
 //! In: the command line. Out: one library call a subcommand, its result on stdout, talk on stderr.
 //! Frame and unit: as the subcommands say; every number is printed with its unit.
 
-mod calibrate;
 mod bench;
+mod board;
+mod calibrate;
 mod console;
 mod demo;
 mod doctor;
@@ -35,11 +36,12 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    Demo(demo::Args),
+    Bench(bench::Args),
+    Board(board::Args),
     /// Calibrate a station's camera, laser plane, pointer or hand-eye from a recording
     #[command(subcommand)]
     Calibrate(calibrate::Command),
-    Bench(bench::Args),
+    Demo(demo::Args),
     Doctor(doctor::Args),
     Find(find::Args),
     Range(range::Args),
@@ -53,9 +55,10 @@ enum Command {
 
 fn run(command: &Command, console: &Console) -> Result<()> {
     match command {
-        Command::Demo(a) => demo::run(a, console),
-        Command::Calibrate(c) => calibrate::run(c, console),
         Command::Bench(a) => bench::run(a, console),
+        Command::Board(a) => board::run(a, console),
+        Command::Calibrate(c) => calibrate::run(c, console),
+        Command::Demo(a) => demo::run(a, console),
         Command::Doctor(a) => doctor::run(a, console),
         Command::Find(a) => find::run(a, console),
         Command::Range(a) => range::run(a, console),

@@ -91,7 +91,8 @@ fn refine(grid: &mut Grid, layout: &Layout<'_>, grey: &Grey, options: &FindOptio
     let margin = 0.75 * 0.5 * (1.0 - layout.marker_mm / layout.square_mm);
     let window = Window { reach: options.reach, longest_px: options.longest_px, margin };
     let mut corners = grid.refined(grey, &window, options.band_px);
-    for _ in 0..4 {
+    // A round grows by one row or column on each side.
+    for _ in 0..grid.columns + grid.rows {
         let Some(typical) = Typical::of(&corners, grid.columns) else { break };
         for (k, c) in corners.iter_mut().enumerate() {
             if c.is_some_and(|c| !typical.resembles(&c, k % grid.columns + k / grid.columns)) {
@@ -143,7 +144,7 @@ impl Typical {
     }
     fn resembles(&self, c: &Corner, parity: usize) -> bool {
         let contrast = c.contrast * sign(parity) / self.contrast;
-        (0.3..3.0).contains(&contrast) && c.blur_px < 2.5 * self.blur + 0.5 && c.sigma_px < 5.0 * self.sigma
+        (0.3..3.0).contains(&contrast) && c.blur_px < 2.5 * self.blur + 0.5 && c.sigma_px < 5.0 * self.sigma + 0.02
     }
 }
 
@@ -155,9 +156,12 @@ fn why_not(layout: &Layout<'_>, span: f64, reason: &str) -> Fault {
     let [c, r] = layout.squares;
     let wanted = format!("fewer than {FEWEST} corners of the {c}x{r} ChArUco board were found");
     if span < 0.06 {
-        return Fault::refused(format!("{wanted}: grey levels span {:.1} % of full scale, 6 % are needed", span * 100.0))
-            .cause("too dark, too bright, or the lens is covered")
-            .next("adjust the exposure so that white squares reach half of full scale");
+        return Fault::refused(format!(
+            "{wanted}: grey levels span {:.1} % of full scale, 6 % are needed",
+            span * 100.0
+        ))
+        .cause("too dark, too bright, or the lens is covered")
+        .next("adjust the exposure so that white squares reach half of full scale");
     }
     Fault::refused(if reason.is_empty() { wanted } else { format!("{wanted} ({reason})") })
         .cause("the board is out of view or out of focus, its markers are smaller than 15 px, or the description names another dictionary or size")

@@ -126,9 +126,12 @@ fn nearest_to_top_left(grid: Grid, corners: &[Corner], quarters: bool) -> Grid {
 fn why_not(best: Option<&Grid>, columns: usize, rows: usize, span: f64, grey: &Grey) -> Fault {
     let wanted = format!("no chessboard of {columns}x{rows} inner corners was found");
     if span < 0.06 {
-        return Fault::refused(format!("{wanted}: grey levels span {:.1} % of full scale, 6 % are needed", span * 100.0))
-            .cause("too dark, too bright, or the lens is covered")
-            .next("adjust the exposure so that white squares reach half of full scale");
+        return Fault::refused(format!(
+            "{wanted}: grey levels span {:.1} % of full scale, 6 % are needed",
+            span * 100.0
+        ))
+        .cause("too dark, too bright, or the lens is covered")
+        .next("adjust the exposure so that white squares reach half of full scale");
     }
     let Some(grid) = best.filter(|g| g.count() >= 9) else {
         return Fault::refused(format!("{wanted}, nor any other lattice of at least 9 corners"))

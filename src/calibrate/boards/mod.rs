@@ -4,8 +4,16 @@
 
 mod charuco;
 mod chessboard;
+mod circles;
+mod ellipse;
 mod grid;
+pub mod print;
 pub mod refine;
+#[cfg(test)]
+mod trials;
+mod turns;
+
+pub use turns::{Turn, resolve, turns};
 
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec2;
@@ -84,6 +92,6 @@ pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<B
                 charuco::Layout { squares: *squares, square_mm: *square_mm, marker_mm: *marker_mm, dictionary };
             charuco::find(image, &layout, options)
         }
-        BoardSpec::Circles { .. } => Err(Fault::usage("this kind of board is not read yet")),
+        BoardSpec::Circles { .. } => circles::find(image, board, options),
     }
 }

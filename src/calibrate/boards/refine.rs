@@ -57,8 +57,8 @@ pub struct Window {
 
 const PARAMETERS: usize = 9;
 
-/// Fits two blurred edges that cross: I = (1 + g·x) (m + c erf(d₁/√2s) erf(d₂/√2s)) with d the signed
-/// distances from the edges. The pattern is symmetric about the corner for any symmetric blur, so
+/// Fits two blurred edges that cross: I = (1 + g·x) (m + c E(d₁) E(d₂)) with d the signed
+/// distances from the edges and E a step blurred by a Gaussian and by the pixel. The pattern is symmetric about the corner for any symmetric blur, so
 /// that an imperfect blur model does not shift it. `u` and `v` are the steps to the next corners, px.
 pub fn corner(grey: &Grey, start: &Vec2, u: &Vec2, v: &Vec2, window: &Window) -> Option<Corner> {
     let to_grid = nalgebra::Matrix2::from_columns(&[*u, *v]).try_inverse()?;
@@ -93,25 +93,25 @@ pub fn corner(grey: &Grey, start: &Vec2, u: &Vec2, v: &Vec2, window: &Window) ->
     })
 }
 
-/// Model value and derivatives at (x, y). Parameters: corner x y, edge angles 1 2, ln blur, mean m,
+/// Model value and derivatives at (x, y); `widths` are the pixel's widths across the edges. Parameters: corner x y, edge angles 1 2, ln blur, mean m,
 /// contrast c, gain slopes gx gy.
-fn model(p: &[f64; PARAMETERS], x: f64, y: f64, j: &mut [f64; PARAMETERS]) -> f64 {
+fn model(p: &[f64; PARAMETERS], widths: &[f64; 2], x: f64, y: f64, j: &mut [f64; PARAMETERS]) -> f64 {
     let (dx, dy) = (x - p[0], y - p[1]);
     let (s1, c1) = p[2].sin_cos();
     let (s2, c2) = p[3].sin_cos();
     // Edge i runs along (cos a, sin a); its normal is (-sin a, cos a).
     let (d1, d2) = (-s1 * dx + c1 * dy, -s2 * dx + c2 * dy);
-    let inv = (-p[4]).exp() * std::f64::consts::FRAC_1_SQRT_2;
-    let ((e1, g1), (e2, g2)) = (erf(d1 * inv), erf(d2 * inv));
+    let blur = p[4].exp();
+    let ((e1, g1, t1), (e2, g2, t2)) = (edge(d1, widths[0], blur), edge(d2, widths[1], blur));
     let gain = 1.0 + p[7] * x + p[8] * y;
     let shape = p[5] + p[6] * e1 * e2;
     // Derivatives by d1 and d2.
-    let (b1, b2) = (gain * p[6] * g1 * inv * e2, gain * p[6] * e1 * g2 * inv);
+    let (b1, b2) = (gain * p[6] * g1 * e2, gain * p[6] * e1 * g2);
     j[0] = b1 * s1 + b2 * s2;
     j[1] = -b1 * c1 - b2 * c2;
     j[2] = b1 * (-c1 * dx - s1 * dy);
     j[3] = b2 * (-c2 * dx - s2 * dy);
-    j[4] = -b1 * d1 - b2 * d2;
+    j[4] = gain * p[6] * (t1 * e2 + e1 * t2);
     j[5] = gain;
     j[6] = gain * e1 * e2;
     j[7] = x * shape;
@@ -124,12 +124,14 @@ fn fit(pixels: &[[f64; 3]], u: &Vec2, v: &Vec2) -> Option<Corner> {
     let mean = pixels.iter().map(|p| p[2]).sum::<f64>() / n;
     // The first edge runs along u, the second along v: d1 d2 < 0 in the quadrant between +u and +v.
     let (a1, a2) = (u.y.atan2(u.x), v.y.atan2(v.x));
+    // A square pixel seen across an edge at angle a is a trapezoid; its wider part is the box, the rest blur.
+    let widths = [a1, a2].map(|a: f64| a.sin().abs().max(a.cos().abs()));
     let mut p = [0.0, 0.0, a1, a2, 0.0, mean, 0.0, 0.0, 0.0];
     // Contrast by projection on the start's own pattern.
     let mut scratch = [0.0; PARAMETERS];
     let (mut top, mut bottom) = (0.0, 0.0);
     for q in pixels {
-        model(&p, q[0], q[1], &mut scratch);
+        model(&p, &widths, q[0], q[1], &mut scratch);
         top += scratch[6] * (q[2] - mean);
         bottom += scratch[6] * scratch[6];
     }
@@ -139,7 +141,7 @@ fn fit(pixels: &[[f64; 3]], u: &Vec2, v: &Vec2) -> Option<Corner> {
     }
     let limit = 0.35 * u.norm().min(v.norm());
     let (mut cost, mut damping) = (f64::INFINITY, 1e-3);
-    let (mut h, mut g) = normal_equations(&p, pixels, &mut cost);
+    let (mut h, mut g) = normal_equations(&p, &widths, pixels, &mut cost);
     for _ in 0..30 {
         let mut damped = h;
         for i in 0..PARAMETERS {
@@ -151,9 +153,9 @@ fn fit(pixels: &[[f64; 3]], u: &Vec2, v: &Vec2) -> Option<Corner> {
             next[i] += step[i];
         }
         // The blur stays between a sharp lens's pixel and half of a square.
-        next[4] = next[4].clamp(0.2f64.ln(), limit.max(0.3).ln());
+        next[4] = next[4].clamp(0.1f64.ln(), limit.max(0.3).ln());
         let mut there = 0.0;
-        let (h2, g2) = normal_equations(&next, pixels, &mut there);
+        let (h2, g2) = normal_equations(&next, &widths, pixels, &mut there);
         if there <= cost {
             let done = step[0].abs().max(step[1].abs()) < 1e-4 && (cost - there) < 1e-4 * cost;
             (p, cost, h, g) = (next, there, h2, g2);
@@ -188,13 +190,13 @@ fn fit(pixels: &[[f64; 3]], u: &Vec2, v: &Vec2) -> Option<Corner> {
 
 type Normal = (SMatrix<f64, PARAMETERS, PARAMETERS>, SVector<f64, PARAMETERS>);
 
-fn normal_equations(p: &[f64; PARAMETERS], pixels: &[[f64; 3]], cost: &mut f64) -> Normal {
+fn normal_equations(p: &[f64; PARAMETERS], widths: &[f64; 2], pixels: &[[f64; 3]], cost: &mut f64) -> Normal {
     let mut h = SMatrix::<f64, PARAMETERS, PARAMETERS>::zeros();
     let mut g = SVector::<f64, PARAMETERS>::zeros();
     let mut j = [0.0; PARAMETERS];
     let mut sum = 0.0;
     for q in pixels {
-        let r = q[2] - model(p, q[0], q[1], &mut j);
+        let r = q[2] - model(p, widths, q[0], q[1], &mut j);
         sum += r * r;
         for a in 0..PARAMETERS {
             g[a] += j[a] * r;
@@ -212,8 +214,22 @@ fn normal_equations(p: &[f64; PARAMETERS], pixels: &[[f64; 3]], cost: &mut f64) 
     (h, g)
 }
 
+/// A step from -1 to 1 blurred by a Gaussian of sigma `s` and a box of width `w`, with its derivatives by
+/// d and by ln s.
+fn edge(d: f64, w: f64, s: f64) -> (f64, f64, f64) {
+    let k = std::f64::consts::SQRT_2 * s;
+    let (a, b) = ((d + 0.5 * w) / k, (d - 0.5 * w) / k);
+    if a.abs().min(b.abs()) > 4.0 && a * b > 0.0 {
+        return (d.signum(), 0.0, 0.0);
+    }
+    let ((ea, ga), (eb, gb)) = (erf(a), erf(b));
+    // The integral of erf is x erf(x) + exp(-x²)/√π, and erf' = 2 exp(-x²)/√π.
+    let blurred = k / w * (a * ea + 0.5 * ga - b * eb - 0.5 * gb);
+    (blurred, (ea - eb) / w, k / w * 0.5 * (ga - gb))
+}
+
 /// erf(x) and its derivative, to 1.5e-7 [abramowitz64, 7.1.26].
-fn erf(x: f64) -> (f64, f64) {
+pub(super) fn erf(x: f64) -> (f64, f64) {
     let a = x.abs();
     if a > 4.0 {
         return (x.signum(), 0.0);
@@ -259,6 +275,17 @@ mod tests {
         let c = corner(&drawn(truth, u, v), &Vec2::new(32.2, 31.6), &u, &v, &window).unwrap();
         assert!((c.pixel - truth).norm() < 0.004, "{c:?}");
         assert!((c.contrast - 80.0).abs() < 15.0 && c.sigma_px < 0.02, "{c:?}");
+    }
+
+    #[test]
+    fn an_edges_derivatives_are_derivatives() {
+        for (d, w, s) in [(0.3, 1.0, 0.4), (-0.8, 0.8, 0.9), (0.0, 1.0, 0.15), (2.0, 0.7, 1.5)] {
+            let (_, by_d, by_s) = edge(d, w, s);
+            let h = 1e-3;
+            assert!(((edge(d + h, w, s).0 - edge(d - h, w, s).0) / (2.0 * h) - by_d).abs() < 2e-3);
+            let (up, down) = (edge(d, w, s * h.exp()).0, edge(d, w, s * (-h).exp()).0);
+            assert!(((up - down) / (2.0 * h) - by_s).abs() < 2e-3, "{d} {w} {s}");
+        }
     }
 
     #[test]

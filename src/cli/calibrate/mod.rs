@@ -1,6 +1,7 @@
 //! In: a recording and a station. Out: one calibration, stored in the station with its report.
 //! Frame and unit: mm, rad, px; each file names its frames.
 
+mod camera;
 mod hand_eye;
 mod laser_plane;
 mod pointer;
@@ -14,6 +15,7 @@ use std::path::Path;
 
 #[derive(clap::Subcommand)]
 pub enum Command {
+    Camera(camera::Args),
     HandEye(hand_eye::Args),
     LaserPlane(laser_plane::Args),
     Pointer(pointer::Args),
@@ -21,6 +23,7 @@ pub enum Command {
 
 pub fn run(command: &Command, console: &Console) -> Result<()> {
     match command {
+        Command::Camera(a) => camera::run(a, console),
         Command::HandEye(a) => hand_eye::run(a, console),
         Command::LaserPlane(a) => laser_plane::run(a, console),
         Command::Pointer(a) => pointer::run(a, console),

@@ -1,0 +1,237 @@
+//! In: a board's description. Out: the board to be printed at true scale, as SVG and PDF.
+//! Frame and unit: millimetres on the sheet, x to the right, y down.
+
+use crate::calibrate::board_print::outline;
+use crate::fault::{Fault, Result};
+use crate::recording::BoardSpec;
+use calib_targets_charuco::resolve_dictionary;
+use std::fmt::Write;
+
+/// Black shapes on a white sheet.
+#[derive(Clone, Debug, Default)]
+pub struct Sheet {
+    pub width: f64,
+    pub height: f64,
+    /// x, y, width, height.
+    pub rectangles: Vec<[f64; 4]>,
+    /// centre x, y, radius.
+    pub discs: Vec<[f64; 3]>,
+    /// Under the board, outside its border.
+    pub label: String,
+}
+
+/// Space under the board for the label and a 100 mm rule to check the printer with.
+const FOOT: f64 = 12.0;
+
+/// Draws a board.
+///
+/// # Errors
+/// Sizes that cannot be printed, unknown dictionaries, more markers than the dictionary has.
+pub fn sheet(board: &BoardSpec) -> Result<Sheet> {
+    check(board)?;
+    let [x0, y0, x1, y1] = outline(board);
+    let mut sheet = Sheet { width: x1 - x0, height: y1 - y0 + FOOT, label: label(board), ..Sheet::default() };
+    match board {
+        BoardSpec::Chessboard { inner_corners: [nx, ny], square_mm: s, first_square, .. } => {
+            let odd = u32::from(first_square == "white");
+            squares(&mut sheet, *nx + 1, *ny + 1, *s, -s - x0, -s - y0, odd);
+        }
+        BoardSpec::Charuco { squares: [nx, ny], square_mm: s, marker_mm, dictionary, .. } => {
+            squares(&mut sheet, *nx, *ny, *s, -x0, -y0, 0);
+            markers(&mut sheet, [*nx, *ny], *s, *marker_mm, dictionary, [-x0, -y0])?;
+        }
+        BoardSpec::Circles { diameter_mm, .. } => {
+            let discs = board.features().into_iter().map(|c| [c.x - x0, c.y - y0, diameter_mm / 2.0]);
+            sheet.discs.extend(discs);
+        }
+    }
+    let rule = sheet.width.min(100.0).floor();
+    sheet.rectangles.push([(sheet.width - rule) / 2.0, sheet.height - 6.0, rule, 0.3]);
+    for end in [0.0, rule - 0.3] {
+        sheet.rectangles.push([(sheet.width - rule) / 2.0 + end, sheet.height - 7.5, 0.3, 3.0]);
+    }
+    Ok(sheet)
+}
+
+fn check(board: &BoardSpec) -> Result<()> {
+    let bad = |what: String, next: &str| Err(Fault::usage(what).next(next));
+    let (n, lengths) = match board {
+        BoardSpec::Chessboard { inner_corners, square_mm, border_mm, .. } => (*inner_corners, [*square_mm, *border_mm]),
+        BoardSpec::Charuco { squares, square_mm, border_mm, .. } => (*squares, [*square_mm, *border_mm]),
+        BoardSpec::Circles { dots, pitch_mm, border_mm, .. } => (*dots, [*pitch_mm, *border_mm]),
+    };
+    if n.iter().any(|n| !(3..=100).contains(n)) {
+        return bad(format!("{}x{} is out of range", n[0], n[1]), "choose 3 to 100 each way");
+    }
+    if !(0.5..=500.0).contains(&lengths[0]) || !(0.0..=500.0).contains(&lengths[1]) {
+        return bad(
+            format!("squares (or pitch) of {} mm with a border of {} mm are out of range", lengths[0], lengths[1]),
+            "choose 0.5 to 500 mm, border 0 to 500 mm",
+        );
+    }
+    match board {
+        BoardSpec::Charuco { square_mm, marker_mm, .. } if !(*marker_mm > 0.0 && *marker_mm < 0.95 * square_mm) => bad(
+            format!("markers of {marker_mm} mm do not fit in squares of {square_mm} mm"),
+            "choose markers of 0.5 to 0.8 of the square",
+        ),
+        BoardSpec::Circles { diameter_mm, pitch_mm, .. } if !(*diameter_mm > 0.0 && *diameter_mm < 0.9 * pitch_mm) => {
+            bad(format!("dots of {diameter_mm} mm touch at a pitch of {pitch_mm} mm"), "choose dots of half the pitch")
+        }
+        _ => Ok(()),
+    }
+}
+
+fn squares(sheet: &mut Sheet, nx: u32, ny: u32, s: f64, x0: f64, y0: f64, odd: u32) {
+    let black = (0..ny).flat_map(|j| (0..nx).map(move |i| (i, j))).filter(|(i, j)| (i + j) % 2 == odd);
+    sheet.rectangles.extend(black.map(|(i, j)| [x0 + f64::from(i) * s, y0 + f64::from(j) * s, s, s]));
+}
+
+/// A marker in every white square, numbered row by row; codes are row by row from the lowest bit, 1 is
+/// black, with a black ring of one cell.
+fn markers(sheet: &mut Sheet, [nx, ny]: [u32; 2], s: f64, size: f64, name: &str, [x0, y0]: [f64; 2]) -> Result<()> {
+    let dictionary = resolve_dictionary(name).ok_or_else(|| {
+        Fault::usage(format!("'{name}' is no known marker dictionary")).next("use OpenCV's name, e.g. DICT_5X5_250")
+    })?;
+    let white: Vec<(u32, u32)> =
+        (0..ny).flat_map(|j| (0..nx).map(move |i| (i, j))).filter(|(i, j)| (i + j) % 2 == 1).collect();
+    if white.len() > dictionary.codes().len() {
+        return Err(Fault::usage(format!(
+            "the board needs {} markers, {name} has {}",
+            white.len(),
+            dictionary.codes().len()
+        ))
+        .next("choose a larger dictionary or a smaller board"));
+    }
+    let bits = dictionary.marker_size();
+    let cell = size / (bits + 2) as f64;
+    for ((i, j), code) in white.into_iter().zip(dictionary.codes()) {
+        let left = x0 + f64::from(i) * s + (s - size) / 2.0;
+        let top = y0 + f64::from(j) * s + (s - size) / 2.0;
+        for row in 0..bits + 2 {
+            let black = |column: usize| {
+                let ring = row == 0 || column == 0 || row > bits || column > bits;
+                ring || code >> ((row - 1) * bits + column - 1) & 1 == 1
+            };
+            // Runs of black cells as one rectangle: no hairlines between cells in print.
+            let mut column = 0;
+            while column < bits + 2 {
+                let start = column;
+                while column < bits + 2 && black(column) {
+                    column += 1;
+                }
+                if column > start {
+                    let (x, w) = (left + start as f64 * cell, (column - start) as f64 * cell);
+                    sheet.rectangles.push([x, top + row as f64 * cell, w, cell]);
+                }
+                column += 1;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn label(board: &BoardSpec) -> String {
+    match board {
+        BoardSpec::Chessboard { inner_corners: [a, b], square_mm, .. } => {
+            format!("chessboard, {a}x{b} inner corners, squares {square_mm} mm")
+        }
+        BoardSpec::Charuco { squares: [a, b], square_mm, marker_mm, dictionary, .. } => {
+            format!("ChArUco, {a}x{b} squares of {square_mm} mm, markers {marker_mm} mm, {dictionary}")
+        }
+        BoardSpec::Circles { dots: [a, b], pitch_mm, diameter_mm, asymmetric, .. } => {
+            let kind = if *asymmetric { "asymmetric" } else { "symmetric" };
+            format!("{kind} circles, {a}x{b}, pitch {pitch_mm} mm, diameter {diameter_mm} mm")
+        }
+    }
+}
+
+impl Sheet {
+    /// SVG whose user unit is a millimetre.
+    pub fn svg(&self) -> String {
+        let (w, h) = (self.width, self.height);
+        let mut out = format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}mm\" height=\"{h}mm\" viewBox=\"0 0 {w} {h}\">\
+             <rect width=\"{w}\" height=\"{h}\" fill=\"#fff\"/>"
+        );
+        // One path: neighbours that touch leave no seam between them.
+        out.push_str("<path d=\"");
+        for [x, y, w, h] in &self.rectangles {
+            let _ = write!(out, "M{x:.5} {y:.5}h{w:.5}v{h:.5}h{:.5}z", -w);
+        }
+        out.push_str("\"/>");
+        for [x, y, r] in &self.discs {
+            let _ = write!(out, "<circle cx=\"{x:.5}\" cy=\"{y:.5}\" r=\"{r:.5}\"/>");
+        }
+        let _ = write!(
+            out,
+            "<text x=\"{:.2}\" y=\"{:.2}\" text-anchor=\"middle\" font-family=\"sans-serif\" font-size=\"2.6\">{}</text></svg>\n",
+            w / 2.0,
+            h - 8.5,
+            self.label
+        );
+        out
+    }
+
+    /// PDF 1.4 with one page of the sheet's size; a unit is 1/72 inch.
+    pub fn pdf(&self) -> Vec<u8> {
+        let k = 72.0 / 25.4;
+        let flip = |y: f64| (self.height - y) * k;
+        let mut draw = String::from("0 g\n");
+        for [x, y, w, h] in &self.rectangles {
+            let _ = writeln!(draw, "{:.4} {:.4} {:.4} {:.4} re", x * k, flip(y + h), w * k, h * k);
+        }
+        draw.push_str("f\n");
+        for [x, y, r] in &self.discs {
+            disc(&mut draw, x * k, flip(*y), r * k);
+        }
+        // Helvetica's digits and letters are about half as wide as high.
+        let left = (self.width / 2.0 - self.label.len() as f64 * 2.6 * 0.25) * k;
+        let _ = writeln!(
+            draw,
+            "BT /F1 {:.2} Tf {:.2} {:.2} Td ({}) Tj ET",
+            2.6 * k,
+            left.max(0.0),
+            flip(self.height - 8.5),
+            self.label
+        );
+        let objects = [
+            "<< /Type /Catalog /Pages 2 0 R /ViewerPreferences << /PrintScaling /None >> >>".to_string(),
+            "<< /Type /Pages /Kids [3 0 R] /Count 1 >>".into(),
+            format!(
+                "<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {:.4} {:.4}] /Contents 4 0 R /Resources << /Font << /F1 5 0 R >> >> >>",
+                self.width * k,
+                self.height * k
+            ),
+            format!("<< /Length {} >>\nstream\n{draw}endstream", draw.len()),
+            "<< /Type /Font /Subtype /Type1 /BaseFont /Helvetica >>".into(),
+        ];
+        let mut out = String::from("%PDF-1.4\n");
+        let mut places = Vec::new();
+        for (i, object) in objects.iter().enumerate() {
+            places.push(out.len());
+            let _ = write!(out, "{} 0 obj\n{object}\nendobj\n", i + 1);
+        }
+        let start = out.len();
+        let _ = write!(out, "xref\n0 {}\n0000000000 65535 f \n", objects.len() + 1);
+        for place in places {
+            let _ = write!(out, "{place:010} 00000 n \n");
+        }
+        let _ = write!(out, "trailer\n<< /Size {} /Root 1 0 R >>\nstartxref\n{start}\n%%EOF\n", objects.len() + 1);
+        out.into_bytes()
+    }
+}
+
+/// A disc of four Bezier arcs; off by at most 0.03 % of the radius.
+fn disc(out: &mut String, x: f64, y: f64, r: f64) {
+    let c = 0.552_285 * r;
+    let _ = writeln!(out, "{:.4} {y:.4} m", x + r);
+    for (sx, sy, quarter) in [(1.0, 1.0, 0), (-1.0, 1.0, 1), (-1.0, -1.0, 0), (1.0, -1.0, 1)] {
+        let p = if quarter == 0 {
+            [x + sx * r, y + sy * c, x + sx * c, y + sy * r, x, y + sy * r]
+        } else {
+            [x + sx * c, y + sy * r, x + sx * r, y + sy * c, x + sx * r, y]
+        };
+        let _ = writeln!(out, "{:.4} {:.4} {:.4} {:.4} {:.4} {:.4} c", p[0], p[1], p[2], p[3], p[4], p[5]);
+    }
+    out.push_str("f\n");
+}

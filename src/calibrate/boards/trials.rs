@@ -1,0 +1,194 @@
+//! In: boards drawn by `print` and seen by a perfect pinhole. Out: tests that each kind is found where
+//! it is, and refused with the right reason where it is not.
+//! Frame and unit: pixels, mm.
+
+use super::print::{Sheet, sheet};
+use super::{BoardView, FindOptions, find, turns};
+use crate::calibrate::board_print::outline;
+use crate::camera::Intrinsics;
+use crate::geometry::{Board, Camera, Rigid, Vec2, Vec3};
+use crate::raster::Image;
+use crate::recording::BoardSpec;
+
+const WIDTH: u32 = 640;
+const HEIGHT: u32 = 480;
+
+fn camera() -> Intrinsics {
+    Intrinsics {
+        fx: 600.0,
+        fy: 600.0,
+        cx: 319.5,
+        cy: 239.5,
+        skew: 0.0,
+        distortion: [0.0; 5],
+        width: WIDTH,
+        height: HEIGHT,
+    }
+}
+
+fn facing(board: &BoardSpec, rotation: Vec3, distance: f64) -> Rigid<Camera, Board> {
+    let features = board.features();
+    let centre = features.iter().sum::<Vec3>() / features.len() as f64;
+    let r = crate::geometry::exp(&rotation);
+    Rigid::new(r, Vec3::new(3.0, -2.0, distance) - r * centre)
+}
+
+/// Brightness of the print at a point of the sheet: rows of rectangles are few, a raster is not needed.
+struct Print {
+    cells: Vec<bool>,
+    columns: usize,
+    rows: usize,
+    origin: [f64; 2],
+}
+
+const CELL: f64 = 0.1;
+
+impl Print {
+    fn new(board: &BoardSpec, sheet: &Sheet) -> Print {
+        let [x0, y0, _, _] = outline(board);
+        let (columns, rows) = ((sheet.width / CELL).ceil() as usize, (sheet.height / CELL).ceil() as usize);
+        let mut cells = vec![false; columns * rows];
+        let at = |v: f64, n: usize| ((v / CELL).round().max(0.0) as usize).min(n);
+        for [x, y, w, h] in &sheet.rectangles {
+            for j in at(*y, rows)..at(y + h, rows) {
+                cells[j * columns + at(*x, columns)..j * columns + at(x + w, columns)].fill(true);
+            }
+        }
+        for [cx, cy, r] in &sheet.discs {
+            for j in at(cy - r - CELL, rows)..at(cy + r + CELL, rows) {
+                for i in at(cx - r - CELL, columns)..at(cx + r + CELL, columns) {
+                    let (x, y) = ((i as f64 + 0.5) * CELL, (j as f64 + 0.5) * CELL);
+                    cells[j * columns + i] |= (x - cx).hypot(y - cy) < *r;
+                }
+            }
+        }
+        Print { cells, columns, rows, origin: [x0, y0] }
+    }
+    fn level(&self, p: &Vec3) -> f64 {
+        let (x, y) = (((p.x - self.origin[0]) / CELL).floor(), ((p.y - self.origin[1]) / CELL).floor());
+        if !(x >= 0.0 && y >= 0.0 && x < self.columns as f64 && y < self.rows as f64) {
+            return 12.0;
+        }
+        if self.cells[y as usize * self.columns + x as usize] { 20.0 } else { 190.0 }
+    }
+}
+
+/// 36 rays a pixel.
+fn picture(board: &BoardSpec, pose: &Rigid<Camera, Board>) -> Image {
+    let print = Print::new(board, &sheet(board).unwrap());
+    let back = pose.inverse();
+    let eye = back.translation;
+    let k = camera();
+    let mut pixels = Vec::new();
+    for v in 0..HEIGHT {
+        for u in 0..WIDTH {
+            let mut sum = 0.0;
+            for s in 0..36 {
+                // A rank-1 lattice: 36 different columns and rows, so that aligned edges are not quantised.
+                let (dx, dy) = ((f64::from(s) + 0.5) / 36.0, (f64::from(s * 11 % 36) + 0.5) / 36.0);
+                let px = Vec2::new(f64::from(u) + dx - 0.5, f64::from(v) + dy - 0.5);
+                let n = k.normalised(&px);
+                let d = back.rotation * Vec3::new(n.x, n.y, 1.0);
+                sum += print.level(&(eye - d * (eye.z / d.z)));
+            }
+            pixels.push((sum / 36.0).round() as u8);
+        }
+    }
+    Image::from_u8(WIDTH, HEIGHT, pixels)
+}
+
+/// Largest distance of the features from where they are, with the best of the board's turns.
+fn worst(board: &BoardSpec, pose: &Rigid<Camera, Board>, view: &BoardView) -> f64 {
+    let features = board.features();
+    let error = |view: &BoardView| {
+        let far = view
+            .points
+            .iter()
+            .map(|p| (camera().pixel_from_point(&pose.point(&features[p.feature_id])).unwrap() - p.pixel).norm());
+        far.fold(0.0, f64::max)
+    };
+    turns(board).iter().map(|t| error(&view.turned(t))).fold(f64::INFINITY, f64::min)
+}
+
+fn chessboard(nx: u32, ny: u32) -> BoardSpec {
+    BoardSpec::Chessboard { inner_corners: [nx, ny], square_mm: 12.0, border_mm: 8.0, first_square: "black".into() }
+}
+
+fn charuco() -> BoardSpec {
+    BoardSpec::Charuco {
+        squares: [9, 6],
+        square_mm: 14.0,
+        marker_mm: 9.8,
+        dictionary: "DICT_5X5_250".into(),
+        border_mm: 8.0,
+    }
+}
+
+fn circles(nx: u32, ny: u32, asymmetric: bool) -> BoardSpec {
+    BoardSpec::Circles { dots: [nx, ny], pitch_mm: 10.0, diameter_mm: 8.0, asymmetric, border_mm: 10.0 }
+}
+
+#[test]
+fn every_kind_is_found_where_it_is_from_every_side() {
+    let boards = [(chessboard(9, 6), 0.03), (chessboard(5, 8), 0.03), (charuco(), 0.03), (circles(4, 9, true), 0.03)];
+    for (board, limit) in boards {
+        assert_eq!(turns(&board).len(), 1);
+        for rotation in [Vec3::new(0.4, -0.2, 0.1), Vec3::new(-0.3, 0.3, 1.6), Vec3::new(0.2, 0.4, 3.0)] {
+            let pose = facing(&board, rotation, 230.0);
+            let view = find(&picture(&board, &pose), &board, &FindOptions::default()).unwrap();
+            let (seen, all) = (view.points.len(), board.features().len());
+            assert!(!view.ambiguous && seen * 10 >= all * 9, "{board:?} {rotation:?}: {seen} of {all}");
+            let off = worst(&board, &pose, &view);
+            assert!(off < limit, "{board:?} {rotation:?}: {off} px");
+        }
+    }
+}
+
+#[test]
+fn boards_that_look_alike_when_turned_say_so() {
+    for board in [chessboard(8, 6), chessboard(7, 7), circles(7, 5, false)] {
+        let pose = facing(&board, Vec3::new(0.35, -0.2, 2.9), 230.0);
+        let view = find(&picture(&board, &pose), &board, &FindOptions::default()).unwrap();
+        assert!(view.ambiguous);
+        assert!(worst(&board, &pose, &view) < 0.03);
+    }
+}
+
+#[test]
+fn a_circles_centre_is_not_the_centre_of_its_ellipse() {
+    // Large dots near a tilted camera: uncorrected, the centres would be 0.1 px and more off.
+    let board =
+        BoardSpec::Circles { dots: [4, 3], pitch_mm: 30.0, diameter_mm: 22.0, asymmetric: false, border_mm: 9.0 };
+    let pose = facing(&board, Vec3::new(0.0, 0.6, 0.1), 190.0);
+    let view = find(&picture(&board, &pose), &board, &FindOptions::default()).unwrap();
+    let off = worst(&board, &pose, &view);
+    assert!(off < 0.03, "{off} px");
+}
+
+#[test]
+fn what_is_not_found_is_explained() {
+    let board = chessboard(9, 6);
+    let why = |image: &Image, board: &BoardSpec| find(image, board, &FindOptions::default()).unwrap_err().to_string();
+    let whole = picture(&board, &facing(&board, Vec3::new(0.3, 0.1, 0.2), 230.0));
+    assert!(why(&whole, &chessboard(8, 6)).contains("wrong board size"), "{}", why(&whole, &chessboard(8, 6)));
+    let near = picture(&board, &facing(&board, Vec3::new(0.3, 0.1, 0.2), 105.0));
+    assert!(why(&near, &board).contains("cut off"), "{}", why(&near, &board));
+    let dark = Image::from_u8(WIDTH, HEIGHT, vec![3; (WIDTH * HEIGHT) as usize]);
+    assert!(why(&dark, &board).contains("grey levels span"), "{}", why(&dark, &board));
+    let empty = Image::from_u8(WIDTH, HEIGHT, (0..WIDTH * HEIGHT).map(|i| (i % WIDTH / 4) as u8).collect());
+    assert!(why(&empty, &board).contains("nor any other lattice"), "{}", why(&empty, &board));
+    let white =
+        BoardSpec::Chessboard { inner_corners: [9, 7], square_mm: 12.0, border_mm: 8.0, first_square: "white".into() };
+    let odd = picture(&chessboard(9, 7), &facing(&chessboard(9, 7), Vec3::new(0.3, 0.1, 0.2), 250.0));
+    assert!(why(&odd, &white).contains("first_square"), "{}", why(&odd, &white));
+    let unknown = BoardSpec::Charuco {
+        squares: [9, 6],
+        square_mm: 14.0,
+        marker_mm: 10.0,
+        dictionary: "DICT_9X9".into(),
+        border_mm: 0.0,
+    };
+    assert!(why(&whole, &unknown).contains("DICT_9X9"));
+    assert!(why(&whole, &charuco()).contains("ChArUco board were found"));
+    assert!(why(&whole, &circles(7, 5, false)).contains("no grid of 7x5 dots"));
+}

@@ -1,0 +1,117 @@
+//! In: the layout of a calibration board. Out: the board to print, as SVG and PDF at true scale, and its
+//! description for meta.json.
+//! Frame and unit: mm; board frame as in docs/conventions.md.
+
+use super::Console;
+use crate::calibrate::boards::print::sheet;
+use crate::fault::{Fault, Result};
+use crate::recording::BoardSpec;
+use crate::rig::write_atomically;
+use std::path::PathBuf;
+
+/// Draw a calibration board to print at true scale
+///
+/// Writes NAME.svg, NAME.pdf and NAME.json. The JSON is the board's description: paste it under
+/// "board" in a recording's meta.json. Print without scaling, measure the rule under the board, and
+/// correct the sizes in the description where the printer was off.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sheetlight board charuco 14x10 --square-mm 15 --out boards/charuco
+  sheetlight board chessboard 9x6 --square-mm 10 --out boards/chess
+  sheetlight board circles 7x5 --square-mm 20 --dot-mm 10 --asymmetric --out boards/dots")]
+pub struct Args {
+    /// chessboard, charuco or circles
+    #[arg(value_parser = ["chessboard", "charuco", "circles"])]
+    kind: String,
+    /// COLUMNSxROWS: inner corners of a chessboard, squares of a ChArUco board, dots of a circle grid
+    #[arg(value_parser = super::parse::<Size>)]
+    size: Size,
+    /// Side of a square, or pitch of the dots, mm
+    #[arg(long)]
+    square_mm: f64,
+    /// ChArUco: side of a marker, mm [default: 0.7 of the square]
+    #[arg(long)]
+    marker_mm: Option<f64>,
+    /// ChArUco: OpenCV's name of the dictionary
+    #[arg(long, default_value = "DICT_5X5_250")]
+    dictionary: String,
+    /// Circles: diameter of a dot, mm [default: half of the pitch]
+    #[arg(long)]
+    dot_mm: Option<f64>,
+    /// Circles: shift every other row by one pitch, columns two pitches apart
+    #[arg(long)]
+    asymmetric: bool,
+    /// White margin round the print, mm [default: 0.6 of the square]
+    #[arg(long)]
+    border_mm: Option<f64>,
+    /// Path of the files, without extension
+    #[arg(long)]
+    out: PathBuf,
+}
+
+#[derive(Clone, Copy)]
+struct Size([u32; 2]);
+
+impl std::str::FromStr for Size {
+    type Err = String;
+    fn from_str(s: &str) -> std::result::Result<Size, String> {
+        let parsed = s.split_once('x').and_then(|(a, b)| Some(Size([a.parse().ok()?, b.parse().ok()?])));
+        parsed.ok_or_else(|| format!("'{s}' is no size: write COLUMNSxROWS, e.g. 9x6"))
+    }
+}
+
+pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let border_mm = args.border_mm.unwrap_or(0.6 * args.square_mm);
+    let board = match args.kind.as_str() {
+        "chessboard" => BoardSpec::Chessboard {
+            inner_corners: args.size.0,
+            square_mm: args.square_mm,
+            border_mm,
+            first_square: "black".into(),
+        },
+        "charuco" => BoardSpec::Charuco {
+            squares: args.size.0,
+            square_mm: args.square_mm,
+            marker_mm: args.marker_mm.unwrap_or(0.7 * args.square_mm),
+            dictionary: args.dictionary.clone(),
+            border_mm,
+        },
+        _ => BoardSpec::Circles {
+            dots: args.size.0,
+            pitch_mm: args.square_mm,
+            diameter_mm: args.dot_mm.unwrap_or(0.5 * args.square_mm),
+            asymmetric: args.asymmetric,
+            border_mm,
+        },
+    };
+    let drawn = sheet(&board)?;
+    if let Some(folder) = args.out.parent().filter(|p| !p.as_os_str().is_empty()) {
+        std::fs::create_dir_all(folder).map_err(|e| Fault::write(folder, e))?;
+    }
+    let with = |extension: &str| {
+        let mut path = args.out.clone().into_os_string();
+        path.push(extension);
+        PathBuf::from(path)
+    };
+    write_atomically(&with(".svg"), drawn.svg().as_bytes())?;
+    write_atomically(&with(".pdf"), &drawn.pdf())?;
+    let text = serde_json::to_string_pretty(&board).expect("plain data");
+    write_atomically(&with(".json"), text.as_bytes())?;
+    if let BoardSpec::Chessboard { inner_corners: [a, b], .. } = board {
+        if (a + b) % 2 == 0 {
+            console.warn(format!(
+                "{a}x{b} inner corners look the same after a half turn; choose one even and one odd number where poses matter"
+            ));
+        }
+    }
+    console.say(format!(
+        "{}.svg .pdf .json written: {:.1} x {:.1} mm; print without scaling and check the rule",
+        args.out.display(),
+        drawn.width,
+        drawn.height
+    ));
+    if console.json {
+        console.result(&board, "");
+    }
+    Ok(())
+}

@@ -1,0 +1,98 @@
+//! In: a recording of a board and a station. Out: the station's camera calibration and a report page.
+//! Frame and unit: camera frame; pixels, mm.
+
+use super::super::Console;
+use super::finish;
+use crate::calibrate::camera::{CameraOptions, CameraResult, calibrate};
+use crate::calibrate::camera_report::page;
+use crate::calibrate::intrinsics::{Lens, SolveOptions};
+use crate::calibrate::projection::{NAMES, to_vector};
+use crate::fault::{Fault, Result};
+use crate::raster::Channel;
+use crate::recording::Recording;
+use crate::rig::Verdict;
+use crate::station::Settings;
+use std::path::PathBuf;
+
+/// Calibrate the camera from pictures of a board
+///
+/// Needs 10 to 20 pictures with the board tilted by 20 to 40 degrees in different directions and
+/// reaching into the picture's corners. The board's description is in the recording's meta.json.
+#[derive(clap::Args)]
+#[command(after_help = "Example:
+  sheetlight calibrate camera recordings/boards --station cell3")]
+pub struct Args {
+    /// Recording folder with meta.json
+    recording: PathBuf,
+    /// Station folder that gets the calibration
+    #[arg(long)]
+    station: PathBuf,
+    /// Lens terms: evidence (all that the pictures determine), five, four (no k3), one (k1), none
+    #[arg(long, default_value = "evidence", value_parser = crate::cli::parse::<Lens>)]
+    lens: Lens,
+    /// Estimate the skew too (sensors with square rows have none)
+    #[arg(long)]
+    skew: bool,
+    /// Distance at which the expected error is stated, mm [default: the middle of the working volume]
+    #[arg(long)]
+    working_distance_mm: Option<f64>,
+    /// Part of a colour picture to use: red, green, blue or luma
+    #[arg(long, default_value = "luma", value_parser = crate::cli::parse::<Channel>)]
+    channel: Channel,
+    /// Store the result even where it is badly determined
+    #[arg(long)]
+    keep_badly_determined: bool,
+}
+
+pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let settings = Settings::load(&args.station)?;
+    let mut recording = Recording::open(&args.recording)?;
+    recording.channel = args.channel;
+    let volume = &settings.working_volume;
+    let options = CameraOptions {
+        solve: SolveOptions { lens: args.lens, skew: args.skew, ..SolveOptions::default() },
+        working_distance_mm: Some(args.working_distance_mm.unwrap_or((volume.near_mm + volume.far_mm) / 2.0)),
+        ..CameraOptions::default()
+    };
+    let bar = console.bar("finding boards", recording.meta.frames.len() as u64);
+    let mut result = calibrate(&recording, &options, &|done, _| bar.set_position(done as u64))?;
+    bar.finish_and_clear();
+    result.calibration = result.calibration.with_input(&args.recording.join("meta.json"))?;
+    for o in &result.used {
+        result.calibration = result.calibration.with_input(&args.recording.join(&o.name))?;
+    }
+    let page = page(&result, &format!("Camera calibration of {}", settings.name));
+    let quality = &result.calibration.quality;
+    if quality.verdict >= Verdict::BadlyDetermined && !args.keep_badly_determined {
+        let folder = args.station.join("calibration");
+        std::fs::create_dir_all(&folder).map_err(|e| Fault::write(&folder, e))?;
+        let html = folder.join("camera.refused.html");
+        page.save(&html)?;
+        console.say(format!("{}: what was found", html.display()));
+        return Err(Fault::refused(format!(
+            "the camera is {}: {}",
+            quality.verdict.words(),
+            quality.reasons.join("; ")
+        ))
+        .cause("too few, too similar or contradicting pictures; the station keeps its former calibration")
+        .next(quality.advice.first().map_or("take more pictures", String::as_str)));
+    }
+    finish(&args.station, &result.calibration, &page, &parameters(&result), console)
+}
+
+/// The parameters with their standard deviations, and the expected error.
+fn parameters(result: &CameraResult) -> String {
+    let (c, k) = (&result.calibration, to_vector(&result.calibration.value));
+    let mut text = String::from("camera");
+    for (name, value) in NAMES.iter().zip(k).take(c.covariance.parameters.len()) {
+        text += &format!("\n  {name:8} {value:12.6} +- {:.6}", c.covariance.sigma(name).unwrap_or(f64::NAN));
+    }
+    let figure = |name: &str| c.quality.figures.get(name).copied().unwrap_or(f64::NAN);
+    text += &format!(
+        "\nexpected error of the viewing rays {:.4} px, {:.4} mm at {:.0} mm",
+        figure("expected_ray_error_px"),
+        figure("expected_error_at_working_distance_mm"),
+        figure("working_distance_mm"),
+    );
+    text
+}

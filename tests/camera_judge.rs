@@ -1,0 +1,286 @@
+//! In: simulated stations with known truth. Out: whether the camera solve is as good as it can be and
+//! says how good it is; whether what cannot be calibrated is refused.
+//! Frame and unit: pixels, mm.
+
+use nalgebra::DMatrix;
+use rand::{Rng, SeedableRng};
+use rand_distr::{Distribution, Normal};
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+use sheetlight::calibrate::boards::{BoardPoint, BoardView};
+use sheetlight::calibrate::camera::{CameraOptions, from_observations};
+use sheetlight::calibrate::intrinsics::{Lens, Observation, SolveOptions, solve};
+use sheetlight::calibrate::pose::point_by_step;
+use sheetlight::calibrate::projection::{INTRINSICS, NAMES, project, to_vector};
+use sheetlight::camera::Intrinsics;
+use sheetlight::geometry::{Board, Camera, Rigid, Vec2, Vec3, exp};
+use sheetlight::recording::BoardSpec;
+use sheetlight::rig::Verdict;
+use std::sync::Arc;
+
+struct Station {
+    camera: Intrinsics,
+    features: Arc<Vec<Vec3>>,
+    poses: Vec<Rigid<Camera, Board>>,
+    sigma_px: f64,
+}
+
+fn between(rng: &mut Pcg64, low: f64, high: f64) -> f64 {
+    low + (high - low) * rng.random::<f64>()
+}
+
+fn random_camera(rng: &mut Pcg64) -> Intrinsics {
+    let (width, height) = [(640, 480), (1280, 1024), (2048, 1536)][rng.random_range(0..3)];
+    let f = f64::from(width) * between(rng, 0.7, 1.6);
+    Intrinsics {
+        fx: f,
+        fy: f * between(rng, 0.99, 1.01),
+        cx: f64::from(width) * between(rng, 0.46, 0.54),
+        cy: f64::from(height) * between(rng, 0.46, 0.54),
+        skew: 0.0,
+        distortion: [
+            between(rng, -0.25, 0.1),
+            between(rng, -0.1, 0.2),
+            between(rng, -0.001, 0.001),
+            between(rng, -0.001, 0.001),
+            between(rng, -0.05, 0.05),
+        ],
+        width,
+        height,
+    }
+}
+
+fn random_station(seed: u64) -> Station {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let camera = random_camera(&mut rng);
+    let board =
+        BoardSpec::Chessboard { inner_corners: [9, 6], square_mm: 15.0, border_mm: 9.0, first_square: "black".into() };
+    let features = Arc::new(board.features());
+    let count = rng.random_range(8..20);
+    let mut poses = Vec::new();
+    while poses.len() < count {
+        let tilt = Vec3::new(between(&mut rng, -0.6, 0.6), between(&mut rng, -0.6, 0.6), between(&mut rng, -3.1, 3.1));
+        let z = camera.fx * 135.0 / (f64::from(camera.width) * between(&mut rng, 0.4, 0.9));
+        let r = exp(&tilt);
+        let at = Vec3::new(between(&mut rng, -0.3, 0.3) * z, between(&mut rng, -0.25, 0.25) * z, z);
+        let pose = Rigid::new(r, at - r * Vec3::new(60.0, 37.5, 0.0));
+        let inside = features.iter().all(|x| {
+            camera.pixel_from_point(&pose.point(x)).is_some_and(|p| {
+                p.x > 0.0 && p.y > 0.0 && p.x < f64::from(camera.width) && p.y < f64::from(camera.height)
+            })
+        });
+        if inside {
+            poses.push(pose);
+        }
+    }
+    Station { camera, features, poses, sigma_px: [0.01, 0.05, 0.2][seed as usize % 3] }
+}
+
+fn seen(s: &Station, seed: u64) -> Vec<Observation> {
+    let mut rng = Pcg64::seed_from_u64(seed ^ 0x9e37_79b9);
+    let noise = Normal::new(0.0, s.sigma_px).unwrap();
+    s.poses
+        .iter()
+        .enumerate()
+        .map(|(i, pose)| {
+            let point = |(feature_id, x): (usize, &Vec3)| BoardPoint {
+                feature_id,
+                pixel: s.camera.pixel_from_point(&pose.point(x)).unwrap()
+                    + Vec2::new(noise.sample(&mut rng), noise.sample(&mut rng)),
+                sigma_px: s.sigma_px,
+            };
+            let points = s.features.iter().enumerate().map(point).collect();
+            Observation {
+                name: format!("picture {i}"),
+                features: s.features.clone(),
+                view: BoardView { points, ambiguous: false },
+            }
+        })
+        .collect()
+}
+
+/// Cramer-Rao bound of the nine intrinsic parameters at the truth: every pose eliminated.
+fn bound(s: &Station) -> DMatrix<f64> {
+    let mut h = DMatrix::<f64>::zeros(INTRINSICS - 1, INTRINSICS - 1);
+    for pose in &s.poses {
+        let (mut kp, mut pp) = (DMatrix::<f64>::zeros(INTRINSICS - 1, 6), DMatrix::<f64>::zeros(6, 6));
+        for x in s.features.iter() {
+            let p = project(&s.camera, &pose.point(x)).unwrap();
+            let jk = DMatrix::from_fn(2, INTRINSICS - 1, |r, c| p.by_intrinsics[(r, c)] / s.sigma_px);
+            let by_pose = p.by_point * point_by_step(&(pose.rotation * x)) / s.sigma_px;
+            let jp = DMatrix::from_fn(2, 6, |r, c| by_pose[(r, c)]);
+            h += jk.transpose() * &jk;
+            kp += jk.transpose() * &jp;
+            pp += jp.transpose() * &jp;
+        }
+        h -= &kp * pp.try_inverse().unwrap() * kp.transpose();
+    }
+    h.try_inverse().unwrap()
+}
+
+#[test]
+fn errors_are_as_small_as_they_can_be_and_as_large_as_reported() {
+    // 100 stations x 4 repetitions of the noise, three noise levels among them.
+    let options = SolveOptions { lens: Lens::Five, ..SolveOptions::default() };
+    let all: Vec<Vec<(f64, f64)>> = (0..100u64)
+        .into_par_iter()
+        .flat_map_iter(|seed| {
+            let s = random_station(seed);
+            let bound = bound(&s);
+            let truth = to_vector(&s.camera);
+            (0..4u64)
+                .map(|k| {
+                    let pictures = seen(&s, 1000 * seed + k);
+                    let solved = solve(&pictures, s.camera.width, s.camera.height, &options).unwrap();
+                    let c = solved.covariance.unwrap();
+                    let found = to_vector(&solved.intrinsics);
+                    (0..INTRINSICS - 1)
+                        .map(|i| {
+                            let e = found[i] - truth[i];
+                            (e / c[(i, i)].sqrt(), e / bound[(i, i)].sqrt())
+                        })
+                        .collect()
+                })
+                .collect::<Vec<_>>()
+        })
+        .collect();
+    let rms =
+        |f: &dyn Fn(&Vec<(f64, f64)>) -> f64| (all.iter().map(|v| f(v).powi(2)).sum::<f64>() / all.len() as f64).sqrt();
+    for i in 0..INTRINSICS - 1 {
+        let (reported, best) = (rms(&|v| v[i].0), rms(&|v| v[i].1));
+        eprintln!("{:6} error over reported sigma {reported:.3}, over the Cramer-Rao bound {best:.3}", NAMES[i]);
+        assert!((0.8..=1.25).contains(&reported), "{}: {reported}", NAMES[i]);
+        assert!(best <= 1.15, "{}: {best}", NAMES[i]);
+    }
+}
+
+fn judged(pictures: Vec<Observation>, s: &Station) -> sheetlight::calibrate::camera::CameraResult {
+    from_observations(pictures, vec![], s.camera.width, s.camera.height, &CameraOptions::default()).unwrap()
+}
+
+#[test]
+fn good_sets_are_good_and_the_expected_error_is_the_true_one() {
+    let mut over = Vec::new();
+    for seed in [1, 4, 7, 10, 13, 16, 19, 22] {
+        let s = random_station(seed);
+        let result = judged(seen(&s, seed), &s);
+        let q = &result.calibration.quality;
+        assert!(q.verdict <= Verdict::Usable, "{q:?}");
+        assert!(result.hold_out_px.iter().all(Option::is_some) && result.left_out.is_empty());
+        // Hold-out is not much worse than the fit: nothing is over-fitted.
+        assert!(q.figures["holdout_rms_px"] < 1.3 * q.figures["rms_px"], "{q:?}");
+        over.push(true_ray_error(&result.calibration.value, &s.camera) / q.figures["expected_ray_error_px"]);
+    }
+    let rms = (over.iter().map(|v| v * v).sum::<f64>() / over.len() as f64).sqrt();
+    assert!((0.5..1.6).contains(&rms), "{over:?}");
+}
+
+fn true_ray_error(found: &Intrinsics, truth: &Intrinsics) -> f64 {
+    let mut pairs = Vec::new();
+    for j in 0..24 {
+        for i in 0..32 {
+            let px = Vec2::new(
+                (f64::from(i) + 0.5) / 32.0 * f64::from(truth.width) - 0.5,
+                (f64::from(j) + 0.5) / 24.0 * f64::from(truth.height) - 0.5,
+            );
+            pairs.push((found.ray_from_pixel(&px).unwrap().direction, truth.ray_from_pixel(&px).unwrap().direction));
+        }
+    }
+    let r = sheetlight::geometry::orthonormalise(&pairs.iter().map(|(f, t)| t * f.transpose()).sum());
+    let off = |(f, t): &(Vec3, Vec3)| {
+        (truth.pixel_from_point(&(r * f)).unwrap() - truth.pixel_from_point(t).unwrap()).norm_squared()
+    };
+    (pairs.iter().map(off).sum::<f64>() / pairs.len() as f64).sqrt()
+}
+
+#[test]
+fn one_outlier_picture_is_found_and_named() {
+    let s = random_station(4);
+    let mut pictures = seen(&s, 4);
+    // The board was bent in this picture: a bow of 0.5 mm.
+    let bent = 5;
+    for p in &mut pictures[bent].view.points {
+        let x = s.features[p.feature_id];
+        let bow = 0.5 * ((x.x - 60.0) / 60.0).powi(2);
+        p.pixel = s.camera.pixel_from_point(&s.poses[bent].point(&(x + Vec3::new(0.0, 0.0, bow)))).unwrap();
+    }
+    let result = judged(pictures, &s);
+    assert_eq!(result.left_out.len(), 1);
+    assert_eq!(result.left_out[0].0, "picture 5");
+    assert!(result.calibration.quality.reasons.iter().any(|r| r.contains("picture 5 was left out")));
+}
+
+#[test]
+fn single_wrong_corners_are_named_and_do_no_harm() {
+    let s = random_station(4);
+    let mut pictures = seen(&s, 4);
+    pictures[2].view.points[20].pixel.x += 6.0;
+    pictures[3].view.points[40].pixel.y -= 4.0;
+    let clean = judged(seen(&s, 4), &s);
+    let result = judged(pictures, &s);
+    assert!(result.left_out.is_empty());
+    let named: Vec<(&str, usize)> = result.worst.iter().take(2).map(|w| (w.0.as_str(), w.1)).collect();
+    assert_eq!(named, [("picture 2", 20), ("picture 3", 40)]);
+    let sigma = clean.calibration.covariance.sigma("fx_px").unwrap();
+    assert!((result.calibration.value.fx - clean.calibration.value.fx).abs() < sigma);
+}
+
+fn with_poses(seed: u64, rotations: &[Vec3]) -> Station {
+    let mut s = random_station(seed);
+    let z = 2.2 * s.camera.fx * 135.0 / f64::from(s.camera.width);
+    s.poses = rotations
+        .iter()
+        .enumerate()
+        .map(|(i, w)| {
+            let r = exp(w);
+            let at = Vec3::new(0.1 * z * (i as f64).sin(), 0.1 * z * (i as f64).cos(), z * (1.0 + 0.05 * i as f64));
+            Rigid::new(r, at - r * Vec3::new(60.0, 37.5, 0.0))
+        })
+        .collect();
+    s
+}
+
+#[test]
+fn degenerate_sets_are_refused_or_badly_determined_with_the_reason() {
+    // Parallel boards, turned in their own plane only.
+    let parallel: Vec<Vec3> = (0..10).map(|i| Vec3::new(0.0, 0.0, 0.3 * f64::from(i))).collect();
+    let s = with_poses(4, &parallel);
+    let q = judged(seen(&s, 1), &s).calibration.quality;
+    assert!(q.verdict >= Verdict::BadlyDetermined, "{q:?}");
+    assert!(q.reasons.iter().any(|r| r.contains("parallel")) && !q.advice.is_empty(), "{q:?}");
+
+    // Two views.
+    let s = with_poses(4, &[Vec3::new(0.5, 0.0, 0.0), Vec3::new(0.0, 0.5, 0.0)]);
+    let q = judged(seen(&s, 1), &s).calibration.quality;
+    assert!(q.verdict >= Verdict::BadlyDetermined, "{q:?}");
+    assert!(q.reasons.iter().any(|r| r.contains("2 pictures")), "{q:?}");
+
+    // One view.
+    let s = with_poses(4, &[Vec3::new(0.5, 0.0, 0.0)]);
+    let e = from_observations(seen(&s, 1), vec![], s.camera.width, s.camera.height, &CameraOptions::default());
+    assert!(e.unwrap_err().what.contains("1 picture"));
+
+    // Corners on one line.
+    let s = random_station(4);
+    let mut pictures = seen(&s, 4);
+    pictures[0].view.points.truncate(9);
+    let e = from_observations(pictures, vec![], s.camera.width, s.camera.height, &CameraOptions::default());
+    assert!(e.unwrap_err().what.contains("picture 0"));
+}
+
+#[test]
+fn lens_terms_that_the_pictures_do_not_tell_are_held_and_said() {
+    // Small boards near the middle: nothing is known of the lens's outer part.
+    let rotations: Vec<Vec3> =
+        (0..12).map(|i| Vec3::new(0.5 * f64::from(i).cos(), 0.5 * f64::from(i).sin(), 0.2 * f64::from(i))).collect();
+    let mut s = with_poses(4, &rotations);
+    s.sigma_px = 0.1;
+    s.camera.distortion = [-0.1, 0.0, 0.0, 0.0, 0.0];
+    for p in &mut s.poses {
+        *p = Rigid::new(p.rotation, p.translation * 1.6);
+    }
+    let result = judged(seen(&s, 1), &s);
+    assert!(result.solved.held.contains(&8), "{:?}", result.solved.held);
+    assert!(result.calibration.quality.reasons.iter().any(|r| r.contains("k3") && r.contains("held at 0")));
+    assert_eq!(result.calibration.value.distortion[4], 0.0);
+}
