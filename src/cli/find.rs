@@ -70,7 +70,11 @@ pub(super) fn summary(r: &Report) -> String {
             "{:12} {} mm and {} degrees at 3 sigma\n",
             "tolerance",
             r.tolerance_mm,
-            if r.within_tolerance { format!("{} kept", r.tolerance_deg) } else { format!("{} NOT kept", r.tolerance_deg) }
+            if r.within_tolerance {
+                format!("{} kept", r.tolerance_deg)
+            } else {
+                format!("{} NOT kept", r.tolerance_deg)
+            }
         );
     }
     let row = |v: &[f64; 3], digits: usize| v.map(|x| format!("{x:.digits$}")).join(" ");
@@ -101,7 +105,13 @@ pub(super) fn summary(r: &Report) -> String {
         s += &format!("  the two-pin construction and the lattice fit disagree by {d:.3} mm\n");
     }
     for g in &r.gates {
-        s += &format!("gate         {:16} {:8.3}  limit {:.3}  {}\n", g.name, g.value, g.limit, if g.passed { "ok" } else { "MISSED" });
+        s += &format!(
+            "gate         {:16} {:8.3}  limit {:.3}  {}\n",
+            g.name,
+            g.value,
+            g.limit,
+            if g.passed { "ok" } else { "MISSED" }
+        );
     }
     for n in &r.notes {
         s += &format!("note         {n}\n");

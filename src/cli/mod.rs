@@ -8,10 +8,12 @@ mod console;
 mod demo;
 mod doctor;
 mod find;
+mod guide;
 mod range;
 mod scan;
 mod simulate;
 mod station;
+mod teach;
 
 pub use console::Console;
 
@@ -44,6 +46,7 @@ enum Command {
     Demo(demo::Args),
     Doctor(doctor::Args),
     Find(find::Args),
+    Guide(guide::Args),
     Range(range::Args),
     Scan(scan::Args),
     /// Simulate a station with known truth: recordings, poses, true calibration
@@ -51,6 +54,7 @@ enum Command {
     /// Make, show, import into or export from a station folder
     #[command(subcommand)]
     Station(station::Command),
+    Teach(teach::Args),
 }
 
 fn run(command: &Command, console: &Console) -> Result<()> {
@@ -61,10 +65,12 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Demo(a) => demo::run(a, console),
         Command::Doctor(a) => doctor::run(a, console),
         Command::Find(a) => find::run(a, console),
+        Command::Guide(a) => guide::run(a, console),
         Command::Range(a) => range::run(a, console),
         Command::Scan(a) => scan::run(a, console),
         Command::Simulate(a) => simulate::run(a, console),
         Command::Station(c) => station::run(c, console),
+        Command::Teach(a) => teach::run(a, console),
     }
 }
 

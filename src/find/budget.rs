@@ -35,10 +35,15 @@ pub struct Budget {
 /// Adds up the budget. `rig` may be missing or have imported values of unknown uncertainty.
 pub fn budget(points: &Ordered, measured: &Measured, rig: Option<&Rig>, robot: &RobotSpec) -> Budget {
     let mut covariance = measured.covariance;
-    let mut terms = vec![peak_noise(points, measured), term("match", &measured.covariance, "edges and surfaces of the part, peak noise included".into())];
+    let mut terms = vec![
+        peak_noise(points, measured),
+        term("match", &measured.covariance, "edges and surfaces of the part, peak noise included".into()),
+    ];
     let mut complete = true;
     let geometry = rig.and_then(|r| Geometry::at(points, measured, r));
-    for (name, part) in [("laser plane", laser_plane(geometry.as_ref(), rig)), ("hand-eye", hand_eye(geometry.as_ref(), rig))] {
+    for (name, part) in
+        [("laser plane", laser_plane(geometry.as_ref(), rig)), ("hand-eye", hand_eye(geometry.as_ref(), rig))]
+    {
         match part {
             Ok((c, note)) => {
                 covariance += c;
@@ -155,7 +160,8 @@ fn align(from: &[Vec3], to: &[Vec3]) -> Option<Rigid<Base, Camera>> {
     let d = (u * vt).determinant().signum();
     let rotation = u * Mat3::from_diagonal(&Vec3::new(1.0, 1.0, d)) * vt;
     let t = Rigid::new(rotation, b - rotation * a);
-    let rms = (from.iter().zip(to).map(|(p, q)| (t.point(p) - q).norm_squared()).sum::<f64>() / from.len() as f64).sqrt();
+    let rms =
+        (from.iter().zip(to).map(|(p, q)| (t.point(p) - q).norm_squared()).sum::<f64>() / from.len() as f64).sqrt();
     // The cloud was made with these very values; more than float rounding means another calibration.
     (rms < 0.2).then_some(t)
 }

@@ -246,9 +246,8 @@ fn line_through(points: &[Value]) -> Result<Value> {
 }
 
 fn direction(v: &Value) -> Result<f64> {
-    v.direction.ok_or_else(|| {
-        Fault::input("a point where a line or a lattice is needed").cause("an impossible construction")
-    })
+    v.direction
+        .ok_or_else(|| Fault::input("a point where a line or a lattice is needed").cause("an impossible construction"))
 }
 
 fn meet(a: &Value, b: &Value) -> Result<Value> {
@@ -279,9 +278,8 @@ fn lattice(name: &str, drawing: &Drawing, measured: &BTreeMap<(usize, usize), Fe
             .cause("an impossible construction")
             .next("give the shape a grid"));
     }
-    let seen: Vec<([f64; 2], Feature)> = (0..elements)
-        .filter_map(|e| measured.get(&(shape, e)).map(|f| (drawing.centre_of(shape, e), *f)))
-        .collect();
+    let seen: Vec<([f64; 2], Feature)> =
+        (0..elements).filter_map(|e| measured.get(&(shape, e)).map(|f| (drawing.centre_of(shape, e), *f))).collect();
     if seen.len() < 2 {
         return Err(Fault::refused(format!(
             "{} of {elements} elements of '{name}' were seen well enough, a lattice needs 2",

@@ -216,7 +216,20 @@ impl Drawing {
                     };
                     let either = c.inside == Inside::Either;
                     let (extent, search, measure) = (c.extent, c.search, c.measure && c.closed && !either);
-                    out.push(EdgeSample { x, y, nx: sign * rx, ny: sign * ry, z: c.z, either, extent, search, measure, shape: c.shape, element: c.element, locates: c.locates });
+                    out.push(EdgeSample {
+                        x,
+                        y,
+                        nx: sign * rx,
+                        ny: sign * ry,
+                        z: c.z,
+                        either,
+                        extent,
+                        search,
+                        measure,
+                        shape: c.shape,
+                        element: c.element,
+                        locates: c.locates,
+                    });
                 }
                 carry -= length;
             }
@@ -261,10 +274,9 @@ impl Drawing {
         let s = &self.shape[shape];
         let points = s.outline().0;
         let n = points.len() as f64;
-        let own = s.centre.unwrap_or([
-            points.iter().map(|p| p[0]).sum::<f64>() / n,
-            points.iter().map(|p| p[1]).sum::<f64>() / n,
-        ]);
+        let own = s
+            .centre
+            .unwrap_or([points.iter().map(|p| p[0]).sum::<f64>() / n, points.iter().map(|p| p[1]).sum::<f64>() / n]);
         let Some(g) = s.grid else { return own };
         let at = [element as u32 % g.count[0], element as u32 / g.count[0]];
         std::array::from_fn(|k| own[k] + (f64::from(at[k]) - 0.5 * f64::from(g.count[k] - 1)) * g.pitch[k])

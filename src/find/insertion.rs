@@ -11,6 +11,7 @@ use super::recipe::{Gates, Recipe};
 use super::refine::Pose;
 use super::scene::{Kind, Layer, Scene};
 use super::search::{Match, find};
+use super::slide::{long_axis, slide};
 use super::verdict::{Agreement, TurnVote, judge, vote};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Grid, Part, Rigid, Tool, Vec3};
@@ -123,9 +124,8 @@ pub fn locate(cloud: &[CloudPoint], recipe: &Recipe, rig: Option<&Rig>, options:
             matches.iter().map(|m| format!("{:.3}", m.score)).collect::<Vec<_>>().join(" ")
         ));
     }
-    let start = lift(&best.pose, &map, &points, recipe);
     let gate = recipe.measure.height_gate_mm;
-    let mut measured = measure(&points, &drawing, start, &recipe.measure)?;
+    let Judged { found: best, mut measured } = best_hypothesis(&points, &map, recipe, &best, &matches)?;
     let mut turns = vote(&points, &drawing, &measured.base_from_part, recipe.alike_turns, gate);
     if let Some(t) = turns.iter().find(|t| t.told() == Some(false)) {
         notes.push(format!(
@@ -134,7 +134,8 @@ pub fn locate(cloud: &[CloudPoint], recipe: &Recipe, rig: Option<&Rig>, options:
             t.votes_against,
             t.votes_for + t.votes_against
         ));
-        let back: Rigid<Part, Part> = Rigid::from_vectors(&Vec3::new(0.0, 0.0, t.rival_deg.to_radians()), Vec3::zeros());
+        let back: Rigid<Part, Part> =
+            Rigid::from_vectors(&Vec3::new(0.0, 0.0, t.rival_deg.to_radians()), Vec3::zeros());
         measured = measure(&points, &drawing, measured.base_from_part * back, &recipe.measure)?;
         turns = vote(&points, &drawing, &measured.base_from_part, recipe.alike_turns, gate);
     }
@@ -144,7 +145,8 @@ pub fn locate(cloud: &[CloudPoint], recipe: &Recipe, rig: Option<&Rig>, options:
     for c in &recipe.construction {
         // One construction that cannot be built does not hinder the others, unless it is the one used.
         let earlier: Vec<_> = recipe.construction.iter().take_while(|o| o.name != c.name).cloned().collect();
-        let usable: Vec<_> = earlier.into_iter().filter(|e| constructions.iter().any(|b: &Built| b.name == e.name)).collect();
+        let usable: Vec<_> =
+            earlier.into_iter().filter(|e| constructions.iter().any(|b: &Built| b.name == e.name)).collect();
         match build(&[usable, vec![c.clone()]].concat(), &drawing, &seen) {
             Ok(mut all) => constructions.push(all.pop().expect("one was asked for")),
             Err(e) if recipe.insertion.construction == c.name => return Err(e),
@@ -152,6 +154,61 @@ pub fn locate(cloud: &[CloudPoint], recipe: &Recipe, rig: Option<&Rig>, options:
         }
     }
     Ok(conclude(recipe, rig, options, &points, map, best, measured, agreement, turns, constructions, notes))
+}
+
+struct Judged {
+    found: Match,
+    measured: Measured,
+}
+
+/// Measures at the best match and, where the points do not agree with the drawing there, at its rivals
+/// and at the other matches: a long part shifted along itself scores nearly as well in the search, but
+/// its surfaces do not end where they should.
+fn best_hypothesis(
+    points: &Ordered,
+    map: &HeightMap,
+    recipe: &Recipe,
+    best: &Match,
+    matches: &[Match],
+) -> Result<Judged> {
+    const MOST: usize = 12;
+    let drawing = recipe.drawing();
+    let rivals = best.rivals.iter().filter(|r| r.1 > 0.6 * best.score).map(|&(pose, score)| {
+        let second_score = best.score;
+        let rivals =
+            std::iter::once((best.pose, best.score)).chain(best.rivals.iter().copied().filter(|r| r.0 != pose));
+        Match { pose, score, second_score, rivals: rivals.collect(), ..best.clone() }
+    });
+    let mut kept: Option<(f64, Judged)> = None;
+    let mut trouble = None;
+    for found in std::iter::once(best.clone()).chain(rivals).chain(matches.iter().skip(1).cloned()).take(MOST) {
+        let start = slide(points, &drawing, lift(&found.pose, map, points, recipe));
+        let measured = match measure(points, &drawing, start, &recipe.measure) {
+            Ok(measured) => measured,
+            Err(e) => {
+                trouble.get_or_insert_with(|| {
+                    e.at(format!(
+                        "match at {:.1} {:.1} mm of the map, turned by {:.1} degrees, score {:.3}",
+                        (found.pose.x + 0.5) * map.cell,
+                        (found.pose.y + 0.5) * map.cell,
+                        found.pose.angle.to_degrees(),
+                        found.score
+                    ))
+                });
+                continue;
+            }
+        };
+        let a = judge(points, &drawing, &measured, recipe.measure.height_gate_mm);
+        let value = a.agreement * a.edges * found.score;
+        let good = a.agreement >= recipe.gates.min_agreement && a.edges >= 0.5;
+        if kept.as_ref().is_none_or(|k| value > k.0) {
+            kept = Some((value, Judged { found, measured }));
+        }
+        if good {
+            break;
+        }
+    }
+    kept.map(|k| k.1).ok_or_else(|| trouble.expect("every hypothesis failed, and there was one"))
 }
 
 /// The layers of a height map that a recipe wants.
@@ -221,9 +278,9 @@ fn conclude(
     let spec = &recipe.insertion;
     let budget = budget(points, &measured, rig, &recipe.robot);
     let named = |name: &Option<String>| constructions.iter().find(|b| Some(&b.name) == name.as_ref());
-    let disagreement_mm = named(&spec.two_pin).zip(named(&spec.lattice)).map(|(a, b)| {
-        (a.deviation_mm[0] - b.deviation_mm[0]).hypot(a.deviation_mm[1] - b.deviation_mm[1])
-    });
+    let disagreement_mm = named(&spec.two_pin)
+        .zip(named(&spec.lattice))
+        .map(|(a, b)| (a.deviation_mm[0] - b.deviation_mm[0]).hypot(a.deviation_mm[1] - b.deviation_mm[1]));
     let gates = gates(&recipe.gates, &found, recipe, &budget, &agreement, &turns, disagreement_mm);
     let reasons: Vec<String> = gates
         .iter()
@@ -318,14 +375,21 @@ fn gates(
     out
 }
 
-/// The best rival that is not one of the part's alike turns: those are told apart by the points.
+/// The best rival that is neither one of the part's alike turns nor, for a long part, a shift along
+/// itself: those are told apart by the points.
 fn rival_score(found: &Match, recipe: &Recipe) -> f64 {
+    let long = long_axis(&recipe.drawing());
     let alike = |pose: &Pose| {
-        (1..recipe.alike_turns).any(|k| {
+        (0..recipe.alike_turns).any(|k| {
             let turn = std::f64::consts::TAU * f64::from(k) / f64::from(recipe.alike_turns);
             let d = super::coarse::turn_between(pose.angle - found.pose.angle, turn);
-            let shift = (pose.x - found.pose.x).hypot(pose.y - found.pose.y) * recipe.cell_mm;
-            d < 3f64.to_radians() && shift < 1.0
+            let (s, c) = found.pose.angle.sin_cos();
+            let (dx, dy) = ((pose.x - found.pose.x) * recipe.cell_mm, (pose.y - found.pose.y) * recipe.cell_mm);
+            let (along, across) = (c * dx + s * dy, c * dy - s * dx);
+            let free = |axis: usize, shift: f64| long == Some(axis) || shift.abs() < 1.0;
+            // A shift of a long part swings its middle aside by what the turn is off.
+            let swing = if long.is_some() { 3.0 } else { 1.0 };
+            d < 3f64.to_radians() && free(0, along / swing) && free(1, across / swing)
         })
     };
     found.rivals.iter().filter(|r| !alike(&r.0)).map(|r| r.1).fold(0.0, f64::max)

@@ -27,7 +27,7 @@ pub struct MeasureOptions {
 
 impl Default for MeasureOptions {
     fn default() -> Self {
-        MeasureOptions { height_gate_mm: 0.25, edge_gate_mm: 0.45, margin_mm: 0.35, edge_bias: 0.06 }
+        MeasureOptions { height_gate_mm: 0.2, edge_gate_mm: 0.45, margin_mm: 0.35, edge_bias: 0.06 }
     }
 }
 
@@ -157,12 +157,20 @@ pub fn measure(
     for round in 0..ROUNDS {
         let local = localise(points, drawing, &pose);
         let datum = fit_datum(points, &local, &faces, &edges, options, round)?;
-        pose = pose * Rigid::<Part, Part>::from_vectors(&Vec3::new(datum.step[1], datum.step[2], 0.0), Vec3::new(0.0, 0.0, datum.step[0]));
+        pose = pose
+            * Rigid::<Part, Part>::from_vectors(
+                &Vec3::new(datum.step[1], datum.step[2], 0.0),
+                Vec3::new(0.0, 0.0, datum.step[0]),
+            );
         let local = localise(points, drawing, &pose);
         let gate = if round < 2 { 2.0 * options.edge_gate_mm } else { options.edge_gate_mm };
         let (observations, step) = surface_ends(points, &local, &faces, &edges, options, gate);
         let plane = fit_edges(observations, &step, options)?;
-        pose = pose * Rigid::<Part, Part>::from_vectors(&Vec3::new(0.0, 0.0, plane.step[2]), Vec3::new(plane.step[0], plane.step[1], 0.0));
+        pose = pose
+            * Rigid::<Part, Part>::from_vectors(
+                &Vec3::new(0.0, 0.0, plane.step[2]),
+                Vec3::new(plane.step[0], plane.step[1], 0.0),
+            );
         last = Some((datum, plane, step));
     }
     let (datum, plane, step) = last.expect("at least one round");
@@ -226,7 +234,9 @@ fn fit_datum(
     let mut rows: Vec<(Vector3<f64>, f64, u32)> = Vec::new();
     for (i, q) in local.iter().enumerate() {
         let Some(q) = q else { continue };
-        let Some(face) = faces.iter().filter(|f| (q.z - f.z).abs() < gate).find(|f| f.material(q.x, q.y)) else { continue };
+        let Some(face) = faces.iter().filter(|f| (q.z - f.z).abs() < gate).find(|f| f.material(q.x, q.y)) else {
+            continue;
+        };
         if edges.nearest(q.x, q.y, options.margin_mm, |s| s.z == face.z).is_none() {
             rows.push((Vector3::new(1.0, q.y, -q.x), q.z - face.z, points.row[i]));
         }
@@ -239,11 +249,13 @@ fn fit_datum(
         .cause("the part is hidden, is another one, or the search was misled")
         .next("look at the picture of the match, then scan the part again"));
     }
-    robust(&rows, &[], 0.005).map(|f| Datum { step: f.step, covariance: f.covariance, used: f.used, sigma: f.sigma }).ok_or_else(|| {
-        Fault::refused("the seen surfaces do not determine height and tilt")
-            .cause("they lie on one line")
-            .next("scan more of the part")
-    })
+    robust(&rows, &[], 0.005)
+        .map(|f| Datum { step: f.step, covariance: f.covariance, used: f.used, sigma: f.sigma })
+        .ok_or_else(|| {
+            Fault::refused("the seen surfaces do not determine height and tilt")
+                .cause("they lie on one line")
+                .next("scan more of the part")
+        })
 }
 
 /// Ends of surfaces: a sample on a face whose next neighbour is not. The end lies where the light that
@@ -290,7 +302,9 @@ fn surface_ends(
                 // Light of the last sample and, where it still shows near the face, of the next one.
                 let full = f64::from(points.intensity[b]).max(1e-6);
                 let mut lit = (f64::from(points.intensity[i]) / full).min(1.0);
-                if let Some(n) = n.filter(|&n| local[n].is_some_and(|p| (p.z - face.z).abs() <= 2.0 * options.height_gate_mm)) {
+                if let Some(n) =
+                    n.filter(|&n| local[n].is_some_and(|p| (p.z - face.z).abs() <= 2.0 * options.height_gate_mm))
+                {
                     lit += (f64::from(points.intensity[n]) / full).min(1.0);
                 }
                 let template = Observation {
@@ -353,10 +367,7 @@ fn consecutive(points: &Ordered, row: i64, dr: i64, stride: u32) -> bool {
     }
     let gap = |a: i64, b: i64| points.shot[a.max(b) as usize] - points.shot[a.min(b) as usize];
     let (next, before) = (row + dr, row - dr);
-    before >= 0
-        && before < points.shot.len() as i64
-        && gap(row, next) == stride
-        && gap(row, before) == stride
+    before >= 0 && before < points.shot.len() as i64 && gap(row, next) == stride && gap(row, before) == stride
 }
 
 struct InPlane {
@@ -466,7 +477,8 @@ fn robust<const N: usize>(rows: &[(SVector<f64, N>, f64, u32)], priors: &[(usize
         *by_shot.entry(*shot).or_insert_with(SVector::zeros) += *w * (r - j.dot(&step)) * j;
     }
     let clusters = by_shot.len() as f64;
-    let middle = by_shot.values().map(|g| g * g.transpose()).sum::<SMatrix<f64, N, N>>() * (clusters / (clusters - N as f64).max(1.0));
+    let middle = by_shot.values().map(|g| g * g.transpose()).sum::<SMatrix<f64, N, N>>()
+        * (clusters / (clusters - N as f64).max(1.0));
     let used = weights.iter().filter(|w| **w > 0.0).count();
     let sandwich = inverse * middle * inverse;
     let plain = inverse * (sigma * sigma);

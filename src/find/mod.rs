@@ -16,6 +16,8 @@ pub mod recipe;
 pub mod refine;
 pub mod scene;
 pub mod search;
+pub mod slide;
+pub mod teach;
 pub mod verdict;
 
 pub use drawing::Drawing;

@@ -31,9 +31,12 @@ impl Ordered {
     /// Sorts a cloud. The strongest of several points in one pixel column of a shot stays.
     pub fn new(cloud: &[CloudPoint]) -> Result<Ordered> {
         if cloud.len() < MIN_POINTS {
-            return Err(Fault::refused(format!("the scan has {} points, at least {MIN_POINTS} are needed", cloud.len()))
-                .cause("an empty or tiny scan: no laser in the pictures, or a few shots only")
-                .next("look at the scan's report, then scan the part again"));
+            return Err(Fault::refused(format!(
+                "the scan has {} points, at least {MIN_POINTS} are needed",
+                cloud.len()
+            ))
+            .cause("an empty or tiny scan: no laser in the pictures, or a few shots only")
+            .next("look at the scan's report, then scan the part again"));
         }
         if let Some(p) = cloud.iter().find(|p| p.position.iter().any(|x| !x.is_finite())) {
             return Err(Fault::input(format!("the cloud holds a point that is not finite, in shot {}", p.shot)));

@@ -87,7 +87,7 @@ impl SearchOptions {
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Match {
     pub pose: Pose,
-    /// Mean cosine between directions over the places that are not missing; weak places count 0.
+    /// Mean cosine between directions; weak places count 0, places on missing cells half.
     pub score: f64,
     /// Share of the model's places whose slope could be known at all.
     pub coverage: f64,
@@ -164,7 +164,7 @@ pub fn find(scene: &Scene, model: &ShapeModel, options: &SearchOptions) -> Resul
         .collect();
     let mut candidates = coarse_candidates(&levels[most], model, most, options);
     for level in (0..=most).rev() {
-        let keep = if level == 0 { options.candidates.min(4 * options.max_matches + 24) } else { options.candidates };
+        let keep = if level == 0 { options.candidates.min(4 * options.max_matches + 100) } else { options.candidates };
         candidates =
             climb_all(&levels[level], &model.levels[level], level, candidates, model.radius, options, level == most);
         let limit = options.min_score - if level == 0 { 0.05 } else { 0.12 };
@@ -237,8 +237,8 @@ fn coarse_candidates(
 }
 
 /// Mean cosine between model and scene with the nearest cells of a level, and the share of places seen.
-/// Places on missing cells do not count (a shadow says nothing about an edge), but at least half of the
-/// model's places do; places outside the scene and without contrast count as misses.
+/// A place on a missing cell counts half a miss: a shadow says nothing about an edge, but a pose that
+/// needs many shadows is the worse explanation. Outside the scene or without contrast is a whole miss.
 fn score(layers: &[Directions], points: &[ModelPoint], level: usize, pose: &Pose, ignore: bool) -> (f64, f64) {
     let (s, c) = pose.angle.sin_cos();
     let shrink = 1.0 / (1u64 << level) as f64;
@@ -265,7 +265,7 @@ fn score(layers: &[Directions], points: &[ModelPoint], level: usize, pose: &Pose
         }
     }
     let n = points.len() as f64;
-    (sum / (n - missing as f64).max(0.5 * n), seen as f64 / n)
+    (sum / (n - 0.5 * missing as f64), seen as f64 / n)
 }
 
 fn climb_all(

@@ -4,9 +4,11 @@
 
 use super::run::{cloud_of, load_report};
 use crate::fault::{Fault, Result};
+use crate::find::teach::{TeachOptions, teach};
 use crate::find::{LocateOptions, Recipe, Report, locate, picture};
 use crate::raster::RgbImage;
 use crate::rig::Rig;
+use crate::scan::{GridOptions, grid};
 use std::path::Path;
 
 /// Finds the recipe's part in a finished scan. Without `station` the budget lacks the calibrations.
@@ -35,4 +37,14 @@ pub fn find_part(
     let report = locate(&cloud, recipe, rig.as_ref(), options).map_err(|e| e.at(scan.display()))?;
     let image = picture::draw(&report, &recipe.drawing());
     Ok((report, image))
+}
+
+/// Teaches a part from a finished scan: the recipe, its proof on that scan, and a picture of it.
+pub fn teach_part(scan: &Path, options: &TeachOptions) -> Result<(Recipe, Report, RgbImage)> {
+    load_report(scan)?;
+    let cloud = cloud_of(scan)?;
+    let map = grid(&cloud, &GridOptions::default())?;
+    let (recipe, proof) = teach(&cloud, &map, options).map_err(|e| e.at(scan.display()))?;
+    let image = picture::draw(&proof, &recipe.drawing());
+    Ok((recipe, proof, image))
 }

@@ -1,6 +1,7 @@
 //! In: a station folder, recordings, options. Out: the product's procedures from top to bottom.
 //! Frame and unit: millimetres; each file names its frames.
 
+mod guide;
 mod judge;
 mod judge_parts;
 mod page;
@@ -20,10 +21,11 @@ pub use judge::{Judged, judge};
 pub use judge_parts::{FoundPart, judge_parts};
 pub use board_views::{Boards, FrameBoard, boards};
 pub use calibrate_hand_eye::{Calibrated, HandEyeResult, HandEyeRun, calibrate_hand_eye};
-pub use find::find_part;
 pub use calibrate_laser_plane::{LaserPlaneRun, calibrate_laser_plane};
 pub use calibrate_pointer::{PointerRun, calibrate_pointer};
 pub use range::{Distance, RangeReport, RangeRun, SurfaceFound, measure_range};
+pub use find::{find_part, teach_part};
+pub use guide::{GuideOptions, Guided, Step, guide};
 pub use run::{HeightMapFigures, ScanOptions, ScanReport, cloud_of, load_report, scan};
 pub use settings::{Settings, WorkingVolume};
 pub use values::Values;

@@ -1,0 +1,112 @@
+//! In: recordings of pointer and line, a recipe, a station. Out: the insertion procedure step by step,
+//! each step with its numbers, asking where a person would decide.
+//! Frame and unit: base frame; poses in the robot's own notation.
+
+use super::Console;
+use crate::fault::{Fault, Result};
+use crate::robot::Convention;
+use crate::scan::Where;
+use crate::station::{GuideOptions, Settings, Step, guide};
+use std::io::{BufRead, IsTerminal};
+use std::path::PathBuf;
+
+/// Guide an operator through a whole insertion, on recordings or a simulated station
+///
+/// Touch the board with the pointer, look at it squarely, scan, find the part, approach, insert,
+/// retract. Every step says what it measured; where the robot would move, it asks.
+#[derive(clap::Args)]
+#[command(after_help = "Example:
+  sheetlight guide --station cell3 --touch recordings/touch --scan recordings/led \\
+      --recipe data/recipes/led.toml --robot denso --out job17 --yes")]
+pub struct Args {
+    /// Station folder with camera, laser plane, pointer and hand-eye calibrated
+    #[arg(long)]
+    station: PathBuf,
+    /// Recording of the pointer's spot on three or more places of the board
+    #[arg(long)]
+    touch: PathBuf,
+    /// Pose file of that recording, where meta.json names none
+    #[arg(long)]
+    touch_poses: Option<String>,
+    /// Recording of the line over the part
+    #[arg(long)]
+    scan: PathBuf,
+    /// Pose file of that recording, where meta.json names none
+    #[arg(long)]
+    scan_poses: Option<String>,
+    /// Recipe (TOML) of the part
+    #[arg(long)]
+    recipe: PathBuf,
+    /// Folder for the scan, the picture and guide.json
+    #[arg(long)]
+    out: PathBuf,
+    /// Notation of the poses [default: the station's robot, else matrix]
+    #[arg(long, value_parser = super::parse::<Convention>)]
+    robot: Option<Convention>,
+    /// Where the stages run: auto, gpu or cpu
+    #[arg(long, default_value = "auto", value_parser = super::parse::<Where>)]
+    on: Where,
+    /// Distance of the camera from the board when it looks at it squarely, mm
+    #[arg(long, default_value_t = 150.0)]
+    view_mm: f64,
+    /// Largest angle between the touched board and the found part, degrees
+    #[arg(long, default_value_t = 3.0)]
+    max_tilt_deg: f64,
+    /// Answer every question with yes: for recordings and simulated stations
+    #[arg(long)]
+    yes: bool,
+}
+
+pub fn run(args: &Args, console: &Console) -> Result<()> {
+    std::fs::create_dir_all(&args.out).map_err(|e| Fault::write(&args.out, e))?;
+    let robot = args.robot.or(Settings::load(&args.station)?.robot).unwrap_or(Convention::Matrix);
+    let options = GuideOptions {
+        station: args.station.clone(),
+        touch: args.touch.clone(),
+        touch_poses: args.touch_poses.clone(),
+        scan: args.scan.clone(),
+        scan_poses: args.scan_poses.clone(),
+        recipe: args.recipe.clone(),
+        out: args.out.clone(),
+        robot,
+        place: args.on,
+        view_mm: args.view_mm,
+        max_tilt_deg: args.max_tilt_deg,
+    };
+    let mut number = 0;
+    let guided = guide(&options, &mut |step| {
+        number += 1;
+        console.say(described(number, step));
+        match &step.asks {
+            Some(_) if args.yes => Ok(true),
+            Some(question) => ask(question),
+            None => Ok(true),
+        }
+    })?;
+    let text: Vec<String> = guided.steps.iter().enumerate().map(|(i, s)| described(i + 1, s)).collect();
+    console.result(&guided, &text.join("\n"));
+    Ok(())
+}
+
+fn described(number: usize, step: &Step) -> String {
+    let mut s = format!("{number}. {}", step.name);
+    for line in &step.says {
+        s += &format!("\n   {line}");
+    }
+    if let Some(pose) = &step.pose {
+        s += &format!("\n   pose {}", pose.iter().map(|v| format!("{v:.4}")).collect::<Vec<_>>().join(" "));
+    }
+    s
+}
+
+/// A yes from the terminal; anything else is a no. Without a terminal nobody can answer.
+fn ask(question: &str) -> Result<bool> {
+    if !std::io::stdin().is_terminal() {
+        return Err(Fault::usage(format!("nobody can answer '{question}': standard input is no terminal"))
+            .next("run it in a terminal, or pass --yes for recordings and simulated stations"));
+    }
+    eprint!("   {question} [y/N] ");
+    let mut line = String::new();
+    std::io::stdin().lock().read_line(&mut line).map_err(|e| Fault::input(format!("standard input: {e}")))?;
+    Ok(matches!(line.trim(), "y" | "Y" | "yes"))
+}

@@ -1,0 +1,240 @@
+//! In: a recording of the pointer on the board, one of the line over the part, a recipe, a station.
+//! Out: the semi-autonomous procedure step by step — normal, view pose, scan, part, approach, insertion,
+//! retract — each with its numbers and, where a person would decide, a question.
+//! Frame and unit: base frame; mm, degrees.
+
+use super::range::{RangeReport, RangeRun, measure_range};
+use super::run::{ScanOptions, scan};
+use super::settings::Settings;
+use crate::fault::{Fault, Result};
+use crate::find::{LocateOptions, Recipe, Report, locate, picture};
+use crate::geometry::{Base, Camera, Flange, Mat3, Rigid, Vec3};
+use crate::recording::Recording;
+use crate::rig::{Rig, hash_file};
+use crate::robot::Convention;
+use crate::scan::{GridOptions, RecordingSource, Where};
+use std::path::PathBuf;
+
+/// What the procedure works on.
+#[derive(Clone, Debug)]
+pub struct GuideOptions {
+    pub station: PathBuf,
+    /// Recording of the pointer's spot on three or more places of the board, with robot poses.
+    pub touch: PathBuf,
+    pub touch_poses: Option<String>,
+    /// Recording of the line over the part, with robot poses.
+    pub scan: PathBuf,
+    pub scan_poses: Option<String>,
+    pub recipe: PathBuf,
+    /// Folder for the scan, the report, the picture and guide.json.
+    pub out: PathBuf,
+    /// Notation of the poses.
+    pub robot: Convention,
+    pub place: Where,
+    /// Distance of the camera from the board when it looks at it squarely, mm, 20 to 2000.
+    pub view_mm: f64,
+    /// Largest angle between the touched board and the found part, degrees, 0.1 to 20: parts sit a little
+    /// askew, but not by more.
+    pub max_tilt_deg: f64,
+}
+
+/// A step that was done, or that is about to be done.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Step {
+    pub name: &'static str,
+    /// What was found or will be done, one sentence a line.
+    pub says: Vec<String>,
+    /// The question for the operator; `None` where nothing moves.
+    pub asks: Option<String>,
+    /// The flange or tool pose that the step moves to, in the robot's notation.
+    pub pose: Option<Vec<f64>>,
+}
+
+/// The procedure as it went.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Guided {
+    pub steps: Vec<Step>,
+    /// True when every step was done and confirmed.
+    pub finished: bool,
+    pub convention: &'static str,
+    pub normal: [f64; 3],
+    pub tilt_to_part_deg: f64,
+    pub report: Report,
+}
+
+impl GuideOptions {
+    pub fn check(&self) -> Result<()> {
+        for (name, v, a, b) in [("view_mm", self.view_mm, 20.0, 2000.0), ("max_tilt_deg", self.max_tilt_deg, 0.1, 20.0)]
+        {
+            if !(a..=b).contains(&v) {
+                return Err(Fault::usage(format!("{name} is {v}, wanted {a} to {b}")));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Runs the procedure. `confirm` is shown every step and answers its question; a "no" ends it with a
+/// refusal that names the step. Nothing is moved here: the poses are for the robot's own program.
+pub fn guide(options: &GuideOptions, confirm: &mut dyn FnMut(&Step) -> Result<bool>) -> Result<Guided> {
+    options.check()?;
+    let recipe = Recipe::load(&options.recipe)?;
+    let (settings, rig) = (Settings::load(&options.station)?, Rig::load(&options.station)?);
+    let hand_eye = rig.need_hand_eye()?.value;
+    let mut steps = Vec::new();
+    let mut pass = |step: Step| -> Result<()> {
+        let go = confirm(&step)?;
+        let name = step.name;
+        steps.push(step);
+        if go {
+            return Ok(());
+        }
+        Err(Fault::refused(format!("stopped at '{name}' by the operator")).next("start again when the cell is ready"))
+    };
+
+    let touched = measure_range(
+        &Recording::open(&options.touch)?,
+        &rig,
+        &RangeRun { poses: options.touch_poses.clone(), one_surface: true, ..RangeRun::default() },
+    )?;
+    let surface = touched.surface.as_ref().expect("asked for");
+    let normal = Vec3::from(surface.normal);
+    pass(Step { name: "touch", says: touched_words(&touched), asks: None, pose: None })?;
+
+    let view =
+        square_view(&surface.base_from_tool.rotation, &Vec3::from(surface.centre_mm), options.view_mm, &hand_eye);
+    pass(Step {
+        name: "look squarely",
+        says: vec![format!("the camera {:.0} mm above the board, its axis along the normal", options.view_mm)],
+        asks: Some("move the flange to this pose?".into()),
+        pose: Some(options.robot.write(&view)),
+    })?;
+
+    pass(Step {
+        name: "scan",
+        says: vec![format!("the line sweeps over the part: {}", options.scan.display())],
+        asks: Some("is the path free?".into()),
+        pose: None,
+    })?;
+    let recording = Recording::open(&options.scan)?;
+    let scan_folder = options.out.join("scan");
+    let poses = options.scan_poses.as_deref();
+    let run = ScanOptions {
+        out: scan_folder.clone(),
+        place: options.place,
+        extraction: settings.extraction.clone(),
+        grid: GridOptions::default(),
+        depth_mm: [settings.working_volume.near_mm, settings.working_volume.far_mm],
+        overlays: 0,
+        skip_bad: false,
+        resume: false,
+    };
+    let open = |first| Ok(Box::new(RecordingSource::open(&recording, poses, first)?) as Box<_>);
+    let id = hash_file(&options.scan.join("meta.json"))?;
+    let scanned = scan(&id, &options.scan.display().to_string(), open, &rig, &run, |_, _| {})?;
+
+    let cloud = super::run::cloud_of(&scan_folder)?;
+    let locate_options = LocateOptions { up: Some(normal), robot: options.robot };
+    let report = locate(&cloud, &recipe, Some(&rig), &locate_options)?;
+    picture::draw(&report, &recipe.drawing()).save_png(&options.out.join("found.png"))?;
+    let tilt = report.base_from_part.direction(&Vec3::z()).dot(&normal).clamp(-1.0, 1.0).acos().to_degrees();
+    let mut says = vec![
+        format!("{} points from {} shots", scanned.points, scanned.shots),
+        format!("'{}' found with score {:.3}; {} edges", report.recipe, report.found.score, report.edges),
+        format!(
+            "sigma {:.3} {:.3} {:.3} mm, {:.3} {:.3} {:.3} degrees",
+            report.sigma_mm[0],
+            report.sigma_mm[1],
+            report.sigma_mm[2],
+            report.sigma_deg[0],
+            report.sigma_deg[1],
+            report.sigma_deg[2]
+        ),
+        format!("the part's top and the touched board differ by {tilt:.2} degrees"),
+    ];
+    says.extend(report.notes.iter().cloned());
+    let Some(poses) = report.poses.clone() else {
+        return Err(Fault::refused(format!("no pose: {}", report.reasons.join("; ")))
+            .cause("the part is hidden in part, another one, or too badly seen")
+            .next(format!("look at {}", options.out.join("found.png").display())));
+    };
+    if tilt > options.max_tilt_deg {
+        return Err(Fault::refused(format!(
+            "the part's top is {tilt:.2} degrees off the touched board, limit {}",
+            options.max_tilt_deg
+        ))
+        .cause("the part is not fully seated, or the pointer touched something else than the board")
+        .next("look at the board, then start again"));
+    }
+    pass(Step { name: "find", says, asks: Some("is the part where the picture shows it?".into()), pose: None })?;
+    for (name, pose, question) in [
+        ("approach", &poses.approach, "move the tool to the approach pose?"),
+        ("insert", &poses.insertion, "insert?"),
+        ("retract", &poses.retract, "is the part in? retract?"),
+    ] {
+        let says = vec![format!("{}: {}", pose.convention, pose.labels.join(", "))];
+        pass(Step { name, says, asks: Some(question.into()), pose: Some(pose.numbers.clone()) })?;
+    }
+    let guided = Guided {
+        steps,
+        finished: true,
+        convention: options.robot.name(),
+        normal: surface.normal,
+        tilt_to_part_deg: tilt,
+        report,
+    };
+    let text = serde_json::to_string_pretty(&guided).expect("plain data");
+    crate::rig::write_atomically(&options.out.join("guide.json"), text.as_bytes())?;
+    Ok(guided)
+}
+
+fn touched_words(r: &RangeReport) -> Vec<String> {
+    let mut out: Vec<String> = r
+        .distances
+        .iter()
+        .map(|d| {
+            format!(
+                "{}: {:.3} mm from the camera along its axis, sigma {:.3}",
+                d.picture, d.along_axis_mm, d.along_axis_sigma_mm
+            )
+        })
+        .collect();
+    out.extend(r.missing.iter().map(|(name, why)| format!("{name}: no distance: {why}")));
+    if let Some(s) = &r.surface {
+        out.push(format!(
+            "normal {:.4} {:.4} {:.4}, good to {:.3} degrees; points to {:.3} mm",
+            s.normal[0], s.normal[1], s.normal[2], s.tilt_sigma_deg[0], s.rms_mm
+        ));
+    }
+    out
+}
+
+/// The flange pose from which the camera looks along the surface's normal at its centre. `tool` has z out
+/// of the surface; the camera's z points into it, its x along the tool's x.
+fn square_view(
+    tool: &Mat3,
+    centre: &Vec3,
+    distance: f64,
+    flange_from_camera: &Rigid<Flange, Camera>,
+) -> Rigid<Base, Flange> {
+    let (x, y, z) = (tool.column(0).into_owned(), tool.column(1).into_owned(), tool.column(2).into_owned());
+    let base_from_camera: Rigid<Base, Camera> = Rigid::new(Mat3::from_columns(&[x, -y, -z]), centre + z * distance);
+    base_from_camera * flange_from_camera.inverse()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_square_view_looks_at_the_centre_along_the_normal() {
+        let tool = crate::geometry::exp(&Vec3::new(0.2, -0.1, 0.7));
+        let hand_eye: Rigid<Flange, Camera> =
+            Rigid::from_vectors(&Vec3::new(0.02, -0.01, -1.5), Vec3::new(-46.0, 1.4, 93.0));
+        let centre = Vec3::new(400.0, -30.0, 60.0);
+        let base_from_camera = square_view(&tool, &centre, 150.0, &hand_eye) * hand_eye;
+        let seen = base_from_camera.inverse().point(&centre);
+        assert!((seen - Vec3::new(0.0, 0.0, 150.0)).norm() < 1e-9);
+        assert!((base_from_camera.direction(&Vec3::z()) + tool.column(2)).norm() < 1e-12);
+    }
+}
