@@ -14,6 +14,7 @@ mod scan;
 mod simulate;
 mod station;
 mod teach;
+mod verify;
 
 pub use console::Console;
 
@@ -51,6 +52,7 @@ enum Command {
     Scan(scan::Args),
     /// Simulate a station with known truth: recordings, poses, true calibration
     Simulate(simulate::Args),
+    Verify(verify::Args),
     /// Make, show, import into or export from a station folder
     #[command(subcommand)]
     Station(station::Command),
@@ -69,6 +71,7 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Range(a) => range::run(a, console),
         Command::Scan(a) => scan::run(a, console),
         Command::Simulate(a) => simulate::run(a, console),
+        Command::Verify(a) => verify::run(a, console),
         Command::Station(c) => station::run(c, console),
         Command::Teach(a) => teach::run(a, console),
     }

@@ -5,6 +5,7 @@ mod camera;
 mod hand_eye;
 mod laser_plane;
 mod pointer;
+mod profile_hand_eye;
 
 use super::Console;
 use crate::calibrate::report::Page;
@@ -19,6 +20,7 @@ pub enum Command {
     HandEye(hand_eye::Args),
     LaserPlane(laser_plane::Args),
     Pointer(pointer::Args),
+    ProfileHandEye(profile_hand_eye::Args),
 }
 
 pub fn run(command: &Command, console: &Console) -> Result<()> {
@@ -27,6 +29,7 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
         Command::HandEye(a) => hand_eye::run(a, console),
         Command::LaserPlane(a) => laser_plane::run(a, console),
         Command::Pointer(a) => pointer::run(a, console),
+        Command::ProfileHandEye(a) => profile_hand_eye::run(a, console),
     }
 }
 

@@ -1,0 +1,51 @@
+//! In: profiles of a ball and robot poses. Out: a line-profile sensor's pose on the flange.
+//! Frame and unit: flange_T_sensor; mm, degrees.
+
+use super::super::Console;
+use super::finish;
+use crate::calibrate::limits::Limits;
+use crate::calibrate::profile_hand_eye::{BallOptions, Side};
+use crate::fault::Result;
+use crate::robot::Convention;
+use crate::station::calibrate_profile_hand_eye;
+use std::path::PathBuf;
+
+/// Find a line-profile sensor's pose on the flange from profiles of a ball and the robot's poses
+///
+/// The sensor measures x along its line and z away from it, both mm; y = z × x. The ball stands still.
+/// On which side of the profile plane its centre lies must be told by the data, or be stated.
+#[derive(clap::Args)]
+#[command(after_help = "Example:
+  sheetlight calibrate profile-hand-eye profiles/ --poses BALL.LS --ball-diameter 30 --station cell3")]
+pub struct Args {
+    /// A folder with a profile a file, or one file with all: CSV (x, z) or OpenCV YAML matrices
+    profiles: PathBuf,
+    /// Poses in the profiles' order: CSV or JSON as in a recording, or a FANUC listing (.LS)
+    #[arg(long)]
+    poses: PathBuf,
+    /// Diameter of the ball, mm
+    #[arg(long, value_name = "MM")]
+    ball_diameter: f64,
+    /// Side of the ball's centre: plus (y > 0 of the sensor, y = z × x) or minus [default: the data must tell]
+    #[arg(long, value_parser = super::super::parse::<Side>)]
+    side: Option<Side>,
+    /// Station folder that the result is stored in
+    #[arg(long)]
+    station: PathBuf,
+    /// Distance at which the expected error is stated, mm
+    #[arg(long, default_value_t = 160.0)]
+    working_mm: f64,
+}
+
+pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let options = BallOptions { side: args.side, ..BallOptions::new(args.ball_diameter) };
+    let limits = Limits { working_mm: [args.working_mm, args.working_mm], ..Limits::default() };
+    let (c, warnings) = calibrate_profile_hand_eye(&args.profiles, &args.poses, &options, &limits)?;
+    warnings.iter().for_each(|w| console.warn(w));
+    let n = Convention::Denso.write(&c.calibration.value);
+    let text = format!(
+        "sensor on the flange: {:.4} {:.4} {:.4} mm, RX {:.4} RY {:.4} RZ {:.4} degrees (R = Rz·Ry·Rx)",
+        n[0], n[1], n[2], n[3], n[4], n[5]
+    );
+    finish(&args.station, &c.calibration, &c.page, &text, console)
+}

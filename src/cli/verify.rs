@@ -1,0 +1,79 @@
+//! In: a station, scans of a flat surface, touched points. Out: fit and verification, apart.
+//! Frame and unit: base frame; mm, px, degrees.
+
+use super::Console;
+use crate::fault::Result;
+use crate::rig::Rig;
+use crate::station::{VerifyReport, VerifyRun, verify};
+use std::path::PathBuf;
+
+/// Check a station with data that its calibrations did not see
+///
+/// A small residual does not prove a small error. This shows, apart from each fit, how well data that
+/// was left out is predicted; how well a flat plate scanned from several poses agrees with itself; and
+/// how far touched points are from where the system put them.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sheetlight verify --station cell3
+  sheetlight verify --station cell3 --flat scans/plate --shots-per-view 16 --touch touches.csv")]
+pub struct Args {
+    /// Station folder
+    #[arg(long)]
+    station: PathBuf,
+    /// Scan folder of a flat surface; give it several times for several scans
+    #[arg(long)]
+    flat: Vec<PathBuf>,
+    /// A flat scan holds several poses of this many shots each; 0: each scan is one view
+    #[arg(long, default_value_t = 0)]
+    shots_per_view: u32,
+    /// Touch test: predicted x y z and touched x y z (base frame, mm) a line
+    #[arg(long)]
+    touch: Option<PathBuf>,
+}
+
+pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let run = VerifyRun { flats: args.flat.clone(), shots_per_view: args.shots_per_view, touches: args.touch.clone() };
+    let report = verify(&Rig::load(&args.station)?, &run)?;
+    console.result(&report, &text(&report));
+    Ok(())
+}
+
+fn text(r: &VerifyReport) -> String {
+    let mut s = String::from("Fit (residuals of the data that was fitted)\n");
+    let figures = |m: &std::collections::BTreeMap<String, f64>| -> String {
+        let all: Vec<String> = m.iter().map(|(k, v)| format!("{k} {v:.4}")).collect();
+        if all.is_empty() { "nothing recorded".into() } else { all.join(", ") }
+    };
+    for (name, c) in &r.calibrations {
+        s += &format!("  {name:12} {}\n", figures(&c.fit));
+    }
+    s += "Verification (data that was left out, and what is to be expected)\n";
+    for (name, c) in &r.calibrations {
+        s += &format!("  {name:12} {} ({})\n", figures(&c.verification), c.verdict);
+    }
+    if let Some(f) = &r.flat {
+        s += &format!(
+            "Flat surface, {} views: heights spread by {:.4} mm (range {:.4}), tilts up to {:.4} degrees, points {:.4} mm rms about their own planes and {:.4} about the common one\n",
+            f.views.len(),
+            f.height_spread_mm,
+            f.height_range_mm,
+            f.largest_tilt_deg,
+            f.own_rms_mm,
+            f.common_rms_mm
+        );
+        for v in &f.views {
+            s += &format!(
+                "  {:24} height {:+.4} mm, tilt {:.4} degrees, {:.4} mm rms, {} points\n",
+                v.name, v.height_mm, v.tilt_deg, v.own_rms_mm, v.points
+            );
+        }
+    }
+    if let Some(t) = &r.touch {
+        let [x, y, z] = t.mean_mm;
+        s += &format!(
+            "Touch test, {} points: {:.3} mm rms, worst {:.3} mm (number {}), mean {x:+.3} {y:+.3} {z:+.3} mm, {:.3} mm about the mean\n",
+            t.points, t.rms_mm, t.worst_mm, t.worst, t.scatter_mm
+        );
+    }
+    s
+}
