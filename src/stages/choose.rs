@@ -40,7 +40,7 @@ impl Default for ChooseParams {
             widest: 1.7,
             cut_width: 0.88,
             cut_amplitude: 0.4,
-            uncertain: 0.43,
+            uncertain: 1.0,
             steepest_deg: 70.0,
             echo: 0.12,
             echo_reach: 5.7,
@@ -210,5 +210,66 @@ pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     for k in bytemuck::cast_slice_mut::<u32, Peak>(peaks).iter_mut().take(header[3] as usize) {
         let from = (k.shot * f.lines) as usize;
         beside(k, strongest, from + line(k, &f), from, &f);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCENE: Scene = Scene { width: 64, height: 48, full_scale: 255.0, width_px: 1.0, across: [0.0, 1.0] };
+
+    fn peak(x: u32, amplitude: f32, width_px: f32) -> Peak {
+        let normal_v = 1.0;
+        Peak { pixel: x | 20 << 16, amplitude, width_px, sigma_px: 0.05, normal_v, ..Peak::default() }
+    }
+    fn reason(of: Peak, among: &[Peak]) -> Reject {
+        let mut peaks = among.to_vec();
+        peaks.push(of);
+        choose(&mut peaks, &SCENE, &ChooseParams::default());
+        peaks.last().unwrap().reject()
+    }
+
+    #[test]
+    fn each_fault_has_its_reason() {
+        assert_eq!(reason(peak(9, 100.0, 1.0), &[]), Reject::Kept);
+        assert_eq!(reason(peak(9, 5.0, 1.0), &[]), Reject::Faint);
+        assert_eq!(reason(peak(9, 100.0, 0.4), &[]), Reject::Narrow);
+        assert_eq!(reason(peak(9, 100.0, 1.9), &[]), Reject::Wide);
+        assert_eq!(reason(Peak { sigma_px: 1.5, ..peak(9, 100.0, 1.0) }, &[]), Reject::Uncertain);
+        assert_eq!(reason(Peak { sigma_px: f32::NAN, ..peak(9, 100.0, 1.0) }, &[]), Reject::Uncertain);
+        assert_eq!(reason(Peak { normal_u: 0.995, normal_v: 0.1, ..peak(9, 100.0, 1.0) }, &[]), Reject::Steep);
+    }
+
+    #[test]
+    fn an_echo_is_weak_beside_the_stripe_on_its_line() {
+        let stripe = [peak(10, 200.0, 1.0)];
+        assert_eq!(reason(peak(12, 20.0, 1.0), &stripe), Reject::Echo);
+        assert_eq!(reason(peak(30, 20.0, 1.0), &stripe), Reject::Kept);
+        assert_eq!(reason(peak(12, 40.0, 1.0), &stripe), Reject::Kept);
+        // What is refused by itself casts no shadow.
+        assert_eq!(reason(peak(12, 20.0, 1.0), &[peak(10, 200.0, 0.3)]), Reject::Kept);
+    }
+
+    #[test]
+    fn a_cut_spot_has_lost_light_and_width() {
+        let stripe = [peak(10, 200.0, 1.0)];
+        assert_eq!(reason(peak(11, 60.0, 0.8), &stripe), Reject::Narrow);
+        assert_eq!(reason(peak(11, 60.0, 1.0), &stripe), Reject::Kept);
+        assert_eq!(reason(peak(11, 150.0, 0.8), &stripe), Reject::Kept);
+    }
+
+    #[test]
+    fn a_stripe_along_the_columns_is_judged_by_rows() {
+        let scene = Scene { across: [1.0, 0.0], ..SCENE };
+        let at = |x: u32, y: u32, amplitude: f32| Peak {
+            pixel: x | y << 16,
+            normal_u: 1.0,
+            normal_v: 0.0,
+            ..peak(0, amplitude, 1.0)
+        };
+        let mut peaks = vec![at(30, 5, 200.0), at(50, 5, 20.0), at(30, 40, 20.0)];
+        choose(&mut peaks, &scene, &ChooseParams::default());
+        assert_eq!(peaks.iter().map(Peak::reject).collect::<Vec<_>>(), [Reject::Kept, Reject::Echo, Reject::Kept]);
     }
 }

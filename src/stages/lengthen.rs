@@ -212,3 +212,28 @@ pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stages::{Thinning, ThresholdParams, skeleton, thin, threshold};
+
+    #[test]
+    fn the_skeleton_reaches_the_edge_of_the_light() {
+        // A horizontal streak of sigma 1.5 px that ends at x = 60 as a blurred step of sigma 1.5 px.
+        let image = crate::stages::cases::drawn(100, 40, 8, |x, y| {
+            let across = (-0.5 * ((f64::from(y) - 20.0) / 1.5).powi(2)).exp();
+            let along = 1.0 / (1.0 + ((f64::from(x) - 60.0) / 0.9).exp());
+            (4.0 + 200.0 * across * along).round() as u32
+        });
+        let lit = threshold::twin(&image, &ThresholdParams::default());
+        let thin = thin::twin(&lit, Thinning::ZhangSuen);
+        let last = |m: &Mask| skeleton::twin(m).iter().map(|p| p & 0xffff).max().unwrap();
+        let long = twin(&image, &lit, &thin, 1.5, &LengthenParams { reach: 4.0, share: 0.5 });
+        // Half of the brightness is at the edge; the lit area goes on into the blur.
+        assert!(last(&thin) <= 60 && (59..=61).contains(&last(&long)), "{} {}", last(&thin), last(&long));
+        assert!(thin.words.iter().zip(&long.words).all(|(t, l)| t & !l == 0), "nothing is taken away");
+        let off = twin(&image, &lit, &thin, 1.5, &LengthenParams { reach: 0.0, share: 0.5 });
+        assert!(off == thin);
+    }
+}

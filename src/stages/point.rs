@@ -232,3 +232,66 @@ pub fn plane_in_view(camera: &Intrinsics, laser: &Plane<Camera>, x: u32, y: u32)
     let ray = camera.ray_from_pixel(&Vec2::new(f64::from(x), f64::from(y)))?;
     Some(ray.meet(laser)?.z)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Base, Vec3};
+
+    fn camera() -> Intrinsics {
+        Intrinsics {
+            fx: 611.6,
+            fy: 611.6,
+            cx: 314.962,
+            cy: 232.344,
+            skew: 0.0,
+            distortion: [-0.118, 0.086, 0.00062, -0.00041, -0.017],
+            width: 640,
+            height: 480,
+        }
+    }
+
+    #[test]
+    fn the_lens_is_inverted_to_a_millionth_of_a_pixel_and_the_precision_of_the_numbers() {
+        let camera = camera();
+        let distortion = camera.distortion.map(|v| v as f32);
+        for v in (0..480).step_by(37) {
+            for u in (0..640).step_by(29) {
+                let d = camera.normalised(&Vec2::new(f64::from(u), f64::from(v)));
+                let (x, y) = undistort(d.x as f32, d.y as f32, &distortion).unwrap();
+                let exact = camera.undistort(&Vec2::new(f64::from(d.x as f32), f64::from(d.y as f32))).unwrap();
+                let error_px = (Vec2::new(f64::from(x), f64::from(y)) - exact).norm() * camera.fx;
+                // f32 holds a ray of 0.5 to 3e-8, which is 2e-5 px; a few roundings may add up.
+                assert!(error_px < 1e-6 + 6e-5, "({u}, {v}): {error_px}");
+            }
+        }
+    }
+
+    #[test]
+    fn points_lie_on_the_plane_and_move_as_their_sigma_says() {
+        let (camera, plane) = (camera(), Plane::new(Vec3::new(-0.019, 0.883, 0.469), 72.15).unwrap());
+        let optics = Optics::new(&camera, &plane);
+        let pose: Rigid<Base, Camera> = Rigid::from_vectors(&Vec3::new(0.2, -0.4, 1.1), Vec3::new(400.0, -60.0, 300.0));
+        let peak = Peak { u: 200.3, v: 250.7, normal_u: 0.1, normal_v: 0.995, sigma_px: 0.05, ..Peak::default() };
+        let at = |p: Peak| points(&mut [p], &optics, &pose)[0];
+        let base = at(peak);
+        let exact = pose.point(&camera.ray_from_pixel(&Vec2::new(200.3, 250.7)).unwrap().meet(&plane).unwrap());
+        assert!((Vec3::from(base.position.map(f64::from)) - exact).norm() < 2e-4);
+        let moved = at(Peak { u: peak.u + 0.1, v: peak.v + 0.995, ..peak });
+        let per_px = (Vec3::from(moved.position.map(f64::from)) - exact).norm();
+        // The lens bends a pixel by a few per cent, which sigma leaves out.
+        assert!((f64::from(base.sigma_mm) / (0.05 * per_px) - 1.0).abs() < 0.06, "{} {per_px}", base.sigma_mm);
+    }
+
+    #[test]
+    fn a_ray_along_the_plane_has_no_point() {
+        let plane = Plane::new(Vec3::new(0.0, 1.0, 0.0), 50.0).unwrap();
+        let optics = Optics::new(&camera(), &plane);
+        let pose: Rigid<Base, Camera> = Rigid::identity();
+        let mut peaks =
+            [Peak { u: 315.0, v: 100.0, ..Peak::default() }, Peak { u: 315.0, v: 400.0, ..Peak::default() }];
+        let found = points(&mut peaks, &optics, &pose);
+        assert!(found[0].sigma_mm.is_nan() && peaks[0].reject() == Reject::NoPoint);
+        assert!((found[1].position[1] - 50.0).abs() < 1e-3 && peaks[1].kept());
+    }
+}

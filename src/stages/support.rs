@@ -30,6 +30,8 @@ pub struct SupportParams {
     pub hazy: f32,
     /// Widths over the stripe's that count as right.
     pub right_width: [f32; 2],
+    /// Largest standard deviation of a clean peak's centre over the stripe's sigma, 0.01..=2; others are doubtful.
+    pub sure: f32,
 }
 
 impl Default for SupportParams {
@@ -39,10 +41,11 @@ impl Default for SupportParams {
             radius_mm: 0.3,
             slope: 1.2,
             clean: 0.1,
-            doubtful: 0.45,
+            doubtful: 0.3,
             haze: 0.05,
             hazy: 0.7,
             right_width: [0.88, 1.22],
+            sure: 0.43,
         }
     }
 }
@@ -56,6 +59,7 @@ impl SupportParams {
             ("doubtful", self.doubtful, 0.0, 1.0),
             ("haze", self.haze, 0.0, 10.0),
             ("hazy", self.hazy, 0.0, 1.0),
+            ("sure", self.sure, 0.01, 2.0),
             ("right_width[0]", self.right_width[0], 0.0, 1.0),
             ("right_width[1]", self.right_width[1], 1.0, 3.0),
         ] {
@@ -159,7 +163,8 @@ fn judge(profile: &mut Profile, others: &[&Held], width_px: f32, axis: &[f32; 3]
     let usual = usual_background(&profile.peaks);
     for (k, point) in profile.peaks.iter_mut().zip(&profile.points).filter(|(k, _)| k.kept()) {
         let ratio = k.width_px / width_px;
-        let clean = ratio >= p.right_width[0] && ratio <= p.right_width[1];
+        let sure = k.sigma_px <= p.sure * width_px;
+        let clean = sure && ratio >= p.right_width[0] && ratio <= p.right_width[1];
         let hazy = k.background - usual > p.haze * k.amplitude;
         let need = expected
             * if hazy {
@@ -199,4 +204,56 @@ fn usual_background(peaks: &[Peak]) -> f32 {
     }
     let middle = levels.len() / 2;
     *levels.select_nth_unstable_by(middle, f32::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stages::peak::Peak;
+
+    /// A flat surface of 21 points a shot, 0.25 mm apart, shots 0.35 mm apart; one more point 3 mm above the middle.
+    fn shot(index: u32, width_px: f32, stray: bool) -> Profile {
+        let mut peaks = vec![Peak { width_px, amplitude: 100.0, sigma_px: 0.05, shot: index, ..Peak::default() }; 21];
+        let mut points: Vec<Point> =
+            (0..21).map(|i| Point { position: [0.25 * i as f32, 0.35 * index as f32, 0.0], sigma_mm: 0.02 }).collect();
+        if stray {
+            peaks.push(peaks[10]);
+            points.push(Point { position: [2.5, 0.35 * index as f32, 3.0], sigma_mm: 0.02 });
+        }
+        Profile { shot: index, peaks, points, anchor: Vec3::new(0.0, 0.35 * f64::from(index), 0.0), pitch: 0.25 }
+    }
+    fn scan(width_px: f32, strays: &[u32]) -> Vec<Profile> {
+        let mut support = Support::new(SupportParams::default(), 1.0, &Vec3::x());
+        let mut out: Vec<_> = (0..6).filter_map(|i| support.push(shot(i, width_px, strays.contains(&i)))).collect();
+        out.extend(support.finish());
+        out
+    }
+
+    #[test]
+    fn a_surface_stays_and_a_stray_point_goes() {
+        let out = scan(1.0, &[2]);
+        assert_eq!(out.iter().map(|p| p.shot).collect::<Vec<_>>(), [0, 1, 2, 3, 4, 5]);
+        for p in &out {
+            for (i, k) in p.peaks.iter().enumerate() {
+                assert_eq!(k.reject(), if i < 21 { Reject::Kept } else { Reject::Unsupported }, "shot {}, {i}", p.shot);
+            }
+        }
+    }
+
+    #[test]
+    fn what_goes_on_in_the_next_shot_is_believed() {
+        let out = scan(1.0, &[2, 3]);
+        assert!(out[2].peaks[21].kept() && out[3].peaks[21].kept());
+        // The same two points with the width of two stripes need more company than one neighbour.
+        let out = scan(1.5, &[2, 3]);
+        assert!(!out[2].peaks[21].kept() && !out[3].peaks[21].kept());
+        assert!(out[2].peaks[..21].iter().all(Peak::kept));
+    }
+
+    #[test]
+    fn one_shot_alone_is_not_judged() {
+        let mut support = Support::new(SupportParams::default(), 1.0, &Vec3::x());
+        assert!(support.push(shot(0, 1.0, true)).is_none());
+        assert!(support.finish().unwrap().peaks.iter().all(Peak::kept));
+    }
 }

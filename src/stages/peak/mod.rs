@@ -27,7 +27,7 @@ pub enum Method {
     Gaussian,
     /// Centre of gravity above the background; fast, pulled by whatever else is in the window.
     Centroid,
-    /// Zero of the derivative of the Gaussian-smoothed profile (Steger 1998 [steger98]).
+    /// Zero of the derivative of the Gaussian-smoothed profile ([steger98]).
     Derivative,
 }
 
