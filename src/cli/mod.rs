@@ -11,6 +11,7 @@ mod find;
 mod guide;
 mod range;
 mod scan;
+mod shift_scan;
 mod simulate;
 mod station;
 mod teach;
@@ -50,6 +51,7 @@ enum Command {
     Guide(guide::Args),
     Range(range::Args),
     Scan(scan::Args),
+    ShiftScan(shift_scan::Args),
     /// Simulate a station with known truth: recordings, poses, true calibration
     Simulate(simulate::Args),
     Verify(verify::Args),
@@ -70,6 +72,7 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Guide(a) => guide::run(a, console),
         Command::Range(a) => range::run(a, console),
         Command::Scan(a) => scan::run(a, console),
+        Command::ShiftScan(a) => shift_scan::run(a, console),
         Command::Simulate(a) => simulate::run(a, console),
         Command::Verify(a) => verify::run(a, console),
         Command::Station(c) => station::run(c, console),

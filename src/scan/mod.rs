@@ -11,6 +11,7 @@ mod map_picture;
 pub mod overlay;
 mod pcd;
 mod scanner;
+mod shift;
 mod source;
 
 pub use cloud::{CloudFile, CloudPoint, CloudWriter, PointSource, read_cloud, write_cloud};
@@ -22,4 +23,5 @@ pub use map_files::MapScale;
 pub use map_picture::{MapPlace, Shown};
 pub use pcd::write_pcd;
 pub use scanner::{Profile, Scanner, Where};
+pub use shift::{Plateau, ShiftReport, ShiftRig, Side, shift_scan};
 pub use source::{BadShot, Format, RawFormat, RawSource, RecordingSource, Shot, Source};

@@ -1,0 +1,105 @@
+//! In: a folder of pictures of a stripe on a moving bed, three numbers of the rig. Out: heights: cloud,
+//! height map, the height of the level surface on it.
+//! Frame and unit: x along the stripe, y along the travel, z up from the bed; mm.
+
+use super::Console;
+use crate::fault::{Fault, Result};
+use crate::geometry::{Base, Grid, Rigid, Vec3};
+use crate::raster::Channel;
+use crate::scan::{GridOptions, ShiftReport, ShiftRig, Side, grid, shift_scan, write_cloud};
+use std::path::PathBuf;
+
+/// Heights from the stripe's sideways shift, for a rig that has no calibrated camera
+///
+/// The stripe runs along image columns; the bed moves between pictures. With s = shift / pixels-per-mm
+/// the height is D s / (d + s): D the camera's height above the bed, d the laser's distance from the camera.
+/// Rows that always show the bare bed give the zero of each picture.
+#[derive(clap::Args)]
+#[command(after_help = "Example:
+  sheetlight shift-scan photos/cube --pixels-per-mm 10.6277 --camera-height-mm 80 --baseline-mm 37.3 \\
+      --raises left --travel-mm 1 --bed-rows 5..40,440..475 --channel red --out scans/cube")]
+pub struct Args {
+    /// Folder with the pictures, taken in the order of their names
+    pictures: PathBuf,
+    /// Pixels per mm on the bed
+    #[arg(long)]
+    pixels_per_mm: f64,
+    /// Camera above the bed, mm
+    #[arg(long)]
+    camera_height_mm: f64,
+    /// Laser beside the camera, mm
+    #[arg(long)]
+    baseline_mm: f64,
+    /// To which side a raised surface moves the stripe: left or right
+    #[arg(long, value_parser = super::parse::<Side>)]
+    raises: Side,
+    /// Travel of the bed from picture to picture, mm
+    #[arg(long)]
+    travel_mm: f64,
+    /// Rows of the bare bed, first..last, separated by commas
+    #[arg(long, value_delimiter = ',')]
+    bed_rows: Vec<String>,
+    /// Part of a colour picture to use: red, green, blue or luma
+    #[arg(long, default_value = "luma", value_parser = super::parse::<Channel>)]
+    channel: Channel,
+    /// Points lower than this do not count for the level surface, mm
+    #[arg(long, default_value_t = 1.0)]
+    min_height_mm: f64,
+    /// Folder for cloud, height map and report
+    #[arg(long)]
+    out: PathBuf,
+}
+
+pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let rig = ShiftRig {
+        pixels_per_mm: args.pixels_per_mm,
+        camera_height_mm: args.camera_height_mm,
+        baseline_mm: args.baseline_mm,
+        raises: args.raises,
+        travel_mm: args.travel_mm,
+        bed_rows: args.bed_rows.iter().map(|r| rows(r)).collect::<Result<_>>()?,
+        channel: args.channel,
+    };
+    let bar = console.bar("measuring shifts", 0);
+    let (report, cloud) = shift_scan(&args.pictures, &rig, args.min_height_mm, &mut |done, of| {
+        bar.set_length(of as u64);
+        bar.set_position(done as u64);
+    })?;
+    bar.finish_and_clear();
+    std::fs::create_dir_all(&args.out).map_err(|e| Fault::write(&args.out, e))?;
+    write_cloud(&args.out.join("cloud.ply"), &cloud)?;
+    let text = serde_json::to_string_pretty(&report).expect("plain numbers");
+    crate::rig::write_atomically(&args.out.join("shift.json"), text.as_bytes())?;
+    if cloud.len() >= 100 {
+        let far = cloud.iter().fold([0f32; 2], |m, p| [m[0].max(p.position[0]), m[1].max(p.position[1])]);
+        // A cell is no finer than the travel, or rows without points would lie between the pictures.
+        let cell = args.travel_mm.max(2.0 / args.pixels_per_mm);
+        let cells = far.map(|x| (f64::from(x) / cell).ceil() as u32 + 1);
+        let frame: Rigid<Base, Grid> = Rigid::new(nalgebra::Matrix3::identity(), Vec3::new(0.0, -0.5 * cell, 0.0));
+        let options =
+            GridOptions { cell: Some(cell), base_from_grid: Some(frame), cells: Some(cells), ..GridOptions::default() };
+        grid(&cloud, &options)?.save(&args.out)?;
+    }
+    console.result(&report, &summary(&report));
+    Ok(())
+}
+
+fn rows(text: &str) -> Result<[u32; 2]> {
+    let parsed = text.split_once("..").and_then(|(a, b)| Some([a.parse().ok()?, b.parse().ok()?]));
+    parsed.ok_or_else(|| Fault::usage(format!("bed rows '{text}' are not like 5..40")).next("give first..last"))
+}
+
+fn summary(r: &ShiftReport) -> String {
+    let mut s =
+        format!("{} points from {} pictures, bed even to {:.3} mm (1 sigma)\n", r.points, r.pictures, r.bed_noise_mm);
+    if !r.without_bed.is_empty() {
+        s += &format!("{} pictures do not show the bed in the given rows\n", r.without_bed.len());
+    }
+    s + &match r.plateau {
+        None => "no level surface above the bed\n".into(),
+        Some(p) => format!(
+            "level surface {:.3} mm above the bed ({} points in {} pictures, noise {:.3} mm, between pictures {:.3} mm)\n",
+            p.height_mm, p.points, p.shots, p.noise_mm, p.between_shots_mm
+        ),
+    }
+}
