@@ -200,7 +200,7 @@ fn best_hypothesis(
         };
         let a = judge(points, &drawing, &measured, recipe.measure.height_gate_mm);
         let value = a.agreement * a.edges * found.score;
-        let good = a.agreement >= recipe.gates.min_agreement && a.edges >= 0.5;
+        let good = a.agreement >= recipe.gates.min_agreement && a.edges >= 0.5 && a.crossed <= recipe.gates.max_crossed;
         if kept.as_ref().is_none_or(|k| value > k.0) {
             kept = Some((value, Judged { found, measured }));
         }
@@ -360,6 +360,7 @@ fn gates(
         least("coverage", agreement.coverage, g.min_coverage),
         least("agreement", agreement.agreement, g.min_agreement),
         least("edges seen", agreement.edges, g.min_edges),
+        most("edges crossed", agreement.crossed, g.max_crossed),
         most("sigma_mm", budget.sigma_mm.iter().copied().fold(0.0, f64::max), g.max_sigma_mm),
         most("sigma_deg", budget.sigma_deg.iter().copied().fold(0.0, f64::max), g.max_sigma_deg),
     ];

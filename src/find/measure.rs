@@ -134,6 +134,9 @@ const ROUNDS: usize = 8;
 /// A face needs so many points, an in-plane fit so many edges.
 const MIN_SURFACE: usize = 60;
 const MIN_EDGES: usize = 40;
+/// Standard deviation of where between two shots an edge is put, as a share of the step: the light of
+/// partly lit samples tells it to about half of what a uniform phase (0.29) would leave.
+const PHASE: f64 = 0.15;
 /// Prior standard deviation of the growth of surfaces, mm: half a laser line.
 const GROWTH_PRIOR: f64 = 0.05;
 
@@ -413,6 +416,23 @@ fn fit_edges(mut observations: Vec<Observation>, step: &[f64; 2], options: &Meas
         o.weight = *w;
     }
     let mut covariance: Matrix3<f64> = fit.covariance.fixed_view::<3, 3>(0, 0).into();
+    // From shot to shot an edge that runs along the stripe is seen by one or two shots only, and all its
+    // samples share the place of those shots against it: one measurement each, however many columns.
+    let mut shared: HashMap<(u32, bool), Vector3<f64>> = HashMap::new();
+    let mut normal = Matrix3::zeros();
+    for o in observations.iter().filter(|o| o.locates && o.weight > 0.0) {
+        let j = Vector3::new(o.nx, o.ny, o.x * o.ny - o.y * o.nx) * o.weight;
+        normal += j * j.transpose() / o.weight;
+        if o.axis == 1 {
+            let ascending = if o.nx.abs() > o.ny.abs() { o.nx > 0.0 } else { o.ny > 0.0 };
+            *shared.entry((o.row, ascending)).or_insert_with(Vector3::zeros) += j;
+        }
+    }
+    if let Some(inverse) = normal.try_inverse() {
+        let phase = PHASE * step[1];
+        let middle = shared.values().map(|j| j * j.transpose()).sum::<Matrix3<f64>>() * (phase * phase);
+        covariance += inverse * middle * inverse;
+    }
     // What all edges of a kind have in common shifts the part as a whole.
     let bias = options.edge_bias * step[0].max(step[1]);
     covariance[(0, 0)] += bias * bias;

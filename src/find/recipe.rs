@@ -90,6 +90,8 @@ pub struct Gates {
     pub min_agreement: f64,
     /// Least share of the drawn edges at which a surface was seen to end, 0 to 1.
     pub min_edges: f64,
+    /// Largest share of the drawn edges beyond which the surface goes on, 0 to 1.
+    pub max_crossed: f64,
     /// Largest disagreement between the two-pin construction and the lattice fit, mm.
     pub max_disagreement_mm: f64,
     /// False lets a part pass whose alike turns could not be told apart.
@@ -106,6 +108,7 @@ impl Default for Gates {
             min_coverage: 0.3,
             min_agreement: 0.9,
             min_edges: 0.15,
+            max_crossed: 0.05,
             max_disagreement_mm: 0.2,
             turn_must_be_told: true,
         }
@@ -207,6 +210,7 @@ impl Recipe {
             ("gates.min_coverage", g.min_coverage),
             ("gates.min_agreement", g.min_agreement),
             ("gates.min_edges", g.min_edges),
+            ("gates.max_crossed", g.max_crossed),
         ] {
             range(name, v, 0.0, 1.0)?;
         }

@@ -22,6 +22,8 @@ pub struct Agreement {
     pub coverage: f64,
     /// Share of the drawn edges (in pieces of 0.5 mm) at which a surface was seen to end.
     pub edges: f64,
+    /// Share of the drawn edges beyond which the surface goes on: another, larger part.
+    pub crossed: f64,
 }
 
 /// Points nearer than this to an edge say nothing about what is surface and what is not, mm.
@@ -40,6 +42,8 @@ pub fn judge(points: &Ordered, drawing: &Drawing, measured: &Measured, gate: f64
     let (mut on, mut inside, mut clear, mut beside) = (0usize, 0usize, 0usize, 0usize);
     let cell = |x: f64, y: f64| ((x / SQUARE).floor() as i32, (y / SQUARE).floor() as i32);
     let mut seen = std::collections::HashSet::new();
+    let mut crossed = std::collections::HashSet::new();
+    let piece = |x: f64, y: f64, shape: usize| ((x / PIECE).floor() as i32, (y / PIECE).floor() as i32, shape);
     for q in local.iter().flatten() {
         if q.x < b[0] - RING || q.x > b[2] + RING || q.y < b[1] - RING || q.y > b[3] + RING {
             continue;
@@ -55,6 +59,11 @@ pub fn judge(points: &Ordered, drawing: &Drawing, measured: &Measured, gate: f64
         if here.is_empty() {
             beside += 1;
             clear += usize::from(!faces.iter().any(at));
+            for f in faces.iter().filter(|f| at(f)) {
+                if let Some(s) = edges.nearest(q.x, q.y, RING, |s| s.z == f.z && s.locates) {
+                    crossed.insert(piece(s.x, s.y, s.shape));
+                }
+            }
         } else {
             inside += 1;
             on += usize::from(here.iter().any(|f| at(f)));
@@ -72,7 +81,6 @@ pub fn judge(points: &Ordered, drawing: &Drawing, measured: &Measured, gate: f64
             }
         }
     }
-    let piece = |x: f64, y: f64, shape: usize| ((x / PIECE).floor() as i32, (y / PIECE).floor() as i32, shape);
     let all: std::collections::HashSet<_> = edges.samples().iter().map(|s| piece(s.x, s.y, s.shape)).collect();
     let ended: std::collections::HashSet<_> = measured
         .observations
@@ -93,6 +101,7 @@ pub fn judge(points: &Ordered, drawing: &Drawing, measured: &Measured, gate: f64
         agreement: on_surface.min(free),
         coverage: share(covered, drawn),
         edges: share(ended.len(), all.len()),
+        crossed: share(crossed.len(), all.len()),
     }
 }
 
