@@ -205,3 +205,46 @@ fn rendered_cameras_are_recovered() {
         assert_eq!(q.verdict, Verdict::Good);
     }
 }
+
+/// A copy of a recording's folder that a test may spoil.
+fn copy(reference: &std::path::Path, set: &str) -> tempfile::TempDir {
+    let copy = tempfile::tempdir().unwrap();
+    for entry in std::fs::read_dir(reference.join("rendered/inputs/public").join(set)).unwrap().flatten() {
+        std::fs::copy(entry.path(), copy.path().join(entry.file_name())).unwrap();
+    }
+    copy
+}
+
+#[test]
+fn bad_recordings_are_explained() {
+    let Some(reference) = reference() else { return };
+    let calibrated = |folder: &std::path::Path| {
+        Recording::open(folder).and_then(|r| calibrate(&r, &CameraOptions::default(), &|_, _| ()))
+    };
+    // Wrong board size given.
+    let copy_dir = copy(&reference, "intrinsics");
+    let meta = copy_dir.path().join("meta.json");
+    let text = std::fs::read_to_string(&meta).unwrap();
+    std::fs::write(&meta, text.replacen("9,", "8,", 1)).unwrap();
+    let fault = calibrated(copy_dir.path()).unwrap_err();
+    assert!(fault.what.contains("9x6") && fault.cause.contains("wrong board size"), "{fault}");
+    // One picture black, one cut off, the rest good: the two are named, the rest calibrates.
+    std::fs::write(&meta, &text).unwrap();
+    let black = sheetlight::raster::Image::from_u8(640, 480, vec![0; 640 * 480]);
+    sheetlight::raster::save_png(&black, &copy_dir.path().join("ambient_003.png")).unwrap();
+    let whole = sheetlight::raster::load(&copy_dir.path().join("ambient_005.png"), Channel::Luma, 8).unwrap().to_u8();
+    let cut: Vec<u8> = (0..640 * 480).map(|i| whole[i / 640 * 640 + (i % 640 + 340) % 640]).collect();
+    let cut = sheetlight::raster::Image::from_u8(640, 480, cut);
+    sheetlight::raster::save_png(&cut, &copy_dir.path().join("ambient_005.png")).unwrap();
+    let result = calibrated(copy_dir.path()).unwrap();
+    let left: Vec<&str> = result.left_out.iter().map(|l| l.0.as_str()).collect();
+    assert_eq!(left, ["ambient_003.png", "ambient_005.png"]);
+    assert!(result.left_out[0].1.contains("grey levels") && result.left_out[1].1.contains("cut off"));
+    // Mixed picture sizes.
+    let small = sheetlight::raster::Image::from_u8(320, 240, vec![0; 320 * 240]);
+    sheetlight::raster::save_png(&small, &copy_dir.path().join("ambient_003.png")).unwrap();
+    assert!(calibrated(copy_dir.path()).unwrap_err().what.contains("320x240"));
+    // An empty folder.
+    let empty = tempfile::tempdir().unwrap();
+    assert!(calibrated(empty.path()).unwrap_err().what.contains("meta.json"));
+}

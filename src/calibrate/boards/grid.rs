@@ -109,8 +109,17 @@ impl Grid {
             .map(|&(i, j)| {
                 let start = self.at(i, j)?;
                 let (u, v) = self.steps(i, j)?;
-                let margin = window.margin.min(band_px / u.norm().min(v.norm()));
-                corner(grey, &start, &u, &v, &Window { margin, ..*window })
+                let with = |start: &Vec2, band_px: f64, longest_px: f64| {
+                    let margin = window.margin.min(band_px / u.norm().min(v.norm()));
+                    corner(grey, start, &u, &v, &Window { margin, longest_px, ..*window })
+                };
+                let first = with(&start, band_px, window.longest_px)?;
+                // A blurred edge is wider than the band and needs more of its length.
+                let (band, longest) = (3.5 * first.blur_px, 8.0 * first.blur_px);
+                if band <= band_px {
+                    return Some(first);
+                }
+                with(&first.pixel, band, longest.max(window.longest_px)).or(Some(first))
             })
             .collect()
     }

@@ -192,3 +192,31 @@ fn what_is_not_found_is_explained() {
     assert!(why(&whole, &charuco()).contains("ChArUco board were found"));
     assert!(why(&whole, &circles(7, 5, false)).contains("no grid of 7x5 dots"));
 }
+
+/// Blurred by three box filters of the given half width: nearly a Gaussian of that many px.
+fn out_of_focus(image: &Image, half: i64) -> Image {
+    let (w, h) = (i64::from(WIDTH), i64::from(HEIGHT));
+    let mut levels = image.to_f32();
+    for (dx, dy) in [(1, 0), (0, 1)].repeat(3) {
+        let old = levels.clone();
+        for y in 0..h {
+            for x in 0..w {
+                let at = |k: i64| old[((y + k * dy).clamp(0, h - 1) * w + (x + k * dx).clamp(0, w - 1)) as usize];
+                levels[(y * w + x) as usize] = (-half..=half).map(at).sum::<f32>() / (2 * half + 1) as f32;
+            }
+        }
+    }
+    Image::from_u8(WIDTH, HEIGHT, levels.iter().map(|v| v.round() as u8).collect())
+}
+
+#[test]
+fn a_board_out_of_focus_is_still_found_where_it_is() {
+    let board = chessboard(9, 6);
+    let pose = facing(&board, Vec3::new(0.3, -0.2, 0.15), 200.0);
+    let sharp = picture(&board, &pose);
+    for half in [2, 4] {
+        let view = find(&out_of_focus(&sharp, half), &board, &FindOptions::default()).unwrap();
+        let off = worst(&board, &pose, &view);
+        assert!(off < 0.05, "blur {half}: {off} px");
+    }
+}
