@@ -7,7 +7,11 @@ use crate::fault::{Fault, Result};
 use crate::gpu::{AdapterInfo, Device};
 use crate::raster::Image;
 use crate::stages::chain::{Chain, ChainConfig};
-use crate::stages::{ThresholdParams, Window};
+use crate::stages::choose::ChooseParams;
+use crate::stages::lengthen::LengthenParams;
+use crate::stages::measured::Measure;
+use crate::stages::peak::PeakParams;
+use crate::stages::{ThresholdParams, Window, cases};
 use std::collections::VecDeque;
 use std::time::Instant;
 
@@ -68,6 +72,10 @@ pub struct Row {
     pub shots: usize,
     /// Wall time a shot, median over the batches in steady state.
     pub ms_per_shot: f64,
+    /// The same with sub-pixel peaks, their sigma, their choice and their points in mm.
+    pub full_ms_per_shot: Option<f64>,
+    /// That against the skeleton alone, median of runs in turns.
+    pub full_over_skeleton: Option<f64>,
     pub shots_per_s: f64,
     pub mpx_per_s: f64,
     /// CPU time of all threads a shot; on a software adapter the GPU's work is in it.
@@ -144,29 +152,16 @@ fn row(
     }
     while chain.collect(true)?.is_some() {}
 
-    let (mut n, mut shots, mut points, mut listed) = (0usize, 0usize, 0usize, 0u64);
-    let mut per_batch = Vec::new();
-    let cpu = machine::cpu_seconds();
-    let start = Instant::now();
-    let mut last = start;
-    while start.elapsed().as_secs_f64() < options.seconds || per_batch.len() < 5 {
-        while chain.has_room() {
-            chain.submit(n as u64, &batch_of(n))?;
-            n += 1;
-        }
-        let batch = chain.collect(true)?.expect("under way");
-        shots += config.shots as usize;
-        points += batch.points.len();
-        listed += u64::from(batch.listed_tiles);
-        per_batch.push(last.elapsed().as_secs_f64());
-        last = Instant::now();
-    }
-    while chain.collect(true)?.is_some() {
-        shots += config.shots as usize;
-    }
-    let cpu_ms = cpu.and_then(|c| Some(1e3 * (machine::cpu_seconds()? - c) / shots as f64));
-    let batches = per_batch.len() as f64;
-    let ms_per_shot = percentile(&mut per_batch, 0.5) / f64::from(config.shots);
+    let steady = steady(&mut chain, options.seconds, &batch_of, &[])?;
+    let (cpu_ms, ms_per_shot) = (steady.cpu_ms_per_shot, steady.ms_per_shot);
+
+    // The full chain in turns with the skeleton alone, so that both see the same machine. Every speck of a
+    // noise-heavy picture would be measured: that is no scan.
+    let full = if scene == Scene::NoiseHeavy {
+        None
+    } else {
+        Some(full_chain(device, &config, scene, &mut chain, &batch_of, options)?)
+    };
 
     let mut single = Chain::new(device, &ChainConfig { shots: 1, slots: 1, ..config.clone() })?;
     single.submit(0, &refs[..1])?;
@@ -184,7 +179,7 @@ fn row(
 
     let px = f64::from(width) * f64::from(height);
     let tiles = f64::from(chain.frame.tiles());
-    let listed = listed as f64 / batches / tiles;
+    let listed = steady.listed / tiles;
     // Written at upload, read once by the statistics; 32 bytes a tile of them written and read by 3 x 5 blocks
     // out of the cache; a listed tile's surroundings and masks.
     let bytes_per_px = 2.0 + 64.0 / 256.0 + listed * (62.0 * 38.0 / 256.0 + 1.0);
@@ -195,8 +190,10 @@ fn row(
         height,
         scene,
         shots_per_batch: config.shots,
-        shots,
+        shots: steady.shots,
         ms_per_shot,
+        full_ms_per_shot: full.map(|f| f.0),
+        full_over_skeleton: full.map(|f| f.1),
         shots_per_s: 1e3 / ms_per_shot,
         mpx_per_s: mpx,
         cpu_ms_per_shot: cpu_ms,
@@ -204,13 +201,86 @@ fn row(
         bytes_per_px,
         share_of_memory: gb_s / ceilings.read_all_gb_s,
         share_of_upload: ceilings.upload_gb_s.map(|u| mpx * 1e6 / 1e9 / u),
-        points_per_shot: points as f64 / (batches * f64::from(config.shots)),
+        points_per_shot: steady.points,
         listed,
         latency,
         gpu_memory_mb: gpu_memory as f64 / 1e6,
         host_peak_mb: machine::peak_memory_bytes().map(|b| b as f64 / 1e6),
         stages: stage_times(device, &config, &batch_of(0))?,
     })
+}
+
+/// What a run in steady state gave.
+struct Steady {
+    shots: usize,
+    ms_per_shot: f64,
+    cpu_ms_per_shot: Option<f64>,
+    /// Skeleton pixels a shot, listed tiles a batch.
+    points: f64,
+    listed: f64,
+}
+
+/// Keeps every place of the ring busy for so many seconds.
+fn steady<'a>(
+    chain: &mut Chain,
+    seconds: f64,
+    batch_of: &impl Fn(usize) -> Vec<&'a Image>,
+    poses: &[[f32; 12]],
+) -> Result<Steady> {
+    let per = chain.frame.shots as usize;
+    let (mut n, mut shots, mut points, mut listed) = (0usize, 0usize, 0u64, 0u64);
+    let mut per_batch = Vec::new();
+    let cpu = machine::cpu_seconds();
+    let start = Instant::now();
+    let mut last = start;
+    while start.elapsed().as_secs_f64() < seconds || per_batch.len() < 3 {
+        while chain.has_room() {
+            chain.submit_posed(n as u64, &batch_of(n), poses)?;
+            n += 1;
+        }
+        let batch = chain.collect(true)?.expect("under way");
+        shots += per;
+        points += u64::from(batch.found);
+        listed += u64::from(batch.listed_tiles);
+        per_batch.push(last.elapsed().as_secs_f64());
+        last = Instant::now();
+    }
+    while chain.collect(true)?.is_some() {
+        shots += per;
+    }
+    let batches = per_batch.len() as f64;
+    Ok(Steady {
+        shots,
+        ms_per_shot: percentile(&mut per_batch, 0.5) / per as f64,
+        cpu_ms_per_shot: cpu.and_then(|c| Some(1e3 * (machine::cpu_seconds()? - c) / shots as f64)),
+        points: points as f64 / (batches * per as f64),
+        listed: listed as f64 / batches,
+    })
+}
+
+/// Time a shot of the full chain, and its ratio to the skeleton alone, in five turns.
+fn full_chain<'a>(
+    device: &Device,
+    config: &ChainConfig,
+    scene: Scene,
+    skeleton: &mut Chain,
+    batch_of: &impl Fn(usize) -> Vec<&'a Image>,
+    options: &BenchOptions,
+) -> Result<(f64, f64)> {
+    let peak = PeakParams { width_px: if scene == Scene::ThickStripe { 6.0 } else { 2.5 }, ..PeakParams::default() };
+    let measure = Measure { peak, choose: ChooseParams::default(), optics: cases::optics(config.width, config.height) };
+    let lengthen = LengthenParams::default().word(peak.width_px);
+    let mut full = Chain::new(device, &ChainConfig { measure: Some(measure), lengthen, ..config.clone() })?;
+    let poses: Vec<_> = (0..config.shots).map(cases::pose).collect();
+    steady(&mut full, 0.0, batch_of, &poses)?;
+    let (mut times, mut ratios) = (Vec::new(), Vec::new());
+    for _ in 0..5 {
+        let with = steady(&mut full, options.seconds / 10.0, batch_of, &poses)?.ms_per_shot;
+        let without = steady(skeleton, options.seconds / 10.0, batch_of, &[])?.ms_per_shot;
+        times.push(with * 1e-3);
+        ratios.push(with / without * 1e-3);
+    }
+    Ok((percentile(&mut times, 0.5), percentile(&mut ratios, 0.5)))
 }
 
 /// GPU timestamps of one batch, the median of five, summed over the dispatches of a stage.
@@ -256,11 +326,13 @@ pub fn table(report: &Report) -> String {
     );
     let _ = writeln!(
         out,
-        "{:11} {:16} {:>5} {:>8} {:>8} {:>8} {:>8} {:>7} {:>7} {:>7} {:>7} {:>8} {:>8}",
+        "{:11} {:16} {:>5} {:>8} {:>8} {:>6} {:>8} {:>8} {:>8} {:>7} {:>7} {:>7} {:>7} {:>8} {:>8}",
         "size",
         "scene",
         "batch",
         "ms/shot",
+        "full ms",
+        "ratio",
         "shots/s",
         "Mpx/s",
         "CPU ms",
@@ -274,11 +346,13 @@ pub fn table(report: &Report) -> String {
     for r in &report.rows {
         let _ = writeln!(
             out,
-            "{:11} {:16} {:>5} {:>8.3} {:>8.1} {:>8.0} {:>8.2} {:>7.1} {:>6.1}% {:>6.1}% {:>6.1}% {:>8.2} {:>8.2}",
+            "{:11} {:16} {:>5} {:>8.3} {:>8.3} {:>6.2} {:>8.1} {:>8.0} {:>8.2} {:>7.1} {:>6.1}% {:>6.1}% {:>6.1}% {:>8.2} {:>8.2}",
             format!("{}x{}", r.width, r.height),
             r.scene.name(),
             r.shots_per_batch,
             r.ms_per_shot,
+            r.full_ms_per_shot.unwrap_or(f64::NAN),
+            r.full_over_skeleton.unwrap_or(f64::NAN),
             r.shots_per_s,
             r.mpx_per_s,
             r.cpu_ms_per_shot.unwrap_or(f64::NAN),

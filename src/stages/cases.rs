@@ -201,7 +201,7 @@ fn peak_cases(scene: &Scene, wanted: &str) -> Vec<Case> {
 }
 
 /// A camera of 55 degrees with a common lens, a sheet that crosses its axis at 155 mm.
-fn optics(width: u32, height: u32) -> point::Optics {
+pub fn optics(width: u32, height: u32) -> point::Optics {
     let f = 0.96 * width as f32;
     point::Optics {
         pinhole: [f, f, 0.49 * width as f32, 0.51 * height as f32, 0.0],
@@ -212,7 +212,7 @@ fn optics(width: u32, height: u32) -> point::Optics {
 }
 
 /// A turned pose some way off the base, another one a shot.
-fn pose(shot: u32) -> [f32; 12] {
+pub fn pose(shot: u32) -> [f32; 12] {
     let (s, c) = (0.3 + 0.1 * shot as f32).sin_cos();
     [c, -s, 0.0, 420.0, s, c, 0.0, -60.0 + shot as f32, 0.0, 0.0, 1.0, 310.0]
 }
