@@ -21,13 +21,13 @@ fn real_photographs_give_the_cube_and_the_steps() {
         bed_rows: vec![[5, 40], [440, 475]],
         channel: Channel::Luma,
     };
-    // Height, and how far the published geometry (three numbers by ruler) and the photographs may be off:
-    // the author's own results for the steps are 0.30, 0.01 and 0.03 mm off the calliper.
+    // The geometry is three numbers by ruler, the top surfaces glare; the author's own results for the steps
+    // are 0.30, 0.01 and 0.03 mm off the calliper.
     for (name, want, allowed) in [
-        ("cube_20mm", 20.0, 0.3),
-        ("video_grey_step_3.68mm", 3.68, 0.35),
-        ("video_grey_step_8.94mm", 8.94, 0.3),
-        ("video_grey_step_14mm", 14.0, 0.3),
+        ("cube_20mm", 20.0, 0.15),
+        ("video_grey_step_3.68mm", 3.68, 0.1),
+        ("video_grey_step_8.94mm", 8.94, 0.1),
+        ("video_grey_step_14mm", 14.0, 0.1),
     ] {
         let (report, _) = shift_scan(&folder.join(name), &rig, 1.0, &mut |_, _| {}).unwrap();
         let p = report.plateau.unwrap_or_else(|| panic!("{name}: no level surface, {report:?}"));
@@ -42,5 +42,6 @@ fn real_photographs_give_the_cube_and_the_steps() {
             report.bed_noise_mm
         );
         assert!((p.height_mm - want).abs() < allowed, "{name}: {}", p.height_mm);
+        assert!(p.points > 1000, "{name}: {} points", p.points);
     }
 }
