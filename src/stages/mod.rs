@@ -7,6 +7,7 @@ pub mod chain;
 pub mod choose;
 mod entry;
 pub mod frame;
+pub mod hough;
 pub mod lengthen;
 pub mod listing;
 pub mod measured;
@@ -57,6 +58,7 @@ pub fn all() -> Vec<Entry> {
         exact(&skeleton::COUNT, skeleton::count_twin, || cases::of("count")),
         exact(&skeleton::SCAN_ROWS, skeleton::scan_rows_twin, || cases::of("scan_rows")),
         exact(&skeleton::SCAN_SHOTS, skeleton::scan_shots_twin, || cases::of("scan_shots")),
+        exact(&hough::STAGE, hough::stage_twin, hough::cases),
         exact(&skeleton::STAGE, skeleton::stage_twin, || cases::of("skeleton")),
         exact(&lengthen::COPY, lengthen::copy_twin, || cases::of("skeleton_copy")),
         exact(&lengthen::STAGE, lengthen::stage_twin, || cases::of("lengthen")),
