@@ -1,0 +1,59 @@
+//! In: pictures of the bench's scenes. Out: Criterion's times of the stripe chain and of its CPU twins.
+//! Frame and unit: seconds a shot. What limits each stands beside it and in benches/README.md.
+
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use sheetlight::bench::{Scene, pictures};
+use sheetlight::gpu::Device;
+use sheetlight::raster::Image;
+use sheetlight::stages::chain::{Chain, ChainConfig};
+use sheetlight::stages::{Thinning, ThresholdParams, hough, skeleton, thin, threshold};
+
+const THRESHOLD: ThresholdParams =
+    ThresholdParams { window: sheetlight::stages::Window::Mean, size: 31, offset: 8, minimum: 0 };
+
+fn twins(c: &mut Criterion) {
+    let image = &pictures(Scene::OneStripe, 1280, 960, 1)[0];
+    let lit = threshold::twin(image, &THRESHOLD);
+    let thinned = thin::twin(&lit, Thinning::ZhangSuen);
+    let pixels = skeleton::twin(&thinned);
+    let mut group = c.benchmark_group("twins 1280x960");
+    group.throughput(Throughput::Elements(1280 * 960));
+    // Limited by the running sums: four dependent additions a pixel on one core.
+    group.bench_function("threshold", |b| b.iter(|| threshold::twin(image, &THRESHOLD)));
+    // Limited by the passes over words that are dark: one comparison each.
+    group.bench_function("thin", |b| b.iter(|| thin::twin(&lit, Thinning::ZhangSuen)));
+    // Limited by reading the mask.
+    group.bench_function("skeleton", |b| b.iter(|| skeleton::twin(&thinned)));
+    let frame = hough::HoughFrame::new(1280, 960, &hough::HoughParams::default());
+    // Limited by scattered additions: one cache miss a vote.
+    group.bench_function("hough votes", |b| b.iter(|| hough::votes(&frame, &pixels)));
+    group.finish();
+}
+
+fn chain(c: &mut Criterion) {
+    let Ok(device) = Device::open() else {
+        eprintln!("SKIPPED, no GPU adapter");
+        return;
+    };
+    for (width, height) in [(640, 480), (1280, 960), (4096, 3072)] {
+        let config = ChainConfig { threshold: THRESHOLD, ..ChainConfig::new(width, height, 8) };
+        let images = pictures(Scene::OneStripe, width, height, config.shots);
+        let refs: Vec<&Image> = images.iter().collect();
+        let mut chain = Chain::new(&device, &config).expect("the sizes fit every adapter");
+        let mut group = c.benchmark_group("chain");
+        group.sample_size(20);
+        group.throughput(Throughput::Elements(u64::from(width * height * config.shots)));
+        // Limited, on a software adapter, by the upload and the statistics, which touch every pixel; on a discrete
+        // GPU by the bus.
+        group.bench_function(format!("{width}x{height}, batches of {}", config.shots), |b| {
+            b.iter(|| {
+                chain.submit(0, &refs).expect("the device is there");
+                chain.collect(true).expect("the device is there")
+            })
+        });
+        group.finish();
+    }
+}
+
+criterion_group!(benches, twins, chain);
+criterion_main!(benches);
