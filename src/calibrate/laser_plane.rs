@@ -3,12 +3,15 @@
 //! Frame and unit: camera frame, mm; peaks in px (docs/math.md, Laser plane (1) to (6)).
 
 use super::board_print::{inside, to_print_edge};
-use super::measured_pose::{MeasuredPose, changed, moved, step_between};
+use super::laser_plane_terms::{
+    Data, Seen, State, basis, by_camera, look, mm_per_px, on_board, ratio, strain, tangents, without,
+};
+use super::measured_pose::MeasuredPose;
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Board, Camera, Plane, Rigid, Vec2, Vec3, fit_plane};
 use crate::recording::BoardSpec;
-use crate::solve::{ConsensusOptions, LmOptions, Loss, Problem, Residuals, Solution, consensus, lm};
+use crate::solve::{ConsensusOptions, Loss, consensus};
 use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix};
 
 /// One place where the stripe was found.
@@ -133,134 +136,6 @@ pub struct LaserPlaneFit {
     pub board_spread: f64,
     /// Spread of the stripes across their own direction, mm (rms): what holds the plane's tilt.
     pub depth_spread: f64,
-}
-
-/// A peak as seen by the solver.
-#[derive(Clone, Copy)]
-struct Seen {
-    view: usize,
-    index: usize,
-    /// Viewing ray (x, y, 1).
-    ray: Vec3,
-    /// d(ray x, y)/d(pixel).
-    ray_by_pixel: nalgebra::Matrix2<f64>,
-    sigma_px: f64,
-}
-
-fn look(camera: &Intrinsics, view: usize, index: usize, peak: &StripePeak) -> Option<Seen> {
-    let n = camera.normalised_from_pixel(&peak.pixel)?;
-    let k = nalgebra::Matrix2::new(camera.fx, camera.skew, 0.0, camera.fy);
-    let ray_by_pixel = (k * camera.distort_jacobian(&n)).try_inverse()?;
-    Some(Seen { view, index, ray: Vec3::new(n.x, n.y, 1.0), ray_by_pixel, sigma_px: peak.sigma_px })
-}
-
-/// Where a ray (x, y, 1) meets a board.
-fn on_board(pose: &Rigid<Camera, Board>, ray: &Vec3) -> Option<Vec3> {
-    let normal: Vec3 = pose.rotation.column(2).into();
-    let slope = normal.dot(ray);
-    let depth = normal.dot(&pose.translation) / slope;
-    (slope.abs() > 1e-6 && depth > 0.0).then(|| ray * depth)
-}
-
-/// Distance from the plane per pixel across the stripe, mm/px.
-fn mm_per_px(plane: &Plane<Camera>, pose: &Rigid<Camera, Board>, s: &Seen) -> f64 {
-    let normal: Vec3 = pose.rotation.column(2).into();
-    let slope = normal.dot(&s.ray);
-    let depth = normal.dot(&pose.translation) / slope;
-    let along = depth * (plane.normal - normal * (plane.normal.dot(&s.ray) / slope));
-    (s.ray_by_pixel.transpose() * Vec2::new(along.x, along.y)).norm()
-}
-
-#[derive(Clone)]
-struct State {
-    plane: Plane<Camera>,
-    poses: Vec<Rigid<Camera, Board>>,
-}
-
-struct Fit<'a> {
-    peaks: &'a [Seen],
-    /// mm of plane distance that one sigma of a peak makes.
-    sigma_mm: Vec<f64>,
-    measured: &'a [Rigid<Camera, Board>],
-    /// Upper Cholesky factors of the poses' information in units of their sigma.
-    roots: &'a [Matrix6<f64>],
-}
-
-/// Two directions in the plane.
-fn tangents(normal: &Vec3) -> [Vec3; 2] {
-    let axis = if normal.x.abs() < 0.7 { Vec3::x() } else { Vec3::y() };
-    let a = normal.cross(&axis).normalize();
-    [a, normal.cross(&a)]
-}
-
-/// A peak's residual in sigmas and its derivatives by the plane's three numbers and the pose's six.
-fn row(plane: &Plane<Camera>, pose: &Rigid<Camera, Board>, peak: &Seen, sigma_mm: f64) -> Option<(f64, [f64; 9])> {
-    let [a, b] = tangents(&plane.normal);
-    let p = on_board(pose, &peak.ray)?;
-    let normal: Vec3 = pose.rotation.column(2).into();
-    // depth = (n·t)/(n·d); a step (v, w) changes n·t by n·v and n by w × n.
-    let along = plane.normal.dot(&peak.ray) / normal.dot(&peak.ray);
-    let by_v = normal * along;
-    let by_w = -normal.cross(&peak.ray) * (along * p.z);
-    let j = [a.dot(&p), b.dot(&p), -1.0, by_v.x, by_v.y, by_v.z, by_w.x, by_w.y, by_w.z];
-    Some((plane.distance(&p) / sigma_mm, j.map(|x| x / sigma_mm)))
-}
-
-impl Problem for Fit<'_> {
-    type State = State;
-    fn width(&self) -> usize {
-        3 + 6 * self.measured.len()
-    }
-    fn moved(&self, s: &State, step: &[f64]) -> State {
-        let [a, b] = tangents(&s.plane.normal);
-        let normal = (s.plane.normal + a * step[0] + b * step[1]).normalize();
-        State {
-            plane: Plane::new(normal, s.plane.offset + step[2]).expect("a normal of length one"),
-            poses: s.poses.iter().enumerate().map(|(i, p)| moved(p, &step[3 + 6 * i..9 + 6 * i])).collect(),
-        }
-    }
-    fn residuals(&self, s: &State, out: &mut Residuals) -> Option<()> {
-        for (peak, sigma) in self.peaks.iter().zip(&self.sigma_mm) {
-            let (r, j) = row(&s.plane, &s.poses[peak.view], peak, *sigma)?;
-            let at = 3 + 6 * peak.view;
-            out.group(&[r], &[0, 1, 2, at, at + 1, at + 2, at + 3, at + 4, at + 5], &j);
-        }
-        for (i, (measured, root)) in self.measured.iter().zip(self.roots).enumerate() {
-            let e = root * step_between(measured, &s.poses[i]);
-            let columns: [usize; 6] = std::array::from_fn(|k| 3 + 6 * i + k);
-            out.prior(e.as_slice(), &columns, root.transpose().as_slice());
-        }
-        Some(())
-    }
-}
-
-/// The data of one solve: views as measured, chosen peaks.
-struct Data {
-    peaks: Vec<Seen>,
-    measured: Vec<Rigid<Camera, Board>>,
-    roots: Vec<Matrix6<f64>>,
-}
-
-impl Data {
-    fn solve(&self, start: &State, loss: Loss, factor: f64) -> Solution<State> {
-        let mut state = start.clone();
-        let mut found = None;
-        // The scale from mm to px follows the plane: two rounds fix it.
-        for _ in 0..2 {
-            let sigma_mm = self
-                .peaks
-                .iter()
-                .map(|s| s.sigma_px * factor * mm_per_px(&state.plane, &state.poses[s.view], s))
-                .collect();
-            let fit = Fit { peaks: &self.peaks, sigma_mm, measured: &self.measured, roots: &self.roots };
-            // A cost that stands still to 1e-9 is 0.002 sigma from the bottom.
-            let o = LmOptions { loss, estimate_scale: loss != Loss::Squares, tolerance: 1e-9, ..LmOptions::default() };
-            let s = lm(&fit, state, &o);
-            state = s.state.clone();
-            found = Some(s);
-        }
-        found.expect("two rounds")
-    }
 }
 
 fn refused(what: String) -> Fault {
@@ -442,12 +317,6 @@ fn leave_out_disagreeing(all: &[Seen], near: &[Seen], used: &mut [bool], o: &Las
     }
 }
 
-/// Residual over `factor` times its sigma.
-fn ratio(p: &Seen, s: &State, factor: f64) -> f64 {
-    let Some(x) = on_board(&s.poses[p.view], &p.ray) else { return f64::INFINITY };
-    s.plane.distance(&x) / (mm_per_px(&s.plane, &s.poses[p.view], p) * p.sigma_px * factor)
-}
-
 fn robust_ratio(data: &Data, s: &State, factor: f64) -> f64 {
     let mut r: Vec<f64> = data.peaks.iter().map(|p| ratio(p, s, factor).abs()).collect();
     crate::solve::robust_scale(&mut r, 1)
@@ -477,89 +346,6 @@ fn neighbour_factor(peaks: &[Seen], ratios: &[f64], views: &[StripeView]) -> f64
         factor += 2.0 * rho;
     }
     factor
-}
-
-fn strain(data: &Data, s: &State, view: usize) -> f64 {
-    (data.roots[view] * step_between(&data.measured[view], &s.poses[view])).norm_squared()
-}
-
-/// d(nx ny nz offset)/d(two tilts, offset).
-fn basis(plane: &Plane<Camera>) -> DMatrix<f64> {
-    let [a, b] = tangents(&plane.normal);
-    let mut j = DMatrix::zeros(4, 3);
-    for i in 0..3 {
-        (j[(i, 0)], j[(i, 1)]) = (a[i], b[i]);
-    }
-    j[(3, 2)] = 1.0;
-    j
-}
-
-/// What one picture says about the plane at a linearisation: information and gradient of its three
-/// numbers, the board's pose eliminated (docs/math.md, Laser plane (5)).
-fn share(data: &Data, state: &State, view: usize, factor: f64) -> Option<(Matrix3<f64>, Vec3)> {
-    let (mut h, mut g) = (SMatrix::<f64, 9, 9>::zeros(), SMatrix::<f64, 9, 1>::zeros());
-    let pose = &state.poses[view];
-    for p in data.peaks.iter().filter(|p| p.view == view) {
-        let (r, j) = row(&state.plane, pose, p, p.sigma_px * factor * mm_per_px(&state.plane, pose, p))?;
-        let j = SMatrix::<f64, 9, 1>::from(j);
-        h += j * j.transpose();
-        g += j * r;
-    }
-    let root = &data.roots[view];
-    let prior = root.transpose() * root;
-    let local = h.fixed_view::<6, 6>(3, 3) + prior;
-    let rest = g.fixed_view::<6, 1>(3, 0) + prior * step_between(&data.measured[view], pose);
-    let mixed = h.fixed_view::<3, 6>(0, 3) * local.try_inverse()?;
-    let information = h.fixed_view::<3, 3>(0, 0) - mixed * h.fixed_view::<6, 3>(3, 0);
-    Some((information, g.fixed_view::<3, 1>(0, 0) - mixed * rest))
-}
-
-/// d(nx ny nz offset)/d(camera): the gradient's change with the camera through the peaks' rays and
-/// the boards' poses, by the implicit function theorem.
-fn by_camera(
-    data: &Data,
-    state: &State,
-    views: &[StripeView],
-    camera: &Intrinsics,
-    factor: f64,
-) -> Option<DMatrix<f64>> {
-    let mut information = Matrix3::zeros();
-    for v in 0..views.len() {
-        information += share(data, state, v, factor)?.0;
-    }
-    let inverse = information.try_inverse()?;
-    let mut local = DMatrix::zeros(3, 9);
-    for k in 0..9 {
-        let h = if k < 4 { 0.05 } else { 1e-4 };
-        let gradient = |sign: f64| -> Option<Vec3> {
-            let mut d = nalgebra::SVector::<f64, 9>::zeros();
-            d[k] = sign * h;
-            let other = changed(camera, &d);
-            let peaks = data.peaks.iter().map(|p| look(&other, p.view, p.index, &views[p.view].peaks[p.index]));
-            let follow = |(v, p): (&StripeView, _)| moved(p, (v.pose.by_intrinsics * d).as_slice());
-            let data = Data {
-                peaks: peaks.collect::<Option<_>>()?,
-                measured: views.iter().zip(&data.measured).map(follow).collect(),
-                roots: data.roots.clone(),
-            };
-            (0..views.len()).map(|v| share(&data, state, v, factor).map(|s| s.1)).sum()
-        };
-        local.set_column(k, &(-inverse * (gradient(1.0)? - gradient(-1.0)?) / (2.0 * h)));
-    }
-    Some(basis(&state.plane) * local)
-}
-
-/// The plane without one picture: one Gauss-Newton step from the whole solution.
-fn without(data: &Data, state: &State, left_out: usize, factor: f64) -> Option<Plane<Camera>> {
-    let (mut h, mut g) = (Matrix3::zeros(), Vec3::zeros());
-    for v in (0..data.measured.len()).filter(|v| *v != left_out) {
-        let (a, b) = share(data, state, v, factor)?;
-        h += a;
-        g += b;
-    }
-    let step = -(h.try_inverse()? * g);
-    let [a, b] = tangents(&state.plane.normal);
-    Plane::new((state.plane.normal + a * step.x + b * step.y).normalize(), state.plane.offset + step.z)
 }
 
 fn residuals(

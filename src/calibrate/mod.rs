@@ -15,6 +15,7 @@ pub mod intrinsics;
 pub mod intrinsics_quality;
 pub mod laser_plane;
 pub mod laser_plane_report;
+mod laser_plane_terms;
 pub mod limits;
 pub mod measured_pose;
 pub mod pointer;
