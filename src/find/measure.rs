@@ -134,6 +134,9 @@ const ROUNDS: usize = 8;
 /// A face needs so many points, an in-plane fit so many edges.
 const MIN_SURFACE: usize = 60;
 const MIN_EDGES: usize = 40;
+/// An edge is taken from samples that cross it at up to 53 degrees from its normal, so that edges at 45
+/// degrees to the sweep are seen along the stripe and from shot to shot.
+const LEAST_COSINE: f64 = 0.6;
 /// Standard deviation of where between two shots an edge is put, as a share of the step: the light of
 /// partly lit samples tells it to about half of what a uniform phase (0.29) would leave.
 const PHASE: f64 = 0.15;
@@ -347,7 +350,7 @@ fn surface_ends(
             let (x, y) = (o.x + o.nx * reach, o.y + o.ny * reach);
             // The nearest edge of any direction: at a corner or beside a hole none is taken for another.
             let s = edges.nearest(x, y, gate, |s| s.z == z)?;
-            if s.nx * o.nx + s.ny * o.ny < 0.85 {
+            if s.nx * o.nx + s.ny * o.ny < LEAST_COSINE {
                 return None;
             }
             let residual = (x - s.x) * s.nx + (y - s.y) * s.ny;
