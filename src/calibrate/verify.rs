@@ -64,7 +64,8 @@ pub fn flat(views: &[(String, Vec<Vec3>)]) -> Result<FlatCheck> {
     }
     let all: Vec<Vec3> = fits.iter().flat_map(|(_, f)| f.2.iter().copied()).collect();
     let (mut common, _) = fit_plane::<Base>(&all).ok_or_else(|| weak("the views together are no plane".into()))?;
-    if common.normal.dot(&fits[0].1.0.normal) < 0.0 {
+    // A fitted normal has no side of its own: heights count along the base axis that the surface faces most.
+    if common.normal[common.normal.iamax()] < 0.0 {
         common = common.flipped();
     }
     let centre = all.iter().sum::<Vec3>() / all.len() as f64;
