@@ -3,7 +3,7 @@ for the same pictures, in turns within one run, and whether Sheetlight's masks a
 Unit: milliseconds a shot, medians over the rounds; ratios are medians of the rounds' ratios. "by CPU" compares the
 CPU time of all threads, which says more than wall time on a machine that is busy with something else.
 
-    make bench-peers            (or: python compare.py --sheetlight target/release/sheetlight)
+    make bench-peers            (or: python run.py --sheetlight target/release/sheetlight)
 """
 import argparse, json, os, subprocess, sys, time
 import cv2
