@@ -25,6 +25,7 @@ fn scanned(out: &Path, options: &SimulateOptions) -> Judged {
         extraction: Extraction::default(),
         grid: GridOptions::default(),
         depth_mm: [60.0, 320.0],
+        ambient: None,
         overlays: 1,
         skip_bad: false,
         resume: false,

@@ -76,6 +76,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         extraction: settings.extraction.clone(),
         grid: GridOptions::default(),
         depth_mm: [settings.working_volume.near_mm, settings.working_volume.far_mm],
+        ambient: None,
         overlays: 4,
         skip_bad: false,
         resume: false,

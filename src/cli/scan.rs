@@ -64,6 +64,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         extraction: settings.extraction.clone(),
         grid: GridOptions { cell: args.cell_mm, ..GridOptions::default() },
         depth_mm: [settings.working_volume.near_mm, settings.working_volume.far_mm],
+        ambient: None,
         overlays: args.overlays,
         skip_bad: args.skip_bad,
         resume: args.resume,

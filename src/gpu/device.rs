@@ -173,6 +173,11 @@ impl Device {
         Ok(Device { raw, queue, info, tick_ns, lost, allocated: Default::default() })
     }
 
+    /// False for a software adapter, which takes the cores that the CPU twins would use.
+    pub fn has_own_processors(&self) -> bool {
+        self.info.kind != "CPU"
+    }
+
     /// A zeroed storage buffer that stages, indirect dispatches and copies can use.
     pub fn storage(&self, label: &str, bytes: u64) -> Result<Buffer> {
         use wgpu::BufferUsages as U;

@@ -115,6 +115,12 @@ impl Replay {
         Ok(Replay { device: device.clone(), queries, labels: Vec::new() })
     }
 
+    /// Runs recordings on what their buffers hold and waits; writes queued before land first.
+    pub fn run(&mut self, recordings: &[&Recording]) -> Result<()> {
+        let at = self.submit(&[], recordings, &[])?;
+        self.device.wait(Some(at))
+    }
+
     /// Copies `before`, runs the recordings, copies `after`: each copy is (from, its offset, to, its offset, bytes).
     pub(super) fn submit(
         &mut self,

@@ -2,7 +2,7 @@
 //! or on the CPU twins, with the same results.
 //! Frame and unit: peaks in pixels and grey levels, points in the poses' frame, mm.
 
-use super::{Extraction, Format, Where};
+use super::{Ambient, Extraction, Format, Where};
 use crate::camera::Intrinsics;
 use crate::fault::Result;
 use crate::geometry::{Camera, Plane};
@@ -15,6 +15,7 @@ use crate::stages::peak::{self, Peak, Stripe};
 use crate::stages::point::{self, Optics, Point, plane_in_view};
 use crate::stages::{ThresholdParams, lengthen, skeleton, thin, threshold};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::collections::VecDeque;
 
 /// The peaks of one shot and their points, entry by entry.
@@ -44,6 +45,7 @@ pub struct Optical {
 pub struct Engine {
     format: Format,
     region: Mask,
+    ambient: Option<Ambient>,
     optics: Optics,
     extraction: Extraction,
     width_px: f32,
@@ -67,8 +69,14 @@ const TWIN_BATCH: usize = 4;
 const LARGE_PIXELS: u32 = 2_000_000;
 
 impl Engine {
-    /// Refused: `Where::Gpu` on a machine without one.
-    pub fn new(format: Format, optical: &Optical, extraction: &Extraction, place: Where) -> Result<Engine> {
+    /// `ambient` is subtracted from every picture. Refused: `Where::Gpu` on a machine without one.
+    pub fn new(
+        format: Format,
+        optical: &Optical,
+        extraction: &Extraction,
+        ambient: Option<Ambient>,
+        place: Where,
+    ) -> Result<Engine> {
         let device = match place {
             Where::Cpu => None,
             Where::Gpu => Some(Device::open()?),
@@ -80,6 +88,7 @@ impl Engine {
         Ok(Engine {
             format,
             region: region(format, optical),
+            ambient,
             optics: Optics::new(&optical.camera, &optical.laser),
             width_px: extraction.peak.width_px,
             extraction,
@@ -105,6 +114,11 @@ impl Engine {
         }
     }
 
+    /// The GPU, if the stages run on one.
+    pub fn device(&self) -> Option<&Device> {
+        self.device.as_ref()
+    }
+
     /// Width and speckle of the stripe, the median over some pictures; `None` where none shows enough of it.
     pub fn measure(&self, images: &[&Image]) -> Option<Stripe> {
         let few = self.format.width * self.format.height > LARGE_PIXELS && images.len() > 3;
@@ -112,7 +126,10 @@ impl Engine {
         let images: Vec<_> = images.iter().step_by(step).collect();
         let mut found: Vec<Stripe> = images
             .par_iter()
-            .filter_map(|image| peak::measure(image, &self.skeleton(image), &self.extraction.peak))
+            .filter_map(|image| {
+                let image = self.lit(image);
+                peak::measure(&image, &self.skeleton(&image), &self.extraction.peak)
+            })
             .collect();
         let middle = found.len() / 2;
         found.sort_by(|a, b| a.speckle.total_cmp(&b.speckle));
@@ -139,6 +156,7 @@ impl Engine {
             threshold: e.threshold,
             thinning: e.thinning,
             region: Some(self.region.clone()),
+            ambient: self.ambient.as_ref().map(|a| a.image.clone()),
             lengthen: e.lengthen.word(self.width_px),
             measure: Some(Measure { peak: e.peak, choose: e.choose, optics: self.optics }),
             ..ChainConfig::new(f.width, f.height, f.bits)
@@ -198,6 +216,11 @@ impl Engine {
         }
     }
 
+    /// The picture without the ambient light, on the twins.
+    fn lit<'a>(&self, image: &'a Image) -> Cow<'a, Image> {
+        self.ambient.as_ref().map_or(Cow::Borrowed(image), |a| Cow::Owned(a.subtracted(image)))
+    }
+
     fn skeleton(&self, image: &Image) -> Vec<u32> {
         let mut lit = threshold::twin(image, &self.extraction.threshold);
         lit.intersect(&self.region);
@@ -206,7 +229,8 @@ impl Engine {
     }
 
     fn twins(&self, job: &Job) -> Measured {
-        let mut peaks = peak::peaks(&job.image, &self.skeleton(&job.image), job.shot, &self.extraction.peak);
+        let image = self.lit(&job.image);
+        let mut peaks = peak::peaks(&image, &self.skeleton(&image), job.shot, &self.extraction.peak);
         let scene = Scene {
             width: self.format.width,
             height: self.format.height,

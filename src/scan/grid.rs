@@ -1,10 +1,13 @@
 //! In: a cloud (in memory or on disk) and a choice of grid. Out: a height map whose cells hold the mean
-//! of their points; a cell with two surfaces takes the one with more points, never a height between.
+//! of their points (stages::grid); a cell with two surfaces takes the one with more points.
 //! Frame and unit: points in the base frame, mm; the grid's frame is the scan's best plane unless given.
 
-use super::{CloudPoint, HeightMap, PointSource};
+use super::filling::{Filling, Pass};
+use super::{HeightMap, PointSource};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Grid, Mat3, Plane, Rigid, Vec3, fit_plane};
+use crate::gpu::Device;
+use crate::stages::grid::Z_MOST;
 use rand::{Rng, SeedableRng};
 
 /// How a cloud becomes a height map.
@@ -58,7 +61,7 @@ impl GridOptions {
     }
 }
 
-/// Where the cells lie and how heights become integers: what both the CPU and the GPU need.
+/// Where the cells lie and how heights become integers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GridSpec {
     pub base_from_grid: Rigid<Base, Grid>,
@@ -70,116 +73,36 @@ pub struct GridSpec {
     pub z_step: f32,
     /// Two surfaces where a cell spans more integer steps than this.
     pub layer_steps: i32,
+    /// Largest intensity of the points, grey levels.
+    pub most_intensity: f32,
 }
 
-/// Largest integer height; the sum over the most points a cell counts fits an i32.
-pub const Z_MOST: i32 = 32_767;
-/// A cell takes no more points than this; later ones are dropped.
-pub const COUNT_MOST: u32 = 65_535;
-/// Intensities are summed in steps of 1/16 grey level up to 4,095 and saturate above.
-pub const INTENSITY_STEP: f32 = 1.0 / 16.0;
-/// Sigmas are summed in steps of 0.1 µm and saturate at 6.5 mm.
-pub const SIGMA_STEP: f32 = 1e-4;
-
-/// Integer sums of the points of one surface in one cell.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct Layer {
-    pub count: u32,
-    pub z: i32,
-    pub intensity: u32,
-    pub sigma: u32,
-}
-
-/// Fills a grid in two passes over the same points: first the span of heights in each cell, then the
-/// sums below and above its middle. Integers only, so the result does not depend on the order of points.
-pub struct Accumulator {
-    pub spec: GridSpec,
-    /// Lowest and highest integer height of each cell; low > high where it is empty.
-    pub span: Vec<[i32; 2]>,
-    /// Sums below and above the middle of the span.
-    pub layers: Vec<[Layer; 2]>,
-    grid_from_base: Rigid<Grid, Base>,
-}
-
-impl Accumulator {
-    pub fn new(spec: GridSpec) -> Accumulator {
-        let n = spec.width as usize * spec.height as usize;
-        Accumulator {
-            spec,
-            span: vec![[i32::MAX, i32::MIN]; n],
-            layers: vec![[Layer::default(); 2]; n],
-            grid_from_base: spec.base_from_grid.inverse(),
-        }
-    }
-
-    /// Cell and integer height of a point; `None` outside the grid. In f64 up to the last division,
-    /// because the base frame's coordinates are large against a cell.
-    pub fn place(&self, p: &CloudPoint) -> Option<(usize, i32)> {
-        let q = self.grid_from_base.point(&Vec3::from(p.position.map(f64::from)));
-        let (x, y) = ((q.x / self.spec.cell).floor(), (q.y / self.spec.cell).floor());
-        let inside = x >= 0.0 && y >= 0.0 && x < f64::from(self.spec.width) && y < f64::from(self.spec.height);
-        let z = (q.z / f64::from(self.spec.z_step) + 0.5).floor() as i32;
-        (inside && z.abs() <= Z_MOST).then(|| (y as usize * self.spec.width as usize + x as usize, z))
-    }
-
-    pub fn first_pass(&mut self, p: &CloudPoint) {
-        if let Some((cell, z)) = self.place(p) {
-            let [low, high] = &mut self.span[cell];
-            (*low, *high) = ((*low).min(z), (*high).max(z));
-        }
-    }
-
-    pub fn second_pass(&mut self, p: &CloudPoint) {
-        let Some((cell, z)) = self.place(p) else { return };
-        let [low, high] = self.span[cell];
-        let layer = &mut self.layers[cell][usize::from(2 * z > low + high)];
-        if layer.count < COUNT_MOST {
-            layer.count += 1;
-            layer.z += z;
-            layer.intensity += (p.intensity / INTENSITY_STEP + 0.5).clamp(0.0, 65_535.0) as u32;
-            layer.sigma += (p.sigma_mm / SIGMA_STEP + 0.5).clamp(0.0, 65_535.0) as u32;
-        }
-    }
-
-    /// Means of the sums. Of two surfaces in a cell the one with more points wins, the upper one in a tie.
-    pub fn resolve(&self) -> HeightMap {
-        let spec = &self.spec;
-        let mut map = HeightMap::empty(spec.width, spec.height, spec.cell, spec.base_from_grid);
-        for (i, (&[low, high], &[below, above])) in self.span.iter().zip(&self.layers).enumerate() {
-            let merged = Layer {
-                count: below.count + above.count,
-                z: below.z.saturating_add(above.z),
-                intensity: below.intensity.saturating_add(above.intensity),
-                sigma: below.sigma.saturating_add(above.sigma),
-            };
-            let two = high.saturating_sub(low) > spec.layer_steps;
-            let chosen = match two {
-                false => merged,
-                true if below.count > above.count => below,
-                true => above,
-            };
-            if chosen.count > 0 {
-                let n = chosen.count as f32;
-                map.count[i] = chosen.count;
-                map.z[i] = (f64::from(chosen.z) / f64::from(n) * f64::from(spec.z_step)) as f32;
-                map.intensity[i] = chosen.intensity as f32 / n * INTENSITY_STEP;
-                map.sigma[i] = chosen.sigma as f32 / n * SIGMA_STEP / n.sqrt();
-            }
-        }
-        map
-    }
-}
-
-/// Grids a cloud. Refuses an empty one, and grids of more than 64 million cells.
+/// Grids a cloud with the twins. Refuses an empty one, and grids of more than 64 million cells.
 pub fn grid(source: &(impl PointSource + ?Sized), options: &GridOptions) -> Result<HeightMap> {
+    grid_on(source, options, None)
+}
+
+/// As [`grid`], on a GPU if one is given and its buffers can hold the grid; the cells are the same.
+pub fn grid_on(
+    source: &(impl PointSource + ?Sized),
+    options: &GridOptions,
+    device: Option<&Device>,
+) -> Result<HeightMap> {
     options.check()?;
     let spec = choose(source, options)?;
-    let mut sums = Accumulator::new(spec);
-    let good = |p: &&CloudPoint| p.quality >= options.min_quality;
-    source.for_each_chunk(&mut |chunk| chunk.iter().filter(good).for_each(|p| sums.first_pass(p)))?;
-    source.for_each_chunk(&mut |chunk| chunk.iter().filter(good).for_each(|p| sums.second_pass(p)))?;
-    Ok(sums.resolve())
+    let mut filling = Filling::new(&spec, options.min_quality, device)?;
+    for pass in [Pass::Span, Pass::Sum] {
+        let mut fault = None;
+        source.for_each_chunk(&mut |chunk| {
+            if fault.is_none() {
+                fault = filling.take(pass, chunk).err();
+            }
+        })?;
+        if let Some(fault) = fault {
+            return Err(fault);
+        }
+    }
+    filling.resolve(&spec)
 }
 
 /// Works out frame, extent, cell and height step from the points and what the options leave open.
@@ -221,24 +144,26 @@ pub fn choose(source: &(impl PointSource + ?Sized), options: &GridOptions) -> Re
     let reach = z0.abs().max(z1.abs()) * 1.05 + 1.0;
     let z_step = (reach / f64::from(Z_MOST)) as f32;
     let layer_steps = (options.layer / f64::from(z_step)).round() as i32;
-    Ok(GridSpec { base_from_grid, width: width as u32, height: height as u32, cell, z_step, layer_steps })
+    Ok(GridSpec { base_from_grid, width: width as u32, height: height as u32, cell, z_step, layer_steps, most_intensity: sample.most_intensity })
 }
 
 struct Sample {
     points: Vec<Vec3>,
     total: u64,
+    most_intensity: f32,
 }
 
 /// Up to 200,000 points, evenly through the source; the extreme points of every chunk are among them,
 /// so that the extent is that of the whole cloud.
 fn sample(source: &(impl PointSource + ?Sized), min_quality: f32) -> Result<Sample> {
     const MOST: usize = 200_000;
-    let mut out = Sample { points: Vec::new(), total: 0 };
+    let mut out = Sample { points: Vec::new(), total: 0, most_intensity: 0.0 };
     let mut extremes: [[Option<(f32, Vec3)>; 2]; 3] = Default::default();
     let mut stride = 1u64;
     source.for_each_chunk(&mut |chunk| {
         for p in chunk.iter().filter(|p| p.quality >= min_quality && p.position.iter().all(|x| x.is_finite())) {
             let point = Vec3::from(p.position.map(f64::from));
+            out.most_intensity = out.most_intensity.max(p.intensity);
             for (axis, [low, high]) in extremes.iter_mut().enumerate() {
                 let value = p.position[axis];
                 if low.is_none_or(|(v, _)| value < v) {
@@ -320,6 +245,7 @@ fn best_frame(points: &[Vec3], up: &Vec3) -> Result<Rigid<Base, Grid>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scan::CloudPoint;
 
     /// A plate with a raised square, in a tilted frame, points on a 0.2 mm raster.
     fn plate(tilt: &Rigid<Base, Grid>) -> Vec<CloudPoint> {

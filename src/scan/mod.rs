@@ -1,9 +1,11 @@
 //! In: shots with poses and a calibrated rig. Out: point clouds, height maps and the files that hold them.
 //! Frame and unit: clouds in the robot's base frame, height maps in a grid frame of their own; mm.
 
+mod ambient;
 mod cloud;
 mod engine;
 mod extraction;
+mod filling;
 mod grid;
 mod heightmap;
 mod map_files;
@@ -14,10 +16,11 @@ mod scanner;
 mod shift;
 mod source;
 
+pub use ambient::Ambient;
 pub use cloud::{CloudFile, CloudPoint, CloudWriter, PointSource, read_cloud, write_cloud};
 pub use engine::{Engine, Measured, Optical};
 pub use extraction::Extraction;
-pub use grid::{Accumulator, GridOptions, GridSpec, grid};
+pub use grid::{GridOptions, GridSpec, grid, grid_on};
 pub use heightmap::HeightMap;
 pub use map_files::MapScale;
 pub use map_picture::{MapPlace, Shown};

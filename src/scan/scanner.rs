@@ -3,10 +3,12 @@
 //! Frame and unit: points in the base frame, mm (docs/math.md, Stripe peak; the paper's eq. 5 and 6).
 
 use super::engine::{Engine, Measured, Optical};
-use super::{CloudPoint, Extraction, Format, Shot};
+use super::{Ambient, CloudPoint, Extraction, Format, Shot};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Camera, Flange, Plane, Rigid, Vec3};
+use crate::gpu::Device;
+use crate::raster::Image;
 use crate::rig::Rig;
 use crate::stages::peak::{Peak, SATURATED, Stripe};
 use crate::stages::point::{self, Optics};
@@ -50,6 +52,7 @@ const MEASURED_SHOTS: usize = 8;
 /// The life of a shot from picture to points, a few shots at a time; memory does not grow with the scan.
 pub struct Scanner {
     engine: Engine,
+    ambient: Option<Ambient>,
     camera_from_flange: Rigid<Camera, Flange>,
     optics: Optics,
     /// Where the laser plane meets the optical axis, or comes closest to it; camera frame, mm.
@@ -65,13 +68,15 @@ pub struct Scanner {
 }
 
 impl Scanner {
-    /// `stripe` is what an earlier part of the same scan measured, if this one is resumed.
+    /// `ambient` is subtracted from every shot; `stripe` is what an earlier part of the same scan measured, if this one
+    /// is resumed.
     /// Refused: a rig without camera, laser plane or hand-eye; another picture shape than the camera's.
     pub fn new(
         rig: &Rig,
         format: Format,
         extraction: &Extraction,
         depth_mm: [f64; 2],
+        ambient: Option<Image>,
         place: Where,
         stripe: Option<Stripe>,
     ) -> Result<Scanner> {
@@ -81,8 +86,10 @@ impl Scanner {
         let flange_from_camera = rig.need_hand_eye()?.value;
         let optics = Optics::new(&camera, &laser);
         let optical = Optical { camera, laser, depth_mm };
+        let ambient = ambient.map(|image| Ambient::new(image, format)).transpose()?;
         Ok(Scanner {
-            engine: Engine::new(format, &optical, extraction, place)?,
+            engine: Engine::new(format, &optical, extraction, ambient.clone(), place)?,
+            ambient,
             camera_from_flange: flange_from_camera.inverse(),
             optics,
             anchor: anchor(&laser, depth_mm),
@@ -112,11 +119,7 @@ impl Scanner {
     /// All that is still under way, after the last shot.
     pub fn finish(&mut self) -> Result<Vec<Profile>> {
         self.release()?;
-        let mut done = self.collect(true)?;
-        if let Some(last) = self.support.as_mut().and_then(Support::finish) {
-            done.push(self.profile(last));
-        }
-        Ok(done)
+        self.collect(true)
     }
 
     /// The stripe's width and speckle, once measured or assumed; a resumed scan needs them.
@@ -134,6 +137,11 @@ impl Scanner {
         self.engine.cut()
     }
 
+    /// The GPU, if it has processors of its own: work that is light on the CPU pays only there.
+    pub fn device(&self) -> Option<&Device> {
+        self.engine.device().filter(|d| d.has_own_processors())
+    }
+
     /// Adapter and driver, or "CPU twins".
     pub fn ran_on(&self) -> String {
         self.engine.ran_on()
@@ -144,6 +152,9 @@ impl Scanner {
             return Ok(());
         }
         if self.support.is_none() {
+            if let Some(ambient) = &self.ambient {
+                ambient.suits(&self.waiting[0].image, &self.waiting[0].name)?;
+            }
             let assumed = Stripe { width_px: self.extraction.peak.width_px, speckle: self.extraction.peak.speckle };
             let stripe = match self.stripe {
                 Some(s) => s,
@@ -160,7 +171,8 @@ impl Scanner {
             let [nx, ny, _] = self.optics.normal.map(f64::from);
             let along = Vec3::new(ny, -nx, 0.0).try_normalize(1e-9).unwrap_or(Vec3::x());
             let axis = base_from_camera.direction(&along);
-            self.support = Some(Support::new(self.extraction.support, stripe.width_px, &axis));
+            let device = self.device();
+            self.support = Some(Support::new(self.extraction.support, stripe.width_px, &axis, device)?);
         }
         for shot in std::mem::take(&mut self.waiting) {
             let base_from_camera = shot.base_from_flange * self.camera_from_flange.inverse();
@@ -171,21 +183,19 @@ impl Scanner {
     }
 
     fn collect(&mut self, all: bool) -> Result<Vec<Profile>> {
-        let mut done = Vec::new();
+        let pitch = (self.anchor.z / f64::from(self.optics.pinhole[0])) as f32;
+        let mut measured = Vec::new();
         for Measured { shot, peaks, points } in self.engine.collect(all)? {
             let (index, base_from_camera) = self.poses.pop_front().expect("one pose a shot submitted");
             assert_eq!(index, shot, "the engine keeps the order");
-            let profile = support::Profile {
-                shot,
-                peaks,
-                points,
-                anchor: base_from_camera.point(&self.anchor),
-                pitch: (self.anchor.z / f64::from(self.optics.pinhole[0])) as f32,
-            };
-            let judged = self.support.as_mut().and_then(|s| s.push(profile));
-            done.extend(judged.map(|p| self.profile(p)));
+            let anchor = base_from_camera.point(&self.anchor);
+            measured.push(support::Profile { shot, peaks, points, anchor, pitch });
         }
-        Ok(done)
+        let judged = match &mut self.support {
+            Some(support) => support.take(measured, all)?,
+            None => Vec::new(),
+        };
+        Ok(judged.into_iter().map(|p| self.profile(p)).collect())
     }
 
     fn profile(&self, judged: support::Profile) -> Profile {

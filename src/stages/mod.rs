@@ -7,6 +7,7 @@ pub mod chain;
 pub mod choose;
 mod entry;
 pub mod frame;
+pub mod grid;
 pub mod hough;
 pub mod lengthen;
 pub mod listing;
@@ -77,5 +78,9 @@ pub fn all() -> Vec<Entry> {
             reason: "f32 with or without fused multiply-add: 1 um, stated sigma 1 %",
             ..exact(&point::STAGE, point::stage_twin, || cases::peaks("point"))
         },
+        exact(&support::STAGE, support::stage_twin, support::cases),
+        exact(&grid::SPAN, grid::span_twin, || grid::cases("grid_span")),
+        exact(&grid::SUM, grid::sum_twin, || grid::cases("grid_sum")),
+        exact(&grid::PICK, grid::pick_twin, || grid::cases("grid_pick")),
     ]
 }

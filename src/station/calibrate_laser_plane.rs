@@ -107,7 +107,7 @@ fn stripes(
     let first = &images[0];
     let format = Format { width: first.width, height: first.height, bits: first.bits };
     let optical = Optical { camera: *camera, laser: *laser, depth_mm };
-    let mut engine = Engine::new(format, &optical, &run.extraction, run.place)?;
+    let mut engine = Engine::new(format, &optical, &run.extraction, None, run.place)?;
     if run.extraction.measure_stripe {
         if let Some(stripe) = engine.measure(&images.iter().collect::<Vec<_>>()) {
             engine.set_stripe(&stripe)?;

@@ -125,6 +125,7 @@ pub fn guide(options: &GuideOptions, confirm: &mut dyn FnMut(&Step) -> Result<bo
         extraction: settings.extraction.clone(),
         grid: GridOptions::default(),
         depth_mm: [settings.working_volume.near_mm, settings.working_volume.far_mm],
+        ambient: None,
         overlays: 0,
         skip_bad: false,
         resume: false,

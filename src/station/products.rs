@@ -5,8 +5,8 @@
 use super::run::HeightMapFigures;
 use crate::fault::Result;
 use crate::geometry::Vec3;
-use crate::rig::Rig;
-use crate::scan::{CloudFile, GridOptions, grid, write_pcd};
+use crate::gpu::Device;
+use crate::scan::{CloudFile, GridOptions, grid_on, write_pcd};
 use std::path::Path;
 
 /// Writes everything that is derived from the cloud; `None` where there are too few points for a map.
@@ -15,14 +15,14 @@ pub fn write(
     cloud: &Path,
     points: u64,
     options: &GridOptions,
-    _rig: &Rig,
     up: Vec3,
+    device: Option<&Device>,
 ) -> Result<Option<HeightMapFigures>> {
     if points < 100 {
         return Ok(None);
     }
     let source = CloudFile::open(cloud)?;
-    let map = grid(&source, &GridOptions { up, ..options.clone() })?;
+    let map = grid_on(&source, &GridOptions { up, ..options.clone() }, device)?;
     let (low, high) = map.quantiles(0.01, 0.99).unwrap_or((f32::NAN, f32::NAN));
     map.save(out)?;
     write_pcd(&out.join("cloud.pcd"), &source, points)?;

@@ -4,6 +4,7 @@
 
 use super::progress::{Checkpoint, Lock};
 use crate::fault::{Fault, Result};
+use crate::raster::Image;
 use crate::rig::Rig;
 use crate::scan::{BadShot, CloudPoint, CloudWriter, Extraction, GridOptions, Profile, Scanner, Source, Where};
 use std::collections::BTreeMap;
@@ -21,6 +22,8 @@ pub struct ScanOptions {
     pub grid: GridOptions,
     /// Nearest and farthest camera depth believed, mm.
     pub depth_mm: [f64; 2],
+    /// A picture with the laser off and the shots' exposure, subtracted from every shot.
+    pub ambient: Option<Image>,
     /// Shots to draw with their kept and rejected peaks, evenly spread; 0 for none.
     pub overlays: usize,
     /// Leave out shots that cannot be read instead of stopping; they are listed in scan.json.
@@ -78,7 +81,7 @@ pub struct HeightMapFigures {
 const CHECKPOINT_SHOTS: usize = 64;
 
 /// Runs a scan from the first shot to the last file. `id` names the recording (a hash of its
-/// meta.json and poses), so that a resumed scan cannot continue another one; `open` gives the source
+/// meta.json, poses and ambient picture), so that a resumed scan cannot continue another one; `open` gives the source
 /// from a shot on; `progress` is told (shots done, shots in all).
 pub fn scan(
     id: &str,
@@ -113,8 +116,15 @@ pub fn scan(
     let mut repeated = state.shots.min(1);
     let mut source = open(state.shots - repeated)?;
     let total = source.remaining().map(|n| n + state.shots - repeated);
-    let mut scanner =
-        Scanner::new(rig, source.format(), &options.extraction, options.depth_mm, options.place, state.stripe)?;
+    let mut scanner = Scanner::new(
+        rig,
+        source.format(),
+        &options.extraction,
+        options.depth_mm,
+        options.ambient.clone(),
+        options.place,
+        state.stripe,
+    )?;
     let mut overlays = Overlays::new(&options.out, options.overlays, total)?;
     let started = Instant::now();
     let first = state.shots;
@@ -156,7 +166,7 @@ pub fn scan(
     let points = cloud.finish()?;
     let seconds = started.elapsed().as_secs_f64();
     let height_map =
-        super::products::write(&options.out, &cloud_path, points, &options.grid, rig, scanner.up_in_base())?;
+        super::products::write(&options.out, &cloud_path, points, &options.grid, scanner.up_in_base(), scanner.device())?;
     if scanner.cut() > 0 {
         state.peaks.insert("beyond the list: more than a tenth of a picture lit".into(), scanner.cut());
     }
@@ -204,7 +214,7 @@ fn take(profile: &Profile, cloud: &mut CloudWriter, state: &mut Checkpoint, over
 struct Overlays {
     folder: PathBuf,
     every: usize,
-    held: BTreeMap<u32, crate::raster::Image>,
+    held: BTreeMap<u32, Image>,
 }
 
 impl Overlays {

@@ -1,0 +1,95 @@
+//! In: one picture with the laser off. Out: shots without that light, and a refusal where it cannot have been taken as the
+//! shots were. Frame and unit: grey levels of the shots' depth. The GPU subtracts in its stage `ambient`, with the same rule.
+
+use super::Format;
+use crate::fault::{Fault, Result};
+use crate::raster::{Image, Pixels};
+use crate::stages::ambient::subtract;
+
+/// Grey levels (8 bits) by which a pixel of the ambient picture may exceed that of a shot: noise, and a robot that moved
+/// on under a leak of room light.
+const SPARE: u32 = 8;
+/// Share of a shot's pixels that may be darker than that. With one exposure hardly any is; of a picture exposed for room
+/// light, which would eat the stripe, most are.
+const DARKER: f64 = 0.1;
+
+/// Light that is in every shot.
+#[derive(Clone, Debug)]
+pub struct Ambient {
+    pub image: Image,
+}
+
+impl Ambient {
+    /// Refused: another size or depth than the shots'.
+    pub fn new(image: Image, format: Format) -> Result<Ambient> {
+        let is = Format { width: image.width, height: image.height, bits: image.bits };
+        if is != format {
+            let words = |f: Format| format!("{}x{} with {} bits", f.width, f.height, f.bits);
+            return Err(Fault::input(format!("the ambient picture is {}, the shots are {}", words(is), words(format)))
+                .cause("a picture of another camera or another setting")
+                .next("take one picture with the laser off and nothing else changed"));
+        }
+        Ok(Ambient { image })
+    }
+
+    /// Refuses a picture that is brighter than the shot in much of it.
+    pub fn suits(&self, shot: &Image, name: &str) -> Result<()> {
+        let spare = SPARE << (shot.bits - 8);
+        let darker = match (&self.image.pixels, &shot.pixels) {
+            (Pixels::U8(a), Pixels::U8(s)) => darker(a, s, spare),
+            (Pixels::U16(a), Pixels::U16(s)) => darker(a, s, spare),
+            _ => shot.pixel_count(),
+        };
+        let share = darker as f64 / shot.pixel_count().max(1) as f64;
+        if share > DARKER {
+            return Err(Fault::input(format!(
+                "the ambient picture is brighter than {name} by more than {spare} grey levels in {:.0} % of its pixels, \
+                 limit {:.0} %",
+                100.0 * share,
+                100.0 * DARKER
+            ))
+            .cause("it was exposed for room light, not as the shots were; subtracted, it would eat the stripe")
+            .next("take it with the shots' exposure, or scan without --ambient"));
+        }
+        Ok(())
+    }
+
+    /// A shot without the ambient light.
+    pub fn subtracted(&self, shot: &Image) -> Image {
+        let full = u32::from(shot.full_scale());
+        let left = |(s, a): (u32, u32)| subtract(s, a, full);
+        match (&shot.pixels, &self.image.pixels) {
+            (Pixels::U8(s), Pixels::U8(a)) => {
+                let px = s.iter().zip(a).map(|(&s, &a)| left((s.into(), a.into())) as u8).collect();
+                Image::from_u8(shot.width, shot.height, px)
+            }
+            (Pixels::U16(s), Pixels::U16(a)) => {
+                let px = s.iter().zip(a).map(|(&s, &a)| left((s.into(), a.into())) as u16).collect();
+                Image::from_u16(shot.width, shot.height, shot.bits, px)
+            }
+            _ => unreachable!("the depths were compared"),
+        }
+    }
+}
+
+fn darker<T: Copy + Into<u32>>(ambient: &[T], shot: &[T], spare: u32) -> usize {
+    ambient.iter().zip(shot).filter(|(a, s)| (**a).into() > (**s).into() + spare).count()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_does_not_fit_the_shots_is_refused() {
+        let format = Format { width: 10, height: 10, bits: 8 };
+        let flat = |v: u8| Image::from_u8(10, 10, vec![v; 100]);
+        assert!(Ambient::new(Image::from_u8(10, 9, vec![0; 90]), format).unwrap_err().what.contains("10x9"));
+        assert!(Ambient::new(Image::from_u16(10, 10, 12, vec![0; 100]), format).unwrap_err().what.contains("12 bits"));
+        let a = Ambient::new(flat(30), format).unwrap();
+        assert!(a.suits(&flat(22), "shot").is_ok());
+        assert!(a.suits(&flat(21), "shot").unwrap_err().what.contains("100 %"));
+        assert_eq!(a.subtracted(&flat(50)), flat(20));
+        assert_eq!((a.subtracted(&flat(20)), a.subtracted(&flat(255))), (flat(0), flat(255)));
+    }
+}

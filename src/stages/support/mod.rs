@@ -1,0 +1,298 @@
+//! In: the points of shot after shot. Out: the same shots one later, points without neighbours in the shots before
+//! and after marked. Frame and unit: base frame, mm. A surface goes on from shot to shot; a reflection does not: it
+//! moves otherwise than the light that made it, and a speck stays in the picture while the robot moves.
+
+mod gpu;
+mod stage;
+
+pub use stage::{STAGE, cases, stage_twin};
+
+use super::peak::Peak;
+use super::point::Point;
+use crate::fault::{Fault, Result};
+use crate::geometry::Vec3;
+use crate::gpu::Device;
+use gpu::OnGpu;
+use stage::{Neighbourhood, Site, SupportFrame, whole};
+
+/// How much of a neighbourhood a point needs. A point on a flat surface has, in each of the two neighbouring shots, a
+/// chord of points within the radius; support is the number found over the number expected there.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SupportParams {
+    /// Whether points are judged by their neighbours at all.
+    pub on: bool,
+    /// Half of the chord on a neighbouring shot's line, 0.01..=10 mm: what a point may be wrong by and still be
+    /// useful; smaller removes more at corners.
+    pub radius_mm: f32,
+    /// How much farther than the distance of the shots a neighbour may lie, 1..=3; 1.2 is a slope of 33 degrees.
+    pub slope: f32,
+    /// Support that a peak of the right width needs, 0..=1.
+    pub clean: f32,
+    /// Support that any other peak needs, 0..=1.
+    pub doubtful: f32,
+    /// Share of the amplitude, 0..=10, by which the level beside a peak may exceed the shot's usual level there.
+    /// A reflection lies in the glow of what it reflects.
+    pub haze: f32,
+    /// Support that a peak in such a glow needs, 0..=1.
+    pub hazy: f32,
+    /// Widths over the stripe's that count as right.
+    pub right_width: [f32; 2],
+    /// Largest standard deviation of a clean peak's centre over the stripe's sigma, 0.01..=2; others are doubtful.
+    pub sure: f32,
+}
+
+impl Default for SupportParams {
+    fn default() -> Self {
+        SupportParams {
+            on: true,
+            radius_mm: 0.3,
+            slope: 1.2,
+            clean: 0.1,
+            doubtful: 0.3,
+            haze: 0.05,
+            hazy: 0.7,
+            right_width: [0.88, 1.22],
+            sure: 0.43,
+        }
+    }
+}
+
+impl SupportParams {
+    pub fn check(&self) -> Result<()> {
+        for (name, value, low, high) in [
+            ("radius_mm", self.radius_mm, 0.01, 10.0),
+            ("slope", self.slope, 1.0, 3.0),
+            ("clean", self.clean, 0.0, 1.0),
+            ("doubtful", self.doubtful, 0.0, 1.0),
+            ("haze", self.haze, 0.0, 10.0),
+            ("hazy", self.hazy, 0.0, 1.0),
+            ("sure", self.sure, 0.01, 2.0),
+            ("right_width[0]", self.right_width[0], 0.0, 1.0),
+            ("right_width[1]", self.right_width[1], 1.0, 3.0),
+        ] {
+            if !(low..=high).contains(&value) {
+                return Err(Fault::usage(format!("support {name} is {value}, it must be in {low}..={high}")));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// One shot: peaks and their points, entry by entry.
+#[derive(Clone, Debug)]
+pub struct Profile {
+    pub shot: u32,
+    pub peaks: Vec<Peak>,
+    pub points: Vec<Point>,
+    /// Where the laser plane meets the optical axis at this shot, base frame: the distance of two shots.
+    pub anchor: Vec3,
+    /// Distance of neighbouring points along the stripe at the anchor, mm.
+    pub pitch: f32,
+}
+
+/// A shot that waits for the one after it.
+struct Held {
+    profile: Profile,
+    /// One a peak, whatever its fate.
+    places: Vec<Site>,
+    /// Kept points, sorted along the line.
+    sites: Vec<Site>,
+}
+
+/// Holds three shots at a time, whatever the length of the scan.
+pub struct Support {
+    params: SupportParams,
+    frame: SupportFrame,
+    /// Direction along the laser line, base frame; only orders the points, so the first shot's serves the scan.
+    axis: Vec3,
+    /// Anchor and sites of the last judged shot.
+    before: Option<(Vec3, Vec<Site>)>,
+    now: Option<Held>,
+    gpu: Option<OnGpu>,
+}
+
+impl Support {
+    /// `axis`: unit vector along the laser line, base frame; `width_px`: the stripe's Gaussian sigma. Without a device
+    /// the twin judges, with the same result.
+    pub fn new(params: SupportParams, width_px: f32, axis: &Vec3, device: Option<&Device>) -> Result<Support> {
+        let gpu = device.map(OnGpu::new).transpose()?;
+        Ok(Support { params, frame: SupportFrame::new(&params, width_px), axis: *axis, before: None, now: None, gpu })
+    }
+
+    /// Takes shots in order and gives those that are judged: all but the last, which waits for its neighbour, or with
+    /// `end` all.
+    pub fn take(&mut self, profiles: Vec<Profile>, end: bool) -> Result<Vec<Profile>> {
+        let mut run: Vec<Held> = self.now.take().into_iter().collect();
+        run.extend(profiles.into_iter().map(|p| self.held(p)));
+        if !end {
+            self.now = run.pop();
+        }
+        if self.params.on && !run.is_empty() {
+            self.judge(&mut run)?;
+        }
+        if let Some(last) = run.last_mut() {
+            self.before = Some((last.profile.anchor, std::mem::take(&mut last.sites)));
+        }
+        Ok(run.into_iter().map(|h| h.profile).collect())
+    }
+
+    fn held(&self, profile: Profile) -> Held {
+        let place = |(k, p): (&Peak, &Point)| {
+            if !k.kept() {
+                return [0; 4];
+            }
+            let [x, y, z] = p.position.map(f64::from);
+            [x, y, z, self.axis.dot(&Vec3::new(x, y, z))].map(whole)
+        };
+        let places: Vec<Site> = profile.peaks.iter().zip(&profile.points).map(place).collect();
+        let mut sites: Vec<Site> =
+            profile.peaks.iter().zip(&places).filter(|(k, _)| k.kept()).map(|(_, s)| *s).collect();
+        sites.sort_unstable_by_key(|s| s[3]);
+        Held { profile, places, sites }
+    }
+
+    /// Judges every shot of a run by its two neighbours; the one behind the last is `now`.
+    fn judge(&mut self, run: &mut [Held]) -> Result<()> {
+        let beside = self.before.iter().map(|(anchor, sites)| (anchor, sites));
+        let beside = beside.chain(run.iter().chain(&self.now).map(|h| (&h.profile.anchor, &h.sites)));
+        let (mut sites, mut ranges): (Vec<Site>, Vec<(Vec3, u32, u32)>) = Default::default();
+        for (anchor, some) in beside {
+            let first = sites.len() as u32;
+            sites.extend_from_slice(some);
+            ranges.push((*anchor, first, sites.len() as u32));
+        }
+        let skip = usize::from(self.before.is_some());
+        let shots: Vec<Neighbourhood> = (run.iter().enumerate())
+            .map(|(i, h)| {
+                let at = i + skip;
+                self.neighbourhood(&h.profile, [at.checked_sub(1), Some(at + 1)].map(|n| ranges.get(n?)))
+            })
+            .collect();
+        let Some(gpu) = &mut self.gpu else {
+            for (h, shot) in run.iter_mut().zip(&shots) {
+                for (k, place) in h.profile.peaks.iter_mut().zip(&h.places) {
+                    k.flags = stage::judge(&self.frame, shot, &sites, place, k);
+                }
+            }
+            return Ok(());
+        };
+        let (mut places, mut peaks): (Vec<Site>, Vec<Peak>) = Default::default();
+        for (i, h) in run.iter().enumerate() {
+            places.extend_from_slice(&h.places);
+            // The stage counts shots within the run.
+            peaks.extend(h.profile.peaks.iter().map(|k| Peak { shot: i as u32, ..*k }));
+        }
+        let frame = SupportFrame { peaks: peaks.len() as u32, ..self.frame };
+        let flags = gpu.judge(&frame, &shots, &sites, &places, &peaks)?;
+        let all = run.iter_mut().flat_map(|h| &mut h.profile.peaks);
+        all.zip(flags).for_each(|(k, flags)| k.flags = flags);
+        Ok(())
+    }
+
+    fn neighbourhood(&self, profile: &Profile, beside: [Option<&(Vec3, u32, u32)>; 2]) -> Neighbourhood {
+        let p = &self.params;
+        let mut out = Neighbourhood { usual: usual_background(&profile.peaks), ..Neighbourhood::default() };
+        let mut expected = 0.0;
+        for (side, (anchor, first, end)) in beside.into_iter().enumerate().filter_map(|(i, b)| Some((i, b?))) {
+            let step = (anchor - profile.anchor).norm() as f32;
+            let reach2 = p.radius_mm * p.radius_mm + p.slope * p.slope * step * step;
+            expected += 2.0 * (reach2 - step * step).sqrt() / profile.pitch;
+            (out.first[side], out.end[side]) = (*first, *end);
+            (out.reach[side], out.drop[side]) = stage::reach(f64::from(reach2.sqrt()));
+        }
+        let need = |share: f32| (expected * share).ceil().max(0.0) as u32;
+        (out.clean, out.doubtful, out.hazy) = (need(p.clean), need(p.doubtful), need(p.hazy));
+        out
+    }
+}
+
+/// Median level beside the kept peaks: room light, which is no sign of a reflection.
+fn usual_background(peaks: &[Peak]) -> f32 {
+    let mut levels: Vec<f32> = peaks.iter().filter(|k| k.kept()).map(|k| k.background).collect();
+    if levels.is_empty() {
+        return 0.0;
+    }
+    let middle = levels.len() / 2;
+    *levels.select_nth_unstable_by(middle, f32::total_cmp).1
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stages::peak::Reject;
+
+    /// A flat surface of 21 points a shot, 0.25 mm apart, shots 0.35 mm apart; one more point 3 mm above the middle.
+    fn shot(index: u32, width_px: f32, stray: bool) -> Profile {
+        let mut peaks = vec![Peak { width_px, amplitude: 100.0, sigma_px: 0.05, shot: index, ..Peak::default() }; 21];
+        let mut points: Vec<Point> =
+            (0..21).map(|i| Point { position: [0.25 * i as f32, 0.35 * index as f32, 0.0], sigma_mm: 0.02 }).collect();
+        if stray {
+            peaks.push(peaks[10]);
+            points.push(Point { position: [2.5, 0.35 * index as f32, 3.0], sigma_mm: 0.02 });
+        }
+        Profile { shot: index, peaks, points, anchor: Vec3::new(0.0, 0.35 * f64::from(index), 0.0), pitch: 0.25 }
+    }
+    fn scan(width_px: f32, strays: &[u32]) -> Vec<Profile> {
+        let mut support = Support::new(SupportParams::default(), 1.0, &Vec3::x(), None).unwrap();
+        let mut out = Vec::new();
+        for i in 0..6 {
+            out.extend(support.take(vec![shot(i, width_px, strays.contains(&i))], false).unwrap());
+        }
+        out.extend(support.take(Vec::new(), true).unwrap());
+        out
+    }
+
+    #[test]
+    fn a_surface_stays_and_a_stray_point_goes() {
+        let out = scan(1.0, &[2]);
+        assert_eq!(out.iter().map(|p| p.shot).collect::<Vec<_>>(), [0, 1, 2, 3, 4, 5]);
+        for p in &out {
+            for (i, k) in p.peaks.iter().enumerate() {
+                assert_eq!(k.reject(), if i < 21 { Reject::Kept } else { Reject::Unsupported }, "shot {}, {i}", p.shot);
+            }
+        }
+    }
+
+    #[test]
+    fn what_goes_on_in_the_next_shot_is_believed() {
+        let out = scan(1.0, &[2, 3]);
+        assert!(out[2].peaks[21].kept() && out[3].peaks[21].kept());
+        // The same two points with the width of two stripes need more company than one neighbour.
+        let out = scan(1.5, &[2, 3]);
+        assert!(!out[2].peaks[21].kept() && !out[3].peaks[21].kept());
+        assert!(out[2].peaks[..21].iter().all(Peak::kept));
+    }
+
+    #[test]
+    fn one_shot_alone_is_not_judged() {
+        let mut support = Support::new(SupportParams::default(), 1.0, &Vec3::x(), None).unwrap();
+        assert!(support.take(vec![shot(0, 1.0, true)], false).unwrap().is_empty());
+        assert!(support.take(Vec::new(), true).unwrap()[0].peaks.iter().all(Peak::kept));
+    }
+
+    /// One at a time or all at once, on the twin or on a GPU: the same fate for every peak.
+    #[test]
+    fn runs_of_any_length_are_judged_alike() {
+        let shots = || (0..6).map(|i| shot(i, if i == 3 { 1.5 } else { 1.0 }, i > 1)).collect::<Vec<_>>();
+        let fates = |device: Option<&Device>, run: usize| {
+            let mut support = Support::new(SupportParams::default(), 1.0, &Vec3::x(), device).unwrap();
+            let mut out = Vec::new();
+            for part in shots().chunks(run) {
+                out.extend(support.take(part.to_vec(), false).unwrap());
+            }
+            out.extend(support.take(Vec::new(), true).unwrap());
+            out.iter().flat_map(|p| p.peaks.iter().map(|k| (p.shot, k.flags))).collect::<Vec<_>>()
+        };
+        let one = fates(None, 1);
+        assert!(one.iter().any(|f| f.1 != 0) && one.len() == 6 * 21 + 4);
+        assert_eq!(fates(None, 4), one);
+        match Device::open() {
+            Ok(device) => assert_eq!(fates(Some(&device), 4), one),
+            Err(e) => {
+                assert!(std::env::var_os("SHEETLIGHT_REQUIRE_GPU").is_none(), "{e}");
+                eprintln!("SKIPPED, no GPU adapter: {e}");
+            }
+        }
+    }
+}

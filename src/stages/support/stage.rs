@@ -1,0 +1,193 @@
+//! In: peaks of some shots, their points' places, the points of the shots beside them. Out: the peaks' flags; kept ones
+//! with too few neighbours carry [`Reject::Unsupported`].
+//! Frame and unit: base frame in whole 2⁻¹⁴ mm (0.06 µm): the same neighbours are counted on every machine.
+
+use super::SupportParams;
+use crate::gpu::{Access::*, Binding, Stage};
+use crate::stages::cases::Noise;
+use crate::stages::entry::Case;
+use crate::stages::peak::{Peak, Reject, SHARED as PEAKS};
+
+pub const STAGE: Stage = Stage {
+    name: "support",
+    wgsl: include_str!("../../../shaders/support.wgsl"),
+    shared: &[PEAKS],
+    workgroup: [64, 1, 1],
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "shots", access: Read },
+        Binding { name: "sites", access: Read },
+        Binding { name: "places", access: Read },
+        Binding { name: "peaks", access: Read },
+        Binding { name: "flags", access: ReadWrite },
+    ],
+    uniform: crate::stages::frame::uniform_fields!(SupportFrame: peaks, sure, right_low, right_high, haze, reserved_0, reserved_1,
+        reserved_2),
+    overrides: &[],
+};
+
+/// The WGSL struct of the same name.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct SupportFrame {
+    /// Peaks at hand.
+    pub peaks: u32,
+    /// Limits of a clean peak, px.
+    pub sure: f32,
+    pub right_low: f32,
+    pub right_high: f32,
+    /// Share of the amplitude.
+    pub haze: f32,
+    pub reserved_0: u32,
+    pub reserved_1: u32,
+    pub reserved_2: u32,
+}
+
+impl SupportFrame {
+    /// `width_px`: the stripe's Gaussian sigma.
+    pub fn new(p: &SupportParams, width_px: f32) -> SupportFrame {
+        SupportFrame {
+            sure: p.sure * width_px,
+            right_low: p.right_width[0] * width_px,
+            right_high: p.right_width[1] * width_px,
+            haze: p.haze,
+            ..SupportFrame::default()
+        }
+    }
+}
+
+/// What the peaks of one shot need, and where its two neighbours' points lie in the list of sites.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Neighbourhood {
+    pub first: [u32; 2],
+    pub end: [u32; 2],
+    /// How far a neighbour may lie, 2⁻¹⁴ mm, at most 1 m; and the bits dropped so that its square fits 30 bits.
+    pub reach: [i32; 2],
+    pub drop: [u32; 2],
+    /// Neighbours that a clean peak, a doubtful one and one in a glow need.
+    pub clean: u32,
+    pub doubtful: u32,
+    pub hazy: u32,
+    /// Median level beside the shot's kept peaks.
+    pub usual: f32,
+}
+
+/// A point and its place along the line.
+pub type Site = [i32; 4];
+
+/// Largest difference of two coordinates whose square counts, after the dropped bits.
+const FAR: i32 = 1 << 15;
+
+/// Whole 2⁻¹⁴ mm; what is farther than 32 m stays there.
+pub fn whole(mm: f64) -> i32 {
+    (mm * 16_384.0).round().clamp(-536_870_912.0, 536_870_912.0) as i32
+}
+
+/// Reach of a neighbourhood and the bits to drop.
+pub fn reach(mm: f64) -> (i32, u32) {
+    let reach = whole(mm.clamp(0.0, 1000.0));
+    (reach, (32 - reach.leading_zeros()).saturating_sub(15))
+}
+
+/// CPU twin for one peak: its flags. `shot` is its shot's entry.
+pub fn judge(f: &SupportFrame, shot: &Neighbourhood, sites: &[Site], p: &Site, k: &Peak) -> u32 {
+    if !k.kept() {
+        return k.flags;
+    }
+    let mut found = 0;
+    for side in 0..2 {
+        let (reach, drop) = (shot.reach[side], shot.drop[side]);
+        let sites = &sites[shot.first[side] as usize..shot.end[side] as usize];
+        let r = (reach >> drop) as u32;
+        let from = sites.partition_point(|s| s[3] < p[3] - reach);
+        let near = |s: &&Site| {
+            let d: [i32; 3] = std::array::from_fn(|i| s[i] - p[i] >> drop);
+            d.iter().all(|d| d.abs() < FAR) && d.iter().map(|d| (d * d) as u32).sum::<u32>() <= r * r
+        };
+        found += sites[from..].iter().take_while(|s| s[3] <= p[3] + reach).filter(near).count() as u32;
+    }
+    let right = k.sigma_px <= f.sure && k.width_px >= f.right_low && k.width_px <= f.right_high;
+    let need = match (k.background - shot.usual > f.haze * k.amplitude, right) {
+        (true, _) => shot.hazy,
+        (false, true) => shot.clean,
+        (false, false) => shot.doubtful,
+    };
+    if found < need { k.flags | Reject::Unsupported as u32 } else { k.flags }
+}
+
+pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+    let f: SupportFrame = *bytemuck::from_bytes(bytemuck::cast_slice(&b[0]));
+    let [_, shots, sites, places, peaks, flags] = b else { unreachable!() };
+    let (shots, sites): (&[Neighbourhood], &[Site]) = (bytemuck::cast_slice(shots), bytemuck::cast_slice(sites));
+    let (places, peaks): (&[Site], &[Peak]) = (bytemuck::cast_slice(places), bytemuck::cast_slice(peaks));
+    for i in 0..f.peaks as usize {
+        flags[i] = judge(&f, &shots[peaks[i].shot as usize], sites, &places[i], &peaks[i]);
+    }
+}
+
+/// Wavy shots with strays, doubtful and hazy peaks, refused ones; shots close together, and ones a hand apart.
+pub fn cases() -> Vec<Case> {
+    [("0.35 mm apart", 0.35, 0.3), ("40 mm apart, wide reach", 40.0, 8.0)]
+        .into_iter()
+        .map(|(name, step, radius)| {
+            let mut noise = Noise(17);
+            let p = SupportParams { radius_mm: radius, ..Default::default() };
+            let mut f = SupportFrame::new(&p, 1.0);
+            let (mut shots, mut sites, mut places, mut peaks) = (vec![], vec![], vec![], vec![]);
+            for shot in 0..5u32 {
+                let first = places.len();
+                for i in 0..150 {
+                    let (x, y) = (0.25 * f64::from(i), step * f64::from(shot));
+                    let stray = if noise.next() % 9 == 0 { 4.0 * noise.normal() } else { 0.02 * noise.normal() };
+                    let z = (x / 7.0).sin() + stray;
+                    let place = [1200.0 + x, y, z, 1200.0 + x].map(whole);
+                    let odd = f32::from(u8::from(noise.next() % 3 == 0));
+                    places.push(place);
+                    peaks.push(Peak {
+                        amplitude: 100.0,
+                        background: if i % 11 == 0 { 40.0 } else { 3.0 },
+                        width_px: 1.0 + 0.4 * odd,
+                        sigma_px: 0.05,
+                        flags: if i % 17 == 0 { Reject::Faint as u32 } else { 0x100 * (i % 2) },
+                        shot,
+                        ..Peak::default()
+                    });
+                }
+                let from = sites.len();
+                let kept = (first..places.len()).filter(|&i| peaks[i].kept());
+                sites.extend(kept.map(|i| places[i]));
+                sites[from..].sort_by_key(|s: &Site| s[3]);
+                shots.push((from as u32, sites.len() as u32));
+            }
+            let (reach, drop) = reach((radius.powi(2) as f64 + 1.44 * step * step).sqrt());
+            let at = |i: i64| usize::try_from(i).ok().and_then(|i| shots.get(i)).copied().unwrap_or((0, 0));
+            let table: Vec<Neighbourhood> = (0..5)
+                .map(|i| Neighbourhood {
+                    first: [at(i - 1).0, at(i + 1).0],
+                    end: [at(i - 1).1, at(i + 1).1],
+                    reach: [reach; 2],
+                    drop: [drop; 2],
+                    clean: 1,
+                    doubtful: 3,
+                    hazy: 5,
+                    usual: 3.0,
+                })
+                .collect();
+            f.peaks = peaks.len() as u32;
+            Case {
+                name: name.into(),
+                overrides: Vec::new(),
+                groups: [f.peaks.div_ceil(64), 1, 1],
+                bindings: vec![
+                    bytemuck::cast_slice(&[f]).to_vec(),
+                    bytemuck::cast_slice(&table).to_vec(),
+                    bytemuck::cast_slice(&sites).to_vec(),
+                    bytemuck::cast_slice(&places).to_vec(),
+                    bytemuck::cast_slice(&peaks).to_vec(),
+                    vec![0; peaks.len()],
+                ],
+            }
+        })
+        .collect()
+}
