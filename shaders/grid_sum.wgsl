@@ -18,7 +18,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             atomicAdd(&layers[to], 1u);
             atomicAdd(&layers[to + 1u], bitcast<u32>(i32(at.y) - 32768));
             atomicAdd(&layers[to + 2u], u32(clamp(fixed(records[i + 4u], frame.intensity_places), 0, 65535)));
-            atomicAdd(&layers[to + 3u], u32(clamp(fixed(records[i + 3u], 13), 0, 65535)));
+            atomicAdd(&layers[to + 3u], (u32(clamp(fixed(records[i + 3u], 16), 0, 429000)) * 10000u + 32768u) >> 16u);
         }
     }
 }

@@ -132,6 +132,11 @@ fn wrong_sizes_depths_and_poses_are_named_with_their_numbers() {
     b.edit("meta.json", "\"pose\":11", "\"pose\":12");
     b.fails(&[], &["needs pose 12", "has 12"]);
     let b = Bench::new(12);
+    let path = b.recording.join("poses.json");
+    let poses = sheetlight::recording::load_poses(&path).unwrap().poses;
+    sheetlight::recording::save_poses(&path, &poses[..9]).unwrap();
+    b.fails(&[], &["needs pose 9", "has 9"]);
+    let b = Bench::new(12);
     b.edit("poses.json", "1.0", "\"NaN\"");
     b.fails(&[], &["poses.json"]);
     let b = Bench::new(12);
@@ -172,4 +177,14 @@ fn stations_and_outputs_are_checked() {
     assert!(code == 1 && text.contains("cannot be written"), "{text}");
     let (code, _) = sheetlight_fails(&["scan", "--nonsense"]);
     assert_eq!(code, 2);
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_is_said_to_be_full() {
+    let b = Bench::new(12);
+    std::fs::create_dir(&b.out).unwrap();
+    // Writing to this device fails as on a full disk.
+    std::os::unix::fs::symlink("/dev/full", Path::new(&b.out).join("cloud.ply.part")).unwrap();
+    b.fails(&[], &["cloud.ply", "No space left on device", "the disk is full", "free some space"]);
 }

@@ -4,11 +4,11 @@
 
 use super::Console;
 use crate::fault::{Fault, Result};
-use crate::raster::Channel;
+use crate::raster::{Channel, load};
 use crate::recording::{Recording, load_poses};
 use crate::rig::{Rig, hash_file, hash_text};
 use crate::scan::{GridOptions, RawFormat, RawSource, RecordingSource, Where};
-use crate::station::{ScanOptions, ScanReport, Settings};
+use crate::station::{Judged, ScanOptions, ScanReport, Settings, judge};
 use std::path::{Path, PathBuf};
 
 /// Turn the shots of a recording into a point cloud and a height map
@@ -39,6 +39,10 @@ pub struct Args {
     /// Part of a colour picture to use: red, green, blue or luma
     #[arg(long, default_value = "luma", value_parser = super::parse::<Channel>)]
     channel: Channel,
+    /// Picture with the laser off, taken at the shots' exposure, to be subtracted from every shot: a name in the recording,
+    /// or a path. Never taken by itself: the `ambient` picture that meta.json names may be exposed for room light
+    #[arg(long)]
+    ambient: Option<PathBuf>,
     /// Where the stages run: auto (GPU where there is one), gpu, or cpu (the twins)
     #[arg(long, default_value = "auto", value_parser = super::parse::<Where>)]
     on: Where,
@@ -54,11 +58,14 @@ pub struct Args {
     /// Continue an interrupted scan into the same folder
     #[arg(long)]
     resume: bool,
+    /// Compare the points with the truth.json of a simulated recording: adds errors.json and a picture of them
+    #[arg(long)]
+    truth: Option<PathBuf>,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let (settings, rig) = (Settings::load(&args.station)?, Rig::load(&args.station)?);
-    let options = ScanOptions {
+    let mut options = ScanOptions {
         out: args.out.clone(),
         place: args.on,
         extraction: settings.extraction.clone(),
@@ -78,7 +85,13 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         (Some(folder), None) => {
             let mut recording = Recording::open(folder)?;
             recording.channel = args.channel;
-            let id = identity(folder, &recording, args.poses.as_deref())?;
+            let mut id = identity(folder, &recording, args.poses.as_deref())?;
+            if let Some(name) = &args.ambient {
+                let inside = folder.join(name);
+                let path = if inside.is_file() { inside } else { name.clone() };
+                options.ambient = Some(load(&path, args.channel, recording.meta.image.bits)?);
+                id += &hash_file(&path)?;
+            }
             let open = |first| Ok(Box::new(RecordingSource::open(&recording, args.poses.as_deref(), first)?) as Box<_>);
             crate::station::scan(&id, &folder.display().to_string(), open, &rig, &options, progress)?
         }
@@ -90,6 +103,9 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
                     Fault::usage("a pipe cannot be resumed").next("record the frames to a folder to be able to resume")
                 );
             }
+            if let Some(path) = &args.ambient {
+                options.ambient = Some(load(path, args.channel, raw.format.bits)?);
+            }
             let open = |_| Ok(Box::new(RawSource::new(raw, std::io::stdin().lock(), file.poses)) as Box<_>);
             crate::station::scan("pipe", "standard input", open, &rig, &options, progress)?
         }
@@ -100,8 +116,29 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         }
     };
     bar.finish_and_clear();
-    console.result(&report, &summary(&report, &args.out));
+    let Some(truth) = &args.truth else {
+        console.result(&report, &summary(&report, &args.out));
+        return Ok(());
+    };
+    let errors = judge(&args.out, truth, &[])?;
+    let e = &errors.cloud;
+    let text = format!(
+        "{}\ntrue distance from the surface: median {:.4} mm, rms {:.4} mm, {:.3} % beyond 1 mm",
+        summary(&report, &args.out),
+        e.median_mm,
+        e.rms_without_outliers_mm,
+        100.0 * e.outliers_share
+    );
+    console.result(&WithErrors { scan: report, errors }, &text);
     Ok(())
+}
+
+/// What `--json` prints with `--truth`.
+#[derive(serde::Serialize)]
+struct WithErrors {
+    #[serde(flatten)]
+    scan: ScanReport,
+    errors: Judged,
 }
 
 /// What a resumed scan must have in common with the interrupted one.

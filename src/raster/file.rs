@@ -38,6 +38,9 @@ pub fn load(path: &Path, channel: Channel, bits: u8) -> Result<Image> {
 
 /// Decodes a picture held in memory.
 pub fn decode(bytes: &[u8], channel: Channel, bits: u8) -> Result<Image> {
+    if bytes.starts_with(b"P5") {
+        return within_depth(super::pgm::decode(bytes, bits)?);
+    }
     let picture = image::load_from_memory(bytes).map_err(|e| {
         Fault::input(format!("is not a readable picture ({} bytes): {e}", bytes.len()))
             .cause("the file is truncated, empty, or of a format other than PNG, JPEG, TIFF and PGM")
@@ -98,7 +101,19 @@ fn from_colour(picture: &image::DynamicImage, channel: Channel, bits: u8, width:
 
 /// Writes a grey image as PNG, 8 or 16 bits.
 pub fn save_png(image: &Image, path: &Path) -> Result<()> {
-    std::fs::write(path, png(image)).map_err(|e| Fault::write(path, e))
+    replace(path, &png(image))
+}
+
+/// Writes beside `path` and renames, so that half a picture never has its name.
+pub(super) fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
+    let mut part = path.as_os_str().to_owned();
+    part.push(".part");
+    let done = std::fs::write(&part, bytes).and_then(|()| std::fs::rename(&part, path));
+    done.map_err(|e| {
+        // What could be written of it is of no use; the first error says why.
+        let _ = std::fs::remove_file(&part);
+        Fault::write(path, e)
+    })
 }
 
 /// The bytes of a grey image as PNG, 8 or 16 bits.

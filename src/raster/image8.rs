@@ -1,7 +1,7 @@
 //! In: colours and shapes. Out: 8-bit colour pictures for people: overlays, height maps, residual plots.
 //! Frame and unit: pixels, x to the right, y down.
 
-use crate::fault::{Fault, Result};
+use crate::fault::Result;
 use std::path::Path;
 
 pub type Rgb = [u8; 3];
@@ -55,6 +55,6 @@ impl RgbImage {
         out.into_inner()
     }
     pub fn save_png(&self, path: &Path) -> Result<()> {
-        std::fs::write(path, self.to_png()).map_err(|e| Fault::write(path, e))
+        super::file::replace(path, &self.to_png())
     }
 }

@@ -7,6 +7,7 @@ mod float;
 mod image8;
 mod text;
 mod mask;
+mod pgm;
 
 pub use file::{Channel, decode, load, png, save_png};
 pub use float::{float_tiff, read_float_tiff};

@@ -2,7 +2,7 @@
 //! or on the CPU twins, with the same results.
 //! Frame and unit: peaks in pixels and grey levels, points in the poses' frame, mm.
 
-use super::{Ambient, Extraction, Format, Where};
+use super::{Ambient, Extraction, Format, Processor};
 use crate::camera::Intrinsics;
 use crate::fault::Result;
 use crate::geometry::{Camera, Plane};
@@ -69,23 +69,21 @@ const TWIN_BATCH: usize = 4;
 const LARGE_PIXELS: u32 = 2_000_000;
 
 impl Engine {
-    /// `ambient` is subtracted from every picture. Refused: `Where::Gpu` on a machine without one.
+    /// `ambient` is subtracted from every picture.
     pub fn new(
         format: Format,
         optical: &Optical,
         extraction: &Extraction,
         ambient: Option<Ambient>,
-        place: Where,
-    ) -> Result<Engine> {
-        let device = match place {
-            Where::Cpu => None,
-            Where::Gpu => Some(Device::open()?),
-            // The twins give the same results, so a machine without a GPU is no error.
-            Where::Auto => Device::open().ok(),
+        processor: Processor,
+    ) -> Engine {
+        let device = match processor {
+            Processor::Twins => None,
+            Processor::Gpu(device) => Some(device),
         };
         let mut extraction = extraction.clone();
         extraction.threshold = for_depth(extraction.threshold, format.bits);
-        Ok(Engine {
+        Engine {
             format,
             region: region(format, optical),
             ambient,
@@ -98,7 +96,7 @@ impl Engine {
             batches: VecDeque::new(),
             done: Vec::new(),
             cut: 0,
-        })
+        }
     }
 
     /// Skeleton pixels that found no room in the GPU's list: more than a tenth of the picture.

@@ -36,8 +36,10 @@ impl Default for GridOptions {
     }
 }
 
-/// Most cells a height map may have: 64 M cells take 2.5 GB while they are filled.
+/// Most cells a height map may have: 64 M cells take 4 GB while they are filled.
 const MOST_CELLS: u64 = 1 << 26;
+/// Most cells of a map whose cell nobody chose, however long the scan: 240 MB while they are filled.
+const FEW_CELLS: u64 = 1 << 22;
 
 impl GridOptions {
     pub fn check(&self) -> Result<()> {
@@ -126,7 +128,8 @@ pub fn choose(source: &(impl PointSource + ?Sized), options: &GridOptions) -> Re
     let area = ((x1 - x0) * (y1 - y0)).max(1e-6);
     let cell = options.cell.unwrap_or_else(|| {
         let wished = (1.5 * area / sample.total as f64).sqrt();
-        ((wished / 0.05).round() * 0.05).clamp(0.05, 50.0)
+        let least = 0.05 * ((area / FEW_CELLS as f64).sqrt() / 0.05).ceil();
+        ((wished / 0.05).round() * 0.05).clamp(least.clamp(0.05, 50.0), 50.0)
     });
     let shift = if options.base_from_grid.is_some() { Vec3::zeros() } else { Vec3::new(x0, y0, 0.0) };
     let base_from_grid = Rigid::new(base_from_grid.rotation, base_from_grid.point(&shift));

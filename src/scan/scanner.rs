@@ -3,7 +3,7 @@
 //! Frame and unit: points in the base frame, mm (docs/math.md, Stripe peak; the paper's eq. 5 and 6).
 
 use super::engine::{Engine, Measured, Optical};
-use super::{Ambient, CloudPoint, Extraction, Format, Shot};
+use super::{Ambient, CloudPoint, Extraction, Format, Processor, Shot};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Camera, Flange, Plane, Rigid, Vec3};
@@ -13,28 +13,6 @@ use crate::rig::Rig;
 use crate::stages::peak::{Peak, SATURATED, Stripe};
 use crate::stages::point::{self, Optics};
 use crate::stages::support::{self, Support};
-
-/// Where the stages run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Where {
-    /// On the GPU where there is one, else on the CPU twins, which give the same results.
-    #[default]
-    Auto,
-    Gpu,
-    Cpu,
-}
-
-impl std::str::FromStr for Where {
-    type Err = String;
-    fn from_str(s: &str) -> std::result::Result<Where, String> {
-        match s {
-            "auto" => Ok(Where::Auto),
-            "gpu" => Ok(Where::Gpu),
-            "cpu" => Ok(Where::Cpu),
-            _ => Err(format!("unknown place '{s}': auto, gpu or cpu")),
-        }
-    }
-}
 
 /// What one shot came to.
 #[derive(Clone, Debug)]
@@ -77,7 +55,7 @@ impl Scanner {
         extraction: &Extraction,
         depth_mm: [f64; 2],
         ambient: Option<Image>,
-        place: Where,
+        processor: Processor,
         stripe: Option<Stripe>,
     ) -> Result<Scanner> {
         extraction.check()?;
@@ -88,7 +66,7 @@ impl Scanner {
         let optical = Optical { camera, laser, depth_mm };
         let ambient = ambient.map(|image| Ambient::new(image, format)).transpose()?;
         Ok(Scanner {
-            engine: Engine::new(format, &optical, extraction, ambient.clone(), place)?,
+            engine: Engine::new(format, &optical, extraction, ambient.clone(), processor),
             ambient,
             camera_from_flange: flange_from_camera.inverse(),
             optics,

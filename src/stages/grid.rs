@@ -53,11 +53,10 @@ const UNIFORM: (&str, &[Field], usize) = super::frame::uniform_fields!(GridFrame
     origin_x, origin_y, origin_z, xx, xy, xz, yx, yy, yz, zx, zy, zz, shift_x, shift_y, shift_z, add_x_low, add_x_high,
     add_y_low, add_y_high, add_z_low, add_z_high, intensity_places, reserved);
 
-/// Binary places of positions (0.06 µm) and sigmas (0.12 µm).
+/// Binary places of positions: 0.06 µm.
 const POSITION_PLACES: i32 = 14;
-const SIGMA_PLACES: i32 = 13;
-/// What a sum of sigmas is worth, mm; each of its terms saturates at 65,535 of them.
-pub const SIGMA_STEP: f64 = 1.0 / 8192.0;
+/// What a sum of sigmas is worth, mm; each of its terms saturates at 65,461 of them.
+pub const SIGMA_STEP: f64 = 1e-4;
 /// Largest integer height; the sum over [`COUNT_MOST`] points fits an i32.
 pub const Z_MOST: i32 = 32_767;
 /// More points in one cell and its sums could overflow.
@@ -190,12 +189,11 @@ impl GridFrame {
             let Some((cell, z)) = self.place(p) else { continue };
             let ([low, high], z) = (span[cell], z as i32 - 32_768);
             let layer = &mut layers[cell][usize::from(2 * z > high as i32 - low as i32)];
-            let part = |bits, places| fixed(bits, places).clamp(0, 65_535) as u32;
             *layer = layer.plus(Layer {
                 count: 1,
                 z,
-                intensity: part(p[4], self.intensity_places),
-                sigma: part(p[3], SIGMA_PLACES),
+                intensity: fixed(p[4], self.intensity_places).clamp(0, 65_535) as u32,
+                sigma: (fixed(p[3], 16).clamp(0, 429_000) as u32 * 10_000 + 32_768) >> 16,
             });
         }
     }

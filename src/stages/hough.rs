@@ -4,7 +4,7 @@
 use super::cases::{Walk, scenes};
 use super::entry::Case;
 use crate::fault::{Fault, Result};
-use crate::gpu::{Access::*, Binding, Stage};
+use crate::gpu::{Access::*, Binding, Device, Stage, Workload, run_once};
 
 pub const STAGE: Stage = Stage {
     name: "hough",
@@ -116,6 +116,35 @@ pub fn votes(frame: &HoughFrame, pixels: &[u32]) -> Vec<u32> {
         }
     }
     votes
+}
+
+/// Bytes of votes in one run; every adapter binds as much.
+const RUN_BYTES: usize = 64 << 20;
+
+/// The votes of each shot's pixels, from the stage on a GPU or from its twin: the same numbers.
+pub fn vote(device: Option<&Device>, frame: &HoughFrame, shots: &[Vec<u32>]) -> Result<Vec<Vec<u32>>> {
+    let Some(device) = device else { return Ok(shots.iter().map(|pixels| votes(frame, pixels)).collect()) };
+    let each = (frame.angles * frame.cells) as usize;
+    let mut out = Vec::new();
+    for run in shots.chunks((RUN_BYTES / 4 / each).max(1)) {
+        let points: Vec<[u32; 2]> =
+            run.iter().enumerate().flat_map(|(i, pixels)| pixels.iter().map(move |&p| [p, i as u32])).collect();
+        let n = points.len() as u32;
+        let load = Workload {
+            overrides: &[],
+            bindings: vec![
+                bytemuck::bytes_of(frame).to_vec(),
+                bytemuck::cast_slice(&[0, 0, 0, n]).to_vec(),
+                bytemuck::cast_slice(&points).to_vec(),
+                bytemuck::cast_slice(&frame.table()).to_vec(),
+                vec![0; 4 * each * run.len()],
+            ],
+            groups: STAGE.groups([n.max(1), 1, 1]),
+        };
+        let bytes = run_once(device, &STAGE, &load)?.pop().expect("the votes");
+        out.extend(bytemuck::pod_collect_to_vec::<u8, u32>(&bytes).chunks_exact(each).map(<[u32]>::to_vec));
+    }
+    Ok(out)
 }
 
 /// Lines of one shot, the one with most votes first. Each is refined by total least squares on the pixels near it,

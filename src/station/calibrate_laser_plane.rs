@@ -1,9 +1,10 @@
 //! In: pairs of pictures of boards (room light, laser) and a station with a camera. Out: the laser
-//! plane's calibration; the stripe is found by the scan engine's own stages.
+//! plane's calibration; the stripe is found by the scan engine's own stages and the straight line on each board.
 //! Frame and unit: camera frame, mm.
 
 use super::board_views::{Boards, FrameBoard, boards};
 use super::calibrate_hand_eye::{Calibrated, first_line};
+use super::straight::keep_straight;
 use crate::stages::point;
 use crate::calibrate::laser_plane::{LaserPlaneFit, LaserPlaneOptions, StripePeak, StripeView, solve};
 use crate::calibrate::laser_plane_report::{covariance, judge, page};
@@ -15,7 +16,7 @@ use crate::geometry::{Rigid, Camera, Plane, Vec2, Vec3};
 use crate::raster::Image;
 use crate::recording::Recording;
 use crate::rig::{Calibration, Rig, hash_file, hash_text};
-use crate::scan::{Engine, Extraction, Format, Optical, Where};
+use crate::scan::{Engine, Extraction, Format, Optical, Processor, Where};
 
 /// How [`calibrate_laser_plane`] is run.
 #[derive(Clone, Debug)]
@@ -60,13 +61,19 @@ pub fn calibrate_laser_plane(
     }
     let c = intrinsic_covariance(&camera.covariance);
     let factor = pooled_factor(&seen.iter().map(|s| s.pose.clone()).collect::<Vec<_>>());
+    let processor = run.place.open()?;
+    let device = match &processor {
+        Processor::Gpu(device) => Some(device),
+        Processor::Twins => None,
+    };
     let fit_with = |laser: &Plane<Camera>, depth_mm: [f64; 2]| -> Result<(Vec<StripeView>, LaserPlaneFit)> {
-        let peaks = stripes(&images, &camera.value, laser, depth_mm, run)?;
-        let views: Vec<StripeView> = seen
+        let peaks = stripes(&images, &camera.value, laser, depth_mm, run, &processor)?;
+        let mut views: Vec<StripeView> = seen
             .iter()
             .zip(peaks)
             .map(|(s, peaks)| StripeView { pose: s.pose.clone(), board: s.board.clone(), peaks })
             .collect();
+        keep_straight(&mut views, &camera.value, device)?;
         let fit = solve(&views, &camera.value, &c, factor, &run.solver)?;
         Ok((views, fit))
     };
@@ -103,11 +110,12 @@ fn stripes(
     laser: &Plane<Camera>,
     depth_mm: [f64; 2],
     run: &LaserPlaneRun,
+    processor: &Processor,
 ) -> Result<Vec<Vec<StripePeak>>> {
     let first = &images[0];
     let format = Format { width: first.width, height: first.height, bits: first.bits };
     let optical = Optical { camera: *camera, laser: *laser, depth_mm };
-    let mut engine = Engine::new(format, &optical, &run.extraction, None, run.place)?;
+    let mut engine = Engine::new(format, &optical, &run.extraction, None, processor.clone());
     if run.extraction.measure_stripe {
         if let Some(stripe) = engine.measure(&images.iter().collect::<Vec<_>>()) {
             engine.set_stripe(&stripe)?;

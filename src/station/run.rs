@@ -6,7 +6,7 @@ use super::progress::{Checkpoint, Lock};
 use crate::fault::{Fault, Result};
 use crate::raster::Image;
 use crate::rig::Rig;
-use crate::scan::{BadShot, CloudPoint, CloudWriter, Extraction, GridOptions, Profile, Scanner, Source, Where};
+use crate::scan::{BadShot, CloudPoint, CloudWriter, Extraction, GridOptions, Processor, Profile, Scanner, Source, Where};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -80,10 +80,24 @@ pub struct HeightMapFigures {
 /// Points and shots between two checkpoints: what a crash can cost.
 const CHECKPOINT_SHOTS: usize = 64;
 
+/// [`scan_on`] where the options say.
+pub fn scan(
+    id: &str,
+    label: &str,
+    open: impl FnOnce(usize) -> Result<Box<dyn Source>>,
+    rig: &Rig,
+    options: &ScanOptions,
+    progress: impl FnMut(usize, Option<usize>),
+) -> Result<ScanReport> {
+    scan_on(options.place.open()?, id, label, open, rig, options, progress)
+}
+
 /// Runs a scan from the first shot to the last file. `id` names the recording (a hash of its
 /// meta.json, poses and ambient picture), so that a resumed scan cannot continue another one; `open` gives the source
-/// from a shot on; `progress` is told (shots done, shots in all).
-pub fn scan(
+/// from a shot on; `progress` is told (shots done, shots in all). Whatever ends it early, the shots that were done stay
+/// done and the next run can resume there.
+pub fn scan_on(
+    processor: Processor,
     id: &str,
     label: &str,
     open: impl FnOnce(usize) -> Result<Box<dyn Source>>,
@@ -98,7 +112,7 @@ pub fn scan(
     let settings = serde_json::to_string(&options.extraction).expect("plain data");
     let identity = crate::rig::hash_text(format!("{id} {} {settings}", rig.fingerprint()).as_bytes());
     let former = Checkpoint::load(&options.out)?.filter(|_| options.resume);
-    let mut state = match former {
+    let state = match former {
         Some(c) if c.identity == identity => c,
         Some(_) => {
             return Err(Fault::usage("the interrupted scan was of another recording, rig or settings")
@@ -107,62 +121,34 @@ pub fn scan(
         }
         None => Checkpoint::new(identity),
     };
-    let mut cloud = if state.shots > 0 {
+    let cloud = if state.shots > 0 {
         CloudWriter::resume(&cloud_path, state.points)?
     } else {
         CloudWriter::create(&cloud_path)?
     };
     // A resumed scan reads the last finished shot again, because points are judged by the shots around them.
-    let mut repeated = state.shots.min(1);
+    let repeated = state.shots.min(1);
     let mut source = open(state.shots - repeated)?;
     let total = source.remaining().map(|n| n + state.shots - repeated);
-    let mut scanner = Scanner::new(
+    let scanner = Scanner::new(
         rig,
         source.format(),
         &options.extraction,
         options.depth_mm,
         options.ambient.clone(),
-        options.place,
+        processor,
         state.stripe,
     )?;
     let mut overlays = Overlays::new(&options.out, options.overlays, total)?;
     let started = Instant::now();
     let first = state.shots;
-
-    let mut ended = false;
-    while !ended {
-        match source.next() {
-            Some(Ok(shot)) => scanner.push(overlays.keep(shot))?,
-            Some(Err(bad)) if options.skip_bad => state.skipped.push(described(bad)),
-            Some(Err(bad)) => {
-                // What was done stays done: the next run can resume here. The last shot is not taken: it
-                // still waits to be judged by its neighbour.
-                for profile in scanner.ready()?.iter().skip(repeated) {
-                    take(profile, &mut cloud, &mut state, &mut overlays)?;
-                }
-                state.stripe = scanner.stripe();
-                state.save(&options.out, &mut cloud)?;
-                return Err(bad
-                    .fault
-                    .at(bad.name)
-                    .next("repair the shot and run again with --resume, or leave it out with --skip-bad"));
-            }
-            None => ended = true,
-        }
-        let ready = if ended { scanner.finish()? } else { scanner.ready()? };
-        for profile in &ready {
-            if repeated > 0 {
-                repeated -= 1;
-                continue;
-            }
-            take(profile, &mut cloud, &mut state, &mut overlays)?;
-            if state.shots.is_multiple_of(CHECKPOINT_SHOTS) {
-                state.stripe = scanner.stripe();
-                state.save(&options.out, &mut cloud)?;
-            }
-        }
-        progress(state.shots, total);
+    let mut work = Work { out: &options.out, repeated, cloud, state, scanner, overlays: &mut overlays };
+    if let Err(fault) = work.all(source.as_mut(), options.skip_bad, |done| progress(done, total)) {
+        // Where the disk itself failed, the checkpoint before this one stands.
+        let _ = work.save();
+        return Err(fault);
     }
+    let Work { cloud, mut state, scanner, .. } = work;
     let points = cloud.finish()?;
     let seconds = started.elapsed().as_secs_f64();
     let height_map =
@@ -199,15 +185,65 @@ pub fn scan(
     Ok(report)
 }
 
-fn described(bad: BadShot) -> (String, String) {
-    (bad.name, bad.fault.what)
+/// A scan under way.
+struct Work<'a> {
+    out: &'a Path,
+    /// Shots that an earlier run finished and this one reads again.
+    repeated: usize,
+    cloud: CloudWriter,
+    state: Checkpoint,
+    scanner: Scanner,
+    overlays: &'a mut Overlays,
 }
 
-fn take(profile: &Profile, cloud: &mut CloudWriter, state: &mut Checkpoint, overlays: &mut Overlays) -> Result<()> {
-    cloud.append(&profile.points)?;
-    overlays.draw(profile)?;
-    state.add(profile);
-    Ok(())
+impl Work<'_> {
+    /// Every shot of the source, to its points in the cloud.
+    fn all(&mut self, source: &mut dyn Source, skip_bad: bool, mut progress: impl FnMut(usize)) -> Result<()> {
+        let mut ended = false;
+        while !ended {
+            match source.next() {
+                Some(Ok(shot)) => self.scanner.push(self.overlays.keep(shot))?,
+                // A resumed scan may meet a bad shot that the run before has listed.
+                Some(Err(bad)) if skip_bad && self.state.skipped.iter().any(|(name, _)| *name == bad.name) => {}
+                Some(Err(bad)) if skip_bad => self.state.skipped.push((bad.name, bad.fault.what)),
+                Some(Err(BadShot { name, fault, .. })) => {
+                    // The last good shot is not taken: it still waits to be judged by its neighbour.
+                    let ready = self.scanner.ready()?;
+                    self.take(&ready)?;
+                    return Err(fault
+                        .at(name)
+                        .next("repair the shot and run again with --resume, or leave it out with --skip-bad"));
+                }
+                None => ended = true,
+            }
+            let ready = if ended { self.scanner.finish()? } else { self.scanner.ready()? };
+            self.take(&ready)?;
+            progress(self.state.shots);
+        }
+        Ok(())
+    }
+
+    fn take(&mut self, ready: &[Profile]) -> Result<()> {
+        for profile in ready {
+            if self.repeated > 0 {
+                self.repeated -= 1;
+                continue;
+            }
+            self.overlays.draw(profile)?;
+            // Points and state go together: what is counted here is what a resumed scan keeps.
+            self.cloud.append(&profile.points)?;
+            self.state.add(profile);
+            if self.state.shots.is_multiple_of(CHECKPOINT_SHOTS) {
+                self.save()?;
+            }
+        }
+        Ok(())
+    }
+
+    fn save(&mut self) -> Result<()> {
+        self.state.stripe = self.scanner.stripe();
+        self.state.save(self.out, &mut self.cloud)
+    }
 }
 
 /// Draws a few shots, evenly spread; holds a picture only from its arrival until its profile is there.
