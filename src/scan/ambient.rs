@@ -1,5 +1,5 @@
 //! In: one picture with the laser off. Out: shots without that light, and a refusal where it cannot have been taken as the
-//! shots were. Frame and unit: grey levels of the shots' depth. The GPU subtracts in its stage `ambient`, with the same rule.
+//! shots were. Frame and unit: grey levels of the shots' depth. The rule is that of the stage `ambient`.
 
 use super::Format;
 use crate::fault::{Fault, Result};

@@ -154,7 +154,6 @@ impl Engine {
             threshold: e.threshold,
             thinning: e.thinning,
             region: Some(self.region.clone()),
-            ambient: self.ambient.as_ref().map(|a| a.image.clone()),
             lengthen: e.lengthen.word(self.width_px),
             measure: Some(Measure { peak: e.peak, choose: e.choose, optics: self.optics }),
             ..ChainConfig::new(f.width, f.height, f.bits)
@@ -165,6 +164,11 @@ impl Engine {
 
     /// Takes a picture; `pose` is base_from_camera as [`point::pose_words`].
     pub fn submit(&mut self, shot: u32, image: Image, pose: [f32; 12]) -> Result<()> {
+        // Here and not in the chain, which starts a batch with very wide stripes over: light is subtracted once.
+        let image = match &self.ambient {
+            Some(ambient) => ambient.subtracted(&image),
+            None => image,
+        };
         self.pending.push(Job { shot, image, pose });
         let full = self.chain.as_ref().map_or(TWIN_BATCH, |c| c.frame.shots as usize);
         if self.pending.len() >= full { self.start() } else { Ok(()) }
@@ -214,7 +218,7 @@ impl Engine {
         }
     }
 
-    /// The picture without the ambient light, on the twins.
+    /// The picture without the ambient light.
     fn lit<'a>(&self, image: &'a Image) -> Cow<'a, Image> {
         self.ambient.as_ref().map_or(Cow::Borrowed(image), |a| Cow::Owned(a.subtracted(image)))
     }
@@ -227,8 +231,7 @@ impl Engine {
     }
 
     fn twins(&self, job: &Job) -> Measured {
-        let image = self.lit(&job.image);
-        let mut peaks = peak::peaks(&image, &self.skeleton(&image), job.shot, &self.extraction.peak);
+        let mut peaks = peak::peaks(&job.image, &self.skeleton(&job.image), job.shot, &self.extraction.peak);
         let scene = Scene {
             width: self.format.width,
             height: self.format.height,
