@@ -2,22 +2,24 @@
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> listing: array<u32>;
 @group(0) @binding(2) var<storage, read> list: array<u32>;
-@group(0) @binding(3) var<storage, read_write> mask: array<u32>;
-@group(0) @binding(4) var<storage, read_write> other_mask: array<u32>;
-@group(0) @binding(5) var<storage, read_write> lit: array<u32>;
+@group(0) @binding(3) var<storage, read_write> mask: array<vec4<u32>>;
+@group(0) @binding(4) var<storage, read_write> other_mask: array<vec4<u32>>;
+@group(0) @binding(5) var<storage, read_write> lit: array<vec4<u32>>;
 @group(0) @binding(6) var<storage, read_write> stamps: array<u32>;
 @group(0) @binding(7) var<storage, read_write> counts: array<u32>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let slot = id.x / 8u;
-    let row = id.x % 8u;
-    for (var inside = u32(slot < listing[3]); inside > 0u; inside--) {
-        let tile = list[slot];
-        mask[mask_index(tile, row)] = 0u;
-        other_mask[mask_index(tile, row)] = 0u;
-        lit[mask_index(tile, row)] = 0u;
-        stamps[tile_index(tile)] = 0u;
-        counts[tile_index(tile)] = 0u;
+    for (var inside = u32(id.x < listing[3]); inside > 0u; inside--) {
+        let at = tile_index(list[id.x]);
+        let none = vec4(0u);
+        mask[2u * at] = none;
+        mask[2u * at + 1u] = none;
+        other_mask[2u * at] = none;
+        other_mask[2u * at + 1u] = none;
+        lit[2u * at] = none;
+        lit[2u * at + 1u] = none;
+        stamps[at] = 0u;
+        counts[at] = 0u;
     }
 }

@@ -15,7 +15,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         for (var keep = u32(latest(tile) > frame.step); keep > 0u; keep--) {
             let at = atomicAdd(&listing.count, 1u);
             active_list[at] = tile;
-            for (var group = u32(at % 8u == 0u); group > 0u; group--) {
+            for (var group = u32(at % 64u == 0u); group > 0u; group--) {
                 atomicAdd(&listing.groups, 1u);
             }
         }

@@ -12,24 +12,25 @@
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let slot = id.x / 8u;
-    let row = id.x % 8u;
-    let tile = list[min(slot, max(listing[3], 1u) - 1u)];
-    var bits = 0u;
-    for (var q = 0u; q < 8u; q++) {
-        bits |= ((quads[8u * slot + q] >> (4u * row)) & 15u) << (4u * q);
-    }
-    let y = 8u * tile_y(tile) + row;
-    let columns = min(frame.width - 32u * tile_x(tile), 32u);
-    bits &= 0xffffffffu >> (32u - columns);
-    bits = select(0u, bits, y < frame.height);
-    for (var region = frame.flags & 2u; region != 0u; region = 0u) {
-        bits &= roi[y * frame.tiles_x + tile_x(tile)];
-    }
-    for (var once = u32(slot < listing[3]); once > 0u; once--) {
-        mask[mask_index(tile, row)] = bits;
-        lit[mask_index(tile, row)] = bits;
-        for (var some = u32(bits != 0u); some > 0u; some--) {
+    for (var inside = u32(id.x < listing[3]); inside > 0u; inside--) {
+        let tile = list[id.x];
+        let columns = min(frame.width - 32u * tile_x(tile), 32u);
+        var any_lit = 0u;
+        for (var row = 0u; row < 8u; row++) {
+            var bits = 0u;
+            for (var q = 0u; q < 8u; q++) {
+                bits |= ((quads[8u * id.x + q] >> (4u * row)) & 15u) << (4u * q);
+            }
+            bits &= 0xffffffffu >> (32u - columns);
+            bits = select(0u, bits, 8u * tile_y(tile) + row < frame.height);
+            for (var region = frame.flags & 2u; region != 0u; region = 0u) {
+                bits &= roi[8u * (tile_y(tile) * frame.tiles_x + tile_x(tile)) + row];
+            }
+            mask[mask_index(tile, row)] = bits;
+            lit[mask_index(tile, row)] = bits;
+            any_lit |= bits;
+        }
+        for (var some = u32(any_lit != 0u); some > 0u; some--) {
             stamps[tile_index(tile)] = 2u;
         }
     }

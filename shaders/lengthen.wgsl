@@ -8,12 +8,8 @@
 @group(0) @binding(5) var<storage, read> lit: array<u32>;
 @group(0) @binding(6) var<storage, read_write> long: array<atomic<u32>>;
 
-// Word of a pixel in a mask; its bit is x % 32.
-fn mask_word(shot: u32, x: i32, y: i32) -> u32 {
-    return (shot * frame.tiles_y * 8u + u32(y)) * frame.tiles_x + (u32(x) >> 5u);
-}
 fn thin(shot: u32, x: i32, y: i32) -> i32 {
-    return i32((mask[mask_word(shot, x, y)] >> (u32(x) & 31u)) & 1u);
+    return i32((mask[mask_word(shot, u32(x), u32(y))] >> (u32(x) & 31u)) & 1u);
 }
 // Sum of the 3x3 pixels around one.
 fn nine(shot: u32, x: i32, y: i32) -> u32 {
@@ -29,12 +25,11 @@ fn nine(shot: u32, x: i32, y: i32) -> u32 {
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let slot = id.x / 8u;
-    let row = id.x % 8u;
     let w = i32(frame.width);
     let h = i32(frame.height);
-    for (var inside = u32(slot < listing[3]); inside > 0u; inside--) {
-        let tile = list[slot];
+    // Eight invocations a tile would each look at one row: most rows are dark, so one looks at all.
+    for (var row = 0u; row < select(0u, 8u, id.x < listing[3]); row++) {
+        let tile = list[id.x];
         let shot = tile_shot(tile);
         let y = i32(8u * tile_y(tile) + row);
         var bits = mask[mask_index(tile, row)];
@@ -80,7 +75,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
                 let there = a >= 1 && b >= 1 && a < w - 1 && b < h - 1;
                 let c = clamp(a, 0, w - 1);
                 let d = clamp(b, 0, h - 1);
-                let word = mask_word(shot, c, d);
+                let word = mask_word(shot, u32(c), u32(d));
                 let bit = 1u << (u32(c) & 31u);
                 let on = there && (lit[word] & bit) != 0u && 4096u * nine(shot, c, d) >= limit;
                 for (var once = u32(on); once > 0u; once--) {

@@ -10,21 +10,18 @@
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let slot = id.x / 8u;
-    let row = id.x % 8u;
-    for (var inside = u32(slot < listing[3]); inside > 0u; inside--) {
-        let tile = list[slot];
+    for (var inside = u32(id.x < listing[3]); inside > 0u; inside--) {
+        let tile = list[id.x];
         let shot = tile_shot(tile);
         var at = row_starts[shot * frame.tiles_y + tile_y(tile)] + starts[tile_index(tile)];
-        for (var above = 0u; above < row; above++) {
-            at += countOneBits(mask[mask_index(tile, above)]);
-        }
-        var bits = mask[mask_index(tile, row)];
-        let y = 8u * tile_y(tile) + row;
-        while bits != 0u && at < frame.capacity {
-            points[at] = vec2((32u * tile_x(tile) + countTrailingZeros(bits)) | (y << 16u), shot);
-            bits &= bits - 1u;
-            at += 1u;
+        for (var row = 0u; row < 8u; row++) {
+            var bits = mask[mask_index(tile, row)];
+            let y = 8u * tile_y(tile) + row;
+            while bits != 0u && at < frame.capacity {
+                points[at] = vec2((32u * tile_x(tile) + countTrailingZeros(bits)) | (y << 16u), shot);
+                bits &= bits - 1u;
+                at += 1u;
+            }
         }
     }
 }

@@ -1,10 +1,11 @@
 // In: pictures. Out: per block of 16 x 8 pixels its sum, its largest and smallest pixel, its smallest
-// row sum and its smallest column sum: what `tiles` needs to prove that a block holds no lit pixel.
-// The only pass that touches every pixel: 16 pixels a load, four pixels an addition.
+// row sum and its smallest column sum: what `bands` and `tiles` need to prove that a block holds no lit pixel.
+// The only pass that touches every pixel: 16 pixels a load, four pixels an addition. Deeper pictures are
+// given in 256ths of their full scale, rounded to the safe side: largest up, all else down.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> image: array<vec4<u32>>;
-// (sum, largest | smallest << 16, smallest row sum, smallest column sum)
-@group(0) @binding(2) var<storage, read_write> stats: array<vec4<u32>>;
+// (sum | largest << 15 | smallest << 24, smallest row sum | smallest column sum << 16)
+@group(0) @binding(2) var<storage, read_write> stats: array<vec2<u32>>;
 
 fn most(v: vec4<u32>) -> u32 {
     return max(max(v.x, v.y), max(v.z, v.w));
@@ -13,7 +14,7 @@ fn least(v: vec4<u32>) -> u32 {
     return min(min(v.x, v.y), min(v.z, v.w));
 }
 
-fn block8(first: u32, top: u32) -> vec4<u32> {
+fn block8(first: u32, top: u32) -> vec2<u32> {
     let low = vec4(0x00ff00ffu);
     let pitch = frame.pitch / 4u;
     var even = vec4(0u); // columns 0 and 2 of each word, 16 bits each
@@ -54,10 +55,10 @@ fn block8(first: u32, top: u32) -> vec4<u32> {
     let columns = min(min(even & vec4(0xffffu), even >> vec4(16u)), min(odd & vec4(0xffffu), odd >> vec4(16u)));
     let largest = most(max(max(m0, m1), max(m2, m3))) >> 24u;
     let smallest = least(min(min(n0, n1), min(n2, n3))) >> 24u;
-    return vec4((sum.x + sum.y) + (sum.z + sum.w), largest | (smallest << 16u), row_least, least(columns));
+    return vec2(((sum.x + sum.y) + (sum.z + sum.w)) | (largest << 15u) | (smallest << 24u), row_least | (least(columns) << 16u));
 }
 
-fn block16(first: u32, top: u32) -> vec4<u32> {
+fn block16(first: u32, top: u32) -> vec2<u32> {
     let pitch = frame.pitch / 4u;
     var a = vec4(0u);
     var b = vec4(0u);
@@ -84,11 +85,13 @@ fn block16(first: u32, top: u32) -> vec4<u32> {
         smallest = min(smallest, min(min(v0, v1), min(u0, u1)));
     }
     let sum = (a + b) + (c + d);
-    return vec4(
-        (sum.x + sum.y) + (sum.z + sum.w),
-        most(largest) | (least(smallest) << 16u),
-        row_least,
-        least(min(min(a, b), min(c, d))),
+    let total = (sum.x + sum.y) + (sum.z + sum.w);
+    let column_least = least(min(min(a, b), min(c, d)));
+    let deep = depth_shift();
+    let largest8 = (most(largest) + (1u << deep) - 1u) >> deep;
+    return vec2(
+        (total >> deep) | (largest8 << 15u) | ((least(smallest) >> deep) << 24u),
+        (row_least >> deep) | ((column_least >> deep) << 16u),
     );
 }
 

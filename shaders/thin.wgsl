@@ -1,24 +1,24 @@
 // In: the mask before a sub-iteration. Out: the mask after it, in the tiles whose surroundings changed
-// in the last two: 32 pixels a word, one word an invocation [zhang84], [guo89].
+// in the last two: 32 pixels a word, the 8 words of a tile an invocation [zhang84], [guo89].
 // The border rows and columns of the picture are never deleted, as in OpenCV.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> listing: array<u32>;
 @group(0) @binding(2) var<storage, read> list: array<u32>;
-@group(0) @binding(3) var<storage, read> before: array<u32>;
-@group(0) @binding(4) var<storage, read_write> after: array<u32>;
+@group(0) @binding(3) var<storage, read> before: array<vec4<u32>>;
+@group(0) @binding(4) var<storage, read_write> after: array<vec4<u32>>;
 @group(0) @binding(5) var<storage, read_write> stamps: array<u32>;
 
 // Exactly one of the bits given one after the other; `more` collects the rest.
 struct Count {
-    one: u32,
-    more: u32,
+    one: vec4<u32>,
+    more: vec4<u32>,
 }
-fn add(c: Count, bit: u32) -> Count {
+fn add(c: Count, bit: vec4<u32>) -> Count {
     return Count(c.one | bit, c.more | (c.one & bit));
 }
 
-fn zhang_suen(p2: u32, p3: u32, p4: u32, p5: u32, p6: u32, p7: u32, p8: u32, p9: u32, second: bool) -> u32 {
-    var a = Count(~p2 & p3, 0u);
+fn zhang_suen(p2: vec4<u32>, p3: vec4<u32>, p4: vec4<u32>, p5: vec4<u32>, p6: vec4<u32>, p7: vec4<u32>, p8: vec4<u32>, p9: vec4<u32>, second: bool) -> vec4<u32> {
+    var a = Count(~p2 & p3, vec4(0u));
     a = add(a, ~p3 & p4);
     a = add(a, ~p4 & p5);
     a = add(a, ~p5 & p6);
@@ -43,12 +43,12 @@ fn zhang_suen(p2: u32, p3: u32, p4: u32, p5: u32, p6: u32, p7: u32, p8: u32, p9:
     return a.one & ~a.more & (b1 | b2) & ~(b0 & b1 & b2) & ~stays;
 }
 
-fn two_of(a: u32, b: u32, c: u32, d: u32) -> u32 {
+fn two_of(a: vec4<u32>, b: vec4<u32>, c: vec4<u32>, d: vec4<u32>) -> vec4<u32> {
     return (a & b) | (c & d) | ((a | b) & (c | d));
 }
 
-fn guo_hall(p2: u32, p3: u32, p4: u32, p5: u32, p6: u32, p7: u32, p8: u32, p9: u32, second: bool) -> u32 {
-    var c = Count(~p2 & (p3 | p4), 0u);
+fn guo_hall(p2: vec4<u32>, p3: vec4<u32>, p4: vec4<u32>, p5: vec4<u32>, p6: vec4<u32>, p7: vec4<u32>, p8: vec4<u32>, p9: vec4<u32>, second: bool) -> vec4<u32> {
+    var c = Count(~p2 & (p3 | p4), vec4(0u));
     c = add(c, ~p4 & (p5 | p6));
     c = add(c, ~p6 & (p7 | p8));
     c = add(c, ~p8 & (p9 | p2));
@@ -60,63 +60,92 @@ fn guo_hall(p2: u32, p3: u32, p4: u32, p5: u32, p6: u32, p7: u32, p8: u32, p9: u
     return c.one & ~c.more & n1 & n2 & ~(all1 & all2) & ~stays;
 }
 
+fn gone_of(p2: vec4<u32>, p3: vec4<u32>, p4: vec4<u32>, p5: vec4<u32>, p6: vec4<u32>, p7: vec4<u32>, p8: vec4<u32>, p9: vec4<u32>) -> vec4<u32> {
+    let second = (frame.step & 1u) != 0u;
+    var gone = vec4(0u);
+    for (var zs = frame.rule; zs == 0u; zs++) {
+        gone = zhang_suen(p2, p3, p4, p5, p6, p7, p8, p9, second);
+    }
+    for (var gh = frame.rule; gh == 1u; gh++) {
+        gone = guo_hall(p2, p3, p4, p5, p6, p7, p8, p9, second);
+    }
+    return gone;
+}
+
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let slot = id.x / 8u;
-    let row = id.x % 8u;
-    for (var inside = u32(slot < listing[3]); inside > 0u; inside--) {
-        let tile = list[slot];
-        for (var run = u32(stamps[tile_index(tile)] > frame.step); run > 0u; run--) {
+    for (var inside = u32(id.x < listing[3]); inside > 0u; inside--) {
+        let tile = list[id.x];
+        let at = tile_index(tile);
+        for (var run = u32(stamps[at] > frame.step); run > 0u; run--) {
             let x = tile_x(tile);
-            let y = 8u * tile_y(tile) + row;
-            let rows = 8u * frame.tiles_y;
+            let y = tile_y(tile);
             let pitch = frame.tiles_x;
-            let own = mask_index(tile, row);
-            let up = select(own, own - pitch, y > 0u);
-            let down = select(own, own + pitch, y + 1u < rows);
+            // Tiles beyond the picture are dark: their place is the tile's own, their bits are cleared.
+            let to_left = select(0u, 1u, x > 0u);
+            let to_right = select(0u, 1u, x + 1u < pitch);
+            let above = at - select(0u, pitch, y > 0u);
+            let below = at + select(0u, pitch, y + 1u < frame.tiles_y);
             let up_bits = select(0u, 0xffffffffu, y > 0u);
-            let down_bits = select(0u, 0xffffffffu, y + 1u < rows);
-            let left = select(0u, 1u, x > 0u);
-            let right = select(0u, 1u, x + 1u < pitch);
-            let here = before[own];
-            let n = before[up] & up_bits;
-            let s = before[down] & down_bits;
-            let west = (here << 1u) | ((before[own - left] >> 31u) & left);
-            let east = (here >> 1u) | ((before[own + right] & right) << 31u);
-            let nw = ((before[up] << 1u) | ((before[up - left] >> 31u) & left)) & up_bits;
-            let ne = ((before[up] >> 1u) | ((before[up + right] & right) << 31u)) & up_bits;
-            let sw = ((before[down] << 1u) | ((before[down - left] >> 31u) & left)) & down_bits;
-            let se = ((before[down] >> 1u) | ((before[down + right] & right) << 31u)) & down_bits;
-            let second = (frame.step & 1u) != 0u;
-            var gone = 0u;
-            for (var zs = frame.rule; zs == 0u; zs++) {
-                gone = zhang_suen(n, ne, east, se, s, sw, west, nw, second);
-            }
-            for (var gh = frame.rule; gh == 1u; gh++) {
-                gone = guo_hall(n, ne, east, se, s, sw, west, nw, second);
-            }
+            let down_bits = select(0u, 0xffffffffu, y + 1u < frame.tiles_y);
+            // Rows 0 to 3 and 4 to 7 of the tile; the last bit of its left, the first of its right neighbour.
+            let here0 = before[2u * at];
+            let here1 = before[2u * at + 1u];
+            let left0 = (before[2u * (at - to_left)] >> vec4(31u)) & vec4(to_left);
+            let left1 = (before[2u * (at - to_left) + 1u] >> vec4(31u)) & vec4(to_left);
+            let right0 = (before[2u * (at + to_right)] & vec4(to_right)) << vec4(31u);
+            let right1 = (before[2u * (at + to_right) + 1u] & vec4(to_right)) << vec4(31u);
+            let up = before[2u * above + 1u].w & up_bits;
+            let up_left = (before[2u * (above - to_left) + 1u].w >> 31u) & to_left & up_bits;
+            let up_right = (before[2u * (above + to_right) + 1u].w & to_right & up_bits) << 31u;
+            let down = before[2u * below].x & down_bits;
+            let down_left = (before[2u * (below - to_left)].x >> 31u) & to_left & down_bits;
+            let down_right = (before[2u * (below + to_right)].x & to_right & down_bits) << 31u;
+            let west0 = (here0 << vec4(1u)) | left0;
+            let west1 = (here1 << vec4(1u)) | left1;
+            let east0 = (here0 >> vec4(1u)) | right0;
+            let east1 = (here1 >> vec4(1u)) | right1;
+            let up_west = (up << 1u) | up_left;
+            let up_east = (up >> 1u) | up_right;
+            let down_west = (down << 1u) | down_left;
+            let down_east = (down >> 1u) | down_right;
+            // Clockwise from north; what is north of rows 1 to 3 are rows 0 to 2, and so on.
+            var gone0 = gone_of(
+                vec4(up, here0.xyz), vec4(up_east, east0.xyz), east0, vec4(east0.yzw, east1.x),
+                vec4(here0.yzw, here1.x), vec4(west0.yzw, west1.x), west0, vec4(up_west, west0.xyz));
+            var gone1 = gone_of(
+                vec4(here0.w, here1.xyz), vec4(east0.w, east1.xyz), east1, vec4(east1.yzw, down_east),
+                vec4(here1.yzw, down), vec4(west1.yzw, down_west), west1, vec4(west0.w, west1.xyz));
             // Columns 1 to width - 2 and rows 1 to height - 2.
             let keep = min(frame.width - 1u - min(32u * x, frame.width - 1u), 32u);
             var deletable = select((1u << (keep & 31u)) - 1u, 0xffffffffu, keep == 32u);
             deletable &= select(0xffffffffu, 0xfffffffeu, x == 0u);
-            deletable = select(0u, deletable, y > 0u && y + 1u < frame.height);
-            gone &= here & deletable;
-            after[own] = here & ~gone;
+            let row0 = vec4(8u * y) + vec4(0u, 1u, 2u, 3u);
+            let row1 = row0 + vec4(4u);
+            let last = vec4(frame.height);
+            gone0 &= here0 & select(vec4(0u), vec4(deletable), row0 > vec4(0u) & row0 + vec4(1u) < last);
+            gone1 &= here1 & select(vec4(0u), vec4(deletable), row1 + vec4(1u) < last);
+            after[2u * at] = here0 & ~gone0;
+            after[2u * at + 1u] = here1 & ~gone1;
             // A change wakes its own tile, and a neighbour only where it touches it.
+            let both = gone0 | gone1;
+            let gone = (both.x | both.y) | (both.z | both.w);
+            let stamp = frame.step + 3u;
             for (var changed = u32(gone != 0u); changed > 0u; changed--) {
-                let at = tile_index(tile);
-                let stamp = frame.step + 3u;
                 stamps[at] = stamp;
-                let to_left = select(0u, 1u, (gone & 1u) != 0u && x > 0u);
-                let to_right = select(0u, 1u, (gone >> 31u) != 0u && x + 1u < pitch);
-                stamps[at - to_left] = stamp;
-                stamps[at + to_right] = stamp;
-                let up_row = select(0u, pitch, row == 0u && y > 0u);
-                let down_row = select(0u, pitch, row == 7u && y + 1u < rows);
-                let beside = at - up_row + down_row;
-                stamps[beside] = stamp;
-                stamps[beside - to_left] = stamp;
-                stamps[beside + to_right] = stamp;
+            }
+            let edges = (gone & 0x80000001u) | gone0.x | gone1.w;
+            for (var beside = u32(edges != 0u); beside > 0u; beside--) {
+                stamps[at - select(0u, to_left, (gone & 1u) != 0u)] = stamp;
+                stamps[at + select(0u, to_right, (gone >> 31u) != 0u)] = stamp;
+                let over = select(at, above, gone0.x != 0u);
+                let under = select(at, below, gone1.w != 0u);
+                stamps[over] = stamp;
+                stamps[over - select(0u, to_left, (gone0.x & 1u) != 0u)] = stamp;
+                stamps[over + select(0u, to_right, (gone0.x >> 31u) != 0u)] = stamp;
+                stamps[under] = stamp;
+                stamps[under - select(0u, to_left, (gone1.w & 1u) != 0u)] = stamp;
+                stamps[under + select(0u, to_right, (gone1.w >> 31u) != 0u)] = stamp;
             }
         }
     }

@@ -1,61 +1,176 @@
-// In: pictures, the tile list, column sums. Out: the pixels brighter than the mean of the window around them,
-// one word a tile row, inside the picture and the region of interest only, twice: `mask` is thinned, `lit`
-// stays. Tiles with a lit pixel are stamped as changed, so that thinning starts there.
+// In: pictures, the tile list. Out: the pixels brighter than the mean of the window around them, inside the
+// picture and the region of interest only, twice: `mask` is thinned, `lit` stays. Tiles with a lit pixel are
+// stamped as changed, so that thinning starts there. One invocation a tile: the sums of the columns that its
+// windows touch are carried down its rows in registers, four words of pixels a load (a load costs as much as
+// ten additions and more). The radius is a constant of the pipeline, so that every index is one too.
 @group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<storage, read> image: array<u32>;
+@group(0) @binding(1) var<storage, read> image: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> listing: array<u32>;
 @group(0) @binding(3) var<storage, read> list: array<u32>;
-@group(0) @binding(4) var<storage, read> columns: array<u32>;
-@group(0) @binding(5) var<storage, read> roi: array<u32>;
-@group(0) @binding(6) var<storage, read_write> mask: array<u32>;
-@group(0) @binding(7) var<storage, read_write> lit: array<u32>;
-@group(0) @binding(8) var<storage, read_write> stamps: array<u32>;
+@group(0) @binding(4) var<storage, read> roi: array<vec4<u32>>;
+@group(0) @binding(5) var<storage, read_write> mask: array<vec4<u32>>;
+@group(0) @binding(6) var<storage, read_write> lit: array<vec4<u32>>;
+@group(0) @binding(7) var<storage, read_write> stamps: array<u32>;
+
+// Half the window's edge, less a half.
+override radius: u32 = 15u;
+// Pixels in four words; of those, how many on each side of the tile, and in all.
+fn per_load() -> u32 {
+    return 4u << px_log2;
+}
+fn beside() -> u32 {
+    return (radius + per_load() - 1u) / per_load();
+}
+fn loads() -> u32 {
+    return 2u * beside() + 32u / per_load();
+}
+
+// Sums of columns over the window's height, two vectors a load: of its even and of its odd columns. In 8-bit
+// pictures each word carries two of 16 bits: 101 * 255 fits. At most 18 loads: 16 bits and a radius of 50.
+var<private> sums: array<vec4<u32>, 36>;
+// The tile's own pixels of one row.
+var<private> own: array<vec4<u32>, 4>;
+
+fn low() -> u32 {
+    return select(0x0000ffffu, 0x00ff00ffu, px_log2 == 2u);
+}
+fn half() -> u32 {
+    return select(16u, 8u, px_log2 == 2u);
+}
+
+// Four words of a row; words beyond the row repeat its border pixel.
+fn four(row: u32, i: i32) -> vec4<u32> {
+    let last = i32(frame.pitch / 4u) - 1;
+    let v = image[row + u32(clamp(i, 0, last))];
+    let bits = 32u >> px_log2;
+    let ones = select(0x01010101u, 0x00010001u, px_log2 == 1u);
+    let left = (v.x & ((1u << bits) - 1u)) * ones;
+    let right = (v.w >> (32u - bits)) * ones;
+    return select(select(v, vec4(left), i < 0), vec4(right), i > last);
+}
+
+// A row of pixels enters the sums (sign 1) or leaves them (sign -1).
+fn pass_row(row: u32, first: i32, sign: u32) {
+    for (var i = 0u; i < loads(); i++) {
+        let v = four(row, first + i32(i));
+        sums[2u * i] += (v & vec4(low())) * sign;
+        sums[2u * i + 1u] += ((v >> vec4(half())) & vec4(low())) * sign;
+    }
+}
+
+// Sum of column c, counted from the first one loaded.
+fn column(c: u32) -> u32 {
+    let pair = sums[2u * (c / per_load()) + (c & 1u)];
+    let word = pair[(c % per_load()) >> px_log2];
+    return select(word, (word >> (8u * (c & 2u))) & 0xffffu, px_log2 == 2u);
+}
+
+fn own_pixel(i: u32) -> u32 {
+    let word = own[i / per_load()][(i % per_load()) >> px_log2];
+    let bits = 32u >> px_log2;
+    return (word >> ((i & ((1u << px_log2) - 1u)) * bits)) & ((1u << bits) - 1u);
+}
+
+// First column of the first pixel's window.
+fn begin() -> u32 {
+    return beside() * per_load() - radius;
+}
+
+// All bits where a column is one of the 2 r that the first pixel's window begins with.
+fn early(c: vec4<u32>) -> vec4<u32> {
+    return select(vec4(0u), vec4(0xffffffffu), c >= vec4(begin()) & c < vec4(begin() + 2u * radius));
+}
+
+// Sum of those columns.
+fn early_sum() -> u32 {
+    var sum = vec4(0u);
+    for (var i = 0u; i < loads(); i++) {
+        let c = vec4(i * per_load()) + vec4(0u, 1u, 2u, 3u) * vec4(1u << px_log2);
+        let even = sums[2u * i];
+        let odd = sums[2u * i + 1u];
+        if px_log2 == 2u {
+            sum += (even & vec4(0xffffu) & early(c)) + ((even >> vec4(16u)) & early(c + vec4(2u)));
+            sum += (odd & vec4(0xffffu) & early(c + vec4(1u))) + ((odd >> vec4(16u)) & early(c + vec4(3u)));
+        } else {
+            sum += (even & early(c)) + (odd & early(c + vec4(1u)));
+        }
+    }
+    return (sum.x + sum.y) + (sum.z + sum.w);
+}
+
+// The window's sum moves on by one pixel: the last column enters, the pixel is compared, the first leaves.
+var<private> sum: i32;
+var<private> bits: u32;
+fn pixel_step(i: u32, area: i32) {
+    sum += i32(column(begin() + 2u * radius + i));
+    let value = own_pixel(i);
+    bits |= select(0u, 1u << i, area * i32(value) > sum && value >= frame.minimum);
+    sum -= i32(column(begin() + i));
+}
+// Written out, because Mesa leaves a loop of 32 as it is, and an index that is not constant costs 10 cycles.
+fn eight_steps(i: u32, area: i32) {
+    pixel_step(i, area);
+    pixel_step(i + 1u, area);
+    pixel_step(i + 2u, area);
+    pixel_step(i + 3u, area);
+    pixel_step(i + 4u, area);
+    pixel_step(i + 5u, area);
+    pixel_step(i + 6u, area);
+    pixel_step(i + 7u, area);
+}
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let slot = id.x / 8u;
-    let row = id.x % 8u;
-    let per_word = 1u << px_log2;
-    let bits_px = 32u >> px_log2;
-    let full = (1u << bits_px) - 1u;
-    let r = i32(frame.size / 2u);
     // n^2 (value - offset) > sum + (n^2 - 1) / 2: the mean rounded to a whole level, without a division.
     let area = i32(frame.size * frame.size);
-    for (var inside = u32(slot < listing[3]); inside > 0u; inside--) {
-        let tile = list[slot];
-        let y = 8u * tile_y(tile) + row;
-        let x0 = i32(32u * tile_x(tile));
-        let wide = i32(32u * frame.tiles_x);
-        let base = (tile_shot(tile) * frame.tiles_y * 8u + y) * u32(wide);
-        var sum = (area - 1) / 2 + frame.offset * area;
-        for (var x = x0 - r; x < x0 + r; x++) {
-            sum += i32(columns[base + u32(clamp(x, 0, wide - 1))]);
+    let r = i32(radius);
+    for (var inside = u32(id.x < listing[3]); inside > 0u; inside--) {
+        let tile = list[id.x];
+        let top = i32(8u * tile_y(tile));
+        let picture = tile_shot(tile) * (frame.shot_words / 4u);
+        let pitch = frame.pitch / 4u;
+        let last_row = i32(frame.height) - 1;
+        let own_first = tile_x(tile) * (32u / per_load());
+        let first = i32(own_first) - i32(beside());
+        for (var i = 0u; i < 2u * loads(); i++) {
+            sums[i] = vec4(0u);
         }
-        let first = tile_shot(tile) * frame.shot_words + min(y, frame.height - 1u) * frame.pitch + (u32(x0) >> px_log2);
-        var bits = 0u;
-        var x = x0;
-        for (var w = 0u; w < (32u >> px_log2); w++) {
-            var pixels = image[first + w];
-            for (var k = 0u; k < per_word; k++) {
-                sum += i32(columns[base + u32(min(x + r, wide - 1))]);
-                let value = pixels & full;
-                let over = area * i32(value) > sum && value >= frame.minimum;
-                bits = (bits >> 1u) | select(0u, 0x80000000u, over);
-                sum -= i32(columns[base + u32(max(x - r, 0))]);
-                pixels >>= bits_px;
-                x += 1;
+        for (var y = top - r; y < top + r; y++) {
+            pass_row(picture + u32(clamp(y, 0, last_row)) * pitch, first, 1u);
+        }
+        let inner = min(frame.width - 32u * tile_x(tile), 32u);
+        let wanted = 0xffffffffu >> (32u - inner);
+        var upper = vec4(0u);
+        var lower = vec4(0u);
+        for (var k = 0; k < 8; k++) {
+            pass_row(picture + u32(min(top + k + r, last_row)) * pitch, first, 1u);
+            let row = picture + u32(min(top + k, last_row)) * pitch + own_first;
+            for (var i = 0u; i < 32u / per_load(); i++) {
+                own[i] = image[row + i];
             }
+            sum = (area - 1) / 2 + frame.offset * area + i32(early_sum());
+            bits = 0u;
+            eight_steps(0u, area);
+            eight_steps(8u, area);
+            eight_steps(16u, area);
+            eight_steps(24u, area);
+            bits = select(0u, bits & wanted, top + k <= last_row);
+            upper = select(upper, vec4(bits), vec4(k) == vec4(0, 1, 2, 3));
+            lower = select(lower, vec4(bits), vec4(k) == vec4(4, 5, 6, 7));
+            pass_row(picture + u32(clamp(top + k - r, 0, last_row)) * pitch, first, 0xffffffffu);
         }
-        let inner = min(frame.width - u32(x0), 32u);
-        bits &= 0xffffffffu >> (32u - inner);
-        bits = select(0u, bits, y < frame.height);
         for (var region = frame.flags & 2u; region != 0u; region = 0u) {
-            bits &= roi[y * frame.tiles_x + tile_x(tile)];
+            let at = tile_y(tile) * frame.tiles_x + tile_x(tile);
+            upper &= roi[2u * at];
+            lower &= roi[2u * at + 1u];
         }
-        mask[mask_index(tile, row)] = bits;
-        lit[mask_index(tile, row)] = bits;
-        for (var some = u32(bits != 0u); some > 0u; some--) {
-            stamps[tile_index(tile)] = 2u;
+        let at = tile_index(tile);
+        mask[2u * at] = upper;
+        mask[2u * at + 1u] = lower;
+        lit[2u * at] = upper;
+        lit[2u * at + 1u] = lower;
+        for (var some = u32(any((upper | lower) != vec4(0u))); some > 0u; some--) {
+            stamps[at] = 2u;
         }
     }
 }

@@ -19,33 +19,34 @@ fn blurred(first: u32, x: i32, r: i32) -> vec4<f32> {
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let slot = id.x / 8u;
-    let tile = list[min(slot, max(listing[3], 1u) - 1u)];
-    let shot = tile_shot(tile);
-    let x = i32(32u * tile_x(tile) + 4u * (id.x % 8u));
-    let top = i32(8u * tile_y(tile));
     let r = i32(frame.size / 2u);
-    // One accumulator a row of the tile; each blurred row enters all the windows that hold it.
-    var sums = array<vec4<f32>, 8>();
-    for (var y = -r; y < 8 + r; y++) {
-        let row = blurred(row_start(shot, top + y), x, r);
-        for (var k = 0; k < 8; k++) {
-            let tap = y - k + r;
-            let inside = tap >= 0 && tap <= 2 * r;
-            let weight = select(0.0, weights[clamp(tap, 0, 2 * r)], inside);
-            sums[k] = sums[k] + weight * row;
+    for (var inside = u32(id.x < listing[3]); inside > 0u; inside--) {
+        let tile = list[id.x];
+        let shot = tile_shot(tile);
+        let top = i32(8u * tile_y(tile));
+        for (var q = 0u; q < 8u; q++) {
+            let x = i32(32u * tile_x(tile) + 4u * q);
+            // One accumulator a row of the tile; each blurred row enters all the windows that hold it.
+            var sums = array<vec4<f32>, 8>();
+            for (var y = -r; y < 8 + r; y++) {
+                let row = blurred(row_start(shot, top + y), x, r);
+                for (var k = 0; k < 8; k++) {
+                    let tap = y - k + r;
+                    let within = tap >= 0 && tap <= 2 * r;
+                    let weight = select(0.0, weights[clamp(tap, 0, 2 * r)], within);
+                    sums[k] = sums[k] + weight * row;
+                }
+            }
+            var bits = 0u;
+            for (var k = 0; k < 8; k++) {
+                let first = row_start(shot, top + k);
+                for (var c = 0; c < 4; c++) {
+                    let value = pixel(first, x + c);
+                    let lit = i32(value) - frame.offset > i32(round(sums[k][c])) && value >= frame.minimum;
+                    bits |= u32(lit) << u32(4 * k + c);
+                }
+            }
+            quads[8u * id.x + q] = bits;
         }
-    }
-    var bits = 0u;
-    for (var k = 0; k < 8; k++) {
-        let first = row_start(shot, top + k);
-        for (var c = 0; c < 4; c++) {
-            let value = pixel(first, x + c);
-            let lit = i32(value) - frame.offset > i32(round(sums[k][c])) && value >= frame.minimum;
-            bits |= u32(lit) << u32(4 * k + c);
-        }
-    }
-    for (var once = u32(slot < listing[3]); once > 0u; once--) {
-        quads[id.x] = bits;
     }
 }

@@ -25,15 +25,39 @@ const MAY: &[(&str, &[&str])] = &[
     (
         "station",
         &[
-            "geometry", "raster", "solve", "gpu", "camera", "robot", "recording", "rig", "simulate", "calibrate", "stages",
-            "scan", "find",
+            "geometry",
+            "raster",
+            "solve",
+            "gpu",
+            "camera",
+            "robot",
+            "recording",
+            "rig",
+            "simulate",
+            "calibrate",
+            "stages",
+            "scan",
+            "find",
         ],
     ),
     (
         "cli",
         &[
-            "geometry", "raster", "solve", "gpu", "camera", "robot", "recording", "rig", "simulate", "calibrate", "stages",
-            "scan", "bench", "find", "station",
+            "geometry",
+            "raster",
+            "solve",
+            "gpu",
+            "camera",
+            "robot",
+            "recording",
+            "rig",
+            "simulate",
+            "calibrate",
+            "stages",
+            "scan",
+            "bench",
+            "find",
+            "station",
         ],
     ),
 ];
@@ -61,7 +85,8 @@ fn imports(text: &str) -> Vec<String> {
             Some(group) => {
                 let mut depth = 0;
                 for part in group.split_inclusive([',', '{', '}']) {
-                    let name: String = part.trim_start().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
+                    let name: String =
+                        part.trim_start().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect();
                     if depth == 0 && !name.is_empty() {
                         found.push(name);
                     }
@@ -94,7 +119,9 @@ fn every_module_imports_only_from_lower_floors() {
         if module == "lib" || module == "main" {
             continue;
         }
-        let allowed = may.get(module.as_str()).unwrap_or_else(|| panic!("{module} stands on no floor: add it to ARCHITECTURE.md and here"));
+        let allowed = may
+            .get(module.as_str())
+            .unwrap_or_else(|| panic!("{module} stands on no floor: add it to ARCHITECTURE.md and here"));
         for import in imports(&text) {
             if import != "fault" && import != module && !allowed.contains(&import.as_str()) {
                 faults.push(format!("{}: {module} imports {import}", path.display()));
@@ -103,7 +130,8 @@ fn every_module_imports_only_from_lower_floors() {
         for (vendor, home) in HOMES {
             let named = text.lines().any(|l| {
                 let code = l.split("//").next().unwrap_or("");
-                code.match_indices(vendor).any(|(at, _)| !code[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':'))
+                code.match_indices(vendor)
+                    .any(|(at, _)| !code[..at].ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':'))
             });
             if named && module != *home {
                 faults.push(format!("{}: {vendor} belongs to {home}", path.display()));

@@ -1,7 +1,7 @@
 // What every stage of the stripe chain knows: the size of the pictures, how they lie in memory, and
 // the settings. Pictures of one batch lie behind each other ("shots"). A picture's rows are padded to
-// whole tiles of 32 pixels by repeating the last pixel; masks hold one bit a pixel, one word a tile
-// row, and have their height padded to whole tiles of 8 rows with zeros.
+// whole tiles of 32 pixels by repeating the last pixel; masks hold one bit a pixel, the 8 words of a tile
+// (one a row) behind each other, and have their height padded to whole tiles of 8 rows with zeros.
 struct Frame {
     width: u32,
     height: u32,
@@ -30,7 +30,7 @@ struct Frame {
 // Pixels a word as a power of two: 2 for 8-bit pictures, 1 for 9 to 16 bits.
 override px_log2: u32 = 2u;
 
-// Arguments of an indirect dispatch with 8 invocations a tile and 64 a workgroup, and the list's length.
+// Arguments of an indirect dispatch with one invocation a tile and 64 a workgroup, and the list's length.
 struct Listing {
     groups: atomic<u32>,
     groups_y: u32,
@@ -57,5 +57,13 @@ fn tile_index(tile: u32) -> u32 {
 }
 // Place of a tile's row in a mask.
 fn mask_index(tile: u32, row: u32) -> u32 {
-    return ((tile_shot(tile) * frame.tiles_y + tile_y(tile)) * 8u + row) * frame.tiles_x + tile_x(tile);
+    return 8u * tile_index(tile) + row;
+}
+// Place of a pixel's word in a mask; its bit is x % 32.
+fn mask_word(shot: u32, x: u32, y: u32) -> u32 {
+    return 8u * ((shot * frame.tiles_y + y / 8u) * frame.tiles_x + x / 32u) + y % 8u;
+}
+// Bits beyond eight of the pictures' depth.
+fn depth_shift() -> u32 {
+    return countOneBits(frame.full_scale) - 8u;
 }

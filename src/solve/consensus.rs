@@ -26,7 +26,9 @@ impl Default for ConsensusOptions {
 
 impl ConsensusOptions {
     pub fn check(&self) -> Result<()> {
-        if !(self.threshold > 0.0) || !(0.5..1.0).contains(&self.confidence) || !(1..=1_000_000).contains(&self.max_draws)
+        if !(self.threshold > 0.0)
+            || !(0.5..1.0).contains(&self.confidence)
+            || !(1..=1_000_000).contains(&self.max_draws)
         {
             return Err(Fault::usage(format!(
                 "consensus options out of range: threshold {} (above 0), confidence {} (0.5 to 1), max_draws {} (1 to 1000000)",

@@ -216,9 +216,8 @@ fn finish<P: Problem>(
     let free: Vec<usize> = (0..n).filter(|i| !o.hold.contains(i)).collect();
     let mut r = Residuals::new(n, o.loss, scale, true);
     let stop = if problem.residuals(&state, &mut r).is_none() { Stop::BadStart } else { stop };
-    let measured = |f: &dyn Fn(&super::system::Group) -> f64| -> f64 {
-        r.groups.iter().filter(|g| !g.prior).map(f).sum()
-    };
+    let measured =
+        |f: &dyn Fn(&super::system::Group) -> f64| -> f64 { r.groups.iter().filter(|g| !g.prior).map(f).sum() };
     let count = measured(&|g| g.size as f64);
     let all: f64 = r.groups.iter().map(|g| g.size as f64).sum();
     let rms = (measured(&|g| g.length * g.length) / count.max(1.0)).sqrt();

@@ -252,7 +252,8 @@ impl<'a> Walk<'a> {
         let buffers = BTreeMap::from([
             ("image", pack(&scene.shots)),
             ("ambient", pack(scene.ambient.as_slice())),
-            ("stats", vec![0; 8 * tiles]),
+            ("stats", vec![0; 4 * tiles]),
+            ("bands", vec![0; 4 * tiles]),
             ("roi", (0..per_shot).map(|i| if i % 5 < 3 { 0x00ff_fff0 } else { 0 }).collect()),
             ("first", vec![7; 4]),
             ("all_active", vec![7; 8 * header]),
@@ -262,7 +263,6 @@ impl<'a> Walk<'a> {
             ("active_list", vec![0; tiles]),
             ("weights", weights),
             ("quads", vec![0; 8 * tiles]),
-            ("columns", vec![0; 256 * tiles]),
             ("mask", vec![0; 8 * tiles]),
             ("other_mask", vec![0; 8 * tiles]),
             ("lit", vec![0; 8 * tiles]),
@@ -286,7 +286,11 @@ impl<'a> Walk<'a> {
         names: &[&'static str],
         groups: [u32; 3],
     ) {
-        let overrides = vec![(frame::PX_LOG2, f64::from(px_log2(self.scene.shots[0].bits)))];
+        let all = [
+            (frame::PX_LOG2, f64::from(px_log2(self.scene.shots[0].bits))),
+            (threshold::RADIUS, f64::from(self.frame.size / 2)),
+        ];
+        let overrides: Vec<_> = all.into_iter().filter(|o| stage.overrides.contains(&o.0)).collect();
         let mut bindings = vec![bytemuck::cast_slice::<Frame, u32>(&[self.frame]).to_vec()];
         bindings.extend(names.iter().map(|n| self.buffers[n].clone()));
         if stage.name == self.wanted {
@@ -303,12 +307,13 @@ impl<'a> Walk<'a> {
     pub fn run(&mut self, wanted: &'a str) -> Vec<Case> {
         self.wanted = wanted;
         let f = self.frame;
-        let listed = |b: &BTreeMap<&'static str, Vec<u32>>, list: &str| [(b[list][3] * 8).div_ceil(64).max(1), 1, 1];
+        let listed = |b: &BTreeMap<&'static str, Vec<u32>>, list: &str| [b[list][3].div_ceil(64).max(1), 1, 1];
         if self.scene.ambient.is_some() {
             self.step(&ambient::STAGE, ambient::twin, &["image", "ambient"], ambient::groups(&f));
         }
         self.step(&stats::STAGE, stats::twin, &["image", "stats"], stats::groups(&f));
-        self.step(&tiles::STAGE, tiles::twin, &["stats", "roi", "listing", "list"], tiles::groups(&f));
+        self.step(&bands::STAGE, bands::twin, &["stats", "bands"], bands::groups(&f));
+        self.step(&tiles::STAGE, tiles::twin, &["stats", "bands", "roi", "listing", "list"], tiles::groups(&f));
         let all = listed(&self.buffers, "listing");
         if f.flags & frame::GAUSSIAN != 0 {
             let names = ["image", "listing", "list", "weights", "quads"];
@@ -316,8 +321,7 @@ impl<'a> Walk<'a> {
             let names = ["listing", "list", "quads", "roi", "mask", "lit", "stamps"];
             self.step(&threshold::GATHER, threshold::gather_twin, &names, all);
         } else {
-            self.step(&threshold::COLUMNS, threshold::columns_twin, &["image", "listing", "list", "columns"], all);
-            let names = ["image", "listing", "list", "columns", "roi", "mask", "lit", "stamps"];
+            let names = ["image", "listing", "list", "roi", "mask", "lit", "stamps"];
             self.step(&threshold::MEAN, threshold::mean_twin, &names, all);
         }
         self.buffers.insert("active", self.buffers["listing"].clone());

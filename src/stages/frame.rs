@@ -168,16 +168,22 @@ impl Frame {
 
     /// One shot's mask out of a batch's mask words.
     pub fn unpack_mask(&self, words: &[u32], shot: u32) -> Mask {
-        let (rows, w) = (self.tiles_y as usize * 8, self.tiles_x as usize);
-        let from = shot as usize * rows * w;
-        Mask { width: self.width, height: self.height, words: words[from..from + self.height as usize * w].to_vec() }
+        let place = |y: u32| (0..self.tiles_x).map(move |i| self.mask_word(shot, 32 * i, y));
+        let words = (0..self.height).flat_map(place).map(|at| words[at]).collect();
+        Mask { width: self.width, height: self.height, words }
     }
-    /// A mask in the layout of one shot: height padded to whole tiles.
+    /// A mask in the layout of one shot: tile by tile, height padded to whole tiles.
     pub fn pack_mask(&self, mask: &Mask) -> Vec<u32> {
         assert_eq!((mask.width, mask.height), (self.width, self.height));
-        let mut words = mask.words.clone();
-        words.resize((self.tiles_x * self.tiles_y * 8) as usize, 0);
+        let mut words = vec![0; (self.tiles_x * self.tiles_y * 8) as usize];
+        for (i, &word) in (0..).zip(&mask.words) {
+            words[self.mask_word(0, i % self.tiles_x * 32, i / self.tiles_x)] = word;
+        }
         words
+    }
+    /// Place of a pixel's word in a mask; its bit is x % 32.
+    pub fn mask_word(&self, shot: u32, x: u32, y: u32) -> usize {
+        (8 * ((shot * self.tiles_y + y / 8) * self.tiles_x + x / 32) + y % 8) as usize
     }
 }
 

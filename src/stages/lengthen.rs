@@ -173,10 +173,7 @@ pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     let [_, image, listing, list, mask, lit, long] = b else { unreachable!() };
     for &tile in &list[..listing[3] as usize] {
         let (tx, ty, shot) = tile_unpack(tile);
-        let place = |x: i32, y: i32| {
-            let row = shot * f.tiles_y * 8 + y as u32;
-            ((row * f.tiles_x + x as u32 / 32) as usize, x as u32 % 32)
-        };
+        let place = |x: i32, y: i32| (f.mask_word(shot, x as u32, y as u32), x as u32 % 32);
         let bit = |words: &[u32], x: i32, y: i32| {
             let (at, shift) = place(x, y);
             words[at] >> shift & 1 == 1

@@ -72,10 +72,10 @@ pub const REBASE: Stage = Stage {
     overrides: &[PX_LOG2],
 };
 
-/// Adds a tile: word 3 of the header counts, word 0 is the number of workgroups of 8 tiles.
+/// Adds a tile: word 3 of the header counts, word 0 is the number of workgroups of 64 tiles.
 pub fn append(listing: &mut [u32], list: &mut [u32], tile: u32) {
     list[listing[3] as usize] = tile;
-    listing[0] += u32::from(listing[3].is_multiple_of(8));
+    listing[0] += u32::from(listing[3].is_multiple_of(64));
     listing[3] += 1;
 }
 
@@ -86,8 +86,7 @@ pub fn tile_index(f: &Frame, tile: u32) -> usize {
 }
 /// Place of a tile's row in a mask.
 pub fn mask_index(f: &Frame, tile: u32, row: u32) -> usize {
-    let (x, y, shot) = tile_unpack(tile);
-    (((shot * f.tiles_y + y) * 8 + row) * f.tiles_x + x) as usize
+    8 * tile_index(f, tile) + row as usize
 }
 /// The latest stamp of a tile and its neighbours.
 pub fn latest(f: &Frame, stamps: &[u32], tile: u32) -> u32 {

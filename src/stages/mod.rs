@@ -2,6 +2,7 @@
 //! Frame and unit: image pixels (x right, y down, an integer is a pixel's centre), grey levels.
 
 pub mod ambient;
+pub mod bands;
 pub mod cases;
 pub mod chain;
 pub mod choose;
@@ -43,8 +44,8 @@ pub fn all() -> Vec<Entry> {
         exact(&listing::RESET, listing::reset_twin, || cases::of("reset")),
         exact(&ambient::STAGE, ambient::twin, || cases::of("ambient")),
         exact(&stats::STAGE, stats::twin, || cases::of("stats")),
+        exact(&bands::STAGE, bands::twin, || cases::of("bands")),
         unordered(&tiles::STAGE, tiles::twin, || cases::of("tiles")),
-        exact(&threshold::COLUMNS, threshold::columns_twin, || cases::of("columns")),
         exact(&threshold::MEAN, threshold::mean_twin, || cases::of("threshold")),
         Entry {
             compare: threshold::pixels_apart,

@@ -3,7 +3,7 @@
 
 use super::chain::ChainConfig;
 use super::frame::{PX_LOG2, px_log2};
-use super::{Frame, Window, ambient, lengthen, listing, skeleton, stats, thin, threshold, tiles};
+use super::{Frame, Window, ambient, bands, lengthen, listing, skeleton, stats, thin, threshold, tiles};
 use crate::fault::Result;
 use crate::gpu::{Buffer, Device, Pipeline, Recording};
 
@@ -19,14 +19,15 @@ const STEP_BYTES: u64 = 256;
 pub struct Shared {
     uniforms: Buffer,
     stats: Buffer,
+    bands: Buffer,
     roi: Buffer,
     first: Buffer,
     active: Buffer,
     list: Buffer,
     active_list: Buffer,
     weights: Buffer,
-    /// Column sums of the mean window, or the Gaussian window's quads.
-    sums: Buffer,
+    /// The Gaussian window's lit pixels before they are gathered into words.
+    quads: Buffer,
     pub mask: Buffer,
     other_mask: Buffer,
     pub lit: Buffer,
@@ -45,10 +46,11 @@ pub struct Pipelines {
     reset: Pipeline,
     ambient: Pipeline,
     stats: Pipeline,
+    bands: Pipeline,
     tiles: Pipeline,
     threshold: Pipeline,
-    /// Before the mean window's threshold its column sums; after the Gaussian one's the words of the mask.
-    spread: Pipeline,
+    /// After the Gaussian window's threshold: the words of the mask.
+    gather: Option<Pipeline>,
     thin: Pipeline,
     compact: Pipeline,
     rebase: Pipeline,
@@ -62,22 +64,27 @@ pub struct Pipelines {
 
 impl Pipelines {
     pub fn new(device: &Device, config: &ChainConfig) -> Result<Pipelines> {
-        let overrides = [(PX_LOG2, f64::from(px_log2(config.bits)))];
-        let build = |stage: &crate::gpu::Stage| stage.pipeline(device, &overrides);
+        let all =
+            [(PX_LOG2, f64::from(px_log2(config.bits))), (threshold::RADIUS, f64::from(config.threshold.size / 2))];
+        let build = |stage: &crate::gpu::Stage| {
+            let overrides: Vec<_> = all.into_iter().filter(|o| stage.overrides.contains(&o.0)).collect();
+            stage.pipeline(device, &overrides)
+        };
         Ok(Pipelines {
             clear: build(&listing::CLEAR)?,
             reset: build(&listing::RESET)?,
             ambient: build(&ambient::STAGE)?,
             stats: build(&stats::STAGE)?,
+            bands: build(&bands::STAGE)?,
             tiles: build(&tiles::STAGE)?,
             threshold: build(match config.threshold.window {
                 Window::Mean => &threshold::MEAN,
                 Window::Gaussian => &threshold::GAUSSIAN,
             })?,
-            spread: build(match config.threshold.window {
-                Window::Mean => &threshold::COLUMNS,
-                Window::Gaussian => &threshold::GATHER,
-            })?,
+            gather: match config.threshold.window {
+                Window::Mean => None,
+                Window::Gaussian => Some(build(&threshold::GATHER)?),
+            },
             thin: build(&thin::STAGE)?,
             compact: build(&listing::COMPACT)?,
             rebase: build(&listing::REBASE)?,
@@ -124,14 +131,15 @@ impl Shared {
         let gaussian = config.threshold.window == Window::Gaussian;
         Ok(Shared {
             uniforms,
-            stats: words("stats", 8 * f.tiles())?,
+            stats: words("stats", 4 * f.tiles())?,
+            bands: words("bands", 4 * f.tiles())?,
             roi,
             first: words("first list's header", listing::HEADER_WORDS)?,
             active: words("other lists' headers", listing::HEADER_WORDS * STEPS / STRIDE)?,
             list: words("list", f.tiles())?,
             active_list: words("active list", f.tiles())?,
             weights,
-            sums: words("sums", f.tiles() * if gaussian { 8 } else { 256 })?,
+            quads: words("quads", if gaussian { 8 * f.tiles() } else { 4 })?,
             mask: words("mask", f.mask_words())?,
             other_mask: words("other mask", f.mask_words())?,
             lit: words("lit", f.mask_words())?,
@@ -172,16 +180,19 @@ impl Shared {
             r.dispatch_parts(device, &p.ambient, &[zero, whole(image), whole(a)], ambient::groups(f));
         }
         r.dispatch_parts(device, &p.stats, &[zero, whole(image), whole(&self.stats)], stats::groups(f));
-        let tiles = [zero, whole(&self.stats), whole(&self.roi), self.all(), whole(&self.list)];
+        let (stats, bands, roi) = (whole(&self.stats), whole(&self.bands), whole(&self.roi));
+        r.dispatch_parts(device, &p.bands, &[zero, stats, bands], bands::groups(f));
+        let tiles = [zero, stats, bands, roi, self.all(), whole(&self.list)];
         r.dispatch_parts(device, &p.tiles, &tiles, tiles::groups(f));
-        let (list, sums, roi) = (whole(&self.list), whole(&self.sums), whole(&self.roi));
-        let (image, stamps) = (whole(image), whole(&self.stamps));
-        if p.threshold.stage.name == threshold::GAUSSIAN.name {
-            r.indirect(device, &p.threshold, &[zero, image, self.all(), list, whole(&self.weights), sums], all);
-            r.indirect(device, &p.spread, &[zero, self.all(), list, sums, roi, mask, lit, stamps], all);
-        } else {
-            r.indirect(device, &p.spread, &[zero, image, self.all(), list, sums], all);
-            r.indirect(device, &p.threshold, &[zero, image, self.all(), list, sums, roi, mask, lit, stamps], all);
+        let (list, image, stamps) = (whole(&self.list), whole(image), whole(&self.stamps));
+        match &p.gather {
+            None => r.indirect(device, &p.threshold, &[zero, image, self.all(), list, roi, mask, lit, stamps], all),
+            Some(gather) => {
+                let quads = whole(&self.quads);
+                let weights = whole(&self.weights);
+                r.indirect(device, &p.threshold, &[zero, image, self.all(), list, weights, quads], all);
+                r.indirect(device, gather, &[zero, self.all(), list, quads, roi, mask, lit, stamps], all);
+            }
         }
         r
     }

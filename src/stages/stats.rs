@@ -1,5 +1,5 @@
-//! In: pictures. Out: per block of 16 x 8 pixels (sum, largest | smallest << 16, smallest row sum,
-//! smallest column sum). Frame and unit: pixels, grey levels.
+//! In: pictures. Out: per block of 16 x 8 pixels (sum | largest << 15 | smallest << 24, smallest row sum |
+//! smallest column sum << 16). Frame and unit: pixels, 256ths of full scale.
 
 use super::frame::{self, Frame, PX_LOG2, SHARED, frame_of};
 use crate::gpu::{Access::*, Binding, Stage};
@@ -23,6 +23,37 @@ pub fn groups(f: &Frame) -> [u32; 3] {
     STAGE.groups([2 * f.tiles(), 1, 1])
 }
 
+/// Bits beyond eight of the pictures' depth. Deeper pictures are given in 256ths of full scale, which keeps a block
+/// in two words: rounded to the safe side, the largest pixel up and all else down.
+pub fn depth_shift(f: &Frame) -> u32 {
+    f.full_scale.count_ones() - 8
+}
+
+/// Statistics of one block, unpacked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Block {
+    pub sum: u32,
+    pub largest: u32,
+    pub smallest: u32,
+    pub row: u32,
+    pub column: u32,
+}
+
+impl Block {
+    pub fn unpack(words: &[u32]) -> Block {
+        Block {
+            sum: words[0] & 0x7fff,
+            largest: words[0] >> 15 & 511,
+            smallest: words[0] >> 24,
+            row: words[1] & 0xffff,
+            column: words[1] >> 16,
+        }
+    }
+    fn pack(&self) -> [u32; 2] {
+        [self.sum | self.largest << 15 | self.smallest << 24, self.row | self.column << 16]
+    }
+}
+
 /// Grey level at (x, y) of a shot in packed words; x may lie in the padding, y is clamped.
 pub fn padded_pixel(f: &Frame, image: &[u32], px_log2: u32, shot: u32, x: u32, y: u32) -> u32 {
     let bits = 32 >> px_log2;
@@ -33,7 +64,7 @@ pub fn padded_pixel(f: &Frame, image: &[u32], px_log2: u32, shot: u32, x: u32, y
 pub fn twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, image, stats] = b else { unreachable!() };
-    for (i, out) in stats.chunks_exact_mut(4).enumerate().take(2 * f.tiles() as usize) {
+    for (i, out) in stats.chunks_exact_mut(2).enumerate().take(2 * f.tiles() as usize) {
         let (x, y) = (i as u32 % (2 * f.tiles_x), i as u32 / (2 * f.tiles_x));
         let px = |c: u32, r: u32| {
             let y_in_shot = y % f.tiles_y * 8 + r;
@@ -42,9 +73,14 @@ pub fn twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
         let rows: Vec<u32> = (0..8).map(|r| (0..16).map(|c| px(c, r)).sum()).collect();
         let columns: Vec<u32> = (0..16).map(|c| (0..8).map(|r| px(c, r)).sum()).collect();
         let all = || (0..8).flat_map(|r| (0..16).map(move |c| (c, r))).map(|(c, r)| px(c, r));
-        out[0] = rows.iter().sum();
-        out[1] = all().max().unwrap() | all().min().unwrap() << 16;
-        out[2] = *rows.iter().min().unwrap();
-        out[3] = *columns.iter().min().unwrap();
+        let deep = depth_shift(&f);
+        let block = Block {
+            sum: rows.iter().sum::<u32>() >> deep,
+            largest: all().max().expect("128 pixels").div_ceil(1 << deep),
+            smallest: all().min().expect("128 pixels") >> deep,
+            row: rows.iter().min().expect("8 rows") >> deep,
+            column: columns.iter().min().expect("16 columns") >> deep,
+        };
+        out.copy_from_slice(&block.pack());
     }
 }

@@ -150,7 +150,9 @@ pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, listing, list, before, after, stamps] = b else { unreachable!() };
     let former = stamps.clone();
-    let words = f.tiles_x as usize;
+    // A row of the mask as words; beyond the last tile there is none, but it is never asked for: y + 1 < height.
+    let line =
+        |shot: u32, y: u32| -> Vec<u32> { (0..f.tiles_x).map(|i| before[f.mask_word(shot, 32 * i, y)]).collect() };
     for &tile in list[..listing[3] as usize].iter().filter(|&&t| former[tile_index(&f, t)] > f.step) {
         let (tx, ty, shot) = tile_unpack(tile);
         for row in 0..8 {
@@ -160,10 +162,8 @@ pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
                 after[own] = before[own];
                 continue;
             }
-            let top = (shot * f.tiles_y * 8) as usize;
-            let line = |y: u32| &before[(top + y as usize) * words..(top + y as usize + 1) * words];
-            // The row below the last tile does not exist; it is never reached, because y + 1 < height.
-            let p = neighbours([line(y - 1), line(y), line(y + 1)], tx as usize);
+            let lines = [line(shot, y - 1), line(shot, y), line(shot, y + 1)];
+            let p = neighbours([&lines[0], &lines[1], &lines[2]], tx as usize);
             let gone = before[own] & deletions(f.rule(), &p, f.step % 2 == 1) & interior(f.width, tx as usize);
             after[own] = before[own] & !gone;
             // A change wakes its own tile, and a neighbour only where it touches it.

@@ -7,10 +7,13 @@ use crate::fault::{Fault, Result};
 use crate::gpu::{Access::*, Binding, Stage};
 use crate::raster::{Image, Mask};
 
-/// Column sums over the window's height, for the mean window.
-pub const COLUMNS: Stage = Stage {
-    name: "columns",
-    wgsl: include_str!("../../shaders/columns.wgsl"),
+/// Half the window's edge, less a half: a constant of the mean window's pipeline.
+pub const RADIUS: &str = "radius";
+
+/// Mean window.
+pub const MEAN: Stage = Stage {
+    name: "threshold",
+    wgsl: include_str!("../../shaders/threshold.wgsl"),
     shared: &[SHARED],
     workgroup: [64, 1, 1],
     bindings: &[
@@ -18,28 +21,13 @@ pub const COLUMNS: Stage = Stage {
         Binding { name: "image", access: Read },
         Binding { name: "listing", access: Read },
         Binding { name: "list", access: Read },
-        Binding { name: "columns", access: ReadWrite },
-    ],
-    uniform: frame::UNIFORM,
-    overrides: &[PX_LOG2],
-};
-
-/// Mean window.
-pub const MEAN: Stage = Stage {
-    name: "threshold",
-    wgsl: include_str!("../../shaders/threshold.wgsl"),
-    bindings: &[
-        Binding { name: "frame", access: Uniform },
-        Binding { name: "image", access: Read },
-        Binding { name: "listing", access: Read },
-        Binding { name: "list", access: Read },
-        Binding { name: "columns", access: Read },
         Binding { name: "roi", access: Read },
         Binding { name: "mask", access: ReadWrite },
         Binding { name: "lit", access: ReadWrite },
         Binding { name: "stamps", access: ReadWrite },
     ],
-    ..COLUMNS
+    uniform: frame::UNIFORM,
+    overrides: &[PX_LOG2, RADIUS],
 };
 
 /// Gaussian window.
@@ -55,7 +43,8 @@ pub const GAUSSIAN: Stage = Stage {
         Binding { name: "weights", access: Read },
         Binding { name: "quads", access: ReadWrite },
     ],
-    ..COLUMNS
+    overrides: &[PX_LOG2],
+    ..MEAN
 };
 
 /// Quads to words, cut to the picture and the region of interest.
@@ -72,7 +61,8 @@ pub const GATHER: Stage = Stage {
         Binding { name: "lit", access: ReadWrite },
         Binding { name: "stamps", access: ReadWrite },
     ],
-    ..COLUMNS
+    shared: &[SHARED],
+    ..GAUSSIAN
 };
 
 /// The mean that a pixel is compared with.
@@ -259,43 +249,17 @@ fn padded_shot(f: &Frame, image: &[u32], px_log2: u32, shot: u32) -> Image {
     Image { width: w, height: h, bits: 16, pixels: crate::raster::Pixels::U16(px.collect()) }
 }
 
-/// Sums of each column over the window's height, for the rows of the listed tiles and as far beside them as
-/// the window reaches, rounded to whole words.
-pub fn columns_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
-    let f = frame_of(b);
-    let px_log2 = overrides[0].1 as u32;
-    let [_, image, listing, list, columns] = b else { unreachable!() };
-    let (wide, r) = (32 * f.tiles_x, f.size / 2);
-    let reach = r.next_multiple_of(1 << px_log2);
-    for &tile in &list[..listing[3] as usize] {
-        let (tx, ty, shot) = tile_unpack(tile);
-        for x in (32 * tx).saturating_sub(reach)..(32 * (tx + 1) + reach).min(wide) {
-            for y in 8 * ty..8 * (ty + 1) {
-                let rows = y as i32 - r as i32..=(y + r) as i32;
-                let sum = rows.map(|y| padded_pixel(&f, image, px_log2, shot, x, y.max(0) as u32)).sum();
-                columns[((shot * f.tiles_y * 8 + y) * wide + x) as usize] = sum;
-            }
-        }
-    }
-}
-
 pub fn mean_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let p = f.threshold();
-    let [_, image, listing, list, columns, roi, mask, lit, stamps] = b else { unreachable!() };
-    let (wide, r) = (32 * f.tiles_x as i32, (f.size / 2) as i32);
+    let masks: Vec<Mask> = (0..f.shots).map(|s| twin(&padded_shot(&f, &b[1], overrides[0].1 as u32, s), &p)).collect();
+    let [_, _, listing, list, roi, mask, lit, stamps] = b else { unreachable!() };
     for &tile in &list[..listing[3] as usize] {
         let (tx, ty, shot) = tile_unpack(tile);
         for row in 0..8 {
             let y = 8 * ty + row;
-            let base = (shot * f.tiles_y * 8 + y) as usize * wide as usize;
-            let mut bits = 0;
-            for x in (32 * tx..32 * (tx + 1)).filter(|&x| x < f.width && y < f.height) {
-                let near = x as i32 - r..=x as i32 + r;
-                let sum = near.map(|x| columns[base + x.clamp(0, wide - 1) as usize]).sum();
-                let value = padded_pixel(&f, image, overrides[0].1 as u32, shot, x, y);
-                bits |= u32::from(passes_mean(value, sum, &p)) << (x % 32);
-            }
+            let passes = |x: u32| 32 * tx + x < f.width && y < f.height && masks[shot as usize].get(32 * tx + x, y);
+            let bits = (0..32).filter(|&x| passes(x)).fold(0, |w, x| w | 1 << x);
             store(&f, tile, row, bits, roi, mask, lit, stamps);
         }
     }
@@ -314,7 +278,7 @@ fn store(
     stamps: &mut [u32],
 ) {
     let (tx, ty, _) = tile_unpack(tile);
-    let region = if f.flags & frame::HAS_ROI != 0 { roi[((8 * ty + row) * f.tiles_x + tx) as usize] } else { !0 };
+    let region = if f.flags & frame::HAS_ROI != 0 { roi[f.mask_word(0, 32 * tx, 8 * ty + row)] } else { !0 };
     let at = super::listing::mask_index(f, tile, row);
     mask[at] = bits & region;
     lit[at] = bits & region;
