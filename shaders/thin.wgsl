@@ -60,16 +60,15 @@ fn guo_hall(p2: vec4<u32>, p3: vec4<u32>, p4: vec4<u32>, p5: vec4<u32>, p6: vec4
     return c.one & ~c.more & n1 & n2 & ~(all1 & all2) & ~stays;
 }
 
+// 0 Zhang-Suen, 1 Guo-Hall: a constant, so that the other rule is not in the code.
+override rule: u32 = 0u;
+
 fn gone_of(p2: vec4<u32>, p3: vec4<u32>, p4: vec4<u32>, p5: vec4<u32>, p6: vec4<u32>, p7: vec4<u32>, p8: vec4<u32>, p9: vec4<u32>) -> vec4<u32> {
     let second = (frame.step & 1u) != 0u;
-    var gone = vec4(0u);
-    for (var zs = frame.rule; zs == 0u; zs++) {
-        gone = zhang_suen(p2, p3, p4, p5, p6, p7, p8, p9, second);
+    if rule == 0u {
+        return zhang_suen(p2, p3, p4, p5, p6, p7, p8, p9, second);
     }
-    for (var gh = frame.rule; gh == 1u; gh++) {
-        gone = guo_hall(p2, p3, p4, p5, p6, p7, p8, p9, second);
-    }
-    return gone;
+    return guo_hall(p2, p3, p4, p5, p6, p7, p8, p9, second);
 }
 
 @compute @workgroup_size(64)

@@ -106,9 +106,7 @@ fn centres_are_as_good_as_the_light_allows() {
             let stripe = Stripe { sigma, peak, slope: 0.03 };
             let one = stripe.bound(0.3, |i, _| f64::from(u8::from(i == 0)));
             let radius = 2.4 * sigma;
-            let stride = ((0.7 * sigma) as i32).max(1);
-            let wide = stripe
-                .bound(0.3, |i, t| if i % stride == 0 { (1.0 - (t / radius).powi(2)).max(0.0).powi(2) } else { 0.0 });
+            let wide = stripe.bound(0.3, |_, t| (1.0 - (t / radius).powi(2)).max(0.0).powi(2));
             let (sd_one, bias_one) = errors(&stripe, Method::Gaussian, 0.0, 3);
             let (sd_wide, bias_wide) = errors(&stripe, Method::Gaussian, 1.0, 3);
             let centroid = errors(&stripe, Method::Centroid, 0.0, 1).0 / one;

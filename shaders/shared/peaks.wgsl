@@ -12,10 +12,9 @@ struct PeakFrame {
     speckle2: f32,
     along_factor: f32,
     reach_along: i32,
-    stride_along: i32,
-    reach: i32,
+    stride_across: i32,
+    lattice: i32,
     stride: i32,
-    lag: i32,
     steps: u32,
     faintest: f32,
     narrowest: f32,
@@ -33,6 +32,7 @@ struct PeakFrame {
     entries: u32,
     reserved_0: u32,
     reserved_1: u32,
+    reserved_2: u32,
 }
 
 // One peak, 12 words.

@@ -289,6 +289,7 @@ impl<'a> Walk<'a> {
         let all = [
             (frame::PX_LOG2, f64::from(px_log2(self.scene.shots[0].bits))),
             (threshold::RADIUS, f64::from(self.frame.size / 2)),
+            (thin::RULE, f64::from(self.frame.rule)),
         ];
         let overrides: Vec<_> = all.into_iter().filter(|o| stage.overrides.contains(&o.0)).collect();
         let mut bindings = vec![bytemuck::cast_slice::<Frame, u32>(&[self.frame]).to_vec()];

@@ -89,10 +89,7 @@ impl Frame {
             offset: p.offset,
             minimum: u32::from(p.minimum),
             flags: if p.window == Window::Gaussian { GAUSSIAN } else { 0 },
-            rule: match rule {
-                Thinning::ZhangSuen => 0,
-                Thinning::GuoHall => 1,
-            },
+            rule: rule.number(),
             step: 0,
             // One pixel in ten is more than a scene with a stripe ever gives; a small picture keeps all.
             capacity: (width * height / 10).max((width * height).min(32768)) * shots,

@@ -64,8 +64,11 @@ pub struct Pipelines {
 
 impl Pipelines {
     pub fn new(device: &Device, config: &ChainConfig) -> Result<Pipelines> {
-        let all =
-            [(PX_LOG2, f64::from(px_log2(config.bits))), (threshold::RADIUS, f64::from(config.threshold.size / 2))];
+        let all = [
+            (PX_LOG2, f64::from(px_log2(config.bits))),
+            (threshold::RADIUS, f64::from(config.threshold.size / 2)),
+            (thin::RULE, f64::from(config.thinning.number())),
+        ];
         let build = |stage: &crate::gpu::Stage| {
             let overrides: Vec<_> = all.into_iter().filter(|o| stage.overrides.contains(&o.0)).collect();
             stage.pipeline(device, &overrides)

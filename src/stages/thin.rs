@@ -21,8 +21,11 @@ pub const STAGE: Stage = Stage {
         Binding { name: "stamps", access: ReadWrite },
     ],
     uniform: frame::UNIFORM,
-    overrides: &[PX_LOG2],
+    overrides: &[PX_LOG2, RULE],
 };
+
+/// Selects the rule when the pipeline is built, `Frame::rule`.
+pub const RULE: &str = "rule";
 
 /// The rule that decides which boundary pixels go.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -31,6 +34,16 @@ pub enum Thinning {
     #[default]
     ZhangSuen,
     GuoHall,
+}
+
+impl Thinning {
+    /// The value of the override [`RULE`].
+    pub fn number(self) -> u32 {
+        match self {
+            Thinning::ZhangSuen => 0,
+            Thinning::GuoHall => 1,
+        }
+    }
 }
 
 /// The eight neighbours of 32 pixels, clockwise from north: p2 to p9 of the papers.

@@ -1,29 +1,34 @@
 //! In: a picture, a skeleton pixel, the expected stripe. Out: the maximum-likelihood Gaussian profile across it.
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels. docs/math.md, Stripe peak (1) to (5).
 
+use super::profile::{Profile, by_columns};
 use super::{Grey, Peak, PeakFrame, SATURATED};
 
-/// Direction across the stripe: the strongest eigenvector of the structure tensor, with differences over one
-/// stripe width so that noise of single pixels does not turn it (docs/math.md, Stripe peak (1)).
+/// Grey levels to each side that the direction is taken from, and in all.
+const SIDE: i32 = 4;
+const LATTICE: usize = 2 * SIDE as usize + 1;
+
+/// Direction across the stripe: the strongest eigenvector of the structure tensor, on a lattice of grey levels so far
+/// apart that noise of single pixels does not turn it (docs/math.md, Stripe peak (1)).
 pub(super) fn direction<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> (f32, f32) {
-    let edge = (s.reach + 1) as f32;
-    let scale = 1.0 / (edge * edge);
+    let mut lattice = [0f32; LATTICE * LATTICE];
+    for (k, level) in lattice.iter_mut().enumerate() {
+        let (i, j) = ((k % LATTICE) as i32 - SIDE, (k / LATTICE) as i32 - SIDE);
+        *level = image.at(x + i * s.lattice, y + j * s.lattice);
+    }
     let (mut xx, mut xy, mut yy) = (0f32, 0f32, 0f32);
-    let mut j = -s.reach;
-    while j <= s.reach {
-        let mut i = -s.reach;
-        while i <= s.reach {
-            let fade = (1.0 - (i * i + j * j) as f32 * scale).max(0.0);
+    for j in 1..LATTICE - 1 {
+        for i in 1..LATTICE - 1 {
+            let at = LATTICE * j + i;
+            let (a, b) = (i as i32 - SIDE, j as i32 - SIDE);
+            let fade = (1.0 - (a * a + b * b) as f32 / (SIDE * SIDE) as f32).max(0.0);
             let weight = fade * fade;
-            let (a, b) = (x + i, y + j);
-            let gx = image.at(a + s.lag, b) - image.at(a - s.lag, b);
-            let gy = image.at(a, b + s.lag) - image.at(a, b - s.lag);
+            let gx = lattice[at + 1] - lattice[at - 1];
+            let gy = lattice[at + LATTICE] - lattice[at - LATTICE];
             xx += weight * (gx * gx);
             xy += weight * (gx * gy);
             yy += weight * (gy * gy);
-            i += s.stride;
         }
-        j += s.stride;
     }
     let d = 0.5 * (xx - yy);
     let q = (d * d + xy * xy).sqrt();
@@ -55,83 +60,45 @@ pub(super) fn background<G: Grey>(image: G, x: i32, y: i32, nx: f32, ny: f32, s:
     low.min(high) / n
 }
 
-/// The pixels that take part: columns (or rows) along the stripe, in each those within three widths of the line.
-/// `visit` gets offset across, offset along, weight, grey level.
-#[inline(always)]
-pub(super) fn window<G: Grey>(
-    image: G,
-    (x, y): (i32, i32),
-    (nx, ny): (f32, f32),
-    m0: f32,
-    s: &PeakFrame,
-    mut visit: impl FnMut(f32, f32, f32),
-) {
-    // Walk along the image axis that is nearer to the stripe.
-    let rows = ny >= nx.abs();
-    let (na, nb) = if rows { (nx, ny) } else { (ny, nx) };
-    let half = 3.0 * s.s0;
-    let reach = (half / nb.abs()).ceil() as i32;
-    let mut i = -s.reach_along;
-    while i <= s.reach_along {
-        let centre = ((m0 - i as f32 * na) / nb + 0.5).floor() as i32;
-        for j in centre - reach..=centre + reach {
-            let (di, dj) = if rows { (i, j) } else { (j, i) };
-            let d = di as f32 * nx + dj as f32 * ny;
-            let t = dj as f32 * nx - di as f32 * ny;
-            let (a, b) = (x + di, y + dj);
-            if (d - m0).abs() <= half && a >= 0 && b >= 0 && a < s.width && b < s.height {
-                let fade = (1.0 - s.along_factor * (t * t)).max(0.0);
-                visit(d, fade * fade, image.at(a, b));
-            }
-        }
-        i += s.stride_along;
-    }
-}
+/// Samples for which the noise model counts.
+const BELIEF: f32 = 10.0;
 
-/// First guess of offset and amplitude: centre of gravity and sum above the background.
-pub(super) fn guess<G: Grey>(image: G, at: (i32, i32), n: (f32, f32), background: f32, s: &PeakFrame) -> (f32, f32) {
-    let (mut sum, mut moment, mut square) = (0f32, 0f32, 0f32);
-    window(image, at, n, 0.0, s, |d, weight, level| {
-        // A window of 1.5 widths: neighbours of the stripe shall not pull.
-        let near = if d.abs() <= 1.5 * s.s0 + 0.5 { weight } else { 0.0 };
-        let light = near * (level - background).max(0.0);
-        sum += light;
-        moment += light * d;
-        square += near;
-    });
-    let m = if sum > 0.0 { moment / sum } else { 0.0 };
-    (m, (1.25 * sum / square.max(1e-6)).max(1.0))
-}
-
-/// Fisher scoring of amplitude, offset and width. Variance of a pixel: read noise + gain · level + speckle² · light².
-/// A saturated pixel says only "at least this bright": it pulls while the model is below it and is silent above.
+/// Fisher scoring of amplitude, offset and width on the profile. Variance of a pixel: read noise + gain · level +
+/// speckle² · light². A saturated pixel says only "at least this bright".
 pub(super) fn gaussian<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak {
-    let (nx, ny) = direction(image, x, y, s);
-    let base = background(image, x, y, nx, ny, s);
-    let (m0, mut a) = guess(image, (x, y), (nx, ny), base, s);
-    let (mut m, mut w) = (m0, s.s0);
+    let n = direction(image, x, y, s);
+    let base = background(image, x, y, n.0, n.1, s);
+    let profile = Profile::new(image, (x, y), n, s);
+    let (m0, mut a) = profile.guess(base, s);
+    // The width that is expected of the profile.
+    let s0 = (s.s0 * s.s0 + profile.blur2).sqrt();
+    let (mut m, mut w) = (m0, s0);
     // A weak belief that the width is the expected one keeps two or three lit pixels solvable.
-    let prior = 4.0 / (s.s0 * s.s0);
-    let (mut i11, mut chi, mut spread) = (0f32, 0f32, 1f32);
+    let prior = 4.0 / (s0 * s0);
+    let (mut i11, mut chi, mut samples) = (0f32, 0f32, 0f32);
     let mut saturated = false;
     let mut step = 0;
     while step < s.steps {
         let (mut h00, mut h01, mut h02, mut h11, mut h12, mut h22) = (1e-9f32, 0f32, 0f32, 1e-9f32, 0f32, prior);
-        let (mut g0, mut g1, mut g2) = (0f32, 0f32, prior * (s.s0 - w));
-        let (mut sum, mut sum_square, mut sum_weight) = (0f32, 0f32, 0f32);
+        let (mut g0, mut g1, mut g2) = (0f32, 0f32, prior * (s0 - w));
+        let (mut sum, mut count) = (0f32, 0f32);
         let mut any = false;
         let inverse = 1.0 / w;
-        window(image, (x, y), (nx, ny), m0, s, |d, weight, level| {
+        for k in 0..profile.count {
+            let (d, level, clear) = profile.sample(k);
             let z = (d - m) * inverse;
             let shape = (-0.5 * (z * z)).exp();
             let model = a * shape;
-            let full = level >= s.full_scale;
-            any = any || (full && weight > 0.0);
-            let silent = full && model + base >= level;
-            let residual = level - base - model;
+            let inside = (d - m0).abs() <= 3.0 * s0;
+            any = any || (clear < 1.0 && inside);
+            // Clipped pixels pull while the model is below them, and are silent above.
+            let above = model + base >= s.full_scale;
+            let unclipped = (level - s.full_scale * (1.0 - clear)) / clear.max(1e-3);
+            let residual = (if above { unclipped } else { level }) - base - model;
             let quiet = s.read2 + s.gain * (model + base);
-            let believed = if silent { 0.0 } else { weight };
-            let certainty = believed / (quiet + s.speckle2 * (model * model));
+            let share = if above { clear } else { 1.0 };
+            let believed = if inside { share } else { 0.0 };
+            let certainty = (believed * profile.weight) / (quiet + s.speckle2 * (model * model));
             let jm = model * (z * inverse);
             let jw = jm * z;
             h00 += certainty * (shape * shape);
@@ -144,9 +111,8 @@ pub(super) fn gaussian<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak
             g1 += certainty * (jm * residual);
             g2 += certainty * (jw * residual);
             sum += certainty * (residual * residual);
-            sum_weight += believed;
-            sum_square += believed * believed;
-        });
+            count += believed;
+        }
         let c00 = h11 * h22 - h12 * h12;
         let c01 = h02 * h12 - h01 * h22;
         let c02 = h01 * h12 - h02 * h11;
@@ -159,33 +125,56 @@ pub(super) fn gaussian<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak
         let dw = (c02 * g0 + (c12 * g1 + c22 * g2)) / det;
         // Bounded steps: the model is not linear far from the answer.
         let da = da.clamp(-0.5 * a, a);
-        let dm = dm.clamp(-0.7 * s.s0, 0.7 * s.s0);
-        let dw = dw.clamp(-0.3 * s.s0, 0.3 * s.s0);
+        let dm = dm.clamp(-0.7 * s0, 0.7 * s0);
+        let dw = dw.clamp(-0.3 * s0, 0.3 * s0);
         a = (a + da).max(1.0);
-        m = (m + dm).clamp(m0 - 2.0 * s.s0, m0 + 2.0 * s.s0);
-        w = (w + dw).clamp(0.3 * s.s0, 3.0 * s.s0);
+        m = (m + dm).clamp(m0 - 2.0 * s0, m0 + 2.0 * s0);
+        w = (w + dw).clamp(0.3 * s0, 3.0 * s0);
         i11 = c11 / det;
-        let pixels = sum_weight.max(1e-6);
-        chi = sum / pixels;
-        spread = sum_square / pixels;
+        (chi, samples) = (sum, count);
         saturated = any;
         step += 1;
-        if dm.abs() < 2e-3 * s.s0 && dw.abs() < 5e-3 * s.s0 && da.abs() < 5e-3 * a {
+        if dm.abs() < 2e-3 * s0 && dw.abs() < 5e-3 * s0 && da.abs() < 5e-3 * a {
             break;
         }
     }
-    // Where the noise is larger than the model says, the centre is less certain by the same factor.
-    let sigma = (i11 * spread * chi.max(0.05)).max(0.0).sqrt();
+    // A sample is the weighted mean of pixels that err independently: its variance is a pixel's times this.
+    let share = profile.square / profile.weight;
+    // Where the noise is larger than the model says, the centre is less certain by the same factor. Few samples tell
+    // little of it, so where it seems smaller the model counts for ten samples.
+    let free = (samples - 3.0).max(1.0);
+    let squares = chi / share;
+    let noise = (squares / free).max((BELIEF + squares) / (BELIEF + free));
+    let sigma = (i11 * share * noise).max(0.0).sqrt();
+    let width = (w * w - profile.blur2).max(0.01 * s.s0 * s.s0).sqrt();
+    finish(x, y, n, m, a, base, width, sigma, saturated, s)
+}
+
+#[allow(clippy::too_many_arguments)]
+pub(super) fn finish(
+    x: i32,
+    y: i32,
+    (nx, ny): (f32, f32),
+    m: f32,
+    amplitude: f32,
+    base: f32,
+    width: f32,
+    sigma: f32,
+    saturated: bool,
+    s: &PeakFrame,
+) -> Peak {
+    // Along the image axis that the profile was taken on: on the line, however the direction errs.
+    let columns = by_columns((nx, ny));
     Peak {
-        u: x as f32 + m * nx,
-        v: y as f32 + m * ny,
+        u: x as f32 + if columns { 0.0 } else { m / nx },
+        v: y as f32 + if columns { m / ny } else { 0.0 },
         normal_u: nx,
         normal_v: ny,
-        amplitude: a,
+        amplitude,
         background: base,
-        width_px: w,
+        width_px: width,
         sigma_px: sigma,
-        snr: a / (s.read2 + s.gain * base).sqrt(),
+        snr: amplitude / (s.read2 + s.gain * base).sqrt(),
         flags: if saturated { SATURATED } else { 0 },
         ..Peak::default()
     }

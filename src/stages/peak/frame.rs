@@ -25,13 +25,14 @@ pub struct PeakFrame {
     pub speckle2: f32,
     /// 1 / R², px⁻²; the weight along the stripe is (1 - t² / R²)², close to a Gaussian of sigma R / 2.4.
     pub along_factor: f32,
-    /// Half window along the stripe, px, and its step: a wide stripe has light to spare.
+    /// Half window along the stripe, px.
     pub reach_along: i32,
-    pub stride_along: i32,
-    /// Half window of the direction, px, its step and the lag of its differences.
-    pub reach: i32,
+    /// Step of the profile's samples across the stripe, px: a stripe wider than 8 px has light to spare.
+    pub stride_across: i32,
+    /// Spacing of the grey levels that the direction is taken from, px.
+    pub lattice: i32,
+    /// Step of the background's samples, px.
     pub stride: i32,
-    pub lag: i32,
     pub steps: u32,
     /// Limits of the choice: grey levels, px, px, px, cosine.
     pub faintest: f32,
@@ -53,12 +54,13 @@ pub struct PeakFrame {
     pub entries: u32,
     pub reserved_0: u32,
     pub reserved_1: u32,
+    pub reserved_2: u32,
 }
 
 pub const UNIFORM: (&str, &[Field], usize) = crate::stages::frame::uniform_fields!(PeakFrame: width, height, pitch, shot_words, s0, full_scale,
-    read2, gain, speckle2, along_factor, reach_along, stride_along, reach, stride, lag, steps, faintest, narrowest,
+    read2, gain, speckle2, along_factor, reach_along, stride_across, lattice, stride, steps, faintest, narrowest,
     widest, uncertain, upright, across_u, across_v, cut_width, cut_amplitude, echo, echo_reach, lines, columns, entries,
-    reserved_0, reserved_1);
+    reserved_0, reserved_1, reserved_2);
 
 impl PeakFrame {
     /// `across`: unit image direction of depth ([`crate::stages::point::Optics::across`]).
@@ -73,7 +75,6 @@ impl PeakFrame {
         let scale = full_scale / 255.0;
         let s0 = p.width_px;
         let radius = 2.4 * (p.along * s0).max(0.05);
-        let stride_along = (0.7 * s0).floor().max(1.0) as i32;
         let pitch = (width.div_ceil(32) * 32) >> px_log2(bits);
         // Lines across the stripe are image columns, or rows where the laser lies the other way.
         let columns = across[1].abs() >= across[0].abs();
@@ -90,12 +91,12 @@ impl PeakFrame {
             speckle2: p.speckle * p.speckle,
             // One line across the stripe needs no fading.
             along_factor: if p.along > 0.0 { 1.0 / (radius * radius) } else { 0.0 },
-            // Whole steps, so that the skeleton pixel's own line is among them.
-            reach_along: (radius / stride_along as f32).floor() as i32 * stride_along,
-            stride_along,
-            reach: (3.0 * s0).ceil() as i32,
-            stride: (0.7 * s0).floor().max(1.0) as i32,
-            lag: s0.round().max(1.0) as i32,
+            reach_along: if p.along > 0.0 { radius.floor() as i32 } else { 0 },
+            stride_across: (0.25 * s0).floor().max(1.0) as i32,
+            // Differences over nearly three widths: noise and speckle turn the direction least, and a Gaussian has
+            // little left between samples that far apart.
+            lattice: (1.4 * s0).round().max(1.0) as i32,
+            stride: (0.7 * s0).round().max(1.0) as i32,
             steps: p.steps,
             faintest: c.faintest * scale,
             narrowest: c.narrowest * s0,
@@ -113,6 +114,7 @@ impl PeakFrame {
             entries: lines * shots,
             reserved_0: 0,
             reserved_1: 0,
+            reserved_2: 0,
         }
     }
 }

@@ -83,13 +83,13 @@ fn excess<G: Grey>(image: G, x: i32, y: i32, k: &Peak, s: &PeakFrame) -> Option<
         (j, light, quiet, quiet + s.speckle2 * light * light)
     };
     let mut normal = nalgebra::Matrix3::zeros();
-    fit::window(image, (x, y), n, m, s, |d, weight, _| {
+    window(image, (x, y), n, m, s, |d, weight, _| {
         let (j, _, _, variance) = row(d);
         normal += j * j.transpose() * (weight / variance);
     });
     let inverse = normal.try_inverse()?;
     let (mut excess, mut sum) = (0f32, 0f32);
-    fit::window(image, (x, y), n, m, s, |d, weight, level| {
+    window(image, (x, y), n, m, s, |d, weight, level| {
         let (j, light, quiet, variance) = row(d);
         let left = (1.0 - weight / variance * (inverse * j).dot(&j)).max(0.0);
         let residual = level - k.background - light;
@@ -97,6 +97,39 @@ fn excess<G: Grey>(image: G, x: i32, y: i32, k: &Peak, s: &PeakFrame) -> Option<
         sum += weight * left * light * light;
     });
     (sum > 0.0).then_some((excess, sum))
+}
+
+/// The pixels that take part: columns (or rows) along the stripe, in each those within three widths of the line.
+/// `visit` gets offset across, offset along, weight, grey level.
+#[inline(always)]
+fn window<G: Grey>(
+    image: G,
+    (x, y): (i32, i32),
+    (nx, ny): (f32, f32),
+    m0: f32,
+    s: &PeakFrame,
+    mut visit: impl FnMut(f32, f32, f32),
+) {
+    // Walk along the image axis that is nearer to the stripe.
+    let rows = ny >= nx.abs();
+    let (na, nb) = if rows { (nx, ny) } else { (ny, nx) };
+    let half = 3.0 * s.s0;
+    let reach = (half / nb.abs()).ceil() as i32;
+    let mut i = -s.reach_along;
+    while i <= s.reach_along {
+        let centre = ((m0 - i as f32 * na) / nb + 0.5).floor() as i32;
+        for j in centre - reach..=centre + reach {
+            let (di, dj) = if rows { (i, j) } else { (j, i) };
+            let d = di as f32 * nx + dj as f32 * ny;
+            let t = dj as f32 * nx - di as f32 * ny;
+            let (a, b) = (x + di, y + dj);
+            if (d - m0).abs() <= half && a >= 0 && b >= 0 && a < s.width && b < s.height {
+                let fade = (1.0 - s.along_factor * (t * t)).max(0.0);
+                visit(d, fade * fade, image.at(a, b));
+            }
+        }
+        i += 1;
+    }
 }
 
 /// Median over the sample of the pixels above half of the local maximum, along the shorter image axis, as a sigma.

@@ -1,32 +1,35 @@
 //! In: a picture, a skeleton pixel, the expected stripe. Out: peaks by centre of gravity and by derivatives.
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels.
 
-use super::fit::{background, direction, guess, window};
-use super::{Grey, Peak, PeakFrame, SATURATED};
+use super::fit::{background, direction, finish};
+use super::profile::Profile;
+use super::{Grey, Peak, PeakFrame};
 
 /// Centre of gravity of the light above the background, within three widths of a first guess.
 pub(super) fn centroid<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak {
     let n = direction(image, x, y, s);
     let base = background(image, x, y, n.0, n.1, s);
-    let (m0, _) = guess(image, (x, y), n, base, s);
+    let profile = Profile::new(image, (x, y), n, s);
+    let (m0, _) = profile.guess(base, s);
     let (mut sum, mut first, mut second, mut noise, mut top) = (0f32, 0f32, 0f32, 0f32, 0f32);
     let mut saturated = false;
-    window(image, (x, y), n, m0, s, |d, weight, level| {
-        let light = weight * (level - base);
+    for k in 0..profile.count {
+        let (d, level, clear) = profile.sample(k);
+        let inside = (d - m0).abs() <= 3.0 * s.s0;
+        let light = if inside { level - base } else { 0.0 };
         sum += light;
         first += light * d;
         second += light * (d * d);
-        if weight > 0.0 {
-            top = top.max(level - base);
-            saturated |= level >= s.full_scale;
-        }
-        let e = weight * (d - m0);
+        top = top.max(light);
+        saturated = saturated || (clear < 1.0 && inside);
+        let e = if inside { d - m0 } else { 0.0 };
         let lit = (level - base).max(0.0);
         noise += (e * e) * (s.read2 + s.gain * level + s.speckle2 * (lit * lit));
-    });
+    }
     let m = if sum > 0.0 { (first / sum).clamp(m0 - 2.0 * s.s0, m0 + 2.0 * s.s0) } else { m0 };
-    let width = (second / sum.max(1e-6) - m * m).max(0.0).sqrt();
-    finish(x, y, n, m, top.max(1.0), base, width, noise.sqrt() / sum.max(1e-6), saturated, s)
+    let width = (second / sum.max(1e-6) - m * m - profile.blur2).max(0.0).sqrt();
+    let share = profile.square / (profile.weight * profile.weight);
+    finish(x, y, n, m, top.max(1.0), base, width, (noise * share).sqrt() / sum.max(1e-6), saturated, s)
 }
 
 /// Steger's line point: second-order Taylor expansion of the picture smoothed with a Gaussian of sigma
@@ -35,7 +38,7 @@ pub(super) fn derivative<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Pe
     let n = direction(image, x, y, s);
     let base = background(image, x, y, n.0, n.1, s);
     // The expansion holds within half a pixel: it starts at the pixel nearest to the centre of gravity.
-    let (m0, _) = guess(image, (x, y), n, base, s);
+    let (m0, _) = Profile::new(image, (x, y), n, s).guess(base, s);
     let (dx, dy) = ((m0 * n.0 + 0.5).floor() as i32, (m0 * n.1 + 0.5).floor() as i32);
     let (cx, cy) = (x + dx, y + dy);
     let sigma = (s.s0 / 3f32.sqrt()).max(0.8);
@@ -64,32 +67,4 @@ pub(super) fn derivative<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Pe
     // For a Gaussian line the curvature over the value of the smoothed profile is -1 / (w² + sigma²).
     let width = (smooth / (-d2).max(1e-6) - sigma * sigma).max(0.0).sqrt();
     finish(cx, cy, n, m, top.max(1.0), base, width, noise.sqrt() / (-d2).max(1e-6), saturated, s)
-}
-
-#[allow(clippy::too_many_arguments)]
-fn finish(
-    x: i32,
-    y: i32,
-    (nx, ny): (f32, f32),
-    m: f32,
-    amplitude: f32,
-    base: f32,
-    width: f32,
-    sigma: f32,
-    saturated: bool,
-    s: &PeakFrame,
-) -> Peak {
-    Peak {
-        u: x as f32 + m * nx,
-        v: y as f32 + m * ny,
-        normal_u: nx,
-        normal_v: ny,
-        amplitude,
-        background: base,
-        width_px: width,
-        sigma_px: sigma,
-        snr: amplitude / (s.read2 + s.gain * base).sqrt(),
-        flags: if saturated { SATURATED } else { 0 },
-        ..Peak::default()
-    }
 }

@@ -6,6 +6,7 @@ mod fit;
 mod frame;
 mod measure;
 mod methods;
+mod profile;
 mod stage;
 
 pub use frame::{PeakFrame, UNIFORM};

@@ -93,6 +93,10 @@ pub fn apart(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
     };
     a.iter().zip(b).fold(if a.len() == b.len() { 0.0 } else { f64::INFINITY }, |worst, (a, b)| {
         let same = a.flags == b.flags && a.pixel == b.pixel && a.shot == b.shot;
+        // A centre that is uncertain by a pixel is refused; where a fit without an answer stops, rounding decides.
+        if same && a.sigma_px.min(b.sigma_px) >= 1.0 {
+            return worst;
+        }
         let place = (0.01 * a.sigma_px.max(b.sigma_px)).max(0.01);
         let d = [
             near(a.u, b.u, 0.0, place),
