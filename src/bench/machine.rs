@@ -79,6 +79,11 @@ pub fn peak_memory_bytes() -> Option<u64> {
     status("VmHWM:")
 }
 
+/// Memory that this process holds now; `None` where the system does not tell.
+pub fn resident_bytes() -> Option<u64> {
+    status("VmRSS:")
+}
+
 fn status(key: &str) -> Option<u64> {
     let text = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = text.lines().find(|l| l.starts_with(key))?;

@@ -8,5 +8,5 @@ mod scenes;
 
 pub use machine::{Ceilings, cpu_seconds, peak_memory_bytes};
 pub use peer::serve;
-pub use run::{BenchOptions, Latency, Report, Row, Stage, run, table};
+pub use run::{BenchOptions, Latency, Report, Row, Soak, Stage, run, table};
 pub use scenes::{Scene, pictures};

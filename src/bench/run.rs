@@ -6,7 +6,7 @@ use super::scenes::{Scene, pictures};
 use crate::fault::{Fault, Result};
 use crate::gpu::{AdapterInfo, Device};
 use crate::raster::Image;
-use crate::stages::chain::{Chain, ChainConfig};
+use crate::stages::chain::{Batch, Chain, ChainConfig};
 use crate::stages::choose::ChooseParams;
 use crate::stages::lengthen::LengthenParams;
 use crate::stages::measured::Measure;
@@ -23,6 +23,8 @@ pub struct BenchOptions {
     pub scenes: Vec<Scene>,
     /// Seconds a row runs, 0.1..=600; longer is steadier.
     pub seconds: f64,
+    /// Shots of a long run of the full chain that is watched for growing memory, a row; 0 is none.
+    pub soak: usize,
 }
 
 impl Default for BenchOptions {
@@ -31,6 +33,7 @@ impl Default for BenchOptions {
             sizes: vec![(640, 480), (1280, 960), (4096, 3072), (5120, 5120)],
             scenes: Scene::ALL.to_vec(),
             seconds: 2.0,
+            soak: 0,
         }
     }
 }
@@ -60,6 +63,15 @@ pub struct Stage {
 pub struct Latency {
     pub p50_ms: f64,
     pub p99_ms: f64,
+}
+
+/// Memory of the process over a long run.
+#[derive(Clone, Copy, Debug, serde::Serialize)]
+pub struct Soak {
+    pub shots: usize,
+    /// Resident after the first tenth, and at the end.
+    pub early_mb: f64,
+    pub late_mb: f64,
 }
 
 /// One size and scene.
@@ -93,6 +105,7 @@ pub struct Row {
     pub latency: Latency,
     pub gpu_memory_mb: f64,
     pub host_peak_mb: Option<f64>,
+    pub soak: Option<Soak>,
     pub stages: Vec<Stage>,
 }
 
@@ -166,16 +179,18 @@ fn row(
     let mut single = Chain::new(device, &ChainConfig { shots: 1, slots: 1, ..config.clone() })?;
     single.submit(0, &refs[..1])?;
     single.collect(true)?;
-    let mut waits = Vec::new();
+    let (mut waits, mut batch) = (Vec::new(), Batch::default());
     let start = Instant::now();
     while start.elapsed().as_secs_f64() < options.seconds / 2.0 || waits.len() < 5 {
         let one = Instant::now();
         single.submit(0, &refs[waits.len() % refs.len()..][..1])?;
-        single.collect(true)?;
+        single.collect_into(true, &mut batch)?;
         waits.push(one.elapsed().as_secs_f64());
     }
     let latency = Latency { p50_ms: percentile(&mut waits.clone(), 0.5), p99_ms: percentile(&mut waits, 0.99) };
     drop(single);
+
+    let soak = if options.soak == 0 { None } else { soak(device, &config, scene, &batch_of, options.soak)? };
 
     let px = f64::from(width) * f64::from(height);
     let tiles = f64::from(chain.frame.tiles());
@@ -205,6 +220,7 @@ fn row(
         listed,
         latency,
         gpu_memory_mb: gpu_memory as f64 / 1e6,
+        soak,
         host_peak_mb: machine::peak_memory_bytes().map(|b| b as f64 / 1e6),
         stages: stage_times(device, &config, &batch_of(0))?,
     })
@@ -229,7 +245,7 @@ fn steady<'a>(
 ) -> Result<Steady> {
     let per = chain.frame.shots as usize;
     let (mut n, mut shots, mut points, mut listed) = (0usize, 0usize, 0u64, 0u64);
-    let mut per_batch = Vec::new();
+    let (mut per_batch, mut batch) = (Vec::new(), Batch::default());
     let cpu = machine::cpu_seconds();
     let start = Instant::now();
     let mut last = start;
@@ -238,14 +254,14 @@ fn steady<'a>(
             chain.submit_posed(n as u64, &batch_of(n), poses)?;
             n += 1;
         }
-        let batch = chain.collect(true)?.expect("under way");
+        chain.collect_into(true, &mut batch)?;
         shots += per;
         points += u64::from(batch.found);
         listed += u64::from(batch.listed_tiles);
         per_batch.push(last.elapsed().as_secs_f64());
         last = Instant::now();
     }
-    while chain.collect(true)?.is_some() {
+    while chain.collect_into(true, &mut batch)? {
         shots += per;
     }
     let batches = per_batch.len() as f64;
@@ -258,6 +274,15 @@ fn steady<'a>(
     })
 }
 
+/// The chain with peaks, their choice and points, and poses for a batch.
+fn full(device: &Device, config: &ChainConfig, scene: Scene) -> Result<(Chain, Vec<[f32; 12]>)> {
+    let peak = PeakParams { width_px: if scene == Scene::ThickStripe { 6.0 } else { 2.5 }, ..PeakParams::default() };
+    let measure = Measure { peak, choose: ChooseParams::default(), optics: cases::optics(config.width, config.height) };
+    let lengthen = LengthenParams::default().word(peak.width_px);
+    let chain = Chain::new(device, &ChainConfig { measure: Some(measure), lengthen, ..config.clone() })?;
+    Ok((chain, (0..config.shots).map(cases::pose).collect()))
+}
+
 /// Time a shot of the full chain, and its ratio to the skeleton alone, in five turns.
 fn full_chain<'a>(
     device: &Device,
@@ -267,11 +292,7 @@ fn full_chain<'a>(
     batch_of: &impl Fn(usize) -> Vec<&'a Image>,
     options: &BenchOptions,
 ) -> Result<(f64, f64)> {
-    let peak = PeakParams { width_px: if scene == Scene::ThickStripe { 6.0 } else { 2.5 }, ..PeakParams::default() };
-    let measure = Measure { peak, choose: ChooseParams::default(), optics: cases::optics(config.width, config.height) };
-    let lengthen = LengthenParams::default().word(peak.width_px);
-    let mut full = Chain::new(device, &ChainConfig { measure: Some(measure), lengthen, ..config.clone() })?;
-    let poses: Vec<_> = (0..config.shots).map(cases::pose).collect();
+    let (mut full, poses) = full(device, config, scene)?;
     steady(&mut full, 0.0, batch_of, &poses)?;
     let (mut times, mut ratios) = (Vec::new(), Vec::new());
     for _ in 0..5 {
@@ -281,6 +302,36 @@ fn full_chain<'a>(
         ratios.push(with / without * 1e-3);
     }
     Ok((percentile(&mut times, 0.5), percentile(&mut ratios, 0.5)))
+}
+
+/// Runs the full chain for so many shots and asks the system what the process holds.
+fn soak<'a>(
+    device: &Device,
+    config: &ChainConfig,
+    scene: Scene,
+    batch_of: &impl Fn(usize) -> Vec<&'a Image>,
+    shots: usize,
+) -> Result<Option<Soak>> {
+    let (mut chain, poses) = full(device, config, scene)?;
+    let mut batch = Batch::default();
+    let batches = shots.div_ceil(config.shots as usize).max(10);
+    let mut early = None;
+    for n in 0..batches {
+        if !chain.has_room() {
+            chain.collect_into(true, &mut batch)?;
+        }
+        chain.submit_posed(n as u64, &batch_of(n), &poses)?;
+        if n == batches / 10 {
+            early = machine::resident_bytes();
+        }
+    }
+    while chain.collect_into(true, &mut batch)? {}
+    let mb = |bytes: u64| bytes as f64 / 1e6;
+    Ok(early.zip(machine::resident_bytes()).map(|(early, late)| Soak {
+        shots: batches * config.shots as usize,
+        early_mb: mb(early),
+        late_mb: mb(late),
+    }))
 }
 
 /// GPU timestamps of one batch, the median of five, summed over the dispatches of a stage.
@@ -362,6 +413,18 @@ pub fn table(report: &Report) -> String {
             100.0 * r.listed,
             r.latency.p50_ms,
             r.latency.p99_ms
+        );
+    }
+    for (r, s) in report.rows.iter().filter_map(|r| Some((r, r.soak?))) {
+        let _ = writeln!(
+            out,
+            "{}x{} {}: {} shots of the full chain: {:.1} MB after a tenth, {:.1} MB at the end",
+            r.width,
+            r.height,
+            r.scene.name(),
+            s.shots,
+            s.early_mb,
+            s.late_mb
         );
     }
     for r in &report.rows {

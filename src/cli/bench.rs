@@ -26,6 +26,9 @@ pub struct Args {
     /// Seconds a row runs
     #[arg(long, default_value_t = BenchOptions::default().seconds)]
     seconds: f64,
+    /// Shots of a long run of the full chain, watched for growing memory (0: none)
+    #[arg(long, default_value_t = 0)]
+    soak: usize,
     /// Folder for bench.json and bench.txt
     #[arg(long)]
     save: Option<PathBuf>,
@@ -53,7 +56,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     if args.peer_pipe {
         return bench::serve(&device, std::io::stdin().lock(), std::io::stdout().lock());
     }
-    let mut options = BenchOptions { seconds: args.seconds, ..BenchOptions::default() };
+    let mut options = BenchOptions { seconds: args.seconds, soak: args.soak, ..BenchOptions::default() };
     if !args.size.is_empty() {
         options.sizes = args.size.clone();
     }

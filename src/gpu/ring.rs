@@ -134,8 +134,8 @@ impl Ring {
         Ok(())
     }
 
-    /// The oldest place whose work is done, with its header; waits for it if asked.
-    pub fn oldest(&mut self, wait: bool) -> Result<Option<(usize, Vec<u8>)>> {
+    /// The oldest place whose work is done, its header written into `header`; waits for it if asked.
+    pub fn oldest(&mut self, wait: bool, header: &mut [u32]) -> Result<Option<usize>> {
         let Some(&at) = self.busy.front() else { return Ok(None) };
         self.device.poll()?;
         while !self.slots[at].mapping.as_ref().is_some_and(Mapping::ready) {
@@ -146,9 +146,10 @@ impl Ring {
         }
         let slot = &mut self.slots[at];
         slot.mapping.take().expect("busy").done()?;
-        let header = slot.header_staging.view(0..slot.header.bytes)?.to_vec();
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(header);
+        bytes.copy_from_slice(&slot.header_staging.view(0..bytes.len() as u64)?);
         slot.header_staging.raw.unmap();
-        Ok(Some((at, header)))
+        Ok(Some(at))
     }
 
     /// Gives the first `bytes[i]` bytes of each output of the oldest place to `read` and frees the place.

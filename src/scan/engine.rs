@@ -56,6 +56,8 @@ pub struct Engine {
     chain: Option<Chain>,
     /// Shots of the batches under way, oldest first.
     batches: VecDeque<Vec<u32>>,
+    /// The batch that was collected last; its memory is used again.
+    batch: Batch,
     done: Vec<Measured>,
     cut: u64,
 }
@@ -94,6 +96,7 @@ impl Engine {
             device,
             chain: None,
             batches: VecDeque::new(),
+            batch: Batch::default(),
             done: Vec::new(),
             cut: 0,
         }
@@ -179,8 +182,10 @@ impl Engine {
         if all && !self.pending.is_empty() {
             self.start()?;
         }
-        while let Some(batch) = self.chain.as_mut().map(|c| c.collect(all)).transpose()?.flatten() {
-            self.take(batch);
+        while let Some(chain) = &mut self.chain
+            && chain.collect_into(all, &mut self.batch)?
+        {
+            self.take();
         }
         Ok(std::mem::take(&mut self.done))
     }
@@ -196,17 +201,20 @@ impl Engine {
             self.done.extend(done);
             return Ok(());
         };
-        let waited = if chain.has_room() { None } else { chain.collect(true)? };
+        let waited = !chain.has_room() && chain.collect_into(true, &mut self.batch)?;
         let images: Vec<_> = jobs.iter().map(|j| &j.image).collect();
         let poses: Vec<_> = jobs.iter().map(|j| j.pose).collect();
         chain.submit_posed(u64::from(jobs[0].shot), &images, &poses)?;
         self.batches.push_back(jobs.iter().map(|j| j.shot).collect());
-        waited.into_iter().for_each(|batch| self.take(batch));
+        if waited {
+            self.take();
+        }
         Ok(())
     }
 
-    /// Splits a batch into its shots.
-    fn take(&mut self, batch: Batch) {
+    /// Splits the batch that was collected last into its shots.
+    fn take(&mut self) {
+        let batch = &self.batch;
         let shots = self.batches.pop_front().expect("one list a batch");
         self.cut += u64::from(batch.found) - batch.peaks.len() as u64;
         for (i, shot) in shots.into_iter().enumerate() {

@@ -75,6 +75,8 @@ pub struct Chain {
     again: Vec<Recording>,
     /// Further rounds that every batch gets; grows when stripes are wider than they reach.
     rounds: usize,
+    /// The header of the batch that was collected last.
+    header: Vec<u32>,
     tags: VecDeque<u64>,
     shots_in: VecDeque<u32>,
     shared: Shared,
@@ -167,6 +169,7 @@ impl Chain {
             first: first_runs,
             again,
             rounds: 0,
+            header: vec![0; skeleton::HEADER + frame.shots as usize + 1],
             tags: VecDeque::new(),
             shots_in: VecDeque::new(),
             shared,
@@ -221,37 +224,42 @@ impl Chain {
 
     /// The oldest batch if it is done; waits for it if asked. `None` when nothing is under way, or not done.
     pub fn collect(&mut self, wait: bool) -> Result<Option<Batch>> {
-        let header = loop {
-            let Some((at, bytes)) = self.ring.oldest(wait)? else { return Ok(None) };
-            let header: Vec<u32> = bytemuck::pod_collect_to_vec(&bytes);
-            if header[6] == 0 {
-                break header;
+        let mut batch = Batch::default();
+        Ok(self.collect_into(wait, &mut batch)?.then_some(batch))
+    }
+
+    /// As `collect`, into a batch whose memory is used again: the steady state asks for none. False when there is none.
+    pub fn collect_into(&mut self, wait: bool, batch: &mut Batch) -> Result<bool> {
+        loop {
+            let Some(at) = self.ring.oldest(wait, &mut self.header)? else { return Ok(false) };
+            if self.header[6] == 0 {
+                break;
             }
             // Some stripe takes more than the recorded sub-iterations. Another batch may have used the masks
             // since: this one starts over with more rounds, and so do all that follow.
             self.rounds = 2 * self.rounds + 1;
             self.run(at, false)?;
-        };
+        }
         let shots = self.shots_in.pop_front().expect("as many as batches") as usize;
-        let kept = header[skeleton::HEADER + shots];
-        let mut batch = Batch {
-            tag: self.tags.pop_front().expect("as many as batches"),
-            starts: header[skeleton::HEADER..=skeleton::HEADER + shots].to_vec(),
-            found: header[4],
-            listed_tiles: header[5],
-            ..Batch::default()
-        };
-        let n = u64::from(kept);
+        let header = &self.header;
+        batch.tag = self.tags.pop_front().expect("as many as batches");
+        batch.starts.clear();
+        batch.starts.extend_from_slice(&header[skeleton::HEADER..=skeleton::HEADER + shots]);
+        (batch.found, batch.listed_tiles) = (header[4], header[5]);
+        batch.points.clear();
+        batch.peaks.clear();
+        batch.spots.clear();
+        let n = u64::from(header[skeleton::HEADER + shots]);
         if self.poses.is_some() {
             let bytes = [n * size_of::<Peak>() as u64, n * size_of::<Point>() as u64];
             self.ring.finish(&bytes, |i, bytes| match i {
-                0 => batch.peaks = bytemuck::pod_collect_to_vec(bytes),
-                _ => batch.spots = bytemuck::pod_collect_to_vec(bytes),
+                0 => refill(&mut batch.peaks, bytes),
+                _ => refill(&mut batch.spots, bytes),
             })?;
         } else {
-            self.ring.finish(&[8 * n], |_, bytes| batch.points = bytemuck::pod_collect_to_vec(bytes))?;
+            self.ring.finish(&[8 * n], |_, bytes| refill(&mut batch.points, bytes))?;
         }
-        Ok(Some(batch))
+        Ok(true)
     }
 
     fn run(&mut self, at: usize, upload: bool) -> Result<()> {
@@ -275,4 +283,10 @@ impl Chain {
     pub fn times(&self) -> Result<Vec<StageTime>> {
         self.replay.times()
     }
+}
+
+/// Replaces the content by what the bytes say, in the same memory if it is large enough.
+fn refill<T: bytemuck::Pod>(list: &mut Vec<T>, bytes: &[u8]) {
+    list.resize(bytes.len() / size_of::<T>(), T::zeroed());
+    bytemuck::cast_slice_mut(list).copy_from_slice(bytes);
 }
