@@ -23,6 +23,7 @@ bench: vulkan build
 bench-peers: vulkan build
 	tools/python-env.sh $(VENV) peers
 	$(VENV)/bin/python benches/peers/run.py
+	$(VENV)/bin/python benches/peers/find.py --cargo $(CARGO)
 
 # Software Vulkan (Mesa lavapipe) is installed where we may; without it the CPU twins do the work.
 vulkan:

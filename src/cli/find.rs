@@ -4,7 +4,7 @@
 
 use super::Console;
 use crate::fault::{Fault, Result};
-use crate::find::{LocateOptions, Recipe, Report};
+use crate::find::{Accelerator, LocateOptions, Recipe, Report};
 use crate::geometry::Vec3;
 use crate::robot::Convention;
 use crate::station::{Settings, find_part};
@@ -43,7 +43,8 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     if up.is_some_and(|u| !(u.norm() > 1e-6 && u.norm().is_finite())) {
         return Err(Fault::usage("--up has no direction").next("give three numbers, e.g. 0,0,1"));
     }
-    let options = LocateOptions { up, robot: args.robot.or(of_station).unwrap_or(Convention::Matrix) };
+    let robot = args.robot.or(of_station).unwrap_or(Convention::Matrix);
+    let options = LocateOptions { up, robot, accelerator: Accelerator::open() };
     let (report, picture) = find_part(&args.scan, &recipe, args.station.as_deref(), &options)?;
     let text = serde_json::to_string_pretty(&report).expect("plain data");
     crate::rig::write_atomically(&args.out, text.as_bytes())?;

@@ -3,7 +3,7 @@
 //! Frame and unit: the part frame of the measured pose; mm, rad.
 
 use super::drawing::Drawing;
-use super::measure::Observation;
+use super::surface_ends::Observation;
 use crate::fault::{Fault, Result};
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
 use std::collections::BTreeMap;

@@ -129,6 +129,8 @@ pub struct EdgeSample {
     /// Index of the shape, and of the element of its grid (row by row).
     pub shape: usize,
     pub element: usize,
+    /// 1 / radius of a circle or an arc, positive where the material is inside, 1/mm; 0 for straight edges.
+    pub curvature: f64,
 }
 
 /// A level surface: union of the high shapes less the low ones at one height.
@@ -216,6 +218,12 @@ impl Drawing {
                     };
                     let either = c.inside == Inside::Either;
                     let (extent, search, measure) = (c.extent, c.search, c.measure && c.closed && !either);
+                    let s = &self.shape[c.shape];
+                    let round = s.radius.filter(|_| matches!(s.kind, Form::Circle | Form::Arc));
+                    let curvature = round.map_or(0.0, |r| {
+                        let [cx, cy] = self.centre_of(c.shape, c.element);
+                        (sign * (rx * (x - cx) + ry * (y - cy))).signum() / r
+                    });
                     out.push(EdgeSample {
                         x,
                         y,
@@ -229,6 +237,7 @@ impl Drawing {
                         shape: c.shape,
                         element: c.element,
                         locates: c.locates,
+                        curvature,
                     });
                 }
                 carry -= length;

@@ -2,6 +2,7 @@
 //! that is and why, or a refusal: no pose leaves with a failed gate.
 //! Frame and unit: base frame; mm, degrees; sigmas along the part's own axes.
 
+use super::accelerator::Accelerator;
 use super::budget::{Budget, budget, towards_camera};
 use super::construct::{Built, build, features};
 use super::measure::{Measured, localise, measure};
@@ -10,7 +11,7 @@ use super::points::Ordered;
 use super::recipe::{Gates, Recipe};
 use super::refine::Pose;
 use super::scene::{Kind, Layer, Scene};
-use super::search::{Match, find};
+use super::search::{Match, find_on};
 use super::slide::{long_axis, slide};
 use super::verdict::{Agreement, TurnVote, judge, vote};
 use crate::fault::{Fault, Result};
@@ -27,11 +28,13 @@ pub struct LocateOptions {
     pub up: Option<Vec3>,
     /// Notation of the poses for the robot. Default the 4x4 matrix.
     pub robot: Convention,
+    /// A GPU for the coarse search; the result is the same without.
+    pub accelerator: Option<Accelerator>,
 }
 
 impl Default for LocateOptions {
     fn default() -> Self {
-        LocateOptions { up: None, robot: Convention::Matrix }
+        LocateOptions { up: None, robot: Convention::Matrix, accelerator: None }
     }
 }
 
@@ -107,7 +110,7 @@ pub fn locate(cloud: &[CloudPoint], recipe: &Recipe, rig: Option<&Rig>, options:
     let mut search = recipe.search;
     search.max_matches = search.max_matches.max(3);
     search.min_score = search.min_score.min(recipe.gates.min_score);
-    let matches = find(&scene, &model, &search)?;
+    let matches = find_on(&scene, &model, &search, options.accelerator.as_ref())?;
     let Some(best) = matches.first().cloned() else {
         return Err(Fault::refused(format!(
             "'{}' was not found: nothing scores {:.2} or more",

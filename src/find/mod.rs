@@ -2,11 +2,17 @@
 //! uncertainty or an honest refusal.
 //! Frame and unit: scene pixels for matches; base frame, mm, for poses.
 
+pub mod accelerator;
 pub mod budget;
 pub mod coarse;
 pub mod construct;
+mod datum;
 pub mod drawing;
+pub mod edge_index;
+mod edge_pieces;
 pub mod gradient;
+mod in_plane;
+mod lit_edges;
 pub mod insertion;
 pub mod measure;
 pub mod model;
@@ -14,16 +20,21 @@ pub mod picture;
 pub mod points;
 pub mod recipe;
 pub mod refine;
+mod robust;
 pub mod scene;
 pub mod search;
+pub mod search_options;
 pub mod slide;
+pub mod surface_ends;
 pub mod teach;
 pub mod verdict;
 
+pub use accelerator::Accelerator;
 pub use drawing::Drawing;
 pub use insertion::{LocateOptions, Report, locate};
 pub use model::{ModelOptions, ShapeModel};
 pub use recipe::Recipe;
 pub use refine::Pose;
 pub use scene::{Kind, Layer, Region, Scene};
-pub use search::{Match, SearchOptions, find};
+pub use search::{Match, find, find_on};
+pub use search_options::SearchOptions;

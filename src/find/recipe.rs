@@ -7,7 +7,7 @@ use super::drawing::{Drawing, Shape};
 use super::measure::MeasureOptions;
 use super::model::ModelOptions;
 use super::scene::Kind;
-use super::search::SearchOptions;
+use super::search_options::SearchOptions;
 use crate::fault::{Fault, Result};
 use std::path::Path;
 

@@ -2,86 +2,16 @@
 //! by a pyramid search over quantised directions, then directions, then least squares ([steger02]).
 //! Frame and unit: pixels of the scene, degrees in options, radians in poses.
 
-use super::coarse::{Coarse, STRIDE, Turn, turn_between};
+use super::accelerator::Accelerator;
+use super::coarse::{Level, Query, Turn, turn_between};
 use super::gradient::{Field, slopes};
 use super::model::{ModelPoint, ShapeModel};
 use super::refine::{Pose, refine};
 use super::scene::{Kind, Scene, from_level, to_level};
+use super::search_options::SearchOptions;
 use crate::fault::{Fault, Result};
+use crate::stages::shape_frame::STRIDE;
 use rayon::prelude::*;
-
-/// What is searched for.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SearchOptions {
-    /// First and last turn, degrees; the last not below the first, at most 360 apart. Default all.
-    pub angles_deg: [f64; 2],
-    /// Smallest and largest scale, 0.2 to 5. Default 1 alone.
-    pub scales: [f64; 2],
-    /// Least score, 0.1 to 1: the mean cosine between the model's and the scene's directions.
-    pub min_score: f64,
-    /// Most matches, 1 to 1000.
-    pub max_matches: usize,
-    /// Largest overlap of two matches, 0 to 1, as a share of the smaller one's box.
-    pub max_overlap: f64,
-    /// Takes dark-to-bright for bright-to-dark.
-    pub ignore_polarity: bool,
-    /// Weakest edge, in values per px of the layer; `None` for three times the noise.
-    pub min_contrast: Option<f64>,
-    /// A runner-up above this share of a match's score makes it ambiguous, 0.5 to 1.
-    pub ambiguous_at: f64,
-    /// Candidates carried from the coarsest level, 8 to 5000. More find weaker instances in clutter.
-    pub candidates: usize,
-}
-
-impl Default for SearchOptions {
-    fn default() -> Self {
-        SearchOptions {
-            angles_deg: [-180.0, 180.0],
-            scales: [1.0, 1.0],
-            min_score: 0.6,
-            max_matches: 1,
-            max_overlap: 0.5,
-            ignore_polarity: false,
-            min_contrast: None,
-            ambiguous_at: 0.9,
-            candidates: 200,
-        }
-    }
-}
-
-impl SearchOptions {
-    pub fn check(&self) -> Result<()> {
-        let bad = |what: String| Err(Fault::usage(what).next("correct the search options"));
-        let [a0, a1] = self.angles_deg;
-        if !(a0.is_finite() && a1.is_finite() && a1 >= a0 && a1 - a0 <= 360.0 + 1e-9) {
-            return bad(format!("angles_deg are {a0} to {a1}, wanted ascending and at most 360 apart"));
-        }
-        let [s0, s1] = self.scales;
-        if !(s0 >= 0.2 && s1 >= s0 && s1 <= 5.0) {
-            return bad(format!("scales are {s0} to {s1}, wanted ascending within 0.2 to 5"));
-        }
-        if !(0.1..=1.0).contains(&self.min_score) {
-            return bad(format!("min_score is {}, wanted 0.1 to 1", self.min_score));
-        }
-        if !(1..=1000).contains(&self.max_matches) {
-            return bad(format!("max_matches is {}, wanted 1 to 1000", self.max_matches));
-        }
-        if !(0.0..=1.0).contains(&self.max_overlap) {
-            return bad(format!("max_overlap is {}, wanted 0 to 1", self.max_overlap));
-        }
-        if self.min_contrast.is_some_and(|c| !(c > 0.0 && c.is_finite())) {
-            return bad("min_contrast must be above 0".into());
-        }
-        if !(0.5..=1.0).contains(&self.ambiguous_at) {
-            return bad(format!("ambiguous_at is {}, wanted 0.5 to 1", self.ambiguous_at));
-        }
-        if !(8..=5000).contains(&self.candidates) {
-            return bad(format!("candidates is {}, wanted 8 to 5000", self.candidates));
-        }
-        Ok(())
-    }
-}
 
 /// A found instance.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -138,6 +68,16 @@ struct Candidate {
 
 /// Finds the model in the scene, best first. An empty list is an answer: nothing scored above the least.
 pub fn find(scene: &Scene, model: &ShapeModel, options: &SearchOptions) -> Result<Vec<Match>> {
+    find_on(scene, model, options, None)
+}
+
+/// As [`find`], with the coarse search on a GPU where it pays; the matches are the same.
+pub fn find_on(
+    scene: &Scene,
+    model: &ShapeModel,
+    options: &SearchOptions,
+    accelerator: Option<&Accelerator>,
+) -> Result<Vec<Match>> {
     options.check()?;
     for p in &model.levels[0] {
         if !scene.layers.iter().any(|l| l.kind == p.kind) {
@@ -162,7 +102,7 @@ pub fn find(scene: &Scene, model: &ShapeModel, options: &SearchOptions) -> Resul
                 .collect()
         })
         .collect();
-    let mut candidates = coarse_candidates(&levels[most], model, most, options);
+    let mut candidates = coarse_candidates(&levels[most], model, most, options, accelerator);
     for level in (0..=most).rev() {
         let keep = if level == 0 { options.candidates.min(4 * options.max_matches + 100) } else { options.candidates };
         candidates =
@@ -212,17 +152,19 @@ fn coarse_candidates(
     model: &ShapeModel,
     level: usize,
     options: &SearchOptions,
+    accelerator: Option<&Accelerator>,
 ) -> Vec<Candidate> {
     let px = (1u64 << level) as f64;
     let turns = turns(model, level, options);
     let inputs: Vec<(Kind, &Field, f32)> = layers.iter().map(|d| (d.kind, &d.field, d.threshold)).collect();
     let ignore = options.ignore_polarity || model.levels[level].iter().all(|p| p.either);
-    let coarse = Coarse::new(&inputs, ignore, (0.5 * model.radius / px) as usize);
+    let coarse = Level::new(&inputs, ignore, (0.5 * model.radius / px) as usize);
     let apart = 2.0 * (STRIDE as f64 * 0.5) / (model.radius / px).max(4.0);
     // Spreading only raises a score, quantising costs up to a quarter of it.
     let limit = (0.75 * (options.min_score - 0.1)).max(0.2) as f32;
+    let query = Query { model: &model.levels[level], turns: &turns, px, limit, most: options.candidates, apart };
     coarse
-        .search(&model.levels[level], &turns, px, limit, options.candidates, apart)
+        .search(&query, accelerator)
         .into_iter()
         .map(|h| Candidate {
             pose: Pose {

@@ -3,7 +3,8 @@
 //! Frame and unit: part frame, mm.
 
 use super::drawing::{Drawing, Face};
-use super::measure::{EdgeIndex, Measured, localise};
+use super::edge_index::EdgeIndex;
+use super::measure::{Measured, localise};
 use super::points::Ordered;
 use crate::geometry::{Base, Part, Rigid, Vec3};
 

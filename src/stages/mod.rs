@@ -16,6 +16,9 @@ pub mod measured;
 pub mod peak;
 pub mod point;
 mod recorded;
+pub mod shape_frame;
+pub mod shape_maps;
+pub mod shape_sums;
 pub mod skeleton;
 pub mod stats;
 pub mod support;
@@ -83,5 +86,13 @@ pub fn all() -> Vec<Entry> {
         exact(&grid::SPAN, grid::span_twin, || grid::cases("grid_span")),
         exact(&grid::SUM, grid::sum_twin, || grid::cases("grid_sum")),
         exact(&grid::PICK, grid::pick_twin, || grid::cases("grid_pick")),
+        exact(&shape_maps::QUANTISE, shape_maps::quantise_twin, || shape_frame::cases("shape_quantise")),
+        exact(&shape_maps::SPREAD, shape_maps::spread_twin, || shape_frame::cases("shape_spread")),
+        exact(&shape_sums::SCORE, shape_sums::score_twin, || shape_frame::cases("shape_score")),
+        Entry {
+            compare: shape_sums::differing_hits,
+            reason: UNORDERED,
+            ..exact(&shape_sums::PEAKS, shape_sums::peaks_twin, || shape_frame::cases("shape_peaks"))
+        },
     ]
 }

@@ -7,7 +7,7 @@ use super::range::{RangeReport, RangeRun, measure_range};
 use super::run::{ScanOptions, scan};
 use super::settings::Settings;
 use crate::fault::{Fault, Result};
-use crate::find::{LocateOptions, Recipe, Report, locate, picture};
+use crate::find::{Accelerator, LocateOptions, Recipe, Report, locate, picture};
 use crate::geometry::{Base, Camera, Flange, Mat3, Rigid, Vec3};
 use crate::recording::Recording;
 use crate::rig::{Rig, hash_file};
@@ -135,7 +135,8 @@ pub fn guide(options: &GuideOptions, confirm: &mut dyn FnMut(&Step) -> Result<bo
     let scanned = scan(&id, &options.scan.display().to_string(), open, &rig, &run, |_, _| {})?;
 
     let cloud = super::run::cloud_of(&scan_folder)?;
-    let locate_options = LocateOptions { up: Some(normal), robot: options.robot };
+    let accelerator = (options.place != Where::Cpu).then(Accelerator::open).flatten();
+    let locate_options = LocateOptions { up: Some(normal), robot: options.robot, accelerator };
     let report = locate(&cloud, &recipe, Some(&rig), &locate_options)?;
     picture::draw(&report, &recipe.drawing()).save_png(&options.out.join("found.png"))?;
     let tilt = report.base_from_part.direction(&Vec3::z()).dot(&normal).clamp(-1.0, 1.0).acos().to_degrees();

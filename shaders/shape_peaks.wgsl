@@ -1,0 +1,45 @@
+// In: sums of every turn. Out: the places that reach the least sum and that no neighbour of the same turn exceeds, in
+// whatever order the GPU ran: turn and sum in one word, column and row in the next.
+// Frame and unit: strided cells.
+@group(0) @binding(0) var<uniform> frame: ShapeFrame;
+@group(0) @binding(1) var<storage, read> sums: array<u32>;
+// Word 3: how many there were, of which the first `capacity` are in the list.
+@group(0) @binding(2) var<storage, read_write> header: array<atomic<u32>>;
+@group(0) @binding(3) var<storage, read_write> hits: array<vec2<u32>>;
+
+fn at(first: u32, x: i32, y: i32) -> u32 {
+    let inside = x >= 0 && y >= 0 && x < i32(frame.columns) && y < i32(frame.rows);
+    let cell = vec2<u32>(u32(clamp(x, 0, i32(frame.columns) - 1)), u32(clamp(y, 0, i32(frame.rows) - 1)));
+    let word = sums[first + cell.y * frame.words + cell.x / 4u];
+    return select(0u, (word >> (8u * (cell.x % 4u))) & 255u, inside);
+}
+
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    let plane = frame.words * frame.rows;
+    let first = id.y * plane;
+    for (var inside = u32(id.x < plane); inside > 0u; inside--) {
+        let row = id.x / frame.words;
+        let column = id.x % frame.words * 4u;
+        let word = sums[first + id.x];
+        for (var k = 0u; k < 4u; k++) {
+            let x = i32(column + k);
+            let y = i32(row);
+            let value = (word >> (8u * k)) & 255u;
+            for (var high = u32(value >= frame.least && column + k < frame.columns); high > 0u; high--) {
+                var highest = 0u;
+                for (var dy = -1; dy <= 1; dy++) {
+                    for (var dx = -1; dx <= 1; dx++) {
+                        highest = max(highest, at(first, x + dx, y + dy));
+                    }
+                }
+                for (var peak = u32(highest <= value); peak > 0u; peak--) {
+                    let place = atomicAdd(&header[3], 1u);
+                    for (var room = u32(place < frame.capacity); room > 0u; room--) {
+                        hits[place] = vec2<u32>(id.y | (value << 24u), (column + k) | (row << 16u));
+                    }
+                }
+            }
+        }
+    }
+}

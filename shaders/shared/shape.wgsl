@@ -1,0 +1,21 @@
+// The layout that the stages of the coarse shape search share; src/stages/shape_frame.rs holds the same.
+struct ShapeFrame {
+    // Size of the level, px.
+    width: u32,
+    height: u32,
+    // Empty border around the level, px, a multiple of 4.
+    margin: u32,
+    // Strided grid of the search, border included; `words` u32 a row, four cells each.
+    columns: u32,
+    rows: u32,
+    words: u32,
+    // Words of all directions and phases of the layers before this one.
+    first: u32,
+    // 1: rising and falling edges are the same.
+    ignore: u32,
+    // Features a turn, least sum that is kept, turns of this run, places in the list of hits.
+    features: u32,
+    least: u32,
+    turns: u32,
+    capacity: u32,
+}

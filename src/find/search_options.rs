@@ -1,0 +1,77 @@
+//! In: what a person or a recipe asks of the search. Out: the same, checked.
+//! Frame and unit: degrees, scores from 0 to 1, values per pixel of the layer.
+
+use crate::fault::{Fault, Result};
+
+/// What is searched for.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SearchOptions {
+    /// First and last turn, degrees; the last not below the first, at most 360 apart. Default all.
+    pub angles_deg: [f64; 2],
+    /// Smallest and largest scale, 0.2 to 5. Default 1 alone.
+    pub scales: [f64; 2],
+    /// Least score, 0.1 to 1: the mean cosine between the model's and the scene's directions.
+    pub min_score: f64,
+    /// Most matches, 1 to 1000.
+    pub max_matches: usize,
+    /// Largest overlap of two matches, 0 to 1, as a share of the smaller one's box.
+    pub max_overlap: f64,
+    /// Takes dark-to-bright for bright-to-dark.
+    pub ignore_polarity: bool,
+    /// Weakest edge, in values per px of the layer; `None` for three times the noise.
+    pub min_contrast: Option<f64>,
+    /// A runner-up above this share of a match's score makes it ambiguous, 0.5 to 1.
+    pub ambiguous_at: f64,
+    /// Candidates carried from the coarsest level, 8 to 5000. More find weaker instances in clutter.
+    pub candidates: usize,
+}
+
+impl Default for SearchOptions {
+    fn default() -> Self {
+        SearchOptions {
+            angles_deg: [-180.0, 180.0],
+            scales: [1.0, 1.0],
+            min_score: 0.6,
+            max_matches: 1,
+            max_overlap: 0.5,
+            ignore_polarity: false,
+            min_contrast: None,
+            ambiguous_at: 0.9,
+            candidates: 200,
+        }
+    }
+}
+
+impl SearchOptions {
+    pub fn check(&self) -> Result<()> {
+        let bad = |what: String| Err(Fault::usage(what).next("correct the search options"));
+        let [a0, a1] = self.angles_deg;
+        if !(a0.is_finite() && a1.is_finite() && a1 >= a0 && a1 - a0 <= 360.0 + 1e-9) {
+            return bad(format!("angles_deg are {a0} to {a1}, wanted ascending and at most 360 apart"));
+        }
+        let [s0, s1] = self.scales;
+        if !(s0 >= 0.2 && s1 >= s0 && s1 <= 5.0) {
+            return bad(format!("scales are {s0} to {s1}, wanted ascending within 0.2 to 5"));
+        }
+        if !(0.1..=1.0).contains(&self.min_score) {
+            return bad(format!("min_score is {}, wanted 0.1 to 1", self.min_score));
+        }
+        if !(1..=1000).contains(&self.max_matches) {
+            return bad(format!("max_matches is {}, wanted 1 to 1000", self.max_matches));
+        }
+        if !(0.0..=1.0).contains(&self.max_overlap) {
+            return bad(format!("max_overlap is {}, wanted 0 to 1", self.max_overlap));
+        }
+        if self.min_contrast.is_some_and(|c| !(c > 0.0 && c.is_finite())) {
+            return bad("min_contrast must be above 0".into());
+        }
+        if !(0.5..=1.0).contains(&self.ambiguous_at) {
+            return bad(format!("ambiguous_at is {}, wanted 0.5 to 1", self.ambiguous_at));
+        }
+        if !(8..=5000).contains(&self.candidates) {
+            return bad(format!("candidates is {}, wanted 8 to 5000", self.candidates));
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,170 @@
+//! In: simulated scans of a part at random poses, by several specimens of the station, noise levels and scan pitches.
+//! Out: judgement on the reported uncertainty: true insertion error over reported sigma, rms per axis, near 1.
+//! Frame and unit: the part's own axes; mm, degrees.
+
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+use sheetlight::find::{LocateOptions, Recipe, locate};
+use sheetlight::geometry::{Base, Part, Rigid, Vec3};
+use sheetlight::rig::Rig;
+use sheetlight::scan::{CloudPoint, Extraction, Format, Scanner, Shot, Where};
+use sheetlight::simulate::{Canvas, InScene, Scene, SceneSpec, Sensor, Station, View, above, base_from_scene, expose, flange, part_pose, reported};
+
+/// A relay socket on a board: a body with a window and a notch. {x} {y} {turn} {tx} {ty} are drawn.
+fn scene(rng: &mut Pcg64) -> Scene {
+    let mut within = |by: f64| rng.random_range(-by..by);
+    let (x, y, turn, tx, ty) = (within(0.6), within(0.6), within(180.0), within(1.0), within(1.0));
+    let text = format!(
+        "name = 'relay'\nregion_mm = [-14, -14, 14, 14]\nfocus_height_mm = 3.0\n\
+         [[solid]]\nshape = {{ block = {{ size_mm = [190, 104, 1.6] }} }}\nat_mm = [0, 0, 0]\nmaterial = {{ albedo = 0.45 }}\n\
+         [[part]]\nname = 'relay'\nat_mm = [{x}, {y}, 4.2]\nturn_deg = {turn}\ntilt_deg = [{tx}, {ty}]\n\
+         [[part.solid]]\nshape = {{ block = {{ size_mm = [20, 12, 4.6] }} }}\nat_mm = [0, 0, 0]\nmaterial = {{ albedo = 0.5 }}\n\
+         [[part.solid.cut]]\nshape = {{ block = {{ size_mm = [9, 5, 3] }} }}\nat_mm = [0, 0, 0]\n\
+         [[part.solid.cut]]\nshape = {{ cylinder = {{ diameter_mm = 4, depth_mm = 3 }} }}\nat_mm = [-10, 0, 0]\n"
+    );
+    Scene::new(SceneSpec::parse(&text).unwrap()).unwrap()
+}
+
+const RELAY: &str = r#"
+format = 1
+name = "relay"
+cell_mm = 0.5
+alike_turns = 2
+[[shape]]
+kind = "rectangle"
+centre = [0, 0]
+size = [20, 12]
+[[shape]]
+kind = "rectangle"
+inside = "low"
+centre = [0, 0]
+size = [9, 5]
+[[shape]]
+kind = "circle"
+inside = "low"
+centre = [-10, 0]
+radius = 2
+[insertion]
+approach_mm = 25
+retract_mm = 50
+tolerance_mm = 0.3
+tolerance_deg = 0.5
+# The simulated robot goes exactly where it is sent: what is judged is the measurement.
+[robot]
+sigma_mm = 0
+sigma_deg = 0
+"#;
+
+/// What differs from scan to scan.
+#[derive(Debug)]
+struct Conditions {
+    pitch: f64,
+    width: u32,
+    noise: f64,
+    pose_mm: f64,
+    pose_deg: f64,
+}
+
+fn conditions(rng: &mut Pcg64) -> Conditions {
+    let shaky = rng.random_bool(0.5);
+    Conditions {
+        pitch: rng.random_range(0.15..0.35),
+        width: [480, 640, 800][rng.random_range(0..3)],
+        noise: rng.random_range(0.5..1.5),
+        pose_mm: if shaky { 0.02 } else { 0.0 },
+        pose_deg: if shaky { 0.004 } else { 0.0 },
+    }
+}
+
+struct Trial {
+    said: Conditions,
+    /// Error over x y z, mm, and the turn, degrees; in the part's axes, and the first three in the scan's.
+    error: [f64; 4],
+    scanned: Vec3,
+    sigma: [f64; 4],
+    passed: bool,
+}
+
+/// One scan from pictures to pose; `None` where the part was refused.
+fn trial(seed: u64) -> Option<Trial> {
+    let mut rng = Pcg64::seed_from_u64(0x51_6a ^ seed);
+    let said = conditions(&mut rng);
+    let scene = scene(&mut rng);
+    let mut station = Station::random(1 + seed % 7);
+    let s = Sensor::default();
+    station.sensor = Sensor {
+        read_noise_e: s.read_noise_e * said.noise,
+        speckle: s.speckle * said.noise,
+        full_well_e: s.full_well_e / said.noise.powi(2),
+        hot_per_million: 0.0,
+        ..s
+    };
+    // The stripe moves by some 20 px for the part's height: a band of the sensor holds it all.
+    let mut station = station.with_size(said.width, said.width / 8 * 2);
+    // A narrow fan: what falls beside the part would only cost time.
+    station.laser.half_fan_deg = 8.0;
+    let folder = tempfile::tempdir().unwrap();
+    station.store(folder.path()).unwrap();
+    let rig = Rig::load(folder.path()).unwrap();
+    let base_from_scene = base_from_scene(&station);
+    let format = Format { width: station.camera.width, height: station.camera.height, bits: 8 };
+    let mut scanner = Scanner::new(&rig, format, &Extraction::default(), [100.0, 210.0], Where::Cpu, None).unwrap();
+    let [_, y0, _, y1] = scene.spec.region_mm;
+    let height = scene.spec.focus_height_mm + station.working_distance;
+    let mut cloud: Vec<CloudPoint> = Vec::new();
+    let shots = ((y1 - y0) / said.pitch) as usize;
+    for i in 0..shots {
+        let scene_from_camera = above(0.0, y0 + said.pitch * i as f64, height);
+        let view = View { station: &station, scene: &scene, scene_from_camera };
+        let mut light = Canvas::new(format.width, format.height);
+        view.sheet(&mut light);
+        let dark = Canvas::new(format.width, format.height);
+        let image = expose(&station.sensor, &light, &dark, 0.0, &[], &mut rng);
+        let pose = flange(&station, &(base_from_scene * scene_from_camera));
+        let base_from_flange = reported(&pose, said.pose_mm, said.pose_deg, &mut rng);
+        scanner.push(Shot { index: i as u32, name: String::new(), image, base_from_flange }).unwrap();
+        cloud.extend(scanner.ready().unwrap().into_iter().flat_map(|p| p.points));
+    }
+    cloud.extend(scanner.finish().unwrap().into_iter().flat_map(|p| p.points));
+    let truth: Rigid<Base, Part> = base_from_scene * part_pose::<InScene>(&scene.spec.part[0]);
+    if let Some(dump) = std::env::var_os("DUMP") {
+        let dump = std::path::PathBuf::from(dump);
+        sheetlight::scan::write_cloud(&dump.join(format!("{seed}.ply")), &cloud).unwrap();
+        let bs = base_from_scene.to_rows();
+        let tr = truth.to_rows();
+        std::fs::write(dump.join(format!("{seed}.json")), serde_json::json!({"said": format!("{said:?}"), "pitch": said.pitch, "width": said.width, "noise": said.noise, "pose": said.pose_mm, "base_from_scene": bs.as_slice(), "truth": tr.as_slice(), "normal": station.laser.normal.as_slice(), "f": station.camera.fx, "z": station.working_distance}).to_string()).unwrap();
+    }
+    let recipe = Recipe::parse(RELAY).unwrap();
+    let report = match locate(&cloud, &recipe, Some(&rig), &LocateOptions::default()) {
+        Ok(r) => r,
+        Err(e) => {
+            println!("{seed}: refused: {} {:?}", e.what, said);
+            return None;
+        }
+    };
+    let d = truth.inverse() * report.base_from_part;
+    let scanned = base_from_scene.inverse().direction(&truth.direction(&d.translation));
+    let turn = d.rotation_vector().z.to_degrees();
+    println!(
+        "{seed}: error {:.4?} mm {turn:.4} deg, scan axes {:.4?}, sigma {:.4?} {:.4}, edges {} to {:.4}, growth {:.4?}, {:?} {:?}",
+        d.translation.as_slice(), scanned.as_slice(), report.sigma_mm, report.sigma_deg[2], report.edges, report.edge_rms_mm, report.growth_mm, said, report.reasons
+    );
+    Some(Trial {
+        said,
+        error: [d.translation.x, d.translation.y, d.translation.z, turn],
+        scanned,
+        sigma: [report.sigma_mm[0], report.sigma_mm[1], report.sigma_mm[2], report.sigma_deg[2]],
+        passed: report.passed,
+    })
+}
+
+#[test]
+fn the_error_over_the_reported_sigma_is_one() {
+    let n: u64 = std::env::var("SHEETLIGHT_SIGMA_SCANS").ok().and_then(|s| s.parse().ok()).unwrap_or(48);
+    let trials: Vec<Trial> = (0..n).into_par_iter().filter_map(trial).collect();
+    for k in 0..4 {
+        let ratio = (trials.iter().map(|t| (t.error[k] / t.sigma[k]).powi(2)).sum::<f64>() / trials.len() as f64).sqrt();
+        println!("{}: {ratio:.3}", ["x", "y", "z", "turn"][k]);
+    }
+}
