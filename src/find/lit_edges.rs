@@ -22,9 +22,14 @@ const SHARPEST: f64 = 0.03;
 /// A sample this far inside an edge is fully lit, and so near to it at most may it be to measure the edge, mm.
 const DEEP: f64 = 0.6;
 const NEAR: f64 = 0.8;
-/// Fully lit samples around a partly lit one, within this distance, give its full light, mm; at least so many.
-const AROUND: f64 = 1.6;
-const MIN_FULL: usize = 4;
+/// Edges farther away than this take no light, mm.
+const BEYOND: f64 = 1.0;
+/// Fully lit samples around a partly lit one, within the first of these distances that holds enough, give its full light,
+/// mm: between a row of pins and an edge none are near.
+const AROUND: [f64; 4] = [1.6, 3.2, 6.4, 12.8];
+const MIN_FULL: usize = 6;
+/// A second edge at least so many widths away dims a sample a little, which is predicted; a nearer one decides it.
+const APART: f64 = 1.5;
 /// Samples lit by less than half may show another surface's light; more than 2.5 widths inside none is missing.
 const USED: [f64; 2] = [0.0, 2.5];
 const MIN_SAMPLES: usize = 60;
@@ -159,20 +164,27 @@ fn full_light(
     i: usize,
     step: [f64; 2],
 ) -> Option<f64> {
-    let reach = step.map(|s| (AROUND / s).ceil().min(40.0) as i64);
     let q = local[i]?;
-    let (mut sum, mut n) = (0.0, 0usize);
-    for dr in -reach[1]..=reach[1] {
-        for dc in -reach[0]..=reach[0] {
-            let there = points.at(i64::from(points.row[i]) + dr, i64::from(points.column[i]) + dc);
-            let Some(k) = there.filter(|&k| deep[k] && on[k] == on[i]) else { continue };
-            if local[k].is_some_and(|p| (p - q).norm() < AROUND) {
-                sum += f64::from(points.intensity[k]);
-                n += 1;
+    for around in AROUND {
+        let reach = step.map(|s| (around / s).ceil().min(80.0) as i64);
+        // A few hundred places are enough.
+        let stride = reach.map(|r| (r / 8).max(1) as usize);
+        let (mut sum, mut n) = (0.0, 0usize);
+        for dr in (-reach[1]..=reach[1]).step_by(stride[1]) {
+            for dc in (-reach[0]..=reach[0]).step_by(stride[0]) {
+                let there = points.at(i64::from(points.row[i]) + dr, i64::from(points.column[i]) + dc);
+                let Some(k) = there.filter(|&k| deep[k] && on[k] == on[i]) else { continue };
+                if local[k].is_some_and(|p| (p - q).norm() < around) {
+                    sum += f64::from(points.intensity[k]);
+                    n += 1;
+                }
             }
         }
+        if n >= MIN_FULL && sum > 0.0 {
+            return Some(sum / n as f64);
+        }
     }
-    (n >= MIN_FULL && sum > 0.0).then(|| sum / n as f64)
+    None
 }
 
 /// Standard deviation of the shots' heights beyond what their points' noise explains: the poses' own, mm.
@@ -207,22 +219,22 @@ fn row(s: &Sample, edges: &EdgeIndex, x: &Unknowns, directions: &[Vector2<f64>; 
     let (sin, cos) = x[2].sin_cos();
     let (dx, dy) = (s.at.x - x[0], s.at.y - x[1]);
     let (px, py) = (cos * dx + sin * dy, cos * dy - sin * dx);
-    let (edge, straight) = edges.nearest_locating(px, py, NEAR, s.z)?;
-    if !straight {
-        return None;
-    }
+    let edge = edges.nearest_locating(px, py, NEAR, s.z)?;
     let EdgeSample { nx, ny, .. } = *edge;
-    let share = directions.map(|d| (nx * d.x + ny * d.y).powi(2));
-    let (width, beside) =
-        ((x[5].powi(2) * share[0] + x[6].powi(2) * share[1]).sqrt(), x[5].powi(2) * share[1] + x[6].powi(2) * share[0]);
-    // The light falls off along a curved edge as well: a disc is lit by less, a hole's rim by more than a straight edge.
-    let inside = (edge.x - px) * nx + (edge.y - py) * ny - 0.5 * edge.curvature * beside;
-    let t = (inside + x[3] * share[0] + x[4] * share[1]) / width;
+    let (t, share, width) = widths_inside(edge, px, py, x, directions);
     if !(USED[0]..USED[1]).contains(&t) {
         return None;
     }
+    // A round edge turns away by itself.
+    let same = |o: &EdgeSample| (o.shape, o.element) == (edge.shape, edge.element) && o.curvature != 0.0;
+    let other = edges.nearest(px, py, BEYOND, |o| o.z == s.z && o.nx * nx + o.ny * ny < 0.8 && !same(o));
+    let spared = match other.map(|o| widths_inside(o, px, py, x, directions).0) {
+        Some(t) if t < APART => return None,
+        Some(t) => fall(t).0,
+        None => 1.0,
+    };
     let (lit, slope) = fall(t);
-    let slope = slope / width;
+    let (lit, slope) = (lit * spared, slope * spared / width);
     let mut j = Unknowns::zeros();
     j[0] = slope * nx;
     j[1] = slope * ny;
@@ -232,6 +244,24 @@ fn row(s: &Sample, edges: &EdgeIndex, x: &Unknowns, directions: &[Vector2<f64>; 
         j[5 + k] = -slope * t * x[5 + k] * share[k] / width;
     }
     Some(Row { j, residual: s.light - lit, shot: s.row, slope, normal: [nx, ny], piece: edges.piece(edge, px, py) })
+}
+
+/// How many widths of the light's fall a place lies inside an edge, the shares of the two directions in its normal, and that
+/// width in mm. The light falls off along a curved edge as well: a disc is lit by less, a hole's rim by more than a straight
+/// edge.
+fn widths_inside(
+    edge: &EdgeSample,
+    px: f64,
+    py: f64,
+    x: &Unknowns,
+    directions: &[Vector2<f64>; 2],
+) -> (f64, [f64; 2], f64) {
+    let EdgeSample { nx, ny, .. } = *edge;
+    let share = directions.map(|d| (nx * d.x + ny * d.y).powi(2));
+    let width = (x[5].powi(2) * share[0] + x[6].powi(2) * share[1]).sqrt();
+    let beside = x[5].powi(2) * share[1] + x[6].powi(2) * share[0];
+    let inside = (edge.x - px) * nx + (edge.y - py) * ny - 0.5 * edge.curvature * beside;
+    ((inside + x[3] * share[0] + x[4] * share[1]) / width, share, width)
 }
 
 /// Share of a Gaussian sheet that still falls on the surface when its middle is `t` widths inside, and its derivative.

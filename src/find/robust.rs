@@ -55,6 +55,14 @@ pub(super) fn robust<const N: usize>(rows: &[(SVector<f64, N>, f64, u32)], prior
     let middle = by_shot.values().map(|g| g * g.transpose()).sum::<SMatrix<f64, N, N>>()
         * (clusters / (clusters - N as f64).max(1.0));
     let used = weights.iter().filter(|w| **w > 0.0).count();
+    // A weighted mean follows a shift of its rows by the mean slope of the influence only, not by the mean weight.
+    let (mut weight, mut slope) = (0.0, 0.0);
+    for ((j, r, _), w) in rows.iter().zip(&weights).filter(|(_, w)| **w > 0.0) {
+        let u = (r - j.dot(&step)) / (TUKEY * sigma);
+        weight += w;
+        slope += (1.0 - u * u) * (1.0 - 5.0 * u * u);
+    }
+    let inverse = inverse * (weight / slope.max(0.3 * weight)).max(1.0);
     let sandwich = inverse * middle * inverse;
     let plain = inverse * (sigma * sigma);
     // Few shots make the sandwich optimistic: never below the plain estimate.
