@@ -52,6 +52,7 @@ fn insertion_from_pictures_and_noisy_poses_alone() {
                 "{part}: {lateral:.3} mm in the plane, {:+.3} mm in height, {angle:.3} degrees; sigma {sigma:.3?} mm, passed {} {}",
                 d.translation.z, report["passed"], report["reasons"]
             );
+            println!("   two pins against lattice {}, {}", report["disagreement_mm"], report["notes"]);
             kept += usize::from(lateral <= ASKED_MM && angle <= ASKED_DEG);
             worst = (worst.0.max(lateral), worst.1.max(angle));
             // The stated budget, hand-eye included, must cover what really happened.

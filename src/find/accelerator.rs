@@ -85,7 +85,7 @@ impl Accelerator {
             maps.dispatch(device, &self.spread, &[&uniform, &bits, &responses], groups(plane, 16));
         }
         let mut replay = Replay::new(device, false)?;
-        replay.run(&maps)?;
+        replay.run(&[&maps])?;
         let uniform = device.storage("frame", size_of::<ShapeFrame>() as u64)?;
         let features = device.storage("features", u64::from(frame.turns * frame.features) * 16)?;
         let sums = device.storage("sums", 4 * (plane * frame.turns as usize) as u64)?;
@@ -103,7 +103,7 @@ impl Accelerator {
             let mut sweep = Recording::default();
             sweep.dispatch(device, &self.score, &[&uniform, &responses, &features, &sums], groups);
             sweep.dispatch(device, &self.peaks, &[&uniform, &sums, &header, &hits], groups);
-            replay.run(&sweep)?;
+            replay.run(&[&sweep])?;
             let head: Vec<u32> = bytemuck::pod_collect_to_vec(&device.read(&header)?);
             if head[3] > CAPACITY {
                 return Ok(None);

@@ -166,11 +166,6 @@ impl Replay {
         Ok(at)
     }
 
-    /// Runs a recording on what its buffers hold; `Device::read` waits for it.
-    pub fn run(&mut self, recording: &Recording) -> Result<()> {
-        self.submit(&[], &[recording], &[]).map(|_| ())
-    }
-
     /// GPU time of every step of the last submission; waits. Empty without timestamps.
     pub fn times(&self) -> Result<Vec<StageTime>> {
         let (Some((_, _, staging)), Some(tick)) = (&self.queries, self.device.tick_ns) else {
