@@ -137,7 +137,7 @@ fn trial(seed: u64) -> Option<Trial> {
     let turn = d.rotation_vector().z.to_degrees();
     let error = [d.translation.x, d.translation.y, d.translation.z, turn];
     let sigma = [report.sigma_mm[0], report.sigma_mm[1], report.sigma_mm[2], report.sigma_deg[2]];
-    println!("{seed:3}: error {error:8.4?}, sigma {sigma:7.4?}, passed {}, {said:.2?}", report.passed);
+    println!("{seed:3}: error {error:8.4?}, sigma {sigma:7.4?}, {said:.2?} {:?}", report.reasons);
     Some(Trial { error, sigma })
 }
 

@@ -32,7 +32,7 @@ pub struct MeasureOptions {
 
 impl Default for MeasureOptions {
     fn default() -> Self {
-        MeasureOptions { height_gate_mm: 0.2, edge_gate_mm: 0.45, margin_mm: 0.5, edge_bias: 0.06 }
+        MeasureOptions { height_gate_mm: 0.2, edge_gate_mm: 0.45, margin_mm: 0.5, edge_bias: 0.07 }
     }
 }
 
