@@ -9,6 +9,7 @@ mod demo;
 mod doctor;
 mod find;
 mod guide;
+mod live;
 mod range;
 mod scan;
 mod shift_scan;
@@ -49,6 +50,7 @@ enum Command {
     Doctor(doctor::Args),
     Find(find::Args),
     Guide(guide::Args),
+    Live(live::Args),
     Range(range::Args),
     Scan(scan::Args),
     ShiftScan(shift_scan::Args),
@@ -70,6 +72,7 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Doctor(a) => doctor::run(a, console),
         Command::Find(a) => find::run(a, console),
         Command::Guide(a) => guide::run(a, console),
+        Command::Live(a) => live::run(a, console),
         Command::Range(a) => range::run(a, console),
         Command::Scan(a) => scan::run(a, console),
         Command::ShiftScan(a) => shift_scan::run(a, console),

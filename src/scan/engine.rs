@@ -54,6 +54,8 @@ pub struct Engine {
     device: Option<Device>,
     /// Built when the stripe is known, because its sizes follow from the stripe.
     chain: Option<Chain>,
+    /// Pictures that are started together, and batches under way; `None` is what the size asks for.
+    at_once: Option<(u32, usize)>,
     /// Shots of the batches under way, oldest first.
     batches: VecDeque<Vec<u32>>,
     /// The batch that was collected last; its memory is used again.
@@ -96,10 +98,17 @@ impl Engine {
             device,
             chain: None,
             batches: VecDeque::new(),
+            at_once: None,
             batch: Batch::default(),
             done: Vec::new(),
             cut: 0,
         }
+    }
+
+    /// Every picture is started by itself, the next when it is done: least delay instead of most shots a second.
+    pub fn one_at_a_time(mut self) -> Engine {
+        self.at_once = Some((1, 1));
+        self
     }
 
     /// Skeleton pixels that found no room in the GPU's list: more than a tenth of the picture.
@@ -153,13 +162,17 @@ impl Engine {
     fn build(&mut self) -> Result<()> {
         let Some(device) = &self.device else { return Ok(()) };
         let (e, f) = (&self.extraction, self.format);
+        let usual = ChainConfig::new(f.width, f.height, f.bits);
+        let (shots, slots) = self.at_once.unwrap_or((usual.shots, usual.slots));
         let config = ChainConfig {
+            shots,
+            slots,
             threshold: e.threshold,
             thinning: e.thinning,
             region: Some(self.region.clone()),
             lengthen: e.lengthen.word(self.width_px),
             measure: Some(Measure { peak: e.peak, choose: e.choose, optics: self.optics }),
-            ..ChainConfig::new(f.width, f.height, f.bits)
+            ..usual
         };
         self.chain = Some(Chain::new(device, &config)?);
         Ok(())
@@ -173,7 +186,8 @@ impl Engine {
             None => image,
         };
         self.pending.push(Job { shot, image, pose });
-        let full = self.chain.as_ref().map_or(TWIN_BATCH, |c| c.frame.shots as usize);
+        let usual = self.chain.as_ref().map_or(TWIN_BATCH, |c| c.frame.shots as usize);
+        let full = self.at_once.map_or(usual, |(shots, _)| shots as usize);
         if self.pending.len() >= full { self.start() } else { Ok(()) }
     }
 

@@ -205,7 +205,7 @@ fn quality(k: &Peak, limit_px: f32) -> f32 {
 }
 
 /// The calibrated camera at the recording's resolution: the same one, or the same lens and field of view.
-fn camera_for(camera: &Intrinsics, format: Format) -> Result<Intrinsics> {
+pub fn camera_for(camera: &Intrinsics, format: Format) -> Result<Intrinsics> {
     let (w, h) = (format.width, format.height);
     let stretch = (f64::from(w) / f64::from(camera.width)) / (f64::from(h) / f64::from(camera.height));
     if (stretch - 1.0).abs() > 1e-3 {

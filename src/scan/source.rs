@@ -151,22 +151,19 @@ impl std::str::FromStr for RawFormat {
     }
 }
 
-/// Raw frames from a reader, one pose each.
-pub struct RawSource<R: Read> {
+/// Raw frames from a reader, as they come.
+pub struct RawFrames<R: Read> {
     format: Format,
     reader: R,
-    poses: Vec<Rigid<Base, Flange>>,
-    next: usize,
-    ended: bool,
 }
 
-impl<R: Read> RawSource<R> {
-    pub fn new(raw: RawFormat, reader: R, poses: Vec<Rigid<Base, Flange>>) -> RawSource<R> {
-        RawSource { format: raw.format, reader, poses, next: 0, ended: false }
+impl<R: Read> RawFrames<R> {
+    pub fn new(raw: RawFormat, reader: R) -> RawFrames<R> {
+        RawFrames { format: raw.format, reader }
     }
 
     /// Reads one frame: `Ok(None)` at a clean end, an error where the pipe ends inside a frame.
-    fn frame(&mut self) -> Result<Option<Image>> {
+    pub fn read(&mut self) -> Result<Option<Image>> {
         let Format { width, height, bits } = self.format;
         let pixels = width as usize * height as usize;
         let mut bytes = vec![0u8; pixels * if bits > 8 { 2 } else { 1 }];
@@ -201,9 +198,23 @@ impl<R: Read> RawSource<R> {
     }
 }
 
+/// Raw frames from a reader, one pose each.
+pub struct RawSource<R: Read> {
+    frames: RawFrames<R>,
+    poses: Vec<Rigid<Base, Flange>>,
+    next: usize,
+    ended: bool,
+}
+
+impl<R: Read> RawSource<R> {
+    pub fn new(raw: RawFormat, reader: R, poses: Vec<Rigid<Base, Flange>>) -> RawSource<R> {
+        RawSource { frames: RawFrames::new(raw, reader), poses, next: 0, ended: false }
+    }
+}
+
 impl<R: Read> Source for RawSource<R> {
     fn format(&self) -> Format {
-        self.format
+        self.frames.format
     }
     fn remaining(&self) -> Option<usize> {
         Some(self.poses.len() - self.next)
@@ -215,7 +226,7 @@ impl<R: Read> Source for RawSource<R> {
         let index = self.next as u32;
         let name = format!("frame {index}");
         let bad = |fault| Some(Err(BadShot { index, name: name.clone(), fault }));
-        let image = match self.frame() {
+        let image = match self.frames.read() {
             Ok(Some(image)) => image,
             Ok(None) => {
                 self.ended = true;

@@ -9,9 +9,10 @@ use crate::gpu::{Buffer, Device, Pipeline, Recording};
 
 /// Sub-iterations in one submission; a stripe 50 px wide takes 52. Wider ones go further rounds.
 const STEPS: u32 = 56;
-/// Sub-iterations between two shortenings of the tile list: what a change can travel in them stays within
-/// the neighbouring tiles, which are 8 px high.
-const STRIDE: u32 = 8;
+/// Sub-iterations before which the tile list is shortened. The first time soon: most tiles of a noisy picture hold specks
+/// that never change. Then at most 8 apart: what a change can travel in them stays within the neighbouring tiles,
+/// which are 8 px high.
+const SHORTEN: [u32; 8] = [2, 8, 16, 24, 32, 40, 48, STEPS];
 /// Bytes from one uniform block, or one list's header, to the next; every adapter can bind there.
 const STEP_BYTES: u64 = 256;
 
@@ -138,7 +139,7 @@ impl Shared {
             bands: words("bands", 4 * f.tiles())?,
             roi,
             first: words("first list's header", listing::HEADER_WORDS)?,
-            active: words("other lists' headers", listing::HEADER_WORDS * STEPS / STRIDE)?,
+            active: words("other lists' headers", listing::HEADER_WORDS * SHORTEN.len() as u32)?,
             list: words("list", f.tiles())?,
             active_list: words("active list", f.tiles())?,
             weights,
@@ -204,8 +205,8 @@ impl Shared {
     pub fn thinning(&self, device: &Device, p: &Pipelines) -> Recording {
         let mut r = Recording::default();
         let stamps = whole(&self.stamps);
+        let mut n = 0;
         for step in 0..STEPS {
-            let n = step / STRIDE;
             let (header, list, args) = match n {
                 0 => (self.all(), &self.list, (&self.first, 0)),
                 n => (self.shortened(n), &self.active_list, (&self.active, self.shortened(n).1)),
@@ -214,8 +215,9 @@ impl Shared {
                 if step % 2 == 0 { (&self.mask, &self.other_mask) } else { (&self.other_mask, &self.mask) };
             let bindings = [self.step(step), header, whole(list), whole(from), whole(to), stamps];
             r.indirect(device, &p.thin, &bindings, args);
-            if (step + 1) % STRIDE == 0 {
-                let short = self.shortened(n + 1);
+            if SHORTEN.contains(&(step + 1)) {
+                n += 1;
+                let short = self.shortened(n);
                 let list = whole(&self.list);
                 let bindings = [self.step(step + 1), self.all(), list, stamps, short, whole(&self.active_list)];
                 r.indirect(device, &p.compact, &bindings, (&self.first, 0));
@@ -258,7 +260,7 @@ impl Shared {
         r.indirect(device, &p.count, &[zero, self.all(), list, mask, whole(&self.counts)], all);
         let (starts, rows) = (whole(&self.starts), whole(&self.rows));
         r.dispatch_parts(device, &p.scan_rows, &[zero, whole(&self.counts), starts, rows], skeleton::rows_groups(f));
-        let (last, row_starts) = (self.shortened(STEPS / STRIDE), whole(&self.row_starts));
+        let (last, row_starts) = (self.shortened(SHORTEN.len() as u32), whole(&self.row_starts));
         let shots = [zero, rows, self.all(), last, row_starts, whole(header)];
         r.dispatch_parts(device, &p.scan_shots, &shots, skeleton::shots_groups(f));
         r.indirect(device, &p.skeleton, &[zero, self.all(), list, mask, starts, row_starts, whole(points)], all);
