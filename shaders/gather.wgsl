@@ -1,6 +1,5 @@
-// In: the quads of the threshold. Out: the mask, one word a tile row, inside the picture and the region
-// of interest only, twice: `mask` is thinned, `lit` stays. Tiles with a lit pixel are stamped as changed,
-// so that thinning starts there.
+// In: the quads of the threshold. Out: the mask, one word a tile row, inside the picture and the region of
+// interest only, twice: `mask` is thinned, `lit` stays; and the list of the tiles that hold a lit pixel.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> listing: array<u32>;
 @group(0) @binding(2) var<storage, read> list: array<u32>;
@@ -8,7 +7,8 @@
 @group(0) @binding(4) var<storage, read> roi: array<u32>;
 @group(0) @binding(5) var<storage, read_write> mask: array<u32>;
 @group(0) @binding(6) var<storage, read_write> lit: array<u32>;
-@group(0) @binding(7) var<storage, read_write> stamps: array<u32>;
+@group(0) @binding(7) var<storage, read_write> lit_listing: Listing;
+@group(0) @binding(8) var<storage, read_write> lit_list: array<u32>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -31,7 +31,11 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             any_lit |= bits;
         }
         for (var some = u32(any_lit != 0u); some > 0u; some--) {
-            stamps[tile_index(tile)] = 2u;
+            let place = atomicAdd(&lit_listing.count, 1u);
+            lit_list[place] = tile;
+            for (var group = u32(place % 64u == 0u); group > 0u; group--) {
+                atomicAdd(&lit_listing.groups, 1u);
+            }
         }
     }
 }

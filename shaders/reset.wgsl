@@ -1,17 +1,17 @@
 // In: the lists' headers of the former batch. Out: empty lists; at a further round of thinning (step 1)
-// the first list, of all tiles, stays. Entries are 64 words apart. The first list has a buffer of its own:
-// no buffer can be both read for the size of a dispatch and written by it.
+// the lists of tiles that may be lit, and of those that are, stay. Entries are 64 words apart. Each of those two
+// has a buffer of its own: no buffer can be both read for the size of a dispatch and written by it.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read_write> first: array<u32>;
-@group(0) @binding(2) var<storage, read_write> others: array<u32>;
+@group(0) @binding(2) var<storage, read_write> lit_first: array<u32>;
+@group(0) @binding(3) var<storage, read_write> others: array<u32>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    for (var inside = u32(id.x >= frame.step && 64u * id.x < arrayLength(&first)); inside > 0u; inside--) {
-        first[64u * id.x] = 0u;
-        first[64u * id.x + 1u] = 1u;
-        first[64u * id.x + 2u] = 1u;
-        first[64u * id.x + 3u] = 0u;
+    let empty = vec4(0u, 1u, 1u, 0u);
+    for (var once = u32(id.x < 4u && frame.step == 0u); once > 0u; once--) {
+        first[id.x] = empty[id.x];
+        lit_first[id.x] = empty[id.x];
     }
     for (var inside = u32(64u * id.x < arrayLength(&others)); inside > 0u; inside--) {
         others[64u * id.x] = 0u;

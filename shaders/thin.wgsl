@@ -76,7 +76,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var inside = u32(id.x < listing[3]); inside > 0u; inside--) {
         let tile = list[id.x];
         let at = tile_index(tile);
-        for (var run = u32(stamps[at] > frame.step); run > 0u; run--) {
+        // A stamp of 0 counts as 2: every listed tile runs in the first two sub-iterations.
+        for (var run = u32(max(stamps[at], 2u) > frame.step); run > 0u; run--) {
             let x = tile_x(tile);
             let y = tile_y(tile);
             let pitch = frame.tiles_x;

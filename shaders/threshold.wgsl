@@ -1,6 +1,6 @@
 // In: pictures, the tile list. Out: the pixels brighter than the mean of the window around them, inside the
-// picture and the region of interest only, twice: `mask` is thinned, `lit` stays. Tiles with a lit pixel are
-// stamped as changed, so that thinning starts there. One invocation a tile: the sums of the columns that its
+// picture and the region of interest only, twice: `mask` is thinned, `lit` stays; and the list of the tiles that
+// hold one, which all later stages work on. One invocation a tile: the sums of the columns that its
 // windows touch are carried down its rows in registers, four words of pixels a load (a load costs as much as
 // ten additions and more). The radius is a constant of the pipeline, so that every index is one too.
 @group(0) @binding(0) var<uniform> frame: Frame;
@@ -10,7 +10,8 @@
 @group(0) @binding(4) var<storage, read> roi: array<vec4<u32>>;
 @group(0) @binding(5) var<storage, read_write> mask: array<vec4<u32>>;
 @group(0) @binding(6) var<storage, read_write> lit: array<vec4<u32>>;
-@group(0) @binding(7) var<storage, read_write> stamps: array<u32>;
+@group(0) @binding(7) var<storage, read_write> lit_listing: Listing;
+@group(0) @binding(8) var<storage, read_write> lit_list: array<u32>;
 
 // Half the window's edge, less a half.
 override radius: u32 = 15u;
@@ -170,7 +171,11 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         lit[2u * at] = upper;
         lit[2u * at + 1u] = lower;
         for (var some = u32(any((upper | lower) != vec4(0u))); some > 0u; some--) {
-            stamps[at] = 2u;
+            let place = atomicAdd(&lit_listing.count, 1u);
+            lit_list[place] = tile;
+            for (var group = u32(place % 64u == 0u); group > 0u; group--) {
+                atomicAdd(&lit_listing.groups, 1u);
+            }
         }
     }
 }

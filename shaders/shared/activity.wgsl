@@ -1,5 +1,5 @@
 // A stamp holds 3 + the sub-iteration in which a tile, or a pixel that touches it, last changed; 2 after the
-// threshold, 0 for never. What follows from pixels that did not change in the last two sub-iterations (both
+// threshold or a former round, 0 for never. What follows from pixels that did not change in the last two sub-iterations (both
 // parities of the rule) does not change either, so a tile runs only when its stamp is that fresh.
 // The latest stamp of a tile and its eight neighbours:
 fn latest(tile: u32) -> u32 {

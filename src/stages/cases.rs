@@ -259,6 +259,9 @@ impl<'a> Walk<'a> {
             ("all_active", vec![7; 8 * header]),
             ("listing", vec![0, 1, 1, 0]),
             ("list", vec![0; tiles]),
+            ("lit_listing", vec![0, 1, 1, 0]),
+            ("lit_list", vec![0; tiles]),
+            ("lit_first", vec![7; 4]),
             ("active", vec![0, 1, 1, 0]),
             ("active_list", vec![0; tiles]),
             ("weights", weights),
@@ -319,14 +322,15 @@ impl<'a> Walk<'a> {
         if f.flags & frame::GAUSSIAN != 0 {
             let names = ["image", "listing", "list", "weights", "quads"];
             self.step(&threshold::GAUSSIAN, threshold::stage_twin, &names, all);
-            let names = ["listing", "list", "quads", "roi", "mask", "lit", "stamps"];
+            let names = ["listing", "list", "quads", "roi", "mask", "lit", "lit_listing", "lit_list"];
             self.step(&threshold::GATHER, threshold::gather_twin, &names, all);
         } else {
-            let names = ["image", "listing", "list", "roi", "mask", "lit", "stamps"];
+            let names = ["image", "listing", "list", "roi", "mask", "lit", "lit_listing", "lit_list"];
             self.step(&threshold::MEAN, threshold::mean_twin, &names, all);
         }
-        self.buffers.insert("active", self.buffers["listing"].clone());
-        self.buffers.insert("active_list", self.buffers["list"].clone());
+        let all = listed(&self.buffers, "lit_listing");
+        self.buffers.insert("active", self.buffers["lit_listing"].clone());
+        self.buffers.insert("active_list", self.buffers["lit_list"].clone());
         while self.buffers["active"][3] > 0 {
             for step in 0..8 {
                 self.frame.step = self.frame.step - self.frame.step % 8 + step;
@@ -337,29 +341,29 @@ impl<'a> Walk<'a> {
             }
             self.frame.step += 1;
             self.buffers.insert("active", vec![0, 1, 1, 0]);
-            let names = ["listing", "list", "stamps", "active", "active_list"];
+            let names = ["lit_listing", "lit_list", "stamps", "active", "active_list"];
             self.step(&listing::COMPACT, listing::compact_twin, &names, all);
         }
         let stamps = self.buffers["stamps"].clone();
         self.frame.step = self.frame.step.saturating_sub(6);
-        self.step(&listing::REBASE, listing::rebase_twin, &["listing", "list", "stamps"], all);
+        self.step(&listing::REBASE, listing::rebase_twin, &["lit_listing", "lit_list", "stamps"], all);
         self.buffers.insert("stamps", stamps);
-        self.step(&lengthen::COPY, lengthen::copy_twin, &["listing", "list", "mask", "long"], all);
-        let names = ["image", "listing", "list", "mask", "lit", "long"];
+        self.step(&lengthen::COPY, lengthen::copy_twin, &["lit_listing", "lit_list", "mask", "long"], all);
+        let names = ["image", "lit_listing", "lit_list", "mask", "lit", "long"];
         self.step(&lengthen::STAGE, lengthen::stage_twin, &names, all);
-        self.step(&skeleton::COUNT, skeleton::count_twin, &["listing", "list", "mask", "counts"], all);
+        self.step(&skeleton::COUNT, skeleton::count_twin, &["lit_listing", "lit_list", "mask", "counts"], all);
         let groups = skeleton::rows_groups(&f);
         self.step(&skeleton::SCAN_ROWS, skeleton::scan_rows_twin, &["counts", "starts", "rows"], groups);
         let names = ["rows", "listing", "active", "row_starts", "header"];
         self.step(&skeleton::SCAN_SHOTS, skeleton::scan_shots_twin, &names, skeleton::shots_groups(&f));
-        let names = ["listing", "list", "mask", "starts", "row_starts", "points"];
+        let names = ["lit_listing", "lit_list", "mask", "starts", "row_starts", "points"];
         self.step(&skeleton::STAGE, skeleton::stage_twin, &names, all);
         if wanted == "clear" {
-            let names = ["listing", "list", "mask", "other_mask", "lit", "stamps", "counts"];
+            let names = ["lit_listing", "lit_list", "mask", "other_mask", "lit", "stamps", "counts"];
             self.step(&listing::CLEAR, listing::clear_twin, &names, all);
         }
         self.frame.step = 1;
-        self.step(&listing::RESET, listing::reset_twin, &["first", "all_active"], [1, 1, 1]);
+        self.step(&listing::RESET, listing::reset_twin, &["first", "lit_first", "all_active"], [1, 1, 1]);
         std::mem::take(&mut self.captured)
     }
 }

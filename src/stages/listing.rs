@@ -15,6 +15,7 @@ pub const RESET: Stage = Stage {
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "first", access: ReadWrite },
+        Binding { name: "lit_first", access: ReadWrite },
         Binding { name: "others", access: ReadWrite },
     ],
     uniform: frame::UNIFORM,
@@ -88,23 +89,26 @@ pub fn tile_index(f: &Frame, tile: u32) -> usize {
 pub fn mask_index(f: &Frame, tile: u32, row: u32) -> usize {
     8 * tile_index(f, tile) + row as usize
 }
-/// The latest stamp of a tile and its neighbours.
-pub fn latest(f: &Frame, stamps: &[u32], tile: u32) -> u32 {
+/// Places of a tile and its neighbours.
+pub fn near_tiles(f: &Frame, tile: u32) -> impl Iterator<Item = usize> {
     let (x, y, shot) = tile_unpack(tile);
     let near = |v: u32, n: u32| v.saturating_sub(1)..=(v + 1).min(n - 1);
-    near(y, f.tiles_y)
-        .flat_map(|ny| near(x, f.tiles_x).map(move |nx| (nx, ny)))
-        .map(|(nx, ny)| stamps[((shot * f.tiles_y + ny) * f.tiles_x + nx) as usize])
-        .max()
-        .unwrap()
+    let (tiles_x, tiles_y) = (f.tiles_x, f.tiles_y);
+    near(y, tiles_y)
+        .flat_map(move |ny| near(x, tiles_x).map(move |nx| ((shot * tiles_y + ny) * tiles_x + nx) as usize))
+}
+/// The latest stamp of a tile and its neighbours.
+pub fn latest(f: &Frame, stamps: &[u32], tile: u32) -> u32 {
+    near_tiles(f, tile).map(|at| stamps[at]).max().expect("the tile itself")
 }
 
 pub fn reset_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
-    let from = frame_of(b).step as usize;
-    for header in b[1].chunks_mut(HEADER_WORDS as usize).skip(from) {
-        header[..4].copy_from_slice(&[0, 1, 1, 0]);
+    const EMPTY: [u32; 4] = [0, 1, 1, 0];
+    if frame_of(b).step == 0 {
+        b[1][..4].copy_from_slice(&EMPTY);
+        b[2][..4].copy_from_slice(&EMPTY);
     }
-    b[2].chunks_mut(HEADER_WORDS as usize).for_each(|h| h[..4].copy_from_slice(&[0, 1, 1, 0]));
+    b[3].chunks_mut(HEADER_WORDS as usize).for_each(|h| h[..4].copy_from_slice(&EMPTY));
 }
 
 pub fn clear_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
@@ -116,7 +120,7 @@ pub fn clear_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
             other[mask_index(&f, tile, row)] = 0;
             lit[mask_index(&f, tile, row)] = 0;
         }
-        stamps[tile_index(&f, tile)] = 0;
+        near_tiles(&f, tile).for_each(|at| stamps[at] = 0);
         counts[tile_index(&f, tile)] = 0;
     }
 }

@@ -23,8 +23,10 @@ pub struct Shared {
     bands: Buffer,
     roi: Buffer,
     first: Buffer,
+    lit_first: Buffer,
     active: Buffer,
     list: Buffer,
+    lit_list: Buffer,
     active_list: Buffer,
     weights: Buffer,
     /// The Gaussian window's lit pixels before they are gathered into words.
@@ -139,8 +141,10 @@ impl Shared {
             bands: words("bands", 4 * f.tiles())?,
             roi,
             first: words("first list's header", listing::HEADER_WORDS)?,
+            lit_first: words("lit list's header", listing::HEADER_WORDS)?,
             active: words("other lists' headers", listing::HEADER_WORDS * SHORTEN.len() as u32)?,
             list: words("list", f.tiles())?,
+            lit_list: words("lit list", f.tiles())?,
             active_list: words("active list", f.tiles())?,
             weights,
             quads: words("quads", if gaussian { 8 * f.tiles() } else { 4 })?,
@@ -161,9 +165,17 @@ impl Shared {
     fn step(&self, step: u32) -> Part<'_> {
         (&self.uniforms, STEP_BYTES * u64::from(step), size_of::<Frame>() as u64)
     }
-    /// The header of the list of all tiles.
+    /// The header of the list of tiles that may be lit.
     fn all(&self) -> Part<'_> {
         (&self.first, 0, 16)
+    }
+    /// The header of the list of tiles that are.
+    fn lit(&self) -> Part<'_> {
+        (&self.lit_first, 0, 16)
+    }
+    /// All headers, to be emptied.
+    fn headers(&self) -> [Part<'_>; 3] {
+        [whole(&self.first), whole(&self.lit_first), whole(&self.active)]
     }
     /// The header of the list after `n` shortenings, n >= 1.
     fn shortened(&self, n: u32) -> Part<'_> {
@@ -177,9 +189,10 @@ impl Shared {
         let all = (&self.first, 0);
         let masks = [whole(&self.mask), whole(&self.other_mask), whole(&self.lit)];
         let [mask, other, lit] = masks;
-        let clear = [zero, self.all(), whole(&self.list), mask, other, lit, whole(&self.stamps), whole(&self.counts)];
-        r.indirect(device, &p.clear, &clear, all);
-        r.dispatch_parts(device, &p.reset, &[zero, whole(&self.first), whole(&self.active)], [1, 1, 1]);
+        let clear = [zero, self.lit(), whole(&self.lit_list), mask, other, lit, whole(&self.stamps), whole(&self.counts)];
+        r.indirect(device, &p.clear, &clear, (&self.lit_first, 0));
+        let [first, lit_first, active] = self.headers();
+        r.dispatch_parts(device, &p.reset, &[zero, first, lit_first, active], [1, 1, 1]);
         if let Some(a) = &self.ambient {
             r.dispatch_parts(device, &p.ambient, &[zero, whole(image), whole(a)], ambient::groups(f));
         }
@@ -188,14 +201,18 @@ impl Shared {
         r.dispatch_parts(device, &p.bands, &[zero, stats, bands], bands::groups(f));
         let tiles = [zero, stats, bands, roi, self.all(), whole(&self.list)];
         r.dispatch_parts(device, &p.tiles, &tiles, tiles::groups(f));
-        let (list, image, stamps) = (whole(&self.list), whole(image), whole(&self.stamps));
+        let (list, image) = (whole(&self.list), whole(image));
+        let (lit_header, lit_list) = (self.lit(), whole(&self.lit_list));
         match &p.gather {
-            None => r.indirect(device, &p.threshold, &[zero, image, self.all(), list, roi, mask, lit, stamps], all),
+            None => {
+                let bindings = [zero, image, self.all(), list, roi, mask, lit, lit_header, lit_list];
+                r.indirect(device, &p.threshold, &bindings, all);
+            }
             Some(gather) => {
                 let quads = whole(&self.quads);
                 let weights = whole(&self.weights);
                 r.indirect(device, &p.threshold, &[zero, image, self.all(), list, weights, quads], all);
-                r.indirect(device, gather, &[zero, self.all(), list, quads, roi, mask, lit, stamps], all);
+                r.indirect(device, gather, &[zero, self.all(), list, quads, roi, mask, lit, lit_header, lit_list], all);
             }
         }
         r
@@ -208,7 +225,7 @@ impl Shared {
         let mut n = 0;
         for step in 0..STEPS {
             let (header, list, args) = match n {
-                0 => (self.all(), &self.list, (&self.first, 0)),
+                0 => (self.lit(), &self.lit_list, (&self.lit_first, 0)),
                 n => (self.shortened(n), &self.active_list, (&self.active, self.shortened(n).1)),
             };
             let (from, to) =
@@ -218,9 +235,9 @@ impl Shared {
             if SHORTEN.contains(&(step + 1)) {
                 n += 1;
                 let short = self.shortened(n);
-                let list = whole(&self.list);
-                let bindings = [self.step(step + 1), self.all(), list, stamps, short, whole(&self.active_list)];
-                r.indirect(device, &p.compact, &bindings, (&self.first, 0));
+                let list = whole(&self.lit_list);
+                let bindings = [self.step(step + 1), self.lit(), list, stamps, short, whole(&self.active_list)];
+                r.indirect(device, &p.compact, &bindings, (&self.lit_first, 0));
             }
         }
         r
@@ -229,9 +246,10 @@ impl Shared {
     /// Between two rounds of thinning.
     pub fn restart(&self, device: &Device, p: &Pipelines) -> Recording {
         let mut r = Recording::default();
-        let rebase = [self.step(STEPS), self.all(), whole(&self.list), whole(&self.stamps)];
-        r.indirect(device, &p.rebase, &rebase, (&self.first, 0));
-        r.dispatch_parts(device, &p.reset, &[self.step(1), whole(&self.first), whole(&self.active)], [1, 1, 1]);
+        let rebase = [self.step(STEPS), self.lit(), whole(&self.lit_list), whole(&self.stamps)];
+        r.indirect(device, &p.rebase, &rebase, (&self.lit_first, 0));
+        let [first, lit_first, active] = self.headers();
+        r.dispatch_parts(device, &p.reset, &[self.step(1), first, lit_first, active], [1, 1, 1]);
         r
     }
 
@@ -246,24 +264,24 @@ impl Shared {
         points: &Buffer,
     ) -> Recording {
         let mut r = Recording::default();
-        let (zero, list) = (self.step(0), whole(&self.list));
-        let all = (&self.first, 0);
+        let (zero, lit, list) = (self.step(0), self.lit(), whole(&self.lit_list));
+        let all = (&self.lit_first, 0);
         let mask = if f.lengthen == 0 {
             whole(&self.mask)
         } else {
             let (thin, long) = (whole(&self.mask), whole(&self.long));
-            r.indirect(device, &p.copy, &[zero, self.all(), list, thin, long], all);
-            let bindings = [zero, whole(image), self.all(), list, thin, whole(&self.lit), long];
+            r.indirect(device, &p.copy, &[zero, lit, list, thin, long], all);
+            let bindings = [zero, whole(image), lit, list, thin, whole(&self.lit), long];
             r.indirect(device, &p.lengthen, &bindings, all);
             long
         };
-        r.indirect(device, &p.count, &[zero, self.all(), list, mask, whole(&self.counts)], all);
+        r.indirect(device, &p.count, &[zero, lit, list, mask, whole(&self.counts)], all);
         let (starts, rows) = (whole(&self.starts), whole(&self.rows));
         r.dispatch_parts(device, &p.scan_rows, &[zero, whole(&self.counts), starts, rows], skeleton::rows_groups(f));
         let (last, row_starts) = (self.shortened(SHORTEN.len() as u32), whole(&self.row_starts));
         let shots = [zero, rows, self.all(), last, row_starts, whole(header)];
         r.dispatch_parts(device, &p.scan_shots, &shots, skeleton::shots_groups(f));
-        r.indirect(device, &p.skeleton, &[zero, self.all(), list, mask, starts, row_starts, whole(points)], all);
+        r.indirect(device, &p.skeleton, &[zero, lit, list, mask, starts, row_starts, whole(points)], all);
         r
     }
 }

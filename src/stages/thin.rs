@@ -166,7 +166,7 @@ pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     // A row of the mask as words; beyond the last tile there is none, but it is never asked for: y + 1 < height.
     let line =
         |shot: u32, y: u32| -> Vec<u32> { (0..f.tiles_x).map(|i| before[f.mask_word(shot, 32 * i, y)]).collect() };
-    for &tile in list[..listing[3] as usize].iter().filter(|&&t| former[tile_index(&f, t)] > f.step) {
+    for &tile in list[..listing[3] as usize].iter().filter(|&&t| former[tile_index(&f, t)].max(2) > f.step) {
         let (tx, ty, shot) = tile_unpack(tile);
         for row in 0..8 {
             let y = 8 * ty + row;

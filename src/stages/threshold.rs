@@ -24,7 +24,8 @@ pub const MEAN: Stage = Stage {
         Binding { name: "roi", access: Read },
         Binding { name: "mask", access: ReadWrite },
         Binding { name: "lit", access: ReadWrite },
-        Binding { name: "stamps", access: ReadWrite },
+        Binding { name: "lit_listing", access: ReadWrite },
+        Binding { name: "lit_list", access: ReadWrite },
     ],
     uniform: frame::UNIFORM,
     overrides: &[PX_LOG2, RADIUS],
@@ -59,7 +60,8 @@ pub const GATHER: Stage = Stage {
         Binding { name: "roi", access: Read },
         Binding { name: "mask", access: ReadWrite },
         Binding { name: "lit", access: ReadWrite },
-        Binding { name: "stamps", access: ReadWrite },
+        Binding { name: "lit_listing", access: ReadWrite },
+        Binding { name: "lit_list", access: ReadWrite },
     ],
     shared: &[SHARED],
     ..GAUSSIAN
@@ -253,37 +255,32 @@ pub fn mean_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let p = f.threshold();
     let masks: Vec<Mask> = (0..f.shots).map(|s| twin(&padded_shot(&f, &b[1], overrides[0].1 as u32, s), &p)).collect();
-    let [_, _, listing, list, roi, mask, lit, stamps] = b else { unreachable!() };
+    let [_, _, listing, list, roi, mask, lit, lit_listing, lit_list] = b else { unreachable!() };
     for &tile in &list[..listing[3] as usize] {
         let (tx, ty, shot) = tile_unpack(tile);
-        for row in 0..8 {
+        let bits = |row: u32| {
             let y = 8 * ty + row;
             let passes = |x: u32| 32 * tx + x < f.width && y < f.height && masks[shot as usize].get(32 * tx + x, y);
-            let bits = (0..32).filter(|&x| passes(x)).fold(0, |w, x| w | 1 << x);
-            store(&f, tile, row, bits, roi, mask, lit, stamps);
-        }
+            (0..32).filter(|&x| passes(x)).fold(0, |w, x| w | 1 << x)
+        };
+        store(&f, tile, bits, roi, [mask, lit, lit_listing, lit_list]);
     }
 }
 
-/// A tile row's lit pixels go into both masks, cut to the region of interest; a tile with one is stamped.
-#[allow(clippy::too_many_arguments)]
-fn store(
-    f: &Frame,
-    tile: u32,
-    row: u32,
-    bits: u32,
-    roi: &[u32],
-    mask: &mut [u32],
-    lit: &mut [u32],
-    stamps: &mut [u32],
-) {
+/// A tile's lit pixels, row by row, go into both masks, cut to the region of interest; a tile with one is listed.
+fn store(f: &Frame, tile: u32, bits: impl Fn(u32) -> u32, roi: &[u32], out: [&mut Vec<u32>; 4]) {
     let (tx, ty, _) = tile_unpack(tile);
-    let region = if f.flags & frame::HAS_ROI != 0 { roi[f.mask_word(0, 32 * tx, 8 * ty + row)] } else { !0 };
-    let at = super::listing::mask_index(f, tile, row);
-    mask[at] = bits & region;
-    lit[at] = bits & region;
-    if bits & region != 0 {
-        stamps[super::listing::tile_index(f, tile)] = 2;
+    let [mask, lit, listing, list] = out;
+    let mut some = 0;
+    for row in 0..8 {
+        let region = if f.flags & frame::HAS_ROI != 0 { roi[f.mask_word(0, 32 * tx, 8 * ty + row)] } else { !0 };
+        let at = super::listing::mask_index(f, tile, row);
+        mask[at] = bits(row) & region;
+        lit[at] = mask[at];
+        some |= mask[at];
+    }
+    if some != 0 {
+        super::listing::append(listing, list, tile);
     }
 }
 
@@ -304,17 +301,16 @@ pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
 
 pub fn gather_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
-    let [_, listing, list, quads, roi, mask, kept, stamps] = b else { unreachable!() };
+    let [_, listing, list, quads, roi, mask, kept, lit_listing, lit_list] = b else { unreachable!() };
     for slot in 0..listing[3] as usize {
         let tile = list[slot];
         let (tx, ty, _) = tile_unpack(tile);
-        for row in 0..8 {
-            let y = 8 * ty + row;
+        let bits = |row: u32| {
             let lit = |x: u32| quads[8 * slot + (x / 4) as usize] >> (4 * row + x % 4) & 1 == 1;
-            let inside = |x: u32| 32 * tx + x < f.width && y < f.height;
-            let bits = (0..32).filter(|&x| lit(x) && inside(x)).fold(0, |w, x| w | 1 << x);
-            store(&f, tile, row, bits, roi, mask, kept, stamps);
-        }
+            let inside = |x: u32| 32 * tx + x < f.width && 8 * ty + row < f.height;
+            (0..32).filter(|&x| lit(x) && inside(x)).fold(0, |w, x| w | 1 << x)
+        };
+        store(&f, tile, bits, roi, [mask, kept, lit_listing, lit_list]);
     }
 }
 
