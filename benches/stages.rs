@@ -5,6 +5,7 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use sheetlight::bench::{Scene, pictures};
 use sheetlight::gpu::Device;
 use sheetlight::raster::Image;
+use sheetlight::scan::{CloudPoint, GridOptions, grid, grid_on};
 use sheetlight::stages::chain::{Chain, ChainConfig};
 use sheetlight::stages::{Thinning, ThresholdParams, hough, skeleton, thin, threshold};
 
@@ -55,5 +56,25 @@ fn chain(c: &mut Criterion) {
     }
 }
 
-criterion_group!(benches, twins, chain);
+/// A tilted surface of 300,000 points, gridded.
+fn clouds(c: &mut Criterion) {
+    let points: Vec<CloudPoint> = (0..300_000u32)
+        .map(|i| {
+            let (x, y) = (0.1 * (i % 600) as f32, 0.1 * (i / 600) as f32);
+            CloudPoint { position: [400.0 + x, y, 0.2 * x], sigma_mm: 0.02, intensity: 90.0, quality: 1.0, ..Default::default() }
+        })
+        .collect();
+    let options = GridOptions { cell: Some(0.25), ..GridOptions::default() };
+    let mut group = c.benchmark_group("height map of 300,000 points");
+    group.sample_size(20);
+    // Limited by finding the best plane, then by one scattered access a point and pass.
+    group.bench_function("twin", |b| b.iter(|| grid(&points, &options).expect("a surface")));
+    if let Ok(device) = Device::open() {
+        // Limited, on a software adapter, by six atomic operations a point; on a discrete GPU by the bus.
+        group.bench_function("GPU", |b| b.iter(|| grid_on(&points, &options, Some(&device)).expect("a surface")));
+    }
+    group.finish();
+}
+
+criterion_group!(benches, twins, chain, clouds);
 criterion_main!(benches);

@@ -76,6 +76,10 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         skip_bad: args.skip_bad,
         resume: args.resume,
     };
+    if let Some(truth) = &args.truth {
+        // A wrong path shall not cost a scan.
+        std::fs::metadata(truth).map_err(|e| Fault::read(truth, e))?;
+    }
     let bar = console.bar("scanning", 0);
     let progress = |done: usize, total: Option<usize>| {
         bar.set_length(total.unwrap_or(done) as u64);

@@ -134,3 +134,58 @@ impl Gpu {
         self.replay.run(&[if pass == Pass::Span { &self.span } else { &self.sum }])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Base, Grid, Rigid, Vec3};
+    use crate::scan::{GridOptions, grid, grid_on};
+
+    /// A wavy surface with a second one above part of it, more points than one chunk, far from the base's origin.
+    fn surface() -> (Rigid<Base, Grid>, Vec<CloudPoint>) {
+        let frame = Rigid::from_vectors(&Vec3::new(0.3, -0.2, 1.0), Vec3::new(800.0, -500.0, 120.0));
+        let point = |i: u32| {
+            let (x, y) = (0.05 * f64::from(i % 400) + 0.013, 0.05 * f64::from(i / 400) + 0.017);
+            let up = if i % 3 == 0 && x > 10.0 { 2.0 } else { 0.0 };
+            let p = frame.point(&Vec3::new(x, y, 0.3 * (x / 3.0).sin() + up));
+            CloudPoint {
+                position: [p.x as f32, p.y as f32, p.z as f32],
+                sigma_mm: 0.01 + 0.001 * (i % 7) as f32,
+                intensity: 30.0 + (i % 90) as f32,
+                quality: (i % 10) as f32 / 9.0,
+                shot: i / 400,
+                ..CloudPoint::default()
+            }
+        };
+        (frame, (0..150_000).map(point).collect())
+    }
+
+    #[test]
+    fn gpu_and_twin_fill_the_same_map() {
+        let device = match Device::open() {
+            Ok(d) => d,
+            Err(e) if std::env::var_os("SHEETLIGHT_REQUIRE_GPU").is_some() => panic!("{e}"),
+            Err(e) => return eprintln!("SKIPPED, no GPU adapter: {e}"),
+        };
+        let (frame, mut points) = surface();
+        let options =
+            GridOptions { cell: Some(0.2), base_from_grid: Some(frame), min_quality: 0.3, ..GridOptions::default() };
+        let twin = grid(&points, &options).unwrap();
+        points.reverse();
+        let gpu = grid_on(&points, &options, Some(&device)).unwrap();
+        assert!(twin.count.iter().sum::<u32>() > 70_000 && twin.coverage() > 0.9);
+        assert_eq!(twin.count, gpu.count);
+        let bits = |v: &[f32]| v.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+        for (a, b) in [(&twin.z, &gpu.z), (&twin.intensity, &gpu.intensity), (&twin.sigma, &gpu.sigma)] {
+            assert!(bits(a) == bits(b));
+        }
+    }
+
+    #[test]
+    fn a_cell_with_more_points_than_its_sums_can_take_is_refused() {
+        let (frame, points) = surface();
+        let options = GridOptions { cell: Some(50.0), base_from_grid: Some(frame), ..GridOptions::default() };
+        let fault = grid(&points, &options).unwrap_err();
+        assert!(fault.what.contains("limit 65535") && fault.next.contains("smaller"), "{fault}");
+    }
+}

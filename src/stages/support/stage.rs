@@ -126,11 +126,12 @@ pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     }
 }
 
-/// Wavy shots with strays, doubtful and hazy peaks, refused ones; shots close together, and ones a hand apart.
+/// Wavy shots with strays, doubtful and hazy peaks, refused ones; shots close together, and ones a hand apart; a lattice
+/// whose diagonals are just within reach.
 pub fn cases() -> Vec<Case> {
-    [("0.35 mm apart", 0.35, 0.3), ("40 mm apart, wide reach", 40.0, 8.0)]
+    [("0.35 mm apart", 0.35, 0.3, 1.0), ("40 mm apart, wide reach", 40.0, 8.0, 1.0), ("a lattice", 0.35, 0.0927, 0.0)]
         .into_iter()
-        .map(|(name, step, radius)| {
+        .map(|(name, step, radius, rough)| {
             let mut noise = Noise(17);
             let p = SupportParams { radius_mm: radius, ..Default::default() };
             let mut f = SupportFrame::new(&p, 1.0);
@@ -140,7 +141,7 @@ pub fn cases() -> Vec<Case> {
                 for i in 0..150 {
                     let (x, y) = (0.25 * f64::from(i), step * f64::from(shot));
                     let stray = if noise.next() % 9 == 0 { 4.0 * noise.normal() } else { 0.02 * noise.normal() };
-                    let z = (x / 7.0).sin() + stray;
+                    let z = rough * ((x / 7.0).sin() + stray);
                     let place = [1200.0 + x, y, z, 1200.0 + x].map(whole);
                     let odd = f32::from(u8::from(noise.next() % 3 == 0));
                     places.push(place);
@@ -168,9 +169,9 @@ pub fn cases() -> Vec<Case> {
                     end: [at(i - 1).1, at(i + 1).1],
                     reach: [reach; 2],
                     drop: [drop; 2],
-                    clean: 1,
-                    doubtful: 3,
-                    hazy: 5,
+                    clean: 3,
+                    doubtful: 4,
+                    hazy: 6,
                     usual: 3.0,
                 })
                 .collect();
