@@ -184,5 +184,11 @@ fn summary(r: &ScanReport, out: &Path) -> String {
             h.z_high_mm
         );
     }
+    let t = &r.spent;
+    s += &format!(
+        "time: start {:.2} s, first profile after {:.2} s; waited {:.2} s for pictures, {:.2} s for the stages; \
+         writing {:.2} s; height map and pictures {:.2} s\n",
+        t.start_s, t.first_profile_s, t.pictures_s, t.stages_s, t.writing_s, t.products_s
+    );
     s + &format!("see {}", out.join("index.html").display())
 }

@@ -30,7 +30,7 @@ pub use calibrate_pointer::{PointerRun, calibrate_pointer};
 pub use range::{Distance, RangeReport, RangeRun, SurfaceFound, measure_range};
 pub use find::{find_part, teach_part};
 pub use guide::{GuideOptions, Guided, Step, guide};
-pub use run::{HeightMapFigures, ScanOptions, ScanReport, cloud_of, load_report, scan, scan_on};
+pub use run::{HeightMapFigures, ScanOptions, ScanReport, Spent, cloud_of, load_report, scan, scan_on};
 pub use settings::{Settings, WorkingVolume};
 pub use values::Values;
 pub use verify::{CalibrationCheck, VerifyReport, VerifyRun, verify};

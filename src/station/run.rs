@@ -58,10 +58,32 @@ pub struct ScanReport {
     pub median_sigma_mm: f64,
     /// Width (px) and speckle of the stripe, measured in the first shots or as set.
     pub stripe: Option<crate::stages::peak::Stripe>,
+    /// From the first shot to the closed cloud.
     pub seconds: f64,
     pub shots_per_second: f64,
+    /// Where the time went.
+    #[serde(default)]
+    pub spent: Spent,
     pub settings: Extraction,
     pub height_map: Option<HeightMapFigures>,
+}
+
+/// Seconds of a scan by what its main thread did; pictures are decoded and stages run meanwhile on other threads, so
+/// only what had to be waited for counts.
+#[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
+pub struct Spent {
+    /// Opening the GPU and the recording, until the first shot could be handed over.
+    pub start_s: f64,
+    /// Until the first profile was there; stages are compiled in it.
+    pub first_profile_s: f64,
+    /// Waiting for decoded pictures.
+    pub pictures_s: f64,
+    /// Handing shots to the stages and waiting for them; judging points by their neighbours.
+    pub stages_s: f64,
+    /// Cloud, overlays and checkpoints.
+    pub writing_s: f64,
+    /// Height map, pictures and PCD, after the last shot.
+    pub products_s: f64,
 }
 
 /// The height map's figures.
@@ -105,6 +127,7 @@ pub fn scan_on(
     options: &ScanOptions,
     mut progress: impl FnMut(usize, Option<usize>),
 ) -> Result<ScanReport> {
+    let begun = Instant::now();
     options.grid.check()?;
     std::fs::create_dir_all(&options.out).map_err(|e| Fault::write(&options.out, e))?;
     let _lock = Lock::take(&options.out)?;
@@ -142,17 +165,20 @@ pub fn scan_on(
     let mut overlays = Overlays::new(&options.out, options.overlays, total)?;
     let started = Instant::now();
     let first = state.shots;
-    let mut work = Work { out: &options.out, repeated, cloud, state, scanner, overlays: &mut overlays };
+    let spent = Spent { start_s: begun.elapsed().as_secs_f64(), ..Spent::default() };
+    let mut work = Work { out: &options.out, repeated, cloud, state, scanner, overlays: &mut overlays, spent };
     if let Err(fault) = work.all(source.as_mut(), options.skip_bad, |done| progress(done, total)) {
         // Where the disk itself failed, the checkpoint before this one stands.
         let _ = work.save();
         return Err(fault);
     }
-    let Work { cloud, mut state, scanner, .. } = work;
+    let Work { cloud, mut state, scanner, mut spent, .. } = work;
     let points = cloud.finish()?;
     let seconds = started.elapsed().as_secs_f64();
+    let products = Instant::now();
     let height_map =
         super::products::write(&options.out, &cloud_path, points, &options.grid, scanner.up_in_base(), scanner.device())?;
+    spent.products_s = products.elapsed().as_secs_f64();
     if scanner.cut() > 0 {
         state.peaks.insert("beyond the list: more than a tenth of a picture lit".into(), scanner.cut());
     }
@@ -175,6 +201,7 @@ pub fn scan_on(
         stripe: scanner.stripe(),
         seconds,
         shots_per_second: (state.shots - first) as f64 / seconds.max(1e-9),
+        spent,
         settings: options.extraction.clone(),
         height_map,
     };
@@ -194,15 +221,21 @@ struct Work<'a> {
     state: Checkpoint,
     scanner: Scanner,
     overlays: &'a mut Overlays,
+    spent: Spent,
 }
 
 impl Work<'_> {
     /// Every shot of the source, to its points in the cloud.
     fn all(&mut self, source: &mut dyn Source, skip_bad: bool, mut progress: impl FnMut(usize)) -> Result<()> {
         let mut ended = false;
+        let started = Instant::now();
         while !ended {
-            match source.next() {
-                Some(Ok(shot)) => self.scanner.push(self.overlays.keep(shot))?,
+            let next = clocked(&mut self.spent.pictures_s, || source.next());
+            match next {
+                Some(Ok(shot)) => {
+                    let shot = self.overlays.keep(shot);
+                    clocked(&mut self.spent.stages_s, || self.scanner.push(shot))?;
+                }
                 // A resumed scan may meet a bad shot that the run before has listed.
                 Some(Err(bad)) if skip_bad && self.state.skipped.iter().any(|(name, _)| *name == bad.name) => {}
                 Some(Err(bad)) if skip_bad => self.state.skipped.push((bad.name, bad.fault.what)),
@@ -216,8 +249,15 @@ impl Work<'_> {
                 }
                 None => ended = true,
             }
-            let ready = if ended { self.scanner.finish()? } else { self.scanner.ready()? };
+            let scanner = &mut self.scanner;
+            let ready =
+                clocked(&mut self.spent.stages_s, || if ended { scanner.finish() } else { scanner.ready() })?;
+            if self.spent.first_profile_s == 0.0 && !ready.is_empty() {
+                self.spent.first_profile_s = started.elapsed().as_secs_f64();
+            }
+            let from = Instant::now();
             self.take(&ready)?;
+            self.spent.writing_s += from.elapsed().as_secs_f64();
             progress(self.state.shots);
         }
         Ok(())
@@ -244,6 +284,14 @@ impl Work<'_> {
         self.state.stripe = self.scanner.stripe();
         self.state.save(self.out, &mut self.cloud)
     }
+}
+
+/// Adds the time that something takes to a sum of seconds.
+fn clocked<T>(seconds: &mut f64, what: impl FnOnce() -> T) -> T {
+    let from = Instant::now();
+    let result = what();
+    *seconds += from.elapsed().as_secs_f64();
+    result
 }
 
 /// Draws a few shots, evenly spread; holds a picture only from its arrival until its profile is there.
