@@ -6,25 +6,8 @@ use crate::recording::BoardSpec;
 
 /// Distance inside the board's outline, mm; negative outside.
 pub fn inside(board: &BoardSpec, x: f64, y: f64) -> f64 {
-    let [x0, y0, x1, y1] = outline(board);
+    let [x0, y0, x1, y1] = board.outline();
     (x - x0).min(x1 - x).min(y - y0).min(y1 - y)
-}
-
-/// The outline [x low, y low, x high, y high], border included.
-pub fn outline(board: &BoardSpec) -> [f64; 4] {
-    match board {
-        BoardSpec::Chessboard { inner_corners: [nx, ny], square_mm: s, border_mm: b, .. } => {
-            [-s - b, -s - b, f64::from(*nx) * s + b, f64::from(*ny) * s + b]
-        }
-        BoardSpec::Charuco { squares: [nx, ny], square_mm: s, border_mm: b, .. } => {
-            [-b, -b, f64::from(*nx) * s + b, f64::from(*ny) * s + b]
-        }
-        BoardSpec::Circles { dots: [nx, ny], pitch_mm: p, diameter_mm: d, asymmetric, border_mm: b } => {
-            let columns = if *asymmetric { f64::from(2 * nx - 1) } else { f64::from(nx - 1) };
-            let r = d / 2.0 + b;
-            [-r, -r, columns * p + r, f64::from(ny - 1) * p + r]
-        }
-    }
 }
 
 /// Distance to the nearest border between dark and bright print, mm: a stripe or spot across such
@@ -78,7 +61,7 @@ mod tests {
             border_mm: 7.0,
             first_square: "black".into(),
         };
-        assert_eq!(outline(&b), [-17.0, -17.0, 97.0, 67.0]);
+        assert_eq!(b.outline(), [-17.0, -17.0, 97.0, 67.0]);
         assert!((to_print_edge(&b, 5.0, 3.0) - 3.0).abs() < 1e-12);
         assert!((to_print_edge(&b, -14.0, 20.0) - 4.0).abs() < 1e-12);
         assert!(inside(&b, -18.0, 0.0) < 0.0 && (inside(&b, 95.0, 20.0) - 2.0).abs() < 1e-12);

@@ -3,6 +3,7 @@
 
 use super::Console;
 use crate::fault::Result;
+use crate::recording::BoardSpec;
 use crate::simulate::{Sensor, Set, SimulateOptions, simulate};
 use crate::station::Settings;
 use std::path::PathBuf;
@@ -24,6 +25,9 @@ pub struct Args {
     /// Scene file (TOML, see docs/file-formats.md); a circuit board with parts when not given
     #[arg(long)]
     scene: Option<PathBuf>,
+    /// Description of the calibration board (JSON as sheetlight board writes it) for the sets that show one
+    #[arg(long)]
+    board: Option<PathBuf>,
     /// Another specimen of the station, scene pose and noise for every seed; 0 is the design itself
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -69,6 +73,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let mut options = SimulateOptions {
         sets,
         scene: args.scene.clone(),
+        board: args.board.as_deref().map(BoardSpec::load).transpose()?,
         seed: args.seed,
         width: args.width,
         height: args.height.unwrap_or(args.width * 3 / 4),

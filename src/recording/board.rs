@@ -2,7 +2,9 @@
 //! Frame and unit: board frame, mm. Chessboard: origin in the first inner corner, x along the
 //! columns, y along the rows, z into the board. ChArUco: origin in the outer corner of the first square.
 
+use crate::fault::{Fault, Result};
 use crate::geometry::Vec3;
+use std::path::Path;
 
 /// A calibration target as a description file or meta.json states it.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -45,6 +47,16 @@ fn black() -> String {
 }
 
 impl BoardSpec {
+    /// Reads a board's description file, as `sheetlight board` writes it.
+    pub fn load(path: &Path) -> Result<BoardSpec> {
+        let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+        serde_json::from_str(&text).map_err(|e| {
+            Fault::input(format!("{}: is no board description: {e}", path.display()))
+                .cause("a misspelt key or a missing size")
+                .next("compare it with docs/file-formats.md, or write one with sheetlight board")
+        })
+    }
+
     /// Positions of the features in the board frame, row by row; their index is the feature's id.
     /// Chessboard: inner corners. ChArUco: inner corners too, with the origin one square outside
     /// the first of them. Circles: centres; in an asymmetric grid (OpenCV's layout) columns are
@@ -66,6 +78,22 @@ impl BoardSpec {
                     [f64::from(i) * pitch_mm, f64::from(j) * pitch_mm]
                 }
             }),
+        }
+    }
+    /// The outline [x low, y low, x high, y high], border included.
+    pub fn outline(&self) -> [f64; 4] {
+        match self {
+            BoardSpec::Chessboard { inner_corners: [nx, ny], square_mm: s, border_mm: b, .. } => {
+                [-s - b, -s - b, f64::from(*nx) * s + b, f64::from(*ny) * s + b]
+            }
+            BoardSpec::Charuco { squares: [nx, ny], square_mm: s, border_mm: b, .. } => {
+                [-b, -b, f64::from(*nx) * s + b, f64::from(*ny) * s + b]
+            }
+            BoardSpec::Circles { dots: [nx, ny], pitch_mm: p, diameter_mm: d, asymmetric, border_mm: b } => {
+                let columns = if *asymmetric { f64::from(2 * nx - 1) } else { f64::from(nx - 1) };
+                let r = d / 2.0 + b;
+                [-r, -r, columns * p + r, f64::from(ny - 1) * p + r]
+            }
         }
     }
 }

@@ -2,10 +2,12 @@
 //! Frame and unit: poses are base_from_flange in mm; boards in mm; see docs/file-formats.md.
 
 mod board;
+mod markers;
 mod meta;
 mod poses;
 
 pub use board::BoardSpec;
+pub use markers::Markers;
 pub use meta::{AmbientRef, Beam, FrameRef, ImageSpec, Meta};
 pub use poses::{PoseFile, load_poses, save_poses};
 

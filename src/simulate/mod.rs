@@ -13,7 +13,7 @@ mod truth;
 mod write;
 
 pub use light::{Canvas, InScene, LitPoint, View};
-pub use pattern::{is_black, plate};
+pub use pattern::Pattern;
 pub use picture::{expose, hot_pixels};
 pub use plan::{Views, above, base_from_scene, board_views, flange, reported, scan};
 pub use scene::{CutSpec, Hit, Material, PartSpec, Scene, SceneSpec, ShapeSpec, SolidSpec, part_pose};

@@ -1,42 +1,45 @@
 //! In: a board description and a place on it. Out: whether that place is printed black.
 //! Frame and unit: board frame (recording::BoardSpec), mm.
 
-use crate::recording::BoardSpec;
+use crate::fault::Result;
+use crate::recording::{BoardSpec, Markers};
 
-/// The lower left and upper right corner of the printed plate, border included: x0, y0, x1, y1.
-pub fn plate(board: &BoardSpec) -> [f64; 4] {
-    match board {
-        BoardSpec::Chessboard { inner_corners: [nx, ny], square_mm: s, border_mm: b, .. } => {
-            [-s - b, -s - b, f64::from(*nx) * s + b, f64::from(*ny) * s + b]
-        }
-        BoardSpec::Charuco { squares: [nx, ny], square_mm: s, border_mm: b, .. } => {
-            [-b, -b, f64::from(*nx) * s + b, f64::from(*ny) * s + b]
-        }
-        BoardSpec::Circles { dots: [nx, ny], pitch_mm: p, asymmetric, border_mm: b, .. } => {
-            let columns = if *asymmetric { 2 * nx - 1 } else { nx - 1 };
-            let margin = b.max(*p);
-            [-margin, -margin, f64::from(columns) * p + margin, f64::from(ny - 1) * p + margin]
-        }
-    }
+/// A board as it is printed.
+#[derive(Clone, Debug)]
+pub struct Pattern {
+    pub board: BoardSpec,
+    markers: Option<Markers>,
+    /// Centres of the dots of a circle grid.
+    dots: Vec<[f64; 2]>,
 }
 
-/// True where the print is black. ChArUco markers are not printed here: their squares stay white.
-pub fn is_black(board: &BoardSpec, x: f64, y: f64) -> bool {
-    match board {
-        BoardSpec::Chessboard { inner_corners: [nx, ny], square_mm: s, first_square, .. } => {
-            let (i, j) = ((x / s).floor(), (y / s).floor());
-            let on = i >= -1.0 && j >= -1.0 && i < f64::from(*nx) && j < f64::from(*ny);
-            // The square outside the origin, (-1, -1), has the first colour.
-            on && ((i + j).rem_euclid(2.0) == 0.0) == (first_square == "black")
-        }
-        BoardSpec::Charuco { squares: [nx, ny], square_mm: s, .. } => {
-            let (i, j) = ((x / s).floor(), (y / s).floor());
-            let on = i >= 0.0 && j >= 0.0 && i < f64::from(*nx) && j < f64::from(*ny);
-            on && (i + j).rem_euclid(2.0) == 0.0
-        }
-        BoardSpec::Circles { diameter_mm, .. } => {
-            let r = diameter_mm / 2.0;
-            board.features().iter().any(|c| (x - c.x).hypot(y - c.y) <= r)
+impl Pattern {
+    /// # Errors
+    /// A ChArUco board whose markers its dictionary does not have.
+    pub fn new(board: &BoardSpec) -> Result<Pattern> {
+        let circles = matches!(board, BoardSpec::Circles { .. });
+        let dots = if circles { board.features().iter().map(|c| [c.x, c.y]).collect() } else { Vec::new() };
+        Ok(Pattern { board: board.clone(), markers: Markers::of(board)?, dots })
+    }
+
+    /// True where the print is black.
+    pub fn is_black(&self, x: f64, y: f64) -> bool {
+        match &self.board {
+            BoardSpec::Chessboard { inner_corners: [nx, ny], square_mm: s, first_square, .. } => {
+                let (i, j) = ((x / s).floor(), (y / s).floor());
+                let on = i >= -1.0 && j >= -1.0 && i < f64::from(*nx) && j < f64::from(*ny);
+                // The square outside the origin, (-1, -1), has the first colour.
+                on && ((i + j).rem_euclid(2.0) == 0.0) == (first_square == "black")
+            }
+            BoardSpec::Charuco { squares: [nx, ny], square_mm: s, .. } => {
+                let (i, j) = ((x / s).floor(), (y / s).floor());
+                let on = i >= 0.0 && j >= 0.0 && i < f64::from(*nx) && j < f64::from(*ny);
+                on && ((i + j) % 2.0 == 0.0 || self.markers.as_ref().is_some_and(|m| m.black_at(x, y)))
+            }
+            BoardSpec::Circles { diameter_mm, .. } => {
+                let r = diameter_mm / 2.0;
+                self.dots.iter().any(|c| (x - c[0]).hypot(y - c[1]) <= r)
+            }
         }
     }
 }
@@ -47,15 +50,16 @@ mod tests {
 
     #[test]
     fn the_corner_squares_tell_a_half_turn() {
-        let board = BoardSpec::Chessboard {
+        let board = Pattern::new(&BoardSpec::Chessboard {
             inner_corners: [9, 6],
             square_mm: 15.0,
             border_mm: 9.0,
             first_square: "black".into(),
-        };
-        assert!(is_black(&board, -7.0, -7.0) && !is_black(&board, 7.0, -7.0));
-        assert!(!is_black(&board, 9.0 * 15.0 - 7.0, 6.0 * 15.0 - 7.0), "the opposite corner is white");
-        assert!(!is_black(&board, -20.0, -7.0), "the border is white");
-        assert_eq!(plate(&board), [-24.0, -24.0, 144.0, 99.0]);
+        })
+        .unwrap();
+        assert!(board.is_black(-7.0, -7.0) && !board.is_black(7.0, -7.0));
+        assert!(!board.is_black(9.0 * 15.0 - 7.0, 6.0 * 15.0 - 7.0), "the opposite corner is white");
+        assert!(!board.is_black(-20.0, -7.0), "the border is white");
+        assert_eq!(board.board.outline(), [-24.0, -24.0, 144.0, 99.0]);
     }
 }

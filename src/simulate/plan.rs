@@ -2,9 +2,10 @@
 //! Frame and unit: base, flange, camera, board, scene; mm. Every pose is reproducible from the seed.
 
 use super::light::InScene;
-use super::pattern::{is_black, plate};
+use super::pattern::Pattern;
 use super::scene::Scene;
 use super::station::Station;
+use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Board, Camera, Flange, Mat3, Plane, Ray, Rigid, Vec2, Vec3, exp};
 use crate::recording::{Beam, BoardSpec};
 use rand::Rng;
@@ -63,13 +64,13 @@ pub struct Views {
     pub tilt_deg: f64,
     /// Largest turn in the image plane, degrees.
     pub turn_deg: f64,
-    /// Whether every feature must be in the picture.
-    pub whole: bool,
+    /// Share of the features that must be in the picture: 1 unless markers tell the corners apart.
+    pub seen: f64,
 }
 
 /// Whether a beam falls on a board where it can be measured: the sheet's middle well inside the
 /// plate, the pointer on an even patch, because print under the spot moves its centroid.
-fn useful(station: &Station, board: &BoardSpec, pose: &Rigid<Camera, Board>, beam: Beam) -> bool {
+fn useful(station: &Station, board: &Pattern, pose: &Rigid<Camera, Board>, beam: Beam) -> bool {
     let plane = pose.plane(&Plane::<Board>::new(Vec3::z(), 0.0).expect("unit normal"));
     let ray = match beam {
         Beam::Line => Ray::new(station.laser.source, station.laser.axis),
@@ -77,55 +78,64 @@ fn useful(station: &Station, board: &BoardSpec, pose: &Rigid<Camera, Board>, bea
     };
     let Some(p) = ray.and_then(|r| r.meet(&plane)) else { return false };
     let p = pose.inverse().point(&p);
-    let [x0, y0, x1, y1] = plate(board);
+    let [x0, y0, x1, y1] = board.board.outline();
     let margin = if beam == Beam::Line { 0.2 * (y1 - y0) } else { 2.0 };
     let inside = p.x > x0 + margin && p.x < x1 - margin && p.y > y0 + margin && p.y < y1 - margin;
     let around = |i: u32| Vec2::new(p.x, p.y) + 1.6 * Vec2::new(f64::from(i).cos(), f64::from(i).sin());
-    inside && (beam == Beam::Line || (0..12).map(around).all(|q| !is_black(board, q.x, q.y)))
+    inside && (beam == Beam::Line || (0..12).map(around).all(|q| !board.is_black(q.x, q.y)))
 }
 
 /// Board poses that cover the image and the range of tilts; rejection sampling, seeded.
+///
+/// # Errors
+/// Where a board does not fit into the picture in the range of distances and tilts.
 pub fn board_views(
     station: &Station,
     board: &BoardSpec,
     views: &Views,
     beam: Option<Beam>,
     purpose: &str,
-) -> Vec<Rigid<Camera, Board>> {
+) -> Result<Vec<Rigid<Camera, Board>>> {
+    let pattern = Pattern::new(board)?;
     let features = board.features();
     let centre = features.iter().sum::<Vec3>() / features.len() as f64;
     let camera = &station.camera;
     let (w, h) = (f64::from(camera.width), f64::from(camera.height));
     let edge = 0.02 * w;
-    (0..views.count)
-        .map(|i| {
-            let mut rng = station.rng(purpose, i as u64);
-            // The picture's middle third is left a little as the tries go on, so that a board that
-            // only just fits is still placed.
-            for attempt in 0..20_000 {
-                let spread = 1.0 - f64::from(attempt) / 20_000.0;
-                let mut within = |by: f64| rng.random_range(-by..=by);
-                let px = Vec2::new(w / 2.0 + within(0.45 * w) * spread, h / 2.0 + within(0.45 * h) * spread);
-                let azimuth = within(std::f64::consts::PI);
-                let tilt = within(views.tilt_deg).to_radians();
-                let turn = within(views.turn_deg).to_radians();
-                let z = rng.random_range(views.near..=views.far);
-                let Some(ray) = camera.ray_from_pixel(&px) else { continue };
-                let rotation = exp(&(Vec3::new(azimuth.cos(), azimuth.sin(), 0.0) * tilt)) * exp(&(Vec3::z() * turn));
-                let pose: Rigid<Camera, Board> =
-                    Rigid::new(rotation, ray.direction * (z / ray.direction.z) - rotation * centre);
-                let inside = |p: &Vec3| {
-                    camera
-                        .pixel_from_point(&pose.point(p))
-                        .is_some_and(|q| q.x > edge && q.y > edge && q.x < w - edge && q.y < h - edge)
-                };
-                let lit = beam.is_none_or(|b| useful(station, board, &pose, b));
-                if lit && (!views.whole || features.iter().all(inside)) {
-                    return pose;
-                }
-            }
-            // Frontal, in the middle, as far as asked: the most that can be done for a large board.
-            Rigid::new(Mat3::identity(), Vec3::new(0.0, 0.0, views.far) - centre)
+    let inside = |p: Vec3| {
+        camera.pixel_from_point(&p).is_some_and(|q| q.x > edge && q.y > edge && q.x < w - edge && q.y < h - edge)
+    };
+    let view = |i: usize| {
+        let mut rng = station.rng(purpose, i as u64);
+        // The picture's middle third is left a little as the tries go on, so that a board that
+        // only just fits is still placed.
+        (0..20_000).find_map(|attempt| {
+            let spread = 1.0 - f64::from(attempt) / 20_000.0;
+            let mut within = |by: f64| rng.random_range(-by..=by);
+            let px = Vec2::new(w / 2.0 + within(0.45 * w) * spread, h / 2.0 + within(0.45 * h) * spread);
+            let azimuth = within(std::f64::consts::PI);
+            let tilt = within(views.tilt_deg).to_radians();
+            let turn = within(views.turn_deg).to_radians();
+            let z = rng.random_range(views.near..=views.far);
+            let ray = camera.ray_from_pixel(&px)?;
+            let rotation = exp(&(Vec3::new(azimuth.cos(), azimuth.sin(), 0.0) * tilt)) * exp(&(Vec3::z() * turn));
+            let pose: Rigid<Camera, Board> =
+                Rigid::new(rotation, ray.direction * (z / ray.direction.z) - rotation * centre);
+            let lit = beam.is_none_or(|b| useful(station, &pattern, &pose, b));
+            let seen = || features.iter().filter(|p| inside(pose.point(p))).count();
+            (lit && seen() as f64 >= views.seen * features.len() as f64).then_some(pose)
         })
-        .collect()
+    };
+    let found: Option<Vec<_>> = (0..views.count).map(view).collect();
+    found.ok_or_else(|| {
+        Fault::usage(format!(
+            "{:.0} % of the board's {} features do not come into the picture at {:.0} to {:.0} mm",
+            100.0 * views.seen,
+            features.len(),
+            views.near,
+            views.far
+        ))
+        .cause("the board is too large for this camera and distance")
+        .next("simulate a smaller board, or a ChArUco board, which may be partly seen")
+    })
 }

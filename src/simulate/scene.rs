@@ -2,7 +2,7 @@
 //! which material, and how far a measured point is from the nearest surface.
 //! Frame and unit: scene frame, z up, mm; the file's keys are in docs/file-formats.md, Scene file.
 
-use super::pattern;
+use super::pattern::Pattern;
 use super::solid::{Body, Cut, Shape};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Part, Rigid, Vec3};
@@ -182,7 +182,7 @@ struct Placed {
 
 #[derive(Clone, Debug)]
 struct Print {
-    board: BoardSpec,
+    pattern: Pattern,
     /// Board coordinates of the middle of the top face.
     middle: [f64; 2],
     black: f64,
@@ -254,8 +254,11 @@ impl Scene {
 
     /// A calibration board alone, in the board's own frame turned so that the scene's z comes out
     /// of the board: scene x = board x, scene y = -board y, scene z = -board z.
-    pub fn of_board(board: &BoardSpec, white: f64, black: f64) -> Scene {
-        let [x0, y0, x1, y1] = pattern::plate(board);
+    ///
+    /// # Errors
+    /// A ChArUco board whose markers its dictionary does not have.
+    pub fn of_board(board: &BoardSpec, white: f64, black: f64) -> Result<Scene> {
+        let [x0, y0, x1, y1] = board.outline();
         let spec = SceneSpec {
             name: "board".into(),
             region_mm: [x0, -y1, x1, -y0],
@@ -273,10 +276,10 @@ impl Scene {
             centre: at,
             radius: half[0].hypot(half[1]) + 3.0,
             material: Material { albedo: white, ..Material::default() },
-            print: Some(Print { board: board.clone(), middle, black }),
+            print: Some(Print { pattern: Pattern::new(board)?, middle, black }),
             part: None,
         };
-        Scene { spec, bodies: vec![placed] }
+        Ok(Scene { spec, bodies: vec![placed] })
     }
 
     /// First surface along `o + t d`, t in 0..far; `d` of unit length.
@@ -370,7 +373,7 @@ impl Placed {
     fn material_at(&self, p: &Vec3) -> Material {
         let Some(print) = &self.print else { return self.material };
         let q = self.to_body(p);
-        let black = q.z > -1e-3 && pattern::is_black(&print.board, q.x + print.middle[0], -q.y + print.middle[1]);
+        let black = q.z > -1e-3 && print.pattern.is_black(q.x + print.middle[0], -q.y + print.middle[1]);
         Material { albedo: if black { print.black } else { self.material.albedo }, ..self.material }
     }
 }

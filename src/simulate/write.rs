@@ -71,6 +71,8 @@ pub struct SimulateOptions {
     pub sets: Vec<Set>,
     /// A scene file; the built-in board with parts when not given.
     pub scene: Option<PathBuf>,
+    /// The calibration board of all sets that show one; chessboards of our own choice when not given.
+    pub board: Option<BoardSpec>,
     /// 0 is the design itself, every other number another specimen, scene pose and noise.
     pub seed: u64,
     /// Sensor size, px, 64..=8192 each.
@@ -89,6 +91,7 @@ impl Default for SimulateOptions {
         SimulateOptions {
             sets: vec![Set::Scan],
             scene: None,
+            board: None,
             seed: 1,
             width: 640,
             height: 480,
@@ -157,7 +160,7 @@ pub fn simulate(out: &Path, options: &SimulateOptions, progress: &(dyn Fn(usize,
     let folder = out.join("station");
     std::fs::create_dir_all(&folder).map_err(|e| Fault::write(&folder, e))?;
     station.store(&folder)?;
-    let plans: Vec<Plan> = options.sets.iter().map(|set| Plan::new(*set, &station, &scene, options)).collect();
+    let plans: Vec<Plan> = options.sets.iter().map(|set| Plan::new(*set, &station, &scene, options)).collect::<Result<_>>()?;
     let total = plans.iter().map(|p| p.shots.iter().map(Shot::pictures).sum::<usize>()).sum();
     let done = std::sync::atomic::AtomicUsize::new(0);
     let count = || progress(1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed), total);
@@ -206,7 +209,7 @@ fn scene_from_board() -> Rigid<InScene, Board> {
 }
 
 impl Plan {
-    fn new(set: Set, station: &Station, scene: &Scene, options: &SimulateOptions) -> Plan {
+    fn new(set: Set, station: &Station, scene: &Scene, options: &SimulateOptions) -> Result<Plan> {
         let truth = TruthFile::of(station, set.name());
         let mut plan = Plan { set, scenes: vec![], boards: vec![], shots: vec![], poses: vec![], truth };
         let z = station.working_distance;
@@ -228,13 +231,13 @@ impl Plan {
             }
             Set::Intrinsics => {
                 let views =
-                    Views { count: 20, near: 1.1 * z, far: 2.0 * z, tilt_deg: 40.0, turn_deg: 25.0, whole: true };
-                plan.show_boards(station, vec![chessboard(9, 6, 15.0, 9.0)], &views, None);
+                    Views { count: 20, near: 1.1 * z, far: 2.0 * z, tilt_deg: 40.0, turn_deg: 25.0, seen: 1.0 };
+                plan.show_boards(station, vec![chessboard(9, 6, 15.0, 9.0)], &views, None, options)?;
             }
             Set::Handeye => {
                 let views =
-                    Views { count: 16, near: 1.2 * z, far: 2.0 * z, tilt_deg: 35.0, turn_deg: 80.0, whole: true };
-                plan.show_boards(station, vec![chessboard(9, 6, 15.0, 9.0)], &views, None);
+                    Views { count: 16, near: 1.2 * z, far: 2.0 * z, tilt_deg: 35.0, turn_deg: 80.0, seen: 1.0 };
+                plan.show_boards(station, vec![chessboard(9, 6, 15.0, 9.0)], &views, None, options)?;
                 let base_from_board: Rigid<Base, Board> =
                     Rigid::from_vectors(&Vec3::new(3.1, 0.02, 0.03), Vec3::new(470.0, -80.0, 60.0));
                 plan.truth.base_from_board = Some(base_from_board);
@@ -243,14 +246,14 @@ impl Plan {
             }
             Set::Laserplane => {
                 let views =
-                    Views { count: 14, near: 0.75 * z, far: 1.35 * z, tilt_deg: 30.0, turn_deg: 15.0, whole: true };
+                    Views { count: 14, near: 0.75 * z, far: 1.35 * z, tilt_deg: 30.0, turn_deg: 15.0, seen: 1.0 };
                 let boards = vec![chessboard(9, 6, 8.0, 6.0), chessboard(8, 5, 10.0, 6.0)];
-                plan.show_boards(station, boards, &views, Some(Beam::Line));
+                plan.show_boards(station, boards, &views, Some(Beam::Line), options)?;
             }
             Set::PointerCal => {
                 let views =
-                    Views { count: 12, near: 0.7 * z, far: 1.85 * z, tilt_deg: 20.0, turn_deg: 10.0, whole: true };
-                plan.show_boards(station, vec![chessboard(9, 6, 8.0, 6.0)], &views, Some(Beam::Pointer));
+                    Views { count: 12, near: 0.7 * z, far: 1.85 * z, tilt_deg: 20.0, turn_deg: 10.0, seen: 1.0 };
+                plan.show_boards(station, vec![chessboard(9, 6, 8.0, 6.0)], &views, Some(Beam::Pointer), options)?;
             }
             Set::Pointer => {
                 let plate = SceneSpec::parse(
@@ -268,15 +271,31 @@ impl Plan {
                 plan.shots = plan.truth.distances_mm.iter().map(shot).collect();
             }
         }
-        plan
+        Ok(plan)
     }
 
     /// Boards in free poses, one after another; with a beam each pose is seen by room light and by laser.
-    fn show_boards(&mut self, station: &Station, boards: Vec<BoardSpec>, views: &Views, laser: Option<Beam>) {
-        self.scenes = boards.iter().map(|b| Scene::of_board(b, 0.85, 0.06)).collect();
-        let each = Views { count: views.count / boards.len(), ..*views };
+    fn show_boards(
+        &mut self,
+        station: &Station,
+        ours: Vec<BoardSpec>,
+        views: &Views,
+        laser: Option<Beam>,
+        options: &SimulateOptions,
+    ) -> Result<()> {
+        let boards = options.board.clone().map_or_else(|| ours.clone(), |b| vec![b]);
+        self.scenes = boards.iter().map(|b| Scene::of_board(b, 0.85, 0.06)).collect::<Result<_>>()?;
+        // A board of another size is shown as large as ours, unless a beam has to meet it at its own distance.
+        let size = |b: &BoardSpec| {
+            let [x0, y0, x1, y1] = b.outline();
+            (x1 - x0).hypot(y1 - y0)
+        };
+        let scale = if laser.is_none() { size(&boards[0]) / size(&ours[0]) } else { 1.0 };
+        let seen = if matches!(boards[0], BoardSpec::Charuco { .. }) { 0.6 } else { views.seen };
+        let (near, far) = (views.near * scale, views.far * scale);
+        let each = Views { count: views.count / boards.len(), near, far, seen, ..*views };
         for (i, board) in boards.iter().enumerate() {
-            for pose in plan::board_views(station, board, &each, laser, &format!("{} {i}", self.set.name())) {
+            for pose in plan::board_views(station, board, &each, laser, &format!("{} {i}", self.set.name()))? {
                 let scene_from_camera = scene_from_board() * pose.inverse();
                 let board = laser.map(|_| i);
                 self.shots.push(Shot { scene_from_camera, scene: i, laser, ambient: true, board });
@@ -284,6 +303,7 @@ impl Plan {
             }
         }
         self.boards = boards;
+        Ok(())
     }
 
     fn meta(&self, station: &Station) -> Meta {

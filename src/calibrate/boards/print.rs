@@ -1,10 +1,8 @@
 //! In: a board's description. Out: the board to be printed at true scale, as SVG and PDF.
 //! Frame and unit: millimetres on the sheet, x to the right, y down.
 
-use crate::calibrate::board_print::outline;
 use crate::fault::{Fault, Result};
-use crate::recording::BoardSpec;
-use calib_targets_charuco::resolve_dictionary;
+use crate::recording::{BoardSpec, Markers};
 use std::fmt::Write;
 
 /// Black shapes on a white sheet.
@@ -29,16 +27,17 @@ const FOOT: f64 = 12.0;
 /// Sizes that cannot be printed, unknown dictionaries, more markers than the dictionary has.
 pub fn sheet(board: &BoardSpec) -> Result<Sheet> {
     check(board)?;
-    let [x0, y0, x1, y1] = outline(board);
+    let [x0, y0, x1, y1] = board.outline();
     let mut sheet = Sheet { width: x1 - x0, height: y1 - y0 + FOOT, label: label(board), ..Sheet::default() };
     match board {
         BoardSpec::Chessboard { inner_corners: [nx, ny], square_mm: s, first_square, .. } => {
             let odd = u32::from(first_square == "white");
             squares(&mut sheet, *nx + 1, *ny + 1, *s, -s - x0, -s - y0, odd);
         }
-        BoardSpec::Charuco { squares: [nx, ny], square_mm: s, marker_mm, dictionary, .. } => {
+        BoardSpec::Charuco { squares: [nx, ny], square_mm: s, .. } => {
             squares(&mut sheet, *nx, *ny, *s, -x0, -y0, 0);
-            markers(&mut sheet, [*nx, *ny], *s, *marker_mm, dictionary, [-x0, -y0])?;
+            let all = Markers::of(board)?.expect("a ChArUco board has markers");
+            markers(&mut sheet, &all, [-x0, -y0]);
         }
         BoardSpec::Circles { diameter_mm, .. } => {
             let discs = board.features().into_iter().map(|c| [c.x - x0, c.y - y0, diameter_mm / 2.0]);
@@ -86,48 +85,26 @@ fn squares(sheet: &mut Sheet, nx: u32, ny: u32, s: f64, x0: f64, y0: f64, odd: u
     sheet.rectangles.extend(black.map(|(i, j)| [x0 + f64::from(i) * s, y0 + f64::from(j) * s, s, s]));
 }
 
-/// A marker in every white square, numbered row by row; codes are row by row from the lowest bit, 1 is
-/// black, with a black ring of one cell.
-fn markers(sheet: &mut Sheet, [nx, ny]: [u32; 2], s: f64, size: f64, name: &str, [x0, y0]: [f64; 2]) -> Result<()> {
-    let dictionary = resolve_dictionary(name).ok_or_else(|| {
-        Fault::usage(format!("'{name}' is no known marker dictionary")).next("use OpenCV's name, e.g. DICT_5X5_250")
-    })?;
-    let white: Vec<(u32, u32)> =
-        (0..ny).flat_map(|j| (0..nx).map(move |i| (i, j))).filter(|(i, j)| (i + j) % 2 == 1).collect();
-    if white.len() > dictionary.codes().len() {
-        return Err(Fault::usage(format!(
-            "the board needs {} markers, {name} has {}",
-            white.len(),
-            dictionary.codes().len()
-        ))
-        .next("choose a larger dictionary or a smaller board"));
-    }
-    let bits = dictionary.marker_size();
-    let cell = size / (bits + 2) as f64;
-    for ((i, j), code) in white.into_iter().zip(dictionary.codes()) {
-        let left = x0 + f64::from(i) * s + (s - size) / 2.0;
-        let top = y0 + f64::from(j) * s + (s - size) / 2.0;
-        for row in 0..bits + 2 {
-            let black = |column: usize| {
-                let ring = row == 0 || column == 0 || row > bits || column > bits;
-                ring || code >> ((row - 1) * bits + column - 1) & 1 == 1
-            };
-            // Runs of black cells as one rectangle: no hairlines between cells in print.
+/// Runs of black cells become one rectangle: no hairlines between cells in print.
+fn markers(sheet: &mut Sheet, all: &Markers, [x0, y0]: [f64; 2]) {
+    let cell = all.cell_mm();
+    for (i, j, k) in all.places() {
+        let [left, top] = all.corner(i, j);
+        for row in 0..all.cells() {
             let mut column = 0;
-            while column < bits + 2 {
+            while column < all.cells() {
                 let start = column;
-                while column < bits + 2 && black(column) {
+                while column < all.cells() && all.black(k, column, row) {
                     column += 1;
                 }
                 if column > start {
-                    let (x, w) = (left + start as f64 * cell, (column - start) as f64 * cell);
-                    sheet.rectangles.push([x, top + row as f64 * cell, w, cell]);
+                    let (x, w) = (x0 + left + start as f64 * cell, (column - start) as f64 * cell);
+                    sheet.rectangles.push([x, y0 + top + row as f64 * cell, w, cell]);
                 }
                 column += 1;
             }
         }
     }
-    Ok(())
 }
 
 fn label(board: &BoardSpec) -> String {

@@ -4,7 +4,6 @@
 
 use super::print::{Sheet, sheet};
 use super::{BoardView, FindOptions, find, turns};
-use crate::calibrate::board_print::outline;
 use crate::camera::Intrinsics;
 use crate::geometry::{Board, Camera, Rigid, Vec2, Vec3};
 use crate::raster::Image;
@@ -45,7 +44,7 @@ const CELL: f64 = 0.1;
 
 impl Print {
     fn new(board: &BoardSpec, sheet: &Sheet) -> Print {
-        let [x0, y0, _, _] = outline(board);
+        let [x0, y0, _, _] = board.outline();
         let (columns, rows) = ((sheet.width / CELL).ceil() as usize, (sheet.height / CELL).ceil() as usize);
         let mut cells = vec![false; columns * rows];
         let at = |v: f64, n: usize| ((v / CELL).round().max(0.0) as usize).min(n);
