@@ -71,8 +71,9 @@ fn corner_errors(set: &str, reference: &std::path::Path) -> (f64, f64, Vec<usize
 #[test]
 fn chessboard_corners_lie_where_the_truth_puts_them() {
     let Some(reference) = reference() else { return };
-    let (rms, _, counts) = corner_errors("intrinsics", &reference);
+    let (rms, over_sigma, counts) = corner_errors("intrinsics", &reference);
     assert!(counts.iter().all(|n| *n == 54) && rms < 0.015);
+    assert!((0.8..=1.25).contains(&over_sigma), "corner errors are {over_sigma} of their sigmas");
 }
 
 #[test]

@@ -146,7 +146,8 @@ fn why_not(best: Option<&Grid>, columns: usize, rows: usize, span: f64, grey: &G
         let border = 1.3 * pitch;
         p.x < border || p.y < border || p.x > grey.width as f64 - border || p.y > grey.height as f64 - border
     });
-    if grid.count() == c * r && c * r >= wc * wr && !cut {
+    // A complete lattice that is larger than the one asked for is no board that was cut off.
+    if grid.count() == c * r && c * r >= wc * wr && (!cut || (c >= wc && r >= wr && (c, r) != (wc, wr))) {
         return Fault::refused(seen)
             .cause("wrong board size given")
             .next(format!("if the board has {c}x{r} inner corners, say so in its description"));

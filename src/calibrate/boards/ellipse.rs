@@ -3,6 +3,7 @@
 //! Frame and unit: pixels; grey levels.
 
 use super::refine::{Grey, erf};
+use super::sandwich::place_variance;
 use crate::geometry::Vec2;
 use nalgebra::{Matrix2, SMatrix, SVector};
 
@@ -117,7 +118,13 @@ fn fit(pixels: &[[f64; 3]], shape: &Matrix2<f64>, smallest: f64) -> Option<Dot> 
     let variance = cost / (pixels.len() - PARAMETERS) as f64;
     let c = h.try_inverse()?;
     let good = Vec2::new(p[0], p[1]).norm() < 0.5 * smallest + 1.0 && p[7].abs() > 3.0 * variance.sqrt();
-    good.then(|| Dot { pixel: Vec2::new(p[0], p[1]), sigma_px: (variance * 0.5 * (c[(0, 0)] + c[(1, 1)])).sqrt() })
+    let scatter = || {
+        place_variance(pixels, &c, |q| {
+            let mut j = [0.0; PARAMETERS];
+            (q[2] - model(&p, q[0], q[1], &mut j), j)
+        })
+    };
+    good.then(|| Dot { pixel: Vec2::new(p[0], p[1]), sigma_px: scatter().sqrt() })
 }
 
 type Normal = (SMatrix<f64, PARAMETERS, PARAMETERS>, SVector<f64, PARAMETERS>, f64);

@@ -9,11 +9,12 @@ mod ellipse;
 mod grid;
 pub mod print;
 pub mod refine;
+mod sandwich;
 #[cfg(test)]
 mod trials;
 mod turns;
 
-pub use turns::{Turn, resolve, turns};
+pub use turns::{Turn, turns};
 
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec2;

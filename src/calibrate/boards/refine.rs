@@ -2,6 +2,7 @@
 //! a few hundredths of a pixel with its sigma (docs/math.md, Corners (1) to (3)).
 //! Frame and unit: pixels; grey levels.
 
+use super::sandwich::place_variance;
 use crate::geometry::Vec2;
 use nalgebra::{SMatrix, SVector};
 
@@ -34,7 +35,7 @@ impl Grey {
 #[derive(Clone, Copy, Debug)]
 pub struct Corner {
     pub pixel: Vec2,
-    /// Standard deviation per axis, px, from the fit's residuals.
+    /// Standard deviation per axis, px, from the pixels' own residuals.
     pub sigma_px: f64,
     /// Sigma of the edge blur, px.
     pub blur_px: f64,
@@ -56,6 +57,8 @@ pub struct Window {
 }
 
 const PARAMETERS: usize = 9;
+/// Corners nearer to the picture's edge show too little of one of their squares, px.
+const RIM: f64 = 5.0;
 
 /// Fits two blurred edges that cross: I = (1 + g·x) (m + c E(d₁) E(d₂)) with d the signed
 /// distances from the edges and E a step blurred by a Gaussian and by the pixel. The pattern is symmetric about the corner for any symmetric blur, so
@@ -68,9 +71,11 @@ pub fn corner(grey: &Grey, start: &Vec2, u: &Vec2, v: &Vec2, window: &Window) ->
     let half = u * ru;
     let other = v * rv;
     let (hx, hy) = (half.x.abs() + other.x.abs(), half.y.abs() + other.y.abs());
-    let (x0, x1) = ((start.x - hx).ceil(), (start.x + hx).floor());
-    let (y0, y1) = ((start.y - hy).ceil(), (start.y + hy).floor());
-    if !(x0 >= 0.0 && y0 >= 0.0 && x1 < grey.width as f64 && y1 < grey.height as f64) {
+    // A corner near the picture's edge is fitted to what is there of its window.
+    let (right, bottom) = (grey.width as f64 - 1.0, grey.height as f64 - 1.0);
+    let (x0, x1) = ((start.x - hx).ceil().max(0.0), (start.x + hx).floor().min(right));
+    let (y0, y1) = ((start.y - hy).ceil().max(0.0), (start.y + hy).floor().min(bottom));
+    if !(start.x >= RIM && start.y >= RIM && start.x <= right - RIM && start.y <= bottom - RIM) {
         return None;
     }
     let mut pixels = Vec::with_capacity(((x1 - x0 + 1.0) * (y1 - y0 + 1.0)).max(0.0) as usize);
@@ -182,7 +187,11 @@ fn fit(pixels: &[[f64; 3]], u: &Vec2, v: &Vec2) -> Option<Corner> {
         && p[5] > p[6].abs() * 0.5;
     good.then(|| Corner {
         pixel: moved,
-        sigma_px: (variance * 0.5 * (c[(0, 0)] + c[(1, 1)])).sqrt(),
+        sigma_px: place_variance(pixels, &c, |q| {
+            let mut j = [0.0; PARAMETERS];
+            (q[2] - model(&p, &widths, q[0], q[1], &mut j), j)
+        })
+        .sqrt(),
         blur_px: p[4].exp(),
         contrast,
     })
