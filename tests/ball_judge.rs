@@ -2,25 +2,15 @@
 //! comes with its true sigma and the ball's side is found, stated or refused, never guessed.
 //! Frame and unit: mm, rad.
 
-use rand::{Rng, SeedableRng};
-use rand_distr::{Distribution, StandardNormal};
+mod common;
+
+use common::judge::{Trial, between, gauss, gauss3, judge};
+use nalgebra::{DMatrix, DVector};
+use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use sheetlight::calibrate::profile_files::Profile;
 use sheetlight::calibrate::profile_hand_eye::{BallOptions, Side, solve};
 use sheetlight::geometry::{Base, Flange, Mat3, Rigid, Sensor, Vec3, exp, log};
-
-fn gauss(rng: &mut Pcg64, sigma: f64) -> f64 {
-    let z: f64 = StandardNormal.sample(rng);
-    z * sigma
-}
-
-fn gauss3(rng: &mut Pcg64, sigma: f64) -> Vec3 {
-    Vec3::new(gauss(rng, sigma), gauss(rng, sigma), gauss(rng, sigma))
-}
-
-fn between(rng: &mut Pcg64, low: f64, high: f64) -> f64 {
-    low + (high - low) * rng.random::<f64>()
-}
 
 const RADIUS: f64 = 20.0;
 
@@ -67,25 +57,52 @@ fn rig(rng: &mut Pcg64) -> Rig {
     Rig { sensor: Rigid::from_vectors(&gauss3(rng, 1.0), gauss3(rng, 80.0)), ball: gauss3(rng, 300.0) }
 }
 
+/// Cramer-Rao bound of sensor and ball (9 numbers), from numerical derivatives of each profile's circle; what
+/// the robot's place adds is eliminated.
+fn bound(rig: &Rig, poses: &[Rigid<Base, Flange>], point_mm: f64, robot_mm: f64) -> DMatrix<f64> {
+    let angles = (0..160).map(|k| -1.2 + 2.4 * f64::from(k) / 159.0);
+    // A point at angle a on the circle (x, z, r) tells x sin a - z cos a + r.
+    let rows = DMatrix::from_row_iterator(160, 3, angles.flat_map(|a| [a.sin(), -a.cos(), 1.0]));
+    let by_points = (rows.transpose() * &rows).try_inverse().unwrap() * (point_mm * point_mm);
+    let mut information = DMatrix::<f64>::zeros(9, 9);
+    for pose in poses {
+        let circle = |d: &[f64; 12]| {
+            let v = |i: usize| Vec3::new(d[i], d[i + 1], d[i + 2]);
+            let sensor = Rigid::<Flange, Sensor>::new(exp(&v(3)) * rig.sensor.rotation, rig.sensor.translation + v(0));
+            let pose = Rigid::<Base, Flange>::new(pose.rotation, pose.translation + v(9));
+            let q = (pose * sensor).inverse().point(&(rig.ball + v(6)));
+            DVector::from_vec(vec![q.x, q.z, (RADIUS * RADIUS - q.y * q.y).sqrt()])
+        };
+        let mut j = DMatrix::<f64>::zeros(3, 12);
+        for c in 0..12 {
+            let h = if (3..6).contains(&c) { 1e-6 } else { 1e-4 };
+            let (mut a, mut b) = ([0.0; 12], [0.0; 12]);
+            (a[c], b[c]) = (h, -h);
+            j.set_column(c, &((circle(&a) - circle(&b)) / (2.0 * h)));
+        }
+        let by_robot = j.columns(9, 3).into_owned();
+        let v = &by_points + &by_robot * by_robot.transpose() * (robot_mm * robot_mm);
+        let j = j.columns(0, 9).into_owned();
+        information += j.transpose() * v.try_inverse().unwrap() * j;
+    }
+    information.try_inverse().unwrap()
+}
+
 #[test]
-fn the_sensors_pose_comes_with_its_true_sigma() {
-    let mut over = [0.0; 9];
-    for k in 0..100 {
-        let rng = &mut Pcg64::seed_from_u64(k);
-        let rig = rig(rng);
-        let (point, robot) = [(0.01, 0.02), (0.05, 0.02), (0.02, 0.1), (0.03, 0.05)][k as usize % 4];
-        let (profiles, poses) = scans(rng, &rig, 20, [-14.0, 14.0], 0.35, point, robot);
+fn the_sensors_pose_comes_with_its_true_sigma_and_near_the_bound() {
+    let levels = [(0.01, 0.02), (0.05, 0.02), (0.02, 0.1), (0.03, 0.05)];
+    let make = |k: u64, level: usize| (k, levels[level]);
+    let names = ["x_mm", "y_mm", "z_mm", "rx", "ry", "rz", "ball_x_mm", "ball_y_mm", "ball_z_mm"];
+    judge("profile sensor", &names, levels.len(), make, |(k, (point, robot)), rng| {
+        let rig = rig(&mut Pcg64::seed_from_u64(*k));
+        let (profiles, poses) = scans(rng, &rig, 20, [-14.0, 14.0], 0.35, *point, *robot);
         let found = solve(&profiles, &poses, &BallOptions::new(2.0 * RADIUS)).unwrap();
         let w = log(&(found.flange_from_sensor.rotation * rig.sensor.rotation.transpose()));
         let t = found.flange_from_sensor.translation - rig.sensor.translation;
         let p = found.ball - rig.ball;
-        for (i, e) in [t.x, t.y, t.z, w.x, w.y, w.z, p.x, p.y, p.z].into_iter().enumerate() {
-            over[i] += e * e / found.covariance[(i, i)] / 100.0;
-        }
-    }
-    let over = over.map(f64::sqrt);
-    println!("error over sigma {over:.3?}");
-    assert!(over.iter().all(|x| (0.8..=1.25).contains(x)), "{over:?}");
+        let error = DVector::from_iterator(9, t.iter().chain(w.iter()).chain(p.iter()).copied());
+        Trial::new(error, &found.covariance, &bound(&rig, &poses, *point, *robot))
+    });
 }
 
 #[test]

@@ -2,121 +2,21 @@
 //! says they are, and whether wrong input is found and named.
 //! Frame and unit: mm, rad, px.
 
+mod common;
+
+use common::hand_eye::{LEVELS, Noise, Station, pairs, station};
+use common::judge::{Trial, gauss, judge};
 use nalgebra::{DMatrix, DVector, SMatrix};
 use rand::{Rng, SeedableRng, seq::SliceRandom};
-use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
+use sheetlight::calibrate::boards::{Turn, turns};
 use sheetlight::calibrate::hand_eye::{HandEyeFit, HandEyeOptions, Mount, solve};
 use sheetlight::calibrate::hand_eye_closed::{Chain, Far, Near, Pair};
-use sheetlight::calibrate::measured_pose::{INTRINSIC_NAMES, SeenBoard, changed, measure};
-use sheetlight::camera::Intrinsics;
-use sheetlight::geometry::{Board, Camera, Rigid, Vec2, Vec3, exp};
-
-fn gauss(rng: &mut Pcg64, sigma: f64) -> f64 {
-    let z: f64 = StandardNormal.sample(rng);
-    z * sigma
-}
-
-fn gauss3(rng: &mut Pcg64, sigma: f64) -> Vec3 {
-    Vec3::new(gauss(rng, sigma), gauss(rng, sigma), gauss(rng, sigma))
-}
-
-fn between(rng: &mut Pcg64, low: f64, high: f64) -> f64 {
-    low + (high - low) * rng.random::<f64>()
-}
-
-struct Station {
-    camera: Intrinsics,
-    truth: Chain,
-    mount: Mount,
-    /// True near_from_far.
-    poses: Vec<Rigid<Near, Far>>,
-    points: Vec<Vec3>,
-}
-
-/// A camera that looks at a 9x6 board from `count` sides.
-fn station(rng: &mut Pcg64, mount: Mount, count: usize) -> Station {
-    let f = between(rng, 500.0, 900.0);
-    let camera = Intrinsics {
-        fx: f,
-        fy: f * between(rng, 0.99, 1.01),
-        cx: between(rng, 300.0, 340.0),
-        cy: between(rng, 220.0, 260.0),
-        skew: 0.0,
-        distortion: [between(rng, -0.15, 0.0), between(rng, 0.0, 0.1), gauss(rng, 5e-4), gauss(rng, 5e-4), 0.0],
-        width: 640,
-        height: 480,
-    };
-    let points: Vec<Vec3> = (0..54).map(|i| Vec3::new(f64::from(i % 9) * 15.0, f64::from(i / 9) * 15.0, 0.0)).collect();
-    let truth = Chain {
-        near_from_camera: Rigid::from_vectors(&gauss3(rng, 1.0), gauss3(rng, 60.0)),
-        far_from_board: Rigid::from_vectors(&gauss3(rng, 1.0), gauss3(rng, 300.0)),
-    };
-    let poses = (0..count)
-        .map(|_| {
-            let distance = f * between(rng, 0.32, 0.5);
-            let turn = exp(&Vec3::new(0.0, 0.0, between(rng, -0.8, 0.8)))
-                * exp(
-                    &(gauss3(rng, 1.0).component_mul(&Vec3::new(1.0, 1.0, 0.0)).normalize() * between(rng, 0.15, 0.6))
-                );
-            let centre = Vec3::new(gauss(rng, 6.0), gauss(rng, 6.0), distance);
-            let camera_from_board: Rigid<Camera, Board> = Rigid::new(turn, centre - turn * Vec3::new(60.0, 37.5, 0.0));
-            truth.near_from_camera * camera_from_board * truth.far_from_board.inverse()
-        })
-        .collect();
-    Station { camera, truth, mount, poses, points }
-}
-
-#[derive(Clone, Copy)]
-struct Noise {
-    mm: f64,
-    deg: f64,
-    px: f64,
-}
-
-/// The robot's reading of a pose: noise of base_from_flange, translation and rotation apart.
-fn read(rng: &mut Pcg64, s: &Station, pose: &Rigid<Near, Far>, noise: Noise) -> Rigid<Near, Far> {
-    let blur = |rng: &mut Pcg64, rotation, translation: Vec3| {
-        let turn = exp(&gauss3(rng, noise.deg.to_radians()));
-        (turn * rotation, translation + gauss3(rng, noise.mm))
-    };
-    match s.mount {
-        Mount::EyeToHand => {
-            let (r, t) = blur(rng, pose.rotation, pose.translation);
-            Rigid::new(r, t)
-        }
-        Mount::EyeInHand => {
-            let p = pose.inverse();
-            let (r, t) = blur(rng, p.rotation, p.translation);
-            Rigid::<Far, Near>::new(r, t).inverse()
-        }
-    }
-}
-
-fn pairs(rng: &mut Pcg64, s: &Station, noise: Noise, believed: &Intrinsics) -> Vec<Pair> {
-    s.poses
-        .iter()
-        .enumerate()
-        .map(|(i, pose)| {
-            let true_board = s.truth.expected(pose);
-            let pixels: Vec<Vec2> = s
-                .points
-                .iter()
-                .map(|p| {
-                    s.camera.pixel_from_point(&true_board.point(p)).unwrap()
-                        + Vec2::new(gauss(rng, noise.px), gauss(rng, noise.px))
-                })
-                .collect();
-            let seen = SeenBoard {
-                name: format!("picture {i}"),
-                points: s.points.clone(),
-                pixels,
-                sigmas_px: vec![1.0; s.points.len()],
-            };
-            Pair { near_from_far: read(rng, s, pose, noise), seen: measure(&seen, believed, &true_board).unwrap() }
-        })
-        .collect()
-}
+use sheetlight::calibrate::hand_eye_expected::expected_error;
+use sheetlight::calibrate::hand_eye_turns::{read_with, resolve};
+use sheetlight::calibrate::measured_pose::{INTRINSIC_NAMES, changed};
+use sheetlight::geometry::{Board, Camera, Rigid, Vec3, exp};
+use sheetlight::recording::BoardSpec;
 
 fn run(s: &Station, pairs: &[Pair], camera_covariance: &SMatrix<f64, 9, 9>) -> sheetlight::fault::Result<HandEyeFit> {
     solve(pairs, s.mount, camera_covariance, &s.camera, &HandEyeOptions::default())
@@ -186,39 +86,34 @@ fn bound(s: &Station, noise: Noise) -> DMatrix<f64> {
     information.try_inverse().unwrap()
 }
 
-const LEVELS: [Noise; 4] = [
-    Noise { mm: 0.02, deg: 0.004, px: 0.03 },
-    Noise { mm: 0.05, deg: 0.02, px: 0.05 },
-    Noise { mm: 0.05, deg: 0.02, px: 0.2 },
-    Noise { mm: 0.3, deg: 0.06, px: 0.1 },
+const NAMES: [&str; 12] = [
+    "x_mm",
+    "y_mm",
+    "z_mm",
+    "rx",
+    "ry",
+    "rz",
+    "board_x_mm",
+    "board_y_mm",
+    "board_z_mm",
+    "board_rx",
+    "board_ry",
+    "board_rz",
 ];
 
 #[test]
 fn errors_are_what_the_report_says_and_near_the_bound() {
     for mount in [Mount::EyeInHand, Mount::EyeToHand] {
-        let mut over_sigma = [0.0; 12];
-        let mut over_bound = [0.0; 12];
-        let mut n = 0.0;
-        for k in 0..100 {
-            let rng = &mut Pcg64::seed_from_u64(1000 + k);
-            let s = station(rng, mount, 13);
-            let noise = LEVELS[k as usize % LEVELS.len()];
-            let found = run(&s, &pairs(rng, &s, noise, &s.camera), &SMatrix::zeros()).unwrap();
-            assert!(found.pairs.iter().filter(|p| !p.used).count() <= 1, "station {k}: good pairs were left out");
-            let e = error(&found.chain, &s.truth);
-            let b = bound(&s, noise);
-            for i in 0..12 {
-                over_sigma[i] += e[i] * e[i] / found.covariance[(i, i)];
-                over_bound[i] += e[i] * e[i] / b[(i, i)];
-            }
-            n += 1.0;
-        }
-        let rms = |a: [f64; 12]| a.map(|x: f64| (x / n).sqrt());
-        let (s, b) = (rms(over_sigma), rms(over_bound));
-        println!("{mount:?}: error over sigma {s:.3?}\n  error over bound {b:.3?}");
-        assert!(s.iter().all(|x| (0.8..=1.25).contains(x)), "{mount:?} error over sigma {s:?}");
-        let whole = (b.iter().map(|x| x * x).sum::<f64>() / 12.0).sqrt();
-        assert!(whole <= 1.15, "{mount:?} error over bound {b:?}");
+        let make = |k: u64, level: usize| {
+            let s = station(&mut Pcg64::seed_from_u64(1000 + k), mount, 13);
+            let b = bound(&s, LEVELS[level]);
+            (s, b, LEVELS[level])
+        };
+        judge(&format!("hand-eye, {mount:?}"), &NAMES, LEVELS.len(), make, |(s, bound, noise), rng| {
+            let found = run(s, &pairs(rng, s, *noise, &s.camera), &SMatrix::zeros()).unwrap();
+            assert!(found.pairs.iter().filter(|p| !p.used).count() <= 1, "good pairs were left out");
+            Trial::new(error(&found.chain, &s.truth), &found.covariance, bound)
+        });
     }
 }
 
@@ -230,6 +125,7 @@ fn the_cameras_uncertainty_reaches_the_report() {
     let covariance = SMatrix::<f64, 9, 9>::from_diagonal(&nalgebra::SVector::from(sigma).map(|s: f64| s * s));
     let mut over = [0.0; 12];
     let mut camera_exact = [0.0; 12];
+    let mut point = 0.0;
     for k in 0..100 {
         let rng = &mut Pcg64::seed_from_u64(5000 + k);
         let s = station(rng, Mount::EyeInHand, 13);
@@ -242,11 +138,88 @@ fn the_cameras_uncertainty_reaches_the_report() {
             over[i] += e[i] * e[i] / found.covariance[(i, i)] / 100.0;
             camera_exact[i] += e[i] * e[i] / found.covariance_camera_exact[(i, i)] / 100.0;
         }
+        // A point 160 mm before the camera, by its pixel and depth: camera and transform err together.
+        let seen = s.camera.pixel_from_point(&Vec3::new(0.0, 0.0, 160.0)).unwrap();
+        let ray = believed.ray_from_pixel(&seen).unwrap().direction;
+        let off = found.chain.near_from_camera.point(&(ray * (160.0 / ray.z)))
+            - s.truth.near_from_camera.point(&Vec3::new(0.0, 0.0, 160.0));
+        let expected = expected_error(&found, 160.0);
+        point += (off.norm() / expected.whole).powi(2) / 100.0;
     }
+    println!("a point's error over the expected one {:.3}", f64::sqrt(point));
+    assert!((0.8..=1.25).contains(&f64::sqrt(point)), "a point's error is {:.3} of the expected", f64::sqrt(point));
     let over = over.map(f64::sqrt);
     println!("with the camera's part {over:.3?}, without {:.2?}", camera_exact.map(f64::sqrt));
     assert!(over.iter().all(|x| (0.8..=1.25).contains(x)), "{over:?}");
     assert!(camera_exact.iter().sum::<f64>().sqrt() > 5.0, "the test must be able to fail");
+}
+
+/// Each picture of a board that looks the same after a turn is read with a turn drawn by lot.
+fn read_by_lot(rng: &mut Pcg64, pairs: &[Pair], turns: &[Turn]) -> Vec<Pair> {
+    pairs.iter().map(|p| read_with(p, &turns[rng.random_range(0..turns.len())])).collect()
+}
+
+#[test]
+fn turned_readings_are_told_by_the_whole_set() {
+    for (k, corners) in [[8, 6], [9, 7], [7, 7]].iter().cycle().take(30).enumerate() {
+        let rng = &mut Pcg64::seed_from_u64(300 + k as u64);
+        let mut s = station(rng, [Mount::EyeInHand, Mount::EyeToHand][k % 2], 12);
+        let board = BoardSpec::Chessboard {
+            inner_corners: *corners,
+            square_mm: 15.0,
+            border_mm: 0.0,
+            first_square: "black".into(),
+        };
+        s.points = board.features();
+        let turns = turns(&board);
+        let mut p = pairs(rng, &s, LEVELS[k % 4], &s.camera);
+        // Two pictures get each other's poses: they agree with no reading and must not spoil the rest.
+        let kept = p[3].near_from_far;
+        (p[3].near_from_far, p[7].near_from_far) = (p[7].near_from_far, kept);
+        let mut seen = read_by_lot(rng, &p, &turns);
+        for _ in 0..2 {
+            let chosen = resolve(&seen, &turns, 1).unwrap();
+            let one: Vec<Pair> = seen.iter().zip(&chosen).map(|(p, k)| read_with(p, &turns[*k])).collect();
+            let found = run(&s, &one, &SMatrix::zeros()).unwrap();
+            let wrong: Vec<bool> = found.pairs.iter().map(|p| !p.used).collect();
+            assert_eq!(wrong.iter().filter(|w| **w).count(), 2, "seed {k}: {wrong:?}");
+            let e = error(&found.chain, &s.truth);
+            assert!((0..6).all(|i| e[i].abs() < 5.0 * found.covariance[(i, i)].sqrt()), "seed {k}: {e}");
+            seen.reverse();
+        }
+    }
+}
+
+#[test]
+fn readings_that_nothing_tells_apart_are_refused() {
+    let rng = &mut Pcg64::seed_from_u64(400);
+    let mut s = station(rng, Mount::EyeInHand, 8);
+    let board =
+        BoardSpec::Chessboard { inner_corners: [8, 6], square_mm: 15.0, border_mm: 0.0, first_square: "black".into() };
+    (s.points, s.mount) = (board.features(), Mount::EyeInHand);
+    let turns = turns(&board);
+    // Half of the pictures a quarter turn about the line of sight from the others, all tilted about one axis
+    // alike: read the other way round, that half fits another camera as well.
+    let middle = Vec3::new(52.5, 37.5, 0.0);
+    s.poses = (0..8)
+        .map(|i| {
+            let turn = exp(&Vec3::new(0.0, 0.0, if i < 4 { 0.0 } else { std::f64::consts::FRAC_PI_2 }));
+            let seen: Rigid<Camera, Board> =
+                Rigid::new(turn, Vec3::new(0.0, 0.0, 200.0 + f64::from(i)) - turn * middle);
+            s.truth.near_from_camera * seen * s.truth.far_from_board.inverse()
+        })
+        .collect();
+    let p = pairs(rng, &s, LEVELS[0], &s.camera);
+    let refused = resolve(&read_by_lot(rng, &p, &turns), &turns, 1).unwrap_err();
+    println!("{refused}");
+    assert!(refused.to_string().contains("looks the same after a turn"), "{refused}");
+    // Poses in another order fit no reading.
+    let s = station(rng, Mount::EyeInHand, 12);
+    let mut p = pairs(rng, &s, LEVELS[0], &s.camera);
+    let poses: Vec<_> = p.iter().map(|p| p.near_from_far).collect();
+    (0..12).for_each(|i| p[i].near_from_far = poses[(5 * i + 3) % 12]);
+    let refused = resolve(&p, &turns, 1).unwrap_err();
+    assert!(refused.to_string().contains("do not belong together"), "{refused}");
 }
 
 #[test]

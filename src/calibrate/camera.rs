@@ -90,7 +90,9 @@ pub fn calibrate(
         }
     }
     if pictures.len() < 2 {
-        let first = left_out.first().map(|l| l.1.clone());
+        // The reason that most pictures give; of equal ones the first.
+        let votes = |l: &(String, Fault)| left_out.iter().filter(|o| o.1.cause == l.1.cause).count();
+        let first = left_out.iter().rev().max_by_key(|l| votes(l)).map(|l| l.1.clone());
         let listed: Vec<String> = left_out.iter().map(|(n, f)| format!("{n}: {}", f.what)).collect();
         return Err(Fault::refused(format!(
             "the board was found in {} of {all} pictures, 3 or more are needed\n    {}",

@@ -1,14 +1,14 @@
 //! In: board poses with their information and the robot's poses. Out: the hand-eye transform and the
 //! board's place by joint maximum likelihood, with the robot's noise, covariance and hold-out errors.
-//! Frame and unit: see `hand_eye_closed`; mm, rad (docs/math.md, Hand-eye (1) to (9)).
+//! Frame and unit: see `hand_eye_closed`; mm, rad (docs/math.md, Hand-eye (1) to (10)).
 
 use super::components::Components;
 use super::hand_eye_checks as checks;
-use super::hand_eye_closed::{Agreement, Chain, Far, Near, Pair, agree};
-use super::measured_pose::{pooled_factor, step_between};
+use super::hand_eye_closed::{Agreement, Chain, Far, Near, Pair, agree, canonical_order};
+use super::hand_eye_terms::{jacobian, refine, robot_parts, step_covariance};
+use super::measured_pose::pooled_factor;
 use crate::fault::{Fault, Result};
-use crate::geometry::{Camera, Mat3, Rigid, Vec3, exp, skew};
-use crate::solve::{LmOptions, Problem, Residuals, Stop, lm};
+use crate::geometry::{Rigid, Vec3};
 use nalgebra::{DMatrix, DVector, Matrix6, SMatrix};
 
 /// Settings of [`solve`].
@@ -95,7 +95,7 @@ pub enum Mount {
 
 impl Mount {
     /// The flange's origin in the camera frame.
-    fn flange(self, chain: &Chain, near_from_far: &Rigid<Near, Far>) -> Vec3 {
+    pub(super) fn flange(self, chain: &Chain, near_from_far: &Rigid<Near, Far>) -> Vec3 {
         match self {
             Mount::EyeInHand => chain.near_from_camera.inverse().translation,
             Mount::EyeToHand => (chain.near_from_camera.inverse() * *near_from_far).translation,
@@ -134,6 +134,11 @@ pub struct HandEyeFit {
     pub covariance: DMatrix<f64>,
     /// The part of it that the pictures and the robot's noise make, the camera taken as exact.
     pub covariance_camera_exact: DMatrix<f64>,
+    /// The 12 numbers by the nine camera parameters: how the result follows the camera it was given.
+    pub by_camera: SMatrix<f64, 12, 9>,
+    /// The camera that was held, and the covariance of its parameters.
+    pub camera: crate::camera::Intrinsics,
+    pub camera_covariance: SMatrix<f64, 9, 9>,
     pub noise: Noise,
     /// One per pair, in the order given.
     pub pairs: Vec<PairResidual>,
@@ -141,91 +146,6 @@ pub struct HandEyeFit {
     pub chi2: f64,
     /// The closed form that it started from.
     pub start: Agreement,
-}
-
-/// Steps of one pair by the 12 unknowns, at the present chain.
-fn jacobian(chain: &Chain, pair: &Pair) -> (SMatrix<f64, 6, 1>, SMatrix<f64, 6, 12>) {
-    let expected = chain.expected(&pair.near_from_far);
-    let e = step_between(&pair.seen.camera_from_board, &expected);
-    let camera_from_near = chain.near_from_camera.rotation.transpose();
-    let camera_from_far = camera_from_near * pair.near_from_far.rotation;
-    let shift = skew(&Vec3::new(e[0], e[1], e[2]));
-    // w = -R_Xᵀ r and v = -R_Xᵀ dt for the camera's side; w = A r and v = A dt + g × A r for the
-    // board's, g the board's origin seen from the camera. The step before adds w × its translation.
-    let mut j = SMatrix::<f64, 6, 12>::zeros();
-    j.fixed_view_mut::<3, 3>(0, 0).copy_from(&-camera_from_near);
-    j.fixed_view_mut::<3, 3>(0, 3).copy_from(&(shift * camera_from_near));
-    j.fixed_view_mut::<3, 3>(3, 3).copy_from(&-camera_from_near);
-    j.fixed_view_mut::<3, 3>(0, 6).copy_from(&camera_from_far);
-    let g = skew(&expected.translation) - shift;
-    j.fixed_view_mut::<3, 3>(0, 9).copy_from(&(g * camera_from_far));
-    j.fixed_view_mut::<3, 3>(3, 9).copy_from(&camera_from_far);
-    (e, j)
-}
-
-/// Covariance of a step: the robot's translation and rotation, each for a sigma of 1.
-fn robot_parts(flange: &Vec3) -> [Matrix6<f64>; 2] {
-    let f = skew(flange);
-    let mut translation = Matrix6::zeros();
-    translation.fixed_view_mut::<3, 3>(0, 0).copy_from(&Mat3::identity());
-    let mut rotation = Matrix6::zeros();
-    rotation.fixed_view_mut::<3, 3>(0, 0).copy_from(&(f * f.transpose()));
-    rotation.fixed_view_mut::<3, 3>(0, 3).copy_from(&f);
-    rotation.fixed_view_mut::<3, 3>(3, 0).copy_from(&f.transpose());
-    rotation.fixed_view_mut::<3, 3>(3, 3).copy_from(&Mat3::identity());
-    [translation, rotation]
-}
-
-fn step_covariance(chain: &Chain, pair: &Pair, noise: &Noise, mount: Mount) -> Matrix6<f64> {
-    let [t, r] = robot_parts(&mount.flange(chain, &pair.near_from_far));
-    pair.seen.covariance(noise.feature_factor) + t * noise.robot_mm.powi(2) + r * noise.robot_rad.powi(2)
-}
-
-/// The refinement: the robot's true poses are eliminated in closed form, which leaves whitened
-/// steps of six numbers a pair (docs/math.md, Hand-eye (6), (7)).
-struct Refinement<'a> {
-    pairs: &'a [&'a Pair],
-    /// Inverse Cholesky factors of the steps' covariances.
-    whiteners: Vec<Matrix6<f64>>,
-}
-
-impl Problem for Refinement<'_> {
-    type State = Chain;
-    fn width(&self) -> usize {
-        12
-    }
-    fn moved(&self, c: &Chain, s: &[f64]) -> Chain {
-        let v = |i: usize| Vec3::new(s[i], s[i + 1], s[i + 2]);
-        Chain {
-            near_from_camera: Rigid::new(
-                exp(&v(3)) * c.near_from_camera.rotation,
-                c.near_from_camera.translation + v(0),
-            ),
-            far_from_board: Rigid::new(exp(&v(9)) * c.far_from_board.rotation, c.far_from_board.translation + v(6)),
-        }
-    }
-    fn residuals(&self, chain: &Chain, out: &mut Residuals) -> Option<()> {
-        const ALL: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
-        for (pair, w) in self.pairs.iter().zip(&self.whiteners) {
-            let (e, j) = jacobian(chain, pair);
-            let r = w * e;
-            out.group(r.as_slice(), &ALL, (w * j).transpose().as_slice());
-        }
-        Some(())
-    }
-}
-
-fn refine(pairs: &[&Pair], start: &Chain, noise: &Noise, mount: Mount) -> Option<(Chain, DMatrix<f64>, f64)> {
-    let whiteners = pairs
-        .iter()
-        .map(|p| step_covariance(start, p, noise, mount).cholesky()?.l().try_inverse())
-        .collect::<Option<Vec<_>>>()?;
-    let found = lm(&Refinement { pairs, whiteners }, *start, &LmOptions::default());
-    if found.stop == Stop::BadStart {
-        return None;
-    }
-    let cost = found.lengths.iter().map(|l| l * l).sum();
-    Some((found.state, found.covariance?, cost))
 }
 
 /// One round of variance components at a fitted chain.
@@ -408,9 +328,8 @@ pub fn solve(
     let chosen: Vec<&Pair> = used.iter().map(|&i| &pairs[i]).collect();
     let by_camera = by_camera(&chosen, &chain, &covariance, &noise, mount).ok_or_else(undetermined)?;
     let judge = Judge { chain: &chain, covariance: &covariance, noise: &noise, given: &given, by_camera };
-    let by_camera = DMatrix::from_column_slice(12, 9, by_camera.as_slice());
-    let camera = DMatrix::from_column_slice(9, 9, camera.as_slice());
-    let whole = &covariance + &by_camera * camera * by_camera.transpose();
+    let followed = by_camera * camera * by_camera.transpose();
+    let whole = &covariance + DMatrix::from_column_slice(12, 12, followed.as_slice());
     let residuals = pairs
         .iter()
         .enumerate()
@@ -435,6 +354,9 @@ pub fn solve(
         chain,
         covariance: whole,
         covariance_camera_exact: covariance,
+        by_camera,
+        camera: *model,
+        camera_covariance: *camera,
         noise,
         pairs: residuals,
         chi2: cost / freedom.max(1.0),
@@ -446,15 +368,7 @@ pub fn solve(
 
 /// The closed form in an order that does not depend on the recording's.
 fn start(pairs: &[Pair], o: &HandEyeOptions) -> Result<Agreement> {
-    let mut order: Vec<usize> = (0..pairs.len()).collect();
-    let key = |p: &Pair| {
-        let (a, b) = (p.near_from_far.translation, p.seen.camera_from_board.translation);
-        [a.x, a.y, a.z, b.x, b.y, b.z]
-    };
-    order.sort_by(|&a, &b| {
-        let (a, b) = (key(&pairs[a]), key(&pairs[b]));
-        a.iter().zip(&b).map(|(x, y)| x.total_cmp(y)).find(|c| c.is_ne()).unwrap_or(std::cmp::Ordering::Equal)
-    });
+    let order = canonical_order(pairs);
     let sorted: Vec<Pair> = order.iter().map(|&i| pairs[i].clone()).collect();
     let mut found = agree(&sorted, o.seed).ok_or_else(undetermined)?;
     found.agreeing = found.agreeing.iter().map(|&i| order[i]).collect();
@@ -465,15 +379,4 @@ fn start(pairs: &[Pair], o: &HandEyeOptions) -> Result<Agreement> {
 fn mean(values: impl Iterator<Item = f64>) -> f64 {
     let (s, n) = values.fold((0.0, 0.0), |(s, n), v| (s + v, n + 1.0));
     s / f64::max(n, 1.0)
-}
-
-/// Expected error of a point at a distance along the optical axis from the six hand-eye numbers'
-/// covariance (first 6x6 block), mm rms over the three axes together.
-pub fn expected_error(near_from_camera: &Rigid<Near, Camera>, covariance: &DMatrix<f64>, distance: f64) -> f64 {
-    let p = near_from_camera.rotation * Vec3::new(0.0, 0.0, distance);
-    let mut j = DMatrix::zeros(3, 6);
-    j.view_mut((0, 0), (3, 3)).copy_from(&Mat3::identity());
-    j.view_mut((0, 3), (3, 3)).copy_from(&-skew(&p));
-    let c = covariance.view((0, 0), (6, 6));
-    (&j * c * j.transpose()).trace().max(0.0).sqrt()
 }

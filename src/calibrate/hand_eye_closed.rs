@@ -45,6 +45,20 @@ impl Chain {
     }
 }
 
+/// Indices of the pairs in an order that does not depend on the recording's: by the robot's place.
+pub fn canonical_order(pairs: &[Pair]) -> Vec<usize> {
+    let key = |i: usize| {
+        let (a, b) = (pairs[i].near_from_far.translation, pairs[i].seen.camera_from_board.translation);
+        [a.x, a.y, a.z, b.x, b.y, b.z]
+    };
+    let mut order: Vec<usize> = (0..pairs.len()).collect();
+    order.sort_by(|&i, &j| {
+        let unequal = |(x, y): (&f64, &f64)| Some(x.total_cmp(y)).filter(|c| c.is_ne());
+        key(i).iter().zip(&key(j)).find_map(unequal).unwrap_or(std::cmp::Ordering::Equal)
+    });
+    order
+}
+
 /// Relative motions of two pairs: (robot, camera), both as rotation vector and translation.
 fn motion(a: &Pair, b: &Pair) -> (Rigid<Near, Near>, Rigid<Camera, Camera>) {
     (a.near_from_far * b.near_from_far.inverse(), a.seen.camera_from_board * b.seen.camera_from_board.inverse())

@@ -2,9 +2,10 @@
 //! and the page a person reads; fit and verification apart.
 //! Frame and unit: near = what carries the camera; mm, degrees, px.
 
-use super::hand_eye::{HandEyeFit, expected_error};
+use super::hand_eye::HandEyeFit;
 use super::hand_eye_checks::belongs_to;
 use super::hand_eye_closed::{Pair, axis_spread};
+use super::hand_eye_expected::{ExpectedError, expected_error};
 use super::limits::{Judgement, Limits, rms};
 use super::report::{Page, axis_sphere, bars};
 use crate::geometry::{Vec3, log};
@@ -24,7 +25,7 @@ pub fn judge(fit: &HandEyeFit, pairs: &[Pair], limits: &Limits) -> Quality {
     let used: Vec<&Pair> = pairs.iter().zip(&fit.pairs).filter(|(_, r)| r.used).map(|(p, _)| p).collect();
     let spread = axis_spread(&used);
     let [first, second, third] = spread.map(|s| s.1.to_degrees());
-    let expected = expected_error(&fit.chain.near_from_camera, &fit.covariance, limits.middle());
+    let ExpectedError { whole: expected, from_camera: camera_part } = expected_error(fit, limits.middle());
     let sigma = |i: usize| fit.covariance[(i, i)].max(0.0).sqrt();
     let holdout_mm = rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.holdout_mm));
     let holdout_px = rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.holdout_px));
@@ -48,10 +49,6 @@ pub fn judge(fit: &HandEyeFit, pairs: &[Pair], limits: &Limits) -> Quality {
             format!("{} was left out: its pose and picture disagree by {:.2} mm{whose}", r.name, r.mm)
         });
     }
-    let camera_part = {
-        let exact = expected_error(&fit.chain.near_from_camera, &fit.covariance_camera_exact, limits.middle());
-        (expected * expected - exact * exact).max(0.0).sqrt()
-    };
     j.reasons.push(format!(
         "the robot's poses scatter by {:.3} mm and {:.4} degrees per axis; the camera's own uncertainty makes {camera_part:.3} mm of the error",
         fit.noise.robot_mm,

@@ -192,11 +192,41 @@ pub struct Surface {
     /// The tool square to the surface: z out of the surface, x along the flange's x as far as that
     /// is possible, origin at the centre.
     pub base_from_tool: Rigid<Base, Tool>,
+    /// Squared distances from the plane over what the points' own noise makes expect; 0 for three points.
+    pub misfit: f64,
+    /// The point that did not lie on the plane of the others and was left out.
+    pub left_out: Option<usize>,
 }
 
 /// The plane through three or more points, weighted by their own noise, with the uncertainty that
 /// they share propagated on top. `x` is the direction wanted for the tool's x axis (base frame).
 pub fn surface(points: &[BasePoint], shared: &SMatrix<f64, 21, 21>, x: &Vec3) -> Result<Surface> {
+    let whole = plane_of(points, shared, x)?;
+    let freedom = points.len() as f64 - 3.0;
+    if points.len() < 5 || whole.misfit * freedom < GROSS {
+        return Ok(whole);
+    }
+    // One spot over an edge or on another surface spoils the normal; four others must agree without it.
+    let without = |i: usize| {
+        let others: Vec<BasePoint> =
+            points.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, p)| p.clone()).collect();
+        plane_of(&others, shared, x).ok().map(|s| Surface { left_out: Some(i), ..s })
+    };
+    let best = (0..points.len()).filter_map(without).min_by(|a, b| a.misfit.total_cmp(&b.misfit));
+    let belongs =
+        |b: &Surface| whole.misfit * freedom - b.misfit * (freedom - 1.0) < GROSS || b.misfit > even(freedom - 1.0);
+    Ok(best.filter(|b| !belongs(b)).unwrap_or(whole))
+}
+
+/// A spot is left out where the sum of squared distances falls by this without it: five sigmas.
+const GROSS: f64 = 25.0;
+
+/// Misfit up to which points count as lying on a plane: three sigmas above 1.
+fn even(freedom: f64) -> f64 {
+    1.0 + 3.0 * (2.0 / freedom).sqrt()
+}
+
+fn plane_of(points: &[BasePoint], shared: &SMatrix<f64, 21, 21>, x: &Vec3) -> Result<Surface> {
     let weak = |what: String| {
         Fault::refused(what)
             .cause("a surface's tilt needs three spots that do not lie on a line")
@@ -215,7 +245,7 @@ pub fn surface(points: &[BasePoint], shared: &SMatrix<f64, 21, 21>, x: &Vec3) ->
         normal = -normal;
     }
     // Two rounds: the weights depend on the normal.
-    let (mut covariance, mut residuals) = (Mat3::zeros(), vec![0.0; n]);
+    let (mut covariance, mut residuals, mut misfit) = (Mat3::zeros(), vec![0.0; n], 0.0);
     for _ in 0..3 {
         let axis = if normal.x.abs() < 0.7 { Vec3::x() } else { Vec3::y() };
         let a = normal.cross(&axis).normalize();
@@ -241,7 +271,13 @@ pub fn surface(points: &[BasePoint], shared: &SMatrix<f64, 21, 21>, x: &Vec3) ->
             j += rows[i] * weights[i] * (normal.transpose() * points[i].shared);
         }
         let j = inverse * j;
-        covariance = inverse + j * shared * j.transpose();
+        let freedom = n as f64 - 3.0;
+        if freedom > 0.0 {
+            misfit = residuals.iter().zip(&weights).map(|(r, w)| r * r * w).sum::<f64>() / freedom;
+        }
+        // A surface that is not as flat as the spots are good has a normal that is not as good either.
+        let uneven = if freedom > 0.0 && misfit > even(freedom) { misfit } else { 1.0 };
+        covariance = inverse * uneven + j * shared * j.transpose();
         normal = (normal - a * s.x - b * s.y).normalize();
     }
     let tilt: Matrix2<f64> = covariance.fixed_view::<2, 2>(0, 0).into();
@@ -254,6 +290,8 @@ pub fn surface(points: &[BasePoint], shared: &SMatrix<f64, 21, 21>, x: &Vec3) ->
         centre,
         tilt_sigma: [e.max().max(0.0).sqrt(), e.min().max(0.0).sqrt()],
         height_sigma: covariance[(2, 2)].max(0.0).sqrt(),
+        misfit,
+        left_out: None,
         rms: (residuals.iter().map(|r| r * r).sum::<f64>() / n as f64).sqrt(),
         base_from_tool: Rigid::new(rotation, centre),
     })

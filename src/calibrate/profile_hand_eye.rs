@@ -363,9 +363,11 @@ pub fn solve(profiles: &[Profile], poses: &[Rigid<Base, Flange>], o: &BallOption
     let items: Vec<Item<'_>> = circles.iter().zip(poses).map(|(circle, pose)| Item { circle, pose }).collect();
     let solve_side = |side: Side| -> Option<(Solved, Noise, Vec<usize>)> {
         let rough = Noise { point, robot: 0.5 };
-        let best = starts(&items, radius, side)
-            .iter()
-            .filter_map(|s| fit(&items, s, radius, &rough, Loss::Cauchy(2.0)))
+        // A start of one side may end on the other where the ball is seen from both: all are tried for each.
+        let best = [Side::Plus, Side::Minus]
+            .into_iter()
+            .flat_map(|s| starts(&items, radius, s))
+            .filter_map(|s| fit(&items, &s, radius, &rough, Loss::Cauchy(2.0)))
             .filter(|s| side_of(&items, &s.0) == side)
             .min_by(|a, b| a.2.total_cmp(&b.2))?;
         let mut used: Vec<usize> = (0..items.len()).collect();

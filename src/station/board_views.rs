@@ -51,23 +51,26 @@ pub fn boards(recording: &Recording, camera: &Intrinsics, progress: &(dyn Fn(usi
             .next("record an ambient picture with each frame"));
     }
     let done = std::sync::atomic::AtomicUsize::new(0);
+    // A picture that is missing or of another size is the recording's fault and ends it; a board that is not
+    // found is that picture's.
     let each: Vec<(String, Result<FrameBoard>)> = frames
         .par_iter()
         .map(|(index, frame, name)| {
+            let board = meta.board_of(frame).ok_or_else(|| {
+                Fault::input(format!("{name}: meta.json describes no board for it"))
+                    .next("describe the board under 'board' or 'boards'")
+            })?;
+            let picture = recording.picture(name)?;
             let one = || {
-                let board = meta.board_of(frame).ok_or_else(|| {
-                    Fault::input("meta.json describes no board for it")
-                        .next("describe the board under 'board' or 'boards'")
-                })?;
-                let view = find(&recording.picture(name)?, board, &FindOptions::default())?;
+                let view = find(&picture, board, &FindOptions::default())?;
                 let pose = measure_view(name, camera, board, &view)?;
                 Ok(FrameBoard { frame: *index, board: board.clone(), pose, ambiguous: view.ambiguous })
             };
             let result = one();
             progress(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1, frames.len());
-            (name.to_string(), result)
+            Ok((name.to_string(), result))
         })
-        .collect();
+        .collect::<Result<_>>()?;
     let mut out = Boards::default();
     for (name, result) in each {
         match result {
@@ -76,7 +79,10 @@ pub fn boards(recording: &Recording, camera: &Intrinsics, progress: &(dyn Fn(usi
         }
     }
     if out.found.is_empty() {
-        let (name, why) = &out.missing[0];
+        // The picture that says what most pictures say.
+        let line = |why: &str| why.lines().nth(1).unwrap_or_default().to_owned();
+        let votes = |m: &(String, String)| out.missing.iter().filter(|o| line(&o.1) == line(&m.1)).count();
+        let (name, why) = out.missing.iter().rev().max_by_key(|m| votes(m)).expect("one picture or more");
         return Err(Fault::input(format!("no board was found in any of {} pictures; {name}: {why}", frames.len()))
             .cause("a wrong board size in meta.json, too little contrast, or the board cut off")
             .next("compare meta.json's board with the real one and look at the pictures"));

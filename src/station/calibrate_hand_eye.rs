@@ -2,10 +2,12 @@
 //! calibration, its report, and the files it came from.
 //! Frame and unit: flange_from_camera (eye in hand) or base_from_camera (eye to hand); mm, rad.
 
-use super::board_views::boards;
+use super::board_views::{FrameBoard, boards};
+use crate::calibrate::boards::turns;
 use crate::calibrate::hand_eye::{HandEyeOptions, Mount, solve};
 use crate::calibrate::hand_eye_closed::Pair;
 use crate::calibrate::hand_eye_report::{covariance, judge, page};
+use crate::calibrate::hand_eye_turns::{read_with, resolve};
 use crate::calibrate::limits::Limits;
 use crate::calibrate::measured_pose::intrinsic_covariance;
 use crate::calibrate::report::Page;
@@ -51,13 +53,6 @@ pub fn calibrate_hand_eye(
     let camera = rig.need_camera()?;
     let poses = recording.poses(run.poses.as_deref())?;
     let seen = boards(recording, &camera.value, progress)?;
-    if let Some(b) = seen.found.iter().find(|b| b.ambiguous) {
-        return Err(Fault::refused(format!("{}: the board looks the same after half a turn", b.pose.name))
-            .cause("its corners are even by even: where its origin is cannot be told from one picture")
-            .next(
-                "use a board with an odd number of corners one way and an even number the other, or a ChArUco board",
-            ));
-    }
     let mut pairs = Vec::new();
     for b in &seen.found {
         let index = recording.meta.frames[b.frame].pose.unwrap_or(b.frame);
@@ -72,9 +67,11 @@ pub fn calibrate_hand_eye(
         };
         pairs.push(Pair { near_from_far: Rigid::new(r, t), seen: b.pose.clone() });
     }
+    let turned = one_origin(&mut pairs, &seen.found, run.solver.seed)?;
     let fit = solve(&pairs, run.mount, &intrinsic_covariance(&camera.covariance), &camera.value, &run.solver)?;
     let mut quality = judge(&fit, &pairs, &run.limits);
     quality.reasons.extend(seen.missing.iter().map(|(name, why)| format!("{name} was not used: {}", first_line(why))));
+    quality.reasons.extend(turned);
     let x = fit.chain.near_from_camera;
     let pose_name = run.poses.clone().or(recording.meta.pose_file.clone()).unwrap_or_default();
     let sources = |c: &mut std::collections::BTreeMap<String, String>| -> Result<()> {
@@ -103,6 +100,28 @@ pub fn calibrate_hand_eye(
             HandEyeResult::InBase(Calibrated { calibration, page, missing: seen.missing })
         }
     })
+}
+
+/// Reads a board that looks the same after a turn alike in all pictures, and says so.
+fn one_origin(pairs: &mut [Pair], found: &[FrameBoard], seed: u64) -> Result<Option<String>> {
+    if !found.iter().any(|b| b.ambiguous) {
+        return Ok(None);
+    }
+    if let Some(b) = found.iter().find(|b| b.board != found[0].board) {
+        return Err(Fault::input(format!("{} shows another board than {}", b.pose.name, found[0].pose.name))
+            .cause("a hand-eye recording shows one board that does not move against its carrier")
+            .next("keep the pictures of one board"));
+    }
+    let turns = turns(&found[0].board);
+    let chosen = resolve(pairs, &turns, seed)?;
+    for (pair, k) in pairs.iter_mut().zip(&chosen) {
+        *pair = read_with(pair, &turns[*k]);
+    }
+    let anew = chosen.iter().filter(|k| **k != 0).count();
+    Ok(Some(format!(
+        "the board looks the same after a turn: its origin was told by the robot's poses, {anew} of {} pictures are read turned",
+        chosen.len()
+    )))
 }
 
 pub(super) fn first_line(text: &str) -> &str {

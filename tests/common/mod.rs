@@ -2,6 +2,9 @@
 //! Frame and unit: as in the reference data's FORMAT.md: base frame, mm.
 #![allow(dead_code)] // each test binary uses its own part
 
+pub mod hand_eye;
+pub mod judge;
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

@@ -1,0 +1,100 @@
+//! In: a chain, pairs, noise. Out: the steps between seen and expected boards with their derivatives and
+//! covariance, and the chain that makes them least.
+//! Frame and unit: see `hand_eye_closed`; mm, rad (docs/math.md, Hand-eye (6), (7)).
+
+use super::hand_eye::{Mount, Noise};
+use super::hand_eye_closed::{Chain, Pair};
+use super::measured_pose::step_between;
+use crate::geometry::{Mat3, Rigid, Vec3, exp, skew};
+use crate::solve::{LmOptions, Problem, Residuals, Stop, lm};
+use nalgebra::{DMatrix, Matrix6, SMatrix};
+
+/// Steps of one pair by the 12 unknowns, at the present chain.
+pub(super) fn jacobian(chain: &Chain, pair: &Pair) -> (SMatrix<f64, 6, 1>, SMatrix<f64, 6, 12>) {
+    let expected = chain.expected(&pair.near_from_far);
+    let e = step_between(&pair.seen.camera_from_board, &expected);
+    let camera_from_near = chain.near_from_camera.rotation.transpose();
+    let camera_from_far = camera_from_near * pair.near_from_far.rotation;
+    let shift = skew(&Vec3::new(e[0], e[1], e[2]));
+    // w = -R_Xᵀ r and v = -R_Xᵀ dt for the camera's side; w = A r and v = A dt + g × A r for the
+    // board's, g the board's origin seen from the camera. The step before adds w × its translation.
+    let mut j = SMatrix::<f64, 6, 12>::zeros();
+    j.fixed_view_mut::<3, 3>(0, 0).copy_from(&-camera_from_near);
+    j.fixed_view_mut::<3, 3>(0, 3).copy_from(&(shift * camera_from_near));
+    j.fixed_view_mut::<3, 3>(3, 3).copy_from(&-camera_from_near);
+    j.fixed_view_mut::<3, 3>(0, 6).copy_from(&camera_from_far);
+    let g = skew(&expected.translation) - shift;
+    j.fixed_view_mut::<3, 3>(0, 9).copy_from(&(g * camera_from_far));
+    j.fixed_view_mut::<3, 3>(3, 9).copy_from(&camera_from_far);
+    (e, j)
+}
+
+/// Covariance of a step: the robot's translation and rotation, each for a sigma of 1.
+pub(super) fn robot_parts(flange: &Vec3) -> [Matrix6<f64>; 2] {
+    let f = skew(flange);
+    let mut translation = Matrix6::zeros();
+    translation.fixed_view_mut::<3, 3>(0, 0).copy_from(&Mat3::identity());
+    let mut rotation = Matrix6::zeros();
+    rotation.fixed_view_mut::<3, 3>(0, 0).copy_from(&(f * f.transpose()));
+    rotation.fixed_view_mut::<3, 3>(0, 3).copy_from(&f);
+    rotation.fixed_view_mut::<3, 3>(3, 0).copy_from(&f.transpose());
+    rotation.fixed_view_mut::<3, 3>(3, 3).copy_from(&Mat3::identity());
+    [translation, rotation]
+}
+
+pub(super) fn step_covariance(chain: &Chain, pair: &Pair, noise: &Noise, mount: Mount) -> Matrix6<f64> {
+    let [t, r] = robot_parts(&mount.flange(chain, &pair.near_from_far));
+    pair.seen.covariance(noise.feature_factor) + t * noise.robot_mm.powi(2) + r * noise.robot_rad.powi(2)
+}
+
+/// The refinement: the robot's true poses are eliminated in closed form, which leaves whitened
+/// steps of six numbers a pair (docs/math.md, Hand-eye (6), (7)).
+struct Refinement<'a> {
+    pairs: &'a [&'a Pair],
+    /// Inverse Cholesky factors of the steps' covariances.
+    whiteners: Vec<Matrix6<f64>>,
+}
+
+impl Problem for Refinement<'_> {
+    type State = Chain;
+    fn width(&self) -> usize {
+        12
+    }
+    fn moved(&self, c: &Chain, s: &[f64]) -> Chain {
+        let v = |i: usize| Vec3::new(s[i], s[i + 1], s[i + 2]);
+        Chain {
+            near_from_camera: Rigid::new(
+                exp(&v(3)) * c.near_from_camera.rotation,
+                c.near_from_camera.translation + v(0),
+            ),
+            far_from_board: Rigid::new(exp(&v(9)) * c.far_from_board.rotation, c.far_from_board.translation + v(6)),
+        }
+    }
+    fn residuals(&self, chain: &Chain, out: &mut Residuals) -> Option<()> {
+        const ALL: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
+        for (pair, w) in self.pairs.iter().zip(&self.whiteners) {
+            let (e, j) = jacobian(chain, pair);
+            let r = w * e;
+            out.group(r.as_slice(), &ALL, (w * j).transpose().as_slice());
+        }
+        Some(())
+    }
+}
+
+pub(super) fn refine(
+    pairs: &[&Pair],
+    start: &Chain,
+    noise: &Noise,
+    mount: Mount,
+) -> Option<(Chain, DMatrix<f64>, f64)> {
+    let whiteners = pairs
+        .iter()
+        .map(|p| step_covariance(start, p, noise, mount).cholesky()?.l().try_inverse())
+        .collect::<Option<Vec<_>>>()?;
+    let found = lm(&Refinement { pairs, whiteners }, *start, &LmOptions::default());
+    if found.stop == Stop::BadStart {
+        return None;
+    }
+    let cost = found.lengths.iter().map(|l| l * l).sum();
+    Some((found.state, found.covariance?, cost))
+}
