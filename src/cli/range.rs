@@ -62,6 +62,9 @@ fn table(r: &RangeReport, robot: Convention) -> String {
             "surface normal {x:.6} {y:.6} {z:.6} (base), known to {:.4} by {:.4} degrees; points within {:.4} mm rms\n",
             f.tilt_sigma_deg[0], f.tilt_sigma_deg[1], f.rms_mm
         );
+        if let Some(name) = &f.left_out {
+            s += &format!("{name} was left out of it: its spot does not lie on the plane of the others\n");
+        }
         let pose: Vec<String> = robot
             .labels()
             .iter()

@@ -207,6 +207,9 @@ fn touched_words(r: &RangeReport) -> Vec<String> {
             "normal {:.4} {:.4} {:.4}, good to {:.3} degrees; points to {:.3} mm",
             s.normal[0], s.normal[1], s.normal[2], s.tilt_sigma_deg[0], s.rms_mm
         ));
+        out.extend(
+            s.left_out.iter().map(|n| format!("{n} was left out: its spot does not lie on the plane of the others")),
+        );
     }
     out
 }

@@ -61,6 +61,12 @@ pub struct SurfaceFound {
     pub tilt_sigma_deg: [f64; 2],
     pub height_sigma_mm: f64,
     pub rms_mm: f64,
+    /// Squared distances from the plane over what the spots' own noise makes expect: far above 1 the surface is
+    /// not flat, and its sigmas say so; 0 for three points.
+    pub misfit: f64,
+    /// The picture whose spot does not lie on the plane of the others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub left_out: Option<String>,
     /// z out of the surface, x along the flange's x as seen at the first shot, origin at the centre.
     #[serde(rename = "base_T_tool")]
     pub base_from_tool: Rigid<crate::geometry::Base, Tool>,
@@ -148,7 +154,8 @@ pub fn measure_range(recording: &Recording, rig: &Rig, run: &RangeRun) -> Result
     }
     if run.one_surface {
         let s = surface(&points, &shared, &first_x.unwrap_or(Vec3::x()))?;
-        out.surface = Some(describe(&s));
+        let left_out = s.left_out.map(|i| out.distances[i].picture.clone());
+        out.surface = Some(describe(&s, left_out));
     }
     Ok(out)
 }
@@ -187,13 +194,15 @@ fn row(name: &str, spot: &Spot, r: &Ranged, base: Option<&BasePoint>) -> Distanc
     }
 }
 
-fn describe(s: &Surface) -> SurfaceFound {
+fn describe(s: &Surface, left_out: Option<String>) -> SurfaceFound {
     SurfaceFound {
         normal: s.normal.into(),
         centre_mm: s.centre.into(),
         tilt_sigma_deg: s.tilt_sigma.map(f64::to_degrees),
         height_sigma_mm: s.height_sigma,
         rms_mm: s.rms,
+        misfit: s.misfit,
+        left_out,
         base_from_tool: s.base_from_tool,
     }
 }

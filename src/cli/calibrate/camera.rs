@@ -2,15 +2,14 @@
 //! Frame and unit: camera frame; pixels, mm.
 
 use super::super::Console;
-use super::finish;
+use super::{Keep, finish};
 use crate::calibrate::camera::{CameraOptions, CameraResult, calibrate};
 use crate::calibrate::camera_report::page;
 use crate::calibrate::intrinsics::{Lens, SolveOptions};
 use crate::calibrate::projection::{NAMES, to_vector};
-use crate::fault::{Fault, Result};
+use crate::fault::Result;
 use crate::raster::Channel;
 use crate::recording::Recording;
-use crate::rig::Verdict;
 use crate::station::Settings;
 use std::path::PathBuf;
 
@@ -39,9 +38,8 @@ pub struct Args {
     /// Part of a colour picture to use: red, green, blue or luma
     #[arg(long, default_value = "luma", value_parser = crate::cli::parse::<Channel>)]
     channel: Channel,
-    /// Store the result even where it is badly determined
-    #[arg(long)]
-    keep_badly_determined: bool,
+    #[command(flatten)]
+    keep: Keep,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
@@ -62,22 +60,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         result.calibration = result.calibration.with_input(&args.recording.join(&o.name))?;
     }
     let page = page(&result, &format!("Camera calibration of {}", settings.name));
-    let quality = &result.calibration.quality;
-    if quality.verdict >= Verdict::BadlyDetermined && !args.keep_badly_determined {
-        let folder = args.station.join("calibration");
-        std::fs::create_dir_all(&folder).map_err(|e| Fault::write(&folder, e))?;
-        let html = folder.join("camera.refused.html");
-        page.save(&html)?;
-        console.say(format!("{}: what was found", html.display()));
-        return Err(Fault::refused(format!(
-            "the camera is {}: {}",
-            quality.verdict.words(),
-            quality.reasons.join("; ")
-        ))
-        .cause("too few, too similar or contradicting pictures; the station keeps its former calibration")
-        .next(quality.advice.first().map_or("take more pictures", String::as_str)));
-    }
-    finish(&args.station, &result.calibration, &page, &parameters(&result), console)
+    finish(&args.station, &result.calibration, &page, &parameters(&result), &args.keep, console)
 }
 
 /// The parameters with their standard deviations, and the expected error.

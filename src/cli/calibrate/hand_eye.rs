@@ -2,7 +2,7 @@
 //! Frame and unit: flange_T_camera or base_T_camera; mm, degrees.
 
 use super::super::Console;
-use super::finish;
+use super::{Keep, finish};
 use crate::calibrate::hand_eye::{HandEyeOptions, Mount};
 use crate::calibrate::limits::Limits;
 use crate::fault::Result;
@@ -42,6 +42,8 @@ pub struct Args {
     /// Distance at which the expected error is stated, mm
     #[arg(long, default_value_t = 160.0)]
     working_mm: f64,
+    #[command(flatten)]
+    keep: Keep,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
@@ -67,11 +69,11 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     match result {
         HandEyeResult::OnFlange(c) => {
             let text = described("camera on the flange", &c.calibration.value);
-            finish(&args.station, &c.calibration, &c.page, &text, console)
+            finish(&args.station, &c.calibration, &c.page, &text, &args.keep, console)
         }
         HandEyeResult::InBase(c) => {
             let text = described("camera in the base", &c.calibration.value);
-            finish(&args.station, &c.calibration, &c.page, &text, console)
+            finish(&args.station, &c.calibration, &c.page, &text, &args.keep, console)
         }
     }
 }

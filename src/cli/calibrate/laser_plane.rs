@@ -2,7 +2,7 @@
 //! Frame and unit: camera frame, mm.
 
 use super::super::Console;
-use super::finish;
+use super::{Keep, finish};
 use crate::calibrate::laser_plane::LaserPlaneOptions;
 use crate::calibrate::limits::Limits;
 use crate::fault::Result;
@@ -35,6 +35,8 @@ pub struct Args {
     /// Where the stages run: auto (GPU where there is one), gpu, or cpu (the twins)
     #[arg(long, default_value = "auto", value_parser = super::super::parse::<Where>)]
     on: Where,
+    #[command(flatten)]
+    keep: Keep,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
@@ -59,5 +61,5 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         "laser plane: normal {:.6} {:.6} {:.6}, offset {:.4} mm (camera frame)",
         p.normal.x, p.normal.y, p.normal.z, p.offset
     );
-    finish(&args.station, &c.calibration, &c.page, &text, console)
+    finish(&args.station, &c.calibration, &c.page, &text, &args.keep, console)
 }

@@ -9,7 +9,7 @@ mod profile_hand_eye;
 
 use super::Console;
 use crate::calibrate::report::Page;
-use crate::fault::Result;
+use crate::fault::{Fault, Result};
 use crate::rig::{Calibration, Rig, Verdict};
 use serde::Serialize;
 use std::path::Path;
@@ -33,18 +33,40 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
     }
 }
 
-/// Stores a calibration and its page beside it, and says what it came to.
+/// What happens to a result that is badly determined.
+#[derive(clap::Args)]
+struct Keep {
+    /// Store the result even where it is badly determined
+    #[arg(long)]
+    keep_badly_determined: bool,
+}
+
+/// Stores a calibration and its page beside it, and says what it came to. A badly determined one is refused:
+/// the station keeps its former calibration, the page says what was found.
 fn finish<T: Serialize>(
     station: &Path,
     calibration: &Calibration<T>,
     page: &Page,
     value: &str,
+    keep: &Keep,
     console: &Console,
 ) -> Result<()> {
+    let q = &calibration.quality;
+    if q.verdict >= Verdict::BadlyDetermined && !keep.keep_badly_determined {
+        let folder = station.join("calibration");
+        std::fs::create_dir_all(&folder).map_err(|e| Fault::write(&folder, e))?;
+        let html = folder.join(format!("{}.refused.html", calibration.kind));
+        page.save(&html)?;
+        console.say(format!("{}: what was found", html.display()));
+        let what =
+            format!("the {} is {}: {}", calibration.kind.replace('_', " "), q.verdict.words(), q.reasons.join("; "));
+        return Err(Fault::refused(what)
+            .cause("too few, too similar or contradicting pictures; the station keeps its former calibration")
+            .next(q.advice.first().map_or("take more pictures", String::as_str)));
+    }
     let path = Rig::store(station, calibration)?;
     let html = station.join("calibration").join(format!("{}.html", calibration.kind));
     page.save(&html)?;
-    let q = &calibration.quality;
     let mut text = format!("{value}\nverdict: {}\n", q.verdict.words());
     for r in &q.reasons {
         text += &format!("  {r}\n");
@@ -62,7 +84,7 @@ fn finish<T: Serialize>(
     show(&mut text, "verification:", &["holdout_rms_px", "holdout_rms_mm"]);
     text += &format!("stored {}\nreport {}", path.display(), html.display());
     console.result(calibration, &text);
-    if q.verdict == Verdict::BadlyDetermined {
+    if q.verdict >= Verdict::BadlyDetermined {
         console.warn("badly determined: see the reasons before using it");
     }
     Ok(())

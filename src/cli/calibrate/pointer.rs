@@ -2,7 +2,7 @@
 //! Frame and unit: camera frame, mm.
 
 use super::super::Console;
-use super::finish;
+use super::{Keep, finish};
 use crate::calibrate::limits::Limits;
 use crate::calibrate::pointer::PointerOptions;
 use crate::calibrate::spot::SpotOptions;
@@ -31,6 +31,8 @@ pub struct Args {
     /// Farthest working distance for the expected error, mm
     #[arg(long, default_value_t = 290.0)]
     far_mm: f64,
+    #[command(flatten)]
+    keep: Keep,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
@@ -53,5 +55,5 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         "pointer: through {:.4} {:.4} {:.4} mm along {:.7} {:.7} {:.7} (camera frame)",
         o.x, o.y, o.z, d.x, d.y, d.z
     );
-    finish(&args.station, &c.calibration, &c.page, &text, console)
+    finish(&args.station, &c.calibration, &c.page, &text, &args.keep, console)
 }

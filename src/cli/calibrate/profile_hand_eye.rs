@@ -2,7 +2,7 @@
 //! Frame and unit: flange_T_sensor; mm, degrees.
 
 use super::super::Console;
-use super::finish;
+use super::{Keep, finish};
 use crate::calibrate::limits::Limits;
 use crate::calibrate::profile_hand_eye::{BallOptions, Side};
 use crate::fault::Result;
@@ -35,6 +35,8 @@ pub struct Args {
     /// Distance at which the expected error is stated, mm
     #[arg(long, default_value_t = 160.0)]
     working_mm: f64,
+    #[command(flatten)]
+    keep: Keep,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
@@ -47,5 +49,5 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         "sensor on the flange: {:.4} {:.4} {:.4} mm, RX {:.4} RY {:.4} RZ {:.4} degrees (R = Rz·Ry·Rx)",
         n[0], n[1], n[2], n[3], n[4], n[5]
     );
-    finish(&args.station, &c.calibration, &c.page, &text, console)
+    finish(&args.station, &c.calibration, &c.page, &text, &args.keep, console)
 }

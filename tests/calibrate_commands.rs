@@ -1,0 +1,258 @@
+//! In: recordings written by `sheetlight simulate`. Out: every calibration command run as a command, from the
+//! board to the insertion, each result against the station's truth.
+//! Frame and unit: mm, degrees.
+
+mod common;
+
+use common::{figure, sheetlight, sheetlight_fails};
+use nalgebra::Matrix4;
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+fn text(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+/// A simulated station with recordings of `sets`, and a fresh station folder beside it.
+struct Simulated {
+    _dir: tempfile::TempDir,
+    at: PathBuf,
+    station: String,
+}
+
+impl Simulated {
+    fn new(sets: &str, more: &[&str]) -> Simulated {
+        let dir = tempfile::tempdir().unwrap();
+        let at = dir.path().to_owned();
+        let mut args = vec!["simulate", "--out", text(&at), "--set", sets];
+        args.extend(more);
+        sheetlight(&args);
+        let station = text(&at.join("mine")).to_owned();
+        sheetlight(&["station", "new", &station, "--robot", "denso"]);
+        Simulated { _dir: dir, at, station }
+    }
+    fn run(&self, command: &[&str], recording: &str, more: &[&str]) -> Value {
+        let recording = self.at.join(recording);
+        let mut args = command.to_vec();
+        args.extend([text(&recording), "--station", &self.station, "--json"]);
+        args.extend(more);
+        serde_json::from_str(&sheetlight(&args)).unwrap()
+    }
+    fn calibrate(&self, what: &str, recording: &str, more: &[&str]) -> Value {
+        self.run(&["calibrate", what], recording, more)
+    }
+    /// The true camera and its place on the flange, for tests of what comes after them.
+    fn copy_truth(&self, kinds: &[&str]) {
+        let folder = Path::new(&self.station).join("calibration");
+        std::fs::create_dir_all(&folder).unwrap();
+        for kind in kinds {
+            let name = format!("{kind}.json");
+            std::fs::copy(self.at.join("station/calibration").join(&name), folder.join(name)).unwrap();
+        }
+    }
+    fn truth(&self, kind: &str) -> Value {
+        json(&self.at.join("station/calibration").join(format!("{kind}.json")))
+    }
+}
+
+fn pose(v: &Value) -> Matrix4<f64> {
+    let rows: Vec<f64> = serde_json::from_value(v.clone()).unwrap();
+    Matrix4::from_row_slice(&rows)
+}
+
+/// Distance in mm and angle in degrees between two poses.
+fn apart(a: &Value, b: &Value) -> (f64, f64) {
+    let (a, b) = (pose(a), pose(b));
+    let d = a.fixed_view::<3, 1>(0, 3) - b.fixed_view::<3, 1>(0, 3);
+    let r = a.fixed_view::<3, 3>(0, 0).transpose() * b.fixed_view::<3, 3>(0, 0);
+    // Through the sine: near zero the cosine has lost its digits.
+    let s = 0.5
+        * ((r[(2, 1)] - r[(1, 2)]).powi(2) + (r[(0, 2)] - r[(2, 0)]).powi(2) + (r[(1, 0)] - r[(0, 1)]).powi(2)).sqrt();
+    (d.norm(), s.atan2(0.5 * (r.trace() - 1.0)).to_degrees())
+}
+
+#[test]
+fn a_station_is_calibrated_ranged_and_verified_by_its_commands() {
+    let s = Simulated::new(
+        "intrinsics,handeye,laserplane,pointer_cal,pointer,surface",
+        &["--seed", "5", "--pose-noise-mm", "0.02", "--pose-noise-deg", "0.005"],
+    );
+    let camera = s.calibrate("camera", "intrinsics", &[]);
+    let k = &s.truth("camera")["value"];
+    for name in ["fx", "fy", "cx", "cy"] {
+        let sigma = |n: &str| {
+            let all: Vec<String> = serde_json::from_value(camera["covariance"]["parameters"].clone()).unwrap();
+            let i = all.iter().position(|p| *p == format!("{n}_px")).unwrap();
+            camera["covariance"]["matrix"][i][i].as_f64().unwrap().sqrt()
+        };
+        let off = figure(&camera, &["value", name]) - figure(k, &[name]);
+        assert!(off.abs() < 4.0 * sigma(name), "{name} is {off:+.4} px off, sigma {:.4}", sigma(name));
+    }
+    let found = s.calibrate("hand-eye", "handeye", &["--poses", "poses_noisy"]);
+    let (mm, deg) = apart(&found["value"], &s.truth("hand_eye")["value"]);
+    let sigma = |name: &str| figure(&found, &["quality", "figures", name]);
+    assert!(mm < 3.0 * sigma("translation_sigma_mm"), "hand-eye: {mm} mm of {}", sigma("translation_sigma_mm"));
+    assert!(deg < 3.0 * sigma("rotation_sigma_deg"), "hand-eye: {deg} of {}", sigma("rotation_sigma_deg"));
+
+    let plane = s.calibrate("laser-plane", "laserplane", &["--on", "cpu"]);
+    let normal =
+        |v: &Value| nalgebra::Vector3::from_iterator((0..3).map(|i| v["value"]["normal"][i].as_f64().unwrap()));
+    let truth = s.truth("laser_plane");
+    let angle = normal(&plane).cross(&normal(&truth)).norm().atan2(normal(&plane).dot(&normal(&truth))).to_degrees();
+    assert!(angle < 0.02, "laser plane: {angle} degrees");
+
+    s.calibrate("pointer", "pointer_cal", &[]);
+    let ranges = s.run(&["range"], "pointer", &[]);
+    let wanted: Vec<f64> =
+        serde_json::from_value(json(&s.at.join("pointer/truth.json"))["distances_mm"].clone()).unwrap();
+    let distances = ranges["distances"].as_array().unwrap();
+    assert_eq!(distances.len(), wanted.len(), "missing: {}", ranges["missing"]);
+    for (d, z) in distances.iter().zip(&wanted) {
+        let e = figure(d, &["along_axis_mm"]) - z;
+        let sigma = figure(d, &["along_axis_sigma_mm"]);
+        assert!(e.abs() < 4.0 * sigma.max(0.005), "at {z} mm: {e:+.4} mm, sigma {sigma:.4}");
+    }
+    // Without robot poses there is no surface; with them the scene's normal is the board's.
+    let (code, said) = sheetlight_fails(&["range", text(&s.at.join("pointer")), "--station", &s.station, "--surface"]);
+    assert!(code != 0 && said.contains("next step"), "{said}");
+    let surface = s.run(&["range"], "surface", &["--surface"]);
+    let base_from_scene = pose(&json(&s.at.join("surface/truth.json"))["base_from_scene"]);
+    let up = base_from_scene.fixed_view::<3, 1>(0, 2).into_owned();
+    let n = nalgebra::Vector3::from_iterator((0..3).map(|i| surface["surface"]["normal"][i].as_f64().unwrap()));
+    let off = n.cross(&up).norm().asin().to_degrees();
+    assert!(off < 4.0 * figure(&surface, &["surface", "tilt_sigma_deg", "0"]).max(0.02), "normal: {off} degrees");
+
+    let touches = s.at.join("touches.csv");
+    std::fs::write(&touches, "x,y,z,tx,ty,tz\n0,0,0,0.1,0,0\n10,0,0,10.1,0,0.02\n0,10,5,0.1,10,4.98\n").unwrap();
+    let args = ["verify", "--station", &s.station, "--touch", text(&touches), "--json"];
+    let report: Value = serde_json::from_str(&sheetlight(&args)).unwrap();
+    assert!((figure(&report, &["touch", "rms_mm"]) - 0.1013).abs() < 1e-3, "{}", report["touch"]);
+    for (name, c) in report["calibrations"].as_object().unwrap() {
+        assert!(!c["verification"].as_object().unwrap().is_empty(), "{name} says nothing of data it did not see");
+        let mixed = c["fit"].as_object().unwrap().keys().any(|k| c["verification"].get(k).is_some());
+        assert!(!mixed, "{name} mixes fit and verification");
+    }
+    std::fs::write(&touches, "0,0,0,0.1,0\n").unwrap();
+    let (code, said) = sheetlight_fails(&args);
+    assert!(code == 1 && said.contains("line 1") && said.contains("six numbers"), "{said}");
+}
+
+#[test]
+fn a_flat_surface_is_verified_from_several_scans() {
+    let dir = tempfile::tempdir().unwrap();
+    let scene = dir.path().join("plate.toml");
+    std::fs::write(
+        &scene,
+        "name = 'plate'\nregion_mm = [-25, -6, 25, 6]\n[[solid]]\nshape = { block = { size_mm = [90, 60, 5] } }\nat_mm = [0, 0, 0]\n",
+    )
+    .unwrap();
+    let s = Simulated::new("scan", &["--seed", "7", "--shots", "12", "--scene", text(&scene)]);
+    let (out, station, recording) = (dir.path().join("result"), s.at.join("station"), s.at.join("scan"));
+    let (out, station) = (text(&out), text(&station));
+    sheetlight(&["scan", text(&recording), "--station", station, "--out", out, "--on", "cpu"]);
+    // The same scan twice: nothing but itself to differ from.
+    let same = sheetlight(&["verify", "--station", station, "--flat", out, "--flat", out, "--json"]);
+    let same: Value = serde_json::from_str(&same).unwrap();
+    assert!(figure(&same, &["flat", "height_range_mm"]) < 1e-9, "{}", same["flat"]);
+    let views = ["verify", "--station", station, "--flat", out, "--shots-per-view", "4", "--json"];
+    let views: Value = serde_json::from_str(&sheetlight(&views)).unwrap();
+    assert_eq!(views["flat"]["views"].as_array().unwrap().len(), 3);
+    let tilt = figure(&views, &["flat", "largest_tilt_deg"]);
+    assert!(tilt < 0.5 && figure(&views, &["flat", "own_rms_mm"]) < 0.05, "{}", views["flat"]);
+    let none = dir.path().join("none");
+    let (code, said) = sheetlight_fails(&["verify", "--station", station, "--flat", text(&none)]);
+    assert!(code == 1 && said.contains("none") && said.contains("next step"), "{said}");
+}
+
+#[test]
+fn charuco_and_symmetric_boards_are_simulated_and_calibrated() {
+    let dir = tempfile::tempdir().unwrap();
+    let board = |kind: &str, size: &str, square: &str| {
+        let out = dir.path().join(format!("{kind}-{size}"));
+        sheetlight(&["board", kind, size, "--square-mm", square, "--out", text(&out)]);
+        out.with_extension("json")
+    };
+    let charuco = board("charuco", "9x6", "16");
+    let s = Simulated::new("intrinsics,handeye", &["--seed", "6", "--board", text(&charuco)]);
+    let camera = s.calibrate("camera", "intrinsics", &[]);
+    let corners = figure(&camera, &["quality", "figures", "corners"]);
+    assert!(corners > 20.0 * 25.0, "{corners} corners of 20 pictures, 40 on the board");
+    let off = figure(&camera, &["value", "fx"]) / figure(&s.truth("camera"), &["value", "fx"]) - 1.0;
+    assert!(off.abs() < 1e-3, "focal length off by {off:.5}");
+    let found = s.calibrate("hand-eye", "handeye", &["--poses", "poses_exact"]);
+    let (mm, deg) = apart(&found["value"], &s.truth("hand_eye")["value"]);
+    assert!(mm < 0.05 && deg < 0.02, "{mm} mm, {deg} degrees");
+
+    // Even by even: each picture could be read the other way round.
+    let even = board("chessboard", "8x6", "15");
+    let s = Simulated::new("handeye", &["--seed", "6", "--board", text(&even)]);
+    s.copy_truth(&["camera"]);
+    let found = s.calibrate("hand-eye", "handeye", &["--poses", "poses_noisy"]);
+    let (mm, _) = apart(&found["value"], &s.truth("hand_eye")["value"]);
+    assert!(mm < 3.0 * figure(&found, &["quality", "figures", "translation_sigma_mm"]), "{mm} mm");
+    let reasons = found["quality"]["reasons"].to_string();
+    assert!(reasons.contains("looks the same after a turn") && reasons.contains("of 16 pictures"), "{reasons}");
+}
+
+#[test]
+fn a_profile_sensor_is_calibrated_from_files() {
+    use sheetlight::geometry::{Base, Flange, Rigid, Sensor, Vec3, exp};
+    let dir = tempfile::tempdir().unwrap();
+    let sensor: Rigid<Flange, Sensor> = Rigid::from_vectors(&Vec3::new(0.3, -1.2, 0.4), Vec3::new(40.0, -25.0, 90.0));
+    let ball = Vec3::new(500.0, -120.0, 60.0);
+    let (mut profiles, mut listing) = (String::from("profile,x,z\n"), String::from("/PROG BALL\n/POS\n"));
+    for i in 0..16u32 {
+        let a = f64::from(i);
+        let turn = exp(&Vec3::new(0.5 * (1.3 * a).sin(), 0.5 * (2.1 * a).cos(), 0.6 * (0.7 * a).sin()));
+        let q = Vec3::new(10.0 * a.sin(), 11.0 * (1.7 * a).cos(), 150.0 + 10.0 * (0.9 * a).sin());
+        let base_from_sensor: Rigid<Base, Sensor> = Rigid::new(turn, ball - turn * q);
+        let r = (400.0 - q.y * q.y).sqrt();
+        for k in 0..120 {
+            let b = -1.2 + 2.4 * f64::from(k) / 119.0;
+            profiles += &format!("{i},{:.4},{:.4}\n", q.x + r * b.sin(), q.z - r * b.cos());
+        }
+        let flange: Rigid<Base, Flange> = base_from_sensor * sensor.inverse();
+        let n = sheetlight::robot::Convention::Fanuc.write(&flange);
+        listing += &format!(
+            "P[{}]{{\n   GP1:\n    UF : 0, UT : 0, CONFIG : 'N U T, 0, 0, 0',\n    X = {:.3} mm, Y = {:.3} mm, Z = {:.3} mm,\n    W = {:.4} deg, P = {:.4} deg, R = {:.4} deg\n}};\n",
+            i + 1,
+            n[0],
+            n[1],
+            n[2],
+            n[3],
+            n[4],
+            n[5]
+        );
+    }
+    listing += "/END\n";
+    let [points, poses] = ["profiles.csv", "BALL.LS"].map(|n| dir.path().join(n));
+    std::fs::write(&points, profiles).unwrap();
+    std::fs::write(&poses, listing).unwrap();
+    let station = dir.path().join("station");
+    sheetlight(&["station", "new", text(&station)]);
+    let args = |diameter: &'static str| {
+        vec![
+            "calibrate",
+            "profile-hand-eye",
+            text(&points),
+            "--poses",
+            text(&poses),
+            "--ball-diameter",
+            diameter,
+            "--station",
+            text(&station),
+            "--json",
+        ]
+    };
+    let found: Value = serde_json::from_str(&sheetlight(&args("40"))).unwrap();
+    let truth = serde_json::to_value(sensor.to_rows().to_vec()).unwrap();
+    let (mm, deg) = apart(&found["value"], &truth);
+    assert!(mm < 0.02 && deg < 0.01, "{mm} mm, {deg} degrees");
+    assert!(station.join("calibration/profile_hand_eye.html").exists());
+    let (code, said) = sheetlight_fails(&args("20"));
+    assert!(code == 1 && said.contains("next step"), "a wrong diameter: {said}");
+}
