@@ -257,5 +257,5 @@ fn degenerate_sets_are_refused_with_the_reason() {
     // Spots in one place tell no direction.
     let c = Case::new("pointer_cal");
     c.keep(&[2; 6]);
-    c.fails("pointer", &[], &["are needed"]);
+    c.fails("pointer", &[], &["one place"]);
 }

@@ -1,4 +1,4 @@
-"""In: the input of benches/calibration.rs. Out: times of OpenCV on it, in ms, best and median of some runs.
+"""In: the input of benches/calibration.rs. Out: times of OpenCV on it, in ms: CPU time of all threads and wall time.
 
 Usage: SHEETLIGHT_REFERENCE=... python benches/peers/calibration.py   (needs opencv-python and numpy)
 """
@@ -15,12 +15,13 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 
 
 def timed(name, work, runs):
-    times = []
+    cpu, wall = [], []
     for _ in range(runs):
-        start = time.perf_counter()
+        start = time.process_time(), time.perf_counter()
         work()
-        times.append(1000.0 * (time.perf_counter() - start))
-    print(f"{name}: best {min(times):.2f} ms, median {statistics.median(times):.2f} ms")
+        cpu.append(1000.0 * (time.process_time() - start[0]))
+        wall.append(1000.0 * (time.perf_counter() - start[1]))
+    print(f"{name}: CPU best {min(cpu):.2f} ms, median {statistics.median(cpu):.2f} ms; wall best {min(wall):.2f} ms")
 
 
 def main():

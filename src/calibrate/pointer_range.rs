@@ -212,10 +212,11 @@ pub fn surface(points: &[BasePoint], shared: &SMatrix<f64, 21, 21>, x: &Vec3) ->
             points.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, p)| p.clone()).collect();
         plane_of(&others, shared, x).ok().map(|s| Surface { left_out: Some(i), ..s })
     };
-    let best = (0..points.len()).filter_map(without).min_by(|a, b| a.misfit.total_cmp(&b.misfit));
-    let belongs =
-        |b: &Surface| whole.misfit * freedom - b.misfit * (freedom - 1.0) < GROSS || b.misfit > even(freedom - 1.0);
-    Ok(best.filter(|b| !belongs(b)).unwrap_or(whole))
+    let explains =
+        |b: &Surface| whole.misfit * freedom - b.misfit * (freedom - 1.0) >= GROSS && b.misfit <= even(freedom - 1.0);
+    let mut found = (0..points.len()).filter_map(without).filter(explains);
+    // Where leaving out any of several would do, which of them is wrong cannot be told: the sigma says so.
+    Ok(found.next().filter(|_| found.next().is_none()).unwrap_or(whole))
 }
 
 /// A spot is left out where the sum of squared distances falls by this without it: five sigmas.

@@ -361,7 +361,7 @@ pub fn solve(profiles: &[Profile], poses: &[Rigid<Base, Flange>], o: &BallOption
     let freedom: f64 = circles.iter().map(|c| c.points[0] as f64 - 3.0).sum();
     let point = (circles.iter().map(|c| c.squares).sum::<f64>() / freedom.max(1.0)).sqrt().max(1e-5);
     let items: Vec<Item<'_>> = circles.iter().zip(poses).map(|(circle, pose)| Item { circle, pose }).collect();
-    let solve_side = |side: Side| -> Option<(Solved, Noise, Vec<usize>)> {
+    let solve_side = |side: Side| -> Option<(Side, (Solved, Noise, Vec<usize>))> {
         let rough = Noise { point, robot: 0.5 };
         // A start of one side may end on the other where the ball is seen from both: all are tried for each.
         let best = [Side::Plus, Side::Minus]
@@ -398,12 +398,14 @@ pub fn solve(profiles: &[Profile], poses: &[Rigid<Base, Flange>], o: &BallOption
                 used = next;
             }
         }
-        (side_of(&items, &now.0) == side).then_some((now, noise, used))
+        Some((side_of(&items, &now.0), (now, noise, used)))
     };
     let mut both: Vec<(Side, (Solved, Noise, Vec<usize>))> =
-        [Side::Plus, Side::Minus].into_iter().filter_map(|s| Some((s, solve_side(s)?))).collect();
+        [Side::Plus, Side::Minus].into_iter().filter_map(solve_side).collect();
     // Both sides are judged with the noise of the better one.
     both.sort_by(|a, b| a.1.1.robot.total_cmp(&b.1.1.robot));
+    // A ball that is seen as often from one side as from the other: both ways may end in one place.
+    both.dedup_by_key(|b| b.0);
     let judged = |s: &Solved, n: &Noise| -> f64 {
         items
             .iter()
