@@ -30,12 +30,12 @@ impl std::fmt::Debug for Accelerator {
 const SUMS: usize = 64 << 20;
 /// Hits of one submission.
 const CAPACITY: u32 = 1 << 18;
-/// A GPU's submissions and readback cost about a millisecond, in which two cores add some 2e7 bytes.
+/// Estimated, not measured on a GPU: submissions and readback cost about a millisecond, in which two cores add 2e7 bytes.
 const LEAST_ADDITIONS: u64 = 50_000_000;
 
 impl Accelerator {
-    /// The best adapter if it is a GPU. A software adapter runs the same sums several times slower than the CPU's own
-    /// code (benches/README.md), so it is not taken.
+    /// The best adapter if it is a GPU. A software adapter runs the sums on the very cores that the CPU's own
+    /// code would use, so it is not taken.
     pub fn open() -> Option<Accelerator> {
         let device = Device::open().ok().filter(|d| d.info.kind != "CPU")?;
         Accelerator::on(&device).ok()
