@@ -84,9 +84,13 @@ fn task(name: &'static str, w: usize, h: usize, kind: Kind, size: f64) -> Task {
     };
     let (picture, template) = (drawn(w, h, &truth, 60), drawn(side, side, &taught, 0));
     let region = Region { x0: 0, y0: 0, x1: side, y1: side };
-    let model =
-        ShapeModel::from_region(&scene(side, side, &template), region, Some([taught.x, taught.y]), &ModelOptions::default())
-            .expect("a clear outline");
+    let model = ShapeModel::from_region(
+        &scene(side, side, &template),
+        region,
+        Some([taught.x, taught.y]),
+        &ModelOptions::default(),
+    )
+    .expect("a clear outline");
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/find-bench");
     std::fs::create_dir_all(&folder).expect("target can be written");
     let keep = |what: &str, w: usize, h: usize, pixels: &[u8]| {
@@ -122,7 +126,8 @@ fn benches(c: &mut Criterion) {
         group.bench_function(t.name, |b| b.iter(|| find(black_box(&t.scene), &t.model, &options)));
         // Fewer levels: the coarse search dominates, as for long parts.
         let fine = ShapeModel { levels: t.model.levels[..2].to_vec(), ..t.model.clone() };
-        group.bench_function(format!("{}, 2 levels", t.name), |b| b.iter(|| find(black_box(&t.scene), &fine, &options)));
+        group
+            .bench_function(format!("{}, 2 levels", t.name), |b| b.iter(|| find(black_box(&t.scene), &fine, &options)));
         if let Some(a) = &accelerator {
             assert_eq!(
                 format!("{:?}", find_on(&t.scene, &fine, &options, Some(a))),

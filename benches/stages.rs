@@ -61,7 +61,13 @@ fn clouds(c: &mut Criterion) {
     let points: Vec<CloudPoint> = (0..300_000u32)
         .map(|i| {
             let (x, y) = (0.1 * (i % 600) as f32, 0.1 * (i / 600) as f32);
-            CloudPoint { position: [400.0 + x, y, 0.2 * x], sigma_mm: 0.02, intensity: 90.0, quality: 1.0, ..Default::default() }
+            CloudPoint {
+                position: [400.0 + x, y, 0.2 * x],
+                sigma_mm: 0.02,
+                intensity: 90.0,
+                quality: 1.0,
+                ..Default::default()
+            }
         })
         .collect();
     let options = GridOptions { cell: Some(0.25), ..GridOptions::default() };

@@ -159,6 +159,25 @@ fn ambient_light_is_subtracted() {
 }
 
 #[test]
+fn ambient_light_is_subtracted_once_however_often_a_batch_starts_over() {
+    let Some(device) = device() else { return };
+    let mut config = ChainConfig::new(400, 300, 8);
+    config.shots = 1;
+    // Subtracted twice, the picture falls below the minimum.
+    config.threshold = ThresholdParams { size: 3, offset: -1, minimum: 80, ..Default::default() };
+    config.region = Some(Mask::from_fn(400, 300, |x, y| (40..360).contains(&x) && (50..250).contains(&y)));
+    let (_, list) = expected(&drawn(400, 300, 8, |_, _| 90), &config);
+    config.ambient = Some(drawn(400, 300, 8, |_, _| 40));
+    let mut chain = Chain::new(&device, &config).unwrap();
+    for n in 0..3 {
+        chain.submit(n, &[&drawn(400, 300, 8, |_, _| 130)]).unwrap();
+    }
+    for _ in 0..3 {
+        assert!(chain.collect(true).unwrap().unwrap().pixels(0).eq(list.iter().copied()));
+    }
+}
+
+#[test]
 fn a_lost_device_ends_in_an_error() {
     let Some(device) = device() else { return };
     let image = stripe(64, 48, 8, 2.0, 0, 1);

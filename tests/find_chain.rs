@@ -42,7 +42,10 @@ fn insertion_from_pictures_and_noisy_poses_alone() {
             let recipe = format!("{}/data/recipes/{part}.toml", env!("CARGO_MANIFEST_DIR"));
             // Exit code 1 is a refusal; its report is judged like any other.
             let find = ["--quiet", "find", &scan, "--recipe", &recipe, "--station", &station, "--out", &out];
-            std::process::Command::new(env!("CARGO_BIN_EXE_sheetlight")).args(find).output().expect("the program starts");
+            std::process::Command::new(env!("CARGO_BIN_EXE_sheetlight"))
+                .args(find)
+                .output()
+                .expect("the program starts");
             let report = read(Path::new(&out));
             let truth = read(&truths.join(&set).join("truth.json"));
             let d = pose(&truth["base_T_part"]).inverse() * pose(&report["base_from_part"]);
@@ -59,7 +62,10 @@ fn insertion_from_pictures_and_noisy_poses_alone() {
             let stated = sigma[0].hypot(sigma[1]);
             assert!(lateral <= 3.0 * stated, "{part}: {lateral:.3} mm, sigma {stated:.3}");
         }
-        println!("within {ASKED_MM} mm and {ASKED_DEG} degrees: {kept} of 4; worst {:.3} mm, {:.3} degrees", worst.0, worst.1);
+        println!(
+            "within {ASKED_MM} mm and {ASKED_DEG} degrees: {kept} of 4; worst {:.3} mm, {:.3} degrees",
+            worst.0, worst.1
+        );
         assert!(worst.0 <= REACHED_MM && worst.1 <= REACHED_DEG, "{worst:?}");
     }
 }

@@ -118,7 +118,8 @@ fn the_shapes_of_the_plate_are_found_at_their_heights() {
     let bars = search(&map, &bar, 6);
     println!("{} bars", bars.len());
     // By eye: middle of each bar, column and row, and its direction.
-    let seen = [(243.8, 116.4, 0.5), (230.0, 177.2, 23.0), (196.0, 232.6, 45.5), (143.3, 268.4, 67.8), (85.2, 283.7, 89.6)];
+    let seen =
+        [(243.8, 116.4, 0.5), (230.0, 177.2, 23.0), (196.0, 232.6, 45.5), (143.3, 268.4, 67.8), (85.2, 283.7, 89.6)];
     for (column, row, turn) in seen {
         let m = bars.iter().find(|m| distance(place(&map, m), at(column, row)) < 1.0);
         let m = m.unwrap_or_else(|| panic!("the bar at {column} {row} was not found"));

@@ -9,7 +9,10 @@ use sheetlight::find::{LocateOptions, Recipe, locate};
 use sheetlight::geometry::{Base, Part, Rigid};
 use sheetlight::rig::Rig;
 use sheetlight::scan::{CloudPoint, Extraction, Format, Processor, Scanner, Shot};
-use sheetlight::simulate::{Canvas, InScene, Scene, SceneSpec, Sensor, Station, View, above, base_from_scene, expose, flange, part_pose, reported};
+use sheetlight::simulate::{
+    Canvas, InScene, Scene, SceneSpec, Sensor, Station, View, above, base_from_scene, expose, flange, part_pose,
+    reported,
+};
 
 /// A relay socket on a board: a body with a window and a notch. {x} {y} {turn} {tx} {ty} are drawn.
 fn scene(rng: &mut Pcg64) -> Scene {
@@ -106,7 +109,8 @@ fn trial(seed: u64) -> Option<Trial> {
     let rig = Rig::load(folder.path()).unwrap();
     let base_from_scene = base_from_scene(&station);
     let format = Format { width: station.camera.width, height: station.camera.height, bits: 8 };
-    let mut scanner = Scanner::new(&rig, format, &Extraction::default(), [100.0, 210.0], None, Processor::Twins, None).unwrap();
+    let mut scanner =
+        Scanner::new(&rig, format, &Extraction::default(), [100.0, 210.0], None, Processor::Twins, None).unwrap();
     let [_, y0, _, y1] = scene.spec.region_mm;
     let height = scene.spec.focus_height_mm + station.working_distance;
     let mut cloud: Vec<CloudPoint> = Vec::new();
@@ -147,13 +151,16 @@ fn the_error_over_the_reported_sigma_is_one() {
     let n: u64 = std::env::var("SHEETLIGHT_SIGMA_SCANS").ok().and_then(|s| s.parse().ok()).unwrap_or(30);
     let trials: Vec<Trial> = (0..n).into_par_iter().filter_map(trial).collect();
     assert!(trials.len() as f64 >= 0.95 * n as f64, "{} of {n} scans gave a pose", trials.len());
-    let rms = |f: &dyn Fn(&Trial) -> f64| {
-        (trials.iter().map(|t| f(t).powi(2)).sum::<f64>() / trials.len() as f64).sqrt()
-    };
+    let rms =
+        |f: &dyn Fn(&Trial) -> f64| (trials.iter().map(|t| f(t).powi(2)).sum::<f64>() / trials.len() as f64).sqrt();
     let mut outside = vec![];
     for (k, (axis, unit)) in [("x", "mm"), ("y", "mm"), ("z", "mm"), ("turn", "degrees")].into_iter().enumerate() {
         let ratio = rms(&|t| t.error[k] / t.sigma[k]);
-        println!("{axis}: error over sigma {ratio:.3} rms, error {:.4} {unit} rms, {} scans", rms(&|t| t.error[k]), trials.len());
+        println!(
+            "{axis}: error over sigma {ratio:.3} rms, error {:.4} {unit} rms, {} scans",
+            rms(&|t| t.error[k]),
+            trials.len()
+        );
         if !(0.8..=1.25).contains(&ratio) {
             outside.push(format!("{axis} {ratio:.3}"));
         }

@@ -111,9 +111,9 @@ fn levels(image: &Image) -> Vec<u16> {
 fn grey(image: &Image) -> image::DynamicImage {
     match &image.pixels {
         Pixels::U8(p) => image::GrayImage::from_raw(image.width, image.height, p.clone()).unwrap().into(),
-        Pixels::U16(p) => image::ImageBuffer::<image::Luma<u16>, _>::from_raw(image.width, image.height, p.clone())
-            .unwrap()
-            .into(),
+        Pixels::U16(p) => {
+            image::ImageBuffer::<image::Luma<u16>, _>::from_raw(image.width, image.height, p.clone()).unwrap().into()
+        }
     }
 }
 

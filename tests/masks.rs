@@ -50,9 +50,7 @@ fn picture(p: &Picture) -> Image {
 /// The masks of a stack, each as high as the picture.
 fn stack(p: &Picture, kind: &str, height: u32) -> Vec<Mask> {
     let all = load(&folder().join(format!("{}_{kind}.png", p.name)), Channel::Luma, 8).unwrap();
-    (0..all.height / height)
-        .map(|i| Mask::from_fn(all.width, height, |x, y| all.get(x, i * height + y) > 0))
-        .collect()
+    (0..all.height / height).map(|i| Mask::from_fn(all.width, height, |x, y| all.get(x, i * height + y) > 0)).collect()
 }
 
 fn params(t: &Threshold) -> ThresholdParams {

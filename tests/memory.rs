@@ -28,7 +28,8 @@ impl Source for Repeating {
             let i = self.next;
             self.next += 1;
             let step = (i % 40).abs_diff(20) as f64;
-            let base_from_flange = Rigid::<Base, Flange>::from_vectors(&Vec3::zeros(), Vec3::new(0.0, 0.25 * step, 0.0));
+            let base_from_flange =
+                Rigid::<Base, Flange>::from_vectors(&Vec3::zeros(), Vec3::new(0.0, 0.25 * step, 0.0));
             let image = self.pictures[i % self.pictures.len()].clone();
             Ok(Shot { index: i as u32, name: format!("{i}"), image, base_from_flange })
         })

@@ -36,7 +36,8 @@ impl Bench {
         self.dir.path().join(name)
     }
     fn command(&self, out: &str, more: &[&str]) -> Vec<String> {
-        let [recording, station, out] = ["sim/scan", "sim/station", out].map(|n| self.at(n).to_str().unwrap().to_owned());
+        let [recording, station, out] =
+            ["sim/scan", "sim/station", out].map(|n| self.at(n).to_str().unwrap().to_owned());
         let mut args = vec!["scan".to_owned(), recording, "--station".into(), station, "--out".into(), out];
         args.extend(["--overlays", "0", "--on", "cpu", "--quiet"].map(str::to_owned));
         args.extend(more.iter().map(|s| (*s).to_owned()));
@@ -122,7 +123,9 @@ fn a_lost_device_costs_no_finished_shot() {
                 None => Box::new(inner),
             })
         };
-        scan_on(Processor::Gpu(device.clone()), "id", "test", source, &rig, &options(&b.at(out)), |done, _| *told = done)
+        scan_on(Processor::Gpu(device.clone()), "id", "test", source, &rig, &options(&b.at(out)), |done, _| {
+            *told = done
+        })
     };
     let mut told = 0;
     let fault = run("lost", device, Some(140), &mut told).expect_err("the device was lost");

@@ -38,6 +38,13 @@ def pictures(width, height, count, scene):
     return out
 
 
+def recorded(folder):
+    """The laser pictures of a recording, at most 16, spread over it."""
+    names = sorted(n for n in os.listdir(folder) if n.startswith("laser") and n.endswith(".png"))
+    names = names[:: max(1, len(names) // 16)][:16]
+    return [cv2.imread(os.path.join(folder, n), cv2.IMREAD_GRAYSCALE) for n in names]
+
+
 def camera(width, height):
     return np.array([[0.96 * width, 0, width / 2], [0, 0.96 * width, height / 2], [0, 0, 1.0]])
 
@@ -160,10 +167,12 @@ def clock(f, times=1):
     return (time.perf_counter() - wall) * 1e3 / times, (time.process_time() - cpu) * 1e3 / times
 
 
-def compare(program, width, height, scene, rounds):
+def compare(program, width, height, scene, rounds, images=None):
     count = 16 if width * height < 5e5 else 4 if width * height < 5e6 else 2
     batch = 16 if width * height < 5e5 else 4 if width * height < 5e6 else 1
-    images = pictures(width, height, count, scene)
+    images = images or pictures(width, height, count, scene)
+    count = len(images)
+    batch = min(batch, count)
     k = camera(width, height)
     ours = Sheetlight(program, images, batch)
     wrong_lit = wrong_thin = 0
@@ -204,23 +213,31 @@ def main():
     p.add_argument("--sheetlight", default=os.path.join(here, "../../target/release/sheetlight"))
     p.add_argument("--size", action="append", help="WIDTHxHEIGHT, may be repeated")
     p.add_argument("--scene", action="append", choices=["stripe", "thick", "noise", "reflections"])
+    p.add_argument("--recording", action="append", default=[], help="also the laser pictures of this folder")
     p.add_argument("--rounds", type=int, default=7)
     p.add_argument("--save", help="file for the figures as JSON")
     args = p.parse_args()
     rows = []
     print(f"{'size':10} {'scene':12} {'OpenCV':>9} {'Steger':>9} {'centroid':>9} {'ours':>9} {'our CPU':>9} {'read':>7}"
           f" {'OpenCV/ours':>12} {'by CPU':>8} {'CPU/read':>9}  masks")
+    work = []
     for size in args.size or ["640x480", "1280x960", "4096x3072", "5120x5120"]:
         width, height = map(int, size.split("x"))
-        for scene in args.scene or ["stripe"]:
-            r = compare(args.sheetlight, width, height, scene, args.rounds)
-            rows.append(r)
-            m = r["ms"]
-            same = "identical" if r["lit_pixels_apart"] + r["skeleton_pixels_apart"] == 0 else \
-                f"DIFFER in {r['lit_pixels_apart']} lit, {r['skeleton_pixels_apart']} skeleton pixels"
-            print(f"{size:10} {scene:12} {m['opencv']:9.2f} {m['steger']:9.2f} {m['centroid']:9.2f}"
-                  f" {m['sheetlight']:9.3f} {m['sheetlight_cpu']:9.3f} {m['read']:7.3f}"
-                  f" {r['opencv_over_ours']:11.1f}x {r['opencv_cpu_over_our_cpu']:7.1f}x {r['cpu_over_plain_read']:8.1f}x  {same}", flush=True)
+        work += [(width, height, scene, None) for scene in args.scene or ["stripe"]]
+    for folder in args.recording:
+        images = recorded(folder)
+        height, width = images[0].shape
+        work.append((width, height, os.path.basename(os.path.normpath(folder)), images))
+    for width, height, scene, images in work:
+        size = f"{width}x{height}"
+        r = compare(args.sheetlight, width, height, scene, args.rounds, images)
+        rows.append(r)
+        m = r["ms"]
+        same = "identical" if r["lit_pixels_apart"] + r["skeleton_pixels_apart"] == 0 else \
+            f"DIFFER in {r['lit_pixels_apart']} lit, {r['skeleton_pixels_apart']} skeleton pixels"
+        print(f"{size:10} {scene:12} {m['opencv']:9.2f} {m['steger']:9.2f} {m['centroid']:9.2f}"
+              f" {m['sheetlight']:9.3f} {m['sheetlight_cpu']:9.3f} {m['read']:7.3f}"
+              f" {r['opencv_over_ours']:11.1f}x {r['opencv_cpu_over_our_cpu']:7.1f}x {r['cpu_over_plain_read']:8.1f}x  {same}", flush=True)
     if args.save:
         with open(args.save, "w") as f:
             json.dump(rows, f, indent=1)

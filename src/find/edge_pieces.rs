@@ -86,7 +86,8 @@ pub(super) fn solve(rows: &[Row], x: &Unknowns, bias: f64, scatter: f64) -> Opti
         let mut sum = PRIOR_PIECES * bias * bias;
         for p in &pieces {
             let k = 1.0 / (p.own + size.powi(-2));
-            sum += (k * (p.right - p.cross.dot(&step))).powi(2) + k + k * k * (p.cross.transpose() * inverse * p.cross)[0];
+            sum +=
+                (k * (p.right - p.cross.dot(&step))).powi(2) + k + k * k * (p.cross.transpose() * inverse * p.cross)[0];
         }
         size = (sum / (PRIOR_PIECES + pieces.len() as f64)).sqrt().max(1e-4);
     }

@@ -26,7 +26,11 @@ pub(super) struct InPlane {
     pub observations: Vec<Observation>,
 }
 
-pub(super) fn fit_edges(mut observations: Vec<Observation>, step: &[f64; 2], options: &MeasureOptions) -> Result<InPlane> {
+pub(super) fn fit_edges(
+    mut observations: Vec<Observation>,
+    step: &[f64; 2],
+    options: &MeasureOptions,
+) -> Result<InPlane> {
     let axes = [0, 1].map(|a| observations.iter().filter(|o| o.locates && o.axis == a).count());
     let locating = axes[0] + axes[1];
     if locating < MIN_EDGES {

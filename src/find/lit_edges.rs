@@ -269,7 +269,8 @@ fn fall(t: f64) -> (f64, f64) {
     let density = (-0.5 * t * t).exp() / (2.0 * std::f64::consts::PI).sqrt();
     // Abramowitz and Stegun 26.2.17: 7.5e-8.
     let k = 1.0 / (1.0 + 0.231_641_9 * t.abs());
-    let poly = k * (0.319_381_53 + k * (-0.356_563_782 + k * (1.781_477_937 + k * (-1.821_255_978 + k * 1.330_274_429))));
+    let poly =
+        k * (0.319_381_53 + k * (-0.356_563_782 + k * (1.781_477_937 + k * (-1.821_255_978 + k * 1.330_274_429))));
     let upper = 1.0 - density * poly;
     (if t >= 0.0 { upper } else { 1.0 - upper }, density)
 }

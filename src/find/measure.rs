@@ -3,7 +3,6 @@
 //! (docs/math.md, Insertion (1) to (4)).
 //! Frame and unit: base_from_part; mm, rad; covariance over x y z rx ry rz about the part's own axes.
 
-
 use super::datum::{Datum, fit_datum};
 use super::drawing::Drawing;
 use super::edge_index::EdgeIndex;

@@ -16,7 +16,11 @@ pub(super) struct Fit<const N: usize> {
 /// Tukey-weighted least squares of `residual = j . step` with priors (unknown, sigma) around zero. Rows
 /// of one shot share its pose's error, so the covariance is the sandwich over shots. `floor`: least
 /// robust sigma, mm.
-pub(super) fn robust<const N: usize>(rows: &[(SVector<f64, N>, f64, u32)], priors: &[(usize, f64)], floor: f64) -> Option<Fit<N>> {
+pub(super) fn robust<const N: usize>(
+    rows: &[(SVector<f64, N>, f64, u32)],
+    priors: &[(usize, f64)],
+    floor: f64,
+) -> Option<Fit<N>> {
     const TUKEY: f64 = 3.0;
     let mut step = SVector::<f64, N>::zeros();
     let mut weights = vec![1.0; rows.len()];

@@ -5,15 +5,15 @@ pub mod colour;
 mod file;
 mod float;
 mod image8;
-mod text;
 mod mask;
 mod pgm;
+mod text;
 
 pub use file::{Channel, decode, load, png, save_png};
 pub use float::{float_tiff, read_float_tiff};
 pub use image8::{Rgb, RgbImage};
-pub use text::text_width;
 pub use mask::Mask;
+pub use text::text_width;
 
 /// Grey levels, row-major.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -170,6 +170,7 @@ impl Engine {
             threshold: e.threshold,
             thinning: e.thinning,
             region: Some(self.region.clone()),
+            ambient: self.ambient.as_ref().map(|a| a.image.clone()),
             lengthen: e.lengthen.word(self.width_px),
             measure: Some(Measure { peak: e.peak, choose: e.choose, optics: self.optics }),
             ..usual
@@ -180,11 +181,6 @@ impl Engine {
 
     /// Takes a picture; `pose` is base_from_camera as [`point::pose_words`].
     pub fn submit(&mut self, shot: u32, image: Image, pose: [f32; 12]) -> Result<()> {
-        // Here and not in the chain, which starts a batch with very wide stripes over: light is subtracted once.
-        let image = match &self.ambient {
-            Some(ambient) => ambient.subtracted(&image),
-            None => image,
-        };
         self.pending.push(Job { shot, image, pose });
         let usual = self.chain.as_ref().map_or(TWIN_BATCH, |c| c.frame.shots as usize);
         let full = self.at_once.map_or(usual, |(shots, _)| shots as usize);
@@ -253,7 +249,8 @@ impl Engine {
     }
 
     fn twins(&self, job: &Job) -> Measured {
-        let mut peaks = peak::peaks(&job.image, &self.skeleton(&job.image), job.shot, &self.extraction.peak);
+        let image = self.lit(&job.image);
+        let mut peaks = peak::peaks(&image, &self.skeleton(&image), job.shot, &self.extraction.peak);
         let scene = Scene {
             width: self.format.width,
             height: self.format.height,

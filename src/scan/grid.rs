@@ -147,7 +147,15 @@ pub fn choose(source: &(impl PointSource + ?Sized), options: &GridOptions) -> Re
     let reach = z0.abs().max(z1.abs()) * 1.05 + 1.0;
     let z_step = (reach / f64::from(Z_MOST)) as f32;
     let layer_steps = (options.layer / f64::from(z_step)).round() as i32;
-    Ok(GridSpec { base_from_grid, width: width as u32, height: height as u32, cell, z_step, layer_steps, most_intensity: sample.most_intensity })
+    Ok(GridSpec {
+        base_from_grid,
+        width: width as u32,
+        height: height as u32,
+        cell,
+        z_step,
+        layer_steps,
+        most_intensity: sample.most_intensity,
+    })
 }
 
 struct Sample {

@@ -24,10 +24,7 @@ struct State<T> {
 
 impl<T> Default for Newest<T> {
     fn default() -> Self {
-        Newest {
-            state: Mutex::new(State { value: None, passed_over: 0, closed: false }),
-            filled: Condvar::new(),
-        }
+        Newest { state: Mutex::new(State { value: None, passed_over: 0, closed: false }), filled: Condvar::new() }
     }
 }
 

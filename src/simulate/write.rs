@@ -160,7 +160,8 @@ pub fn simulate(out: &Path, options: &SimulateOptions, progress: &(dyn Fn(usize,
     let folder = out.join("station");
     std::fs::create_dir_all(&folder).map_err(|e| Fault::write(&folder, e))?;
     station.store(&folder)?;
-    let plans: Vec<Plan> = options.sets.iter().map(|set| Plan::new(*set, &station, &scene, options)).collect::<Result<_>>()?;
+    let plans: Vec<Plan> =
+        options.sets.iter().map(|set| Plan::new(*set, &station, &scene, options)).collect::<Result<_>>()?;
     let total = plans.iter().map(|p| p.shots.iter().map(Shot::pictures).sum::<usize>()).sum();
     let done = std::sync::atomic::AtomicUsize::new(0);
     let count = || progress(1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed), total);
@@ -230,13 +231,11 @@ impl Plan {
                 }
             }
             Set::Intrinsics => {
-                let views =
-                    Views { count: 20, near: 1.1 * z, far: 2.0 * z, tilt_deg: 40.0, turn_deg: 25.0, seen: 1.0 };
+                let views = Views { count: 20, near: 1.1 * z, far: 2.0 * z, tilt_deg: 40.0, turn_deg: 25.0, seen: 1.0 };
                 plan.show_boards(station, vec![chessboard(9, 6, 15.0, 9.0)], &views, None, options)?;
             }
             Set::Handeye => {
-                let views =
-                    Views { count: 16, near: 1.2 * z, far: 2.0 * z, tilt_deg: 35.0, turn_deg: 80.0, seen: 1.0 };
+                let views = Views { count: 16, near: 1.2 * z, far: 2.0 * z, tilt_deg: 35.0, turn_deg: 80.0, seen: 1.0 };
                 plan.show_boards(station, vec![chessboard(9, 6, 15.0, 9.0)], &views, None, options)?;
                 let base_from_board: Rigid<Base, Board> =
                     Rigid::from_vectors(&Vec3::new(3.1, 0.02, 0.03), Vec3::new(470.0, -80.0, 60.0));

@@ -70,7 +70,8 @@ pub struct Chain {
     device: Device,
     ring: Ring,
     replay: Replay,
-    /// First run and further rounds of thinning, per place of the ring.
+    /// What is done once a batch, its first run, and further rounds of thinning, per place of the ring.
+    prepare: Vec<Recording>,
     first: Vec<Recording>,
     again: Vec<Recording>,
     /// Further rounds that every batch gets; grows when stripes are wider than they reach.
@@ -143,8 +144,9 @@ impl Chain {
         )?;
         let pipelines = Pipelines::new(device, config)?;
         let thinning = shared.thinning(device, &pipelines);
-        let (mut first_runs, mut again) = (Vec::new(), Vec::new());
+        let (mut prepare, mut first_runs, mut again) = (Vec::new(), Vec::new(), Vec::new());
         for slot in &ring.slots {
+            prepare.push(shared.prepare(device, &frame, &pipelines, &slot.input));
             let mut first = shared.front(device, &frame, &pipelines, &slot.input);
             first.append(&thinning);
             let pixels = measuring.as_ref().map_or(&slot.outputs[0].buffer, |m| &m.pixels);
@@ -166,6 +168,7 @@ impl Chain {
             device: device.clone(),
             replay: Replay::new(device, config.timed)?,
             ring,
+            prepare,
             first: first_runs,
             again,
             rounds: 0,
@@ -263,7 +266,8 @@ impl Chain {
     }
 
     fn run(&mut self, at: usize, upload: bool) -> Result<()> {
-        let mut work = vec![&self.first[at]];
+        let mut work = if upload { vec![&self.prepare[at]] } else { Vec::new() };
+        work.push(&self.first[at]);
         work.extend(std::iter::repeat_n(&self.again[at], self.rounds));
         self.ring.run(at, &mut self.replay, &work, upload)
     }

@@ -99,7 +99,8 @@ impl GridFrame {
         most_intensity: f32,
     ) -> GridFrame {
         let unit = f64::from(1 << POSITION_PLACES);
-        let origin = base_from_grid.translation.map(|v| (v * unit).round().clamp(-1_073_741_824.0, 1_073_741_824.0) as i32);
+        let origin =
+            base_from_grid.translation.map(|v| (v * unit).round().clamp(-1_073_741_824.0, 1_073_741_824.0) as i32);
         let grid_from_base = base_from_grid.inverse();
         let rest = grid_from_base.point(&Vec3::from_fn(|i, _| f64::from(origin[i]) / unit));
         let row = |i: usize, step: f64, half: f64| {
@@ -157,8 +158,7 @@ impl GridFrame {
     /// Cell of a point, and its height + 32,768; `None` outside the grid.
     fn place(&self, p: &[u32]) -> Option<(usize, u32)> {
         let q = [p[0], p[1], p[2]].map(|bits| fixed(bits, POSITION_PLACES));
-        let d: [i32; 3] =
-            std::array::from_fn(|i| q[i] - [self.origin_x, self.origin_y, self.origin_z][i]);
+        let d: [i32; 3] = std::array::from_fn(|i| q[i] - [self.origin_x, self.origin_y, self.origin_z][i]);
         if q.iter().chain(&d).any(|v| v.abs() >= BEYOND) {
             return None;
         }

@@ -94,8 +94,7 @@ pub fn near_tiles(f: &Frame, tile: u32) -> impl Iterator<Item = usize> {
     let (x, y, shot) = tile_unpack(tile);
     let near = |v: u32, n: u32| v.saturating_sub(1)..=(v + 1).min(n - 1);
     let (tiles_x, tiles_y) = (f.tiles_x, f.tiles_y);
-    near(y, tiles_y)
-        .flat_map(move |ny| near(x, tiles_x).map(move |nx| ((shot * tiles_y + ny) * tiles_x + nx) as usize))
+    near(y, tiles_y).flat_map(move |ny| near(x, tiles_x).map(move |nx| ((shot * tiles_y + ny) * tiles_x + nx) as usize))
 }
 /// The latest stamp of a tile and its neighbours.
 pub fn latest(f: &Frame, stamps: &[u32], tile: u32) -> u32 {

@@ -182,6 +182,15 @@ impl Shared {
         (&self.active, STEP_BYTES * u64::from(n - 1), 16)
     }
 
+    /// What is done to the pictures where they lie, once: a batch that starts over must not do it again.
+    pub fn prepare(&self, device: &Device, f: &Frame, p: &Pipelines, image: &Buffer) -> Recording {
+        let mut r = Recording::default();
+        if let Some(a) = &self.ambient {
+            r.dispatch_parts(device, &p.ambient, &[self.step(0), whole(image), whole(a)], ambient::groups(f));
+        }
+        r
+    }
+
     /// From the pictures to the mask.
     pub fn front(&self, device: &Device, f: &Frame, p: &Pipelines, image: &Buffer) -> Recording {
         let mut r = Recording::default();
@@ -189,13 +198,11 @@ impl Shared {
         let all = (&self.first, 0);
         let masks = [whole(&self.mask), whole(&self.other_mask), whole(&self.lit)];
         let [mask, other, lit] = masks;
-        let clear = [zero, self.lit(), whole(&self.lit_list), mask, other, lit, whole(&self.stamps), whole(&self.counts)];
+        let clear =
+            [zero, self.lit(), whole(&self.lit_list), mask, other, lit, whole(&self.stamps), whole(&self.counts)];
         r.indirect(device, &p.clear, &clear, (&self.lit_first, 0));
         let [first, lit_first, active] = self.headers();
         r.dispatch_parts(device, &p.reset, &[zero, first, lit_first, active], [1, 1, 1]);
-        if let Some(a) = &self.ambient {
-            r.dispatch_parts(device, &p.ambient, &[zero, whole(image), whole(a)], ambient::groups(f));
-        }
         r.dispatch_parts(device, &p.stats, &[zero, whole(image), whole(&self.stats)], stats::groups(f));
         let (stats, bands, roi) = (whole(&self.stats), whole(&self.bands), whole(&self.roi));
         r.dispatch_parts(device, &p.bands, &[zero, stats, bands], bands::groups(f));

@@ -76,7 +76,11 @@ fn slopes(frame: &ShapeFrame, seed: u64) -> Vec<u32> {
             let around = |cx: i32, cy: i32, r: i32| {
                 let (dx, dy) = (x - cx, y - cy);
                 let edge = dx.abs().max(dy.abs()) - r;
-                (edge == 0).then_some(if dx.abs() >= dy.abs() { (dx.signum() * 500, dy * 9) } else { (dx * 9, dy.signum() * 500) })
+                (edge == 0).then_some(if dx.abs() >= dy.abs() {
+                    (dx.signum() * 500, dy * 9)
+                } else {
+                    (dx * 9, dy.signum() * 500)
+                })
             };
             let grain = |n: &mut Noise| (n.next() % 61) as i32 - 30;
             let strong = around(w / 3, h / 2, h / 4).or(around(2 * w / 3, h / 3, h / 6));
@@ -116,14 +120,15 @@ pub fn cases(stage: &str) -> Vec<Case> {
             .collect();
         let uniform = bytemuck::cast_slice(&[frame]).to_vec();
         let groups = |n: usize, y: u32| [(n as u32).div_ceil(64), y, 1];
-        let mut case = |name: &str, bindings: Vec<Vec<u32>>, groups, twin: fn(&mut [Vec<u32>], &[(&'static str, f64)])| {
-            let mut done = bindings.clone();
-            twin(&mut done, &[]);
-            if name == stage {
-                out.push(Case { name: format!("{w} x {h}, margin {margin}"), overrides: vec![], bindings, groups });
-            }
-            done
-        };
+        let mut case =
+            |name: &str, bindings: Vec<Vec<u32>>, groups, twin: fn(&mut [Vec<u32>], &[(&'static str, f64)])| {
+                let mut done = bindings.clone();
+                twin(&mut done, &[]);
+                if name == stage {
+                    out.push(Case { name: format!("{w} x {h}, margin {margin}"), overrides: vec![], bindings, groups });
+                }
+                done
+            };
         let cells = vec![uniform.clone(), slopes(&frame, seed as u64), vec![0; w * h]];
         let done = case("shape_quantise", cells, groups(w * h, 1), super::shape_maps::quantise_twin);
         let maps = vec![uniform.clone(), done[2].clone(), vec![0; frame.layer_words()]];

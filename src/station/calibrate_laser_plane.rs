@@ -5,18 +5,18 @@
 use super::board_views::{Boards, FrameBoard, boards};
 use super::calibrate_hand_eye::{Calibrated, first_line};
 use super::straight::keep_straight;
-use crate::stages::point;
 use crate::calibrate::laser_plane::{LaserPlaneFit, LaserPlaneOptions, StripePeak, StripeView, solve};
 use crate::calibrate::laser_plane_report::{covariance, judge, page};
 use crate::calibrate::limits::Limits;
 use crate::calibrate::measured_pose::{intrinsic_covariance, pooled_factor};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
-use crate::geometry::{Rigid, Camera, Plane, Vec2, Vec3};
+use crate::geometry::{Camera, Plane, Rigid, Vec2, Vec3};
 use crate::raster::Image;
 use crate::recording::Recording;
 use crate::rig::{Calibration, Rig, hash_file, hash_text};
 use crate::scan::{Engine, Extraction, Format, Optical, Processor, Where};
+use crate::stages::point;
 
 /// How [`calibrate_laser_plane`] is run.
 #[derive(Clone, Debug)]

@@ -1,16 +1,16 @@
 //! In: a station folder, recordings, options. Out: the product's procedures from top to bottom.
 //! Frame and unit: millimetres; each file names its frames.
 
+mod board_views;
+mod calibrate_hand_eye;
+mod calibrate_laser_plane;
+mod calibrate_pointer;
+mod calibrate_profile_hand_eye;
+mod find;
 mod guide;
 mod judge;
 mod judge_parts;
 mod page;
-mod board_views;
-mod calibrate_hand_eye;
-mod find;
-mod calibrate_laser_plane;
-mod calibrate_pointer;
-mod calibrate_profile_hand_eye;
 mod products;
 mod progress;
 mod range;
@@ -20,16 +20,16 @@ mod straight;
 mod values;
 mod verify;
 
-pub use judge::{Judged, judge};
-pub use judge_parts::{FoundPart, judge_parts};
 pub use board_views::{Boards, FrameBoard, boards};
 pub use calibrate_hand_eye::{Calibrated, HandEyeResult, HandEyeRun, calibrate_hand_eye};
 pub use calibrate_laser_plane::{LaserPlaneRun, calibrate_laser_plane};
-pub use calibrate_profile_hand_eye::calibrate_profile_hand_eye;
 pub use calibrate_pointer::{PointerRun, calibrate_pointer};
-pub use range::{Distance, RangeReport, RangeRun, SurfaceFound, measure_range};
+pub use calibrate_profile_hand_eye::calibrate_profile_hand_eye;
 pub use find::{find_part, teach_part};
 pub use guide::{GuideOptions, Guided, Step, guide};
+pub use judge::{Judged, judge};
+pub use judge_parts::{FoundPart, judge_parts};
+pub use range::{Distance, RangeReport, RangeRun, SurfaceFound, measure_range};
 pub use run::{HeightMapFigures, ScanOptions, ScanReport, Spent, cloud_of, load_report, scan, scan_on};
 pub use settings::{Settings, WorkingVolume};
 pub use values::Values;

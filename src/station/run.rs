@@ -6,7 +6,9 @@ use super::progress::{Checkpoint, Lock};
 use crate::fault::{Fault, Result};
 use crate::raster::Image;
 use crate::rig::Rig;
-use crate::scan::{BadShot, CloudPoint, CloudWriter, Extraction, GridOptions, Processor, Profile, Scanner, Source, Where};
+use crate::scan::{
+    BadShot, CloudPoint, CloudWriter, Extraction, GridOptions, Processor, Profile, Scanner, Source, Where,
+};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -176,8 +178,14 @@ pub fn scan_on(
     let points = cloud.finish()?;
     let seconds = started.elapsed().as_secs_f64();
     let products = Instant::now();
-    let height_map =
-        super::products::write(&options.out, &cloud_path, points, &options.grid, scanner.up_in_base(), scanner.device())?;
+    let height_map = super::products::write(
+        &options.out,
+        &cloud_path,
+        points,
+        &options.grid,
+        scanner.up_in_base(),
+        scanner.device(),
+    )?;
     spent.products_s = products.elapsed().as_secs_f64();
     if scanner.cut() > 0 {
         state.peaks.insert("beyond the list: more than a tenth of a picture lit".into(), scanner.cut());
@@ -250,8 +258,7 @@ impl Work<'_> {
                 None => ended = true,
             }
             let scanner = &mut self.scanner;
-            let ready =
-                clocked(&mut self.spent.stages_s, || if ended { scanner.finish() } else { scanner.ready() })?;
+            let ready = clocked(&mut self.spent.stages_s, || if ended { scanner.finish() } else { scanner.ready() })?;
             if self.spent.first_profile_s == 0.0 && !ready.is_empty() {
                 self.spent.first_profile_s = started.elapsed().as_secs_f64();
             }

@@ -46,7 +46,8 @@ pub fn keep_straight(views: &mut [StripeView], camera: &Intrinsics, device: Opti
             seen.filter_map(|(_, p)| *p).map(|p| p.x.round() as u32 | (p.y.round() as u32) << 16).collect()
         })
         .collect();
-    for (((view, places), pixels), votes) in views.iter_mut().zip(&places).zip(&pixels).zip(vote(device, &frame, &pixels)?)
+    for (((view, places), pixels), votes) in
+        views.iter_mut().zip(&places).zip(&pixels).zip(vote(device, &frame, &pixels)?)
     {
         let Some(line) = lines(&frame, votes, pixels, &params).first().copied() else { continue };
         let (s, c) = line.angle.sin_cos();
