@@ -112,10 +112,10 @@ fn benches(c: &mut Criterion) {
     ];
     let options = SearchOptions::default();
     let device = Device::open();
-    let accelerator = device.as_ref().ok().and_then(|d| Accelerator::on(d).ok()).map(|mut a| {
-        a.least_additions = 0;
-        a
-    });
+    let accelerator = device.as_ref().ok().and_then(|d| Accelerator::on(d).ok());
+    if let Some(rule) = accelerator.as_ref().and_then(|a| a.measured().ok()) {
+        println!("coarse search, s: {rule:?}");
+    }
     let mut group = c.benchmark_group("find");
     group.sample_size(10);
     for t in &tasks {

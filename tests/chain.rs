@@ -1,22 +1,13 @@
 //! In: random and adversarial pictures in batches. Out: the pruned chain, the plain chain and the plain
 //! definition give the same masks and the same points. Frame and unit: pixels.
 
+mod common;
+
 use sheetlight::gpu::Device;
 use sheetlight::raster::{Image, Mask};
 use sheetlight::stages::cases::{self, Noise, drawn, stripe};
 use sheetlight::stages::chain::{Chain, ChainConfig};
 use sheetlight::stages::{Thinning, ThresholdParams, Window, frame, skeleton, thin, threshold};
-
-fn device() -> Option<Device> {
-    match Device::open() {
-        Ok(d) => Some(d),
-        Err(e) if std::env::var_os("SHEETLIGHT_REQUIRE_GPU").is_some() => panic!("{e}"),
-        Err(e) => {
-            eprintln!("SKIPPED, no GPU adapter: {e}");
-            None
-        }
-    }
-}
 
 fn expected(image: &Image, c: &ChainConfig) -> (Mask, Vec<u32>) {
     let mut lit = threshold::twin(image, &c.threshold);
@@ -58,7 +49,7 @@ fn check(device: &Device, name: &str, config: &ChainConfig, images: &[Image]) ->
 
 #[test]
 fn pruned_plain_and_definition_agree() {
-    let Some(device) = device() else { return };
+    let Some(device) = common::device() else { return };
     for scene in cases::scenes() {
         if scene.ambient.is_some() {
             continue;
@@ -82,7 +73,7 @@ fn pruned_plain_and_definition_agree() {
 
 #[test]
 fn one_stripe_lists_few_tiles() {
-    let Some(device) = device() else { return };
+    let Some(device) = common::device() else { return };
     let mut config = ChainConfig::new(1280, 960, 8);
     config.shots = 1;
     // Four sigmas above the background noise, as OpenCV defines it.
@@ -95,7 +86,7 @@ fn one_stripe_lists_few_tiles() {
 
 #[test]
 fn random_pictures_and_settings() {
-    let Some(device) = device() else { return };
+    let Some(device) = common::device() else { return };
     let mut noise = Noise(2024);
     for round in 0..24 {
         let (w, h) = (1 + noise.next() % 150, 1 + noise.next() % 90);
@@ -126,7 +117,7 @@ fn random_pictures_and_settings() {
 
 #[test]
 fn stripes_of_any_width_end_as_lines() {
-    let Some(device) = device() else { return };
+    let Some(device) = common::device() else { return };
     let mut config = ChainConfig::new(400, 300, 8);
     config.shots = 1;
     config.threshold = ThresholdParams { size: 3, offset: -1, ..Default::default() };
@@ -141,7 +132,7 @@ fn stripes_of_any_width_end_as_lines() {
 
 #[test]
 fn ambient_light_is_subtracted() {
-    let Some(device) = device() else { return };
+    let Some(device) = common::device() else { return };
     let ambient = drawn(200, 120, 8, |x, y| if (60..100).contains(&x) && y > 70 { 130 } else { 12 });
     let image = stripe(200, 120, 8, 2.0, 0, 4);
     let sum = drawn(200, 120, 8, |x, y| (u32::from(image.get(x, y)) + u32::from(ambient.get(x, y))).min(255));
@@ -160,7 +151,7 @@ fn ambient_light_is_subtracted() {
 
 #[test]
 fn ambient_light_is_subtracted_once_however_often_a_batch_starts_over() {
-    let Some(device) = device() else { return };
+    let Some(device) = common::device() else { return };
     let mut config = ChainConfig::new(400, 300, 8);
     config.shots = 1;
     // Subtracted twice, the picture falls below the minimum.
@@ -179,7 +170,7 @@ fn ambient_light_is_subtracted_once_however_often_a_batch_starts_over() {
 
 #[test]
 fn a_lost_device_ends_in_an_error() {
-    let Some(device) = device() else { return };
+    let Some(device) = common::device() else { return };
     let image = stripe(64, 48, 8, 2.0, 0, 1);
     let mut config = ChainConfig::new(64, 48, 8);
     config.shots = 1;

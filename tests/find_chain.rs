@@ -4,6 +4,7 @@
 
 mod common;
 
+use common::pose::{Off, truth};
 use sheetlight::geometry::{Base, Part, Rigid};
 use std::path::Path;
 
@@ -13,10 +14,6 @@ const REACHED_MM: f64 = 0.115;
 const REACHED_DEG: f64 = 0.10;
 const ASKED_MM: f64 = 0.10;
 const ASKED_DEG: f64 = 0.15;
-
-fn pose(value: &serde_json::Value) -> Rigid<Base, Part> {
-    serde_json::from_value(value.clone()).unwrap()
-}
 
 fn read(path: &Path) -> serde_json::Value {
     serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
@@ -47,13 +44,13 @@ fn insertion_from_pictures_and_noisy_poses_alone() {
                 .output()
                 .expect("the program starts");
             let report = read(Path::new(&out));
-            let truth = read(&truths.join(&set).join("truth.json"));
-            let d = pose(&truth["base_T_part"]).inverse() * pose(&report["base_from_part"]);
-            let (lateral, angle) = (d.translation.xy().norm(), d.rotation_vector().norm().to_degrees());
+            let found: Rigid<Base, Part> = serde_json::from_value(report["base_from_part"].clone()).unwrap();
+            let off = Off::of(&found, &truth(&truths.join(&set)));
+            let (lateral, angle) = (off.in_plane(), off.angle_deg);
             let sigma: Vec<f64> = serde_json::from_value(report["sigma_mm"].clone()).unwrap();
             println!(
                 "{part}: {lateral:.3} mm in the plane, {:+.3} mm in height, {angle:.3} degrees; sigma {sigma:.3?} mm, passed {} {}",
-                d.translation.z, report["passed"], report["reasons"]
+                off.by.z, report["passed"], report["reasons"]
             );
             println!("   two pins against lattice {}, {}", report["disagreement_mm"], report["notes"]);
             kept += usize::from(lateral <= ASKED_MM && angle <= ASKED_DEG);

@@ -1,23 +1,13 @@
 //! In: pictures and height maps with a part among noise. Out: the coarse search gives the same matches, to the last bit,
 //! whether its sums come from the CPU or from the WGSL stages. Frame and unit: pixels.
 
+mod common;
+
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use sheetlight::find::{
     Accelerator, Kind, Layer, Match, ModelOptions, Region, Scene, SearchOptions, ShapeModel, find, find_on,
 };
-use sheetlight::gpu::Device;
-
-fn device() -> Option<Device> {
-    match Device::open() {
-        Ok(d) => Some(d),
-        Err(e) if std::env::var_os("SHEETLIGHT_REQUIRE_GPU").is_some() => panic!("{e}"),
-        Err(e) => {
-            eprintln!("SKIPPED, no GPU adapter: {e}");
-            None
-        }
-    }
-}
 
 /// An L with a notch at a place and turn, on noise, some cells missing.
 fn layer(kind: Kind, w: usize, h: usize, x: f64, y: f64, angle: f64, holes: bool, seed: u64) -> Layer {
@@ -43,9 +33,8 @@ fn bits(found: &[Match]) -> Vec<[u64; 4]> {
 
 #[test]
 fn the_gpu_finds_what_the_cpu_finds() {
-    let Some(device) = device() else { return };
-    let mut accelerator = Accelerator::on(&device).unwrap();
-    accelerator.least_additions = 0;
+    let Some(device) = common::device() else { return };
+    let accelerator = Accelerator::on(&device).unwrap();
     let both = |angle: f64, holes: bool| {
         let layers = [Kind::Intensity, Kind::Height].map(|k| layer(k, 150, 110, 71.0, 52.0, angle, holes, 3));
         Scene::new(layers.to_vec(), None).unwrap()
@@ -66,9 +55,8 @@ fn the_gpu_finds_what_the_cpu_finds() {
 
 #[test]
 fn a_lost_device_leaves_the_search_to_the_cpu() {
-    let Some(device) = device() else { return };
-    let mut accelerator = Accelerator::on(&device).unwrap();
-    accelerator.least_additions = 0;
+    let Some(device) = common::device() else { return };
+    let accelerator = Accelerator::on(&device).unwrap();
     device.lose();
     let template = Scene::new(vec![layer(Kind::Height, 120, 90, 60.0, 45.0, 0.0, false, 1)], None).unwrap();
     let region = Region { x0: 20, y0: 25, x1: 100, y1: 80 };
@@ -77,4 +65,19 @@ fn a_lost_device_leaves_the_search_to_the_cpu() {
     let options = SearchOptions::default();
     let cpu = find(&scene, &model, &options).unwrap();
     assert_eq!(bits(&cpu), bits(&find_on(&scene, &model, &options, Some(&accelerator)).unwrap()));
+}
+
+#[test]
+fn the_rule_is_measured_and_weighs_both_sides() {
+    use sheetlight::find::accelerator::Rule;
+    let rule = Rule { fixed_s: 1e-3, here_s: 1e-11, cpu_s: 1e-10 };
+    // Worth it from fixed / (cpu - here) on: 1.1e7 additions.
+    assert!(!rule.pays(11_000_000) && rule.pays(11_200_000));
+    assert!(!Rule { here_s: 2e-10, ..rule }.pays(u64::MAX), "slower an addition: never");
+    let Some(device) = common::device() else { return };
+    let measured = Accelerator::on(&device).unwrap().measured().unwrap();
+    println!("{}: {measured:?}", device.info.name);
+    // A search of no additions never pays; costs are those of a machine, not of a mistaken unit.
+    assert!(!measured.pays(0) && (1e-5..1.0).contains(&measured.fixed_s), "{measured:?}");
+    assert!([measured.here_s, measured.cpu_s].iter().all(|s| (1e-14..1e-6).contains(s)), "{measured:?}");
 }

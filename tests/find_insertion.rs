@@ -4,10 +4,11 @@
 
 mod common;
 
+use common::pose::{Off, truth};
 use sheetlight::find::{LocateOptions, Recipe, Report, locate};
 use sheetlight::geometry::{Base, Part, Rigid, Vec3};
 use sheetlight::scan::{CloudPoint, read_cloud};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 const PARTS: [&str; 4] = ["dimm", "led", "osc", "flash"];
 /// The limits with the true calibration.
@@ -24,12 +25,6 @@ struct Scanned {
 
 fn recipe(part: &str) -> Recipe {
     Recipe::load(&PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("data/recipes/{part}.toml"))).unwrap()
-}
-
-fn truth(folder: &Path) -> Rigid<Base, Part> {
-    let text = std::fs::read_to_string(folder.join("truth.json")).unwrap();
-    let value: serde_json::Value = serde_json::from_str(&text).unwrap();
-    serde_json::from_value(value["base_T_part"].clone()).unwrap()
 }
 
 /// Scans every part of every rig with its true calibration, by the program itself.
@@ -76,8 +71,8 @@ fn scans(test: &str) -> Vec<Scanned> {
 
 /// Error in the plane, along z, and the angle; the half turn counts: the notch tells it.
 fn error(report: &Report, truth: &Rigid<Base, Part>) -> (f64, f64, f64) {
-    let d = truth.inverse() * report.base_from_part;
-    (d.translation.xy().norm(), d.translation.z.abs(), d.rotation_vector().norm().to_degrees())
+    let off = Off::of(&report.base_from_part, truth);
+    (off.in_plane(), off.in_height(), off.angle_deg)
 }
 
 /// A report that passed must be right within what insertion bears; returns whether it passed.

@@ -2,6 +2,9 @@
 //! Out: judgement on the reported uncertainty: true insertion error over reported sigma, rms per axis, near 1.
 //! Frame and unit: the part's own axes; mm, degrees.
 
+mod common;
+
+use common::pose::Off;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
@@ -137,9 +140,8 @@ fn trial(seed: u64) -> Option<Trial> {
             return None;
         }
     };
-    let d = truth.inverse() * report.base_from_part;
-    let turn = d.rotation_vector().z.to_degrees();
-    let error = [d.translation.x, d.translation.y, d.translation.z, turn];
+    let off = Off::of(&report.base_from_part, &truth);
+    let error = [off.by.x, off.by.y, off.by.z, off.turn_deg];
     let sigma = [report.sigma_mm[0], report.sigma_mm[1], report.sigma_mm[2], report.sigma_deg[2]];
     println!("{seed:3}: error {error:8.4?}, sigma {sigma:7.4?}, {said:.2?} {:?}", report.reasons);
     Some(Trial { error, sigma })

@@ -2,7 +2,8 @@
 //! made by the script there). Out: twins and GPU chain give the same: the mean window and thinning pixel for pixel, the
 //! Gaussian window but for 1 pixel in 100,000. Frame and unit: pixels.
 
-use sheetlight::gpu::Device;
+mod common;
+
 use sheetlight::raster::{Channel, Image, Mask, load};
 use sheetlight::stages::chain::{Chain, ChainConfig};
 use sheetlight::stages::{Thinning, ThresholdParams, Window, thin, threshold};
@@ -89,11 +90,7 @@ fn twins_give_the_masks_and_skeletons_of_opencv() {
 
 #[test]
 fn the_gpu_gives_the_masks_and_skeletons_of_opencv() {
-    let device = match Device::open() {
-        Ok(d) => d,
-        Err(e) if std::env::var_os("SHEETLIGHT_REQUIRE_GPU").is_some() => panic!("{e}"),
-        Err(e) => return eprintln!("SKIPPED, no GPU adapter: {e}"),
-    };
+    let Some(device) = common::device() else { return };
     let (mut gaussian, mut differing) = (0, 0);
     for p in list() {
         let image = picture(&p);

@@ -1,24 +1,13 @@
 //! In: every stage with its cases. Out: GPU and CPU twin agree, and the chain of twins agrees with the
 //! plain definition. Frame and unit: words, pixels.
 
-use sheetlight::gpu::Device;
-use sheetlight::stages::{self, cases, skeleton, thin, threshold};
+mod common;
 
-/// Without an adapter the tests pass and say so, unless SHEETLIGHT_REQUIRE_GPU is set.
-fn device() -> Option<Device> {
-    match Device::open() {
-        Ok(d) => Some(d),
-        Err(e) if std::env::var_os("SHEETLIGHT_REQUIRE_GPU").is_some() => panic!("{e}"),
-        Err(e) => {
-            eprintln!("SKIPPED, no GPU adapter: {e}");
-            None
-        }
-    }
-}
+use sheetlight::stages::{self, cases, skeleton, thin, threshold};
 
 #[test]
 fn every_stage_equals_its_twin() {
-    let Some(device) = device() else { return };
+    let Some(device) = common::device() else { return };
     let mut failed = Vec::new();
     for entry in stages::all() {
         let v = entry.verify(&device).unwrap();

@@ -58,8 +58,9 @@ def linemod(scene, template, mask, fill, step):
         t, m = (cv2.copyMakeBorder(i, 16, 16, 16, 16, cv2.BORDER_CONSTANT, value=f) for i, f in ((t, fill), (m, 0)))
         ident, _ = detector.addTemplate([cv2.cvtColor(t, cv2.COLOR_GRAY2BGR)], "part", m)
         added += int(ident >= 0)
-    # Its linear memories want sides that its strides (5, and 8 at half size) divide.
-    h, w = (-s % 80 for s in scene.shape)
+    # Its linear memories want sides that its strides (5, and 8 at half size) divide; rows of both sizes must be a multiple of
+    # 16 wide, or its aligned stores crash (opencv/opencv_contrib#4192).
+    h, w = -scene.shape[0] % 80, -scene.shape[1] % 160
     colour = cv2.cvtColor(cv2.copyMakeBorder(scene, 0, h, 0, w, cv2.BORDER_REPLICATE), cv2.COLOR_GRAY2BGR)
     ms, out = best(lambda: detector.match([colour], 75.0, ["part"]), 5)
     return ms, added, len(out[0]), max((m.similarity for m in out[0]), default=0.0)

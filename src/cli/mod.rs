@@ -10,6 +10,7 @@ mod doctor;
 mod find;
 mod guide;
 mod live;
+mod model;
 mod range;
 mod scan;
 mod shift_scan;
@@ -51,6 +52,7 @@ enum Command {
     Find(find::Args),
     Guide(guide::Args),
     Live(live::Args),
+    Model(model::Args),
     Range(range::Args),
     Scan(scan::Args),
     ShiftScan(shift_scan::Args),
@@ -73,6 +75,7 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Find(a) => find::run(a, console),
         Command::Guide(a) => guide::run(a, console),
         Command::Live(a) => live::run(a, console),
+        Command::Model(a) => model::run(a, console),
         Command::Range(a) => range::run(a, console),
         Command::Scan(a) => scan::run(a, console),
         Command::ShiftScan(a) => shift_scan::run(a, console),

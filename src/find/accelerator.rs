@@ -16,8 +16,24 @@ pub struct Accelerator {
     spread: Pipeline,
     score: Pipeline,
     peaks: Pipeline,
-    /// Additions from which a search is worth its submissions.
-    pub least_additions: u64,
+    /// What decides whether a search runs here; `None`: every search that fits.
+    pub rule: Option<Rule>,
+}
+
+/// What a search costs here and on the CPU, measured on this machine.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rule {
+    /// Submissions and readback of one search, s.
+    pub fixed_s: f64,
+    /// One addition of a feature's response to a place's sum, s.
+    pub here_s: f64,
+    pub cpu_s: f64,
+}
+
+impl Rule {
+    pub fn pays(&self, additions: u64) -> bool {
+        self.fixed_s + self.here_s * additions as f64 <= self.cpu_s * additions as f64
+    }
 }
 
 impl std::fmt::Debug for Accelerator {
@@ -30,18 +46,23 @@ impl std::fmt::Debug for Accelerator {
 const SUMS: usize = 64 << 20;
 /// Hits of one submission.
 const CAPACITY: u32 = 1 << 18;
-/// Estimated, not measured on a GPU: submissions and readback cost about a millisecond, in which two cores add 2e7 bytes.
-const LEAST_ADDITIONS: u64 = 50_000_000;
+/// Level and turns by which the rule is measured: 320 x 320 cells give 6400 places, 32 features a turn.
+const TRIAL: usize = 320;
+const TRIAL_FEATURES: usize = 32;
+const TRIAL_TURNS: [usize; 2] = [8, 72];
+const TRIAL_RUNS: usize = 3;
 
 impl Accelerator {
-    /// The best adapter if it is a GPU. A software adapter runs the sums on the very cores that the CPU's own
-    /// code would use, so it is not taken.
+    /// The best adapter if it is a GPU, with the rule of this machine. A software adapter runs the sums on the very cores
+    /// that the CPU's own code would use, eleven times slower (benches/runs, find.md), so it is not even measured.
     pub fn open() -> Option<Accelerator> {
         let device = Device::open().ok().filter(|d| d.info.kind != "CPU")?;
-        Accelerator::on(&device).ok()
+        let mut accelerator = Accelerator::on(&device).ok()?;
+        accelerator.rule = Some(accelerator.measured().ok()?);
+        Some(accelerator)
     }
 
-    /// Any adapter, for tests and benches.
+    /// Any adapter, for every search that fits: for tests and benches.
     pub fn on(device: &Device) -> Result<Accelerator> {
         Ok(Accelerator {
             device: device.clone(),
@@ -49,14 +70,42 @@ impl Accelerator {
             spread: SPREAD.pipeline(device, &[])?,
             score: SCORE.pipeline(device, &[])?,
             peaks: PEAKS.pipeline(device, &[])?,
-            least_additions: LEAST_ADDITIONS,
+            rule: None,
         })
     }
 
     pub(super) fn pays(&self, frame: &ShapeFrame, placed: &[Vec<Placed>]) -> bool {
         let features: usize = placed.iter().map(Vec::len).sum();
         let fits = frame.plane() * 4 <= SUMS && frame.columns < 1 << 16 && frame.rows < 1 << 16;
-        fits && features as u64 * u64::from(frame.columns * frame.rows) >= self.least_additions
+        fits && self.rule.is_none_or(|r| r.pays(features as u64 * u64::from(frame.columns * frame.rows)))
+    }
+
+    /// Times the same small searches here and on the CPU: the slope is an addition's cost, what is left is fixed.
+    pub fn measured(&self) -> Result<Rule> {
+        let level = Level::trial(TRIAL);
+        let placed = TRIAL_TURNS.map(|turns| Level::trial_turns(turns, TRIAL_FEATURES));
+        // No sum reaches this: what is timed is the additions, not the peaks of a pattern.
+        const LEAST: u8 = u8::MAX;
+        self.peaks(&level, &placed[0], LEAST)?;
+        let best = |work: &dyn Fn() -> Result<()>| -> Result<f64> {
+            let mut least = f64::MAX;
+            for _ in 0..TRIAL_RUNS {
+                let start = std::time::Instant::now();
+                work()?;
+                least = least.min(start.elapsed().as_secs_f64());
+            }
+            Ok(least)
+        };
+        let places = f64::from(level.frame.columns * level.frame.rows);
+        let additions = TRIAL_TURNS.map(|t| (t * TRIAL_FEATURES) as f64 * places);
+        let slope = |t: [f64; 2]| ((t[1] - t[0]) / (additions[1] - additions[0])).max(0.0);
+        let here = [
+            best(&|| self.peaks(&level, &placed[0], LEAST).map(drop))?,
+            best(&|| self.peaks(&level, &placed[1], LEAST).map(drop))?,
+        ];
+        let cpu = [0, 1].map(|k| best(&|| Ok(drop(level.peaks(&placed[k], LEAST)))).expect("it cannot fail"));
+        let here_s = slope(here);
+        Ok(Rule { fixed_s: (here[0] - here_s * additions[0]).max(0.0), here_s, cpu_s: slope(cpu) })
     }
 
     /// The peaks in the order of turn, row, column; `None` where there are more than the list holds.

@@ -104,6 +104,21 @@ impl Level {
         }
     }
 
+    /// A made-up level of `side` cells, by which the accelerator is timed.
+    pub(super) fn trial(side: usize) -> Level {
+        let slopes = (0..side * side).map(|i| pack((i % 7) as f32 - 3.0, (i / side % 5) as f32 - 2.0, 2.0)).collect();
+        Level { frame: ShapeFrame::new(side, side, 0), kinds: vec![Kind::Height], slopes: vec![slopes] }
+    }
+
+    /// As many features at as many turns, within the trial level's middle.
+    pub(super) fn trial_turns(turns: usize, features: usize) -> Vec<Vec<Placed>> {
+        let feature = |t: usize, f: usize| {
+            let (s, c) = (0.3 * f as f64 + 0.01 * t as f64).sin_cos();
+            Placed { layer: 0, want: (t + f) % BINS, dx: (40.0 * c) as i64, dy: (40.0 * s) as i64 }
+        };
+        (0..turns).map(|t| (0..features).map(|f| feature(t, f)).collect()).collect()
+    }
+
     /// Hits above the limit, best first, the same wherever the sums are computed.
     pub fn search(&self, query: &Query, accelerator: Option<&Accelerator>) -> Vec<Hit> {
         let features = thin(query.model, 1.5 * query.px, MAX_FEATURES);
@@ -157,21 +172,24 @@ impl Level {
         let (columns, plane) = (frame.columns as usize, (frame.columns * frame.rows) as usize);
         let bits: Vec<u16> = slopes.par_iter().map(|&s| direction(s)).collect();
         let bits = spread(&bits, w, h);
+        // The phases of the sets of directions first: each direction's responses are then made in one go.
+        let mut phases = vec![0u16; STRIDE * STRIDE * plane];
+        phases.par_chunks_mut(plane).enumerate().for_each(|(phase, of_phase)| {
+            // The first row and column of the picture in this phase, and where it lies in the plane.
+            let first = |phase: usize| (phase + STRIDE - margin % STRIDE) % STRIDE;
+            let (py, px) = (phase / STRIDE, phase % STRIDE);
+            for y in (first(py)..h).step_by(STRIDE) {
+                let from = bits[y * w..(y + 1) * w].iter().skip(first(px)).step_by(STRIDE);
+                let start = (y + margin) / STRIDE * columns + (first(px) + margin) / STRIDE;
+                for (out, &b) in of_phase[start..].iter_mut().zip(from) {
+                    *out = if frame.ignore != 0 { both_polarities(b) } else { b };
+                }
+            }
+        });
         let mut cells = vec![0u8; BINS * STRIDE * STRIDE * plane];
         cells.par_chunks_mut(STRIDE * STRIDE * plane).enumerate().for_each(|(want, of_direction)| {
-            let mut table = vec![0u8; 1 << 16];
-            for (b, t) in table.iter_mut().enumerate() {
-                let b = b as u16;
-                *t = response(if frame.ignore != 0 { both_polarities(b) } else { b }, want);
-            }
-            for y in 0..h {
-                let yy = y + margin;
-                for x in 0..w {
-                    let xx = x + margin;
-                    let phase = (yy % STRIDE) * STRIDE + xx % STRIDE;
-                    of_direction[phase * plane + (yy / STRIDE) * columns + xx / STRIDE] =
-                        table[bits[y * w + x] as usize];
-                }
+            for (out, &b) in of_direction.iter_mut().zip(&phases) {
+                *out = response(b, want);
             }
         });
         cells

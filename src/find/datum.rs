@@ -2,7 +2,7 @@
 //! (docs/math.md, Insertion (1)).
 //! Frame and unit: a correction in the part frame: z mm, turns about x and y rad.
 
-use super::drawing::Face;
+use super::drawn_edges::Face;
 use super::edge_index::EdgeIndex;
 use super::measure::MeasureOptions;
 use super::points::Ordered;

@@ -1,7 +1,8 @@
 //! In: a drawing. Out: its measurable edges in buckets, so that the one nearest to a place is found at once.
 //! Frame and unit: part frame, mm.
 
-use super::drawing::{Drawing, EdgeSample};
+use super::drawing::Drawing;
+use super::drawn_edges::EdgeSample;
 use std::collections::HashMap;
 
 /// Edge samples in buckets.

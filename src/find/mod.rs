@@ -4,18 +4,23 @@
 
 pub mod accelerator;
 pub mod budget;
+mod climb;
 pub mod coarse;
 pub mod construct;
 mod datum;
 pub mod drawing;
+pub mod drawn_edges;
+pub mod dxf;
 pub mod edge_index;
 mod edge_pieces;
+mod from_drawing;
 pub mod gradient;
 mod in_plane;
 pub mod insertion;
 mod lit_edges;
 pub mod measure;
 pub mod model;
+mod outline;
 pub mod picture;
 pub mod points;
 pub mod recipe;
@@ -31,6 +36,7 @@ pub mod verdict;
 
 pub use accelerator::Accelerator;
 pub use drawing::Drawing;
+pub use from_drawing::{TaskOptions, recipe_of};
 pub use insertion::{LocateOptions, Report, locate};
 pub use model::{ModelOptions, ShapeModel};
 pub use recipe::Recipe;

@@ -3,11 +3,12 @@
 //! Frame and unit: pixels of the scene, degrees in options, radians in poses.
 
 use super::accelerator::Accelerator;
+use super::climb::{Candidate, Directions, climb, score};
 use super::coarse::{Level, Query, Turn, turn_between};
 use super::gradient::{Field, slopes};
-use super::model::{ModelPoint, ShapeModel};
+use super::model::ShapeModel;
 use super::refine::{Pose, refine};
-use super::scene::{Kind, Scene, from_level, to_level};
+use super::scene::{Kind, Scene, from_level};
 use super::search_options::SearchOptions;
 use crate::fault::{Fault, Result};
 use crate::stages::shape_frame::STRIDE;
@@ -35,35 +36,6 @@ pub struct Match {
     pub rivals: Vec<(Pose, f64)>,
     /// What fits almost as well, in words.
     pub warning: Option<String>,
-}
-
-/// Directions of a level, unit length, 0 where weak or unseen.
-struct Directions {
-    kind: Kind,
-    field: Field,
-    threshold: f32,
-    unit: Vec<[f32; 2]>,
-}
-
-impl Directions {
-    fn new(kind: Kind, field: Field, threshold: f32) -> Directions {
-        let unit = field
-            .gx
-            .par_iter()
-            .zip(&field.gy)
-            .map(|(&gx, &gy)| {
-                let m = gx.hypot(gy);
-                if m > threshold && m > 0.0 { [gx / m, gy / m] } else { [0.0, 0.0] }
-            })
-            .collect();
-        Directions { kind, field, threshold, unit }
-    }
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Candidate {
-    pose: Pose,
-    score: f64,
 }
 
 /// Finds the model in the scene, best first. An empty list is an answer: nothing scored above the least.
@@ -105,8 +77,10 @@ pub fn find_on(
     let mut candidates = coarse_candidates(&levels[most], model, most, options, accelerator);
     for level in (0..=most).rev() {
         let keep = if level == 0 { options.candidates.min(4 * options.max_matches + 100) } else { options.candidates };
-        candidates =
-            climb_all(&levels[level], &model.levels[level], level, candidates, model.radius, options, level == most);
+        candidates = candidates
+                .into_par_iter()
+                .map(|c| climb(&levels[level], &model.levels[level], level, c, model.radius, options, level == most))
+                .collect();
         let limit = options.min_score - if level == 0 { 0.05 } else { 0.12 };
         candidates.retain(|c| c.score >= limit);
         candidates = distinct(candidates, (1 << level) as f64, model.radius, keep);
@@ -174,107 +148,6 @@ fn coarse_candidates(
                 scale: turns[h.pose].scale,
             },
             score: f64::from(h.score),
-        })
-        .collect()
-}
-
-/// Mean cosine between model and scene with the nearest cells of a level, and the share of places seen.
-/// A place on a missing cell counts half a miss: a shadow says nothing about an edge, but a pose that
-/// needs many shadows is the worse explanation. Outside the scene or without contrast is a whole miss.
-fn score(layers: &[Directions], points: &[ModelPoint], level: usize, pose: &Pose, ignore: bool) -> (f64, f64) {
-    let (s, c) = pose.angle.sin_cos();
-    let shrink = 1.0 / (1u64 << level) as f64;
-    let (cx, cy) = (to_level(pose.x, level) + 0.5, to_level(pose.y, level) + 0.5);
-    let k = pose.scale * shrink;
-    let (mut sum, mut seen, mut missing) = (0.0, 0, 0);
-    for p in points {
-        let x = cx + k * (c * p.x - s * p.y);
-        let y = cy + k * (s * p.x + c * p.y);
-        if x < 0.0 || y < 0.0 {
-            continue;
-        }
-        let (ix, iy) = (x as usize, y as usize);
-        for d in layers {
-            if d.kind != p.kind || ix >= d.field.width || iy >= d.field.height {
-                continue;
-            }
-            let i = iy * d.field.width + ix;
-            seen += usize::from(d.field.seen[i]);
-            missing += usize::from(!d.field.seen[i]);
-            let [ux, uy] = d.unit[i];
-            let dot = f64::from(ux) * (c * p.gx - s * p.gy) + f64::from(uy) * (s * p.gx + c * p.gy);
-            sum += if ignore || p.either { dot.abs() } else { dot };
-        }
-    }
-    let n = points.len() as f64;
-    (sum / (n - 0.5 * missing as f64), seen as f64 / n)
-}
-
-fn climb_all(
-    layers: &[Directions],
-    points: &[ModelPoint],
-    level: usize,
-    candidates: Vec<Candidate>,
-    radius: f64,
-    options: &SearchOptions,
-    first: bool,
-) -> Vec<Candidate> {
-    let px = (1u64 << level) as f64;
-    let scaling = options.scales[1] > options.scales[0];
-    let turn = 1.0 / (radius / px).max(4.0);
-    candidates
-        .into_par_iter()
-        .map(|c| {
-            let value = |p: &Pose| score(layers, points, level, p, options.ignore_polarity).0;
-            let mut best = Candidate { score: value(&c.pose), pose: c.pose };
-            if first {
-                // The coarse grid is STRIDE px wide and the turns as far apart: look around once.
-                for dy in -2..=2 {
-                    for dx in -2..=2 {
-                        for da in -1..=1 {
-                            let mut p = c.pose;
-                            p.x += f64::from(dx) * px;
-                            p.y += f64::from(dy) * px;
-                            p.angle += f64::from(da) * turn;
-                            let s = value(&p);
-                            if s > best.score {
-                                best = Candidate { pose: p, score: s };
-                            }
-                        }
-                    }
-                }
-            }
-            for _ in 0..12 {
-                let from = best;
-                for dy in -1..=1 {
-                    for dx in -1..=1 {
-                        for da in -1..=1 {
-                            let mut p = from.pose;
-                            p.x += f64::from(dx) * px;
-                            p.y += f64::from(dy) * px;
-                            p.angle += f64::from(da) * turn;
-                            let s = value(&p);
-                            if s > best.score {
-                                best = Candidate { pose: p, score: s };
-                            }
-                        }
-                    }
-                }
-                if scaling {
-                    for ds in [-1.0, 1.0] {
-                        let mut p = best.pose;
-                        p.scale = (p.scale * (1.0 + ds * turn)).clamp(options.scales[0], options.scales[1]);
-                        let s = value(&p);
-                        if s > best.score {
-                            best = Candidate { pose: p, score: s };
-                        }
-                    }
-                }
-                if best.score <= from.score {
-                    break;
-                }
-            }
-            best
         })
         .collect()
 }

@@ -2,7 +2,8 @@
 //! how much of the part was seen, and which of its alike turns it is.
 //! Frame and unit: part frame, mm.
 
-use super::drawing::{Drawing, Face};
+use super::drawing::Drawing;
+use super::drawn_edges::Face;
 use super::edge_index::EdgeIndex;
 use super::measure::{Measured, localise};
 use super::points::Ordered;

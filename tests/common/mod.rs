@@ -4,6 +4,7 @@
 
 pub mod hand_eye;
 pub mod judge;
+pub mod pose;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -17,6 +18,18 @@ pub fn reference(test: &str) -> Option<PathBuf> {
     };
     assert!(path.is_dir(), "SHEETLIGHT_REFERENCE is {}, which is no folder", path.display());
     Some(path)
+}
+
+/// An adapter. Without one the tests pass and say so, unless SHEETLIGHT_REQUIRE_GPU is set.
+pub fn device() -> Option<sheetlight::gpu::Device> {
+    match sheetlight::gpu::Device::open() {
+        Ok(d) => Some(d),
+        Err(e) if std::env::var_os("SHEETLIGHT_REQUIRE_GPU").is_some() => panic!("{e}"),
+        Err(e) => {
+            eprintln!("SKIPPED, no GPU adapter: {e}");
+            None
+        }
+    }
 }
 
 /// The rigs in the reference data: (inputs folder, truth folder). Kept-back rigs have the same shape.

@@ -1,0 +1,150 @@
+//! In: curves of a drawing. Out: closed loops, joined end to end, and what could not be joined.
+//! Frame and unit: the drawing's x y z, mm.
+
+use super::curves::{Curve, Form};
+use crate::find::outline::area;
+use std::collections::HashMap;
+
+/// A closed edge.
+#[derive(Clone, Debug)]
+pub struct Loop {
+    pub layer: String,
+    pub z: f64,
+    pub points: Vec<[f64; 2]>,
+    /// Centre and radius of a circle that was drawn as one.
+    pub circle: Option<([f64; 2], f64)>,
+}
+
+#[derive(Debug, Default)]
+pub struct Joined {
+    pub loops: Vec<Loop>,
+    /// Chains with two free ends.
+    pub open: Vec<Curve>,
+    /// Places at which more than two edges end: no chain runs through them.
+    pub forks: usize,
+    pub duplicates: usize,
+}
+
+/// Ends nearer than this are one place, mm.
+pub const JOIN: f64 = 0.01;
+
+/// Nodes of ends that lie together, found through the cells of a grid.
+#[derive(Default)]
+struct Nodes {
+    cells: HashMap<[i64; 3], Vec<usize>>,
+    places: Vec<[f64; 3]>,
+}
+
+impl Nodes {
+    fn at(&mut self, p: [f64; 2], z: f64) -> usize {
+        let q = [p[0], p[1], z];
+        let cell = q.map(|v| (v / JOIN).floor() as i64);
+        for k in 0..27 {
+            let near = [cell[0] + k % 3 - 1, cell[1] + k / 3 % 3 - 1, cell[2] + k / 9 - 1];
+            let known = self.cells.get(&near).into_iter().flatten().copied();
+            let found = known.into_iter().find(|&n| (0..3).all(|i| (self.places[n][i] - q[i]).abs() <= JOIN));
+            if let Some(n) = found {
+                return n;
+            }
+        }
+        self.places.push(q);
+        self.cells.entry(cell).or_default().push(self.places.len() - 1);
+        self.places.len() - 1
+    }
+}
+
+/// Joins the curves; an edge that is drawn twice counts once.
+pub fn join(curves: &[Curve]) -> Joined {
+    let mut out = Joined::default();
+    let mut nodes = Nodes::default();
+    let mut seen = std::collections::HashSet::new();
+    let mut pieces: Vec<([usize; 2], &Curve, &Vec<[f64; 2]>)> = Vec::new();
+    for c in curves {
+        match &c.form {
+            Form::Circle { centre, radius } => {
+                let key = [nodes.at(*centre, c.z), nodes.at([centre[0] + radius, centre[1]], c.z), usize::MAX];
+                if seen.insert(key) {
+                    let points = (0..100).map(|k| {
+                        let (s, co) = (f64::from(k) * std::f64::consts::TAU / 100.0).sin_cos();
+                        [centre[0] + radius * co, centre[1] + radius * s]
+                    });
+                    let circle = Some((*centre, *radius));
+                    out.loops.push(Loop { layer: c.layer.clone(), z: c.z, points: points.collect(), circle });
+                } else {
+                    out.duplicates += 1;
+                }
+            }
+            Form::Path { points, closed } => {
+                let (Some(&first), Some(&last)) = (points.first(), points.last()) else { continue };
+                let ends = [nodes.at(first, c.z), nodes.at(last, c.z)];
+                let half = points[points.len() / 2];
+                let half = if points.len() == 2 { [0, 1].map(|k| 0.5 * (first[k] + last[k])) } else { half };
+                let key = [ends[0].min(ends[1]), ends[0].max(ends[1]), nodes.at(half, c.z)];
+                if !seen.insert(key) {
+                    out.duplicates += 1;
+                } else if *closed || (ends[0] == ends[1] && points.len() > 2) {
+                    push(&mut out, c, points.clone());
+                } else if ends[0] != ends[1] {
+                    pieces.push((ends, c, points));
+                }
+            }
+        }
+    }
+    let mut at: HashMap<usize, Vec<usize>> = HashMap::new();
+    for (i, p) in pieces.iter().enumerate() {
+        p.0.iter().for_each(|&n| at.entry(n).or_default().push(i));
+    }
+    out.forks = at.values().filter(|list| list.len() > 2).count();
+    let through = |node: usize, from: usize| -> Option<usize> {
+        let list = &at[&node];
+        if list.len() == 2 { list.iter().copied().find(|&i| i != from) } else { None }
+    };
+    let mut used = vec![false; pieces.len()];
+    for start in 0..pieces.len() {
+        if used[start] {
+            continue;
+        }
+        // Back to a free end or a fork, or once around.
+        let (mut piece, mut end) = (start, 0);
+        while let Some(next) = through(pieces[piece].0[end], piece).filter(|&n| n != start) {
+            end = usize::from(pieces[next].0[0] == pieces[piece].0[end]);
+            piece = next;
+        }
+        let first = pieces[piece].0[end];
+        let mut points: Vec<[f64; 2]> = Vec::new();
+        let (mut here, mut current) = (first, Some(piece));
+        while let Some(i) = current {
+            used[i] = true;
+            let (ends, _, list) = pieces[i];
+            let forward = ends[0] == here;
+            let skip = usize::from(!points.is_empty());
+            if forward {
+                points.extend(list.iter().skip(skip));
+            } else {
+                points.extend(list.iter().rev().skip(skip));
+            }
+            here = ends[usize::from(forward)];
+            current = through(here, i).filter(|&n| !used[n]);
+        }
+        let c = pieces[piece].1;
+        if here == first && points.len() > 3 {
+            push(&mut out, c, points);
+        } else {
+            let form = Form::Path { points, closed: false };
+            out.open.push(Curve { layer: c.layer.clone(), z: c.z, form });
+        }
+    }
+    out
+}
+
+/// A closed loop without repeated points; one without area is none.
+fn push(out: &mut Joined, c: &Curve, mut points: Vec<[f64; 2]>) {
+    let apart = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) > 1e-6;
+    points.dedup_by(|a, b| !apart(a, b));
+    while points.len() > 1 && !apart(&points[0], &points[points.len() - 1]) {
+        points.pop();
+    }
+    if points.len() > 2 && area(&points).abs() > JOIN * JOIN {
+        out.loops.push(Loop { layer: c.layer.clone(), z: c.z, points, circle: None });
+    }
+}

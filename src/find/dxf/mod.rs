@@ -1,0 +1,137 @@
+//! In: an ASCII DXF file (LINE, ARC, CIRCLE, ELLIPSE, LWPOLYLINE, POLYLINE, INSERT). Out: a drawing of the part.
+//! Frame and unit: part frame, x and y as drawn, z towards the viewer; mm, from the unit that the file or the user states.
+
+mod curves;
+mod loops;
+mod shapes;
+mod tags;
+
+use super::drawing::{Drawing, Form, Inside};
+use super::outline::area;
+use crate::fault::{Fault, Result};
+use curves::{Curve, Form as Drawn};
+
+/// A unit of length of a drawing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unit {
+    pub name: &'static str,
+    pub mm: f64,
+    /// Its number in $INSUNITS.
+    code: i64,
+}
+
+const UNITS: &[Unit] = &[
+    Unit { name: "mm", mm: 1.0, code: 4 },
+    Unit { name: "inch", mm: 25.4, code: 1 },
+    Unit { name: "cm", mm: 10.0, code: 5 },
+    Unit { name: "m", mm: 1000.0, code: 6 },
+    Unit { name: "um", mm: 1e-3, code: 13 },
+    Unit { name: "mil", mm: 0.0254, code: 9 },
+    Unit { name: "foot", mm: 304.8, code: 2 },
+];
+
+impl std::str::FromStr for Unit {
+    type Err = String;
+    fn from_str(s: &str) -> std::result::Result<Unit, String> {
+        let names: Vec<&str> = UNITS.iter().map(|u| u.name).collect();
+        UNITS.iter().copied().find(|u| u.name == s).ok_or(format!("wanted one of {}", names.join(", ")))
+    }
+}
+
+/// What a person says about a drawing.
+#[derive(Clone, Debug, Default)]
+pub struct DxfOptions {
+    /// Needed where the file names no unit, refused where it names another.
+    pub unit: Option<Unit>,
+    /// Layers that hold the part's edges. Default all that are not switched off.
+    pub layers: Vec<String>,
+    /// The part frame's origin in the drawing, in the drawing's unit. Default the middle of the largest outline's box.
+    pub origin: Option<[f64; 2]>,
+}
+
+/// A drawing that was read.
+#[derive(Clone, Debug)]
+pub struct Imported {
+    pub drawing: Drawing,
+    pub unit: &'static str,
+    /// The part frame's origin in the drawing, in the drawing's unit.
+    pub origin: [f64; 2],
+    /// What was passed over, in words.
+    pub notes: Vec<String>,
+    /// What may be a mistake of the drawing, in words.
+    pub warnings: Vec<String>,
+}
+
+/// Reads a drawing.
+pub fn read(bytes: &[u8], options: &DxfOptions) -> Result<Imported> {
+    let file = tags::read(bytes)?;
+    let unit = unit(file.units, options.unit)?;
+    let read = curves::curves(&file, &options.layers)?;
+    let mut notes: Vec<String> = read.passed_over.iter().map(|(what, n)| format!("passed over: {n} {what}")).collect();
+    let scaled: Vec<Curve> = read.curves.iter().map(|c| moved(c, [0.0; 2], unit.mm)).collect();
+    let largest = loops::join(&scaled).loops.into_iter().max_by(|a, b| {
+        let size = |l: &loops::Loop| area(&l.points).abs();
+        size(a).total_cmp(&size(b))
+    });
+    let Some(largest) = largest else {
+        let chosen = if options.layers.is_empty() { String::new() } else { " on the chosen layers".into() };
+        return Err(Fault::input(format!("has no closed outline{chosen}, {} edges were read", read.curves.len()))
+            .cause("edges that do not meet within 0.01 mm, the wrong layers, or the wrong unit")
+            .next("join the outline's edges in the drawing, or name its layer with --layer"));
+    };
+    let origin = options.origin.unwrap_or_else(|| {
+        [0, 1].map(|k| {
+            let (low, high) = largest.points.iter().fold((f64::MAX, f64::MIN), |m, p| (m.0.min(p[k]), m.1.max(p[k])));
+            0.5 * (low + high) / unit.mm
+        })
+    });
+    let placed: Vec<Curve> = read.curves.iter().map(|c| moved(c, origin, unit.mm)).collect();
+    let joined = loops::join(&placed);
+    if joined.duplicates > 0 {
+        notes.push(format!("{} edges are drawn twice and count once", joined.duplicates));
+    }
+    let mut warnings = Vec::new();
+    if joined.forks > 0 {
+        warnings.push(format!("at {} places more than two edges meet: the edges there close no outline", joined.forks));
+    }
+    let shape = shapes::shapes(joined.loops, &joined.open);
+    let lines = shape.iter().filter(|s| s.kind == Form::Line && s.inside == Inside::Either).count();
+    if lines > 0 {
+        warnings.push(format!("{lines} lines close no outline: they are searched, not measured"));
+    }
+    let drawing = Drawing { shape };
+    drawing.check()?;
+    Ok(Imported { drawing, unit: unit.name, origin, notes, warnings })
+}
+
+fn unit(said: Option<i64>, wanted: Option<Unit>) -> Result<Unit> {
+    let named = said.filter(|&code| code != 0);
+    let names: Vec<&str> = UNITS.iter().map(|u| u.name).collect();
+    let known = named.map(|code| {
+        UNITS.iter().copied().find(|u| u.code == code).ok_or_else(|| {
+            Fault::input(format!("its unit is $INSUNITS {code}, which is none of {}", names.join(", ")))
+                .cause("a drawing of something other than a part")
+                .next("scale the drawing to millimetres")
+        })
+    });
+    match (known.transpose()?, wanted) {
+        (Some(file), Some(person)) if file != person => {
+            Err(Fault::usage(format!("the file says {}, --unit says {}", file.name, person.name))
+                .cause("one of them is wrong")
+                .next("leave --unit out, or correct $INSUNITS in the drawing"))
+        }
+        (Some(unit), _) | (None, Some(unit)) => Ok(unit),
+        (None, None) => Err(Fault::input("names no unit ($INSUNITS is missing or 0)")
+            .cause("many programs do not write it, and no unit is guessed")
+            .next(format!("state it with --unit, one of {}", names.join(", ")))),
+    }
+}
+
+fn moved(c: &Curve, origin: [f64; 2], mm: f64) -> Curve {
+    let at = |p: &[f64; 2]| [(p[0] - origin[0]) * mm, (p[1] - origin[1]) * mm];
+    let form = match &c.form {
+        Drawn::Circle { centre, radius } => Drawn::Circle { centre: at(centre), radius: radius * mm },
+        Drawn::Path { points, closed } => Drawn::Path { points: points.iter().map(at).collect(), closed: *closed },
+    };
+    Curve { layer: c.layer.clone(), z: c.z * mm, form }
+}

@@ -1,0 +1,205 @@
+//! In: the bytes of a DXF file (ASCII). Out: its unit, layers that are off, blocks and entities, each as its group codes.
+//! Frame and unit: none; values are text as they stand in the file, lines are counted from 1.
+
+use crate::fault::{Fault, Result};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// More is no drawing of a part, bytes.
+const LARGEST: usize = 64 << 20;
+
+/// One group: a code and its value.
+#[derive(Clone, Debug)]
+pub struct Tag {
+    pub code: i32,
+    pub value: String,
+    pub line: usize,
+}
+
+/// An entity: what it is and its groups up to the next one.
+#[derive(Clone, Debug)]
+pub struct Entity {
+    pub kind: String,
+    pub line: usize,
+    pub tags: Vec<Tag>,
+}
+
+/// What of a file is used.
+#[derive(Clone, Debug, Default)]
+pub struct File {
+    /// $INSUNITS; `None` where it is missing.
+    pub units: Option<i64>,
+    /// Layers that are switched off or frozen.
+    pub hidden: BTreeSet<String>,
+    pub blocks: BTreeMap<String, Block>,
+    pub entities: Vec<Entity>,
+}
+
+/// Entities that INSERT refers to, about their base point.
+#[derive(Clone, Debug)]
+pub struct Block {
+    pub head: Entity,
+    pub entities: Vec<Entity>,
+}
+
+impl Entity {
+    pub fn fault(&self, what: impl std::fmt::Display) -> Fault {
+        Fault::input(format!("{} at line {}: {what}", self.kind, self.line))
+            .cause("a damaged file, or a slip in the drawing")
+            .next("correct it in the drawing and export it again")
+    }
+
+    pub fn text(&self, code: i32) -> Option<&str> {
+        self.tags.iter().find(|t| t.code == code).map(|t| t.value.as_str())
+    }
+
+    /// The number of a group, or what stands for a missing one.
+    pub fn number(&self, code: i32, missing: f64) -> Result<f64> {
+        self.tags.iter().find(|t| t.code == code).map_or(Ok(missing), Tag::number)
+    }
+
+    pub fn needed(&self, code: i32) -> Result<f64> {
+        let found = self.tags.iter().find(|t| t.code == code);
+        found.ok_or_else(|| damaged(self.fault(format!("it has no group {code}"))))?.number()
+    }
+
+    pub fn whole(&self, code: i32, missing: i64) -> Result<i64> {
+        self.tags.iter().find(|t| t.code == code).map_or(Ok(missing), Tag::whole)
+    }
+
+    pub fn layer(&self) -> &str {
+        self.text(8).unwrap_or("0")
+    }
+}
+
+impl Tag {
+    /// A length or an angle: finite, and below what a drawing can hold.
+    pub fn number(&self) -> Result<f64> {
+        let value = self.value.trim().parse::<f64>().ok().filter(|v| v.is_finite() && v.abs() < 1e12);
+        value
+            .ok_or_else(|| damaged(Fault::input(format!("line {}: '{}' is no usable number", self.line, self.short()))))
+    }
+
+    pub fn whole(&self) -> Result<i64> {
+        let value = self.value.trim().parse();
+        value.map_err(|_| damaged(Fault::input(format!("line {}: '{}' is no whole number", self.line, self.short()))))
+    }
+
+    fn short(&self) -> String {
+        self.value.chars().take(40).collect()
+    }
+}
+
+fn damaged(fault: Fault) -> Fault {
+    fault.cause("a damaged file").next("export the drawing again as ASCII DXF")
+}
+
+/// Reads a file's groups; what is not needed is passed over unread.
+pub fn read(bytes: &[u8]) -> Result<File> {
+    const NEXT: &str = "save the drawing as ASCII DXF";
+    if bytes.len() > LARGEST {
+        return Err(Fault::input(format!("is {} MiB large, at most {} are read", bytes.len() >> 20, LARGEST >> 20))
+            .cause("a whole assembly instead of one part")
+            .next("export the part alone"));
+    }
+    if bytes.starts_with(b"AutoCAD Binary DXF") {
+        return Err(Fault::input("is a binary DXF, which is not read").next(NEXT));
+    }
+    if bytes.starts_with(b"AC10") {
+        return Err(Fault::input("is a DWG, which is not read").next(NEXT));
+    }
+    let tags = tags(&String::from_utf8_lossy(bytes))?;
+    let mut file = File::default();
+    let mut at = 0;
+    while let Some(tag) = tags.get(at) {
+        at += 1;
+        match (tag.code, tag.value.trim()) {
+            (0, "EOF") => return Ok(file),
+            (0, "SECTION") => {
+                let end = (at..tags.len()).find(|&i| tags[i].code == 0 && tags[i].value.trim() == "ENDSEC");
+                let end = end.ok_or_else(|| cut(&tags))?;
+                section(&tags[at..end], &mut file)?;
+                at = end + 1;
+            }
+            // Comments and what some programs write between sections.
+            _ => {}
+        }
+    }
+    Err(cut(&tags))
+}
+
+fn cut(tags: &[Tag]) -> Fault {
+    let line = tags.last().map_or(0, |t| t.line);
+    Fault::input(format!("ends at line {line} without ENDSEC and EOF"))
+        .cause("the file was cut off, or is no DXF")
+        .next("export the drawing again as ASCII DXF")
+}
+
+fn tags(text: &str) -> Result<Vec<Tag>> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let mut out = Vec::new();
+    let mut lines = text.lines().enumerate();
+    while let Some((i, code)) = lines.next() {
+        // Some programs end a file with empty lines.
+        if code.trim().is_empty() && out.last().is_some_and(|t: &Tag| t.code == 0 && t.value.trim() == "EOF") {
+            break;
+        }
+        let Ok(number) = code.trim().parse() else {
+            let short: String = code.chars().take(40).collect();
+            return Err(Fault::input(format!("line {}: '{short}' is no group code", i + 1))
+                .cause("the file is no DXF, or is damaged")
+                .next("export the drawing again as ASCII DXF"));
+        };
+        let Some((_, value)) = lines.next() else { break };
+        out.push(Tag { code: number, value: value.to_owned(), line: i + 2 });
+    }
+    Ok(out)
+}
+
+fn section(tags: &[Tag], file: &mut File) -> Result<()> {
+    let Some(name) = tags.first().filter(|t| t.code == 2) else { return Ok(()) };
+    match name.value.trim() {
+        "HEADER" => {
+            let at = tags.iter().position(|t| t.code == 9 && t.value.trim() == "$INSUNITS");
+            file.units = at.and_then(|i| tags.get(i + 1)).filter(|t| t.code == 70).map(Tag::whole).transpose()?;
+        }
+        "TABLES" => {
+            for layer in entities(&tags[1..]).iter().filter(|e| e.kind == "LAYER") {
+                // Bit 1: frozen; a negative colour: off.
+                if layer.whole(70, 0)? & 1 != 0 || layer.whole(62, 7)? < 0 {
+                    file.hidden.extend(layer.text(2).map(str::to_owned));
+                }
+            }
+        }
+        "BLOCKS" => {
+            let mut open: Option<Block> = None;
+            for e in entities(&tags[1..]) {
+                match (e.kind.as_str(), &mut open) {
+                    ("BLOCK", _) => open = Some(Block { head: e, entities: vec![] }),
+                    ("ENDBLK", _) => {
+                        if let Some(block) = open.take() {
+                            let name = block.head.text(2).unwrap_or_default().to_owned();
+                            file.blocks.insert(name, block);
+                        }
+                    }
+                    (_, Some(block)) => block.entities.push(e),
+                    _ => {}
+                }
+            }
+        }
+        "ENTITIES" => file.entities.extend(entities(&tags[1..])),
+        _ => {}
+    }
+    Ok(())
+}
+
+fn entities(tags: &[Tag]) -> Vec<Entity> {
+    let mut out: Vec<Entity> = Vec::new();
+    for t in tags {
+        if t.code == 0 {
+            out.push(Entity { kind: t.value.trim().to_owned(), line: t.line, tags: vec![] });
+        } else if let Some(e) = out.last_mut() {
+            e.tags.push(t.clone());
+        }
+    }
+    out
+}

@@ -1,0 +1,283 @@
+//! In: DXF drawings written here, good ones and broken ones. Out: judgement on what is read of them: the edges of the shipped
+//! recipes, units, blocks, and a refusal with its reason for everything else.
+//! Frame and unit: part frame, mm.
+
+mod common;
+
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64;
+use sheetlight::fault::Fault;
+use sheetlight::find::drawing::{Form, Inside};
+use sheetlight::find::dxf::{DxfOptions, Imported, read};
+use sheetlight::find::{Drawing, Recipe};
+use std::fmt::Write;
+
+/// Groups of an entity, one a line as the file has them.
+fn tags(pairs: &[(i32, String)]) -> String {
+    pairs.iter().fold(String::new(), |mut s, (code, value)| {
+        write!(s, "{code}\n{value}\n").unwrap();
+        s
+    })
+}
+
+macro_rules! entity {
+    ($kind:expr, $($code:literal: $value:expr),* $(,)?) => {
+        tags(&[(0, $kind.to_string()), $(($code, $value.to_string())),*])
+    };
+}
+
+fn file(units: &str, blocks: &str, entities: &str) -> String {
+    format!(
+        "0\nSECTION\n2\nHEADER\n9\n$ACADVER\n1\nAC1027\n{units}0\nENDSEC\n0\nSECTION\n2\nTABLES\n0\nTABLE\n2\nLAYER\n\
+         0\nLAYER\n2\noff\n70\n0\n62\n-7\n0\nENDTAB\n0\nENDSEC\n0\nSECTION\n2\nBLOCKS\n{blocks}0\nENDSEC\n\
+         0\nSECTION\n2\nENTITIES\n{entities}0\nENDSEC\n0\nEOF\n"
+    )
+}
+
+const MM: &str = "9\n$INSUNITS\n70\n4\n";
+const INCH: &str = "9\n$INSUNITS\n70\n1\n";
+
+fn line(a: [f64; 2], b: [f64; 2]) -> String {
+    entity!("LINE", 8: "0", 10: a[0], 20: a[1], 11: b[0], 21: b[1])
+}
+
+fn circle(layer: &str, x: f64, y: f64, r: f64) -> String {
+    entity!("CIRCLE", 8: layer, 10: x, 20: y, 40: r)
+}
+
+fn imported(text: &str) -> Imported {
+    read(text.as_bytes(), &DxfOptions { origin: Some([0.0; 2]), ..Default::default() })
+        .unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn refused(text: &str, options: &DxfOptions) -> Fault {
+    let e = read(text.as_bytes(), options).expect_err("a refusal");
+    assert!(!e.next.is_empty(), "no next step: {e}");
+    e
+}
+
+/// Every edge of one drawing lies on an edge of the other, with the same side up, and the other way round.
+fn same_edges(a: &Drawing, b: &Drawing, within: f64) {
+    for (a, b) in [(a, b), (b, a)] {
+        let other = b.samples(0.02);
+        for s in a.samples(0.1) {
+            let near = |o: &&sheetlight::find::drawn_edges::EdgeSample| {
+                (o.x - s.x).hypot(o.y - s.y) < within + 0.011 && o.nx * s.nx + o.ny * s.ny > 0.95
+            };
+            assert!(other.iter().any(|o| near(&o) && o.z == s.z), "no edge at {:.3} {:.3}", s.x, s.y);
+        }
+    }
+}
+
+/// The oscillator socket as a person draws it: its outline of lines in any order and direction, a window as a light
+/// polyline, a block of two contacts inserted as an array.
+fn oscillator() -> String {
+    let corners = [[-10.2, 6.4], [-10.2, -4.41], [-8.21, -6.4], [10.2, -6.4], [10.2, 6.4]];
+    let side = |i: usize, back: bool| {
+        let (a, b) = (corners[i], corners[(i + 1) % 5]);
+        if back { line(b, a) } else { line(a, b) }
+    };
+    let outline: String = [(3, false), (0, true), (2, true), (4, false), (1, true)].map(|(i, b)| side(i, b)).concat();
+    let window = entity!("LWPOLYLINE", 8: "window", 90: 4, 70: 1, 10: -5.2, 20: -2.2, 10: 5.2, 20: -2.2, 10: 5.2, 20: 2.2,
+        10: -5.2, 20: 2.2);
+    let block = entity!("BLOCK", 8: "0", 2: "PINS", 70: 0, 10: 100.0, 20: 50.0, 30: 0.0)
+        + &circle("pin", 100.0, 50.0, 0.72)
+        + &entity!("ENDBLK", 8: "0");
+    let pins = entity!("INSERT", 8: "0", 2: "PINS", 10: -7.62, 20: -3.81, 70: 2, 71: 2, 44: 15.24, 45: 7.62);
+    let text = entity!("MTEXT", 8: "0", 10: 0.0, 20: 9.0, 40: 1.0, 1: "socket");
+    let construction = circle("off", 0.0, 0.0, 50.0);
+    file(MM, &block, &(outline + &window + &pins + &text + &construction))
+}
+
+#[test]
+fn a_drawn_socket_has_the_edges_of_the_shipped_recipe() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("data/recipes/osc.toml");
+    let recipe = Recipe::load(&path).unwrap().drawing();
+    let drawn = imported(&oscillator());
+    println!("{:?} {:?}", drawn.notes, drawn.warnings);
+    same_edges(&drawn.drawing, &recipe, 1e-3);
+    // The contacts are one array with its pitch, named by their layer, the window a rectangle.
+    let pins = drawn.drawing.shape.iter().find(|s| s.name.as_deref() == Some("pin")).expect("named by its layer");
+    let grid = pins.grid.expect("an array");
+    assert_eq!((grid.count, grid.pitch, pins.inside), ([2, 2], [15.24, 7.62], Inside::Low));
+    assert!(drawn.drawing.shape.iter().any(|s| s.kind == Form::Rectangle && s.size == Some([10.4, 4.4])));
+    assert_eq!(drawn.drawing.shape[0].inside, Inside::High);
+    assert!(drawn.warnings.is_empty() && drawn.notes.iter().any(|n| n.contains("MTEXT")), "{:?}", drawn.notes);
+    // In inches, and about its own middle, it is the same part.
+    let inch = file(INCH, "", &(circle("0", 4.0, 2.0, 1.0) + &circle("0", 4.0, 2.0, 0.5)));
+    let ring = read(inch.as_bytes(), &DxfOptions::default()).unwrap();
+    assert_eq!((ring.unit, ring.origin), ("inch", [4.0, 2.0]));
+    let radii: Vec<f64> = ring.drawing.shape.iter().map(|s| s.radius.unwrap()).collect();
+    assert_eq!((radii, ring.drawing.shape[1].inside), (vec![25.4, 12.7], Inside::Low));
+}
+
+#[test]
+fn bulges_arcs_ellipses_and_both_polylines_draw_the_same_slot() {
+    // 20 x 8 mm with round ends.
+    let arcs = line([-6.0, -4.0], [6.0, -4.0])
+        + &line([-6.0, 4.0], [6.0, 4.0])
+        + &entity!("ARC", 8: "0", 10: 6, 20: 0, 40: 4, 50: 270, 51: 90)
+        + &entity!("ARC", 8: "0", 10: -6, 20: 0, 40: 4, 50: 90, 51: 270);
+    let light = entity!("LWPOLYLINE", 8: "0", 90: 4, 70: 1, 10: -6, 20: -4, 10: 6, 20: -4, 42: 1, 10: 6, 20: 4,
+        10: -6, 20: 4, 42: 1);
+    let vertex = |x: i32, y: i32, bulge: i32| entity!("VERTEX", 8: "0", 10: x, 20: y, 42: bulge);
+    let old = entity!("POLYLINE", 8: "0", 66: 1, 70: 1)
+        + &[(-6, -4, 0), (6, -4, 1), (6, 4, 0), (-6, 4, 1)].map(|(x, y, b)| vertex(x, y, b)).concat()
+        + &entity!("SEQEND", 8: "0");
+    let bows = line([-6.0, -4.0], [6.0, -4.0])
+        + &line([-6.0, 4.0], [6.0, 4.0])
+        + &entity!("ELLIPSE", 8: "0", 10: 6, 20: 0, 11: 4, 21: 0, 40: 1, 41: -std::f64::consts::FRAC_PI_2, 42: std::f64::consts::FRAC_PI_2)
+        // Seen from below: the x axis of an arc's plane points the other way.
+        + &entity!("ARC", 8: "0", 10: 6, 20: 0, 40: 4, 50: 270, 51: 90, 230: -1);
+    let wanted = imported(&file(MM, "", &arcs)).drawing;
+    let p = wanted.shape[0].points.as_ref().unwrap();
+    let turn = |i: usize| 0.5 * (p[i][0] * p[(i + 1) % p.len()][1] - p[(i + 1) % p.len()][0] * p[i][1]);
+    let area = (0..p.len()).map(turn).sum::<f64>().abs();
+    assert!((area - (96.0 + 16.0 * std::f64::consts::PI)).abs() < 0.1, "{area}");
+    for other in [light, old, bows] {
+        same_edges(&imported(&file(MM, "", &other)).drawing, &wanted, 5e-3);
+    }
+}
+
+#[test]
+fn islands_forks_and_doubled_edges_are_told_apart() {
+    let square = |h: f64| {
+        let c = [[-h, -h], [h, -h], [h, h], [-h, h]];
+        (0..4).map(|i| line(c[i], c[(i + 1) % 4])).collect::<String>()
+    };
+    // A frame with a post in its window, and a hole in the post.
+    let text = file(MM, "", &(square(10.0) + &square(6.0) + &square(3.0) + &circle("0", 0.0, 0.0, 1.0)));
+    let d = imported(&text).drawing;
+    let face = &d.faces()[0];
+    let solid = [(8.0, 0.0, true), (4.5, 0.0, false), (2.0, 0.0, true), (0.5, 0.0, false), (11.0, 0.0, false)];
+    for (x, y, there) in solid {
+        assert_eq!(face.material(x, y), there, "{x} {y}");
+    }
+    let length = d.samples(0.02).len() as f64 * 0.02;
+    assert!((length - (80.0 + 48.0 + 24.0 + 6.28)).abs() < 0.3, "{length}");
+    let doubled = imported(&file(MM, "", &(square(10.0) + &square(10.0))));
+    assert!(doubled.notes.iter().any(|n| n.starts_with("4 edges")) && doubled.drawing.shape.len() == 1);
+    let fork =
+        imported(&file(MM, "", &(square(10.0) + &circle("0", 30.0, 0.0, 2.0) + &line([-10.0, -10.0], [10.0, 10.0]))));
+    assert!(fork.warnings.iter().any(|w| w.starts_with("at 2 places")), "{:?}", fork.warnings);
+    assert!(fork.drawing.shape.iter().all(|s| s.kind != Form::Rectangle));
+}
+
+#[test]
+fn what_cannot_be_read_is_refused_with_its_reason() {
+    let ring = circle("0", 0.0, 0.0, 5.0);
+    let none = DxfOptions::default();
+    let unit = |u: &str| DxfOptions { unit: Some(u.parse().unwrap()), ..Default::default() };
+    for text in [file("", "", &ring), file("9\n$INSUNITS\n70\n0\n", "", &ring)] {
+        assert!(refused(&text, &none).what.contains("no unit"));
+        assert_eq!(read(text.as_bytes(), &unit("cm")).unwrap().drawing.shape[0].radius, Some(50.0));
+    }
+    let e = refused(&file(MM, "", &ring), &unit("inch"));
+    assert!(e.what.contains("mm") && e.what.contains("inch") && e.exit_code() == 2, "{e}");
+    assert!(refused(&file("9\n$INSUNITS\n70\n12\n", "", &ring), &none).what.contains("12"));
+    let insert = |name: &str| entity!("INSERT", 8: "0", 2: name, 10: 0, 20: 0);
+    let selfish = entity!("BLOCK", 8: "0", 2: "A", 10: 0, 20: 0) + &insert("A") + &entity!("ENDBLK", 8: "0");
+    let spline = entity!("SPLINE", 8: "free", 70: 8);
+    let cases = [
+        (file(MM, &selfish, &insert("A")), "in itself"),
+        (file(MM, "", &insert("B")), "no block"),
+        (file(MM, "", &(ring.clone() + &spline)), "SPLINE"),
+        (file(MM, "", &line([0.0, 0.0], [5.0, 0.0])), "no closed outline"),
+        (file(MM, "", &entity!("CIRCLE", 8: "0", 10: 0, 20: 0, 40: -1)), "above 0"),
+        (file(MM, "", &entity!("CIRCLE", 8: "0", 10: 0, 20: 0, 40: 5, 210: 0.6, 230: 0.8)), "normal"),
+        (file(MM, "", &entity!("LINE", 8: "0", 10: 0, 20: 0, 30: 0, 11: 1, 21: 0, 31: 7)), "rises"),
+        (file(MM, "", &entity!("CIRCLE", 8: "0", 10: "nan", 20: 0, 40: 5)), "no usable number"),
+        (file(MM, "", &entity!("INSERT", 8: "0", 2: "A", 10: 0, 20: 0, 70: 30000, 71: 30000)), "no block"),
+        (file(MM, "", &entity!("LWPOLYLINE", 8: "0", 90: 9, 70: 1, 10: 0, 20: 0)), "9 are announced"),
+        (file(MM, "", &ring).replace("0\nEOF\n", ""), "cut off"),
+        (file(MM, "", &ring)[..200].to_owned(), "cut off"),
+        ("solid part\nfacet normal 0 0 1\n".into(), "group code"),
+        ("AutoCAD Binary DXF\r\n\u{1a}\0".into(), "binary"),
+        ("AC1032\0\0".into(), "DWG"),
+        (String::new(), "EOF"),
+    ];
+    for (text, word) in cases {
+        let e = refused(&text, &none);
+        assert!(format!("{e}").contains(word), "wanted {word}: {e}");
+    }
+    // The free-form curve on a layer that is not asked for does no harm.
+    let only = DxfOptions { layers: vec!["0".into()], ..Default::default() };
+    assert!(read(file(MM, "", &(ring + &spline)).as_bytes(), &only).is_ok());
+}
+
+#[test]
+fn no_broken_file_makes_the_reader_panic_or_hang() {
+    let seeds = [oscillator(), file(MM, "", &(line([0.0, 0.0], [1e9, 1e9]) + &circle("0", 0.0, 0.0, 1.0)))];
+    let mut rng = Pcg64::seed_from_u64(77);
+    let words = [
+        "0",
+        "-1",
+        "1e999",
+        "nan",
+        "9223372036854775807",
+        "",
+        "EOF",
+        "ENDSEC",
+        "\u{e9}",
+        "1e11",
+        "INSERT",
+        "PINS",
+        "70",
+        "3",
+    ];
+    let (mut good, mut bad) = (0, 0);
+    for _ in 0..4000 {
+        let mut lines: Vec<String> = seeds[rng.random_range(0..2)].lines().map(str::to_owned).collect();
+        for _ in 0..rng.random_range(1..4) {
+            let (k, j) = (rng.random_range(0..lines.len()), rng.random_range(0..lines.len()));
+            match rng.random_range(0..5) {
+                0 => drop(lines.remove(k)),
+                1 => lines[k] = words[rng.random_range(0..words.len())].to_owned(),
+                2 => lines.swap(k, j),
+                3 => lines.insert(k, lines[j].clone()),
+                _ => lines[k & !1] = rng.random_range(0..100).to_string(),
+            }
+        }
+        match read(lines.join("\n").as_bytes(), &DxfOptions::default()) {
+            Ok(r) => {
+                good += 1;
+                r.drawing.check().unwrap();
+            }
+            Err(e) => {
+                bad += 1;
+                assert!(!e.what.is_empty());
+            }
+        }
+    }
+    println!("{good} read, {bad} refused");
+    // Most wounds shift codes against values; enough files must get past that to reach the geometry.
+    assert!(good > 100 && bad > 400, "{good} {bad}");
+}
+
+#[test]
+fn the_program_writes_a_recipe_that_find_accepts() {
+    let work = tempfile::tempdir().unwrap();
+    let path = |name: &str| work.path().join(name).to_str().unwrap().to_owned();
+    std::fs::write(path("osc.dxf"), oscillator()).unwrap();
+    let said = common::sheetlight(&[
+        "model",
+        &path("osc.dxf"),
+        "--name",
+        "osc",
+        "--alike-turns",
+        "2",
+        "--out",
+        &path("osc.toml"),
+    ]);
+    let recipe = Recipe::load(&work.path().join("osc.toml")).unwrap();
+    assert!(said.contains("name = \"osc\"") && recipe.alike_turns == 2);
+    assert!(recipe.construction.iter().any(|c| c.name == "all pin"), "the contacts' lattice");
+    let plain = oscillator().replace("70\n4\n", "70\n0\n");
+    std::fs::write(path("plain.dxf"), plain).unwrap();
+    let (code, talk) =
+        common::sheetlight_fails(&["model", &path("plain.dxf"), "--name", "osc", "--out", &path("x.toml")]);
+    assert!(code == 1 && talk.contains("--unit") && talk.contains("plain.dxf"), "{talk}");
+    assert!(!work.path().join("x.toml").exists());
+    let wrong = ["model", &path("plain.dxf"), "--name", "osc", "--unit", "parsec", "--out", &path("x.toml")];
+    assert_eq!(common::sheetlight_fails(&wrong).0, 2);
+}
