@@ -1,11 +1,11 @@
 // In: lit pixels per row of tiles. Out: how many lie before each row in the batch, and the header: the
 // arguments of a dispatch over all points, totals, and where each shot's points begin.
-// header: 0..2 workgroups of 64 points, 3 points kept, 4 points found, 5 listed tiles, 6 tiles still
-// changing, 7 shots, 8.. first point of every shot and the end.
+// header: 0..2 workgroups of 64 points, 3 points kept, 4 points found, 5 listed tiles, 6 how many of the shortened
+// lists still held a tile, 7 shots, 8.. first point of every shot and the end.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> rows: array<u32>;
 @group(0) @binding(2) var<storage, read> listing: array<u32>;
-@group(0) @binding(3) var<storage, read> active_listing: array<u32>;
+@group(0) @binding(3) var<storage, read> shortened: array<u32>;
 @group(0) @binding(4) var<storage, read_write> row_starts: array<u32>;
 @group(0) @binding(5) var<storage, read_write> header: array<u32>;
 
@@ -32,7 +32,10 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             header[3] = kept;
             header[4] = sum;
             header[5] = listing[3];
-            header[6] = active_listing[3];
+            header[6] = 0u;
+            for (var list = 0u; 64u * list < arrayLength(&shortened); list++) {
+                header[6] += select(0u, 1u, shortened[64u * list + 3u] > 0u);
+            }
             header[7] = frame.shots;
             header[9u + shot] = kept;
         }

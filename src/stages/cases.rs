@@ -256,7 +256,7 @@ impl<'a> Walk<'a> {
             ("bands", vec![0; 4 * tiles]),
             ("roi", (0..per_shot).map(|i| if i % 5 < 3 { 0x00ff_fff0 } else { 0 }).collect()),
             ("first", vec![7; 4]),
-            ("all_active", vec![7; 8 * header]),
+            ("all_active", [7, 7, 0, 0, 0, 0, 0, 0].iter().flat_map(|&n| vec![n; header]).collect()),
             ("listing", vec![0, 1, 1, 0]),
             ("list", vec![0; tiles]),
             ("lit_listing", vec![0, 1, 1, 0]),
@@ -354,7 +354,7 @@ impl<'a> Walk<'a> {
         self.step(&skeleton::COUNT, skeleton::count_twin, &["lit_listing", "lit_list", "mask", "counts"], all);
         let groups = skeleton::rows_groups(&f);
         self.step(&skeleton::SCAN_ROWS, skeleton::scan_rows_twin, &["counts", "starts", "rows"], groups);
-        let names = ["rows", "listing", "active", "row_starts", "header"];
+        let names = ["rows", "listing", "all_active", "row_starts", "header"];
         self.step(&skeleton::SCAN_SHOTS, skeleton::scan_shots_twin, &names, skeleton::shots_groups(&f));
         let names = ["lit_listing", "lit_list", "mask", "starts", "row_starts", "points"];
         self.step(&skeleton::STAGE, skeleton::stage_twin, &names, all);

@@ -70,12 +70,13 @@ pub struct Chain {
     device: Device,
     ring: Ring,
     replay: Replay,
-    /// What is done once a batch, its first run, and further rounds of thinning, per place of the ring.
-    prepare: Vec<Recording>,
-    first: Vec<Recording>,
-    again: Vec<Recording>,
-    /// Further rounds that every batch gets; grows when stripes are wider than they reach.
+    runs: Runs,
+    /// Sections that were needed so far; 0 before the first batch, which gets a whole round.
+    needed: usize,
+    /// Further whole rounds that every batch gets; grows when stripes are wider than they reach.
     rounds: usize,
+    /// Sections of the first round that each batch under way was given.
+    given: VecDeque<usize>,
     /// The header of the batch that was collected last.
     header: Vec<u32>,
     tags: VecDeque<u64>,
@@ -83,6 +84,33 @@ pub struct Chain {
     shared: Shared,
     /// Where the poses begin in the input, if points are wanted.
     poses: Option<usize>,
+}
+
+/// The chain's work in pieces.
+struct Runs {
+    /// What is done once a batch, to its mask, and from the thinned mask on, per place of the ring.
+    prepare: Vec<Recording>,
+    front: Vec<Recording>,
+    back: Vec<Recording>,
+    /// A round of thinning in sections, and what goes before a further round.
+    thinning: Vec<Recording>,
+    restart: Recording,
+}
+
+impl Runs {
+    /// One batch: so many sections of thinning, then further whole rounds.
+    fn of(&self, at: usize, upload: bool, sections: usize, rounds: usize) -> Vec<&Recording> {
+        let mut work = Vec::new();
+        work.extend(upload.then_some(&self.prepare[at]));
+        work.push(&self.front[at]);
+        work.extend(&self.thinning[..sections]);
+        for _ in 0..rounds {
+            work.push(&self.restart);
+            work.extend(&self.thinning);
+        }
+        work.push(&self.back[at]);
+        work
+    }
 }
 
 /// What one batch came to.
@@ -143,12 +171,16 @@ impl Chain {
             },
         )?;
         let pipelines = Pipelines::new(device, config)?;
-        let thinning = shared.thinning(device, &pipelines);
-        let (mut prepare, mut first_runs, mut again) = (Vec::new(), Vec::new(), Vec::new());
+        let mut runs = Runs {
+            prepare: Vec::new(),
+            front: Vec::new(),
+            thinning: shared.thinning(device, &pipelines),
+            restart: shared.restart(device, &pipelines),
+            back: Vec::new(),
+        };
         for slot in &ring.slots {
-            prepare.push(shared.prepare(device, &frame, &pipelines, &slot.input));
-            let mut first = shared.front(device, &frame, &pipelines, &slot.input);
-            first.append(&thinning);
+            runs.prepare.push(shared.prepare(device, &frame, &pipelines, &slot.input));
+            runs.front.push(shared.front(device, &frame, &pipelines, &slot.input));
             let pixels = measuring.as_ref().map_or(&slot.outputs[0].buffer, |m| &m.pixels);
             let mut back = shared.back(device, &frame, &pipelines, &slot.input, &slot.header, pixels);
             if let Some(m) = &measuring {
@@ -156,22 +188,17 @@ impl Chain {
                 let [peaks, points] = [0, 1].map(|i| &slot.outputs[i].buffer);
                 back.append(&m.record(device, &slot.input, poses, &slot.header, peaks, points));
             }
-            first.append(&back);
-            first_runs.push(first);
-            let mut round = shared.restart(device, &pipelines);
-            round.append(&thinning);
-            round.append(&back);
-            again.push(round);
+            runs.back.push(back);
         }
         Ok(Chain {
             frame,
             device: device.clone(),
             replay: Replay::new(device, config.timed)?,
             ring,
-            prepare,
-            first: first_runs,
-            again,
+            runs,
+            needed: 0,
             rounds: 0,
+            given: VecDeque::new(),
             header: vec![0; skeleton::HEADER + frame.shots as usize + 1],
             tags: VecDeque::new(),
             shots_in: VecDeque::new(),
@@ -190,11 +217,6 @@ impl Chain {
     pub fn in_flight(&self) -> usize {
         self.ring.in_flight()
     }
-    /// Dispatches of one batch.
-    pub fn dispatches(&self) -> usize {
-        self.first[0].len()
-    }
-
     /// Starts a batch of 1 to `shots` pictures. Call `collect` first when there is no room.
     pub fn submit(&mut self, tag: u64, images: &[&Image]) -> Result<()> {
         self.submit_posed(tag, images, &[])
@@ -219,7 +241,9 @@ impl Chain {
             }
             Ok(())
         })?;
-        self.run(at, true)?;
+        let sections = self.sections();
+        self.run(at, true, sections)?;
+        self.given.push_back(sections);
         self.tags.push_back(tag);
         self.shots_in.push_back(images.len() as u32);
         Ok(())
@@ -235,14 +259,21 @@ impl Chain {
     pub fn collect_into(&mut self, wait: bool, batch: &mut Batch) -> Result<bool> {
         loop {
             let Some(at) = self.ring.oldest(wait, &mut self.header)? else { return Ok(false) };
-            if self.header[6] == 0 {
+            let (left, given) = (self.header[6] as usize, self.given[0]);
+            if left < given {
+                self.needed = self.needed.max(left + 1);
                 break;
             }
-            // Some stripe takes more than the recorded sub-iterations. Another batch may have used the masks
-            // since: this one starts over with more rounds, and so do all that follow.
-            self.rounds = 2 * self.rounds + 1;
-            self.run(at, false)?;
+            // Some stripe takes more sub-iterations than were done. Another batch may have used the masks since:
+            // this one starts over with more of them, and so do all that follow.
+            self.needed = self.runs.thinning.len();
+            if given == self.runs.thinning.len() {
+                self.rounds = 2 * self.rounds + 1;
+            }
+            self.given[0] = self.needed;
+            self.run(at, false, self.needed)?;
         }
+        self.given.pop_front();
         let shots = self.shots_in.pop_front().expect("as many as batches") as usize;
         let header = &self.header;
         batch.tag = self.tags.pop_front().expect("as many as batches");
@@ -265,10 +296,17 @@ impl Chain {
         Ok(true)
     }
 
-    fn run(&mut self, at: usize, upload: bool) -> Result<()> {
-        let mut work = if upload { vec![&self.prepare[at]] } else { Vec::new() };
-        work.push(&self.first[at]);
-        work.extend(std::iter::repeat_n(&self.again[at], self.rounds));
+    /// Sections of the first round for the next batch: as many as any batch needed so far. Empty dispatches cost 10 us
+    /// each on a software adapter, and one batch that starts over costs less than those of all others.
+    fn sections(&self) -> usize {
+        match (self.needed, self.rounds) {
+            (0, _) | (_, 1..) => self.runs.thinning.len(),
+            (needed, _) => needed,
+        }
+    }
+
+    fn run(&mut self, at: usize, upload: bool, sections: usize) -> Result<()> {
+        let work = self.runs.of(at, upload, sections, self.rounds);
         self.ring.run(at, &mut self.replay, &work, upload)
     }
 

@@ -7,9 +7,9 @@ use super::{Frame, Window, ambient, bands, lengthen, listing, skeleton, stats, t
 use crate::fault::Result;
 use crate::gpu::{Buffer, Device, Pipeline, Recording};
 
-/// Sub-iterations in one submission; a stripe 50 px wide takes 52. Wider ones go further rounds.
+/// Sub-iterations in one round; a stripe 50 px wide takes 52. Wider ones go further rounds.
 const STEPS: u32 = 56;
-/// Sub-iterations before which the tile list is shortened. The first time soon: most tiles of a noisy picture hold specks
+/// Sub-iterations before which the tile list is shortened: the ends of the sections of a round. The first time soon: most tiles of a noisy picture hold specks
 /// that never change. Then at most 8 apart: what a change can travel in them stays within the neighbouring tiles,
 /// which are 8 px high.
 const SHORTEN: [u32; 8] = [2, 8, 16, 24, 32, 40, 48, STEPS];
@@ -225,29 +225,28 @@ impl Shared {
         r
     }
 
-    /// One round of thinning: all recorded sub-iterations; those after the last change are empty.
-    pub fn thinning(&self, device: &Device, p: &Pipelines) -> Recording {
-        let mut r = Recording::default();
+    /// One round of thinning, in sections that end with a shortened list.
+    pub fn thinning(&self, device: &Device, p: &Pipelines) -> Vec<Recording> {
         let stamps = whole(&self.stamps);
-        let mut n = 0;
-        for step in 0..STEPS {
+        let begins = std::iter::once(0).chain(SHORTEN);
+        (0..).zip(begins.zip(SHORTEN)).map(|(n, (begin, end))| {
+            let mut r = Recording::default();
             let (header, list, args) = match n {
                 0 => (self.lit(), &self.lit_list, (&self.lit_first, 0)),
                 n => (self.shortened(n), &self.active_list, (&self.active, self.shortened(n).1)),
             };
-            let (from, to) =
-                if step % 2 == 0 { (&self.mask, &self.other_mask) } else { (&self.other_mask, &self.mask) };
-            let bindings = [self.step(step), header, whole(list), whole(from), whole(to), stamps];
-            r.indirect(device, &p.thin, &bindings, args);
-            if SHORTEN.contains(&(step + 1)) {
-                n += 1;
-                let short = self.shortened(n);
-                let list = whole(&self.lit_list);
-                let bindings = [self.step(step + 1), self.lit(), list, stamps, short, whole(&self.active_list)];
-                r.indirect(device, &p.compact, &bindings, (&self.lit_first, 0));
+            for step in begin..end {
+                let (from, to) =
+                    if step % 2 == 0 { (&self.mask, &self.other_mask) } else { (&self.other_mask, &self.mask) };
+                let bindings = [self.step(step), header, whole(list), whole(from), whole(to), stamps];
+                r.indirect(device, &p.thin, &bindings, args);
             }
-        }
-        r
+            let list = whole(&self.lit_list);
+            let bindings =
+                [self.step(end), self.lit(), list, stamps, self.shortened(n + 1), whole(&self.active_list)];
+            r.indirect(device, &p.compact, &bindings, (&self.lit_first, 0));
+            r
+        }).collect()
     }
 
     /// Between two rounds of thinning.
@@ -285,8 +284,8 @@ impl Shared {
         r.indirect(device, &p.count, &[zero, lit, list, mask, whole(&self.counts)], all);
         let (starts, rows) = (whole(&self.starts), whole(&self.rows));
         r.dispatch_parts(device, &p.scan_rows, &[zero, whole(&self.counts), starts, rows], skeleton::rows_groups(f));
-        let (last, row_starts) = (self.shortened(SHORTEN.len() as u32), whole(&self.row_starts));
-        let shots = [zero, rows, self.all(), last, row_starts, whole(header)];
+        let row_starts = whole(&self.row_starts);
+        let shots = [zero, rows, self.all(), whole(&self.active), row_starts, whole(header)];
         r.dispatch_parts(device, &p.scan_shots, &shots, skeleton::shots_groups(f));
         r.indirect(device, &p.skeleton, &[zero, lit, list, mask, starts, row_starts, whole(points)], all);
         r

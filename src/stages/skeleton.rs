@@ -2,7 +2,7 @@
 //! Frame and unit: pixels, packed x | y << 16.
 
 use super::frame::{self, Frame, PX_LOG2, SHARED, frame_of, tile_unpack};
-use super::listing::{mask_index, tile_index};
+use super::listing::{HEADER_WORDS, mask_index, tile_index};
 use crate::gpu::{Access::*, Binding, Stage};
 use crate::raster::Mask;
 
@@ -74,7 +74,7 @@ pub const SCAN_SHOTS: Stage = Stage {
         Binding { name: "frame", access: Uniform },
         Binding { name: "rows", access: Read },
         Binding { name: "listing", access: Read },
-        Binding { name: "active_listing", access: Read },
+        Binding { name: "shortened", access: Read },
         Binding { name: "row_starts", access: ReadWrite },
         Binding { name: "header", access: ReadWrite },
     ],
@@ -130,7 +130,7 @@ pub fn scan_rows_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
 
 pub fn scan_shots_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
-    let [_, rows, listing, active, row_starts, header] = b else { unreachable!() };
+    let [_, rows, listing, shortened, row_starts, header] = b else { unreachable!() };
     let mut sum = 0;
     for shot in 0..f.shots as usize {
         header[HEADER + shot] = sum.min(f.capacity);
@@ -140,7 +140,8 @@ pub fn scan_shots_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
         }
     }
     let kept = sum.min(f.capacity);
-    header[..8].copy_from_slice(&[kept.div_ceil(64), 1, 1, kept, sum, listing[3], active[3], f.shots]);
+    let left = shortened.chunks(HEADER_WORDS as usize).filter(|list| list[3] > 0).count() as u32;
+    header[..8].copy_from_slice(&[kept.div_ceil(64), 1, 1, kept, sum, listing[3], left, f.shots]);
     header[HEADER + f.shots as usize] = kept;
 }
 
