@@ -1,10 +1,10 @@
-// In: pictures. Out: per block of 16 x 8 pixels its sum, its largest and smallest pixel, its smallest
-// row sum and its smallest column sum: what `bands` and `tiles` need to prove that a block holds no lit pixel.
+// In: pictures. Out: per block of 16 x 8 pixels its sum, its largest and smallest pixel, and its smallest sums of a
+// row, of a column and of a quad (2 x 2 pixels): what `bands` and `tiles` need to prove that it holds no lit pixel.
 // The only pass that touches every pixel: 16 pixels a load, four pixels an addition. Deeper pictures are
 // given in 256ths of their full scale, rounded to the safe side: largest up, all else down.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> image: array<vec4<u32>>;
-// (sum | largest << 15 | smallest << 24, smallest row sum | smallest column sum << 16)
+// (sum | largest << 15 | smallest << 24, smallest row sum | smallest column sum << 12 | half the smallest quad << 23)
 @group(0) @binding(2) var<storage, read_write> stats: array<vec2<u32>>;
 
 fn most(v: vec4<u32>) -> u32 {
@@ -20,7 +20,8 @@ fn block8(first: u32, top: u32) -> vec2<u32> {
     var even = vec4(0u); // columns 0 and 2 of each word, 16 bits each
     var odd = vec4(0u); // columns 1 and 3
     var row_least = 0xffffffffu;
-    // The top byte of the largest word is the largest of the top bytes.
+    // The top half or byte of the largest word is the largest of the top halves or bytes, and so for the smallest.
+    var quads = vec4(0xffffffffu);
     var m0 = vec4(0u);
     var m1 = vec4(0u);
     var m2 = vec4(0u);
@@ -29,33 +30,49 @@ fn block8(first: u32, top: u32) -> vec2<u32> {
     var n1 = vec4(0xffffffffu);
     var n2 = vec4(0xffffffffu);
     var n3 = vec4(0xffffffffu);
-    for (var r = 0u; r < 8u; r++) {
-        let v = image[first + min(top + r, frame.height - 1u) * pitch];
-        let e = v & low;
-        let v1 = v << vec4(8u);
-        let o = (v >> vec4(8u)) & low;
-        even += e;
-        odd += o;
-        let s = e + o;
-        let t = (s.x + s.y) + (s.z + s.w);
-        row_least = min(row_least, (t & 0xffffu) + (t >> 16u));
-        let v2 = v << vec4(16u);
-        let v3 = v << vec4(24u);
-        m0 = max(m0, v);
-        m1 = max(m1, v1);
-        m2 = max(m2, v2);
-        m3 = max(m3, v3);
-        n0 = min(n0, v);
-        n1 = min(n1, v1);
-        n2 = min(n2, v2);
-        n3 = min(n3, v3);
+    for (var r = 0u; r < 8u; r += 2u) {
+        let va = image[first + min(top + r, frame.height - 1u) * pitch];
+        let ea = va & low;
+        let oa = (va >> vec4(8u)) & low;
+        even += ea;
+        odd += oa;
+        let sa = ea + oa;
+        let ta = (sa.x + sa.y) + (sa.z + sa.w);
+        row_least = min(row_least, (ta & 0xffffu) + (ta >> 16u));
+        m0 = max(m0, va);
+        m1 = max(m1, va << vec4(8u));
+        m2 = max(m2, va << vec4(16u));
+        m3 = max(m3, va << vec4(24u));
+        n0 = min(n0, va);
+        n1 = min(n1, va << vec4(8u));
+        n2 = min(n2, va << vec4(16u));
+        n3 = min(n3, va << vec4(24u));
+        let vb = image[first + min(top + r + 1u, frame.height - 1u) * pitch];
+        let eb = vb & low;
+        let ob = (vb >> vec4(8u)) & low;
+        even += eb;
+        odd += ob;
+        let sb = eb + ob;
+        let tb = (sb.x + sb.y) + (sb.z + sb.w);
+        row_least = min(row_least, (tb & 0xffffu) + (tb >> 16u));
+        m0 = max(m0, vb);
+        m1 = max(m1, vb << vec4(8u));
+        m2 = max(m2, vb << vec4(16u));
+        m3 = max(m3, vb << vec4(24u));
+        n0 = min(n0, vb);
+        n1 = min(n1, vb << vec4(8u));
+        n2 = min(n2, vb << vec4(16u));
+        n3 = min(n3, vb << vec4(24u));
+        let pairs = sa + sb;
+        quads = min(quads, min(pairs, pairs << vec4(16u)));
     }
     let s = even + odd;
     let sum = (s & vec4(0xffffu)) + (s >> vec4(16u));
     let columns = min(min(even & vec4(0xffffu), even >> vec4(16u)), min(odd & vec4(0xffffu), odd >> vec4(16u)));
     let largest = most(max(max(m0, m1), max(m2, m3))) >> 24u;
     let smallest = least(min(min(n0, n1), min(n2, n3))) >> 24u;
-    return vec2(((sum.x + sum.y) + (sum.z + sum.w)) | (largest << 15u) | (smallest << 24u), row_least | (least(columns) << 16u));
+    let quad = least(quads) >> 17u;
+    return vec2(((sum.x + sum.y) + (sum.z + sum.w)) | (largest << 15u) | (smallest << 24u), row_least | (least(columns) << 12u) | (quad << 23u));
 }
 
 fn block16(first: u32, top: u32) -> vec2<u32> {
@@ -67,6 +84,9 @@ fn block16(first: u32, top: u32) -> vec2<u32> {
     var row_least = 0xffffffffu;
     var largest = vec4(0u);
     var smallest = vec4(0xffffu);
+    var quads = vec4(0xffffffffu);
+    var above_v = vec4(0u);
+    var above_u = vec4(0u);
     for (var r = 0u; r < 8u; r++) {
         let at = first + min(top + r, frame.height - 1u) * pitch;
         let v = image[at];
@@ -79,7 +99,14 @@ fn block16(first: u32, top: u32) -> vec2<u32> {
         b += v1;
         c += u0;
         d += u1;
-        let s = (v0 + v1) + (u0 + u1);
+        let pairs_v = v0 + v1;
+        let pairs_u = u0 + u1;
+        // The first row of a pair is kept, the second completes the quads.
+        let complete = vec4((r & 1u) == 1u);
+        quads = min(quads, select(quads, min(above_v + pairs_v, above_u + pairs_u), complete));
+        above_v = pairs_v;
+        above_u = pairs_u;
+        let s = pairs_v + pairs_u;
         row_least = min(row_least, (s.x + s.y) + (s.z + s.w));
         largest = max(largest, max(max(v0, v1), max(u0, u1)));
         smallest = min(smallest, min(min(v0, v1), min(u0, u1)));
@@ -91,7 +118,7 @@ fn block16(first: u32, top: u32) -> vec2<u32> {
     let largest8 = (most(largest) + (1u << deep) - 1u) >> deep;
     return vec2(
         (total >> deep) | (largest8 << 15u) | ((least(smallest) >> deep) << 24u),
-        (row_least >> deep) | ((column_least >> deep) << 16u),
+        (row_least >> deep) | ((column_least >> deep) << 12u) | ((least(quads) >> (deep + 1u)) << 23u),
     );
 }
 
@@ -101,8 +128,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let blocks = blocks_x * frame.tiles_y * frame.shots;
     // Invocations beyond the end repeat the last block: cheaper than a branch.
     let i = min(id.x, blocks - 1u);
-    let y = i / blocks_x;
-    let shot = y / frame.tiles_y;
+    let y = divide(i, blocks_x);
+    let shot = divide(y, frame.tiles_y);
     let top = (y - shot * frame.tiles_y) * 8u;
     let x = i - y * blocks_x;
     let first = shot * (frame.shot_words / 4u);

@@ -3,7 +3,7 @@
 
 mod common;
 
-use sheetlight::stages::{self, cases, skeleton, thin, threshold};
+use sheetlight::stages::{self, Frame, ThresholdParams, Thinning, cases, skeleton, thin, threshold};
 
 #[test]
 fn every_stage_equals_its_twin() {
@@ -49,6 +49,44 @@ fn the_chain_of_twins_is_the_plain_definition() {
             let points = &walk.buffers["points"][2 * from..2 * to];
             assert!(points.iter().step_by(2).copied().eq(list), "{}, shot {i}: points", scene.name);
             assert!(points.iter().skip(1).step_by(2).all(|&s| s == i as u32));
+        }
+    }
+}
+
+/// The proof that a block is dark rests on this: no window around any of its pixels sums to less than the bound. On a
+/// plain picture the two are equal, and the bound is worth having only if it is never far below.
+#[test]
+fn window_sums_are_never_below_their_bound() {
+    let mut noise = cases::Noise(5);
+    for (size, width, height) in [(3, 70, 41), (9, 70, 41), (15, 64, 48), (31, 101, 83), (33, 96, 64), (101, 161, 120)] {
+        for amplitude in [1, 40, 196] {
+            let image = cases::drawn(width, height, 8, |_, _| 60 + noise.next() % amplitude);
+            let params = ThresholdParams { size, ..ThresholdParams::default() };
+            let frame = Frame::new(width, height, 8, 1, &params, Thinning::default()).unwrap();
+            let mut words = vec![0u8; frame.image_bytes()];
+            frame.pack_image(&image, &mut words).unwrap();
+            let n = frame.tiles() as usize;
+            let uniform = bytemuck::cast_slice::<Frame, u32>(&[frame]).to_vec();
+            let mut bindings = vec![uniform.clone(), bytemuck::pod_collect_to_vec(&words), vec![0; 4 * n]];
+            stages::stats::twin(&mut bindings, &[(stages::frame::PX_LOG2, 2.0)]);
+            let mut bindings = vec![uniform, bindings.remove(2), vec![0; 4 * n]];
+            stages::bands::twin(&mut bindings, &[]);
+            let r = (size / 2) as i32;
+            let at = |x: i32, y: i32| {
+                u32::from(image.get(x.clamp(0, width as i32 - 1) as u32, y.clamp(0, height as i32 - 1) as u32))
+            };
+            // Large windows are looked at on a grid that no block's edge repeats.
+            let step = if size > 31 { 5 } else { 1 };
+            for y in (0..height as i32).step_by(step) {
+                for x in (0..width as i32).step_by(step) {
+                    let sum: u32 = (-r..=r).map(|dy| (-r..=r).map(|dx| at(x + dx, y + dy)).sum::<u32>()).sum();
+                    let row = &bindings[2][(y / 8 * 4 * frame.tiles_x as i32) as usize..][..4 * frame.tiles_x as usize];
+                    let bound = stages::tiles::bound(&frame, row, x / 16);
+                    assert!(bound <= sum, "window {size} at ({x}, {y}): bound {bound}, sum {sum}");
+                    let least = if amplitude == 1 { sum } else if size == 31 { sum / 2 } else { 0 };
+                    assert!(bound >= least, "window {size} at ({x}, {y}): bound {bound} far below {sum}");
+                }
+            }
         }
     }
 }

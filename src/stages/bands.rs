@@ -1,8 +1,8 @@
-//! In: block statistics. Out: per block what its column of blocks gives to the windows around it: (least sum of
-//! their rows over its width, the same over one column of pixels | its largest pixel << 16).
+//! In: block statistics. Out: per block what its column of blocks gives to the windows around it ([`Band`]).
 //! Frame and unit: blocks of 16 x 8 pixels, 256ths of full scale.
 
 use super::frame::{self, Frame, PX_LOG2, SHARED, frame_of};
+use super::threshold::RADIUS;
 use super::stats::Block;
 use crate::gpu::{Access::*, Binding, Stage};
 
@@ -17,7 +17,7 @@ pub const STAGE: Stage = Stage {
         Binding { name: "bands", access: ReadWrite },
     ],
     uniform: frame::UNIFORM,
-    overrides: &[PX_LOG2],
+    overrides: &[PX_LOG2, RADIUS],
 };
 
 /// One invocation four tiles, one below the other.
@@ -50,6 +50,34 @@ impl Cover {
     }
 }
 
+/// What a column of blocks gives to the windows of all pixels of one of its blocks, and that block's largest pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Band {
+    /// Least sum of the windows' rows over the block's width.
+    pub sum: u32,
+    pub largest: u32,
+    /// Least sum over one column of pixels of the rows that all windows cover.
+    pub column: u32,
+    /// Smallest pixel, and half the smallest quad, of the blocks that windows cover in part.
+    pub smallest: u32,
+    pub half_quad: u32,
+}
+
+impl Band {
+    pub fn unpack(words: &[u32]) -> Band {
+        Band {
+            sum: words[0] & 0x7f_ffff,
+            largest: words[0] >> 23,
+            column: words[1] & 0x7fff,
+            smallest: words[1] >> 15 & 0xff,
+            half_quad: words[1] >> 23,
+        }
+    }
+    fn pack(&self) -> [u32; 2] {
+        [self.sum | self.largest << 23, self.column | self.smallest << 15 | self.half_quad << 23]
+    }
+}
+
 pub fn twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, stats, bands] = b else { unreachable!() };
@@ -58,19 +86,25 @@ pub fn twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     for (at, out) in bands.chunks_exact_mut(2).enumerate().take(2 * f.tiles() as usize) {
         let (x, row) = (at % blocks_x, (at / blocks_x) as i32);
         let (shot, y) = (row / blocks_y, row % blocks_y);
-        // (sum, column, row, smallest); above and below the picture its border's pixels repeat.
+        // Above and below the picture its border's pixels repeat.
         let block = |dy: i32| {
             let near = (y + dy).clamp(0, blocks_y - 1);
             let at = 2 * ((shot * blocks_y + near) as usize * blocks_x + x);
             let b = Block::unpack(&stats[at..at + 2]);
-            let beyond = near != y + dy;
-            [if beyond { 8 * b.row } else { b.sum }, if beyond { 8 * b.smallest } else { b.column }, b.row, b.smallest]
+            if near == y + dy {
+                return b;
+            }
+            Block { sum: 8 * b.row, column: 8 * b.smallest, half_quad: 2 * b.smallest, ..b }
         };
-        let total = |whole: usize, part: usize| {
-            let rest = cover.partial().map(|dy| block(dy)[part]).min().expect("no window ends with a block");
-            cover.whole().map(|dy| block(dy)[whole]).sum::<u32>() + cover.rest * rest
+        let whole = |of: fn(Block) -> u32| cover.whole().map(|dy| of(block(dy))).sum::<u32>();
+        let part = |of: fn(Block) -> u32| cover.partial().map(|dy| of(block(dy))).min().expect("no window ends with a block");
+        let band = Band {
+            sum: whole(|b| b.sum) + cover.rest * part(|b| b.row),
+            largest: block(0).largest,
+            column: whole(|b| b.column),
+            smallest: part(|b| b.smallest),
+            half_quad: part(|b| b.half_quad),
         };
-        let largest = Block::unpack(&stats[2 * at..2 * at + 2]).largest;
-        out.copy_from_slice(&[total(0, 2), total(1, 3) | largest << 16]);
+        out.copy_from_slice(&band.pack());
     }
 }

@@ -1,5 +1,5 @@
 //! In: pictures. Out: per block of 16 x 8 pixels (sum | largest << 15 | smallest << 24, smallest row sum |
-//! smallest column sum << 16). Frame and unit: pixels, 256ths of full scale.
+//! smallest column sum << 12 | half the smallest sum of 2 x 2 << 23). Frame and unit: pixels, 256ths of full scale.
 
 use super::frame::{self, Frame, PX_LOG2, SHARED, frame_of};
 use crate::gpu::{Access::*, Binding, Stage};
@@ -37,6 +37,8 @@ pub struct Block {
     pub smallest: u32,
     pub row: u32,
     pub column: u32,
+    /// Half the smallest sum of 2 x 2 pixels that begin at an even column and row of the block.
+    pub half_quad: u32,
 }
 
 impl Block {
@@ -45,12 +47,13 @@ impl Block {
             sum: words[0] & 0x7fff,
             largest: words[0] >> 15 & 511,
             smallest: words[0] >> 24,
-            row: words[1] & 0xffff,
-            column: words[1] >> 16,
+            row: words[1] & 0xfff,
+            column: words[1] >> 12 & 0x7ff,
+            half_quad: words[1] >> 23,
         }
     }
     fn pack(&self) -> [u32; 2] {
-        [self.sum | self.largest << 15 | self.smallest << 24, self.row | self.column << 16]
+        [self.sum | self.largest << 15 | self.smallest << 24, self.row | self.column << 12 | self.half_quad << 23]
     }
 }
 
@@ -72,6 +75,7 @@ pub fn twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
         };
         let rows: Vec<u32> = (0..8).map(|r| (0..16).map(|c| px(c, r)).sum()).collect();
         let columns: Vec<u32> = (0..16).map(|c| (0..8).map(|r| px(c, r)).sum()).collect();
+        let quad = |i: u32| (0..4).map(|k| px(i % 8 * 2 + k % 2, i / 8 * 2 + k / 2)).sum::<u32>();
         let all = || (0..8).flat_map(|r| (0..16).map(move |c| (c, r))).map(|(c, r)| px(c, r));
         let deep = depth_shift(&f);
         let block = Block {
@@ -80,6 +84,7 @@ pub fn twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
             smallest: all().min().expect("128 pixels") >> deep,
             row: rows.iter().min().expect("8 rows") >> deep,
             column: columns.iter().min().expect("16 columns") >> deep,
+            half_quad: (0..32).map(quad).min().expect("32 quads") >> deep >> 1,
         };
         out.copy_from_slice(&block.pack());
     }

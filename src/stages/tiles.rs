@@ -1,8 +1,9 @@
 //! In: bands of block statistics. Out: the list of tiles that may hold a lit pixel; the others are proven dark.
 //! Frame and unit: tiles of 32 x 8 pixels, blocks of 16 x 8.
 
-use super::bands::Cover;
+use super::bands::{Band, Cover};
 use super::frame::{self, ALL_TILES, Frame, GAUSSIAN, HAS_ROI, PX_LOG2, SHARED, frame_of, tile_pack};
+use super::threshold::RADIUS;
 use super::stats::{Block, depth_shift};
 use crate::gpu::{Access::*, Binding, Stage};
 
@@ -20,7 +21,7 @@ pub const STAGE: Stage = Stage {
         Binding { name: "list", access: ReadWrite },
     ],
     uniform: frame::UNIFORM,
-    overrides: &[PX_LOG2],
+    overrides: &[PX_LOG2, RADIUS],
 };
 
 pub fn groups(f: &Frame) -> [u32; 3] {
@@ -29,16 +30,26 @@ pub fn groups(f: &Frame) -> [u32; 3] {
 
 /// Lower bound on the sum of every window of edge `f.size` whose centre lies in block x of a row of blocks, in 256ths of
 /// full scale: windows hold the blocks up to `full` away whole, the rest of their columns comes from those up to `reach`.
-fn bound(f: &Frame, row: &[u32], x: i32) -> u32 {
-    let cover = Cover::new(f.size, 16);
-    // Beyond the picture its border repeats: sixteen times the least column.
+/// `row` holds the two words of every block's [`Band`].
+pub fn bound(f: &Frame, row: &[u32], x: i32) -> u32 {
+    let (cover, down) = (Cover::new(f.size, 16), Cover::new(f.size, 8));
+    // What is covered in part in both directions holds, on both sides together, this many whole quads.
+    let quads = (cover.rest - 1) / 2 * ((down.rest - 1) / 2);
+    let singles = cover.rest * down.rest - 4 * quads;
+    // Beyond the picture its border repeats: sixteen times the least column, four times the smallest pixel.
     let band = |dx: i32| {
         let near = (x + dx).clamp(0, 2 * f.tiles_x as i32 - 1);
-        let (sum, column) = (row[2 * near as usize], row[2 * near as usize + 1] & 0xffff);
-        (if near == x + dx { sum } else { 16 * column }, column)
+        let b = Band::unpack(&row[2 * near as usize..][..2]);
+        if near == x + dx {
+            return b;
+        }
+        Band { sum: 16 * (b.column + down.rest * b.smallest), half_quad: 2 * b.smallest, ..b }
     };
-    let rest = cover.partial().map(|dx| band(dx).1).min().expect("no window ends with a block");
-    cover.whole().map(|dx| band(dx).0).sum::<u32>() + cover.rest * rest
+    let part = |of: fn(Band) -> u32| cover.partial().map(|dx| of(band(dx))).min().expect("no window ends with a block");
+    cover.whole().map(|dx| band(dx).sum).sum::<u32>()
+        + cover.rest * part(|b| b.column)
+        + 2 * quads * part(|b| b.half_quad)
+        + singles * part(|b| b.smallest)
 }
 
 /// Block x of a row of blocks that begins at `row` (counted in blocks).
@@ -46,7 +57,7 @@ fn may_be_lit(f: &Frame, stats: &[u32], bands: &[u32], row: usize, x: i32) -> bo
     let deep = depth_shift(f);
     let blocks_x = 2 * f.tiles_x as usize;
     let of_row = &bands[2 * row..2 * (row + blocks_x)];
-    let largest = of_row[2 * x as usize + 1] >> 16 << deep;
+    let largest = Band::unpack(&of_row[2 * x as usize..][..2]).largest << deep;
     if largest < f.minimum {
         return false;
     }
