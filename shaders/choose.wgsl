@@ -9,7 +9,7 @@
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var inside = u32(id.x < header[3]); inside > 0u; inside--) {
         let k = peaks[id.x];
-        let along = i32(select(k.pixel >> 16u, k.pixel & 0xffffu, frame.columns != 0u));
+        let along = i32(select(k.pixel >> 16u, k.pixel & 0xffffu, frame.columns != 0u) / frame.line_px);
         let low = max(along - frame.echo_reach, 0);
         let high = min(along + frame.echo_reach, i32(frame.lines) - 1);
         var bits = 0u;

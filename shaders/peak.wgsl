@@ -23,40 +23,46 @@ fn level(x: i32, y: i32) -> f32 {
     let b = u32(clamp(y, 0, frame.height - 1));
     let bits = 32u >> px_log2;
     let place = a & ((1u << px_log2) - 1u);
-    return f32((image[first + b * frame.pitch + (a >> px_log2)] >> (place * bits)) & ((1u << bits) - 1u));
+    return f32(i32((image[first + b * frame.pitch + (a >> px_log2)] >> (place * bits)) & ((1u << bits) - 1u)));
 }
 
-// Grey levels around the pixel, `lattice` px apart, 4 to each side.
-const LATTICE = 9;
-var<private> lattice: array<f32, 81>;
+// Weights (1 - r^2 / 16)^2 of gradients one step away along both axes; two along one; two along both.
+const ONE = 0.765625;
+const TWO = 0.5625;
+const FAR = 0.25;
 
+// The structure tensor from 13 gradients on 24 grey levels, every other place of a lattice.
 fn direction(x: i32, y: i32) -> vec2<f32> {
-    for (var j = 0; j < LATTICE; j++) {
-        for (var i = 0; i < LATTICE; i++) {
-            lattice[LATTICE * j + i] = level(x + (i - 4) * frame.lattice, y + (j - 4) * frame.lattice);
-        }
-    }
-    var xx = 0.0;
-    var xy = 0.0;
-    var yy = 0.0;
-    for (var j = 1; j < LATTICE - 1; j++) {
-        for (var i = 1; i < LATTICE - 1; i++) {
-            let at = LATTICE * j + i;
-            let fade = max(1.0 - f32((i - 4) * (i - 4) + (j - 4) * (j - 4)) / 16.0, 0.0);
-            let weight = fade * fade;
-            let gx = lattice[at + 1] - lattice[at - 1];
-            let gy = lattice[at + LATTICE] - lattice[at - LATTICE];
-            xx += weight * (gx * gx);
-            xy += weight * (gx * gy);
-            yy += weight * (gy * gy);
-        }
-    }
-    let d = 0.5 * (xx - yy);
-    let q = sqrt(d * d + xy * xy);
-    let n = select(vec2(xy, q - d), vec2(d + q, xy), d > 0.0);
-    let l = sqrt(n.x * n.x + n.y * n.y);
+    let u = frame.lattice_u;
+    let v = frame.lattice_v;
+    let a = vec3(level(x - 2 * u, y - 3 * v), level(x, y - 3 * v), level(x + 2 * u, y - 3 * v));
+    let b = vec4(level(x - 3 * u, y - 2 * v), level(x - u, y - 2 * v), level(x + u, y - 2 * v), level(x + 3 * u, y - 2 * v));
+    let c = vec3(level(x - 2 * u, y - v), level(x, y - v), level(x + 2 * u, y - v));
+    let d = vec4(level(x - 3 * u, y), level(x - u, y), level(x + u, y), level(x + 3 * u, y));
+    let e = vec3(level(x - 2 * u, y + v), level(x, y + v), level(x + 2 * u, y + v));
+    let f = vec4(level(x - 3 * u, y + 2 * v), level(x - u, y + 2 * v), level(x + u, y + 2 * v), level(x + 3 * u, y + 2 * v));
+    let g = vec3(level(x - 2 * u, y + 3 * v), level(x, y + 3 * v), level(x + 2 * u, y + 3 * v));
+    // In the rows two above, of the pixel, two below; then the diagonals.
+    let ratio = f32(v) / f32(u);
+    let ax = ratio * (b.yzw - b.xyz);
+    let ay = c - a;
+    let rx = ratio * (d.yzw - d.xyz);
+    let ry = e - c;
+    let bx = ratio * (f.yzw - f.xyz);
+    let by = g - e;
+    let dx = ratio * vec4(c.yz - c.xy, e.yz - e.xy);
+    let dy = vec4(d.yz - b.yz, f.yz - d.yz);
+    let far = vec3(FAR, TWO, FAR);
+    let row = vec3(TWO, 1.0, TWO);
+    let xx = (dot(far, ax * ax) + dot(far, bx * bx)) + (dot(row, rx * rx) + ONE * dot(dx, dx));
+    let xy = (dot(far, ax * ay) + dot(far, bx * by)) + (dot(row, rx * ry) + ONE * dot(dx, dy));
+    let yy = (dot(far, ay * ay) + dot(far, by * by)) + (dot(row, ry * ry) + ONE * dot(dy, dy));
+    let h = 0.5 * (xx - yy);
+    let q = sqrt(h * h + xy * xy);
+    let n = select(vec2(xy, q - h), vec2(h + q, xy), h > 0.0);
+    let length = sqrt(n.x * n.x + n.y * n.y);
     let sign = select(1.0, -1.0, n.y < 0.0);
-    return select(vec2(sign * n.x / l, sign * n.y / l), vec2(0.0, 1.0), l < 1e-9);
+    return select(vec2(sign * n.x / length, sign * n.y / length), vec2(0.0, 1.0), length < 1e-9);
 }
 
 fn background(x: i32, y: i32, n: vec2<f32>) -> f32 {
@@ -66,136 +72,13 @@ fn background(x: i32, y: i32, n: vec2<f32>) -> f32 {
     var high = 0.0;
     var count = 0.0;
     for (var q = start; q <= end; q += frame.stride) {
-        for (var t = -1; t <= 1; t++) {
-            let du = i32(floor((f32(q) * n.x - f32(t) * n.y) + 0.5));
-            let dv = i32(floor((f32(q) * n.y + f32(t) * n.x) + 0.5));
-            low += level(x - du, y - dv);
-            high += level(x + du, y + dv);
-            count += 1.0;
-        }
+        let du = i32(floor(f32(q) * n.x + 0.5));
+        let dv = i32(floor(f32(q) * n.y + 0.5));
+        low += level(x - du, y - dv);
+        high += level(x + du, y + dv);
+        count += 1.0;
     }
     return min(low, high) / count;
-}
-
-// The stripe's profile: src/stages/peak/profile.rs. Mean grey levels, and the share of the weight that is not clipped.
-const SAMPLES = 96;
-var<private> levels: array<f32, SAMPLES>;
-var<private> clear: array<f32, SAMPLES>;
-struct Profile {
-    count: i32,
-    offset: f32,
-    step: f32,
-    weight: f32,
-    square: f32,
-    blur2: f32,
-}
-
-// Columns where the stripe is nearer to the horizontal, else rows; at 45 degrees rounding shall not decide.
-fn by_columns(n: vec2<f32>) -> bool {
-    return 1.001 * n.y >= abs(n.x);
-}
-
-fn floor_div(a: i32, b: i32) -> i32 {
-    return (a - select(0, b - 1, a < 0)) / b;
-}
-
-// Weights along the stripe of the places i beside the skeleton pixel x0; 0 outside the window or the picture.
-fn weights(i: vec4<i32>, x0: i32, size: i32, fade: f32) -> vec4<f32> {
-    let f = max(vec4(1.0) - fade * vec4<f32>(i * i), vec4(0.0));
-    let inside = abs(i) <= vec4(frame.reach_along) & i + vec4(x0) >= vec4(0) & i + vec4(x0) < vec4(size);
-    return select(vec4(0.0), f * f, inside);
-}
-
-// Four pixels of a row as they lie in memory, from column a, a multiple of four.
-fn four(a: i32, y: i32) -> vec4<f32> {
-    let row = first + u32(y) * frame.pitch;
-    let last = i32(frame.pitch) - 1;
-    if px_log2 == 2u {
-        let v = image[row + u32(clamp(a >> 2u, 0, last))];
-        return vec4<f32>(vec4(v, v >> 8u, v >> 16u, v >> 24u) & vec4(255u));
-    }
-    let low = image[row + u32(clamp(a >> 1u, 0, last))];
-    let high = image[row + u32(clamp((a >> 1u) + 1, 0, last))];
-    return vec4<f32>(vec4(low, low >> 16u, high, high >> 16u) & vec4(0xffffu));
-}
-
-// Whole pixels by which a group of columns (or a row) follows the line.
-fn shift(from_x0: i32, middle: f32, na: f32, nb: f32) -> i32 {
-    return i32(floor(-((f32(from_x0) + middle) * na) / nb + 0.47));
-}
-
-fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
-    let columns = by_columns(n);
-    let na = select(n.y, n.x, columns);
-    let nb = select(n.x, n.y, columns);
-    let x0 = select(at.y, at.x, columns);
-    let y0 = select(at.x, at.y, columns);
-    let width = select(frame.height, frame.width, columns);
-    let height = select(frame.width, frame.height, columns);
-    // A wide stripe's columns go in groups of four, as they lie in memory; all else goes one by one.
-    let fours = columns && frame.reach_along >= 4;
-    let mask = select(-1, -4, fours);
-    let size = select(1, 4, fours);
-    let middle = select(0.0, 1.5, fours);
-    let begin = (x0 - frame.reach_along) & mask;
-    let end = x0 + frame.reach_along;
-    let fade = frame.along_factor / (nb * nb);
-    // Of a single one, the first of four places counts.
-    let only = select(vec4(1.0, 0.0, 0.0, 0.0), vec4(1.0), fours);
-    var sum = vec4(0.0);
-    var square = vec4(0.0);
-    var moment = vec4(0.0);
-    var second = vec4(0.0);
-    for (var a = begin; a <= end; a += size) {
-        let i = vec4(a - x0) + vec4(0, 1, 2, 3);
-        let g = only * weights(i, x0, width, fade);
-        let e = vec4(f32(shift(a - x0, middle, na, nb)) * nb) + vec4<f32>(i) * na;
-        sum += g;
-        square += g * g;
-        moment += g * e;
-        second += g * (e * e);
-    }
-    let ones = vec4(1.0);
-    let total = dot(sum, ones);
-    let mean = dot(moment, ones) / total;
-    let first_shift = shift(begin - x0, middle, na, nb);
-    let last_shift = shift((end & mask) - x0, middle, na, nb);
-    let low = min(first_shift, last_shift);
-    let high = max(first_shift, last_shift);
-    let stride = frame.stride_across;
-    let half = i32(ceil((4.0 * frame.s0) / (abs(nb) * f32(stride))));
-    let start = max(-half, -floor_div(y0 + low, stride));
-    let stop = min(half, floor_div(height - 1 - high - y0, stride));
-    let count = clamp(stop - start + 1, 0, SAMPLES);
-    for (var k = 0; k < count; k++) {
-        let row = y0 + (start + k) * stride;
-        var light = 0.0;
-        var clipped = 0.0;
-        for (var a = begin; a <= select(begin - 1, end, fours); a += 4) {
-            let g = weights(vec4(a - x0) + vec4(0, 1, 2, 3), x0, width, fade);
-            let v = four(a, row + shift(a - x0, middle, na, nb));
-            light += (g.x * v.x + g.y * v.y) + (g.z * v.z + g.w * v.w);
-            let c = select(vec4(0.0), g, v >= vec4(frame.full_scale));
-            clipped += (c.x + c.y) + (c.z + c.w);
-        }
-        for (var a = begin; a <= select(end, begin - 1, fours); a++) {
-            let g = weights(vec4(a - x0), x0, width, fade).x;
-            let b = row + shift(a - x0, middle, na, nb);
-            let v = level(select(b, a, columns), select(a, b, columns));
-            light += g * v;
-            clipped += select(0.0, g, v >= frame.full_scale);
-        }
-        levels[k] = light / total;
-        clear[k] = 1.0 - clipped / total;
-    }
-    let step = f32(stride) * nb;
-    return Profile(count, mean + f32(start) * step, step, total, dot(square, ones),
-        max(dot(second, ones) / total - mean * mean, 0.0));
-}
-
-// Offset, grey level and unclipped share of a sample.
-fn sample(p: Profile, k: i32) -> vec3<f32> {
-    return vec3(p.offset + f32(k) * p.step, levels[k], clear[k]);
 }
 
 // First guess of offset and amplitude.
@@ -203,7 +86,8 @@ fn guess(profile: Profile, base: f32) -> vec2<f32> {
     var sum = 0.0;
     var moment = 0.0;
     var square = 0.0;
-    for (var k = 0; k < profile.count; k++) {
+    let some = within(profile, 0.0, 1.5 * frame.s0 + 0.5);
+    for (var k = some.x; k < some.y; k++) {
         let p = sample(profile, k);
         let near = select(0.0, 1.0, abs(p.x) <= 1.5 * frame.s0 + 0.5);
         let light = near * max(p.y - base, 0.0);
@@ -247,6 +131,7 @@ fn gaussian(at: vec2<i32>) -> Peak {
     var chi = 0.0;
     var samples = 0.0;
     var saturated = false;
+    let some = within(profile, m0, 3.0 * s0);
     var left = frame.steps;
     while left > 0u {
         var h00 = 1e-9;
@@ -262,19 +147,20 @@ fn gaussian(at: vec2<i32>) -> Peak {
         var number = 0.0;
         var any_full = false;
         let inverse = 1.0 / width;
-        for (var k = 0; k < profile.count; k++) {
+        for (var k = some.x; k < some.y; k++) {
             let p = sample(profile, k);
+            let clear = clear_of(profile, k);
             let z = (p.x - m) * inverse;
             let shape = exp(-0.5 * (z * z));
             let model = a * shape;
             let inside = abs(p.x - m0) <= 3.0 * s0;
-            any_full = any_full || (p.z < 1.0 && inside);
+            any_full = any_full || (clear < 1.0 && inside);
             // Clipped pixels pull while the model is below them, and are silent above.
             let above = model + base >= frame.full_scale;
-            let unclipped = (p.y - frame.full_scale * (1.0 - p.z)) / max(p.z, 1e-3);
+            let unclipped = (p.y - frame.full_scale * (1.0 - clear)) / max(clear, 1e-3);
             let residual = select(p.y, unclipped, above) - base - model;
             let quiet = frame.read2 + frame.gain * (model + base);
-            let believed = select(0.0, select(1.0, p.z, above), inside);
+            let believed = select(0.0, select(1.0, clear, above), inside);
             let certainty = (believed * profile.weight) / (quiet + frame.speckle2 * (model * model));
             let jm = model * (z * inverse);
             let jw = jm * z;
@@ -307,7 +193,7 @@ fn gaussian(at: vec2<i32>) -> Peak {
         chi = sum;
         samples = number;
         saturated = any_full;
-        let still = abs(dm) < 2e-3 * s0 && abs(dw) < 5e-3 * s0 && abs(da) < 5e-3 * a;
+        let still = abs(dm) < 1e-2 * s0 && abs(dw) < 3e-2 * s0 && abs(da) < 3e-2 * a;
         left = select(left - 1u, 0u, still);
     }
     let share = profile.square / profile.weight;
@@ -338,7 +224,7 @@ fn centroid(at: vec2<i32>) -> Peak {
         moment += light * p.x;
         second += light * (p.x * p.x);
         top = max(top, light);
-        saturated = saturated || (p.z < 1.0 && inside);
+        saturated = saturated || (clear_of(profile, k) < 1.0 && inside);
         let e = select(0.0, p.x - m0, inside);
         let lit = max(p.y - base, 0.0);
         noise += (e * e) * (frame.read2 + frame.gain * p.y + frame.speckle2 * (lit * lit));

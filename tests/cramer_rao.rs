@@ -93,7 +93,7 @@ fn errors(stripe: &Stripe, method: Method, along: f32, pictures: u64) -> (f64, f
     ((square / n - mean * mean).sqrt(), mean)
 }
 
-const SIGMAS: [f64; 4] = [1.5, 2.0, 3.0, 4.0];
+const SIGMAS: [f64; 5] = [1.5, 2.0, 2.5, 3.0, 4.0];
 const PEAKS: [f64; 4] = [30.0, 60.0, 120.0, 240.0];
 
 #[test]

@@ -110,7 +110,7 @@ pub fn choose(peaks: &mut [Peak], scene: &Scene, p: &ChooseParams) {
 
 /// The line across the stripe that a peak lies on.
 fn line(k: &Peak, f: &PeakFrame) -> usize {
-    (if f.columns != 0 { k.pixel & 0xffff } else { k.pixel >> 16 }) as usize
+    ((if f.columns != 0 { k.pixel & 0xffff } else { k.pixel >> 16 }) / f.line_px) as usize
 }
 
 /// The tests that need no other peak.

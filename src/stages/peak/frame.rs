@@ -29,8 +29,9 @@ pub struct PeakFrame {
     pub reach_along: i32,
     /// Step of the profile's samples across the stripe, px: a stripe wider than 8 px has light to spare.
     pub stride_across: i32,
-    /// Spacing of the grey levels that the direction is taken from, px.
-    pub lattice: i32,
+    /// Spacing of the grey levels that the direction is taken from along the picture's axes, px.
+    pub lattice_u: i32,
+    pub lattice_v: i32,
     /// Step of the background's samples, px.
     pub stride: i32,
     pub steps: u32,
@@ -45,21 +46,28 @@ pub struct PeakFrame {
     pub cut_width: f32,
     pub cut_amplitude: f32,
     pub echo: f32,
-    /// Half window of lines, px.
+    /// Half window of lines.
     pub echo_reach: i32,
     /// Lines across the stripe in one picture; 1 where they are columns, 0 where they are rows.
     pub lines: u32,
     pub columns: u32,
     /// Entries of the strongest peaks' list, all shots.
     pub entries: u32,
+    /// Columns or rows of a line, about a stripe's width: what is strongest within five widths needs no finer lines.
+    pub line_px: u32,
+    /// Groups of four columns that a profile is added up from; 0 where the stripe is so narrow that each goes by itself.
+    pub fours: i32,
+    /// Half of a profile that stands upright, samples.
+    pub half_across: f32,
     pub reserved_0: u32,
     pub reserved_1: u32,
     pub reserved_2: u32,
 }
 
 pub const UNIFORM: (&str, &[Field], usize) = crate::stages::frame::uniform_fields!(PeakFrame: width, height, pitch, shot_words, s0, full_scale,
-    read2, gain, speckle2, along_factor, reach_along, stride_across, lattice, stride, steps, faintest, narrowest,
+    read2, gain, speckle2, along_factor, reach_along, stride_across, lattice_u, lattice_v, stride, steps, faintest, narrowest,
     widest, uncertain, upright, across_u, across_v, cut_width, cut_amplitude, echo, echo_reach, lines, columns, entries,
+    line_px, fours, half_across,
     reserved_0, reserved_1, reserved_2);
 
 impl PeakFrame {
@@ -78,7 +86,13 @@ impl PeakFrame {
         let pitch = (width.div_ceil(32) * 32) >> px_log2(bits);
         // Lines across the stripe are image columns, or rows where the laser lies the other way.
         let columns = across[1].abs() >= across[0].abs();
-        let lines = if columns { width } else { height };
+        let line_px = s0.floor().max(1.0);
+        let lines = (if columns { width } else { height }).div_ceil(line_px as u32);
+        let reach_along = if p.along > 0.0 { radius.floor() as i32 } else { 0 };
+        // Differences over nearly three widths: noise and speckle turn the direction least, and a Gaussian has little left
+        // between samples that far apart. Along a stripe that lies as it should there is room for half as much again.
+        let (lattice_across, lattice_along) = ((1.4 * s0).round().max(1.0) as i32, (2.1 * s0).round().max(2.0) as i32);
+        let stride_across = (0.25 * s0).floor().max(1.0);
         PeakFrame {
             width: width as i32,
             height: height as i32,
@@ -91,11 +105,10 @@ impl PeakFrame {
             speckle2: p.speckle * p.speckle,
             // One line across the stripe needs no fading.
             along_factor: if p.along > 0.0 { 1.0 / (radius * radius) } else { 0.0 },
-            reach_along: if p.along > 0.0 { radius.floor() as i32 } else { 0 },
-            stride_across: (0.25 * s0).floor().max(1.0) as i32,
-            // Differences over nearly three widths: noise and speckle turn the direction least, and a Gaussian has
-            // little left between samples that far apart.
-            lattice: (1.4 * s0).round().max(1.0) as i32,
+            reach_along,
+            stride_across: stride_across as i32,
+            lattice_u: if columns { lattice_along } else { lattice_across },
+            lattice_v: if columns { lattice_across } else { lattice_along },
             stride: (0.7 * s0).round().max(1.0) as i32,
             steps: p.steps,
             faintest: c.faintest * scale,
@@ -108,10 +121,16 @@ impl PeakFrame {
             cut_width: c.cut_width * s0,
             cut_amplitude: c.cut_amplitude,
             echo: c.echo,
-            echo_reach: (c.echo_reach * s0 + 0.5).floor() as i32,
+            echo_reach: (c.echo_reach * s0 / line_px + 0.5).floor() as i32,
             lines,
             columns: u32::from(columns),
             entries: lines * shots,
+            line_px: line_px as u32,
+            // Groups start at multiples of four, so that the window is up to two pixels off: five sixths of it, which hold
+            // 99 % of the weight, shall be there on the shorter side as well.
+            fours: if reach_along >= 4 { (0.415 * radius + 1.5) as i32 } else { 0 },
+            // The fit looks at three widths; the skeleton is a pixel beside the centre.
+            half_across: (4.0 * s0).min(3.0 * s0 + 1.0) / stride_across,
             reserved_0: 0,
             reserved_1: 0,
             reserved_2: 0,

@@ -14,14 +14,14 @@ pub(super) fn centroid<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak
     let (mut sum, mut first, mut second, mut noise, mut top) = (0f32, 0f32, 0f32, 0f32, 0f32);
     let mut saturated = false;
     for k in 0..profile.count {
-        let (d, level, clear) = profile.sample(k);
+        let (d, level) = profile.sample(k);
         let inside = (d - m0).abs() <= 3.0 * s.s0;
         let light = if inside { level - base } else { 0.0 };
         sum += light;
         first += light * d;
         second += light * (d * d);
         top = top.max(light);
-        saturated = saturated || (clear < 1.0 && inside);
+        saturated = saturated || (profile.clear(k) < 1.0 && inside);
         let e = if inside { d - m0 } else { 0.0 };
         let lit = (level - base).max(0.0);
         noise += (e * e) * (s.read2 + s.gain * level + s.speckle2 * (lit * lit));

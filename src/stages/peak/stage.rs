@@ -10,11 +10,12 @@ use rayon::prelude::*;
 pub const METHOD: &str = "peak_method";
 
 pub const SHARED: &str = include_str!("../../../shaders/shared/peaks.wgsl");
+const PROFILE: &str = include_str!("../../../shaders/shared/profile.wgsl");
 
 pub const STAGE: Stage = Stage {
     name: "peak",
     wgsl: include_str!("../../../shaders/peak.wgsl"),
-    shared: &[SHARED],
+    shared: &[SHARED, PROFILE],
     workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
