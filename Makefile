@@ -24,6 +24,8 @@ bench-peers: vulkan build
 	tools/python-env.sh $(VENV) peers
 	$(VENV)/bin/python benches/peers/run.py
 	$(VENV)/bin/python benches/peers/find.py --cargo $(CARGO)
+	$(CARGO) bench --locked --bench calibration
+	$(VENV)/bin/python benches/peers/calibration.py
 
 # Software Vulkan (Mesa lavapipe) is installed where we may; without it the CPU twins do the work.
 vulkan:

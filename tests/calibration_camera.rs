@@ -189,7 +189,7 @@ fn rendered_cameras_are_recovered() {
     let Some(reference) = reference() else { return };
     for (set, bar) in [("intrinsics", 0.08), ("intrinsics_charuco", 0.10)] {
         let recording = Recording::open(&reference.join("rendered/inputs/public").join(set)).unwrap();
-        let result = calibrate(&recording, &CameraOptions::default(), &|_, _| ()).unwrap();
+        let result = calibrate(&[recording], &CameraOptions::default(), &|_, _| ()).unwrap();
         let (truth, _) = truth(&reference, set);
         let k = result.calibration.value;
         let error = ray_error(&k, &truth);
@@ -220,7 +220,7 @@ fn copy(reference: &std::path::Path, set: &str) -> tempfile::TempDir {
 fn bad_recordings_are_explained() {
     let Some(reference) = reference() else { return };
     let calibrated = |folder: &std::path::Path| {
-        Recording::open(folder).and_then(|r| calibrate(&r, &CameraOptions::default(), &|_, _| ()))
+        Recording::open(folder).and_then(|r| calibrate(&[r], &CameraOptions::default(), &|_, _| ()))
     };
     // Wrong board size given.
     let copy_dir = copy(&reference, "intrinsics");

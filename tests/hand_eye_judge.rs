@@ -6,7 +6,7 @@ mod common;
 
 use common::hand_eye::{LEVELS, Noise, Station, pairs, station};
 use common::judge::{Trial, gauss, judge};
-use nalgebra::{DMatrix, DVector, SMatrix};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 use rand::{Rng, SeedableRng, seq::SliceRandom};
 use rand_pcg::Pcg64;
 use sheetlight::calibrate::boards::{Turn, turns};
@@ -14,7 +14,7 @@ use sheetlight::calibrate::hand_eye::{HandEyeFit, HandEyeOptions, Mount, solve};
 use sheetlight::calibrate::hand_eye_closed::{Chain, Far, Near, Pair};
 use sheetlight::calibrate::hand_eye_expected::expected_error;
 use sheetlight::calibrate::hand_eye_turns::{read_with, resolve};
-use sheetlight::calibrate::measured_pose::{INTRINSIC_NAMES, changed};
+use sheetlight::calibrate::measured_pose::{change_between, changed};
 use sheetlight::geometry::{Board, Camera, Rigid, Vec3, exp};
 use sheetlight::recording::BoardSpec;
 
@@ -36,13 +36,13 @@ fn error(found: &Chain, truth: &Chain) -> DVector<f64> {
     DVector::from_iterator(12, parts.iter().flat_map(|p| p.iter().copied()))
 }
 
-/// Cramer-Rao bound of the whole joint problem (12 unknowns and six for every robot pose), from
-/// numerical derivatives of the pixels: shares nothing with the solver.
-fn bound(s: &Station, noise: Noise) -> DMatrix<f64> {
-    let mut information = DMatrix::<f64>::zeros(12, 12);
-    let v = |d: &[f64; 18], i: usize| Vec3::new(d[i], d[i + 1], d[i + 2]);
+/// Cramer-Rao bound of the whole joint problem (12 unknowns, nine of the camera where it is not exact, and six for
+/// every robot pose), from numerical derivatives of the pixels: shares nothing with the solver.
+fn bound(s: &Station, noise: Noise, camera: Option<&SMatrix<f64, 9, 9>>) -> DMatrix<f64> {
+    let mut information = DMatrix::<f64>::zeros(21, 21);
+    let v = |d: &[f64; 27], i: usize| Vec3::new(d[i], d[i + 1], d[i + 2]);
     for pose in &s.poses {
-        let pixels = |d: &[f64; 18]| -> DVector<f64> {
+        let pixels = |d: &[f64; 27]| -> DVector<f64> {
             let x = Rigid::<Near, Camera>::new(
                 exp(&v(d, 3)) * s.truth.near_from_camera.rotation,
                 s.truth.near_from_camera.translation + v(d, 0),
@@ -51,39 +51,64 @@ fn bound(s: &Station, noise: Noise) -> DMatrix<f64> {
                 exp(&v(d, 9)) * s.truth.far_from_board.rotation,
                 s.truth.far_from_board.translation + v(d, 6),
             );
+            let lens = changed(&s.camera, &SVector::from_column_slice(&d[12..21]));
             let m = match s.mount {
-                Mount::EyeToHand => Rigid::new(exp(&v(d, 15)) * pose.rotation, pose.translation + v(d, 12)),
+                Mount::EyeToHand => Rigid::new(exp(&v(d, 24)) * pose.rotation, pose.translation + v(d, 21)),
                 Mount::EyeInHand => {
                     let p = pose.inverse();
-                    Rigid::<Far, Near>::new(exp(&v(d, 15)) * p.rotation, p.translation + v(d, 12)).inverse()
+                    Rigid::<Far, Near>::new(exp(&v(d, 24)) * p.rotation, p.translation + v(d, 21)).inverse()
                 }
             };
             let t = x.inverse() * m * w;
             DVector::from_iterator(
                 s.points.len() * 2,
                 s.points.iter().flat_map(|p| {
-                    let q = s.camera.pixel_from_point(&t.point(p)).unwrap();
+                    let q = lens.pixel_from_point(&t.point(p)).unwrap();
                     [q.x, q.y]
                 }),
             )
         };
-        let mut j = DMatrix::<f64>::zeros(s.points.len() * 2, 18);
-        for c in 0..18 {
-            let h = if c % 6 < 3 { 1e-4 } else { 1e-6 };
-            let (mut a, mut b) = ([0.0; 18], [0.0; 18]);
+        let mut j = DMatrix::<f64>::zeros(s.points.len() * 2, 27);
+        for c in 0..27 {
+            let h = match c {
+                12..16 => 1e-3,
+                16..21 => 1e-5,
+                _ if c % 6 < 3 => 1e-4,
+                _ => 1e-6,
+            };
+            let h = if (21..24).contains(&c) {
+                1e-4
+            } else if (24..27).contains(&c) {
+                1e-6
+            } else {
+                h
+            };
+            let (mut a, mut b) = ([0.0; 27], [0.0; 27]);
             (a[c], b[c]) = (h, -h);
             j.set_column(c, &((pixels(&a) - pixels(&b)) / (2.0 * h)));
         }
         let mut h = j.transpose() * j / (noise.px * noise.px);
         for c in 0..6 {
             let sigma = if c < 3 { noise.mm } else { noise.deg.to_radians() };
-            h[(12 + c, 12 + c)] += 1.0 / (sigma * sigma);
+            h[(21 + c, 21 + c)] += 1.0 / (sigma * sigma);
         }
-        let local = h.view((12, 12), (6, 6)).into_owned().try_inverse().unwrap();
-        let mixed = h.view((0, 12), (12, 6)).into_owned();
-        information += h.view((0, 0), (12, 12)).into_owned() - &mixed * local * mixed.transpose();
+        let local = h.view((21, 21), (6, 6)).into_owned().try_inverse().unwrap();
+        let mixed = h.view((0, 21), (21, 6)).into_owned();
+        information += h.view((0, 0), (21, 21)).into_owned() - &mixed * local * mixed.transpose();
     }
-    information.try_inverse().unwrap()
+    match camera {
+        None => information.view((0, 0), (12, 12)).into_owned().try_inverse().unwrap(),
+        Some(c) => {
+            let known = DMatrix::from_column_slice(9, 9, c.try_inverse().unwrap().as_slice());
+            let mut own = information.view_mut((12, 12), (9, 9));
+            own += known;
+            // Units differ by orders of magnitude.
+            let d = DVector::from_fn(21, |i, _| 1.0 / information[(i, i)].sqrt());
+            let scaled = DMatrix::from_fn(21, 21, |i, j| information[(i, j)] * d[i] * d[j]);
+            let inverse = scaled.try_inverse().unwrap();
+            DMatrix::from_fn(12, 12, |i, j| inverse[(i, j)] * d[i] * d[j])
+        }
+    }
 }
 
 const NAMES: [&str; 12] = [
@@ -106,7 +131,7 @@ fn errors_are_what_the_report_says_and_near_the_bound() {
     for mount in [Mount::EyeInHand, Mount::EyeToHand] {
         let make = |k: u64, level: usize| {
             let s = station(&mut Pcg64::seed_from_u64(1000 + k), mount, 13);
-            let b = bound(&s, LEVELS[level]);
+            let b = bound(&s, LEVELS[level], None);
             (s, b, LEVELS[level])
         };
         judge(&format!("hand-eye, {mount:?}"), &NAMES, LEVELS.len(), make, |(s, bound, noise), rng| {
@@ -117,41 +142,95 @@ fn errors_are_what_the_report_says_and_near_the_bound() {
     }
 }
 
+/// How well a camera may be known: its first calibration was a poor one.
+const CAMERA_SIGMAS: [f64; 9] = [0.6, 0.6, 0.4, 0.4, 2e-3, 1e-3, 1e-4, 1e-4, 1e-3];
+
+/// A station, the Cramer-Rao bound of its hand-eye, its noise, the camera's covariance and a root of it.
+type Uncertain = (Station, DMatrix<f64>, Noise, SMatrix<f64, 9, 9>, SMatrix<f64, 9, 9>);
+
+/// A station with a camera that is known to a covariance whose parameters hang together, as a calibration's do.
+fn uncertain(k: u64, level: usize) -> Uncertain {
+    let rng = &mut Pcg64::seed_from_u64(5000 + k);
+    let s = station(rng, Mount::EyeInHand, 13);
+    let sigma = SMatrix::<f64, 9, 9>::from_diagonal(&SVector::from(CAMERA_SIGMAS));
+    let mut mix = SMatrix::<f64, 9, 9>::identity();
+    (mix[(1, 0)], mix[(5, 4)], mix[(8, 5)]) = (0.9, -0.9, -0.9);
+    let root = sigma * mix;
+    let covariance = root * root.transpose();
+    let b = bound(&s, LEVELS[level], Some(&covariance));
+    (s, b, LEVELS[level], covariance, root)
+}
+
+/// The camera as its calibration gave it.
+fn believed(s: &Station, root: &SMatrix<f64, 9, 9>, rng: &mut Pcg64) -> sheetlight::camera::Intrinsics {
+    changed(&s.camera, &(root * SVector::<f64, 9>::from_fn(|_, _| gauss(rng, 1.0))))
+}
+
+/// The pictures sharpen the camera as far as they can, and the report says what is left.
+#[test]
+fn a_camera_that_is_not_exact_is_solved_along() {
+    judge("hand-eye, camera uncertain", &NAMES, LEVELS.len(), uncertain, |(s, bound, noise, covariance, root), rng| {
+        let camera = believed(s, root, rng);
+        let p = pairs(rng, s, *noise, &camera);
+        let found = solve(&p, s.mount, covariance, &camera, &HandEyeOptions::default()).unwrap();
+        Trial::new(error(&found.chain, &s.truth), &found.covariance, bound)
+    });
+}
+
 /// The camera's own error is larger than the robot's here: a report that forgets it would fail.
 #[test]
 fn the_cameras_uncertainty_reaches_the_report() {
-    let sigma = [0.6, 0.6, 0.4, 0.4, 2e-3, 1e-3, 1e-4, 1e-4, 1e-3];
-    assert_eq!(sigma.len(), INTRINSIC_NAMES.len());
-    let covariance = SMatrix::<f64, 9, 9>::from_diagonal(&nalgebra::SVector::from(sigma).map(|s: f64| s * s));
-    let mut over = [0.0; 12];
-    let mut camera_exact = [0.0; 12];
-    let mut point = 0.0;
+    let (mut over, mut exact, mut point, mut joint, mut held, mut camera) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    let mut surprise = 0.0;
     for k in 0..100 {
-        let rng = &mut Pcg64::seed_from_u64(5000 + k);
-        let s = station(rng, Mount::EyeInHand, 13);
-        let wrong = nalgebra::SVector::<f64, 9>::from_fn(|i, _| gauss(rng, sigma[i]));
-        let believed = changed(&s.camera, &wrong);
-        let p = pairs(rng, &s, LEVELS[0], &believed);
-        let found = solve(&p, s.mount, &covariance, &believed, &HandEyeOptions::default()).unwrap();
-        let e = error(&found.chain, &s.truth);
-        for i in 0..12 {
-            over[i] += e[i] * e[i] / found.covariance[(i, i)] / 100.0;
-            camera_exact[i] += e[i] * e[i] / found.covariance_camera_exact[(i, i)] / 100.0;
-        }
+        let (s, _, noise, covariance, root) = uncertain(k, 0);
+        let rng = &mut Pcg64::seed_from_u64(6000 + k);
+        let given = believed(&s, &root, rng);
+        let p = pairs(rng, &s, noise, &given);
+        let found = solve(&p, s.mount, &covariance, &given, &HandEyeOptions::default()).unwrap();
+        // Taken as exact, such a camera looks like a robot that scatters.
+        let lenient =
+            HandEyeOptions { max_robot_sigma_mm: 10.0, max_robot_sigma_deg: 5.0, ..HandEyeOptions::default() };
+        let trusting = solve(&p, s.mount, &SMatrix::zeros(), &given, &lenient).unwrap();
+        let share = |f: &HandEyeFit| {
+            let e = error(&f.chain, &s.truth);
+            (0..12).map(|i| e[i] * e[i] / f.covariance[(i, i)]).sum::<f64>() / 1200.0
+        };
+        over += share(&found);
+        exact += share(&trusting);
+        // The camera that came out, and how far the one that went in is said to be from it.
+        let off = change_between(&s.camera, &found.joint_camera);
+        camera += (0..9).map(|i| off[i] * off[i] / found.joint_covariance[(12 + i, 12 + i)]).sum::<f64>() / 900.0;
+        surprise += found.camera_surprise.0 / found.camera_surprise.1 / 100.0;
         // A point 160 mm before the camera, by its pixel and depth: camera and transform err together.
         let seen = s.camera.pixel_from_point(&Vec3::new(0.0, 0.0, 160.0)).unwrap();
-        let ray = believed.ray_from_pixel(&seen).unwrap().direction;
-        let off = found.chain.near_from_camera.point(&(ray * (160.0 / ray.z)))
-            - s.truth.near_from_camera.point(&Vec3::new(0.0, 0.0, 160.0));
+        let off = |camera: &sheetlight::camera::Intrinsics, chain: &Chain| {
+            let ray = camera.ray_from_pixel(&seen).unwrap().direction;
+            (chain.near_from_camera.point(&(ray * (160.0 / ray.z)))
+                - s.truth.near_from_camera.point(&Vec3::new(0.0, 0.0, 160.0)))
+            .norm_squared()
+        };
         let expected = expected_error(&found, 160.0);
-        point += (off.norm() / expected.whole).powi(2) / 100.0;
+        point += off(&given, &found.chain) / expected.whole.powi(2) / 100.0;
+        joint += off(&found.joint_camera, &found.chain) / expected.with_joint_camera.powi(2) / 100.0;
+        held += (off(&given, &found.chain) / off(&given, &trusting.chain)).ln() / 200.0;
     }
-    println!("a point's error over the expected one {:.3}", f64::sqrt(point));
-    assert!((0.8..=1.25).contains(&f64::sqrt(point)), "a point's error is {:.3} of the expected", f64::sqrt(point));
-    let over = over.map(f64::sqrt);
-    println!("with the camera's part {over:.3?}, without {:.2?}", camera_exact.map(f64::sqrt));
-    assert!(over.iter().all(|x| (0.8..=1.25).contains(x)), "{over:?}");
-    assert!(camera_exact.iter().sum::<f64>().sqrt() > 5.0, "the test must be able to fail");
+    let root = |x: f64| x.sqrt();
+    println!(
+        "over sigma: transform {:.3}, joint camera {:.3}, a point {:.3}, with the joint camera {:.3}; camera taken as exact {:.1}; \
+         surprise over freedom {surprise:.3}; point's error over that with the camera held {:.3}",
+        root(over),
+        root(camera),
+        root(point),
+        root(joint),
+        root(exact),
+        held.exp()
+    );
+    for (what, x) in [("transform", over), ("camera", camera), ("point", point), ("point, joint camera", joint)] {
+        assert!((0.8..=1.25).contains(&root(x)), "{what}: {:.3} of its sigma", root(x));
+    }
+    assert!((0.9..1.1).contains(&surprise), "{surprise}");
+    assert!(root(exact) > 2.0, "the test must be able to fail: {:.2}", root(exact));
 }
 
 /// Each picture of a board that looks the same after a turn is read with a turn drawn by lot.

@@ -1,19 +1,18 @@
-//! In: a recording of a board. Out: the camera's calibration with verdict, advice and all that a
+//! In: recordings of boards. Out: the camera's calibration with verdict, advice and all that a
 //! report shows ([zhang00]; docs/math.md, Camera calibration).
 //! Frame and unit: camera frame; pixels, mm, degrees where the name says so.
 
-use super::boards::{FindOptions, find};
+use super::boards::FindOptions;
+use super::camera_pictures::{Pictures, one_size, pictures};
 use super::intrinsics::{Observation, SolveOptions, Solved, held_names, solve};
 use super::intrinsics_quality::{self as quality, expected_ray_error};
 use super::projection::{INTRINSICS, NAMES};
 use crate::camera::Intrinsics;
-use crate::fault::{Fault, Kind, Result};
+use crate::fault::{Fault, Result};
 use crate::geometry::Vec2;
 use crate::recording::Recording;
 use crate::rig::{Calibration, Covariance, Quality, Verdict};
-use rayon::prelude::*;
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 /// Settings of [`calibrate`].
 #[derive(Clone, Debug, Default)]
@@ -53,63 +52,25 @@ pub struct CameraResult {
     pub worst: Vec<(String, usize, f64)>,
 }
 
-/// Finds the board in every picture of a recording (ambient ones where there are such) and calibrates.
-/// `progress` is called with (done, all).
+/// Finds the board in every picture (ambient ones where there are such) of recordings that one camera took, and
+/// calibrates it from all of them together. A picture that comes twice counts once. `progress` is called with
+/// (done, all).
 ///
 /// # Errors
-/// No board described; no pictures; the board found in fewer than two of them (with the reasons).
+/// No board described; no pictures; pictures of two sizes; the board found in fewer than two of them (with the
+/// reasons).
 pub fn calibrate(
-    recording: &Recording,
+    recordings: &[Recording],
     options: &CameraOptions,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<CameraResult> {
     options.check()?;
-    let meta = &recording.meta;
-    let all = meta.frames.len();
-    let done = std::sync::atomic::AtomicUsize::new(0);
-    let seen: Vec<(String, Result<Observation>)> = meta
-        .frames
-        .par_iter()
-        .map(|frame| {
-            let name = frame.ambient.as_ref().or(frame.laser.as_ref()).cloned().unwrap_or_default();
-            let seen = meta.board_of(frame).ok_or_else(no_board).and_then(|board| {
-                let view = find(&recording.picture(&name)?, board, &options.find)?;
-                Ok(Observation { name: name.clone(), features: Arc::new(board.features()), view })
-            });
-            progress(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1, all);
-            (name, seen)
-        })
-        .collect();
-    let (mut pictures, mut left_out): (Vec<Observation>, Vec<(String, Fault)>) = Default::default();
-    for (name, seen) in seen {
-        match seen {
-            Ok(o) => pictures.push(o),
-            // Wrong sizes, missing files and misdescribed boards are the recording's fault, not one picture's.
-            Err(fault) if fault.kind != Kind::Refused => return Err(fault),
-            Err(fault) => left_out.push((name, fault)),
-        }
-    }
-    if pictures.len() < 2 {
-        // The reason that most pictures give; of equal ones the first.
-        let votes = |l: &(String, Fault)| left_out.iter().filter(|o| o.1.cause == l.1.cause).count();
-        let first = left_out.iter().rev().max_by_key(|l| votes(l)).map(|l| l.1.clone());
-        let listed: Vec<String> = left_out.iter().map(|(n, f)| format!("{n}: {}", f.what)).collect();
-        return Err(Fault::refused(format!(
-            "the board was found in {} of {all} pictures, 3 or more are needed\n    {}",
-            pictures.len(),
-            listed.join("\n    ")
-        ))
-        .cause(first.as_ref().map_or("too few pictures", |f| f.cause.as_str()))
-        .next(first.as_ref().map_or("take 10 to 20 pictures of the board", |f| f.next.as_str())));
-    }
-    let left_out = left_out.into_iter().map(|(n, f)| (n, format!("{} ({})", f.what, f.cause))).collect();
-    from_observations(pictures, left_out, meta.image.width, meta.image.height, options)
-}
-
-fn no_board() -> Fault {
-    Fault::input("the recording describes no board")
-        .cause("meta.json has neither 'board' nor 'boards'")
-        .next("describe the board in meta.json; sheetlight board writes such a description")
+    let (width, height) = one_size(recordings)?;
+    let Pictures { found, left_out, mut inputs } = pictures(recordings, &options.find, progress)?;
+    let mut result = from_observations(found, left_out, width, height, options)?;
+    inputs.retain(|name, _| name.ends_with("meta.json") || result.used.iter().any(|o| o.name == *name));
+    result.calibration.inputs = inputs;
+    Ok(result)
 }
 
 /// A picture whose typical residual, over its corners' sigmas, is this many times the median picture's is

@@ -2,14 +2,16 @@
 //! board's place by joint maximum likelihood, with the robot's noise, covariance and hold-out errors.
 //! Frame and unit: see `hand_eye_closed`; mm, rad (docs/math.md, Hand-eye (1) to (10)).
 
-use super::components::Components;
+use super::hand_eye_camera::CameraBelief;
 use super::hand_eye_checks as checks;
 use super::hand_eye_closed::{Agreement, Chain, Far, Near, Pair, agree, canonical_order};
-use super::hand_eye_terms::{jacobian, refine, robot_parts, step_covariance};
-use super::measured_pose::pooled_factor;
+use super::hand_eye_noise::{Fitted, fit};
+use super::hand_eye_terms::{Refined, UNKNOWNS, refine, step_covariance, with_camera};
+use super::measured_pose::{changed, moved, pooled_factor};
+use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Rigid, Vec3};
-use nalgebra::{DMatrix, DVector, Matrix6, SMatrix};
+use nalgebra::{DMatrix, Matrix6, SMatrix};
 
 /// Settings of [`solve`].
 #[derive(Clone, Debug)]
@@ -103,12 +105,6 @@ impl Mount {
     }
 }
 
-/// What is known beforehand: where the camera is, and the covariance of its parameters.
-struct Given {
-    mount: Mount,
-    camera: SMatrix<f64, 9, 9>,
-}
-
 /// How one pair fits: its step from the expected to the seen board pose.
 #[derive(Clone, Debug)]
 pub struct PairResidual {
@@ -132,13 +128,17 @@ pub struct HandEyeFit {
     /// Covariance of 12 numbers: translation (mm) and left rotation (rad) of near_from_camera in
     /// the near frame, then of far_from_board in the far frame. Camera uncertainty included.
     pub covariance: DMatrix<f64>,
-    /// The part of it that the pictures and the robot's noise make, the camera taken as exact.
-    pub covariance_camera_exact: DMatrix<f64>,
-    /// The 12 numbers by the nine camera parameters: how the result follows the camera it was given.
+    /// The 12 numbers by the nine of the given camera's z: how the result follows the camera it was given.
     pub by_camera: SMatrix<f64, 12, 9>,
-    /// The camera that was held, and the covariance of its parameters.
-    pub camera: crate::camera::Intrinsics,
-    pub camera_covariance: SMatrix<f64, 9, 9>,
+    /// The camera that was given, as a belief about itself.
+    pub camera: Intrinsics,
+    pub given: CameraBelief,
+    /// The camera that all pixels and poses together speak for, and the covariance of the 12 numbers and of its
+    /// nine parameters.
+    pub joint_camera: Intrinsics,
+    pub joint_covariance: DMatrix<f64>,
+    /// Squared Mahalanobis distance between the given camera and what these pictures say of it, and its freedom.
+    pub camera_surprise: (f64, f64),
     pub noise: Noise,
     /// One per pair, in the order given.
     pub pairs: Vec<PairResidual>,
@@ -148,138 +148,17 @@ pub struct HandEyeFit {
     pub start: Agreement,
 }
 
-/// One round of variance components at a fitted chain.
-///
-/// The camera's own error moves all boards together; it is part of the known covariance, so that
-/// it is not taken for noise of the robot.
-fn components(pairs: &[&Pair], chain: &Chain, noise: &Noise, given: &Given, o: &HandEyeOptions) -> Option<Noise> {
-    let mount = given.mount;
-    let n = pairs.len() * 6;
-    let mut model = Components {
-        residual: DVector::zeros(n),
-        jacobian: DMatrix::zeros(n, 12),
-        known: DMatrix::zeros(n, n),
-        parts: Vec::new(),
-    };
-    let mut parts = [DMatrix::zeros(n, n), DMatrix::zeros(n, n)];
-    for (i, pair) in pairs.iter().enumerate() {
-        let (e, j) = jacobian(chain, pair);
-        let at = 6 * i;
-        model.residual.rows_mut(at, 6).copy_from(&e);
-        model.jacobian.view_mut((at, 0), (6, 12)).copy_from(&j);
-        let mut known = pair.seen.covariance(noise.feature_factor);
-        let [t, r] = robot_parts(&mount.flange(chain, &pair.near_from_far));
-        for (k, (part, given)) in
-            [(t, o.robot_sigma_mm), (r, o.robot_sigma_deg.map(f64::to_radians))].into_iter().enumerate()
-        {
-            match given {
-                Some(s) => known += part * (s * s),
-                None => parts[k].view_mut((at, at), (6, 6)).copy_from(&part),
-            }
-        }
-        model.known.view_mut((at, at), (6, 6)).copy_from(&known);
-    }
-    let mut by_camera = DMatrix::zeros(n, 9);
-    for (i, pair) in pairs.iter().enumerate() {
-        by_camera.view_mut((6 * i, 0), (6, 9)).copy_from(&pair.seen.by_intrinsics);
-    }
-    model.known += &by_camera * DMatrix::from_column_slice(9, 9, given.camera.as_slice()) * by_camera.transpose();
-    // Below these the robot's noise no longer matters beside any camera's.
-    let (floor_mm, floor_rad) = (1e-4f64, 1e-6f64);
-    let (mut theta, mut floor) = (Vec::new(), Vec::new());
-    let mut estimated = Vec::new();
-    for (k, part) in parts.into_iter().enumerate() {
-        let (given, now, low) = [
-            (o.robot_sigma_mm.is_some(), noise.robot_mm, floor_mm),
-            (o.robot_sigma_deg.is_some(), noise.robot_rad, floor_rad),
-        ][k];
-        if !given {
-            model.parts.push(part);
-            theta.push(now * now);
-            floor.push(low * low);
-            estimated.push(k);
-        }
-    }
-    let mut out = Noise {
-        robot_mm: o.robot_sigma_mm.unwrap_or(noise.robot_mm),
-        robot_rad: o.robot_sigma_deg.map_or(noise.robot_rad, f64::to_radians),
-        ..*noise
-    };
-    if !theta.is_empty() {
-        let next = model.step(&theta, &floor)?;
-        for (k, t) in estimated.iter().zip(next) {
-            *[&mut out.robot_mm, &mut out.robot_rad][*k] = t.sqrt();
-        }
-    }
-    Some(out)
-}
-
 fn undetermined() -> Fault {
     Fault::refused("the hand-eye transform is not determined by these poses")
         .cause("the flange turned about one axis only, or hardly at all")
         .next("turn the flange about a second axis by 20 degrees or more and take more pictures")
 }
 
-/// Alternates the fit and the noise until both stand still.
-fn fit(
-    pairs: &[&Pair],
-    start: &Chain,
-    noise: Noise,
-    given: &Given,
-    o: &HandEyeOptions,
-) -> Result<(Chain, DMatrix<f64>, f64, Noise)> {
-    let (mut chain, mut noise) = (*start, noise);
-    for _ in 0..30 {
-        chain = refine(pairs, &chain, &noise, given.mount).ok_or_else(undetermined)?.0;
-        let next = components(pairs, &chain, &noise, given, o).ok_or_else(undetermined)?;
-        let settled = (next.robot_mm / noise.robot_mm - 1.0).abs() < 1e-3
-            && (next.robot_rad / noise.robot_rad - 1.0).abs() < 1e-3;
-        noise = next;
-        if settled {
-            break;
-        }
-    }
-    let (chain, covariance, cost) = refine(pairs, &chain, &noise, given.mount).ok_or_else(undetermined)?;
-    Ok((chain, covariance, cost, noise))
-}
-
-/// d(12 unknowns)/d(camera): the boards' poses move with the camera, and the fit follows them.
-fn by_camera(
-    pairs: &[&Pair],
-    chain: &Chain,
-    covariance: &DMatrix<f64>,
-    noise: &Noise,
-    mount: Mount,
-) -> Option<SMatrix<f64, 12, 9>> {
-    let mut cross = SMatrix::<f64, 12, 9>::zeros();
-    for pair in pairs {
-        let (_, j) = jacobian(chain, pair);
-        cross += j.transpose() * step_covariance(chain, pair, noise, mount).try_inverse()? * pair.seen.by_intrinsics;
-    }
-    let c: SMatrix<f64, 12, 12> = covariance.fixed_view::<12, 12>(0, 0).into();
-    Some(c * cross)
-}
-
-/// A fit that pairs are judged by.
-struct Judge<'a> {
-    chain: &'a Chain,
-    covariance: &'a DMatrix<f64>,
-    noise: &'a Noise,
-    given: &'a Given,
-    by_camera: SMatrix<f64, 12, 9>,
-}
-
 /// Squared Mahalanobis distance of a pair from a chain that was fitted with or without it.
-fn distance2(judge: &Judge<'_>, pair: &Pair, used: bool) -> f64 {
-    let Judge { chain, covariance, noise, given, by_camera } = judge;
-    let (e, j) = jacobian(chain, pair);
-    // What the camera's error leaves after the fit has followed it.
-    let left = j * by_camera - pair.seen.by_intrinsics;
-    let own = step_covariance(chain, pair, noise, given.mount) + left * given.camera * left.transpose();
-    let fitted = {
-        let c: SMatrix<f64, 12, 12> = covariance.fixed_view::<12, 12>(0, 0).into();
-        j * c * j.transpose()
-    };
+fn distance2(fit: &Fitted, mount: Mount, pair: &Pair, used: bool) -> f64 {
+    let (e, j) = with_camera(&fit.refined.chain, &fit.refined.z, pair, &fit.camera.belief);
+    let own = step_covariance(&fit.refined.chain, pair, &fit.noise, mount);
+    let fitted = j * fit.refined.covariance * j.transpose();
     let total = if used { own - fitted } else { own + fitted };
     // Where a pair determines a direction alone its residual there is zero: its own noise stands in.
     let solve = |m: Matrix6<f64>| m.cholesky().map(|c| e.dot(&c.solve(&e)));
@@ -292,78 +171,95 @@ pub fn solve(
     pairs: &[Pair],
     mount: Mount,
     camera: &SMatrix<f64, 9, 9>,
-    model: &crate::camera::Intrinsics,
+    model: &Intrinsics,
     o: &HandEyeOptions,
 ) -> Result<HandEyeFit> {
     o.check()?;
     checks::before(pairs, o)?;
-    let given = Given { mount, camera: *camera };
-    let mispaired = |_| checks::explain(pairs, "pictures and robot poses do not belong together".into(), o);
-    let agreement = start(pairs, o).map_err(mispaired)?;
+    let given = CameraBelief::given(camera);
+    let mispaired = || checks::explain(pairs, "pictures and robot poses do not belong together".into(), o);
+    let agreement = start(pairs, o).map_err(|_| mispaired())?;
     let seen: Vec<_> = pairs.iter().map(|p| p.seen.clone()).collect();
     let scatter = agreement.spread.max(1e-3);
-    let mut noise = Noise {
+    let noise = Noise {
         robot_mm: o.robot_sigma_mm.unwrap_or(scatter),
         // The scatter of the board's corners seen as a rotation over the board's distance.
         robot_rad: o.robot_sigma_deg.map_or(scatter / mean(seen.iter().map(|s| s.centre().norm())), f64::to_radians),
         feature_factor: pooled_factor(&seen),
     };
+    let chosen = |used: &[usize]| -> Vec<&Pair> { used.iter().map(|&i| &pairs[i]).collect() };
     let mut used = agreement.agreeing.clone();
-    let mut chain = agreement.chain;
-    let (mut covariance, mut cost);
-    let mut rounds = 0;
-    loop {
-        let chosen: Vec<&Pair> = used.iter().map(|&i| &pairs[i]).collect();
-        (chain, covariance, cost, noise) = fit(&chosen, &chain, noise, &given, o).map_err(mispaired)?;
-        rounds += 1;
-        let by_camera = by_camera(&chosen, &chain, &covariance, &noise, mount).ok_or_else(undetermined)?;
-        let judge = Judge { chain: &chain, covariance: &covariance, noise: &noise, given: &given, by_camera };
-        let keeps = |i: usize| distance2(&judge, &pairs[i], used.contains(&i)) <= o.gate;
+    let mut found = fit(&chosen(&used), &agreement.chain, noise, mount, &given, o).ok_or_else(mispaired)?;
+    for _ in 0..10 {
+        let keeps = |i: usize| distance2(&found, mount, &pairs[i], used.contains(&i)) <= o.gate;
         let next: Vec<usize> = (0..pairs.len()).filter(|&i| keeps(i)).collect();
-        if next == used || rounds == 10 || next.len() < o.min_pairs {
+        if next == used || next.len() < o.min_pairs {
             break;
         }
         used = next;
+        found = fit(&chosen(&used), &found.refined.chain, found.noise, mount, &given, o).ok_or_else(mispaired)?;
     }
-    let chosen: Vec<&Pair> = used.iter().map(|&i| &pairs[i]).collect();
-    let by_camera = by_camera(&chosen, &chain, &covariance, &noise, mount).ok_or_else(undetermined)?;
-    let judge = Judge { chain: &chain, covariance: &covariance, noise: &noise, given: &given, by_camera };
-    let followed = by_camera * camera * by_camera.transpose();
-    let whole = &covariance + DMatrix::from_column_slice(12, 12, followed.as_slice());
     let residuals = pairs
         .iter()
         .enumerate()
         .map(|(i, pair)| {
-            let without: Vec<&Pair> = used.iter().filter(|&&k| k != i).map(|&k| &pairs[k]).collect();
-            let left_out = refine(&without, &chain, &noise, mount).map(|f| f.0);
-            let inside = chain.expected(&pair.near_from_far);
-            let outside = left_out.map(|c| c.expected(&pair.near_from_far));
+            let without: Vec<usize> = used.iter().copied().filter(|&k| k != i).collect();
+            let residual = residual(&found, pair, &chosen(&without), mount, &given, model);
             PairResidual {
-                name: pair.seen.name.clone(),
                 used: used.contains(&i),
-                distance2: distance2(&judge, pair, used.contains(&i)),
-                px: pair.seen.displacement_px(&inside, model),
-                mm: pair.seen.displacement(&inside),
-                holdout_px: outside.map_or(f64::INFINITY, |t| pair.seen.displacement_px(&t, model)),
-                holdout_mm: outside.map_or(f64::INFINITY, |t| pair.seen.displacement(&t)),
+                distance2: distance2(&found, mount, pair, used.contains(&i)),
+                ..residual
             }
         })
         .collect();
     let freedom = (used.len() * 6) as f64 - 12.0;
+    let Fitted { refined, noise, camera } = found;
+    let c = refined.covariance;
+    // From the camera's z to its nine parameters.
+    let mut to_parameters = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::identity();
+    to_parameters.fixed_view_mut::<9, 9>(12, 12).copy_from(&camera.belief.root);
+    let joint = to_parameters * c * to_parameters.transpose();
     let fit = HandEyeFit {
-        chain,
-        covariance: whole,
-        covariance_camera_exact: covariance,
-        by_camera,
+        chain: refined.chain,
+        covariance: DMatrix::from_fn(12, 12, |i, j| c[(i, j)]),
+        by_camera: c.fixed_view::<12, 9>(0, 12) * camera.by_given,
         camera: *model,
-        camera_covariance: *camera,
+        given,
+        joint_camera: changed(model, &(camera.belief.mean + camera.belief.root * refined.z)),
+        joint_covariance: DMatrix::from_column_slice(UNKNOWNS, UNKNOWNS, joint.as_slice()),
+        camera_surprise: (camera.surprise, camera.freedom),
         noise,
         pairs: residuals,
-        chi2: cost / freedom.max(1.0),
+        chi2: refined.cost / freedom.max(1.0),
         start: agreement,
     };
     checks::after(pairs, &fit, o)?;
     Ok(fit)
+}
+
+/// How a pair fits the whole, and how the others predict it.
+fn residual(
+    fit: &Fitted,
+    pair: &Pair,
+    others: &[&Pair],
+    mount: Mount,
+    given: &CameraBelief,
+    model: &Intrinsics,
+) -> PairResidual {
+    let held_out = given
+        .after(others, fit.noise.feature_factor)
+        .and_then(|c| Some((refine(others, &fit.refined.chain, &fit.noise, mount, &c.belief)?, c.belief)));
+    let off = |r: &Refined, belief: &CameraBelief| {
+        // The board as that camera sees it: px and mm are then free of what the cameras differ by.
+        let change = belief.mean + belief.root * r.z;
+        let mut seen = pair.seen.clone();
+        seen.camera_from_board = moved(&seen.camera_from_board, (seen.by_intrinsics * change).as_slice());
+        let expected = r.chain.expected(&pair.near_from_far);
+        (seen.displacement_px(&expected, &changed(model, &change)), seen.displacement(&expected))
+    };
+    let (px, mm) = off(&fit.refined, &fit.camera.belief);
+    let (holdout_px, holdout_mm) = held_out.map_or((f64::INFINITY, f64::INFINITY), |(r, b)| off(&r, &b));
+    PairResidual { name: pair.seen.name.clone(), used: false, distance2: 0.0, px, mm, holdout_px, holdout_mm }
 }
 
 /// The closed form in an order that does not depend on the recording's.

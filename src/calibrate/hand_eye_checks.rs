@@ -107,9 +107,12 @@ pub fn explain(pairs: &[Pair], what: String, o: &HandEyeOptions) -> Fault {
         return wrong_scale(scale);
     }
     if let Some(order) = other_order(pairs, o) {
-        return Fault::input(what)
-            .cause(format!("the poses fit the pictures {order}"))
-            .next("put the poses into the order in which the pictures were taken");
+        let inverted = order.contains("inverted");
+        return Fault::input(what).cause(format!("the poses fit the pictures {order}")).next(if inverted {
+            "state the mount as it is (with or without --eye-to-hand), or export the poses as base_from_flange"
+        } else {
+            "put the poses into the order in which the pictures were taken"
+        });
     }
     Fault::input(what)
         .cause("poses and pictures mispaired, a board that was moved, or another hand-eye mount than stated")

@@ -10,10 +10,10 @@ use nalgebra::{DMatrix, SMatrix};
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExpectedError {
     pub whole: f64,
-    /// The share of it that the camera makes: its viewing ray and, by way of the fit, the hand-eye transform.
-    /// The two belong together. A camera whose principal point is off turns the fitted transform the other way,
-    /// so that the point stays nearly where it is.
+    /// The share of it that the given camera makes: its viewing ray and, by way of the fit, the hand-eye transform.
     pub from_camera: f64,
+    /// The same point seen with the camera that came out of the fit: the two belong together.
+    pub with_joint_camera: f64,
 }
 
 /// Of a point at a distance along the optical axis, known by its pixel and its depth.
@@ -23,10 +23,22 @@ pub fn expected_error(fit: &HandEyeFit, distance: f64) -> ExpectedError {
     let mut by_chain = SMatrix::<f64, 3, 12>::zeros();
     by_chain.fixed_view_mut::<3, 3>(0, 0).copy_from(&Mat3::identity());
     by_chain.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew(&(rotation * point)));
-    let c = by_chain * fixed(&fit.covariance_camera_exact) * by_chain.transpose();
-    let by_camera = by_chain * fit.by_camera + rotation * seen_by_camera(fit, &point);
-    let from_camera = by_camera * fit.camera_covariance * by_camera.transpose();
-    ExpectedError { whole: (c + from_camera).trace().max(0.0).sqrt(), from_camera: from_camera.trace().max(0.0).sqrt() }
+    let by_ray = rotation * seen_by_camera(fit, &point);
+    // What the given camera's error makes, and what pixels and robot make beside it.
+    let follows = fit.by_camera * fit.by_camera.transpose();
+    let rest = by_chain * (fixed(&fit.covariance) - follows) * by_chain.transpose();
+    let by_given = by_chain * fit.by_camera + by_ray * fit.given.root;
+    let from_camera = (by_given * by_given.transpose()).trace();
+    let mut by_all = DMatrix::<f64>::zeros(3, 21);
+    by_all.view_mut((0, 0), (3, 12)).copy_from(&by_chain);
+    by_all.view_mut((0, 12), (3, 9)).copy_from(&by_ray);
+    let joint = (&by_all * &fit.joint_covariance * by_all.transpose()).trace();
+    let root = |x: f64| x.max(0.0).sqrt();
+    ExpectedError {
+        whole: root(rest.trace() + from_camera),
+        from_camera: root(from_camera),
+        with_joint_camera: root(joint),
+    }
 }
 
 /// How the point that a pixel and a depth stand for moves with the camera's parameters.

@@ -3,10 +3,12 @@
 //! Frame and unit: near = what carries the camera; mm, degrees, px.
 
 use super::hand_eye::HandEyeFit;
+use super::hand_eye_camera::ray_error_px;
 use super::hand_eye_checks::belongs_to;
 use super::hand_eye_closed::{Pair, axis_spread};
 use super::hand_eye_expected::{ExpectedError, expected_error};
 use super::limits::{Judgement, Limits, rms};
+use super::measured_pose::change_between;
 use super::report::{Page, axis_sphere, bars};
 use crate::geometry::{Vec3, log};
 use crate::rig::{Covariance, Quality, Verdict};
@@ -25,7 +27,8 @@ pub fn judge(fit: &HandEyeFit, pairs: &[Pair], limits: &Limits) -> Quality {
     let used: Vec<&Pair> = pairs.iter().zip(&fit.pairs).filter(|(_, r)| r.used).map(|(p, _)| p).collect();
     let spread = axis_spread(&used);
     let [first, second, third] = spread.map(|s| s.1.to_degrees());
-    let ExpectedError { whole: expected, from_camera: camera_part } = expected_error(fit, limits.middle());
+    let ExpectedError { whole: expected, from_camera: camera_part, with_joint_camera } =
+        expected_error(fit, limits.middle());
     let sigma = |i: usize| fit.covariance[(i, i)].max(0.0).sqrt();
     let holdout_mm = rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.holdout_mm));
     let holdout_px = rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.holdout_px));
@@ -54,6 +57,29 @@ pub fn judge(fit: &HandEyeFit, pairs: &[Pair], limits: &Limits) -> Quality {
         fit.noise.robot_mm,
         fit.noise.robot_rad.to_degrees()
     ));
+    let change = change_between(&fit.camera, &fit.joint_camera);
+    let moved = ray_error_px(&fit.camera, &(change * change.transpose()));
+    let before = ray_error_px(&fit.camera, &fit.given.covariance());
+    let after = ray_error_px(&fit.camera, &fit.joint_covariance.fixed_view::<9, 9>(12, 12).into());
+    let (surprise, freedom) = fit.camera_surprise;
+    if before > 0.0 {
+        j.reasons.push(format!(
+            "the camera was solved along, its calibration as what is known beforehand: its viewing rays move by {moved:.3} px, \
+             known to {before:.3} px before and {after:.3} px after; the station's camera stays as it is"
+        ));
+    }
+    // One good set in some thousands [wilson31]: a chi-square variable over its freedom, to the third root, is normal.
+    let changed = freedom > 0.0
+        && ((surprise / freedom).cbrt() - 1.0 + 2.0 / (9.0 * freedom)) / (2.0 / (9.0 * freedom)).sqrt() > 3.7;
+    j.at_best(Verdict::Usable, changed, || {
+        format!(
+            "the camera is not the one that was calibrated: the boards in these pictures want another, squared distance {surprise:.0}, \
+             {freedom:.0} expected; focus, zoom or the board's description changed"
+        )
+    });
+    j.advise(changed, || {
+        "calibrate the camera again with its present focus, and compare the boards' descriptions".into()
+    });
     let name = |v: &Vec3| format!("({:.2}, {:.2}, {:.2})", v.x, v.y, v.z);
     let (weak, axis) = if second < 12.0 { (second, spread[1].0) } else { (third, spread[2].0) };
     j.advise(weak < 12.0, || {
@@ -71,10 +97,18 @@ pub fn judge(fit: &HandEyeFit, pairs: &[Pair], limits: &Limits) -> Quality {
     j.advise(camera_part >= 0.7 * expected && j.verdict != Verdict::Good, || {
         "calibrate the camera with more pictures first: most of the error comes from it".into()
     });
+    let camera_figures = [
+        ("camera_change_px", moved),
+        ("camera_known_before_px", before),
+        ("camera_known_after_px", after),
+        ("camera_surprise", surprise),
+        ("camera_surprise_expected", freedom),
+    ];
     let t = fit.chain.far_from_board.translation;
-    let figures = BTreeMap::from([
+    let mut figures = BTreeMap::from([
         ("expected_error_at_working_distance_mm".to_string(), expected),
         ("expected_error_from_camera_mm".into(), camera_part),
+        ("expected_error_with_joint_camera_mm".into(), with_joint_camera),
         ("working_distance_mm".into(), limits.middle()),
         ("rms_px".into(), rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.px))),
         ("rms_mm".into(), rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.mm))),
@@ -94,6 +128,9 @@ pub fn judge(fit: &HandEyeFit, pairs: &[Pair], limits: &Limits) -> Quality {
         ("board_y_mm".into(), t.y),
         ("board_z_mm".into(), t.z),
     ]);
+    if before > 0.0 {
+        figures.extend(camera_figures.map(|(name, value)| (name.to_string(), value)));
+    }
     Quality {
         verdict: j.verdict,
         reasons: j.reasons,

@@ -1,13 +1,14 @@
 //! In: a chain, pairs, noise. Out: the steps between seen and expected boards with their derivatives and
 //! covariance, and the chain that makes them least.
-//! Frame and unit: see `hand_eye_closed`; mm, rad (docs/math.md, Hand-eye (6), (7)).
+//! Frame and unit: see `hand_eye_closed`; mm, rad (docs/math.md, Hand-eye (6), (7), (9)).
 
 use super::hand_eye::{Mount, Noise};
+use super::hand_eye_camera::CameraBelief;
 use super::hand_eye_closed::{Chain, Pair};
 use super::measured_pose::step_between;
 use crate::geometry::{Mat3, Rigid, Vec3, exp, skew};
 use crate::solve::{LmOptions, Problem, Residuals, Stop, lm};
-use nalgebra::{DMatrix, Matrix6, SMatrix};
+use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
 
 /// Steps of one pair by the 12 unknowns, at the present chain.
 pub(super) fn jacobian(chain: &Chain, pair: &Pair) -> (SMatrix<f64, 6, 1>, SMatrix<f64, 6, 12>) {
@@ -48,34 +49,76 @@ pub(super) fn step_covariance(chain: &Chain, pair: &Pair, noise: &Noise, mount: 
 }
 
 /// The refinement: the robot's true poses are eliminated in closed form, which leaves whitened
-/// steps of six numbers a pair (docs/math.md, Hand-eye (6), (7)).
+/// steps of six numbers a pair, and nine numbers of the camera (docs/math.md, Hand-eye (6), (7), (9)).
 struct Refinement<'a> {
     pairs: &'a [&'a Pair],
     /// Inverse Cholesky factors of the steps' covariances.
     whiteners: Vec<Matrix6<f64>>,
+    camera: &'a CameraBelief,
+}
+
+/// Unknowns: twelve of the chain, nine of the camera.
+pub(super) const UNKNOWNS: usize = 21;
+
+/// A refined chain with the camera that goes with it.
+pub(super) struct Refined {
+    pub chain: Chain,
+    /// The camera's z in its belief.
+    pub z: SVector<f64, 9>,
+    /// Of the chain's twelve numbers and the camera's z.
+    pub covariance: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
+    pub cost: f64,
+}
+
+/// Steps from the boards, as the camera `mean + root z` would have seen them, to the expected ones, with
+/// derivatives by all unknowns.
+pub(super) fn with_camera(
+    chain: &Chain,
+    z: &SVector<f64, 9>,
+    pair: &Pair,
+    camera: &CameraBelief,
+) -> (Vector6<f64>, SMatrix<f64, 6, UNKNOWNS>) {
+    let (e, j) = jacobian(chain, pair);
+    let follow = pair.seen.by_intrinsics;
+    let mut all = SMatrix::<f64, 6, UNKNOWNS>::zeros();
+    all.fixed_columns_mut::<12>(0).copy_from(&j);
+    all.fixed_columns_mut::<9>(12).copy_from(&-(follow * camera.root));
+    (e - follow * (camera.mean + camera.root * z), all)
 }
 
 impl Problem for Refinement<'_> {
-    type State = Chain;
+    type State = (Chain, SVector<f64, 9>);
     fn width(&self) -> usize {
-        12
+        UNKNOWNS
     }
-    fn moved(&self, c: &Chain, s: &[f64]) -> Chain {
+    fn moved(&self, (c, z): &Self::State, s: &[f64]) -> Self::State {
         let v = |i: usize| Vec3::new(s[i], s[i + 1], s[i + 2]);
-        Chain {
+        let chain = Chain {
             near_from_camera: Rigid::new(
                 exp(&v(3)) * c.near_from_camera.rotation,
                 c.near_from_camera.translation + v(0),
             ),
             far_from_board: Rigid::new(exp(&v(9)) * c.far_from_board.rotation, c.far_from_board.translation + v(6)),
-        }
+        };
+        (chain, z + SVector::from_column_slice(&s[12..]))
     }
-    fn residuals(&self, chain: &Chain, out: &mut Residuals) -> Option<()> {
-        const ALL: [usize; 12] = [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
+    fn residuals(&self, (chain, z): &Self::State, out: &mut Residuals) -> Option<()> {
+        const ALL: [usize; UNKNOWNS] = {
+            let mut all = [0; UNKNOWNS];
+            let mut i = 0;
+            while i < UNKNOWNS {
+                all[i] = i;
+                i += 1;
+            }
+            all
+        };
         for (pair, w) in self.pairs.iter().zip(&self.whiteners) {
-            let (e, j) = jacobian(chain, pair);
+            let (e, j) = with_camera(chain, z, pair, self.camera);
             let r = w * e;
             out.group(r.as_slice(), &ALL, (w * j).transpose().as_slice());
+        }
+        for i in 0..9 {
+            out.prior(&[z[i]], &[12 + i], &[1.0]);
         }
         Some(())
     }
@@ -86,15 +129,17 @@ pub(super) fn refine(
     start: &Chain,
     noise: &Noise,
     mount: Mount,
-) -> Option<(Chain, DMatrix<f64>, f64)> {
+    camera: &CameraBelief,
+) -> Option<Refined> {
     let whiteners = pairs
         .iter()
         .map(|p| step_covariance(start, p, noise, mount).cholesky()?.l().try_inverse())
         .collect::<Option<Vec<_>>>()?;
-    let found = lm(&Refinement { pairs, whiteners }, *start, &LmOptions::default());
+    let found = lm(&Refinement { pairs, whiteners, camera }, (*start, SVector::zeros()), &LmOptions::default());
     if found.stop == Stop::BadStart {
         return None;
     }
     let cost = found.lengths.iter().map(|l| l * l).sum();
-    Some((found.state, found.covariance?, cost))
+    let covariance = found.covariance?.fixed_view::<UNKNOWNS, UNKNOWNS>(0, 0).into();
+    Some(Refined { chain: found.state.0, z: found.state.1, covariance, cost })
 }

@@ -10,7 +10,7 @@ use super::zhang::{Seen, first_camera};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Board, Camera, Mat3, Rigid, Vec2, Vec3};
-use crate::solve::{LmOptions, Loss, Problem, Residuals, Solution, Stop, lm};
+use crate::solve::{Blocks, LmOptions, Loss, Problem, Residuals, Solution, Stop, lm};
 use nalgebra::{DMatrix, Matrix2x6, SMatrix};
 
 /// A picture of a board: its name for messages, the board's features, what was seen of them.
@@ -114,6 +114,9 @@ impl Problem for Bundle<'_> {
     type State = State;
     fn width(&self) -> usize {
         INTRINSICS + 6 * self.pictures.len()
+    }
+    fn blocks(&self) -> Option<Blocks> {
+        Some(Blocks { first: INTRINSICS, size: 6 })
     }
     fn moved(&self, (k, poses): &State, step: &[f64]) -> State {
         let k = std::array::from_fn(|i| k[i] + step[i]);

@@ -207,7 +207,10 @@ pub fn folds(k: &Intrinsics) -> bool {
 pub fn feature_bias(pictures: &[Observation], solved: &Solved) -> Vec<(usize, Vec2, f64, usize)> {
     let count = pictures.iter().flat_map(|o| o.view.points.iter().map(|p| p.feature_id + 1)).max().unwrap_or(0);
     let mut sums = vec![(Vec2::zeros(), 0.0, 0usize); count];
-    for ((o, residuals), pose) in pictures.iter().zip(&solved.residuals).zip(&solved.camera_from_board) {
+    // The ids of another board mean other places: the board of the first picture is the one that is judged.
+    let same = |o: &Observation| pictures.first().is_some_and(|first| o.features == first.features);
+    let each = pictures.iter().zip(&solved.residuals).zip(&solved.camera_from_board);
+    for ((o, residuals), pose) in each.filter(|((o, _), _)| same(o)) {
         for (p, (r, _)) in o.view.points.iter().zip(residuals) {
             let Some(q) = project(&solved.intrinsics, &pose.point(&o.features[p.feature_id])) else { continue };
             let by_board: Matrix2<f64> = q.by_point * pose.rotation.fixed_columns::<2>(0);

@@ -1,6 +1,6 @@
 //! In: the features of one picture of a board and the camera that took it. Out: the board's pose as
 //! a measurement: its information and how it moves with the camera's parameters.
-//! Frame and unit: camera_from_board, mm; features in px (docs/math.md, Board pose (1) to (4)).
+//! Frame and unit: camera_from_board, mm; features in px (docs/math.md, Board pose (1) to (5)).
 
 use super::boards::BoardView;
 use super::pose::board_pose;
@@ -18,6 +18,23 @@ pub const INTRINSIC_NAMES: [&str; 9] = ["fx_px", "fy_px", "cx_px", "cy_px", "k1"
 
 /// Change of six pose numbers by the nine camera parameters.
 pub type ByIntrinsics = SMatrix<f64, 6, 9>;
+
+/// What a picture's pixels say about the camera, its own pose left to them: a change d of the camera's parameters
+/// changes the sum of squared residuals, in units of the features' stated sigmas, by 2 gᵀd + dᵀAd.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AboutCamera {
+    /// A.
+    pub information: SMatrix<f64, 9, 9>,
+    /// g.
+    pub gradient: SVector<f64, 9>,
+}
+
+impl AboutCamera {
+    /// Says nothing.
+    pub fn silent() -> AboutCamera {
+        AboutCamera { information: SMatrix::zeros(), gradient: SVector::zeros() }
+    }
+}
 
 /// A small motion in the camera frame: translation (mm) then rotation vector (rad);
 /// a point P goes to exp(w) P + v.
@@ -59,6 +76,8 @@ pub struct MeasuredPose {
     pub information: Matrix6<f64>,
     /// Step of the pose per unit of each camera parameter.
     pub by_intrinsics: ByIntrinsics,
+    /// What the same pixels say about the camera.
+    pub about_camera: AboutCamera,
     /// rms of the feature residuals per coordinate, px.
     pub rms_px: f64,
     /// What the residuals say about the stated sigmas: the factor that makes them true.
@@ -167,25 +186,32 @@ pub fn measure(seen: &SeenBoard, camera: &Intrinsics, start: &Rigid<Camera, Boar
     }
     let pose = found.state;
     let (mut information, mut mixed, mut squares) = (Matrix6::zeros(), ByIntrinsics::zeros(), 0.0);
+    let mut about_camera = AboutCamera::silent();
     for (i, weight) in found.weights.iter().enumerate() {
         let p = pose.point(&seen.points[i]);
         let at = project(camera, &p).expect("in front of the camera at the solution");
         let j = at.by_point * point_by_step(&p);
+        let by_camera = at.by_intrinsics.fixed_columns::<9>(0);
         let w = weight / (seen.sigmas_px[i] * seen.sigmas_px[i]);
+        let r = at.pixel - seen.pixels[i];
         information += j.transpose() * j * w;
-        mixed += j.transpose() * at.by_intrinsics.fixed_columns::<9>(0) * w;
-        squares += (at.pixel - seen.pixels[i]).norm_squared();
+        mixed += j.transpose() * by_camera * w;
+        about_camera.information += by_camera.transpose() * by_camera * w;
+        about_camera.gradient += by_camera.transpose() * r * w;
+        squares += r.norm_squared();
     }
     let inverse = information.try_inverse().ok_or_else(|| {
         Fault::refused(format!("{}: the board's pose is not determined by its pixels", seen.name))
             .cause("the features lie on a line")
             .next("leave this picture out")
     })?;
+    about_camera.information -= mixed.transpose() * inverse * mixed;
     Ok(MeasuredPose {
         name: seen.name.clone(),
         camera_from_board: pose,
         information,
         by_intrinsics: -(inverse * mixed),
+        about_camera,
         rms_px: (squares / (2.0 * seen.points.len() as f64)).sqrt(),
         sigma_factor: found.sigma0,
         freedom: found.freedom,
@@ -241,4 +267,13 @@ pub fn changed(camera: &Intrinsics, d: &SVector<f64, 9>) -> Intrinsics {
         distortion: std::array::from_fn(|i| k[i] + d[4 + i]),
         ..*camera
     }
+}
+
+/// What leads from one camera's parameters to another's: the inverse of [`changed`].
+pub fn change_between(from: &Intrinsics, to: &Intrinsics) -> SVector<f64, 9> {
+    let vector = |c: &Intrinsics| {
+        let k = c.distortion;
+        SVector::<f64, 9>::from([c.fx, c.fy, c.cx, c.cy, k[0], k[1], k[2], k[3], k[4]])
+    };
+    vector(to) - vector(from)
 }

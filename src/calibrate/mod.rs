@@ -4,12 +4,15 @@
 pub mod board_print;
 pub mod boards;
 pub mod camera;
+mod camera_pictures;
 pub mod camera_report;
 pub mod components;
 pub mod hand_eye;
+pub mod hand_eye_camera;
 pub mod hand_eye_checks;
 pub mod hand_eye_closed;
 pub mod hand_eye_expected;
+mod hand_eye_noise;
 pub mod hand_eye_report;
 mod hand_eye_terms;
 pub mod hand_eye_turns;

@@ -50,11 +50,56 @@ impl BoardSpec {
     /// Reads a board's description file, as `sheetlight board` writes it.
     pub fn load(path: &Path) -> Result<BoardSpec> {
         let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
-        serde_json::from_str(&text).map_err(|e| {
+        let board: BoardSpec = serde_json::from_str(&text).map_err(|e| {
             Fault::input(format!("{}: is no board description: {e}", path.display()))
                 .cause("a misspelt key or a missing size")
                 .next("compare it with docs/file-formats.md, or write one with sheetlight board")
-        })
+        })?;
+        board.check().map_err(|e| e.at(path.display()))?;
+        Ok(board)
+    }
+
+    /// Refuses a board that cannot be.
+    pub(super) fn check(&self) -> Result<()> {
+        let (count, what, least, border) = match self {
+            BoardSpec::Chessboard { inner_corners, border_mm, .. } => (inner_corners, "inner corners", 2, border_mm),
+            BoardSpec::Charuco { squares, border_mm, .. } => (squares, "squares", 3, border_mm),
+            BoardSpec::Circles { dots, border_mm, .. } => (dots, "dots", 2, border_mm),
+        };
+        let refuse = |what: String| {
+            Err(Fault::input(what)
+                .cause("the board's description was typed by hand, or the unit is not mm")
+                .next("measure the board and correct its description"))
+        };
+        if let Some(n) = count.iter().find(|n| !(least..=1000).contains(*n)) {
+            return refuse(format!("the board has {n} {what} along a side, {least} to 1000 are allowed"));
+        }
+        let in_range = |v: f64| v > 0.0 && v <= 10_000.0;
+        // What is drawn in the cells must fit into them.
+        let (cell, name, drawn) = match self {
+            BoardSpec::Chessboard { square_mm, .. } => (*square_mm, "square_mm", None),
+            BoardSpec::Charuco { square_mm, marker_mm, .. } => {
+                (*square_mm, "square_mm", Some(("marker_mm", *marker_mm)))
+            }
+            BoardSpec::Circles { pitch_mm, diameter_mm, .. } => {
+                (*pitch_mm, "pitch_mm", Some(("diameter_mm", *diameter_mm)))
+            }
+        };
+        if !in_range(cell) {
+            return refuse(format!("the board's {name} is {cell}, above 0 and up to 10000 mm is allowed"));
+        }
+        if let Some((inner, v)) = drawn.filter(|(_, v)| !(*v > 0.0 && *v < cell)) {
+            return refuse(format!("the board's {inner} is {v}, above 0 and below {name} {cell} is allowed"));
+        }
+        if !(0.0..=10_000.0).contains(border) {
+            return refuse(format!("the board's border_mm is {border}, 0 to 10000 mm is allowed"));
+        }
+        match self {
+            BoardSpec::Chessboard { first_square, .. } if first_square != "black" && first_square != "white" => {
+                refuse(format!("the board's first_square is '{first_square}', 'black' or 'white' is allowed"))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Positions of the features in the board frame, row by row; their index is the feature's id.

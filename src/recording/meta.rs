@@ -141,6 +141,9 @@ impl Meta {
         if self.frames.is_empty() {
             return refuse("the recording has no frames".into(), "record at least one shot");
         }
+        for board in self.boards.iter().chain(&self.board) {
+            board.check()?;
+        }
         let boards = self.boards.len() + usize::from(self.board.is_some());
         for (i, f) in self.frames.iter().enumerate() {
             if f.laser.is_none() && f.ambient.is_none() {

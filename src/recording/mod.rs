@@ -33,8 +33,31 @@ impl Recording {
                 .cause("a recording is a folder with meta.json, pictures and poses")
                 .next("give the folder, not one of its files"));
         }
-        let meta = Meta::load(&folder.join("meta.json"))?;
+        let path = folder.join("meta.json");
+        if !path.exists() {
+            let files = std::fs::read_dir(folder).map_or(0, |entries| entries.count());
+            return Err(Fault::input(format!("{}: holds no meta.json; {files} other files", folder.display()))
+                .cause("an empty folder, pictures that nobody described, or the folder above the recording")
+                .next("write meta.json as docs/file-formats.md shows: the picture's size, the board, the frames"));
+        }
+        let meta = Meta::load(&path)?;
         Ok(Recording { folder: folder.to_owned(), meta, channel: Channel::default() })
+    }
+
+    /// Refuses a recording of the other beam, where meta.json says which one it shows.
+    pub fn shows(&self, wanted: Beam) -> Result<()> {
+        let name = |b: Beam| if b == Beam::Line { "line" } else { "pointer" };
+        match self.meta.beam.filter(|b| *b != wanted) {
+            None => Ok(()),
+            Some(other) => Err(Fault::input(format!(
+                "{}: its laser pictures show the {}, the {} is wanted here",
+                self.folder.display(),
+                name(other),
+                name(wanted)
+            ))
+            .cause("another recording was given, or two were exchanged")
+            .next(format!("give the recording of the {}, or correct 'beam' in its meta.json", name(wanted)))),
+        }
     }
 
     /// Reads one of the recording's pictures and checks its size against `meta.json`.

@@ -3,9 +3,10 @@
 //! Frame and unit: none; the caller's.
 
 use super::loss::robust_scale;
+use super::normal::{Blocks, Factor, Order, inverse};
 use super::{Loss, Residuals};
 use crate::fault::{Fault, Result};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// Something to minimise. A state lives where it likes (rotations included); a step is a vector of
 /// `width` numbers, and Jacobians are derivatives by such a step at zero.
@@ -18,6 +19,10 @@ pub trait Problem {
     /// Hands over all residuals at `state`. `None` where the state is impossible (a point behind
     /// the camera): the step that led there is shortened.
     fn residuals(&self, state: &Self::State, out: &mut Residuals) -> Option<()>;
+    /// Parameters that fall into blocks which share no residual: solved block by block, with the same result.
+    fn blocks(&self) -> Option<Blocks> {
+        None
+    }
 }
 
 /// Settings of [`lm`].
@@ -142,32 +147,29 @@ fn scale_at<P: Problem>(problem: &P, state: &P::State) -> f64 {
 
 fn minimise<P: Problem>(problem: &P, start: P::State, o: &LmOptions, scale: f64) -> (P::State, usize, Stop) {
     let n = problem.width();
-    let free: Vec<usize> = (0..n).filter(|i| !o.hold.contains(i)).collect();
+    let order = Order::new(n, &o.hold, problem.blocks());
+    let free = order.free();
     let evaluate = |state: &P::State, jacobian: bool| {
         let mut r = Residuals::new(n, o.loss, scale, jacobian);
         problem.residuals(state, &mut r)?;
+        r.settle();
         r.cost.is_finite().then_some(r)
     };
     let mut state = start;
     let Some(mut here) = evaluate(&state, true) else { return (state, 0, Stop::BadStart) };
     let (mut damping, mut growth) = (1e-4, 2.0);
     for iteration in 0..o.max_iterations {
-        let h = reduced(&here.hessian, &free);
-        let g = DVector::from_iterator(free.len(), free.iter().map(|&i| here.gradient[i]));
-        let floor = 1e-14 * h.diagonal().max();
+        let (h, g) = (&here.hessian, &here.gradient);
+        let floor = 1e-14 * free.iter().map(|&i| h[(i, i)]).fold(0.0, f64::max);
         let (next, gain, predicted) = loop {
-            let mut damped = h.clone();
-            for i in 0..free.len() {
-                damped[(i, i)] += damping * h[(i, i)].max(floor);
-            }
-            let tried = damped.cholesky().and_then(|c| {
-                let step = -c.solve(&g);
-                let mut full = vec![0.0; n];
-                free.iter().zip(step.iter()).for_each(|(&i, s)| full[i] = *s);
+            let extra = |i: usize| damping * h[(i, i)].max(floor);
+            let factor = Factor::new(&order, |i, j| if i == j { h[(i, i)] + extra(i) } else { h[(i, j)] });
+            let tried = factor.and_then(|f| {
+                let full: Vec<f64> = f.solve(g).iter().map(|s| -s).collect();
                 let next = problem.moved(&state, &full);
                 let cost = evaluate(&next, false)?.cost;
-                let scaled: f64 = (0..free.len()).map(|i| damping * h[(i, i)].max(floor) * step[i] * step[i]).sum();
-                Some((next, here.cost - cost, scaled - step.dot(&g)))
+                let predicted: f64 = free.iter().map(|&i| full[i] * (extra(i) * full[i] - g[i])).sum();
+                Some((next, here.cost - cost, predicted))
             });
             match tried {
                 Some(t) if t.1 >= 0.0 => break t,
@@ -196,14 +198,6 @@ fn minimise<P: Problem>(problem: &P, start: P::State, o: &LmOptions, scale: f64)
     (state, o.max_iterations, Stop::Exhausted)
 }
 
-/// The symmetric matrix of the free parameters, from the lower triangle of the whole.
-fn reduced(lower: &DMatrix<f64>, free: &[usize]) -> DMatrix<f64> {
-    DMatrix::from_fn(free.len(), free.len(), |a, b| {
-        let (i, j) = (free[a].max(free[b]), free[a].min(free[b]));
-        lower[(i, j)]
-    })
-}
-
 fn finish<P: Problem>(
     problem: &P,
     state: P::State,
@@ -213,15 +207,16 @@ fn finish<P: Problem>(
     stop: Stop,
 ) -> Solution<P::State> {
     let n = problem.width();
-    let free: Vec<usize> = (0..n).filter(|i| !o.hold.contains(i)).collect();
+    let order = Order::new(n, &o.hold, problem.blocks());
     let mut r = Residuals::new(n, o.loss, scale, true);
     let stop = if problem.residuals(&state, &mut r).is_none() { Stop::BadStart } else { stop };
+    r.settle();
     let measured =
         |f: &dyn Fn(&super::system::Group) -> f64| -> f64 { r.groups.iter().filter(|g| !g.prior).map(f).sum() };
     let count = measured(&|g| g.size as f64);
     let all: f64 = r.groups.iter().map(|g| g.size as f64).sum();
     let rms = (measured(&|g| g.length * g.length) / count.max(1.0)).sqrt();
-    let freedom = (all - free.len() as f64).max(0.0);
+    let freedom = (all - order.free().len() as f64).max(0.0);
     // Huber's covariance of an M-estimate with the correction for the weights' mean, so that
     // measurements that were set aside carry no information: docs/math.md, Least squares (5).
     let p = r.psi;
@@ -230,16 +225,8 @@ fn finish<P: Problem>(
     let variance = p.squared / measured_freedom * mean_weight / (mean_slope * mean_slope).max(1e-300);
     let sigma0 = if freedom > 0.0 { scale * variance.sqrt() } else { f64::NAN };
     // The hessian was built with residuals in units of `scale`.
-    let (covariance, condition) = inverse(&reduced(&r.hessian, &free));
-    let covariance = covariance.map(|c| {
-        let mut whole = DMatrix::zeros(n, n);
-        for (a, &i) in free.iter().enumerate() {
-            for (b, &j) in free.iter().enumerate() {
-                whole[(i, j)] = c[(a, b)] / (scale * scale);
-            }
-        }
-        whole
-    });
+    let (covariance, condition) = inverse(&order, &r.hessian);
+    let covariance = covariance.map(|c| c / (scale * scale));
     Solution {
         state,
         stop,
@@ -254,26 +241,6 @@ fn finish<P: Problem>(
     }
 }
 
-/// Inverse and reciprocal condition of a symmetric matrix, after scaling its diagonal to one.
-fn inverse(h: &DMatrix<f64>) -> (Option<DMatrix<f64>>, f64) {
-    let n = h.nrows();
-    if n == 0 {
-        return (Some(DMatrix::zeros(0, 0)), 1.0);
-    }
-    if (0..n).any(|i| h[(i, i)] <= 0.0 || !h[(i, i)].is_finite()) {
-        return (None, 0.0);
-    }
-    let d: Vec<f64> = (0..n).map(|i| 1.0 / h[(i, i)].sqrt()).collect();
-    let scaled = DMatrix::from_fn(n, n, |i, j| h[(i, j)] * d[i] * d[j]);
-    let Some(inv) = scaled.clone().cholesky().map(|c| c.inverse()) else { return (None, 0.0) };
-    let norm = |m: &DMatrix<f64>| m.column_iter().map(|c| c.iter().map(|x| x.abs()).sum::<f64>()).fold(0.0, f64::max);
-    let condition = 1.0 / (norm(&scaled) * norm(&inv));
-    if !(condition > 1e-14) {
-        return (None, condition);
-    }
-    (Some(DMatrix::from_fn(n, n, |i, j| inv[(i, j)] * d[i] * d[j])), condition)
-}
-
 /// Largest difference between a problem's gradient and central differences of its cost, relative
 /// to the gradient's largest entry: for tests of Jacobians. Use it away from the optimum.
 pub fn worst_jacobian_error<P: Problem>(problem: &P, state: &P::State, step: f64) -> f64 {
@@ -285,6 +252,7 @@ pub fn worst_jacobian_error<P: Problem>(problem: &P, state: &P::State, step: f64
     };
     let mut here = Residuals::new(n, Loss::Squares, 1.0, true);
     problem.residuals(state, &mut here).expect("a possible state");
+    here.settle();
     let mut worst: f64 = 0.0;
     for i in 0..n {
         let mut e = vec![0.0; n];

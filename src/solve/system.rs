@@ -17,6 +17,10 @@ pub struct Residuals {
     /// Per group: number of residuals, unscaled length, weight.
     pub(super) groups: Vec<Group>,
     pub(super) psi: Psi,
+    /// Sums of the groups that came last and touch the same columns: whole rows without a look at where they belong.
+    columns: Vec<usize>,
+    block: Vec<f64>,
+    block_gradient: Vec<f64>,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -48,6 +52,9 @@ impl Residuals {
             gradient: DVector::zeros(n),
             groups: Vec::new(),
             psi: Psi::default(),
+            columns: Vec::new(),
+            block: Vec::new(),
+            block_gradient: Vec::new(),
         }
     }
 
@@ -85,22 +92,36 @@ impl Residuals {
             return;
         }
         assert_eq!(j.len(), m * k, "a Jacobian of {m} residuals in {k} parameters");
+        if self.columns != columns {
+            self.settle();
+            self.columns.extend_from_slice(columns);
+            self.block.resize(k * k, 0.0);
+            self.block_gradient.resize(k, 0.0);
+        }
         let w = w * inv;
-        for (a, &ca) in columns.iter().enumerate() {
-            let mut g = 0.0;
-            for i in 0..m {
-                g += j[i * k + a] * r[i];
-            }
-            self.gradient[ca] += w * g;
-            for (b, &cb) in columns.iter().enumerate().take(a + 1) {
-                let mut h = 0.0;
-                for i in 0..m {
-                    h += j[i * k + a] * j[i * k + b];
-                }
-                // Only the lower triangle is filled; the order of columns is the caller's.
-                let (row, col) = if ca >= cb { (ca, cb) } else { (cb, ca) };
-                self.hessian[(row, col)] += w * h;
+        for (row, r) in j.chunks_exact(k).zip(r) {
+            let wr = w * r;
+            self.block_gradient.iter_mut().zip(row).for_each(|(g, x)| *g += wr * x);
+            for (sums, a) in self.block.chunks_exact_mut(k).zip(row) {
+                let wa = w * a;
+                sums.iter_mut().zip(row).for_each(|(h, b)| *h += wa * b);
             }
         }
+    }
+
+    /// Puts the last groups' sums into the equations: before they are read.
+    pub(super) fn settle(&mut self) {
+        let k = self.columns.len();
+        for (a, &ca) in self.columns.iter().enumerate() {
+            self.gradient[ca] += self.block_gradient[a];
+            for (b, &cb) in self.columns.iter().enumerate().take(a + 1) {
+                // Only the lower triangle is filled; the order of columns is the caller's.
+                let (row, col) = if ca >= cb { (ca, cb) } else { (cb, ca) };
+                self.hessian[(row, col)] += self.block[a * k + b];
+            }
+        }
+        self.columns.clear();
+        self.block.clear();
+        self.block_gradient.clear();
     }
 }

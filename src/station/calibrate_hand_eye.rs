@@ -9,8 +9,9 @@ use crate::calibrate::hand_eye_closed::Pair;
 use crate::calibrate::hand_eye_report::{covariance, judge, page};
 use crate::calibrate::hand_eye_turns::{read_with, resolve};
 use crate::calibrate::limits::Limits;
-use crate::calibrate::measured_pose::intrinsic_covariance;
+use crate::calibrate::measured_pose::{AboutCamera, intrinsic_covariance};
 use crate::calibrate::report::Page;
+use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Camera, Flange, Rigid};
 use crate::recording::Recording;
@@ -67,11 +68,17 @@ pub fn calibrate_hand_eye(
         };
         pairs.push(Pair { near_from_far: Rigid::new(r, t), seen: b.pose.clone() });
     }
+    let again = said_already(recording, camera, &mut pairs)?;
     let turned = one_origin(&mut pairs, &seen.found, run.solver.seed)?;
     let fit = solve(&pairs, run.mount, &intrinsic_covariance(&camera.covariance), &camera.value, &run.solver)?;
     let mut quality = judge(&fit, &pairs, &run.limits);
     quality.reasons.extend(seen.missing.iter().map(|(name, why)| format!("{name} was not used: {}", first_line(why))));
     quality.reasons.extend(turned);
+    if again > 0 {
+        quality.reasons.push(format!(
+            "{again} of these pictures are among those that the camera was calibrated with: what they say of it counts once"
+        ));
+    }
     let x = fit.chain.near_from_camera;
     let pose_name = run.poses.clone().or(recording.meta.pose_file.clone()).unwrap_or_default();
     let sources = |c: &mut std::collections::BTreeMap<String, String>| -> Result<()> {
@@ -100,6 +107,20 @@ pub fn calibrate_hand_eye(
             HandEyeResult::InBase(Calibrated { calibration, page, missing: seen.missing })
         }
     })
+}
+
+/// Pictures that went into the camera's calibration have said what they know of the camera: here they speak of the
+/// board's pose alone. Returns how many there are.
+fn said_already(recording: &Recording, camera: &Calibration<Intrinsics>, pairs: &mut [Pair]) -> Result<usize> {
+    let known: std::collections::BTreeSet<&String> = camera.inputs.values().collect();
+    let mut count = 0;
+    for pair in pairs {
+        if known.contains(&crate::rig::hash_file(&recording.folder.join(&pair.seen.name))?) {
+            pair.seen.about_camera = AboutCamera::silent();
+            count += 1;
+        }
+    }
+    Ok(count)
 }
 
 /// Reads a board that looks the same after a turn alike in all pictures, and says so.

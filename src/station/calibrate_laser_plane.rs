@@ -13,7 +13,7 @@ use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Camera, Plane, Rigid, Vec2, Vec3};
 use crate::raster::Image;
-use crate::recording::Recording;
+use crate::recording::{Beam, Recording};
 use crate::rig::{Calibration, Rig, hash_file, hash_text};
 use crate::scan::{Engine, Extraction, Format, Optical, Processor, Where};
 use crate::stages::point;
@@ -40,6 +40,7 @@ pub fn calibrate_laser_plane(
     run.limits.check()?;
     run.solver.check()?;
     let camera = rig.need_camera()?;
+    recording.shows(Beam::Line)?;
     let Boards { found, mut missing } = boards(recording, &camera.value, progress)?;
     let mut seen: Vec<FrameBoard> = Vec::new();
     let mut images = Vec::new();

@@ -11,7 +11,7 @@ use crate::calibrate::pointer_report::{covariance, judge, page};
 use crate::calibrate::spot::{SpotOptions, SpotPicture, find_spots, hot_pixels};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Camera, Ray};
-use crate::recording::Recording;
+use crate::recording::{Beam, Recording};
 use crate::rig::{Calibration, Rig, hash_file, hash_text};
 
 /// How [`calibrate_pointer`] is run.
@@ -33,6 +33,7 @@ pub fn calibrate_pointer(
     run.limits.check()?;
     run.solver.check()?;
     let camera = rig.need_camera()?;
+    recording.shows(Beam::Pointer)?;
     let Boards { found, mut missing } = boards(recording, &camera.value, progress)?;
     let mut pictures = Vec::new();
     for b in found {

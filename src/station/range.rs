@@ -9,7 +9,7 @@ use crate::calibrate::pointer_range::{
 use crate::calibrate::spot::{Spot, SpotOptions, SpotPicture, find_spots, hot_pixels};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Mat3, Rigid, Tool, Vec3};
-use crate::recording::Recording;
+use crate::recording::{Beam, Recording};
 use crate::rig::Rig;
 use nalgebra::SMatrix;
 
@@ -88,6 +88,7 @@ pub fn measure_range(recording: &Recording, rig: &Rig, run: &RangeRun) -> Result
         return Err(Fault::usage(format!("max_off_beam is {}, 3 to 100 sigmas are allowed", run.max_off_beam)));
     }
     let (camera, pointer) = (rig.need_camera()?, rig.need_pointer()?);
+    recording.shows(Beam::Pointer)?;
     let joint = joint_covariance(&pointer.covariance);
     let has_poses = run.poses.is_some() || recording.meta.pose_file.is_some();
     let poses = if has_poses { Some(recording.poses(run.poses.as_deref())?) } else { None };

@@ -345,5 +345,12 @@ pub fn load_report(scan: &Path) -> Result<ScanReport> {
 
 /// The points of a finished scan, streamed.
 pub fn cloud_of(scan: &Path) -> Result<Vec<CloudPoint>> {
+    if !scan.join("cloud.ply").exists() {
+        let recording = scan.join("meta.json").exists();
+        let cause = if recording { "it is a recording, not a scan" } else { "another folder was given" };
+        return Err(Fault::input(format!("{}: holds no cloud.ply", scan.display()))
+            .cause(cause)
+            .next("give the folder that sheetlight scan wrote with --out"));
+    }
     crate::scan::read_cloud(&scan.join("cloud.ply"))
 }

@@ -17,12 +17,15 @@ use std::path::PathBuf;
 ///
 /// Needs 10 to 20 pictures with the board tilted by 20 to 40 degrees in different directions and
 /// reaching into the picture's corners. The board's description is in the recording's meta.json.
+/// Several recordings of the same camera, of other boards too, are solved together.
 #[derive(clap::Args)]
-#[command(after_help = "Example:
-  sheetlight calibrate camera recordings/boards --station cell3")]
+#[command(after_help = "Examples:
+  sheetlight calibrate camera recordings/boards --station cell3
+  sheetlight calibrate camera recordings/boards recordings/handeye --station cell3")]
 pub struct Args {
-    /// Recording folder with meta.json
-    recording: PathBuf,
+    /// Recording folders with meta.json
+    #[arg(required = true)]
+    recordings: Vec<PathBuf>,
     /// Station folder that gets the calibration
     #[arg(long)]
     station: PathBuf,
@@ -44,21 +47,18 @@ pub struct Args {
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let settings = Settings::load(&args.station)?;
-    let mut recording = Recording::open(&args.recording)?;
-    recording.channel = args.channel;
+    let mut recordings = args.recordings.iter().map(|r| Recording::open(r)).collect::<Result<Vec<_>>>()?;
+    recordings.iter_mut().for_each(|r| r.channel = args.channel);
     let volume = &settings.working_volume;
     let options = CameraOptions {
         solve: SolveOptions { lens: args.lens, skew: args.skew, ..SolveOptions::default() },
         working_distance_mm: Some(args.working_distance_mm.unwrap_or((volume.near_mm + volume.far_mm) / 2.0)),
         ..CameraOptions::default()
     };
-    let bar = console.bar("finding boards", recording.meta.frames.len() as u64);
-    let mut result = calibrate(&recording, &options, &|done, _| bar.set_position(done as u64))?;
+    let pictures: usize = recordings.iter().map(|r| r.meta.frames.len()).sum();
+    let bar = console.bar("finding boards", pictures as u64);
+    let result = calibrate(&recordings, &options, &|done, _| bar.set_position(done as u64))?;
     bar.finish_and_clear();
-    result.calibration = result.calibration.with_input(&args.recording.join("meta.json"))?;
-    for o in &result.used {
-        result.calibration = result.calibration.with_input(&args.recording.join(&o.name))?;
-    }
     let page = page(&result, &format!("Camera calibration of {}", settings.name));
     finish(&args.station, &result.calibration, &page, &parameters(&result), &args.keep, console)
 }

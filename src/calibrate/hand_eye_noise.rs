@@ -1,0 +1,113 @@
+//! In: pairs of robot poses and boards, a start. Out: the chain, the camera that goes with it and the robot's noise,
+//! each fitted to the others.
+//! Frame and unit: see `hand_eye_closed`; mm, rad (docs/math.md, Hand-eye (6) to (9)).
+
+use super::components::Components;
+use super::hand_eye::{HandEyeOptions, Mount, Noise};
+use super::hand_eye_camera::{CameraBelief, Sharpened};
+use super::hand_eye_closed::{Chain, Pair};
+use super::hand_eye_terms::{Refined, refine, robot_parts, with_camera};
+use nalgebra::{DMatrix, DVector, SVector};
+
+/// One round of variance components at a fitted chain.
+///
+/// The camera's own error moves all boards together; it is part of the known covariance, so that
+/// it is not taken for noise of the robot.
+fn components(
+    pairs: &[&Pair],
+    chain: &Chain,
+    noise: &Noise,
+    mount: Mount,
+    camera: &CameraBelief,
+    o: &HandEyeOptions,
+) -> Option<Noise> {
+    let n = pairs.len() * 6;
+    let mut model = Components {
+        residual: DVector::zeros(n),
+        jacobian: DMatrix::zeros(n, 12),
+        known: DMatrix::zeros(n, n),
+        parts: Vec::new(),
+    };
+    let mut parts = [DMatrix::zeros(n, n), DMatrix::zeros(n, n)];
+    let mut by_camera = DMatrix::zeros(n, 9);
+    for (i, pair) in pairs.iter().enumerate() {
+        let (e, j) = with_camera(chain, &SVector::zeros(), pair, camera);
+        let at = 6 * i;
+        model.residual.rows_mut(at, 6).copy_from(&e);
+        model.jacobian.view_mut((at, 0), (6, 12)).copy_from(&j.fixed_columns::<12>(0));
+        by_camera.view_mut((at, 0), (6, 9)).copy_from(&j.fixed_columns::<9>(12));
+        let mut known = pair.seen.covariance(noise.feature_factor);
+        let [t, r] = robot_parts(&mount.flange(chain, &pair.near_from_far));
+        for (k, (part, given)) in
+            [(t, o.robot_sigma_mm), (r, o.robot_sigma_deg.map(f64::to_radians))].into_iter().enumerate()
+        {
+            match given {
+                Some(s) => known += part * (s * s),
+                None => parts[k].view_mut((at, at), (6, 6)).copy_from(&part),
+            }
+        }
+        model.known.view_mut((at, at), (6, 6)).copy_from(&known);
+    }
+    model.known += &by_camera * by_camera.transpose();
+    // Below these the robot's noise no longer matters beside any camera's.
+    let (floor_mm, floor_rad) = (1e-4f64, 1e-6f64);
+    let (mut theta, mut floor) = (Vec::new(), Vec::new());
+    let mut estimated = Vec::new();
+    for (k, part) in parts.into_iter().enumerate() {
+        let (given, now, low) = [
+            (o.robot_sigma_mm.is_some(), noise.robot_mm, floor_mm),
+            (o.robot_sigma_deg.is_some(), noise.robot_rad, floor_rad),
+        ][k];
+        if !given {
+            model.parts.push(part);
+            theta.push(now * now);
+            floor.push(low * low);
+            estimated.push(k);
+        }
+    }
+    let mut out = Noise {
+        robot_mm: o.robot_sigma_mm.unwrap_or(noise.robot_mm),
+        robot_rad: o.robot_sigma_deg.map_or(noise.robot_rad, f64::to_radians),
+        ..*noise
+    };
+    if !theta.is_empty() {
+        let next = model.step(&theta, &floor)?;
+        for (k, t) in estimated.iter().zip(next) {
+            *[&mut out.robot_mm, &mut out.robot_rad][*k] = t.sqrt();
+        }
+    }
+    Some(out)
+}
+
+/// A fit of some pairs.
+pub(super) struct Fitted {
+    pub refined: Refined,
+    pub noise: Noise,
+    /// The camera after the pairs' pixels, before the robot's poses.
+    pub camera: Sharpened,
+}
+
+/// Alternates the fit and the noise until both stand still. `None` where something is not determined.
+pub(super) fn fit(
+    pairs: &[&Pair],
+    start: &Chain,
+    noise: Noise,
+    mount: Mount,
+    given: &CameraBelief,
+    o: &HandEyeOptions,
+) -> Option<Fitted> {
+    let camera = given.after(pairs, noise.feature_factor)?;
+    let (mut chain, mut noise) = (*start, noise);
+    for _ in 0..30 {
+        chain = refine(pairs, &chain, &noise, mount, &camera.belief)?.chain;
+        let next = components(pairs, &chain, &noise, mount, &camera.belief, o)?;
+        let settled = (next.robot_mm / noise.robot_mm - 1.0).abs() < 1e-3
+            && (next.robot_rad / noise.robot_rad - 1.0).abs() < 1e-3;
+        noise = next;
+        if settled {
+            break;
+        }
+    }
+    let refined = refine(pairs, &chain, &noise, mount, &camera.belief)?;
+    Some(Fitted { refined, noise, camera })
+}
