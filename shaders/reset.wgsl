@@ -1,10 +1,11 @@
 // In: the lists' headers of the former batch. Out: empty lists; at a further round of thinning (step 1)
-// the lists of tiles that may be lit, and of those that are, stay. Entries are 64 words apart. Each of those two
+// the lists of tiles that may be lit, and of those that are, stay. Entries are 64 words apart. Each of those
 // has a buffer of its own: no buffer can be both read for the size of a dispatch and written by it.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read_write> first: array<u32>;
 @group(0) @binding(2) var<storage, read_write> lit_first: array<u32>;
-@group(0) @binding(3) var<storage, read_write> others: array<u32>;
+@group(0) @binding(3) var<storage, read_write> runs: array<u32>;
+@group(0) @binding(4) var<storage, read_write> others: array<u32>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -12,6 +13,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var once = u32(id.x < 4u && frame.step == 0u); once > 0u; once--) {
         first[id.x] = empty[id.x];
         lit_first[id.x] = empty[id.x];
+        runs[id.x] = empty[id.x];
+        runs[64u + id.x] = empty[id.x];
     }
     for (var inside = u32(64u * id.x < arrayLength(&others)); inside > 0u; inside--) {
         others[64u * id.x] = 0u;

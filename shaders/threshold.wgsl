@@ -1,12 +1,13 @@
-// In: pictures, the tile list. Out: the pixels brighter than the mean of the window around them, inside the
+// In: pictures, a list of runs of tiles. Out: the pixels brighter than the mean of the window around them, inside the
 // picture and the region of interest only, twice: `mask` is thinned, `lit` stays; and the list of the tiles that
-// hold one, which all later stages work on. One invocation a tile: the sums of the columns that its
+// hold one, which all later stages work on. One invocation a run: the sums of the columns that its
 // windows touch are carried down its rows in registers, four words of pixels a load (a load costs as much as
 // ten additions and more). The radius is a constant of the pipeline, so that every index is one too.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> image: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> listing: array<u32>;
-@group(0) @binding(3) var<storage, read> list: array<u32>;
+// (first tile, number of tiles one below the other)
+@group(0) @binding(3) var<storage, read> list: array<vec2<u32>>;
 @group(0) @binding(4) var<storage, read> roi: array<vec4<u32>>;
 @group(0) @binding(5) var<storage, read_write> mask: array<vec4<u32>>;
 @group(0) @binding(6) var<storage, read_write> lit: array<vec4<u32>>;
@@ -126,55 +127,62 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let area = i32(frame.size * frame.size);
     let r = i32(radius);
     for (var inside = u32(id.x < listing[3]); inside > 0u; inside--) {
-        let tile = list[id.x];
-        let top = i32(8u * tile_y(tile));
-        let picture = tile_shot(tile) * (frame.shot_words / 4u);
+        let run = list[id.x];
+        let x = tile_x(run.x);
+        let shot = tile_shot(run.x);
+        let picture = shot * (frame.shot_words / 4u);
         let pitch = frame.pitch / 4u;
         let last_row = i32(frame.height) - 1;
-        let own_first = tile_x(tile) * (32u / per_load());
+        let own_first = x * (32u / per_load());
         let first = i32(own_first) - i32(beside());
         for (var i = 0u; i < 2u * loads(); i++) {
             sums[i] = vec4(0u);
         }
-        for (var y = top - r; y < top + r; y++) {
+        let begins = i32(8u * tile_y(run.x));
+        for (var y = begins - r; y < begins + r; y++) {
             pass_row(picture + u32(clamp(y, 0, last_row)) * pitch, first, 1u);
         }
-        let inner = min(frame.width - 32u * tile_x(tile), 32u);
+        let inner = min(frame.width - 32u * x, 32u);
         let wanted = 0xffffffffu >> (32u - inner);
-        var upper = vec4(0u);
-        var lower = vec4(0u);
-        for (var k = 0; k < 8; k++) {
-            pass_row(picture + u32(min(top + k + r, last_row)) * pitch, first, 1u);
-            let row = picture + u32(min(top + k, last_row)) * pitch + own_first;
-            for (var i = 0u; i < 32u / per_load(); i++) {
-                own[i] = image[row + i];
+        for (var t = 0u; t < run.y; t++) {
+            let ty = tile_y(run.x) + t;
+            let top = i32(8u * ty);
+            var upper = vec4(0u);
+            var lower = vec4(0u);
+            for (var k = 0; k < 8; k++) {
+                pass_row(picture + u32(min(top + k + r, last_row)) * pitch, first, 1u);
+                let row = picture + u32(min(top + k, last_row)) * pitch + own_first;
+                for (var i = 0u; i < 32u / per_load(); i++) {
+                    own[i] = image[row + i];
+                }
+                sum = (area - 1) / 2 + frame.offset * area + i32(early_sum());
+                bits = 0u;
+                eight_steps(0u, area);
+                eight_steps(8u, area);
+                eight_steps(16u, area);
+                eight_steps(24u, area);
+                bits = select(0u, bits & wanted, top + k <= last_row);
+                upper = select(upper, vec4(bits), vec4(k) == vec4(0, 1, 2, 3));
+                lower = select(lower, vec4(bits), vec4(k) == vec4(4, 5, 6, 7));
+                pass_row(picture + u32(clamp(top + k - r, 0, last_row)) * pitch, first, 0xffffffffu);
             }
-            sum = (area - 1) / 2 + frame.offset * area + i32(early_sum());
-            bits = 0u;
-            eight_steps(0u, area);
-            eight_steps(8u, area);
-            eight_steps(16u, area);
-            eight_steps(24u, area);
-            bits = select(0u, bits & wanted, top + k <= last_row);
-            upper = select(upper, vec4(bits), vec4(k) == vec4(0, 1, 2, 3));
-            lower = select(lower, vec4(bits), vec4(k) == vec4(4, 5, 6, 7));
-            pass_row(picture + u32(clamp(top + k - r, 0, last_row)) * pitch, first, 0xffffffffu);
-        }
-        for (var region = frame.flags & 2u; region != 0u; region = 0u) {
-            let at = tile_y(tile) * frame.tiles_x + tile_x(tile);
-            upper &= roi[2u * at];
-            lower &= roi[2u * at + 1u];
-        }
-        let at = tile_index(tile);
-        mask[2u * at] = upper;
-        mask[2u * at + 1u] = lower;
-        lit[2u * at] = upper;
-        lit[2u * at + 1u] = lower;
-        for (var some = u32(any((upper | lower) != vec4(0u))); some > 0u; some--) {
-            let place = atomicAdd(&lit_listing.count, 1u);
-            lit_list[place] = tile;
-            for (var group = u32(place % 64u == 0u); group > 0u; group--) {
-                atomicAdd(&lit_listing.groups, 1u);
+            for (var region = frame.flags & 2u; region != 0u; region = 0u) {
+                let at = ty * frame.tiles_x + x;
+                upper &= roi[2u * at];
+                lower &= roi[2u * at + 1u];
+            }
+            let tile = tile_pack(x, ty, shot);
+            let at = tile_index(tile);
+            mask[2u * at] = upper;
+            mask[2u * at + 1u] = lower;
+            lit[2u * at] = upper;
+            lit[2u * at + 1u] = lower;
+            for (var some = u32(any((upper | lower) != vec4(0u))); some > 0u; some--) {
+                let place = atomicAdd(&lit_listing.count, 1u);
+                lit_list[place] = tile;
+                for (var group = u32(place % 64u == 0u); group > 0u; group--) {
+                    atomicAdd(&lit_listing.groups, 1u);
+                }
             }
         }
     }

@@ -1,4 +1,5 @@
-// In: the bands of block statistics. Out: the list of tiles (32 x 8) that may hold a lit pixel.
+// In: the bands of block statistics. Out: the list of tiles (32 x 8) that may hold a lit pixel, and for every tile
+// whether it is in it.
 // For every block a lower bound on the window sums around all of its pixels is put together from the bands
 // near it: whole blocks that every window covers, and smallest columns for the rest. Where even the block's
 // largest pixel does not pass against that bound, none of its pixels can pass against its true mean: the
@@ -7,8 +8,9 @@
 @group(0) @binding(1) var<storage, read> stats: array<vec2<u32>>;
 @group(0) @binding(2) var<storage, read> bands: array<vec2<u32>>;
 @group(0) @binding(3) var<storage, read> roi: array<u32>;
-@group(0) @binding(4) var<storage, read_write> listing: Listing;
-@group(0) @binding(5) var<storage, read_write> list: array<u32>;
+@group(0) @binding(4) var<storage, read_write> listed: array<u32>;
+@group(0) @binding(5) var<storage, read_write> listing: Listing;
+@group(0) @binding(6) var<storage, read_write> list: array<u32>;
 
 // Half the window's edge, less a half: a constant, so that the loop over the blocks near is written out.
 override radius: u32 = 15u;
@@ -79,7 +81,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var r = 0u; r < select(0u, 8u, (frame.flags & 2u) != 0u); r++) {
         wanted |= roi[8u * (y * frame.tiles_x + x) + r];
     }
-    let inside = id.x < tiles && (wanted != 0u || (frame.flags & 2u) == 0u);
+    let inside = wanted != 0u || (frame.flags & 2u) == 0u;
     let all = (frame.flags & 1u) != 0u;
     let gaussian = (frame.flags & 4u) != 0u;
     let deep = vec2(depth_shift());
@@ -95,7 +97,10 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let least = darkest(i32(2u * x), i32(y), shot, go && gaussian) << deep.x;
     let over_any = largest - vec2(frame.offset) > vec2(i32(least));
     let lit = any(select(over_mean, over_any, vec2(gaussian)) & bright);
-    for (var once = u32(inside && (lit || all)); once > 0u; once--) {
+    // Invocations beyond the end repeat the last one: what they may not do is list it again.
+    let listed_here = u32(inside && (lit || all));
+    listed[i] = listed_here;
+    for (var once = select(0u, listed_here, id.x < tiles); once > 0u; once--) {
         let at = atomicAdd(&listing.count, 1u);
         list[at] = tile_pack(x, y, shot);
         for (var group = u32(at % 64u == 0u); group > 0u; group--) {

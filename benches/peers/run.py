@@ -39,9 +39,9 @@ def pictures(width, height, count, scene):
 
 
 def recorded(folder):
-    """The laser pictures of a recording, at most 16, spread over it."""
+    """The laser pictures of a recording, at most 32, spread over it."""
     names = sorted(n for n in os.listdir(folder) if n.startswith("laser") and n.endswith(".png"))
-    names = names[:: max(1, len(names) // 16)][:16]
+    names = names[:: max(1, len(names) // 32)][:32]
     return [cv2.imread(os.path.join(folder, n), cv2.IMREAD_GRAYSCALE) for n in names]
 
 
@@ -168,8 +168,8 @@ def clock(f, times=1):
 
 
 def compare(program, width, height, scene, rounds, images=None):
-    count = 16 if width * height < 5e5 else 4 if width * height < 5e6 else 2
-    batch = 16 if width * height < 5e5 else 4 if width * height < 5e6 else 1
+    count = 32 if width * height < 5e5 else 8 if width * height < 5e6 else 2
+    batch = 32 if width * height < 5e5 else 8 if width * height < 5e6 else 1
     images = images or pictures(width, height, count, scene)
     count = len(images)
     batch = min(batch, count)

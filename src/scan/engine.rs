@@ -111,7 +111,7 @@ impl Engine {
         self
     }
 
-    /// Skeleton pixels that found no room in the GPU's list: more than a tenth of the picture.
+    /// Skeleton pixels that found no room in the GPU's list: more than a twentieth of the pictures.
     pub fn cut(&self) -> u64 {
         self.cut
     }

@@ -258,7 +258,13 @@ impl<'a> Walk<'a> {
             ("first", vec![7; 4]),
             ("all_active", [7, 7, 0, 0, 0, 0, 0, 0].iter().flat_map(|&n| vec![n; header]).collect()),
             ("listing", vec![0, 1, 1, 0]),
+            ("listed", vec![7; tiles]),
             ("list", vec![0; tiles]),
+            ("single_listing", vec![0, 1, 1, 0]),
+            ("singles", vec![0; 2 * tiles]),
+            ("run_listing", vec![0, 1, 1, 0]),
+            ("runs", vec![0; 2 * tiles]),
+            ("runs_first", vec![7; 2 * header]),
             ("lit_listing", vec![0, 1, 1, 0]),
             ("lit_list", vec![0; tiles]),
             ("lit_first", vec![7; 4]),
@@ -317,7 +323,7 @@ impl<'a> Walk<'a> {
         }
         self.step(&stats::STAGE, stats::twin, &["image", "stats"], stats::groups(&f));
         self.step(&bands::STAGE, bands::twin, &["stats", "bands"], bands::groups(&f));
-        self.step(&tiles::STAGE, tiles::twin, &["stats", "bands", "roi", "listing", "list"], tiles::groups(&f));
+        self.step(&tiles::STAGE, tiles::twin, &["stats", "bands", "roi", "listed", "listing", "list"], tiles::groups(&f));
         let all = listed(&self.buffers, "listing");
         if f.flags & frame::GAUSSIAN != 0 {
             let names = ["image", "listing", "list", "weights", "quads"];
@@ -325,8 +331,13 @@ impl<'a> Walk<'a> {
             let names = ["listing", "list", "quads", "roi", "mask", "lit", "lit_listing", "lit_list"];
             self.step(&threshold::GATHER, threshold::gather_twin, &names, all);
         } else {
-            let names = ["image", "listing", "list", "roi", "mask", "lit", "lit_listing", "lit_list"];
-            self.step(&threshold::MEAN, threshold::mean_twin, &names, all);
+            let names = ["listing", "list", "listed", "single_listing", "singles", "run_listing", "runs"];
+            self.step(&runs::STAGE, runs::twin, &names, all);
+            for [listing, list] in [["single_listing", "singles"], ["run_listing", "runs"]] {
+                let groups = listed(&self.buffers, listing);
+                let names = ["image", listing, list, "roi", "mask", "lit", "lit_listing", "lit_list"];
+                self.step(&threshold::MEAN, threshold::mean_twin, &names, groups);
+            }
         }
         let all = listed(&self.buffers, "lit_listing");
         self.buffers.insert("active", self.buffers["lit_listing"].clone());
@@ -363,7 +374,7 @@ impl<'a> Walk<'a> {
             self.step(&listing::CLEAR, listing::clear_twin, &names, all);
         }
         self.frame.step = 1;
-        self.step(&listing::RESET, listing::reset_twin, &["first", "lit_first", "all_active"], [1, 1, 1]);
+        self.step(&listing::RESET, listing::reset_twin, &["first", "lit_first", "runs_first", "all_active"], [1, 1, 1]);
         std::mem::take(&mut self.captured)
     }
 }

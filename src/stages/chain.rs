@@ -58,9 +58,9 @@ impl ChainConfig {
             timed: false,
         }
     }
-    /// Batch that hides the fixed cost: about 5 megapixels, 1 to 16 shots.
+    /// Batch that hides the fixed cost: about 10 megapixels, 1 to 32 shots.
     pub fn shots_for(width: u32, height: u32) -> u32 {
-        (5_000_000 / (width * height).max(1)).clamp(1, 16)
+        (10_000_000 / (width * height).max(1)).clamp(1, 32)
     }
 }
 

@@ -91,8 +91,9 @@ impl Frame {
             flags: if p.window == Window::Gaussian { GAUSSIAN } else { 0 },
             rule: rule.number(),
             step: 0,
-            // One pixel in ten is more than a scene with a stripe ever gives; a small picture keeps all.
-            capacity: (width * height / 10).max((width * height).min(32768)) * shots,
+            // One skeleton pixel in twenty, over the whole batch, is more than a scene with a stripe ever gives: 24 lines
+            // across a picture of 480 rows. A small picture keeps all.
+            capacity: (width * height / 20).max((width * height).min(32768)) * shots,
             full_scale: (1 << bits) - 1,
             lengthen: 0,
         })

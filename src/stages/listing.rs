@@ -16,6 +16,7 @@ pub const RESET: Stage = Stage {
         Binding { name: "frame", access: Uniform },
         Binding { name: "first", access: ReadWrite },
         Binding { name: "lit_first", access: ReadWrite },
+        Binding { name: "runs", access: ReadWrite },
         Binding { name: "others", access: ReadWrite },
     ],
     uniform: frame::UNIFORM,
@@ -106,8 +107,9 @@ pub fn reset_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     if frame_of(b).step == 0 {
         b[1][..4].copy_from_slice(&EMPTY);
         b[2][..4].copy_from_slice(&EMPTY);
+        b[3].chunks_mut(HEADER_WORDS as usize).for_each(|h| h[..4].copy_from_slice(&EMPTY));
     }
-    b[3].chunks_mut(HEADER_WORDS as usize).for_each(|h| h[..4].copy_from_slice(&EMPTY));
+    b[4].chunks_mut(HEADER_WORDS as usize).for_each(|h| h[..4].copy_from_slice(&EMPTY));
 }
 
 pub fn clear_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {

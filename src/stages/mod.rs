@@ -16,6 +16,7 @@ pub mod measured;
 pub mod peak;
 pub mod point;
 mod recorded;
+mod runs;
 pub mod shape_frame;
 pub mod shape_maps;
 pub mod shape_sums;
@@ -49,6 +50,7 @@ pub fn all() -> Vec<Entry> {
         exact(&stats::STAGE, stats::twin, || cases::of("stats")),
         exact(&bands::STAGE, bands::twin, || cases::of("bands")),
         unordered(&tiles::STAGE, tiles::twin, || cases::of("tiles")),
+        Entry { compare: runs::apart, reason: UNORDERED, ..exact(&runs::STAGE, runs::twin, || cases::of("runs")) },
         unordered(&threshold::MEAN, threshold::mean_twin, || cases::of("threshold")),
         Entry {
             compare: threshold::pixels_apart,

@@ -3,7 +3,7 @@
 
 use super::chain::ChainConfig;
 use super::frame::{PX_LOG2, px_log2};
-use super::{Frame, Window, ambient, bands, lengthen, listing, skeleton, stats, thin, threshold, tiles};
+use super::{Frame, Window, ambient, bands, lengthen, listing, runs, skeleton, stats, thin, threshold, tiles};
 use crate::fault::Result;
 use crate::gpu::{Buffer, Device, Pipeline, Recording};
 
@@ -25,7 +25,12 @@ pub struct Shared {
     first: Buffer,
     lit_first: Buffer,
     active: Buffer,
+    /// Headers of the lists of tiles that stand alone, and of longer runs.
+    runs_first: Buffer,
+    listed: Buffer,
     list: Buffer,
+    singles: Buffer,
+    runs: Buffer,
     lit_list: Buffer,
     active_list: Buffer,
     weights: Buffer,
@@ -51,6 +56,7 @@ pub struct Pipelines {
     stats: Pipeline,
     bands: Pipeline,
     tiles: Pipeline,
+    runs: Pipeline,
     threshold: Pipeline,
     /// After the Gaussian window's threshold: the words of the mask.
     gather: Option<Pipeline>,
@@ -83,6 +89,7 @@ impl Pipelines {
             stats: build(&stats::STAGE)?,
             bands: build(&bands::STAGE)?,
             tiles: build(&tiles::STAGE)?,
+            runs: build(&runs::STAGE)?,
             threshold: build(match config.threshold.window {
                 Window::Mean => &threshold::MEAN,
                 Window::Gaussian => &threshold::GAUSSIAN,
@@ -143,7 +150,12 @@ impl Shared {
             first: words("first list's header", listing::HEADER_WORDS)?,
             lit_first: words("lit list's header", listing::HEADER_WORDS)?,
             active: words("other lists' headers", listing::HEADER_WORDS * SHORTEN.len() as u32)?,
+            runs_first: words("runs' headers", 2 * listing::HEADER_WORDS)?,
+            listed: words("listed", f.tiles())?,
             list: words("list", f.tiles())?,
+            singles: words("singles", 2 * f.tiles())?,
+            // Two tiles and more each.
+            runs: words("runs", f.tiles().max(2))?,
             lit_list: words("lit list", f.tiles())?,
             active_list: words("active list", f.tiles())?,
             weights,
@@ -174,8 +186,12 @@ impl Shared {
         (&self.lit_first, 0, 16)
     }
     /// All headers, to be emptied.
-    fn headers(&self) -> [Part<'_>; 3] {
-        [whole(&self.first), whole(&self.lit_first), whole(&self.active)]
+    fn headers(&self) -> [Part<'_>; 4] {
+        [whole(&self.first), whole(&self.lit_first), whole(&self.runs_first), whole(&self.active)]
+    }
+    /// The header of the list of tiles that stand alone (0), or of longer runs (1).
+    fn run(&self, n: u64) -> Part<'_> {
+        (&self.runs_first, STEP_BYTES * n, 16)
     }
     /// The header of the list after `n` shortenings, n >= 1.
     fn shortened(&self, n: u32) -> Part<'_> {
@@ -201,19 +217,25 @@ impl Shared {
         let clear =
             [zero, self.lit(), whole(&self.lit_list), mask, other, lit, whole(&self.stamps), whole(&self.counts)];
         r.indirect(device, &p.clear, &clear, (&self.lit_first, 0));
-        let [first, lit_first, active] = self.headers();
-        r.dispatch_parts(device, &p.reset, &[zero, first, lit_first, active], [1, 1, 1]);
+        let [first, lit_first, runs, active] = self.headers();
+        r.dispatch_parts(device, &p.reset, &[zero, first, lit_first, runs, active], [1, 1, 1]);
         r.dispatch_parts(device, &p.stats, &[zero, whole(image), whole(&self.stats)], stats::groups(f));
         let (stats, bands, roi) = (whole(&self.stats), whole(&self.bands), whole(&self.roi));
         r.dispatch_parts(device, &p.bands, &[zero, stats, bands], bands::groups(f));
-        let tiles = [zero, stats, bands, roi, self.all(), whole(&self.list)];
+        let listed = whole(&self.listed);
+        let tiles = [zero, stats, bands, roi, listed, self.all(), whole(&self.list)];
         r.dispatch_parts(device, &p.tiles, &tiles, tiles::groups(f));
         let (list, image) = (whole(&self.list), whole(image));
         let (lit_header, lit_list) = (self.lit(), whole(&self.lit_list));
         match &p.gather {
             None => {
-                let bindings = [zero, image, self.all(), list, roi, mask, lit, lit_header, lit_list];
-                r.indirect(device, &p.threshold, &bindings, all);
+                let lists = [whole(&self.singles), whole(&self.runs)];
+                let bindings = [zero, self.all(), list, listed, self.run(0), lists[0], self.run(1), lists[1]];
+                r.indirect(device, &p.runs, &bindings, all);
+                for (n, list) in (0..).zip(lists) {
+                    let bindings = [zero, image, self.run(n), list, roi, mask, lit, lit_header, lit_list];
+                    r.indirect(device, &p.threshold, &bindings, (&self.runs_first, STEP_BYTES * n));
+                }
             }
             Some(gather) => {
                 let quads = whole(&self.quads);
@@ -254,8 +276,8 @@ impl Shared {
         let mut r = Recording::default();
         let rebase = [self.step(STEPS), self.lit(), whole(&self.lit_list), whole(&self.stamps)];
         r.indirect(device, &p.rebase, &rebase, (&self.lit_first, 0));
-        let [first, lit_first, active] = self.headers();
-        r.dispatch_parts(device, &p.reset, &[self.step(1), first, lit_first, active], [1, 1, 1]);
+        let [first, lit_first, runs, active] = self.headers();
+        r.dispatch_parts(device, &p.reset, &[self.step(1), first, lit_first, runs, active], [1, 1, 1]);
         r
     }
 

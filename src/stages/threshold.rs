@@ -10,7 +10,7 @@ use crate::raster::{Image, Mask};
 /// Half the window's edge, less a half: a constant of the mean window's pipeline.
 pub const RADIUS: &str = "radius";
 
-/// Mean window.
+/// Mean window; its list holds runs of tiles ([`super::runs`]).
 pub const MEAN: Stage = Stage {
     name: "threshold",
     wgsl: include_str!("../../shaders/threshold.wgsl"),
@@ -256,14 +256,16 @@ pub fn mean_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     let p = f.threshold();
     let masks: Vec<Mask> = (0..f.shots).map(|s| twin(&padded_shot(&f, &b[1], overrides[0].1 as u32, s), &p)).collect();
     let [_, _, listing, list, roi, mask, lit, lit_listing, lit_list] = b else { unreachable!() };
-    for &tile in &list[..listing[3] as usize] {
-        let (tx, ty, shot) = tile_unpack(tile);
-        let bits = |row: u32| {
-            let y = 8 * ty + row;
-            let passes = |x: u32| 32 * tx + x < f.width && y < f.height && masks[shot as usize].get(32 * tx + x, y);
-            (0..32).filter(|&x| passes(x)).fold(0, |w, x| w | 1 << x)
-        };
-        store(&f, tile, bits, roi, [mask, lit, lit_listing, lit_list]);
+    for run in list.chunks_exact(2).take(listing[3] as usize) {
+        let (tx, first, shot) = tile_unpack(run[0]);
+        for ty in first..first + run[1] {
+            let bits = |row: u32| {
+                let y = 8 * ty + row;
+                let passes = |x: u32| 32 * tx + x < f.width && y < f.height && masks[shot as usize].get(32 * tx + x, y);
+                (0..32).filter(|&x| passes(x)).fold(0, |w, x| w | 1 << x)
+            };
+            store(&f, frame::tile_pack(tx, ty, shot), bits, roi, [mask, lit, lit_listing, lit_list]);
+        }
     }
 }
 

@@ -1,4 +1,5 @@
-//! In: bands of block statistics. Out: the list of tiles that may hold a lit pixel; the others are proven dark.
+//! In: bands of block statistics. Out: the list of tiles that may hold a lit pixel, and for every tile whether it is in
+//! it; the others are proven dark.
 //! Frame and unit: tiles of 32 x 8 pixels, blocks of 16 x 8.
 
 use super::bands::{Band, Cover};
@@ -17,6 +18,7 @@ pub const STAGE: Stage = Stage {
         Binding { name: "stats", access: Read },
         Binding { name: "bands", access: Read },
         Binding { name: "roi", access: Read },
+        Binding { name: "listed", access: ReadWrite },
         Binding { name: "listing", access: ReadWrite },
         Binding { name: "list", access: ReadWrite },
     ],
@@ -80,7 +82,7 @@ fn may_be_lit(f: &Frame, stats: &[u32], bands: &[u32], row: usize, x: i32) -> bo
 
 pub fn twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
-    let [_, stats, bands, roi, listing, list] = b else { unreachable!() };
+    let [_, stats, bands, roi, listed, listing, list] = b else { unreachable!() };
     for shot in 0..f.shots {
         for y in 0..f.tiles_y {
             for x in 0..f.tiles_x {
@@ -91,6 +93,7 @@ pub fn twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
                 let lit = f.flags & ALL_TILES != 0
                     || may_be_lit(&f, stats, bands, row, 2 * x as i32)
                     || may_be_lit(&f, stats, bands, row, 2 * x as i32 + 1);
+                listed[super::listing::tile_index(&f, tile)] = u32::from(wanted && lit);
                 if wanted && lit {
                     super::listing::append(listing, list, tile);
                 }

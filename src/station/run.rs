@@ -188,7 +188,7 @@ pub fn scan_on(
     )?;
     spent.products_s = products.elapsed().as_secs_f64();
     if scanner.cut() > 0 {
-        state.peaks.insert("beyond the list: more than a tenth of a picture lit".into(), scanner.cut());
+        state.peaks.insert("beyond the list: more than a twentieth of the pictures lit".into(), scanner.cut());
     }
     let report = ScanReport {
         format: 1,
