@@ -2,13 +2,14 @@
 //! (docs/math.md, Insertion (1)).
 //! Frame and unit: a correction in the part frame: z mm, turns about x and y rad.
 
+use super::drawing::Drawing;
 use super::drawn_edges::Face;
 use super::edge_index::EdgeIndex;
-use super::measure::MeasureOptions;
+use super::measure::{MeasureOptions, localise};
 use super::points::Ordered;
 use super::robust::robust;
 use crate::fault::{Fault, Result};
-use crate::geometry::Vec3;
+use crate::geometry::{Base, Part, Rigid, Vec3};
 use nalgebra::{Matrix3, Vector3};
 
 /// Fewer points do not give a datum.
@@ -19,6 +20,30 @@ pub(super) struct Datum {
     pub covariance: Matrix3<f64>,
     pub used: usize,
     pub sigma: f64,
+}
+
+/// A level start laid onto the part's faces. A long part rises by more than any gate from end to end at a degree of tilt:
+/// what lies at its ends can be told only afterwards. As it was where too few points lie on the faces.
+pub(super) fn laid(
+    points: &Ordered,
+    drawing: &Drawing,
+    start: Rigid<Base, Part>,
+    options: &MeasureOptions,
+) -> Rigid<Base, Part> {
+    // The gate grows along the part with each round's tilt.
+    const ROUNDS: usize = 4;
+    let (faces, edges) = (drawing.faces(), EdgeIndex::new(drawing));
+    let mut pose = start;
+    for _ in 0..ROUNDS {
+        let Ok(d) = fit_datum(points, &localise(points, drawing, &pose), &faces, &edges, options, 0) else { break };
+        pose = pose * moved(&d.step);
+    }
+    pose
+}
+
+/// A datum's correction as a motion.
+pub(super) fn moved(step: &Vector3<f64>) -> Rigid<Part, Part> {
+    Rigid::from_vectors(&Vec3::new(step.y, step.z, 0.0), Vec3::new(0.0, 0.0, step.x))
 }
 
 /// Height and tilt from the points inside the faces.

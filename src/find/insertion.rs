@@ -185,7 +185,7 @@ fn best_hypothesis(
     let mut kept: Option<(f64, Judged)> = None;
     let mut trouble = None;
     for found in std::iter::once(best.clone()).chain(rivals).chain(matches.iter().skip(1).cloned()).take(MOST) {
-        let start = slide(points, &drawing, lift(&found.pose, map, points, recipe));
+        let start = slide(points, &drawing, lift(&found.pose, map, points, recipe), &recipe.measure);
         let measured = match measure(points, &drawing, start, &recipe.measure) {
             Ok(measured) => measured,
             Err(e) => {
@@ -371,10 +371,7 @@ fn gates(
         out.push(most("disagreement_mm", d, g.max_disagreement_mm));
     }
     if g.turn_must_be_told {
-        for t in turns {
-            let share = t.votes_for as f64 / (t.votes_for + t.votes_against).max(1) as f64;
-            out.push(Gate { name: "turn told", value: share, limit: 0.8, passed: t.told() == Some(true) });
-        }
+        out.extend(turns.iter().map(TurnVote::gate));
     }
     out
 }

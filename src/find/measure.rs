@@ -3,7 +3,7 @@
 //! (docs/math.md, Insertion (1) to (4)).
 //! Frame and unit: base_from_part; mm, rad; covariance over x y z rx ry rz about the part's own axes.
 
-use super::datum::{Datum, fit_datum};
+use super::datum::{self, Datum, fit_datum};
 use super::drawing::Drawing;
 use super::edge_index::EdgeIndex;
 use super::in_plane::fit_edges;
@@ -97,8 +97,7 @@ pub fn measure(
     };
     let level = |pose: &mut Rigid<Base, Part>, round: usize| -> Result<Datum> {
         let datum = fit_datum(points, &localise(points, drawing, pose), &faces, &edges, options, round)?;
-        let [z, rx, ry] = [datum.step[0], datum.step[1], datum.step[2]];
-        *pose = *pose * Rigid::<Part, Part>::from_vectors(&Vec3::new(rx, ry, 0.0), Vec3::new(0.0, 0.0, z));
+        *pose = *pose * datum::moved(&datum.step);
         Ok(datum)
     };
     // Ends of surfaces lead to within some hundredths of a millimetre, the light of the samples beside them from there.

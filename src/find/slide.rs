@@ -3,7 +3,9 @@
 //! Frame and unit: part frame, mm. Long parallel edges fit at every shift (the aperture problem), so the
 //! search alone cannot tell; what lies at the part's ends can.
 
+use super::datum::laid;
 use super::drawing::Drawing;
+use super::measure::MeasureOptions;
 use super::points::Ordered;
 use crate::geometry::{Base, Part, Rigid, Vec3};
 
@@ -12,7 +14,7 @@ const LONG: f64 = 4.0;
 /// Shifts that are tried: this share of the length to both sides, this far apart (mm).
 const REACH: f64 = 0.3;
 const STEP: f64 = 0.5;
-/// A point this near to a face's height lies on it: the tilt is not known yet, mm.
+/// A point this near to a face's height lies on it: the tilt is known only roughly, mm.
 const GATE: f64 = 1.0;
 /// Points that vote.
 const VOTERS: usize = 3000;
@@ -28,9 +30,16 @@ pub fn long_axis(drawing: &Drawing) -> Option<usize> {
     }
 }
 
-/// The pose shifted along the part's long axis to where the points agree best; as it was for other parts.
-pub fn slide(points: &Ordered, drawing: &Drawing, start: Rigid<Base, Part>) -> Rigid<Base, Part> {
+/// The pose laid onto the part's faces and shifted along its long axis to where the points agree best; as it was for parts
+/// that are not long.
+pub fn slide(
+    points: &Ordered,
+    drawing: &Drawing,
+    start: Rigid<Base, Part>,
+    options: &MeasureOptions,
+) -> Rigid<Base, Part> {
     let Some(axis) = long_axis(drawing) else { return start };
+    let start = laid(points, drawing, start, options);
     let faces = drawing.faces();
     let b = drawing.bounds();
     let reach = REACH * (b[axis + 2] - b[axis]);

@@ -5,6 +5,7 @@
 use super::drawing::Drawing;
 use super::drawn_edges::Face;
 use super::edge_index::EdgeIndex;
+use super::insertion::Gate;
 use super::measure::{Measured, localise};
 use super::points::Ordered;
 use crate::geometry::{Base, Part, Rigid, Vec3};
@@ -118,17 +119,36 @@ pub struct TurnVote {
 }
 
 impl TurnVote {
+    /// Fewer votes tell nothing; a larger share of them decides.
+    const LEAST: usize = 6;
+    const SHARE: f64 = 0.8;
+
+    fn all(&self) -> usize {
+        self.votes_for + self.votes_against
+    }
+
+    fn share(&self) -> f64 {
+        self.votes_for as f64 / self.all().max(1) as f64
+    }
+
     /// `Some(true)`: the pose; `Some(false)`: the rival; `None`: not told.
     pub fn told(&self) -> Option<bool> {
-        const LEAST: usize = 6;
-        let all = self.votes_for + self.votes_against;
-        let share = self.votes_for as f64 / all.max(1) as f64;
-        match () {
-            () if all < LEAST => None,
-            () if share >= 0.8 => Some(true),
-            () if share <= 0.2 => Some(false),
-            () => None,
+        match self.share() {
+            _ if self.all() < Self::LEAST => None,
+            share if share >= Self::SHARE => Some(true),
+            share if share <= 1.0 - Self::SHARE => Some(false),
+            _ => None,
         }
+    }
+
+    /// The gate that asks for it: too few votes, or what they say.
+    pub fn gate(&self) -> Gate {
+        let (name, value, limit) = if self.all() < Self::LEAST {
+            ("points that tell the turn", self.all() as f64, Self::LEAST as f64)
+        } else {
+            ("turn told", self.share(), Self::SHARE)
+        };
+        Gate { name, value, limit, passed: self.told() == Some(true) }
     }
 }
 
