@@ -156,7 +156,7 @@ fn scan(part: &'static str, seed: u64) -> Scanned {
     station.laser.half_fan_deg = 12.0;
     let shaky = rng.random_bool(0.5);
     let (pose_mm, pose_deg) = if shaky { (0.02, 0.004) } else { (0.0, 0.0) };
-    let pitch: f64 = if long { 0.3 } else { rng.random_range(0.2..0.35) };
+    let pitch: f64 = if long { 0.45 } else { rng.random_range(0.2..0.35) };
     let folder = tempfile::tempdir().unwrap();
     station.store(folder.path()).unwrap();
     let rig = Rig::load(folder.path()).unwrap();
