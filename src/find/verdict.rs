@@ -89,8 +89,12 @@ pub fn judge(points: &Ordered, drawing: &Drawing, measured: &Measured, gate: f64
         .observations
         .iter()
         .filter(|o| o.weight > 0.0)
-        .map(|o| piece(o.x - o.residual * o.nx, o.y - o.residual * o.ny, o.shape))
-        .filter(|p| all.contains(p))
+        // By the drawing's own sample: a coordinate of an edge may lie between two pieces, where rounding decides.
+        .filter_map(|o| {
+            let (x, y) = (o.x - o.residual * o.nx, o.y - o.residual * o.ny);
+            edges.nearest(x, y, PIECE, |s| (s.shape, s.element) == (o.shape, o.element))
+        })
+        .map(|s| piece(s.x, s.y, s.shape))
         .collect();
     let share = |n: usize, of: usize| if of == 0 { 0.0 } else { n as f64 / of as f64 };
     let on_surface = share(on, inside);
