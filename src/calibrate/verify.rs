@@ -4,6 +4,7 @@
 
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Plane, Vec3, fit_plane};
+use rand::SeedableRng;
 
 /// One view of the flat surface against all views together.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -33,10 +34,33 @@ pub struct FlatCheck {
     pub own_rms_mm: f64,
 }
 
+/// The plane of most points, by least median of distances over drawn triples [rousseeuw84]: a scan that reaches over the
+/// plate's edge holds the table beside it too. 200 draws hit the plate where it is 40 % of the points or more in all but
+/// one case of 400,000.
+fn start(points: &[Vec3]) -> Option<Plane<Base>> {
+    let mut rng = rand_pcg::Pcg64::seed_from_u64(1);
+    let step = points.len().div_ceil(2000).max(1);
+    let mut best: Option<(f64, Plane<Base>)> = None;
+    for _ in 0..200 {
+        let drawn: Vec<Vec3> = rand::seq::index::sample(&mut rng, points.len(), 3).iter().map(|i| points[i]).collect();
+        let Some((plane, _)) = fit_plane::<Base>(&drawn) else { continue };
+        let mut off: Vec<f64> = points.iter().step_by(step).map(|p| plane.distance(p).abs()).collect();
+        let middle = off.len() / 2;
+        let (_, &mut median, _) = off.select_nth_unstable_by(middle, f64::total_cmp);
+        if best.as_ref().is_none_or(|b| median < b.0) {
+            best = Some((median, plane));
+        }
+    }
+    best.map(|b| b.1)
+}
+
 /// Plane through points, those beyond five robust sigmas left out.
 fn robust_plane(points: &[Vec3]) -> Option<(Plane<Base>, f64, Vec<Vec3>)> {
-    let mut kept = points.to_vec();
-    let mut plane = fit_plane::<Base>(&kept)?.0;
+    if points.len() < 3 {
+        return None;
+    }
+    let mut plane = start(points)?;
+    let mut kept = Vec::new();
     for _ in 0..8 {
         let mut off: Vec<f64> = points.iter().map(|p| plane.distance(p).abs()).collect();
         let limit = 5.0 * crate::solve::robust_scale(&mut off, 1).max(1e-6);
@@ -183,6 +207,22 @@ mod tests {
         let c = flat(&tilted).unwrap();
         assert!((c.largest_tilt_deg - 0.002f64.to_degrees()).abs() < 0.005 && c.height_range_mm < 1e-3, "{c:?}");
         assert!(flat(&views[..1]).is_err());
+    }
+
+    #[test]
+    fn the_table_beside_the_plate_is_not_the_plate() {
+        // A third of the points lie 20 mm lower, all on one side.
+        let view = |lift: f64| -> Vec<Vec3> {
+            (0..900)
+                .map(|i| {
+                    let (x, y) = (f64::from(i % 30) * 2.0, f64::from(i / 30) * 2.0);
+                    Vec3::new(x, y, if x > 40.0 { -20.0 } else { lift } + 0.01 * f64::from(i % 7 - 3))
+                })
+                .collect()
+        };
+        let c = flat(&[("a".to_string(), view(0.05)), ("b".to_string(), view(0.0))]).unwrap();
+        assert!((c.height_range_mm - 0.05).abs() < 2e-3 && c.largest_tilt_deg < 0.02, "{c:?}");
+        assert!(c.own_rms_mm < 0.03 && c.views.iter().all(|v| v.points < 640), "{c:?}");
     }
 
     #[test]
