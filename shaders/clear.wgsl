@@ -1,5 +1,4 @@
-// In: the list of lit tiles of the former batch. Out: what that batch wrote, zeroed; nothing else was. Stamps were
-// also written beside a listed tile.
+// In: the list of lit tiles of the former batch. Out: what that batch wrote, zeroed; nothing else was.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> listing: array<u32>;
 @group(0) @binding(2) var<storage, read> list: array<u32>;
@@ -21,14 +20,6 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         lit[2u * at] = none;
         lit[2u * at + 1u] = none;
         counts[at] = 0u;
-        let x = i32(tile_x(list[id.x]));
-        let y = i32(tile_y(list[id.x]));
-        let first = tile_shot(list[id.x]) * frame.tiles_y;
-        for (var dy = -1; dy <= 1; dy++) {
-            let row = (first + u32(clamp(y + dy, 0, i32(frame.tiles_y) - 1))) * frame.tiles_x;
-            for (var dx = -1; dx <= 1; dx++) {
-                stamps[row + u32(clamp(x + dx, 0, i32(frame.tiles_x) - 1))] = 0u;
-            }
-        }
+        stamps[at] = 0u;
     }
 }

@@ -1,5 +1,4 @@
-// In: the stamps after the recorded sub-iterations, where some tiles still change. Out: the same tiles
-// stamped as changed at the start of another round of them.
+// In: the stamps of a round of sub-iterations after which some tiles still change. Out: none: another round begins.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> listing: array<u32>;
 @group(0) @binding(2) var<storage, read> list: array<u32>;
@@ -8,7 +7,6 @@
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var inside = u32(id.x < listing[3]); inside > 0u; inside--) {
-        let at = tile_index(list[id.x]);
-        stamps[at] = select(0u, 2u, stamps[at] > frame.step);
+        stamps[tile_index(list[id.x])] = 0u;
     }
 }

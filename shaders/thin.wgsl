@@ -1,5 +1,5 @@
-// In: the mask before a sub-iteration. Out: the mask after it, in the tiles whose surroundings changed
-// in the last two: 32 pixels a word, the 8 words of a tile an invocation [zhang84], [guo89].
+// In: the mask before a sub-iteration. Out: the mask after it, in the listed tiles, and a stamp on those that changed:
+// 32 pixels a word, the 8 words of a tile an invocation [zhang84], [guo89].
 // The border rows and columns of the picture are never deleted, as in OpenCV.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> listing: array<u32>;
@@ -76,77 +76,59 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var inside = u32(id.x < listing[3]); inside > 0u; inside--) {
         let tile = list[id.x];
         let at = tile_index(tile);
-        // A stamp of 0 counts as 2: every listed tile runs in the first two sub-iterations.
-        for (var run = u32(max(stamps[at], 2u) > frame.step); run > 0u; run--) {
-            let x = tile_x(tile);
-            let y = tile_y(tile);
-            let pitch = frame.tiles_x;
-            // Tiles beyond the picture are dark: their place is the tile's own, their bits are cleared.
-            let to_left = select(0u, 1u, x > 0u);
-            let to_right = select(0u, 1u, x + 1u < pitch);
-            let above = at - select(0u, pitch, y > 0u);
-            let below = at + select(0u, pitch, y + 1u < frame.tiles_y);
-            let up_bits = select(0u, 0xffffffffu, y > 0u);
-            let down_bits = select(0u, 0xffffffffu, y + 1u < frame.tiles_y);
-            // Rows 0 to 3 and 4 to 7 of the tile; the last bit of its left, the first of its right neighbour.
-            let here0 = before[2u * at];
-            let here1 = before[2u * at + 1u];
-            let left0 = (before[2u * (at - to_left)] >> vec4(31u)) & vec4(to_left);
-            let left1 = (before[2u * (at - to_left) + 1u] >> vec4(31u)) & vec4(to_left);
-            let right0 = (before[2u * (at + to_right)] & vec4(to_right)) << vec4(31u);
-            let right1 = (before[2u * (at + to_right) + 1u] & vec4(to_right)) << vec4(31u);
-            let up = before[2u * above + 1u].w & up_bits;
-            let up_left = (before[2u * (above - to_left) + 1u].w >> 31u) & to_left & up_bits;
-            let up_right = (before[2u * (above + to_right) + 1u].w & to_right & up_bits) << 31u;
-            let down = before[2u * below].x & down_bits;
-            let down_left = (before[2u * (below - to_left)].x >> 31u) & to_left & down_bits;
-            let down_right = (before[2u * (below + to_right)].x & to_right & down_bits) << 31u;
-            let west0 = (here0 << vec4(1u)) | left0;
-            let west1 = (here1 << vec4(1u)) | left1;
-            let east0 = (here0 >> vec4(1u)) | right0;
-            let east1 = (here1 >> vec4(1u)) | right1;
-            let up_west = (up << 1u) | up_left;
-            let up_east = (up >> 1u) | up_right;
-            let down_west = (down << 1u) | down_left;
-            let down_east = (down >> 1u) | down_right;
-            // Clockwise from north; what is north of rows 1 to 3 are rows 0 to 2, and so on.
-            var gone0 = gone_of(
-                vec4(up, here0.xyz), vec4(up_east, east0.xyz), east0, vec4(east0.yzw, east1.x),
-                vec4(here0.yzw, here1.x), vec4(west0.yzw, west1.x), west0, vec4(up_west, west0.xyz));
-            var gone1 = gone_of(
-                vec4(here0.w, here1.xyz), vec4(east0.w, east1.xyz), east1, vec4(east1.yzw, down_east),
-                vec4(here1.yzw, down), vec4(west1.yzw, down_west), west1, vec4(west0.w, west1.xyz));
-            // Columns 1 to width - 2 and rows 1 to height - 2.
-            let keep = min(frame.width - 1u - min(32u * x, frame.width - 1u), 32u);
-            var deletable = select((1u << (keep & 31u)) - 1u, 0xffffffffu, keep == 32u);
-            deletable &= select(0xffffffffu, 0xfffffffeu, x == 0u);
-            let row0 = vec4(8u * y) + vec4(0u, 1u, 2u, 3u);
-            let row1 = row0 + vec4(4u);
-            let last = vec4(frame.height);
-            gone0 &= here0 & select(vec4(0u), vec4(deletable), row0 > vec4(0u) & row0 + vec4(1u) < last);
-            gone1 &= here1 & select(vec4(0u), vec4(deletable), row1 + vec4(1u) < last);
-            after[2u * at] = here0 & ~gone0;
-            after[2u * at + 1u] = here1 & ~gone1;
-            // A change wakes its own tile, and a neighbour only where it touches it.
-            let both = gone0 | gone1;
-            let gone = (both.x | both.y) | (both.z | both.w);
-            let stamp = frame.step + 3u;
-            for (var changed = u32(gone != 0u); changed > 0u; changed--) {
-                stamps[at] = stamp;
-            }
-            let edges = (gone & 0x80000001u) | gone0.x | gone1.w;
-            for (var beside = u32(edges != 0u); beside > 0u; beside--) {
-                stamps[at - select(0u, to_left, (gone & 1u) != 0u)] = stamp;
-                stamps[at + select(0u, to_right, (gone >> 31u) != 0u)] = stamp;
-                let over = select(at, above, gone0.x != 0u);
-                let under = select(at, below, gone1.w != 0u);
-                stamps[over] = stamp;
-                stamps[over - select(0u, to_left, (gone0.x & 1u) != 0u)] = stamp;
-                stamps[over + select(0u, to_right, (gone0.x >> 31u) != 0u)] = stamp;
-                stamps[under] = stamp;
-                stamps[under - select(0u, to_left, (gone1.w & 1u) != 0u)] = stamp;
-                stamps[under + select(0u, to_right, (gone1.w >> 31u) != 0u)] = stamp;
-            }
+        let x = tile_x(tile);
+        let y = tile_y(tile);
+        let pitch = frame.tiles_x;
+        // Tiles beyond the picture are dark: their place is the tile's own, their bits are cleared.
+        let to_left = select(0u, 1u, x > 0u);
+        let to_right = select(0u, 1u, x + 1u < pitch);
+        let above = at - select(0u, pitch, y > 0u);
+        let below = at + select(0u, pitch, y + 1u < frame.tiles_y);
+        let up_bits = select(0u, 0xffffffffu, y > 0u);
+        let down_bits = select(0u, 0xffffffffu, y + 1u < frame.tiles_y);
+        // Rows 0 to 3 and 4 to 7 of the tile; the last bit of its left, the first of its right neighbour.
+        let here0 = before[2u * at];
+        let here1 = before[2u * at + 1u];
+        let left0 = (before[2u * (at - to_left)] >> vec4(31u)) & vec4(to_left);
+        let left1 = (before[2u * (at - to_left) + 1u] >> vec4(31u)) & vec4(to_left);
+        let right0 = (before[2u * (at + to_right)] & vec4(to_right)) << vec4(31u);
+        let right1 = (before[2u * (at + to_right) + 1u] & vec4(to_right)) << vec4(31u);
+        let up = before[2u * above + 1u].w & up_bits;
+        let up_left = (before[2u * (above - to_left) + 1u].w >> 31u) & to_left & up_bits;
+        let up_right = (before[2u * (above + to_right) + 1u].w & to_right & up_bits) << 31u;
+        let down = before[2u * below].x & down_bits;
+        let down_left = (before[2u * (below - to_left)].x >> 31u) & to_left & down_bits;
+        let down_right = (before[2u * (below + to_right)].x & to_right & down_bits) << 31u;
+        let west0 = (here0 << vec4(1u)) | left0;
+        let west1 = (here1 << vec4(1u)) | left1;
+        let east0 = (here0 >> vec4(1u)) | right0;
+        let east1 = (here1 >> vec4(1u)) | right1;
+        let up_west = (up << 1u) | up_left;
+        let up_east = (up >> 1u) | up_right;
+        let down_west = (down << 1u) | down_left;
+        let down_east = (down >> 1u) | down_right;
+        // Clockwise from north; what is north of rows 1 to 3 are rows 0 to 2, and so on.
+        var gone0 = gone_of(
+            vec4(up, here0.xyz), vec4(up_east, east0.xyz), east0, vec4(east0.yzw, east1.x),
+            vec4(here0.yzw, here1.x), vec4(west0.yzw, west1.x), west0, vec4(up_west, west0.xyz));
+        var gone1 = gone_of(
+            vec4(here0.w, here1.xyz), vec4(east0.w, east1.xyz), east1, vec4(east1.yzw, down_east),
+            vec4(here1.yzw, down), vec4(west1.yzw, down_west), west1, vec4(west0.w, west1.xyz));
+        // Columns 1 to width - 2 and rows 1 to height - 2.
+        let keep = min(frame.width - 1u - min(32u * x, frame.width - 1u), 32u);
+        var deletable = select((1u << (keep & 31u)) - 1u, 0xffffffffu, keep == 32u);
+        deletable &= select(0xffffffffu, 0xfffffffeu, x == 0u);
+        let row0 = vec4(8u * y) + vec4(0u, 1u, 2u, 3u);
+        let row1 = row0 + vec4(4u);
+        let last = vec4(frame.height);
+        gone0 &= here0 & select(vec4(0u), vec4(deletable), row0 > vec4(0u) & row0 + vec4(1u) < last);
+        gone1 &= here1 & select(vec4(0u), vec4(deletable), row1 + vec4(1u) < last);
+        after[2u * at] = here0 & ~gone0;
+        after[2u * at + 1u] = here1 & ~gone1;
+        // Only its own: shortening the list looks at the stamps around, eight stores here would cost a third of the stage.
+        let both = gone0 | gone1;
+        for (var changed = u32(((both.x | both.y) | (both.z | both.w)) != 0u); changed > 0u; changed--) {
+            stamps[at] = frame.step + 3u;
         }
     }
 }

@@ -121,7 +121,7 @@ pub fn clear_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
             other[mask_index(&f, tile, row)] = 0;
             lit[mask_index(&f, tile, row)] = 0;
         }
-        near_tiles(&f, tile).for_each(|at| stamps[at] = 0);
+        stamps[tile_index(&f, tile)] = 0;
         counts[tile_index(&f, tile)] = 0;
     }
 }
@@ -138,7 +138,6 @@ pub fn rebase_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, listing, list, stamps] = b else { unreachable!() };
     for &tile in &list[..listing[3] as usize] {
-        let stamp = &mut stamps[tile_index(&f, tile)];
-        *stamp = if *stamp > f.step { 2 } else { 0 };
+        stamps[tile_index(&f, tile)] = 0;
     }
 }

@@ -162,11 +162,10 @@ pub fn twin(mask: &Mask, rule: Thinning) -> Mask {
 pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, listing, list, before, after, stamps] = b else { unreachable!() };
-    let former = stamps.clone();
     // A row of the mask as words; beyond the last tile there is none, but it is never asked for: y + 1 < height.
     let line =
         |shot: u32, y: u32| -> Vec<u32> { (0..f.tiles_x).map(|i| before[f.mask_word(shot, 32 * i, y)]).collect() };
-    for &tile in list[..listing[3] as usize].iter().filter(|&&t| former[tile_index(&f, t)].max(2) > f.step) {
+    for &tile in &list[..listing[3] as usize] {
         let (tx, ty, shot) = tile_unpack(tile);
         for row in 0..8 {
             let y = 8 * ty + row;
@@ -179,17 +178,8 @@ pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
             let p = neighbours([&lines[0], &lines[1], &lines[2]], tx as usize);
             let gone = before[own] & deletions(f.rule(), &p, f.step % 2 == 1) & interior(f.width, tx as usize);
             after[own] = before[own] & !gone;
-            // A change wakes its own tile, and a neighbour only where it touches it.
-            let near = |first: bool, last: bool, at: u32, n: u32| {
-                let from = if first && at > 0 { at - 1 } else { at };
-                from..=if last && at + 1 < n { at + 1 } else { at }
-            };
             if gone != 0 {
-                for y in near(row == 0, row == 7, ty, f.tiles_y) {
-                    for x in near(gone & 1 == 1, gone >> 31 == 1, tx, f.tiles_x) {
-                        stamps[((shot * f.tiles_y + y) * f.tiles_x + x) as usize] = f.step + 3;
-                    }
-                }
+                stamps[tile_index(&f, tile)] = f.step + 3;
             }
         }
     }
