@@ -5,6 +5,7 @@
 mod common;
 
 use common::pose::{Off, truth};
+use sheetlight::find::recipe::InsertionSpec;
 use sheetlight::find::{LocateOptions, Recipe, Report, locate};
 use sheetlight::geometry::{Base, Part, Rigid, Vec3};
 use sheetlight::scan::{CloudPoint, read_cloud};
@@ -288,10 +289,7 @@ fn a_part_is_taught_from_half_millimetre_numbers() {
         angle_deg: rx[(1, 0)].atan2(rx[(0, 0)]).to_degrees().round(),
         windows: vec![around(5.0, 2.0)],
         holes: holes.map(|h| [h[0], h[1], 0.72]).to_vec(),
-        tolerance_mm: 0.25,
-        tolerance_deg: 1.0,
-        approach_mm: 30.0,
-        retract_mm: 60.0,
+        insertion: InsertionSpec::at_the_part((0.25, 1.0), 30.0, 60.0),
     };
     let (recipe, proof) = teach(&s.cloud, &map, &options).unwrap();
     let again = Recipe::parse(&toml::to_string(&recipe).unwrap()).unwrap();

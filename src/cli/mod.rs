@@ -9,6 +9,7 @@ mod demo;
 mod doctor;
 mod find;
 mod guide;
+mod insertion;
 mod live;
 mod model;
 mod range;

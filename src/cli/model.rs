@@ -2,6 +2,7 @@
 //! Frame and unit: part frame, x and y as drawn, z towards the viewer; mm from here on.
 
 use super::Console;
+use super::insertion::InsertionArgs;
 use crate::fault::{Fault, Result};
 use crate::find::dxf::{self, DxfOptions, Unit};
 use crate::find::{TaskOptions, recipe_of};
@@ -37,18 +38,8 @@ pub struct Args {
     /// Edge of a cell of the map that is searched, mm: about two sampling steps of the scan
     #[arg(long, default_value_t = 0.5)]
     cell_mm: f64,
-    /// What the insertion bears in the plane, mm
-    #[arg(long, default_value_t = 0.25)]
-    tolerance_mm: f64,
-    /// What the insertion bears as a turn, degrees
-    #[arg(long, default_value_t = 0.5)]
-    tolerance_deg: f64,
-    /// Height of the approach above the part, mm
-    #[arg(long, default_value_t = 30.0)]
-    approach_mm: f64,
-    /// Height of the retreat above the part, mm
-    #[arg(long, default_value_t = 60.0)]
-    retract_mm: f64,
+    #[command(flatten)]
+    insertion: InsertionArgs,
     /// File for the recipe (TOML)
     #[arg(long)]
     out: PathBuf,
@@ -69,10 +60,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
             name: args.name.clone(),
             cell_mm: args.cell_mm,
             alike_turns: args.alike_turns,
-            tolerance_mm: args.tolerance_mm,
-            tolerance_deg: args.tolerance_deg,
-            approach_mm: args.approach_mm,
-            retract_mm: args.retract_mm,
+            insertion: args.insertion.spec(),
         },
     )?;
     read.notes.iter().for_each(|n| console.say(n));

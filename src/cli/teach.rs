@@ -3,6 +3,7 @@
 //! Frame and unit: height map's grid frame, mm from its corner.
 
 use super::Console;
+use super::insertion::InsertionArgs;
 use crate::fault::Result;
 use crate::find::teach::TeachOptions;
 use crate::station::teach_part;
@@ -34,18 +35,8 @@ pub struct Args {
     /// A round hole, several times: x,y,radius
     #[arg(long = "hole", value_parser = numbers::<3>)]
     holes: Vec<[f64; 3]>,
-    /// What the insertion bears in the plane, mm
-    #[arg(long, default_value_t = 0.25)]
-    tolerance_mm: f64,
-    /// What the insertion bears as a turn, degrees
-    #[arg(long, default_value_t = 0.5)]
-    tolerance_deg: f64,
-    /// Height of the approach above the part, mm
-    #[arg(long, default_value_t = 30.0)]
-    approach_mm: f64,
-    /// Height of the retreat above the part, mm
-    #[arg(long, default_value_t = 60.0)]
-    retract_mm: f64,
+    #[command(flatten)]
+    insertion: InsertionArgs,
     /// File for the recipe (TOML); the picture goes beside it with .png
     #[arg(long)]
     out: PathBuf,
@@ -67,10 +58,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         angle_deg: args.angle_deg,
         windows: args.windows.clone(),
         holes: args.holes.clone(),
-        tolerance_mm: args.tolerance_mm,
-        tolerance_deg: args.tolerance_deg,
-        approach_mm: args.approach_mm,
-        retract_mm: args.retract_mm,
+        insertion: args.insertion.spec(),
     };
     let (recipe, proof, picture) = teach_part(&args.scan, &options)?;
     let text = toml::to_string(&recipe).expect("plain data");

@@ -83,6 +83,28 @@ pub struct Shape {
     pub locates: bool,
 }
 
+impl Shape {
+    /// A shape on the datum surface without its dimensions; all else as where a file names nothing.
+    pub fn new(kind: Form, inside: Inside) -> Shape {
+        Shape {
+            kind,
+            name: None,
+            centre: None,
+            size: None,
+            radius: None,
+            angle_deg: None,
+            span_deg: None,
+            points: None,
+            inside,
+            z_mm: 0.0,
+            grid: None,
+            search: yes(),
+            measure: yes(),
+            locates: yes(),
+        }
+    }
+}
+
 fn yes() -> bool {
     true
 }

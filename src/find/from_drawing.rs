@@ -3,9 +3,7 @@
 
 use super::construct::{Build, Construction};
 use super::drawing::Drawing;
-use super::measure::MeasureOptions;
-use super::recipe::{Gates, InsertionSpec, Recipe, RobotSpec};
-use super::scene::Kind;
+use super::recipe::{InsertionSpec, Recipe};
 use crate::fault::Result;
 
 /// What a drawing does not say.
@@ -16,10 +14,7 @@ pub struct TaskOptions {
     pub cell_mm: f64,
     /// How many turns about z make the part look nearly alike.
     pub alike_turns: u32,
-    pub tolerance_mm: f64,
-    pub tolerance_deg: f64,
-    pub approach_mm: f64,
-    pub retract_mm: f64,
+    pub insertion: InsertionSpec,
 }
 
 /// A recipe with every gate at its default. Each array of shapes is offered as a lattice fit.
@@ -32,32 +27,9 @@ pub fn recipe_of(drawing: Drawing, options: &TaskOptions) -> Result<Recipe> {
         by_mm: None,
         along: None,
     };
-    let recipe = Recipe {
-        format: 1,
-        name: options.name.clone(),
-        title: String::new(),
-        cell_mm: options.cell_mm,
-        layers: vec![Kind::Height],
-        alike_turns: options.alike_turns,
-        search: Default::default(),
-        model: Default::default(),
-        measure: MeasureOptions::default(),
-        construction: arrays.map(lattice).collect(),
-        shape: drawing.shape,
-        insertion: InsertionSpec {
-            construction: "pose".into(),
-            two_pin: None,
-            lattice: None,
-            offset_mm: [0.0; 3],
-            turn_deg: 0.0,
-            approach_mm: options.approach_mm,
-            retract_mm: options.retract_mm,
-            tolerance_mm: options.tolerance_mm,
-            tolerance_deg: options.tolerance_deg,
-        },
-        gates: Gates::default(),
-        robot: RobotSpec::default(),
-    };
+    let construction = arrays.map(lattice).collect();
+    let plain = Recipe::new(&options.name, options.cell_mm, drawing.shape, options.insertion.clone());
+    let recipe = Recipe { alike_turns: options.alike_turns, construction, ..plain };
     recipe.check()?;
     Ok(recipe)
 }

@@ -72,6 +72,45 @@ pub struct InsertionSpec {
     pub tolerance_deg: f64,
 }
 
+impl InsertionSpec {
+    /// The tool goes to the part's own pose; tolerances in the plane and as a turn, distances above it.
+    pub fn at_the_part(tolerance: (f64, f64), approach_mm: f64, retract_mm: f64) -> InsertionSpec {
+        InsertionSpec {
+            construction: pose(),
+            two_pin: None,
+            lattice: None,
+            offset_mm: [0.0; 3],
+            turn_deg: 0.0,
+            approach_mm,
+            retract_mm,
+            tolerance_mm: tolerance.0,
+            tolerance_deg: tolerance.1,
+        }
+    }
+}
+
+impl Recipe {
+    /// A drawing and a task; all else, gates too, as where a file names nothing.
+    pub fn new(name: &str, cell_mm: f64, shape: Vec<Shape>, insertion: InsertionSpec) -> Recipe {
+        Recipe {
+            format: 1,
+            name: name.into(),
+            title: String::new(),
+            cell_mm,
+            layers: height(),
+            alike_turns: one(),
+            search: Default::default(),
+            model: Default::default(),
+            measure: Default::default(),
+            shape,
+            construction: Vec::new(),
+            insertion,
+            gates: Gates::default(),
+            robot: RobotSpec::default(),
+        }
+    }
+}
+
 /// No pose leaves when one of these is missed.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]

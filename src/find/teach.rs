@@ -7,8 +7,7 @@ use super::drawing::{Drawing, Form, Inside, Shape};
 use super::insertion::{LocateOptions, Report, locate};
 use super::measure::{MeasureOptions, Measured, measure};
 use super::points::Ordered;
-use super::recipe::{Gates, InsertionSpec, Recipe, RobotSpec};
-use super::scene::Kind;
+use super::recipe::{Gates, InsertionSpec, Recipe};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Grid, Part, Rigid, Vec3};
 use crate::scan::{CloudPoint, HeightMap};
@@ -26,10 +25,7 @@ pub struct TeachOptions {
     pub windows: Vec<[f64; 4]>,
     /// Round holes: centre x y and radius.
     pub holes: Vec<[f64; 3]>,
-    pub tolerance_mm: f64,
-    pub tolerance_deg: f64,
-    pub approach_mm: f64,
-    pub retract_mm: f64,
+    pub insertion: InsertionSpec,
 }
 
 /// Teaches from a cloud and its map. Refuses numbers that lie outside the map or show no part.
@@ -52,7 +48,7 @@ pub fn teach(cloud: &[CloudPoint], map: &HeightMap, options: &TeachOptions) -> R
     let rectangle = |inside, c: [f64; 2], size: [f64; 2]| Shape {
         centre: Some(c),
         size: Some(size),
-        ..blank(Form::Rectangle, inside)
+        ..Shape::new(Form::Rectangle, inside)
     };
     let mut shapes = vec![rectangle(Inside::High, [0.0, 0.0], [x1 - x0, y1 - y0])];
     for w in &options.windows {
@@ -67,7 +63,7 @@ pub fn teach(cloud: &[CloudPoint], map: &HeightMap, options: &TeachOptions) -> R
             radius: Some(hole[2]),
             search: false,
             locates: false,
-            ..blank(Form::Circle, Inside::Low)
+            ..Shape::new(Form::Circle, Inside::Low)
         });
     }
     let mut drawing = Drawing { shape: shapes };
@@ -86,25 +82,6 @@ pub fn teach(cloud: &[CloudPoint], map: &HeightMap, options: &TeachOptions) -> R
     let up = map.base_from_grid.direction(&Vec3::z());
     let proof = locate(cloud, &recipe, None, &LocateOptions { up: Some(up), ..LocateOptions::default() })?;
     Ok((recipe, proof))
-}
-
-fn blank(kind: Form, inside: Inside) -> Shape {
-    Shape {
-        kind,
-        name: None,
-        centre: None,
-        size: None,
-        radius: None,
-        angle_deg: None,
-        span_deg: None,
-        points: None,
-        inside,
-        z_mm: 0.0,
-        grid: None,
-        search: true,
-        measure: true,
-        locates: true,
-    }
 }
 
 /// The most frequent height inside the outline and outside the windows, in bins of 0.1 mm.
@@ -185,33 +162,11 @@ fn recipe_of(options: &TeachOptions, mut drawing: Drawing, map: &HeightMap) -> R
             along: None,
         });
     }
-    let recipe = Recipe {
-        format: 1,
-        name: options.name.clone(),
-        title: String::new(),
-        cell_mm: (2.0 * map.cell).clamp(0.05, 5.0),
-        layers: vec![Kind::Height],
-        alike_turns: 1,
-        search: Default::default(),
-        model: Default::default(),
-        measure: MeasureOptions::default(),
-        shape: drawing.shape,
-        construction,
-        insertion: InsertionSpec {
-            construction: "pose".into(),
-            two_pin: None,
-            lattice: None,
-            offset_mm: [0.0; 3],
-            turn_deg: 0.0,
-            approach_mm: options.approach_mm,
-            retract_mm: options.retract_mm,
-            tolerance_mm: options.tolerance_mm,
-            tolerance_deg: options.tolerance_deg,
-        },
-        // A rectangle looks the same after half a turn: what was taught has no notch to tell it.
-        gates: Gates { turn_must_be_told: false, min_margin: 0.0, ..Gates::default() },
-        robot: RobotSpec::default(),
-    };
+    let cell_mm = (2.0 * map.cell).clamp(0.05, 5.0);
+    let plain = Recipe::new(&options.name, cell_mm, drawing.shape, options.insertion.clone());
+    // A rectangle looks the same after half a turn: what was taught has no notch to tell it.
+    let gates = Gates { turn_must_be_told: false, min_margin: 0.0, ..Gates::default() };
+    let recipe = Recipe { construction, gates, ..plain };
     recipe.check()?;
     Ok(recipe)
 }

@@ -85,22 +85,7 @@ fn inside_of(p: &[[f64; 2]]) -> [f64; 2] {
 }
 
 fn blank(kind: Form, inside: Inside, z: f64) -> Shape {
-    Shape {
-        kind,
-        name: None,
-        centre: None,
-        size: None,
-        radius: None,
-        angle_deg: None,
-        span_deg: None,
-        points: None,
-        inside,
-        z_mm: micrometre(z),
-        grid: None,
-        search: true,
-        measure: true,
-        locates: true,
-    }
+    Shape { z_mm: micrometre(z), ..Shape::new(kind, inside) }
 }
 
 /// A rectangle where it is one, else a polygon.

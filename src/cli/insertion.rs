@@ -1,0 +1,26 @@
+//! In: the command line. Out: what an insertion bears and how far the tool keeps off, for recipes that are made here.
+//! Frame and unit: part frame; mm, degrees.
+
+use crate::find::recipe::InsertionSpec;
+
+#[derive(clap::Args)]
+pub struct InsertionArgs {
+    /// What the insertion bears in the plane, mm
+    #[arg(long, default_value_t = 0.25)]
+    tolerance_mm: f64,
+    /// What the insertion bears as a turn, degrees
+    #[arg(long, default_value_t = 0.5)]
+    tolerance_deg: f64,
+    /// Height of the approach above the part, mm
+    #[arg(long, default_value_t = 30.0)]
+    approach_mm: f64,
+    /// Height of the retreat above the part, mm
+    #[arg(long, default_value_t = 60.0)]
+    retract_mm: f64,
+}
+
+impl InsertionArgs {
+    pub fn spec(&self) -> InsertionSpec {
+        InsertionSpec::at_the_part((self.tolerance_mm, self.tolerance_deg), self.approach_mm, self.retract_mm)
+    }
+}
