@@ -356,7 +356,6 @@ impl<'a> Walk<'a> {
             self.step(&listing::COMPACT, listing::compact_twin, &names, all);
         }
         let stamps = self.buffers["stamps"].clone();
-        self.frame.step = self.frame.step.saturating_sub(6);
         self.step(&listing::REBASE, listing::rebase_twin, &["lit_listing", "lit_list", "stamps"], all);
         self.buffers.insert("stamps", stamps);
         self.step(&lengthen::COPY, lengthen::copy_twin, &["lit_listing", "lit_list", "mask", "long"], all);

@@ -26,8 +26,6 @@ pub const RESET: Stage = Stage {
 pub const CLEAR: Stage = Stage {
     name: "clear",
     wgsl: include_str!("../../shaders/clear.wgsl"),
-    shared: &[SHARED],
-    workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "listing", access: Read },
@@ -38,15 +36,13 @@ pub const CLEAR: Stage = Stage {
         Binding { name: "stamps", access: ReadWrite },
         Binding { name: "counts", access: ReadWrite },
     ],
-    uniform: frame::UNIFORM,
-    overrides: &[PX_LOG2],
+    ..RESET
 };
 
 pub const COMPACT: Stage = Stage {
     name: "compact",
     wgsl: include_str!("../../shaders/compact.wgsl"),
     shared: &[SHARED, ACTIVITY],
-    workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "all", access: Read },
@@ -55,28 +51,24 @@ pub const COMPACT: Stage = Stage {
         Binding { name: "listing", access: ReadWrite },
         Binding { name: "active_list", access: ReadWrite },
     ],
-    uniform: frame::UNIFORM,
-    overrides: &[PX_LOG2],
+    ..RESET
 };
 
 pub const REBASE: Stage = Stage {
     name: "rebase",
     wgsl: include_str!("../../shaders/rebase.wgsl"),
-    shared: &[SHARED],
-    workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "listing", access: Read },
         Binding { name: "list", access: Read },
         Binding { name: "stamps", access: ReadWrite },
     ],
-    uniform: frame::UNIFORM,
-    overrides: &[PX_LOG2],
+    ..RESET
 };
 
-/// Adds a tile: word 3 of the header counts, word 0 is the number of workgroups of 64 tiles.
-pub fn append(listing: &mut [u32], list: &mut [u32], tile: u32) {
-    list[listing[3] as usize] = tile;
+/// Adds an entry, a tile or a run of them: word 3 of the header counts, word 0 is the number of workgroups of 64 entries.
+pub fn append<const N: usize>(listing: &mut [u32], list: &mut [u32], entry: [u32; N]) {
+    list[N * listing[3] as usize..][..N].copy_from_slice(&entry);
     listing[0] += u32::from(listing[3].is_multiple_of(64));
     listing[3] += 1;
 }
@@ -130,7 +122,7 @@ pub fn compact_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, all, list, stamps, listing, active] = b else { unreachable!() };
     for &tile in list[..all[3] as usize].iter().filter(|&&t| latest(&f, stamps, t) > f.step) {
-        append(listing, active, tile);
+        append(listing, active, [tile]);
     }
 }
 

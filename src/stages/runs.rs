@@ -1,15 +1,13 @@
 //! In: the list of tiles that may be lit. Out: the same tiles as runs one below the other: (first tile, number of tiles).
 //! Frame and unit: tiles of 32 x 8 pixels.
 
-use super::frame::{self, PX_LOG2, SHARED, frame_of, tile_unpack};
-use super::listing::tile_index;
+use super::frame::{frame_of, tile_unpack};
+use super::listing::{RESET, append, tile_index};
 use crate::gpu::{Access::*, Binding, Stage};
 
 pub const STAGE: Stage = Stage {
     name: "runs",
     wgsl: include_str!("../../shaders/runs.wgsl"),
-    shared: &[SHARED],
-    workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "listing", access: Read },
@@ -20,8 +18,7 @@ pub const STAGE: Stage = Stage {
         Binding { name: "run_listing", access: ReadWrite },
         Binding { name: "runs", access: ReadWrite },
     ],
-    uniform: frame::UNIFORM,
-    overrides: &[PX_LOG2],
+    ..RESET
 };
 
 /// Longest run, and the rows of tiles after which runs begin anew.
@@ -39,11 +36,10 @@ pub fn twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
         }
         let room = (LONGEST - y % LONGEST).min(f.tiles_y - y);
         let length = (0..room).take_while(|&down| is_listed(down)).count() as u32;
-        let (listing, list) = if length == 1 { (&mut *single_listing, &mut *singles) } else { (&mut *run_listing, &mut *runs) };
-        let slot = 2 * listing[3] as usize;
-        list[slot..slot + 2].copy_from_slice(&[tile, length]);
-        listing[0] += u32::from(listing[3].is_multiple_of(64));
-        listing[3] += 1;
+        match length {
+            1 => append(single_listing, singles, [tile, length]),
+            _ => append(run_listing, runs, [tile, length]),
+        }
     }
 }
 

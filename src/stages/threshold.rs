@@ -282,7 +282,7 @@ fn store(f: &Frame, tile: u32, bits: impl Fn(u32) -> u32, roi: &[u32], out: [&mu
         some |= mask[at];
     }
     if some != 0 {
-        super::listing::append(listing, list, tile);
+        super::listing::append(listing, list, [tile]);
     }
 }
 

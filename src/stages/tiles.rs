@@ -4,8 +4,8 @@
 
 use super::bands::{Band, Cover};
 use super::frame::{self, ALL_TILES, Frame, GAUSSIAN, HAS_ROI, PX_LOG2, SHARED, frame_of, tile_pack};
-use super::threshold::RADIUS;
 use super::stats::{Block, depth_shift};
+use super::threshold::RADIUS;
 use crate::gpu::{Access::*, Binding, Stage};
 
 pub const STAGE: Stage = Stage {
@@ -95,7 +95,7 @@ pub fn twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
                     || may_be_lit(&f, stats, bands, row, 2 * x as i32 + 1);
                 listed[super::listing::tile_index(&f, tile)] = u32::from(wanted && lit);
                 if wanted && lit {
-                    super::listing::append(listing, list, tile);
+                    super::listing::append(listing, list, [tile]);
                 }
             }
         }
