@@ -130,6 +130,24 @@ fn stripes_of_any_width_end_as_lines() {
     }
 }
 
+/// A chain gives later batches only as many sub-iterations as earlier ones needed: wider stripes must start over,
+/// also while narrow ones are under way, and beyond what one round holds.
+#[test]
+fn wider_stripes_after_narrow_ones_are_thinned_to_lines() {
+    let Some(device) = common::device() else { return };
+    let mut config = ChainConfig::new(200, 160, 8);
+    config.shots = 1;
+    config.threshold = ThresholdParams { size: 101, offset: 4, ..Default::default() };
+    let bar = |width: u32| {
+        drawn(200, 160, 8, |x, y| if (20..180).contains(&x) && (40..40 + width).contains(&y) { 200 } else { 10 })
+    };
+    let images = [3, 3, 3, 3, 24, 3, 64, 3, 12, 3].map(bar);
+    for rule in [Thinning::ZhangSuen, Thinning::GuoHall] {
+        config.thinning = rule;
+        check(&device, &format!("{rule:?}"), &config, &images);
+    }
+}
+
 #[test]
 fn ambient_light_is_subtracted() {
     let Some(device) = common::device() else { return };
