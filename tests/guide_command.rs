@@ -73,14 +73,18 @@ fn an_operator_is_led_from_the_touch_to_the_retract() {
     println!("normal {off:.4} degrees, part {lateral:.4} mm and {angle:.4} degrees");
     assert!(off < 0.1, "the board's normal is {off} degrees off");
     assert!(lateral < 0.05 && d.translation.z.abs() < 0.05 && angle < 0.15, "{lateral} mm, {angle} degrees: {d:?}");
-    // The approach is above the insertion, along the part's axis.
+    // Approach and retreat are above the insertion, along the part's axis, as far as the recipe says.
     let of = |name: &str| -> Vec<f64> {
         let step = guided["steps"].as_array().unwrap().iter().find(|s| s["name"] == name).unwrap();
         serde_json::from_value(step["pose"].clone()).unwrap()
     };
-    let (a, b) = (of("approach"), of("insert"));
-    let lift = Vec3::new(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
-    assert!(lift.norm() > 1.0 && lift.normalize().dot(&up) > 0.999, "{lift}");
+    let recipe = std::fs::read_to_string(&recipe).unwrap();
+    let spec = sheetlight::find::Recipe::parse(&recipe).unwrap().insertion;
+    for (name, mm) in [("approach", spec.approach_mm), ("retract", spec.retract_mm)] {
+        let (a, b) = (of(name), of("insert"));
+        let lift = Vec3::new(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
+        assert!((lift - up * mm).norm() < 0.01 * mm, "{name}: {lift}, {mm} mm wanted along {up}");
+    }
 
     // Where nobody can answer, nothing moves; a part that is askew against the board stops it; so do bad numbers.
     let fails = |more: &[&str]| {
