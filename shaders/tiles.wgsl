@@ -54,7 +54,7 @@ fn bounds(row: u32, x: i32) -> vec2<u32> {
 
 // Smallest pixel of all blocks that a window of the tile can touch: bounds any weighted mean.
 fn darkest(x: i32, y: i32, shot: u32, go: bool) -> u32 {
-    let r = i32(frame.size / 2u);
+    let r = i32(radius);
     let reach_x = (r + 15) / 16;
     let reach_y = (r + 7) / 8;
     let blocks_x = i32(2u * frame.tiles_x);

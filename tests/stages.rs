@@ -3,7 +3,7 @@
 
 mod common;
 
-use sheetlight::stages::{self, Frame, ThresholdParams, Thinning, cases, skeleton, thin, threshold};
+use sheetlight::stages::{self, Frame, ThresholdParams, cases, skeleton, thin, threshold};
 
 #[test]
 fn every_stage_equals_its_twin() {
@@ -58,11 +58,12 @@ fn the_chain_of_twins_is_the_plain_definition() {
 #[test]
 fn window_sums_are_never_below_their_bound() {
     let mut noise = cases::Noise(5);
-    for (size, width, height) in [(3, 70, 41), (9, 70, 41), (15, 64, 48), (31, 101, 83), (33, 96, 64), (101, 161, 120)] {
+    for (size, width, height) in [(3, 70, 41), (9, 70, 41), (15, 64, 48), (31, 101, 83), (33, 96, 64), (101, 161, 120)]
+    {
         for amplitude in [1, 40, 196] {
             let image = cases::drawn(width, height, 8, |_, _| 60 + noise.next() % amplitude);
             let params = ThresholdParams { size, ..ThresholdParams::default() };
-            let frame = Frame::new(width, height, 8, 1, &params, Thinning::default()).unwrap();
+            let frame = Frame::new(width, height, 8, 1, &params).unwrap();
             let mut words = vec![0u8; frame.image_bytes()];
             frame.pack_image(&image, &mut words).unwrap();
             let n = frame.tiles() as usize;
@@ -83,7 +84,13 @@ fn window_sums_are_never_below_their_bound() {
                     let row = &bindings[2][(y / 8 * 4 * frame.tiles_x as i32) as usize..][..4 * frame.tiles_x as usize];
                     let bound = stages::tiles::bound(&frame, row, x / 16);
                     assert!(bound <= sum, "window {size} at ({x}, {y}): bound {bound}, sum {sum}");
-                    let least = if amplitude == 1 { sum } else if size == 31 { sum / 2 } else { 0 };
+                    let least = if amplitude == 1 {
+                        sum
+                    } else if size == 31 {
+                        sum / 2
+                    } else {
+                        0
+                    };
                     assert!(bound >= least, "window {size} at ({x}, {y}): bound {bound} far below {sum}");
                 }
             }

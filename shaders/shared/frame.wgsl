@@ -17,8 +17,7 @@ struct Frame {
     minimum: u32,
     // Bit 0: list every tile (the plain path). Bit 1: a region of interest is given. Bit 2: Gaussian window.
     flags: u32,
-    // Thinning: rule (0 Zhang-Suen, 1 Guo-Hall) and number of the sub-iteration.
-    rule: u32,
+    // Number of thinning's sub-iteration.
     step: u32,
     // Most skeleton pixels of a batch.
     capacity: u32,

@@ -234,9 +234,8 @@ pub struct Walk<'a> {
 impl<'a> Walk<'a> {
     pub fn new(scene: &'a Scene) -> Walk<'a> {
         let first = &scene.shots[0];
-        let mut f =
-            Frame::new(first.width, first.height, first.bits, scene.shots.len() as u32, &scene.params, scene.thinning)
-                .expect("scenes are valid");
+        let mut f = Frame::new(first.width, first.height, first.bits, scene.shots.len() as u32, &scene.params)
+            .expect("scenes are valid");
         f.flags |= scene.flags;
         let pack = |images: &[Image]| {
             let mut bytes = vec![0u8; f.image_bytes() * images.len()];
@@ -298,7 +297,7 @@ impl<'a> Walk<'a> {
         let all = [
             (frame::PX_LOG2, f64::from(px_log2(self.scene.shots[0].bits))),
             (threshold::RADIUS, f64::from(self.frame.size / 2)),
-            (thin::RULE, f64::from(self.frame.rule)),
+            (thin::RULE, f64::from(self.scene.thinning.number())),
         ];
         let overrides: Vec<_> = all.into_iter().filter(|o| stage.overrides.contains(&o.0)).collect();
         let mut bindings = vec![bytemuck::cast_slice::<Frame, u32>(&[self.frame]).to_vec()];
@@ -323,7 +322,12 @@ impl<'a> Walk<'a> {
         }
         self.step(&stats::STAGE, stats::twin, &["image", "stats"], stats::groups(&f));
         self.step(&bands::STAGE, bands::twin, &["stats", "bands"], bands::groups(&f));
-        self.step(&tiles::STAGE, tiles::twin, &["stats", "bands", "roi", "listed", "listing", "list"], tiles::groups(&f));
+        self.step(
+            &tiles::STAGE,
+            tiles::twin,
+            &["stats", "bands", "roi", "listed", "listing", "list"],
+            tiles::groups(&f),
+        );
         let all = listed(&self.buffers, "listing");
         if f.flags & frame::GAUSSIAN != 0 {
             let names = ["image", "listing", "list", "weights", "quads"];

@@ -146,8 +146,7 @@ impl Chain {
                 config.shots, config.slots
             )));
         }
-        let mut frame =
-            Frame::new(config.width, config.height, config.bits, config.shots, &config.threshold, config.thinning)?;
+        let mut frame = Frame::new(config.width, config.height, config.bits, config.shots, &config.threshold)?;
         frame.flags |= if config.prune { 0 } else { ALL_TILES };
         frame.lengthen = config.lengthen;
         frame.flags |= if config.region.is_some() { HAS_ROI } else { 0 };

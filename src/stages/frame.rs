@@ -1,7 +1,7 @@
 //! In: the size and depth of the pictures, the settings. Out: the uniform block of the stripe stages and
 //! the layout of their buffers. Frame and unit: pixels, words of 32 bits.
 
-use super::{Thinning, ThresholdParams, Window};
+use super::{ThresholdParams, Window};
 use crate::fault::{Fault, Result};
 use crate::gpu::Field;
 use crate::raster::{Image, Mask, Pixels};
@@ -21,7 +21,6 @@ pub struct Frame {
     pub offset: i32,
     pub minimum: u32,
     pub flags: u32,
-    pub rule: u32,
     pub step: u32,
     pub capacity: u32,
     pub full_scale: u32,
@@ -47,7 +46,7 @@ macro_rules! uniform_fields {
 pub(crate) use uniform_fields;
 
 pub const UNIFORM: (&str, &[Field], usize) = uniform_fields!(Frame: width, height, pitch, shot_words, tiles_x,
-    tiles_y, shots, size, offset, minimum, flags, rule, step, capacity, full_scale, lengthen);
+    tiles_y, shots, size, offset, minimum, flags, step, capacity, full_scale, lengthen);
 
 pub const SHARED: &str = include_str!("../../shaders/shared/frame.wgsl");
 pub const PIXELS: &str = include_str!("../../shaders/shared/pixels.wgsl");
@@ -61,7 +60,7 @@ pub fn px_log2(bits: u8) -> u32 {
 
 impl Frame {
     /// The layout of `shots` pictures of one size and depth in one batch.
-    pub fn new(width: u32, height: u32, bits: u8, shots: u32, p: &ThresholdParams, rule: Thinning) -> Result<Frame> {
+    pub fn new(width: u32, height: u32, bits: u8, shots: u32, p: &ThresholdParams) -> Result<Frame> {
         p.check()?;
         // A tile packs its column into 10 bits, its row into 12, its shot into 10; a point its pixel into 16 + 16.
         if !(1..=32 * 1023).contains(&width) || !(1..=8 * 4095).contains(&height) {
@@ -89,7 +88,6 @@ impl Frame {
             offset: p.offset,
             minimum: u32::from(p.minimum),
             flags: if p.window == Window::Gaussian { GAUSSIAN } else { 0 },
-            rule: rule.number(),
             step: 0,
             // One skeleton pixel in twenty, over the whole batch, is more than a scene with a stripe ever gives: 24 lines
             // across a picture of 480 rows. A small picture keeps all.
@@ -106,9 +104,6 @@ impl Frame {
     }
     pub fn image_bytes(&self) -> usize {
         self.shot_words as usize * 4
-    }
-    pub fn rule(&self) -> Thinning {
-        if self.rule == 0 { Thinning::ZhangSuen } else { Thinning::GuoHall }
     }
     pub fn threshold(&self) -> ThresholdParams {
         ThresholdParams {

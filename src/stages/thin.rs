@@ -24,7 +24,7 @@ pub const STAGE: Stage = Stage {
     overrides: &[PX_LOG2, RULE],
 };
 
-/// Selects the rule when the pipeline is built, `Frame::rule`.
+/// Selects the rule when the pipeline is built, [`Thinning::number`].
 pub const RULE: &str = "rule";
 
 /// The rule that decides which boundary pixels go.
@@ -43,6 +43,12 @@ impl Thinning {
             Thinning::ZhangSuen => 0,
             Thinning::GuoHall => 1,
         }
+    }
+    /// The rule that a pipeline was built with.
+    fn of(overrides: &[(&'static str, f64)]) -> Thinning {
+        let number = |rule: Thinning| f64::from(rule.number());
+        let given = overrides.iter().find(|o| o.0 == RULE).map(|o| o.1);
+        if given == Some(number(Thinning::GuoHall)) { Thinning::GuoHall } else { Thinning::ZhangSuen }
     }
 }
 
@@ -159,8 +165,9 @@ pub fn twin(mask: &Mask, rule: Thinning) -> Mask {
     unreachable!("every sub-iteration but the last two deletes a pixel")
 }
 
-pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     let f = frame_of(b);
+    let rule = Thinning::of(overrides);
     let [_, listing, list, before, after, stamps] = b else { unreachable!() };
     // A row of the mask as words; beyond the last tile there is none, but it is never asked for: y + 1 < height.
     let line =
@@ -176,7 +183,7 @@ pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
             }
             let lines = [line(shot, y - 1), line(shot, y), line(shot, y + 1)];
             let p = neighbours([&lines[0], &lines[1], &lines[2]], tx as usize);
-            let gone = before[own] & deletions(f.rule(), &p, f.step % 2 == 1) & interior(f.width, tx as usize);
+            let gone = before[own] & deletions(rule, &p, f.step % 2 == 1) & interior(f.width, tx as usize);
             after[own] = before[own] & !gone;
             if gone != 0 {
                 stamps[tile_index(&f, tile)] = f.step + 3;
