@@ -177,11 +177,20 @@ fn what_cannot_be_read_is_refused_with_its_reason() {
     assert!(refused(&file("9\n$INSUNITS\n70\n12\n", "", &ring), &none).what.contains("12"));
     let insert = |name: &str| entity!("INSERT", 8: "0", 2: name, 10: 0, 20: 0);
     let selfish = entity!("BLOCK", 8: "0", 2: "A", 10: 0, 20: 0) + &insert("A") + &entity!("ENDBLK", 8: "0");
-    let spline = entity!("SPLINE", 8: "free", 70: 8);
+    // Points that the curve passes, and no more.
+    let spline = entity!("SPLINE", 8: "free", 70: 8, 71: 3, 74: 2, 11: 0, 21: 0, 11: 5, 21: 5);
+    let knots = |last: i32| entity!("SPLINE", 8: "0", 70: 8, 71: 1, 72: 4, 73: 2, 40: 0, 40: 0, 40: 1, 40: last, 10: 0, 20: 0, 10: 5, 20: 5);
+    let elsewhere = entity!("BLOCK", 8: "0", 2: "X", 70: 4, 10: 0, 20: 0, 1: "other.dwg") + &entity!("ENDBLK", 8: "0");
+    let plain = entity!("BLOCK", 8: "0", 2: "P", 70: 0, 10: 0, 20: 0) + &ring + &entity!("ENDBLK", 8: "0");
     let cases = [
         (file(MM, &selfish, &insert("A")), "in itself"),
         (file(MM, "", &insert("B")), "no block"),
-        (file(MM, "", &(ring.clone() + &spline)), "SPLINE"),
+        (file(MM, "", &(ring.clone() + &spline)), "1 SPLINE of fit points"),
+        (file(MM, "", &knots(0)), "do not rise"),
+        (file(MM, "", &knots(1).replacen("40\n0\n", "", 1)), "3 knots, wanted above 1 points and 4 knots"),
+        (file(MM, "", &(ring.clone() + &entity!("SOLID", 8: "0", 10: 0, 20: 0))), "1 SOLID"),
+        (file(MM, &elsewhere, &insert("X")), "another file"),
+        (file(MM, &plain, &(insert("P") + "41\n0\n")), "scaled by 0"),
         (file(MM, "", &line([0.0, 0.0], [5.0, 0.0])), "no closed outline"),
         (file(MM, "", &entity!("CIRCLE", 8: "0", 10: 0, 20: 0, 40: -1)), "above 0"),
         (file(MM, "", &entity!("CIRCLE", 8: "0", 10: 0, 20: 0, 40: 5, 210: 0.6, 230: 0.8)), "normal"),
@@ -205,9 +214,196 @@ fn what_cannot_be_read_is_refused_with_its_reason() {
     assert!(read(file(MM, "", &(ring + &spline)).as_bytes(), &only).is_ok());
 }
 
+/// A rational quadratic spline of four pieces: a circle, as programs without circles write it.
+fn spline_circle(x: f64, y: f64, r: f64) -> String {
+    let mut groups: Vec<(i32, String)> =
+        [(0, "SPLINE"), (8, "0"), (70, "11"), (71, "2"), (72, "12"), (73, "9")].map(|(c, v)| (c, v.to_owned())).into();
+    groups.extend([0, 0, 0, 1, 1, 2, 2, 3, 3, 4, 4, 4].map(|k| (40, k.to_string())));
+    let around = [[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1], [1, 0]];
+    for (i, [u, v]) in around.into_iter().enumerate() {
+        let weight = if i % 2 == 0 { 1.0 } else { std::f64::consts::FRAC_1_SQRT_2 };
+        let groups_of = [(10, x + r * f64::from(u)), (20, y + r * f64::from(v)), (30, 0.0), (41, weight)];
+        groups.extend(groups_of.map(|(c, v)| (c, v.to_string())));
+    }
+    tags(&groups)
+}
+
+#[test]
+fn splines_are_read_within_two_micrometres() {
+    // A cubic Bezier curve as a cap on a rectangle, with a knot inserted in its middle.
+    let cap = entity!("SPLINE", 8: "0", 210: 0, 220: 0, 230: 1, 70: 8, 71: 3, 72: 9, 73: 5, 40: 0, 40: 0, 40: 0, 40: 0,
+        40: 0.5, 40: 1, 40: 1, 40: 1, 40: 1, 10: 10, 20: 0, 10: 10, 20: 6, 10: 0, 20: 12, 10: -10, 20: 6, 10: -10, 20: 0);
+    let sides =
+        line([-10.0, 0.0], [-10.0, -5.0]) + &line([-10.0, -5.0], [10.0, -5.0]) + &line([10.0, -5.0], [10.0, 0.0]);
+    let drawing = imported(&file(MM, "", &(cap + &sides))).drawing;
+    let points = drawing.shape[0].points.clone().expect("a polygon");
+    // The control points with the knot in the middle are those of the Bezier curve (10,0) (10,12) (-10,12) (-10,0).
+    let bezier = |t: f64| {
+        let (u, t3, u3) = (1.0 - t, t * t * t, (1.0 - t).powi(3));
+        [10.0 * u3 + 30.0 * u * u * t - 30.0 * u * t * t - 10.0 * t3, 36.0 * u * u * t + 36.0 * u * t * t]
+    };
+    let curve: Vec<[f64; 2]> = (0..=20_000).map(|i| bezier(f64::from(i) / 20_000.0)).collect();
+    let off = |p: [f64; 2]| curve.iter().map(|q| (p[0] - q[0]).hypot(p[1] - q[1])).fold(f64::MAX, f64::min);
+    let bow: Vec<[f64; 2]> = points.iter().copied().filter(|p| p[1] > 0.01).collect();
+    assert!(bow.len() > 30 && bow.iter().map(|p| p[1]).fold(0.0, f64::max) > 8.99, "{}", bow.len());
+    for w in bow.windows(2) {
+        let middle = [0.5 * (w[0][0] + w[1][0]), 0.5 * (w[0][1] + w[1][1])];
+        // Corners are rounded to a micrometre, and the comparison's own points lie a micrometre apart.
+        assert!(off(w[0]) < 0.0015 && off(middle) < 0.0045, "{w:?} {} {}", off(w[0]), off(middle));
+    }
+    // A circle drawn as a spline, as an arc of a whole turn, or as two bulges is a circle, and an array of them a grid.
+    let arc = entity!("ARC", 8: "0", 10: 10, 20: 0, 40: 2, 50: 0, 51: 360);
+    let bulges = entity!("LWPOLYLINE", 8: "0", 90: 2, 70: 1, 10: 18, 20: 0, 42: 1, 10: 22, 20: 0, 42: 1);
+    let ring = circle("0", 10.0, 0.0, 30.0);
+    let drawing = imported(&file(MM, "", &(ring + &spline_circle(0.0, 0.0, 2.0) + &arc + &bulges))).drawing;
+    let grid = drawing.shape[1].grid.expect("three equal circles in a row");
+    assert_eq!((drawing.shape.len(), grid.count, grid.pitch), (2, [3, 1], [10.0, 0.0]));
+    assert_eq!(drawing.shape[1].radius, Some(2.0));
+    // A polygon of 36 sides is none.
+    let corner = |i: i32| f64::from(i).to_radians().sin_cos();
+    let sides = (0..36).map(|i| (corner(10 * i), corner(10 * i + 10)));
+    let gear: String = sides.map(|((s, c), (s1, c1))| line([20.0 * c, 20.0 * s], [20.0 * c1, 20.0 * s1])).collect();
+    assert_eq!(imported(&file(MM, "", &gear)).drawing.shape[0].kind, Form::Polygon);
+}
+
+#[test]
+fn a_large_arc_is_as_exact_as_a_small_one() {
+    // A lens of two bows of 150 mm radius, in metres.
+    let half = (40.0f64 / 150.0).asin();
+    let bulge = (half / 2.0).tan();
+    let lens = entity!("LWPOLYLINE", 8: "0", 90: 2, 70: 1, 10: -0.04, 20: 0, 42: bulge, 10: 0.04, 20: 0, 42: bulge);
+    let drawing = imported(&file("9\n$INSUNITS\n70\n6\n", "", &lens)).drawing;
+    let points = drawing.shape[0].points.as_ref().expect("a polygon");
+    let depth = 150.0 * half.cos();
+    for (i, p) in points.iter().enumerate() {
+        let q = points[(i + 1) % points.len()];
+        let middle = [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])];
+        let off = 150.0 - middle[0].hypot(middle[1].abs() + depth);
+        assert!((-0.001..0.003).contains(&off), "{middle:?} {off}");
+    }
+}
+
+#[test]
+fn an_edge_without_area_is_an_edge() {
+    // A bow tie, and a closed polyline of two corners, in a plate.
+    let tie = [[0.0, 0.0], [10.0, 5.0], [10.0, 0.0], [0.0, 5.0]];
+    let tie: String = (0..4).map(|i| line(tie[i], tie[(i + 1) % 4])).collect();
+    let stroke = entity!("LWPOLYLINE", 8: "0", 90: 2, 70: 1, 10: -9, 20: -9, 10: -9, 20: 9);
+    let read = imported(&file(MM, "", &(circle("0", 0.0, 0.0, 20.0) + &tie + &stroke)));
+    let lines: Vec<_> = read.drawing.shape.iter().filter(|s| s.kind == Form::Line).collect();
+    let length = |p: &[[f64; 2]]| (p[1][0] - p[0][0]).hypot(p[1][1] - p[0][1]);
+    let total: f64 = lines.iter().map(|s| length(s.points.as_ref().unwrap())).sum();
+    assert!(lines.len() == 5 && (total - (10.0 + 2.0 * 125f64.sqrt() + 18.0)).abs() < 2e-3, "{} {total}", lines.len());
+    assert!(read.warnings.iter().any(|w| w.starts_with("5 lines")), "{:?}", read.warnings);
+}
+
+#[test]
+fn what_is_not_shown_is_passed_over_with_its_reason() {
+    let layers = "0\nLAYER\n2\nIce\n70\n1\n62\n7\n0\nLAYER\n2\nmid\n70\n0\n62\n3\n6\nCENTER\n0\nENDTAB\n";
+    let block = entity!("BLOCK", 8: "0", 2: "pin", 70: 0, 10: 0, 20: 0)
+        + &circle("hole", 0.0, 0.0, 1.0)
+        + &circle("0", 0.0, 0.0, 0.5)
+        + &entity!("ENDBLK", 8: "0");
+    let insert = |layer: &str, x: f64| entity!("INSERT", 8: layer, 2: "PIN", 10: x, 20: 0);
+    let hidden = |code: i32| circle("0", 0.0, 0.0, 7.0) + &tags(&[(code, "1".into())]);
+    let entities = circle("part", 0.0, 0.0, 20.0)
+        + &hidden(67)
+        + &hidden(60)
+        + &circle("ICE", 0.0, 0.0, 8.0)
+        + &circle("Defpoints", 0.0, 0.0, 9.0)
+        + &entity!("ARC", 8: "0", 10: 0, 20: 0, 40: 0, 50: 0, 51: 90)
+        + &line([-5.0, 3.0], [5.0, 3.0]).replace("8\n0\n", "8\nmid\n")
+        + &insert("ice", -5.0)
+        + &insert("OFF", 5.0)
+        // A line's normal says only along what it is extruded.
+        + &(line([-5.0, -3.0], [5.0, -3.0]) + "210\n1\n220\n0\n230\n0\n")
+        + &entity!("LWPOLYLINE", 8: "0", 90: 2, 43: 0.5, 10: -5, 20: 6, 10: 5, 20: 6);
+    let mut text = file(MM, &block, &entities).replace("0\nENDTAB\n", layers);
+    text = text.replace("0\nEOF\n", "0\nSECTION\n2\nOBJECTS\n0\nSPATIAL_FILTER\n0\nENDSEC\n0\nEOF\n");
+    let read = imported(&text);
+    let radii = |r: &Imported| r.drawing.shape.iter().filter_map(|s| s.radius).collect::<Vec<f64>>();
+    // A block on a layer that is off still shows what it holds on others.
+    assert_eq!(radii(&read), [20.0, 1.0]);
+    for (count, words) in [
+        (1, "CIRCLE in paper space"),
+        (1, "CIRCLE, invisible"),
+        (1, "CIRCLE on layer ICE, which is frozen"),
+        (1, "INSERT on layer ice, which is frozen"),
+        (1, "CIRCLE on layer OFF, which is off"),
+        (1, "CIRCLE on layer Defpoints, which is never plotted"),
+        (1, "ARC of radius 0"),
+    ] {
+        assert!(read.notes.contains(&format!("passed over: {count} {words}")), "{words}: {:?}", read.notes);
+    }
+    for words in
+        ["1 edges are drawn as CENTER", "1 polylines have a width", "1 inserted blocks are shown in part", "3 lines"]
+    {
+        assert!(read.warnings.iter().any(|w| w.starts_with(words)), "{words}: {:?}", read.warnings);
+    }
+    // A layer that a person names is read, hidden or not, in any case of letters; one that is not there is named.
+    let on = |layers: &[&str]| DxfOptions {
+        layers: layers.iter().map(|l| (*l).to_owned()).collect(),
+        origin: Some([0.0; 2]),
+        ..Default::default()
+    };
+    let named = sheetlight::find::dxf::read(text.as_bytes(), &on(&["ICE"])).unwrap();
+    assert_eq!(radii(&named), [8.0, 0.5]);
+    let e = refused(&text, &on(&["part", "pars"]));
+    assert!(
+        e.exit_code() == 2 && e.what.contains("pars") && e.next.contains("Defpoints") && e.next.contains("hole"),
+        "{e}"
+    );
+}
+
+#[test]
+fn files_of_other_systems_are_the_same_drawing() {
+    let plain = file(MM, "", &(circle("rand", 0.0, 0.0, 9.0) + &circle("\u{d6}l", 0.0, 0.0, 4.0)));
+    let only = |layer: &str| DxfOptions { layers: vec![layer.into()], ..Default::default() };
+    let oil =
+        |bytes: &[u8], layer: &str| read(bytes, &only(layer)).unwrap_or_else(|e| panic!("{e}")).drawing.shape[0].radius;
+    assert_eq!(oil(plain.as_bytes(), "\u{f6}l"), Some(4.0));
+    // Before 2007 names were bytes of a code page, or escapes where the page lacked the character.
+    let latin: Vec<u8> = plain.chars().map(|c| c as u8).collect();
+    assert!(std::str::from_utf8(&latin).is_err());
+    assert_eq!(oil(&latin, "\u{d6}l"), Some(4.0));
+    assert_eq!(oil(plain.replace('\u{d6}', "\\U+00D6").as_bytes(), "\u{d6}l"), Some(4.0));
+    // Other line ends, a comment first, codes set right, remains of an older file behind the end.
+    let mut windows: String = "999\r\nby hand\r\n".into();
+    for (i, l) in plain.lines().enumerate() {
+        windows += &if i % 2 == 0 { format!("{l:>3}\r\n") } else { format!("{l}\r\n") };
+    }
+    assert_eq!(oil((windows + "\u{1a}\r\nSECTION\r\n").as_bytes(), "\u{d6}l"), Some(4.0));
+}
+
+#[test]
+fn blocks_are_turned_mirrored_and_arrayed_in_one_another() {
+    let block = |name: &str, x: f64, inside: &str| {
+        entity!("BLOCK", 8: "0", 2: name, 70: 0, 10: x, 20: 0) + inside + &entity!("ENDBLK", 8: "0")
+    };
+    // A hole 1 right and 2 up of the base point; in an array turned by 90 degrees and scaled by 2 and -2; in a block seen
+    // from below.
+    let array =
+        entity!("INSERT", 8: "0", 2: "HOLE", 10: 10, 20: 20, 41: 2, 42: -2, 43: 0, 50: 90, 70: 2, 71: 1, 44: 30);
+    let blocks = block("HOLE", 7.0, &circle("0", 8.0, 2.0, 0.25)) + &block("ROW", 0.0, &array);
+    let from_below = entity!("INSERT", 8: "0", 2: "ROW", 10: 5, 20: 0, 230: -1);
+    let drawing = imported(&file(MM, &blocks, &(circle("0", 0.0, 0.0, 99.0) + &from_below))).drawing;
+    // (1, 2) scaled: (2, -4); turned: (4, 2); at (10, 20) and 30 further along the turned x: (14, 22), (14, 52). Placed at
+    // x 5 and seen from below: x = -(5 + 14).
+    let holes = &drawing.shape[1];
+    let grid = holes.grid.expect("two holes");
+    assert_eq!(
+        (holes.radius, holes.centre, grid.count, grid.pitch),
+        (Some(0.5), Some([-19.0, 37.0]), [1, 2], [0.0, 30.0])
+    );
+}
+
 #[test]
 fn no_broken_file_makes_the_reader_panic_or_hang() {
-    let seeds = [oscillator(), file(MM, "", &(line([0.0, 0.0], [1e9, 1e9]) + &circle("0", 0.0, 0.0, 1.0)))];
+    let seeds = [
+        oscillator(),
+        file(MM, "", &spline_circle(0.0, 0.0, 3.0)),
+        file(MM, "", &(line([0.0, 0.0], [1e9, 1e9]) + &circle("0", 0.0, 0.0, 1.0))),
+    ];
     let mut rng = Pcg64::seed_from_u64(77);
     let words = [
         "0",
@@ -227,7 +423,7 @@ fn no_broken_file_makes_the_reader_panic_or_hang() {
     ];
     let (mut good, mut bad) = (0, 0);
     for _ in 0..4000 {
-        let mut lines: Vec<String> = seeds[rng.random_range(0..2)].lines().map(str::to_owned).collect();
+        let mut lines: Vec<String> = seeds[rng.random_range(0..3)].lines().map(str::to_owned).collect();
         for _ in 0..rng.random_range(1..4) {
             let (k, j) = (rng.random_range(0..lines.len()), rng.random_range(0..lines.len()));
             match rng.random_range(0..5) {
@@ -280,4 +476,18 @@ fn the_program_writes_a_recipe_that_find_accepts() {
     assert!(!work.path().join("x.toml").exists());
     let wrong = ["model", &path("plain.dxf"), "--name", "osc", "--unit", "parsec", "--out", &path("x.toml")];
     assert_eq!(common::sheetlight_fails(&wrong).0, 2);
+    // The places that the help shows.
+    let at = |place: &'static str| {
+        ["model", &path("osc.dxf"), "--name", "osc", "--origin", place, "--out", &path("at.toml")].map(str::to_owned)
+    };
+    for (place, x) in [("0,0", 0.0), ("-1,2.5", 1.0)] {
+        common::sheetlight(&at(place).each_ref().map(String::as_str));
+        let window = Recipe::load(&work.path().join("at.toml")).unwrap().drawing();
+        let window = window.shape.iter().find(|s| s.name.as_deref() == Some("window")).unwrap().centre;
+        assert_eq!(window.map(|c| c[0]), Some(x), "{place}");
+    }
+    for place in ["0", "0,0,0", "0,inf"] {
+        let (code, talk) = common::sheetlight_fails(&at(place).each_ref().map(String::as_str));
+        assert!(code == 2 && talk.contains("wanted 2 numbers"), "{talk}");
+    }
 }

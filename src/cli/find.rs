@@ -32,15 +32,15 @@ pub struct Args {
     #[arg(long, value_parser = super::parse::<Convention>)]
     robot: Option<Convention>,
     /// Direction towards the camera in the base frame [default: from the station, else 0,0,1]
-    #[arg(long, value_delimiter = ',', num_args = 3, allow_hyphen_values = true)]
-    up: Option<Vec<f64>>,
+    #[arg(long, value_name = "X,Y,Z", value_parser = super::numbers::<3>, allow_hyphen_values = true)]
+    up: Option<[f64; 3]>,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let recipe = Recipe::load(&args.recipe)?;
     let of_station = args.station.as_deref().map(Settings::load).transpose()?.and_then(|s| s.robot);
-    let up = args.up.as_ref().map(|u| Vec3::new(u[0], u[1], u[2]));
-    if up.is_some_and(|u| !(u.norm() > 1e-6 && u.norm().is_finite())) {
+    let up = args.up.map(Vec3::from);
+    if up.is_some_and(|u| u.norm() < 1e-6) {
         return Err(Fault::usage("--up has no direction").next("give three numbers, e.g. 0,0,1"));
     }
     let robot = args.robot.or(of_station).unwrap_or(Convention::Matrix);

@@ -10,9 +10,10 @@ use std::path::PathBuf;
 
 /// Make a recipe from a drawing: the part is found without ever having been scanned
 ///
-/// Reads LINE, ARC, CIRCLE, ELLIPSE, LWPOLYLINE, POLYLINE and INSERT of an ASCII DXF. The outermost closed edges are the part's
-/// top, what lies in them is a hole, and so on inwards; edges that close no outline are searched, not measured. Texts and
-/// dimensions are passed over, other curves refused. Equal circles in an array become one shape with a grid.
+/// Reads LINE, ARC, CIRCLE, ELLIPSE, SPLINE, LWPOLYLINE, POLYLINE and INSERT of an ASCII DXF. The outermost closed edges are
+/// the part's top, what lies in them is a hole, and so on inwards; edges that close no outline are searched, not measured.
+/// Texts, dimensions, hatches and what is hidden or in paper space are passed over and counted, other entities refused. Equal
+/// circles in an array become one shape with a grid.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight model socket.dxf --name socket --out socket.toml
@@ -23,15 +24,15 @@ pub struct Args {
     /// A name for the part
     #[arg(long)]
     name: String,
-    /// Unit of the drawing where it names none: mm, inch, cm, m, um, mil or foot; none is guessed
+    /// Unit of the drawing where it names none: mm, inch, cm, m, um, mil or foot [default: the one it names; none is guessed]
     #[arg(long, value_parser = super::parse::<Unit>)]
     unit: Option<Unit>,
-    /// A layer that holds edges of the part, several times [default: all that are not switched off]
+    /// A layer that holds edges of the part, switched off or not; several times [default: all that are shown]
     #[arg(long = "layer")]
     layers: Vec<String>,
     /// The insertion datum in the drawing, in its unit: x,y [default: the middle of the largest outline's box]
-    #[arg(long, value_delimiter = ',', num_args = 2, allow_hyphen_values = true)]
-    origin: Option<Vec<f64>>,
+    #[arg(long, value_name = "X,Y", value_parser = super::numbers::<2>, allow_hyphen_values = true)]
+    origin: Option<[f64; 2]>,
     /// How many turns make the part look nearly alike (2: half a turn)
     #[arg(long, default_value_t = 1)]
     alike_turns: u32,
@@ -46,12 +47,8 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
-    let origin = args.origin.as_ref().map(|o| [o[0], o[1]]);
-    if origin.is_some_and(|o| o.iter().any(|v| !v.is_finite())) {
-        return Err(Fault::usage("--origin is no place").next("give two numbers, e.g. 0,0"));
-    }
     let bytes = std::fs::read(&args.drawing).map_err(|e| Fault::read(&args.drawing, e))?;
-    let options = DxfOptions { unit: args.unit, layers: args.layers.clone(), origin };
+    let options = DxfOptions { unit: args.unit, layers: args.layers.clone(), origin: args.origin };
     let read = dxf::read(&bytes, &options).map_err(|e| e.at(args.drawing.display()))?;
     let [x0, y0, x1, y1] = read.drawing.bounds();
     let recipe = recipe_of(

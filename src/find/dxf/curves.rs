@@ -1,7 +1,9 @@
 //! In: the entities of a DXF file. Out: its curves as polylines and circles, blocks inserted, in one plane seen from above.
 //! Frame and unit: the drawing's own x y z and its own unit; angles in degrees in the file.
 
-use super::tags::{Entity, File, Tag};
+use super::flatten::{arc, bent};
+use super::spline::Spline;
+use super::tags::{Entity, File, Tag, key};
 use crate::fault::{Fault, Result};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -23,23 +25,27 @@ pub enum Form {
 #[derive(Debug, Default)]
 pub struct Curves {
     pub curves: Vec<Curve>,
-    /// Annotation and hidden entities, by what they are.
+    /// Annotation and hidden entities, by what they are and why.
     pub passed_over: BTreeMap<String, usize>,
+    /// Edges whose linetype is not continuous, by linetype: centre lines and hidden edges are drawn so.
+    pub broken: BTreeMap<String, usize>,
+    /// Polylines with a width: what is read is their middle line.
+    pub wide: usize,
 }
 
 /// Limits against a file that inserts blocks in blocks in blocks.
 const MOST_POINTS: usize = 400_000;
 const DEEPEST: usize = 16;
-/// Turn between two points of a flattened curve, rad: the polyline stays within 0.5 per mille of the radius.
-const STEP: f64 = std::f64::consts::TAU / 100.0;
 /// Entities that say something about edges but are none.
 const ANNOTATION: &[&str] = &[
     "TEXT",
     "MTEXT",
     "DIMENSION",
     "ARC_DIMENSION",
+    "LARGE_RADIAL_DIMENSION",
     "LEADER",
     "MULTILEADER",
+    "MLEADER",
     "HATCH",
     "POINT",
     "ATTRIB",
@@ -52,6 +58,7 @@ const ANNOTATION: &[&str] = &[
     "RAY",
     "ACAD_TABLE",
     "OLE2FRAME",
+    "PDFUNDERLAY",
 ];
 
 /// A similarity or a stretch of the plane, and a shift along z.
@@ -83,6 +90,11 @@ impl Placed {
         Placed { x: turn(inner.x), y: turn(inner.y), origin: self.point(inner.origin), z, rise }
     }
 
+    /// The most that a length grows.
+    fn growth(&self) -> f64 {
+        (self.x[0].hypot(self.x[1])).max(self.y[0].hypot(self.y[1]))
+    }
+
     /// The scale where circles stay circles.
     fn scale(&self) -> Option<f64> {
         let (a, b) = (self.x[0].hypot(self.x[1]), self.y[0].hypot(self.y[1]));
@@ -91,15 +103,23 @@ impl Placed {
     }
 }
 
-/// The curves of all layers, or of the named ones.
-pub fn curves(file: &File, layers: &[String]) -> Result<Curves> {
-    let mut reader = Reader { file, layers, out: Curves::default(), unread: BTreeMap::new(), points: 0 };
+/// The curves of all layers, or of the named ones; polylines stay within `flat` of what they stand for.
+pub fn curves(file: &File, layers: &[String], flat: f64) -> Result<Curves> {
+    let wanted = layers.iter().map(|l| key(l)).collect();
+    let out = Curves::default();
+    let mut reader = Reader { file, wanted, flat, out, layers: BTreeMap::new(), unread: BTreeMap::new(), points: 0 };
     reader.list(&file.entities, &Placed::HERE, "0", &mut BTreeSet::new())?;
+    if let Some(missing) = layers.iter().find(|l| !reader.layers.contains_key(&key(l))) {
+        let names: Vec<&str> = reader.layers.values().map(String::as_str).collect();
+        return Err(Fault::usage(format!("--layer {missing}: nothing in the drawing lies on it"))
+            .cause("a misspelt name")
+            .next(format!("name one of its {} layers: {}", names.len(), names.join(", "))));
+    }
     if !reader.unread.is_empty() {
         let list: Vec<String> =
             reader.unread.iter().map(|(kind, (n, line))| format!("{n} {kind} (line {line})")).collect();
         return Err(Fault::input(format!("holds edges that are not read: {}", list.join(", ")))
-            .cause("the drawing has free-form curves, solids or a program's own objects")
+            .cause("the drawing has filled areas, solids or a program's own objects")
             .next("explode them to lines and arcs, or name the layers of the part's edges with --layer"));
     }
     Ok(reader.out)
@@ -107,8 +127,13 @@ pub fn curves(file: &File, layers: &[String]) -> Result<Curves> {
 
 struct Reader<'a> {
     file: &'a File,
-    layers: &'a [String],
+    /// Keys of the layers that a person named; empty: all that are shown.
+    wanted: BTreeSet<String>,
+    /// How far a polyline may lie from its curve, in the drawing's unit.
+    flat: f64,
     out: Curves,
+    /// Every layer that something lies on, as the file writes it, by its key.
+    layers: BTreeMap<String, String>,
     unread: BTreeMap<String, (usize, usize)>,
     points: usize,
 }
@@ -128,11 +153,9 @@ impl Reader<'_> {
             }
             // What lies on layer 0 of a block lies on the layer of its insertion.
             let layer = if e.layer() == "0" { parent } else { e.layer() };
-            let wanted = self.layers.is_empty() || self.layers.iter().any(|l| l == layer) || e.kind == "INSERT";
-            let shown = !self.file.hidden.contains(layer) && e.whole(60, 0)? == 0 && e.whole(67, 0)? == 0;
-            if ANNOTATION.contains(&e.kind.as_str()) || !wanted || !shown {
-                let what = if wanted && shown { e.kind.clone() } else { format!("{} on layer {layer}", e.kind) };
-                *self.out.passed_over.entry(what).or_default() += 1;
+            self.layers.entry(key(layer)).or_insert_with(|| layer.to_owned());
+            if let Some(why) = self.passed(e, layer)? {
+                *self.out.passed_over.entry(why).or_default() += 1;
             } else if e.kind == "INSERT" {
                 self.insert(e, placed, layer, open)?;
             } else {
@@ -142,16 +165,51 @@ impl Reader<'_> {
         Ok(())
     }
 
+    /// Why an entity is no edge of the part, in words.
+    fn passed(&self, e: &Entity, layer: &str) -> Result<Option<String>> {
+        let named = self.wanted.contains(&key(layer));
+        let table = self.file.layers.get(&key(layer));
+        let (off, frozen) = table.map_or((false, false), |l| (l.off, l.frozen));
+        // What a block holds on other layers is seen even where its insertion's layer is off, but not where that is frozen.
+        let block = e.kind == "INSERT";
+        let why = if ANNOTATION.contains(&e.kind.as_str()) {
+            String::new()
+        } else if e.whole(67, 0)? != 0 {
+            " in paper space".into()
+        } else if e.whole(60, 0)? != 0 {
+            ", invisible".into()
+        } else if !self.wanted.is_empty() && !named && !block {
+            format!(" on layer {layer}, which is not asked for")
+        } else if frozen && !named {
+            format!(" on layer {layer}, which is frozen")
+        } else if off && !named && !block {
+            format!(" on layer {layer}, which is off")
+        } else if key(layer) == "DEFPOINTS" && !named && !block {
+            format!(" on layer {layer}, which is never plotted")
+        } else if ["CIRCLE", "ARC"].contains(&e.kind.as_str()) && e.number(40, 1.0)? == 0.0 {
+            " of radius 0".into()
+        } else {
+            return Ok(None);
+        };
+        Ok(Some(e.kind.clone() + &why))
+    }
+
     fn insert(&mut self, e: &Entity, placed: &Placed, layer: &str, open: &mut BTreeSet<String>) -> Result<()> {
         let name = e.text(2).unwrap_or_default().to_owned();
-        let Some(block) = self.file.blocks.get(&name) else {
-            return Err(e.fault(format!("it inserts '{name}', which is no block")).next("bind external references"));
+        let block = self.file.blocks.get(&key(&name));
+        // Flags 4 and 8: the block's content is in another file.
+        let Some(block) = block.filter(|b| b.head.whole(70, 0).is_ok_and(|flags| flags & 12 == 0)) else {
+            let what = if block.is_some() { "which is in another file" } else { "which is no block" };
+            return Err(e.fault(format!("it inserts '{name}', {what}")).next("bind external references"));
         };
-        if open.len() >= DEEPEST || !open.insert(name.clone()) {
+        if open.len() >= DEEPEST || !open.insert(key(&name)) {
             return Err(e.fault(format!("block '{name}' lies in itself, or {DEEPEST} blocks deep")).next("explode it"));
         }
         let mirror = mirrored(e)?;
         let (sx, sy) = (e.number(41, 1.0)?, e.number(42, 1.0)?);
+        if sx == 0.0 || sy == 0.0 {
+            return Err(e.fault(format!("it inserts '{name}' scaled by {sx} and {sy}, wanted other than 0")));
+        }
         let (s, c) = e.number(50, 0.0)?.to_radians().sin_cos();
         let [columns, rows] = [e.whole(70, 1)?.max(1), e.whole(71, 1)?.max(1)];
         if columns.saturating_mul(rows) > 10_000 {
@@ -170,56 +228,56 @@ impl Reader<'_> {
             };
             self.list(&block.entities, &placed.after(&own), layer, open)?;
         }
-        open.remove(&name);
+        open.remove(&key(&name));
         Ok(())
     }
 
     fn curve(&mut self, e: &Entity, vertices: &[Entity], placed: &Placed, layer: &str) -> Result<()> {
-        let mut mirror = mirrored(e)?;
+        use std::f64::consts::TAU;
+        let flat = self.flat / placed.growth();
+        // These are given in the drawing's own axes; a normal of theirs says only along what they are extruded.
+        let flags = e.whole(70, 0)?;
+        let own = ["LINE", "ELLIPSE", "SPLINE"].contains(&e.kind.as_str()) || (e.kind == "POLYLINE" && flags & 8 != 0);
+        let mirror = if own { 1.0 } else { mirrored(e)? };
         let mut z = e.number(30, 0.0)?;
-        let (points, closed) = match e.kind.as_str() {
+        let round = |centre: [f64; 2], radius: f64| match placed.scale() {
+            Some(k) => Form::Circle { centre: placed.point([mirror * centre[0], centre[1]]), radius: radius * k },
+            None => path(placed, mirror, &arc(centre, radius, 0.0, TAU, flat), true),
+        };
+        let form = match e.kind.as_str() {
             "LINE" => {
-                // A line's ends are given in the drawing's own axes.
-                mirror = 1.0;
-                let to = [e.needed(11)?, e.needed(21)?];
                 level(e, z, e.number(31, 0.0)?)?;
-                (vec![point(e)?, to], false)
+                path(placed, 1.0, &[point(e)?, [e.needed(11)?, e.needed(21)?]], false)
             }
-            "CIRCLE" => {
-                let (centre, radius) = (point(e)?, size(e, 40)?);
-                if let Some(k) = placed.scale() {
-                    let centre = placed.point([mirror * centre[0], centre[1]]);
-                    return self.add(layer, placed.height(mirror * z), Form::Circle { centre, radius: radius * k }, 1);
-                }
-                (arc(centre, radius, 0.0, std::f64::consts::TAU), true)
-            }
+            "CIRCLE" => round(point(e)?, size(e, 40)?),
             "ARC" => {
                 let (from, to) = (e.needed(50)?.to_radians(), e.needed(51)?.to_radians());
-                let span = (to - from).rem_euclid(std::f64::consts::TAU);
-                let span = if span < 1e-9 { std::f64::consts::TAU } else { span };
-                (arc(point(e)?, size(e, 40)?, from, from + span), false)
+                match turn(from, to) {
+                    Some(span) => path(placed, mirror, &arc(point(e)?, size(e, 40)?, from, from + span, flat), false),
+                    None => round(point(e)?, size(e, 40)?),
+                }
             }
             "ELLIPSE" => {
                 let (c, a) = (point(e)?, [e.needed(11)?, e.needed(21)?]);
-                let flip = std::mem::replace(&mut mirror, 1.0);
-                let b = [-a[1] * flip * size(e, 40)?, a[0] * flip * size(e, 40)?];
+                let ratio = mirrored(e)? * size(e, 40)?;
+                let b = [-a[1] * ratio, a[0] * ratio];
                 let from = e.number(41, 0.0)?;
-                let span = (e.number(42, std::f64::consts::TAU)? - from).rem_euclid(std::f64::consts::TAU);
-                let closed = !(1e-6..std::f64::consts::TAU - 1e-6).contains(&span);
-                let span = if closed { std::f64::consts::TAU } else { span };
-                let unit = arc([0.0; 2], 1.0, from, from + span);
-                (unit.iter().map(|p| std::array::from_fn(|k| c[k] + p[0] * a[k] + p[1] * b[k])).collect(), closed)
+                let span = turn(from, e.number(42, TAU)?);
+                let unit = arc([0.0; 2], 1.0, from, from + span.unwrap_or(TAU), flat / a[0].hypot(a[1]));
+                let points: Vec<[f64; 2]> =
+                    unit.iter().map(|p| std::array::from_fn(|k| c[k] + p[0] * a[k] + p[1] * b[k])).collect();
+                path(placed, 1.0, &points, span.is_none())
             }
             "LWPOLYLINE" => {
                 z = e.number(38, 0.0)?;
-                (light(e)?, e.whole(70, 0)? & 1 != 0)
+                self.out.wide += usize::from(wide(e)?);
+                path(placed, mirror, &bent(&light(e)?, flags & 1 != 0, flat), flags & 1 != 0)
             }
             "POLYLINE" => {
-                let flags = e.whole(70, 0)?;
                 if flags & (16 | 64) != 0 {
-                    self.unread.entry("POLYLINE mesh".into()).or_insert((0, e.line)).0 += 1;
-                    return Ok(());
+                    return self.skip("POLYLINE mesh", e);
                 }
+                self.out.wide += usize::from(wide(e)?);
                 let mut corners = Vec::new();
                 // Bit 16: a control point that the curve does not pass.
                 for v in vertices {
@@ -230,20 +288,32 @@ impl Reader<'_> {
                         corners.push((point(v)?, v.number(42, 0.0)?));
                     }
                 }
-                (bent(&corners, flags & 1 != 0), flags & 1 != 0)
+                path(placed, mirror, &bent(&corners, flags & 1 != 0, flat), flags & 1 != 0)
             }
-            other => {
-                self.unread.entry(other.to_owned()).or_insert((0, e.line)).0 += 1;
-                return Ok(());
+            "SPLINE" => {
+                let Some(spline) = Spline::of(e)? else { return self.skip("SPLINE of fit points alone", e) };
+                let heights = e.tags.iter().filter(|t| t.code == 30);
+                heights.map(Tag::number).try_for_each(|h| level(e, z, h?))?;
+                path(placed, 1.0, &spline.flat(flat), false)
             }
+            other => return self.skip(other, e),
         };
-        let points: Vec<[f64; 2]> = points.into_iter().map(|p| placed.point([mirror * p[0], p[1]])).collect();
-        let n = points.len();
-        self.add(layer, placed.height(mirror * z), Form::Path { points, closed }, n)
+        let table = self.file.layers.get(&key(layer)).map(|l| l.linetype.as_str());
+        let linetype = e.text(6).filter(|t| key(t) != "BYLAYER").or(table).unwrap_or_default();
+        if !["", "CONTINUOUS", "BYBLOCK", "BYLAYER"].contains(&key(linetype).as_str()) {
+            *self.out.broken.entry(linetype.trim().to_owned()).or_default() += 1;
+        }
+        self.add(layer, placed.height(mirror * z), form)
     }
 
-    fn add(&mut self, layer: &str, z: f64, form: Form, points: usize) -> Result<()> {
-        self.points += points;
+    /// An edge that is not read: the drawing will be refused, with all such edges named.
+    fn skip(&mut self, kind: &str, e: &Entity) -> Result<()> {
+        self.unread.entry(kind.to_owned()).or_insert((0, e.line)).0 += 1;
+        Ok(())
+    }
+
+    fn add(&mut self, layer: &str, z: f64, form: Form) -> Result<()> {
+        self.points += if let Form::Path { points, .. } = &form { points.len() } else { 1 };
         if self.points > MOST_POINTS {
             return Err(Fault::input(format!("has more than {MOST_POINTS} points of edges"))
                 .cause("a whole assembly, or blocks inserted in blocks")
@@ -286,18 +356,24 @@ fn mirrored(e: &Entity) -> Result<f64> {
         .next("export a view of the part from above"))
 }
 
-fn arc(centre: [f64; 2], radius: f64, from: f64, to: f64) -> Vec<[f64; 2]> {
-    let steps = ((to - from).abs() / STEP).ceil().max(2.0) as usize;
-    (0..=steps)
-        .map(|i| {
-            let (s, c) = (from + (to - from) * i as f64 / steps as f64).sin_cos();
-            [centre[0] + radius * c, centre[1] + radius * s]
-        })
-        .collect()
+fn path(placed: &Placed, mirror: f64, points: &[[f64; 2]], closed: bool) -> Form {
+    Form::Path { points: points.iter().map(|p| placed.point([mirror * p[0], p[1]])).collect(), closed }
 }
 
-/// The corners of a light polyline: 10 starts one, 20 and 42 belong to the last.
-fn light(e: &Entity) -> Result<Vec<[f64; 2]>> {
+/// From one angle on to the other, rad; `None`: all the way round.
+fn turn(from: f64, to: f64) -> Option<f64> {
+    let span = (to - from).rem_euclid(std::f64::consts::TAU);
+    (1e-6..std::f64::consts::TAU - 1e-6).contains(&span).then_some(span)
+}
+
+/// Whether a polyline is drawn as a band.
+fn wide(e: &Entity) -> Result<bool> {
+    let mut widths = e.tags.iter().filter(|t| [40, 41, 43].contains(&t.code));
+    widths.try_fold(false, |any, t| Ok(any || t.number()? != 0.0))
+}
+
+/// The corners of a light polyline and their bulges: 10 starts one, 20 and 42 belong to the last.
+fn light(e: &Entity) -> Result<Vec<([f64; 2], f64)>> {
     let mut corners: Vec<([f64; 2], f64)> = Vec::new();
     for t in &e.tags {
         match (t.code, corners.last_mut()) {
@@ -311,26 +387,5 @@ fn light(e: &Entity) -> Result<Vec<[f64; 2]>> {
     if told != corners.len() as i64 || corners.iter().any(|c| c.0[1].is_nan()) {
         return Err(e.fault(format!("{} corners, {told} are announced", corners.len())).cause("a damaged file"));
     }
-    Ok(bent(&corners, e.tags.iter().find(|t| t.code == 70).map_or(Ok(0), Tag::whole)? & 1 != 0))
-}
-
-/// A polyline whose pieces may be arcs: the bulge is the tangent of a quarter of the arc's angle, positive to the left.
-fn bent(corners: &[([f64; 2], f64)], closed: bool) -> Vec<[f64; 2]> {
-    let mut out = Vec::new();
-    for (i, &(a, bulge)) in corners.iter().enumerate() {
-        out.push(a);
-        let Some(&(b, _)) = corners.get(i + 1).or(corners.first().filter(|_| closed)) else { continue };
-        let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
-        let chord = dx.hypot(dy);
-        if bulge.abs() < 1e-9 || chord == 0.0 {
-            continue;
-        }
-        let rise = (1.0 - bulge * bulge) / (4.0 * bulge);
-        let centre = [0.5 * (a[0] + b[0]) - dy * rise, 0.5 * (a[1] + b[1]) + dx * rise];
-        let from = (a[1] - centre[1]).atan2(a[0] - centre[0]);
-        let radius = (a[0] - centre[0]).hypot(a[1] - centre[1]);
-        let bow = arc(centre, radius, from, from + 4.0 * bulge.atan());
-        out.extend(&bow[1..bow.len() - 1]);
-    }
-    out
+    Ok(corners)
 }

@@ -1,7 +1,9 @@
 //! In: curves of a drawing. Out: closed loops, joined end to end, and what could not be joined.
 //! Frame and unit: the drawing's x y z, mm.
 
+use super::FLAT;
 use super::curves::{Curve, Form};
+use super::flatten::arc;
 use crate::find::outline::area;
 use std::collections::HashMap;
 
@@ -64,12 +66,10 @@ pub fn join(curves: &[Curve]) -> Joined {
             Form::Circle { centre, radius } => {
                 let key = [nodes.at(*centre, c.z), nodes.at([centre[0] + radius, centre[1]], c.z), usize::MAX];
                 if seen.insert(key) {
-                    let points = (0..100).map(|k| {
-                        let (s, co) = (f64::from(k) * std::f64::consts::TAU / 100.0).sin_cos();
-                        [centre[0] + radius * co, centre[1] + radius * s]
-                    });
+                    let mut points = arc(*centre, *radius, 0.0, std::f64::consts::TAU, FLAT);
+                    points.pop();
                     let circle = Some((*centre, *radius));
-                    out.loops.push(Loop { layer: c.layer.clone(), z: c.z, points: points.collect(), circle });
+                    out.loops.push(Loop { layer: c.layer.clone(), z: c.z, points, circle });
                 } else {
                     out.duplicates += 1;
                 }
@@ -137,7 +137,7 @@ pub fn join(curves: &[Curve]) -> Joined {
     out
 }
 
-/// A closed loop without repeated points; one without area is none.
+/// A closed loop without repeated points. One without area (a line there and back, a bow tie) is an edge all the same.
 fn push(out: &mut Joined, c: &Curve, mut points: Vec<[f64; 2]>) {
     let apart = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) > 1e-6;
     points.dedup_by(|a, b| !apart(a, b));
@@ -145,6 +145,32 @@ fn push(out: &mut Joined, c: &Curve, mut points: Vec<[f64; 2]>) {
         points.pop();
     }
     if points.len() > 2 && area(&points).abs() > JOIN * JOIN {
-        out.loops.push(Loop { layer: c.layer.clone(), z: c.z, points, circle: None });
+        let circle = circle(&points);
+        out.loops.push(Loop { layer: c.layer.clone(), z: c.z, points, circle });
+    } else if points.len() > 1 {
+        points.extend(points.first().copied().filter(|_| points.len() > 2));
+        out.open.push(Curve { layer: c.layer.clone(), z: c.z, form: Form::Path { points, closed: false } });
     }
+}
+
+/// Centre and radius where arcs, bulges or a spline draw a whole circle.
+fn circle(points: &[[f64; 2]]) -> Option<([f64; 2], f64)> {
+    let n = points.len();
+    if n < 32 {
+        return None;
+    }
+    let (a, b, c) = (points[0], points[n / 3], points[2 * n / 3]);
+    let (u, v) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
+    let twice = 2.0 * (u[0] * v[1] - u[1] * v[0]);
+    let (uu, vv) = (u[0] * u[0] + u[1] * u[1], v[0] * v[0] + v[1] * v[1]);
+    let centre = [a[0] + (v[1] * uu - u[1] * vv) / twice, a[1] + (u[0] * vv - v[0] * uu) / twice];
+    let off = |p: [f64; 2]| (p[0] - centre[0]).hypot(p[1] - centre[1]);
+    let radius = off(a);
+    // The corners lie on it, and the chords as close to it as those of a flattened arc, which a polygon's sides do not.
+    let near = |i: usize| {
+        let (p, q) = (points[i], points[(i + 1) % n]);
+        let middle = [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])];
+        (off(p) - radius).abs() <= FLAT && radius - off(middle) <= FLAT.max(6e-4 * radius)
+    };
+    (radius.is_finite() && (0..n).all(near)).then_some((centre, radius))
 }

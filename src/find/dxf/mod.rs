@@ -1,9 +1,11 @@
-//! In: an ASCII DXF file (LINE, ARC, CIRCLE, ELLIPSE, LWPOLYLINE, POLYLINE, INSERT). Out: a drawing of the part.
+//! In: an ASCII DXF file (LINE, ARC, CIRCLE, ELLIPSE, SPLINE, LWPOLYLINE, POLYLINE, INSERT). Out: a drawing of the part.
 //! Frame and unit: part frame, x and y as drawn, z towards the viewer; mm, from the unit that the file or the user states.
 
 mod curves;
+mod flatten;
 mod loops;
 mod shapes;
+mod spline;
 mod tags;
 
 use super::drawing::{Drawing, Form, Inside};
@@ -38,12 +40,15 @@ impl std::str::FromStr for Unit {
     }
 }
 
+/// How far a polyline may lie from the curve it stands for, mm: well below what a scan can tell.
+const FLAT: f64 = 0.002;
+
 /// What a person says about a drawing.
 #[derive(Clone, Debug, Default)]
 pub struct DxfOptions {
     /// Needed where the file names no unit, refused where it names another.
     pub unit: Option<Unit>,
-    /// Layers that hold the part's edges. Default all that are not switched off.
+    /// Layers that hold the part's edges, switched off or not. Default all that are shown.
     pub layers: Vec<String>,
     /// The part frame's origin in the drawing, in the drawing's unit. Default the middle of the largest outline's box.
     pub origin: Option<[f64; 2]>,
@@ -66,7 +71,7 @@ pub struct Imported {
 pub fn read(bytes: &[u8], options: &DxfOptions) -> Result<Imported> {
     let file = tags::read(bytes)?;
     let unit = unit(file.units, options.unit)?;
-    let read = curves::curves(&file, &options.layers)?;
+    let read = curves::curves(&file, &options.layers, FLAT / unit.mm)?;
     let mut notes: Vec<String> = read.passed_over.iter().map(|(what, n)| format!("passed over: {n} {what}")).collect();
     let scaled: Vec<Curve> = read.curves.iter().map(|c| moved(c, [0.0; 2], unit.mm)).collect();
     let largest = loops::join(&scaled).loops.into_iter().max_by(|a, b| {
@@ -79,11 +84,12 @@ pub fn read(bytes: &[u8], options: &DxfOptions) -> Result<Imported> {
             .cause("edges that do not meet within 0.01 mm, the wrong layers, or the wrong unit")
             .next("join the outline's edges in the drawing, or name its layer with --layer"));
     };
-    let origin = options.origin.unwrap_or_else(|| {
-        [0, 1].map(|k| {
+    let origin = options.origin.unwrap_or_else(|| match largest.circle {
+        Some((centre, _)) => centre.map(|c| c / unit.mm),
+        None => [0, 1].map(|k| {
             let (low, high) = largest.points.iter().fold((f64::MAX, f64::MIN), |m, p| (m.0.min(p[k]), m.1.max(p[k])));
             0.5 * (low + high) / unit.mm
-        })
+        }),
     });
     let placed: Vec<Curve> = read.curves.iter().map(|c| moved(c, origin, unit.mm)).collect();
     let joined = loops::join(&placed);
@@ -93,6 +99,17 @@ pub fn read(bytes: &[u8], options: &DxfOptions) -> Result<Imported> {
     let mut warnings = Vec::new();
     if joined.forks > 0 {
         warnings.push(format!("at {} places more than two edges meet: the edges there close no outline", joined.forks));
+    }
+    for (linetype, n) in &read.broken {
+        warnings.push(format!(
+            "{n} edges are drawn as {linetype}: centre lines and hidden edges are no edges of the part's top"
+        ));
+    }
+    if read.wide > 0 {
+        warnings.push(format!("{} polylines have a width: their middle line was read, not their rims", read.wide));
+    }
+    if file.clipped > 0 {
+        warnings.push(format!("{} inserted blocks are shown in part: they were read whole", file.clipped));
     }
     let shape = shapes::shapes(joined.loops, &joined.open);
     let lines = shape.iter().filter(|s| s.kind == Form::Line && s.inside == Inside::Either).count();

@@ -2,7 +2,7 @@
 //! Frame and unit: none; values are text as they stand in the file, lines are counted from 1.
 
 use crate::fault::{Fault, Result};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// More is no drawing of a part, bytes.
 const LARGEST: usize = 64 << 20;
@@ -28,10 +28,25 @@ pub struct Entity {
 pub struct File {
     /// $INSUNITS; `None` where it is missing.
     pub units: Option<i64>,
-    /// Layers that are switched off or frozen.
-    pub hidden: BTreeSet<String>,
+    /// By `key`.
+    pub layers: BTreeMap<String, Layer>,
+    /// By `key`.
     pub blocks: BTreeMap<String, Block>,
     pub entities: Vec<Entity>,
+    /// Inserted blocks of which the drawing shows a part.
+    pub clipped: usize,
+}
+
+#[derive(Clone, Debug)]
+pub struct Layer {
+    pub off: bool,
+    pub frozen: bool,
+    pub linetype: String,
+}
+
+/// Names of layers, blocks and linetypes are the same in upper and lower case.
+pub fn key(name: &str) -> String {
+    name.trim().to_uppercase()
 }
 
 /// Entities that INSERT refers to, about their base point.
@@ -67,7 +82,7 @@ impl Entity {
     }
 
     pub fn layer(&self) -> &str {
-        self.text(8).unwrap_or("0")
+        self.text(8).map_or("0", str::trim)
     }
 }
 
@@ -107,7 +122,7 @@ pub fn read(bytes: &[u8]) -> Result<File> {
     if bytes.starts_with(b"AC10") {
         return Err(Fault::input("is a DWG, which is not read").next(NEXT));
     }
-    let tags = tags(&String::from_utf8_lossy(bytes))?;
+    let tags = tags(&text(bytes))?;
     let mut file = File::default();
     let mut at = 0;
     while let Some(tag) = tags.get(at) {
@@ -134,13 +149,33 @@ fn cut(tags: &[Tag]) -> Fault {
         .next("export the drawing again as ASCII DXF")
 }
 
+/// UTF-8 since 2007, before that the code page of the writer's Windows. Only names are text here: that they differ where
+/// the file's bytes differ is enough, so each byte is taken for a character, which for the western code page is the right one.
+fn text(bytes: &[u8]) -> String {
+    let plain = match std::str::from_utf8(bytes) {
+        Ok(text) => text.to_owned(),
+        Err(_) => bytes.iter().map(|&b| char::from(b)).collect(),
+    };
+    // A character that the code page lacks is written as \U+ and four digits.
+    let mut parts = plain.split("\\U+");
+    let mut out = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let code = part.get(..4).and_then(|digits| u32::from_str_radix(digits, 16).ok()).and_then(char::from_u32);
+        match code.filter(|c| !c.is_control()) {
+            Some(c) => out.extend([c.to_string().as_str(), &part[4..]]),
+            None => out.extend(["\\U+", part]),
+        }
+    }
+    out
+}
+
 fn tags(text: &str) -> Result<Vec<Tag>> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut out = Vec::new();
     let mut lines = text.lines().enumerate();
     while let Some((i, code)) = lines.next() {
-        // Some programs end a file with empty lines.
-        if code.trim().is_empty() && out.last().is_some_and(|t: &Tag| t.code == 0 && t.value.trim() == "EOF") {
+        // Some programs write empty lines, a Ctrl-Z or remains of an older file behind the end.
+        if out.last().is_some_and(|t: &Tag| t.code == 0 && t.value.trim() == "EOF") {
             break;
         }
         let Ok(number) = code.trim().parse() else {
@@ -164,10 +199,9 @@ fn section(tags: &[Tag], file: &mut File) -> Result<()> {
         }
         "TABLES" => {
             for layer in entities(&tags[1..]).iter().filter(|e| e.kind == "LAYER") {
-                // Bit 1: frozen; a negative colour: off.
-                if layer.whole(70, 0)? & 1 != 0 || layer.whole(62, 7)? < 0 {
-                    file.hidden.extend(layer.text(2).map(str::to_owned));
-                }
+                let (frozen, off) = (layer.whole(70, 0)? & 1 != 0, layer.whole(62, 7)? < 0);
+                let linetype = layer.text(6).unwrap_or_default().to_owned();
+                file.layers.insert(key(layer.text(2).unwrap_or_default()), Layer { off, frozen, linetype });
             }
         }
         "BLOCKS" => {
@@ -177,8 +211,7 @@ fn section(tags: &[Tag], file: &mut File) -> Result<()> {
                     ("BLOCK", _) => open = Some(Block { head: e, entities: vec![] }),
                     ("ENDBLK", _) => {
                         if let Some(block) = open.take() {
-                            let name = block.head.text(2).unwrap_or_default().to_owned();
-                            file.blocks.insert(name, block);
+                            file.blocks.insert(key(block.head.text(2).unwrap_or_default()), block);
                         }
                     }
                     (_, Some(block)) => block.entities.push(e),
@@ -187,6 +220,7 @@ fn section(tags: &[Tag], file: &mut File) -> Result<()> {
             }
         }
         "ENTITIES" => file.entities.extend(entities(&tags[1..])),
+        "OBJECTS" => file.clipped = tags.iter().filter(|t| t.code == 0 && t.value.trim() == "SPATIAL_FILTER").count(),
         _ => {}
     }
     Ok(())
