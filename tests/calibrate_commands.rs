@@ -32,7 +32,7 @@ impl Simulated {
         args.extend(more);
         sheetlight(&args);
         let station = text(&at.join("mine")).to_owned();
-        sheetlight(&["station", "new", &station, "--robot", "denso"]);
+        sheetlight(&["station", "new", "--station", &station, "--robot", "denso"]);
         Simulated { _dir: dir, at, station }
     }
     fn run(&self, command: &[&str], recording: &str, more: &[&str]) -> Value {
@@ -239,7 +239,7 @@ fn a_profile_sensor_is_calibrated_from_files() {
     std::fs::write(&points, profiles).unwrap();
     std::fs::write(&poses, listing).unwrap();
     let station = dir.path().join("station");
-    sheetlight(&["station", "new", text(&station)]);
+    sheetlight(&["station", "new", "--station", text(&station)]);
     let args = |diameter: &'static str| {
         vec![
             "calibrate",

@@ -28,7 +28,7 @@ fn insertion_from_pictures_and_noisy_poses_alone() {
         let station = path("station");
         let run = |args: &[&str]| common::sheetlight(&[&["--quiet"], args].concat());
         let input = |set: &str| inputs.join(set).to_str().unwrap().to_owned();
-        run(&["station", "new", &station, "--robot", "denso"]);
+        run(&["station", "new", "--station", &station, "--robot", "denso"]);
         run(&["calibrate", "camera", &input("intrinsics"), "--station", &station]);
         run(&["calibrate", "hand-eye", &input("handeye"), "--station", &station, "--poses", "poses_noisy"]);
         run(&["calibrate", "laser-plane", &input("laserplane"), "--station", &station, "--on", "cpu"]);

@@ -31,7 +31,7 @@ fn hand_eye_from_exact_and_noisy_poses() {
             let dir = tempfile::tempdir().unwrap();
             let station = if own_camera {
                 let station = text(&dir.path().join("station")).to_owned();
-                sheetlight(&["station", "new", &station, "--robot", "denso"]);
+                sheetlight(&["station", "new", "--station", &station, "--robot", "denso"]);
                 sheetlight(&["calibrate", "camera", text(&inputs.join("intrinsics")), "--station", &station]);
                 station
             } else {
@@ -42,7 +42,7 @@ fn hand_eye_from_exact_and_noisy_poses() {
                 let args = ["calibrate", "hand-eye", text(&input), "--poses", poses, "--station", &station, "--json"];
                 let found: serde_json::Value = serde_json::from_str(&sheetlight(&args)).unwrap();
                 let estimate = dir.path().join("estimate.json");
-                sheetlight(&["station", "export", &station, "--out", text(&estimate)]);
+                sheetlight(&["station", "export", "--station", &station, "--out", text(&estimate)]);
                 let Some(s) = score(&reference, &estimate, &truth) else { return };
                 let (t, r) = (figure(&s, &["hand_eye", "translation_mm"]), figure(&s, &["hand_eye", "rotation_deg"]));
                 println!("own camera {own_camera}, {poses}: {t:.4} mm, {r:.5} degrees\n{:#}", found["quality"]);
@@ -92,7 +92,7 @@ fn laser_plane_and_pointer() {
         let pull = f64::sqrt(pull / n);
         assert!((0.6..1.6).contains(&pull), "distances' errors over their sigmas: {pull}");
         let estimate = dir.path().join("estimate.json");
-        sheetlight(&["station", "export", &station, "--out", text(&estimate)]);
+        sheetlight(&["station", "export", "--station", &station, "--out", text(&estimate)]);
         let Some(s) = score(&reference, &estimate, &truth) else { return };
         let angle = figure(&s, &["laser_plane", "angle_deg"]);
         let rms = figure(&s, &["laser_plane", "rms_distance_mm_in_110_210"]);

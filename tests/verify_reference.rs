@@ -61,7 +61,7 @@ fn a_plate_and_touched_treads_tell_a_good_station_from_a_worse_one() {
         let at = |name: &str| dir.path().join(name);
         let (known, own) = (at("known"), at("own"));
         sheetlight(&["station", "import", text(&truths.join("flat/truth.json")), "--station", text(&known)]);
-        sheetlight(&["station", "new", text(&own), "--robot", "denso"]);
+        sheetlight(&["station", "new", "--station", text(&own), "--robot", "denso"]);
         let calibrate = |what: &str, set: &str, more: &[&str]| {
             let input = inputs.join(set);
             sheetlight(&[&["--quiet", "calibrate", what, text(&input), "--station", text(&own)], more].concat());

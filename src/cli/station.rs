@@ -22,7 +22,11 @@ pub enum Command {
 }
 
 #[derive(clap::Args)]
+#[command(after_help = "Example:
+  sheetlight station new --station cell3 --robot denso")]
 pub struct New {
+    /// Folder to make
+    #[arg(long)]
     station: PathBuf,
     /// A name for pages and files
     #[arg(long, default_value = "station")]
@@ -34,6 +38,8 @@ pub struct New {
 
 #[derive(clap::Args)]
 pub struct Show {
+    /// Station folder
+    #[arg(long)]
     station: PathBuf,
 }
 
@@ -41,13 +47,17 @@ pub struct Show {
 pub struct Import {
     /// JSON file with the values
     values: PathBuf,
+    /// Station folder; made where there is none
     #[arg(long)]
     station: PathBuf,
 }
 
 #[derive(clap::Args)]
 pub struct Export {
+    /// Station folder
+    #[arg(long)]
     station: PathBuf,
+    /// File for the values (JSON)
     #[arg(long)]
     out: PathBuf,
 }

@@ -53,28 +53,50 @@ pub fn sheet(board: &BoardSpec) -> Result<Sheet> {
 }
 
 fn check(board: &BoardSpec) -> Result<()> {
-    let bad = |what: String, next: &str| Err(Fault::usage(what).next(next));
-    let (n, lengths) = match board {
-        BoardSpec::Chessboard { inner_corners, square_mm, border_mm, .. } => (*inner_corners, [*square_mm, *border_mm]),
-        BoardSpec::Charuco { squares, square_mm, border_mm, .. } => (*squares, [*square_mm, *border_mm]),
-        BoardSpec::Circles { dots, pitch_mm, border_mm, .. } => (*dots, [*pitch_mm, *border_mm]),
+    let bad = |what: String, next: &str| {
+        Err(Fault::usage(what).cause("a slip of typing, or another unit than mm").next(next))
+    };
+    let (n, of, cell, name, border) = match board {
+        BoardSpec::Chessboard { inner_corners, square_mm, border_mm, .. } => {
+            (*inner_corners, "inner corners", *square_mm, "squares", *border_mm)
+        }
+        BoardSpec::Charuco { squares, square_mm, border_mm, .. } => {
+            (*squares, "squares", *square_mm, "squares", *border_mm)
+        }
+        BoardSpec::Circles { dots, pitch_mm, border_mm, .. } => (*dots, "dots", *pitch_mm, "a pitch", *border_mm),
     };
     if n.iter().any(|n| !(3..=100).contains(n)) {
-        return bad(format!("{}x{} is out of range", n[0], n[1]), "choose 3 to 100 each way");
-    }
-    if !(0.5..=500.0).contains(&lengths[0]) || !(0.0..=500.0).contains(&lengths[1]) {
         return bad(
-            format!("squares (or pitch) of {} mm with a border of {} mm are out of range", lengths[0], lengths[1]),
-            "choose 0.5 to 500 mm, border 0 to 500 mm",
+            format!("a board of {}x{} {of} cannot be drawn, only 3 to 100 each way", n[0], n[1]),
+            "give COLUMNSxROWS within that, e.g. 9x6",
+        );
+    }
+    if !(0.5..=500.0).contains(&cell) {
+        return bad(
+            format!("a board with {name} of {cell} mm cannot be drawn, only of 0.5 to 500 mm"),
+            "give --square-mm in millimetres",
+        );
+    }
+    if !(0.0..=500.0).contains(&border) {
+        return bad(
+            format!("a board with a border of {border} mm cannot be drawn, only of 0 to 500 mm"),
+            "give --border-mm in millimetres, or leave it out",
         );
     }
     match board {
         BoardSpec::Charuco { square_mm, marker_mm, .. } if !(*marker_mm > 0.0 && *marker_mm < 0.95 * square_mm) => bad(
-            format!("markers of {marker_mm} mm do not fit in squares of {square_mm} mm"),
+            format!(
+                "markers of {marker_mm} mm do not fit in squares of {square_mm} mm: above 0 and below {} mm",
+                0.95 * square_mm
+            ),
             "choose markers of 0.5 to 0.8 of the square",
         ),
         BoardSpec::Circles { diameter_mm, pitch_mm, .. } if !(*diameter_mm > 0.0 && *diameter_mm < 0.9 * pitch_mm) => {
-            bad(format!("dots of {diameter_mm} mm touch at a pitch of {pitch_mm} mm"), "choose dots of half the pitch")
+            let most = 0.9 * pitch_mm;
+            bad(
+                format!("dots of {diameter_mm} mm do not fit a pitch of {pitch_mm} mm: above 0 and below {most} mm"),
+                "choose dots of half the pitch",
+            )
         }
         _ => Ok(()),
     }
