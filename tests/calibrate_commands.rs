@@ -247,7 +247,7 @@ fn a_profile_sensor_is_calibrated_from_files() {
             text(&points),
             "--poses",
             text(&poses),
-            "--ball-diameter",
+            "--ball-diameter-mm",
             diameter,
             "--station",
             text(&station),

@@ -154,7 +154,7 @@ fn islands_forks_and_doubled_edges_are_told_apart() {
         assert_eq!(face.material(x, y), there, "{x} {y}");
     }
     let length = d.samples(0.02).len() as f64 * 0.02;
-    assert!((length - (80.0 + 48.0 + 24.0 + 6.28)).abs() < 0.3, "{length}");
+    assert!((length - (80.0 + 48.0 + 24.0 + std::f64::consts::TAU)).abs() < 0.3, "{length}");
     let doubled = imported(&file(MM, "", &(square(10.0) + &square(10.0))));
     assert!(doubled.notes.iter().any(|n| n.starts_with("4 edges")) && doubled.drawing.shape.len() == 1);
     let fork =

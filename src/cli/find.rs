@@ -14,8 +14,8 @@ use std::path::PathBuf;
 ///
 /// No pose leaves when a gate of the recipe is missed; the report says which, and the exit code is 1.
 #[derive(clap::Args)]
-#[command(after_help = "Examples:
-  sheetlight find scans/board7 --recipe data/recipes/led.toml --station cell3 --robot denso --out led.json")]
+#[command(after_help = "Example:
+  sheetlight find scans/board7 --recipe data/recipes/led.toml --station cell3 --out led.json")]
 pub struct Args {
     /// Folder that sheetlight scan --out wrote
     scan: PathBuf,
@@ -28,7 +28,8 @@ pub struct Args {
     /// Station that scanned: its covariances enter the error budget, its calibration must be the scan's
     #[arg(long)]
     station: Option<PathBuf>,
-    /// Notation of the poses [default: the station's robot, else matrix]
+    /// Notation of the poses: denso, ur, kuka, fanuc, abb, yaskawa, ros, quaternion or matrix [default:
+    /// the station's robot, else matrix]
     #[arg(long, value_parser = super::parse::<Convention>)]
     robot: Option<Convention>,
     /// Direction towards the camera in the base frame [default: from the station, else 0,0,1]

@@ -25,13 +25,13 @@ pub struct Args {
     /// Recording of the pointer's spot on three or more places of the board
     #[arg(long)]
     touch: PathBuf,
-    /// Pose file of that recording, where meta.json names none
+    /// Pose file of that recording, without extension [default: the one meta.json names]
     #[arg(long)]
     touch_poses: Option<String>,
     /// Recording of the line over the part
     #[arg(long)]
     scan: PathBuf,
-    /// Pose file of that recording, where meta.json names none
+    /// Pose file of that recording, without extension [default: the one meta.json names]
     #[arg(long)]
     scan_poses: Option<String>,
     /// Recipe (TOML) of the part
@@ -40,10 +40,11 @@ pub struct Args {
     /// Folder for the scan, the picture and guide.json
     #[arg(long)]
     out: PathBuf,
-    /// Notation of the poses [default: the station's robot, else matrix]
+    /// Notation of the poses: denso, ur, kuka, fanuc, abb, yaskawa, ros, quaternion or matrix [default:
+    /// the station's robot, else matrix]
     #[arg(long, value_parser = super::parse::<Convention>)]
     robot: Option<Convention>,
-    /// Where the stages run: auto, gpu or cpu
+    /// Where the stages run: auto (GPU where there is one), gpu, or cpu (the twins)
     #[arg(long, default_value = "auto", value_parser = super::parse::<Where>)]
     on: Where,
     /// Distance of the camera from the board when it looks at it squarely, mm

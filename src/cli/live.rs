@@ -18,8 +18,10 @@ use std::time::Instant;
 /// line and frame on stdout; a summary when the pipe ends. For recordings use scan, which measures every shot.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  ffmpeg -f v4l2 -i /dev/video0 -f rawvideo -pix_fmt gray - | sheetlight live --raw 640x480:gray8 --station cell3
-  camera-tool --raw | sheetlight live --raw 4096x3072:gray12le --station cell3 --points > profiles.jsonl")]
+  ffmpeg -f v4l2 -i /dev/video0 -f rawvideo -pix_fmt gray - | \\
+      sheetlight live --raw 640x480:gray8 --station cell3
+  camera-tool --raw | \\
+      sheetlight live --raw 4096x3072:gray12le --station cell3 --points > profiles.jsonl")]
 pub struct Args {
     /// Frames on standard input: WIDTHxHEIGHT:gray8, gray10le, gray12le or gray16le
     #[arg(long, value_parser = super::parse::<RawFormat>)]

@@ -30,6 +30,15 @@ use clap::{Parser, Subcommand};
 /// Data goes to stdout, talk to stderr. Exit code 0: done; 1: failed; 2: the command was misused.
 #[derive(Parser)]
 #[command(name = "sheetlight", version, max_term_width = 100)]
+#[command(after_help = "A first look, without camera, robot or GPU:
+  sheetlight demo
+A station, in this order:
+  sheetlight station new --station cell3 --robot denso
+  sheetlight calibrate camera recordings/intrinsics --station cell3
+  sheetlight calibrate hand-eye recordings/handeye --station cell3
+  sheetlight calibrate laser-plane recordings/laserplane --station cell3
+  sheetlight scan recordings/board7 --station cell3 --out scans/board7
+  sheetlight find scans/board7 --recipe data/recipes/led.toml --station cell3 --out pose.json")]
 struct Cli {
     /// Print the result as JSON on stdout, for machines
     #[arg(long, global = true)]
@@ -59,11 +68,11 @@ enum Command {
     ShiftScan(shift_scan::Args),
     /// Simulate a station with known truth: recordings, poses, true calibration
     Simulate(simulate::Args),
-    Verify(verify::Args),
     /// Make, show, import into or export from a station folder
     #[command(subcommand)]
     Station(station::Command),
     Teach(teach::Args),
+    Verify(verify::Args),
 }
 
 fn run(command: &Command, console: &Console) -> Result<()> {
@@ -117,4 +126,58 @@ pub(crate) fn numbers<const N: usize>(s: &str) -> std::result::Result<[f64; N], 
 /// Reads an option's value with the type's own `FromStr`, for clap's `value_parser`.
 pub(crate) fn parse<T: std::str::FromStr<Err = String>>(s: &str) -> std::result::Result<T, String> {
     s.parse()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    /// What a text shows to be typed: its lines, joined where a backslash ends them, from each `sheetlight` on.
+    fn shown(text: &str) -> Vec<String> {
+        let joined = text.replace("\\\n", " ");
+        let calls =
+            joined.lines().filter(|l| l.starts_with("  ")).filter_map(|l| l.split_once("sheetlight ")).map(|(_, c)| c);
+        calls.map(|c| c.split(['>', '#']).next().unwrap_or_default().trim().to_owned()).collect()
+    }
+
+    fn parses(call: &str) {
+        let parsed = Cli::try_parse_from(std::iter::once("sheetlight").chain(call.split_whitespace()));
+        assert!(parsed.is_ok(), "sheetlight {call}\n{}", parsed.err().map(|e| e.to_string()).unwrap_or_default());
+    }
+
+    fn check(command: &clap::Command) -> usize {
+        let help = command.get_after_help().map(ToString::to_string).unwrap_or_default();
+        let wide = help.lines().find(|l| l.len() > 98);
+        assert!(wide.is_none(), "{}: wraps in the help: {wide:?}", command.get_name());
+        let calls = shown(&help);
+        calls.iter().for_each(|c| parses(c));
+        calls.len() + command.get_subcommands().map(check).sum::<usize>()
+    }
+
+    #[test]
+    fn every_command_that_help_and_readme_show_can_be_typed() {
+        let command = Cli::command();
+        assert!(check(&command) > 20);
+        let readme = shown(include_str!("../../README.md"));
+        assert!(readme.len() > 8, "{readme:?}");
+        readme.iter().for_each(|c| parses(c));
+        // Every option and argument says what it is.
+        fn told(command: &clap::Command) {
+            for a in command.get_arguments() {
+                assert!(a.get_help().is_some(), "{} {} has no help", command.get_name(), a.get_id());
+            }
+            command.get_subcommands().for_each(told);
+        }
+        told(&command);
+    }
+
+    #[test]
+    fn a_station_is_named_by_its_option_everywhere() {
+        for verb in ["new", "show", "export --out x.json"] {
+            let call = format!("sheetlight station {verb} cell3");
+            let said = Cli::try_parse_from(call.split_whitespace()).err().expect("no place for it").to_string();
+            assert!(said.contains("'cell3'") && said.contains("--station <STATION>"), "{said}");
+        }
+    }
 }

@@ -17,7 +17,8 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight model socket.dxf --name socket --out socket.toml
-  sheetlight model socket.dxf --name socket --unit inch --layer outline --layer pins --origin 0,0 --out socket.toml")]
+  sheetlight model socket.dxf --name socket --unit inch --layer outline --layer pins \\
+      --origin 0,0 --out socket.toml")]
 pub struct Args {
     /// ASCII DXF, seen from above
     drawing: PathBuf,
@@ -30,7 +31,8 @@ pub struct Args {
     /// A layer that holds edges of the part, switched off or not; several times [default: all that are shown]
     #[arg(long = "layer")]
     layers: Vec<String>,
-    /// The insertion datum in the drawing, in its unit: x,y [default: the middle of the largest outline's box]
+    /// The insertion datum in the drawing, in its unit [default: the middle of the
+    /// largest outline's box]
     #[arg(long, value_name = "X,Y", value_parser = super::numbers::<2>, allow_hyphen_values = true)]
     origin: Option<[f64; 2]>,
     /// How many turns make the part look nearly alike (2: half a turn)

@@ -30,7 +30,8 @@ pub struct Args {
     /// Folder for the results
     #[arg(long)]
     out: PathBuf,
-    /// Pose file: a name in the recording, or with --raw a path
+    /// Pose file: a name in the recording, without extension [default: the one meta.json names]; with
+    /// --raw, which needs it, a path
     #[arg(long)]
     poses: Option<String>,
     /// Raw frames on standard input: WIDTHxHEIGHT:gray8, gray10le, gray12le or gray16le

@@ -16,8 +16,9 @@ use std::path::PathBuf;
 /// Rows that always show the bare bed give the zero of each picture.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
-  sheetlight shift-scan photos/cube --pixels-per-mm 10.6277 --camera-height-mm 80 --baseline-mm 37.3 \\
-      --raises left --travel-mm 1 --bed-rows 5..40,440..475 --channel red --out scans/cube")]
+  sheetlight shift-scan photos/cube --pixels-per-mm 10.6277 --camera-height-mm 80 \\
+      --baseline-mm 37.3 --raises left --travel-mm 1 \\
+      --bed-rows 5..40,440..475 --channel red --out scans/cube")]
 pub struct Args {
     /// Folder with the pictures, taken in the order of their names
     pictures: PathBuf,
@@ -27,7 +28,7 @@ pub struct Args {
     /// Camera above the bed, mm
     #[arg(long)]
     camera_height_mm: f64,
-    /// Laser beside the camera, mm
+    /// Distance of the laser from the camera, mm
     #[arg(long)]
     baseline_mm: f64,
     /// To which side a raised surface moves the stripe: left or right
@@ -36,8 +37,8 @@ pub struct Args {
     /// Travel of the bed from picture to picture, mm
     #[arg(long)]
     travel_mm: f64,
-    /// Rows of the bare bed, first..last, separated by commas
-    #[arg(long, value_delimiter = ',')]
+    /// Picture rows that always show the bare bed: first..last, several times or separated by commas
+    #[arg(long, value_delimiter = ',', required = true)]
     bed_rows: Vec<String>,
     /// Part of a colour picture to use: red, green, blue or luma
     #[arg(long, default_value = "luma", value_parser = super::parse::<Channel>)]

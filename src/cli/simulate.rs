@@ -22,10 +22,11 @@ pub struct Args {
     /// pointer_cal, pointer, surface, all
     #[arg(long = "set", value_delimiter = ',', default_value = "scan")]
     sets: Vec<String>,
-    /// Scene file (TOML, see docs/file-formats.md); a circuit board with parts when not given
+    /// Scene file (TOML, see docs/file-formats.md) [default: a circuit board with parts]
     #[arg(long)]
     scene: Option<PathBuf>,
-    /// Description of the calibration board (JSON as sheetlight board writes it) for the sets that show one
+    /// Description of the calibration board (JSON as sheetlight board writes it) for the sets
+    /// that show one [default: the station's own]
     #[arg(long)]
     board: Option<PathBuf>,
     /// Another specimen of the station, scene pose and noise for every seed; 0 is the design itself
@@ -34,7 +35,7 @@ pub struct Args {
     /// Sensor width, px
     #[arg(long, default_value_t = 640)]
     width: u32,
-    /// Sensor height, px; three quarters of the width when not given
+    /// Sensor height, px [default: three quarters of the width]
     #[arg(long)]
     height: Option<u32>,
     /// Bits per pixel, 8 to 16
@@ -46,10 +47,10 @@ pub struct Args {
     /// Scales shot noise, read noise, speckle and hot pixels; 0 is a noiseless sensor
     #[arg(long, default_value_t = 1.0)]
     noise: f64,
-    /// Speckle contrast per pixel, 0 to 0.6
+    /// Speckle contrast per pixel, 0 to 0.6 [default: 0.12]
     #[arg(long)]
     speckle: Option<f64>,
-    /// Peak of the stripe on white as share of full scale
+    /// Peak of the stripe on white as share of full scale, 0.02 to 20 [default: 0.95]
     #[arg(long)]
     exposure: Option<f64>,
     /// Error of the reported robot poses, 1 sigma per axis, mm

@@ -6,7 +6,7 @@ use crate::fault::{Fault, Result};
 use crate::rig::{Calibration, Rig};
 use crate::robot::Convention;
 use crate::station::{Settings, Values};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
 pub enum Command {
@@ -15,7 +15,7 @@ pub enum Command {
     /// Show what a station knows of its rig, and how well
     Show(Show),
     /// Put known values into a station: a JSON file with any of intrinsics, flange_T_camera,
-    /// laser_plane_camera, pointer_camera
+    /// laser_plane_camera, pointer_camera (px and mm, docs/file-formats.md)
     Import(Import),
     /// Write a station's values as one JSON file, in the keys that import reads
     Export(Export),
@@ -28,10 +28,11 @@ pub struct New {
     /// Folder to make
     #[arg(long)]
     station: PathBuf,
-    /// A name for pages and files
-    #[arg(long, default_value = "station")]
-    name: String,
-    /// How the robot writes poses: denso, ur, kuka, fanuc, abb, yaskawa, ros, quaternion, matrix
+    /// A name for pages and files [default: the folder's]
+    #[arg(long)]
+    name: Option<String>,
+    /// How the robot writes poses: denso, ur, kuka, fanuc, abb, yaskawa, ros, quaternion or matrix
+    /// [default: none; poses are then read and written as matrices]
     #[arg(long, value_parser = super::parse::<Convention>)]
     robot: Option<Convention>,
 }
@@ -69,7 +70,11 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
                 let what = format!("{}: is a station already", a.station.display());
                 return Err(Fault::usage(what).next("choose another folder"));
             }
-            let settings = Settings { name: a.name.clone(), robot: a.robot, ..Settings::default() };
+            let settings = Settings {
+                name: a.name.clone().unwrap_or_else(|| named(&a.station)),
+                robot: a.robot,
+                ..Settings::default()
+            };
             settings.store(&a.station)?;
             console.result(&settings, &format!("{}: made; calibrate it or import values next", a.station.display()));
         }
@@ -79,7 +84,7 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
         }
         Command::Import(a) => {
             if !a.station.join("station.toml").exists() {
-                Settings { name: "station".into(), ..Settings::default() }.store(&a.station)?;
+                Settings { name: named(&a.station), ..Settings::default() }.store(&a.station)?;
             }
             let stored = Values::load(&a.values)?.store(&a.station, &a.values)?;
             console.result(&stored, &format!("{}: imported {}", a.station.display(), stored.join(", ")));
@@ -92,6 +97,12 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// What a station is called where nobody says it.
+fn named(folder: &Path) -> String {
+    let full = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+    full.file_name().map_or_else(|| "station".into(), |n| n.to_string_lossy().into_owned())
 }
 
 fn summary(settings: &Settings, rig: &Rig) -> String {

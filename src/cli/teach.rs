@@ -23,32 +23,23 @@ pub struct Args {
     /// A name for the part
     #[arg(long)]
     name: String,
-    /// Corners of the body: x0,y0,x1,y1
-    #[arg(long, value_parser = numbers::<4>)]
+    /// Corners of the body before it is turned, mm: x0,y0,x1,y1
+    #[arg(long, value_parser = super::numbers::<4>)]
     outline: [f64; 4],
-    /// Turn of the body about its centre, degrees
+    /// Turn of the body about its centre from x towards y, degrees
     #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
     angle_deg: f64,
-    /// Corners of a window in the body, several times: x0,y0,x1,y1
-    #[arg(long = "window", value_parser = numbers::<4>)]
+    /// Corners of a window in the body, mm, several times: x0,y0,x1,y1
+    #[arg(long = "window", value_parser = super::numbers::<4>)]
     windows: Vec<[f64; 4]>,
-    /// A round hole, several times: x,y,radius
-    #[arg(long = "hole", value_parser = numbers::<3>)]
+    /// A round hole, mm, several times: x,y,radius
+    #[arg(long = "hole", value_parser = super::numbers::<3>)]
     holes: Vec<[f64; 3]>,
     #[command(flatten)]
     insertion: InsertionArgs,
     /// File for the recipe (TOML); the picture goes beside it with .png
     #[arg(long)]
     out: PathBuf,
-}
-
-fn numbers<const N: usize>(s: &str) -> std::result::Result<[f64; N], String> {
-    let all: Vec<f64> = s
-        .split(',')
-        .map(|v| v.trim().parse().map_err(|_| format!("'{v}' is no number")))
-        .collect::<std::result::Result<_, _>>()?;
-    let n = all.len();
-    all.try_into().map_err(|_| format!("{n} numbers, wanted {N} with commas between"))
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {

@@ -26,7 +26,7 @@ pub struct Args {
     /// A flat scan holds several poses of this many shots each; 0: each scan is one view
     #[arg(long, default_value_t = 0)]
     shots_per_view: u32,
-    /// Touch test: predicted x y z and touched x y z (base frame, mm) a line
+    /// Touch test: a file with predicted x y z and touched x y z (base frame, mm) a line
     #[arg(long)]
     touch: Option<PathBuf>,
 }

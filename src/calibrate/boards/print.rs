@@ -234,3 +234,32 @@ fn disc(out: &mut String, x: f64, y: f64, r: f64) {
     }
     out.push_str("f\n");
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_board_that_cannot_be_drawn_is_refused_with_the_limit() {
+        let squares = |n: [u32; 2], square_mm: f64, border_mm: f64| BoardSpec::Chessboard {
+            inner_corners: n,
+            square_mm,
+            border_mm,
+            first_square: "black".into(),
+        };
+        let dots =
+            BoardSpec::Circles { dots: [7, 5], pitch_mm: 10.0, diameter_mm: 9.5, asymmetric: false, border_mm: 6.0 };
+        for (board, words) in [
+            (squares([1, 6], 10.0, 6.0), ["board of 1x6 inner corners", "3 to 100"]),
+            (squares([9, 101], 10.0, 6.0), ["board of 9x101 inner corners", "3 to 100"]),
+            (squares([9, 6], 0.01, 6.0), ["squares of 0.01 mm", "0.5 to 500 mm"]),
+            (squares([9, 6], 10.0, -1.0), ["border of -1 mm", "0 to 500 mm"]),
+            (dots, ["dots of 9.5 mm", "below 9 mm"]),
+        ] {
+            let e = check(&board).unwrap_err();
+            assert!(words.iter().all(|w| e.what.contains(w)), "{e}");
+            assert!(!e.cause.is_empty() && !e.next.is_empty() && e.exit_code() == 2, "{e}");
+        }
+        assert!(check(&squares([9, 6], 10.0, 6.0)).is_ok());
+    }
+}

@@ -37,7 +37,7 @@ pub struct Args {
     skew: bool,
     /// Distance at which the expected error is stated, mm [default: the middle of the working volume]
     #[arg(long)]
-    working_distance_mm: Option<f64>,
+    working_mm: Option<f64>,
     /// Part of a colour picture to use: red, green, blue or luma
     #[arg(long, default_value = "luma", value_parser = crate::cli::parse::<Channel>)]
     channel: Channel,
@@ -52,7 +52,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let volume = &settings.working_volume;
     let options = CameraOptions {
         solve: SolveOptions { lens: args.lens, skew: args.skew, ..SolveOptions::default() },
-        working_distance_mm: Some(args.working_distance_mm.unwrap_or((volume.near_mm + volume.far_mm) / 2.0)),
+        working_distance_mm: Some(args.working_mm.unwrap_or((volume.near_mm + volume.far_mm) / 2.0)),
         ..CameraOptions::default()
     };
     let pictures: usize = recordings.iter().map(|r| r.meta.frames.len()).sum();

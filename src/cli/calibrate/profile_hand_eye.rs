@@ -16,7 +16,8 @@ use std::path::PathBuf;
 /// On which side of the profile plane its centre lies must be told by the data, or be stated.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
-  sheetlight calibrate profile-hand-eye profiles/ --poses BALL.LS --ball-diameter 30 --station cell3")]
+  sheetlight calibrate profile-hand-eye profiles/ --poses BALL.LS \\
+      --ball-diameter-mm 30 --station cell3")]
 pub struct Args {
     /// A folder with a profile a file, or one file with all: CSV (x, z) or OpenCV YAML matrices
     profiles: PathBuf,
@@ -24,8 +25,8 @@ pub struct Args {
     #[arg(long)]
     poses: PathBuf,
     /// Diameter of the ball, mm
-    #[arg(long, value_name = "MM")]
-    ball_diameter: f64,
+    #[arg(long)]
+    ball_diameter_mm: f64,
     /// Side of the ball's centre: plus (y > 0 of the sensor, y = z × x) or minus [default: the data must tell]
     #[arg(long, value_parser = super::super::parse::<Side>)]
     side: Option<Side>,
@@ -40,7 +41,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
-    let options = BallOptions { side: args.side, ..BallOptions::new(args.ball_diameter) };
+    let options = BallOptions { side: args.side, ..BallOptions::new(args.ball_diameter_mm) };
     let limits = Limits { working_mm: [args.working_mm, args.working_mm], ..Limits::default() };
     let (c, warnings) = calibrate_profile_hand_eye(&args.profiles, &args.poses, &options, &limits)?;
     warnings.iter().for_each(|w| console.warn(w));
