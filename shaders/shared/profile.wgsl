@@ -1,11 +1,11 @@
 // In: a picture, a skeleton pixel, the direction across the stripe. Out: the stripe's profile there, averaged along it.
 // Twin and reasons: src/stages/peak/profile.rs; docs/math.md, Stripe peak (2). Frame and unit: offsets from the skeleton
 // pixel, px; grey levels.
-// A load costs a software adapter what a hundred other steps cost: as few as possible, and whole words.
 
 // Sums of grey levels; behind them those of the clipped pixels' weights, which are there only if a pixel is clipped.
 const SAMPLES = 96;
-var<private> samples: array<f32, 192>;
+// Three more at the end: samples are read in fours.
+var<private> samples: array<f32, 195>;
 struct Profile {
     count: i32,
     offset: f32,
@@ -149,22 +149,14 @@ fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
                 sums += (moments(w, a, g0) + moments(w, a + size, g1)) + moments(w, a + 2 * size, g2);
             }
             for (var k = 0; k < count; k++) {
-                var light = sum_of(g0, k, w, again);
-                for (var more = u32(a + size <= end); more > 0u; more--) {
-                    let l = sum_of(g1, k, w, again);
-                    light = vec2(light.x + l.x, light.y | l.y);
-                }
-                for (var more = u32(a + 2 * size <= end); more > 0u; more--) {
-                    let l = sum_of(g2, k, w, again);
-                    light = vec2(light.x + l.x, light.y | l.y);
-                }
+                // All three, also where the line ends before: a load is cheaper than a branch.
+                let l0 = sum_of(g0, k, w, again);
+                let l1 = sum_of(g1, k, w, again);
+                let l2 = sum_of(g2, k, w, again);
+                let clipped = l0.y | select(0u, l1.y, a + size <= end) | select(0u, l2.y, a + 2 * size <= end);
                 let slot = k + select(0, SAMPLES, again);
-                var before = 0.0;
-                for (var more = u32(a > begin); more > 0u; more--) {
-                    before = samples[slot];
-                }
-                samples[slot] = before + f32(i32(light.x));
-                full |= light.y;
+                samples[slot] = select(0.0, samples[slot], a > begin) + f32(i32(l0.x + l1.x + l2.x));
+                full |= clipped;
             }
         }
         rounds = select(1u, 2u, full != 0u);
@@ -178,6 +170,20 @@ fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
 // Offset and grey level of a sample.
 fn sample(p: Profile, k: i32) -> vec2<f32> {
     return vec2(p.offset + f32(k) * p.step, samples[k] * p.scale);
+}
+
+// Grey levels of four samples.
+fn four_levels(p: Profile, k: i32) -> vec4<f32> {
+    return vec4(samples[k], samples[k + 1], samples[k + 2], samples[k + 3]) * p.scale;
+}
+
+// The shares of their weights that are not clipped.
+fn four_clear(p: Profile, k: i32) -> vec4<f32> {
+    var clear = vec4(1.0);
+    for (var some = u32(p.clipped); some > 0u; some--) {
+        clear -= four_levels(p, k + SAMPLES);
+    }
+    return clear;
 }
 
 // The share of a sample's weight that is not clipped.
