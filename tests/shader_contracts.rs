@@ -9,12 +9,10 @@ use std::collections::BTreeSet;
 #[test]
 fn every_shader_is_what_its_stage_says() {
     for entry in stages::all() {
-        let (stage, source) = (entry.stage, entry.stage.source());
-        let module = naga::front::wgsl::parse_str(&source)
-            .unwrap_or_else(|e| panic!("{}: {}", stage.name, e.emit_to_string(&source)));
-        let mut validator =
-            naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
-        validator.validate(&module).unwrap_or_else(|e| panic!("{}: {e:?}", stage.name));
+        let stage = entry.stage;
+        let module = valid(stage.name, &stage.source());
+        // What a software adapter is given.
+        valid(stage.name, &stage.source_of_texels());
         assert_eq!(module.entry_points.len(), 1, "{}", stage.name);
         let main = &module.entry_points[0];
         assert_eq!((main.name.as_str(), main.workgroup_size), ("main", stage.workgroup), "{}", stage.name);
@@ -32,6 +30,7 @@ fn every_shader_is_what_its_stage_says() {
             let access = match global.space {
                 AddressSpace::Uniform => Access::Uniform,
                 AddressSpace::Storage { access } if access.contains(StorageAccess::STORE) => Access::ReadWrite,
+                AddressSpace::Storage { .. } if said.access == Access::Texels => Access::Texels,
                 AddressSpace::Storage { .. } => Access::Read,
                 other => panic!("{place}: address space {other:?}"),
             };
@@ -48,6 +47,15 @@ fn every_shader_is_what_its_stage_says() {
             }
         }
     }
+}
+
+fn valid(name: &str, source: &str) -> naga::Module {
+    let module =
+        naga::front::wgsl::parse_str(source).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(source)));
+    let mut validator =
+        naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
+    validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+    module
 }
 
 #[test]

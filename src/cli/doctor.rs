@@ -23,6 +23,8 @@ struct Findings {
     program: String,
     adapters: Vec<AdapterInfo>,
     used: Option<String>,
+    /// Its stages read arrays as texels.
+    reads_texels: bool,
     no_device_because: Option<String>,
     stages: Vec<Verdict>,
     rates: Option<Rates>,
@@ -37,6 +39,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         program: format!("sheetlight {}", env!("CARGO_PKG_VERSION")),
         adapters: adapters(),
         used: None,
+        reads_texels: false,
         no_device_because: None,
         stages: Vec::new(),
         rates: None,
@@ -45,6 +48,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     match Device::open() {
         Ok(device) => {
             findings.used = Some(device.info.name.clone());
+            findings.reads_texels = device.reads_texels;
             let entries = stages::all();
             let bar = console.bar("checking stages", entries.len() as u64);
             for entry in entries {
@@ -92,6 +96,9 @@ fn text(f: &Findings) -> String {
             if a.timestamps { "" } else { "no " },
             if a.unified_memory { "unified" } else { "separate" }
         );
+    }
+    if f.reads_texels {
+        s += "stages read arrays as texels of images on the same memory, which is faster on a software adapter\n";
     }
     if let Some(why) = &f.no_device_because {
         s += &format!("no device: {why}\n");

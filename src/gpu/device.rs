@@ -1,6 +1,8 @@
 //! In: the adapters of this machine. Out: one opened device, its buffers, its measured transfer rates.
 //! Frame and unit: bytes, GB/s (1e9 bytes).
 
+use super::alias::{self, Aliased};
+use super::texels::{self, Texel};
 use crate::fault::{Fault, Result};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -32,6 +34,8 @@ pub struct AdapterInfo {
 pub struct Buffer {
     pub(super) raw: wgpu::Buffer,
     pub bytes: u64,
+    /// Where it lies, if it can be read as texels.
+    pub(super) aliased: Option<Arc<Aliased>>,
 }
 
 /// An opened GPU. Clones share it.
@@ -40,6 +44,8 @@ pub struct Device {
     pub(super) raw: wgpu::Device,
     pub(super) queue: wgpu::Queue,
     pub info: AdapterInfo,
+    /// Stages read arrays as texels of images on the same memory: faster on a software adapter (decision 0012).
+    pub reads_texels: bool,
     /// Nanoseconds per timestamp tick, where the adapter has timestamps.
     pub(super) tick_ns: Option<f32>,
     lost: Arc<Mutex<Option<String>>>,
@@ -136,6 +142,8 @@ impl Device {
             max_buffer_size: offered.max_buffer_size,
             max_storage_buffers_per_shader_stage: offered.max_storage_buffers_per_shader_stage.min(16),
             max_compute_workgroups_per_dimension: offered.max_compute_workgroups_per_dimension,
+            max_storage_textures_per_shader_stage: offered.max_storage_textures_per_shader_stage.min(8),
+            max_texture_dimension_2d: offered.max_texture_dimension_2d.min(16384),
             ..wgpu::Limits::downlevel_defaults()
         };
         let mut features = wgpu::Features::empty();
@@ -145,6 +153,8 @@ impl Device {
         if info.unified_memory {
             features |= wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
         }
+        // Images of two words a texel can be read.
+        features |= chosen.features() & wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES;
         let (raw, queue) = pollster::block_on(chosen.request_device(&wgpu::DeviceDescriptor {
             label: Some("sheetlight"),
             required_features: features,
@@ -170,7 +180,14 @@ impl Device {
             }
         }));
         let tick_ns = info.timestamps.then(|| queue.get_timestamp_period());
-        Ok(Device { raw, queue, info, tick_ns, lost, allocated: Default::default() })
+        let mut device = Device { raw, queue, info, reads_texels: false, tick_ns, lost, allocated: Default::default() };
+        device.reads_texels = !device.has_own_processors() && device.info.unified_memory && texels::trial(&device)?;
+        Ok(device)
+    }
+
+    /// The same device with its arrays read as every other adapter reads them; for tests and comparisons.
+    pub fn without_texels(&self) -> Device {
+        Device { reads_texels: false, ..self.clone() }
     }
 
     /// False for a software adapter, which takes the cores that the CPU twins would use.
@@ -186,7 +203,8 @@ impl Device {
     /// Where stages read what the host writes, on unified memory.
     pub fn mapped_storage(&self, label: &str, bytes: u64) -> Result<Buffer> {
         use wgpu::BufferUsages as U;
-        self.buffer(label, bytes, U::STORAGE | U::MAP_WRITE | U::COPY_SRC)
+        let access = if self.reads_texels { U::COPY_DST } else { U::MAP_WRITE };
+        self.buffer(label, bytes, U::STORAGE | access | U::COPY_SRC)
     }
     /// Where the host reads what stages wrote, on unified memory.
     pub fn readable_storage(&self, label: &str, bytes: u64) -> Result<Buffer> {
@@ -216,14 +234,24 @@ impl Device {
             .next("lower the shots per batch"));
         }
         self.allocated.fetch_add(size, std::sync::atomic::Ordering::Relaxed);
-        let raw = self.raw.create_buffer(&wgpu::BufferDescriptor {
-            label: Some(label),
-            size,
-            usage,
-            mapped_at_creation: false,
-        });
+        let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
+        let maps = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::MAP_WRITE;
+        if self.reads_texels && usage.contains(wgpu::BufferUsages::STORAGE) && !usage.intersects(maps) {
+            let (raw, aliased) = alias::buffer(&self.raw, &descriptor).ok_or_else(|| {
+                Fault::device(format!("{}: {size} bytes for '{label}' cannot be had", self.info.name))
+                    .cause("the memory ran out")
+                    .next("lower the shots per batch")
+            })?;
+            return Ok(Buffer { raw, bytes, aliased: Some(aliased) });
+        }
+        let raw = self.raw.create_buffer(&descriptor);
         self.alive()?;
-        Ok(Buffer { raw, bytes })
+        Ok(Buffer { raw, bytes, aliased: None })
+    }
+
+    /// A buffer as an image.
+    pub(super) fn texels<'a>(&self, buffer: &'a Buffer, texel: Texel) -> Option<&'a wgpu::TextureView> {
+        buffer.aliased.as_ref()?.texels(&self.raw, texel)
     }
 
     /// Bytes of all buffers made so far.
@@ -299,11 +327,15 @@ impl Device {
         let (mut ups, mut downs) = (Vec::new(), Vec::new());
         for _ in 0..9 {
             let start = Instant::now();
-            let mapped = up.map(wgpu::MapMode::Write, 0..bytes);
-            self.wait(None)?;
-            mapped.done()?;
-            up.view_mut(0..bytes)?.copy_from_slice(&data);
-            up.raw.unmap();
+            if let Some(host) = &up.aliased {
+                host.write(0, &data);
+            } else {
+                let mapped = up.map(wgpu::MapMode::Write, 0..bytes);
+                self.wait(None)?;
+                mapped.done()?;
+                up.view_mut(0..bytes)?.copy_from_slice(&data);
+                up.raw.unmap();
+            }
             if !self.info.unified_memory {
                 let mut encoder = self.raw.create_command_encoder(&Default::default());
                 encoder.copy_buffer_to_buffer(&up.raw, 0, &target.raw, 0, bytes);
@@ -358,6 +390,10 @@ impl Mapping {
 }
 
 impl Buffer {
+    /// Asks for what the host must have before it writes: nothing where the memory lies open.
+    pub(super) fn open(&self) -> Option<Mapping> {
+        self.aliased.is_none().then(|| self.map(wgpu::MapMode::Write, 0..self.bytes))
+    }
     pub(super) fn map(&self, mode: wgpu::MapMode, range: std::ops::Range<u64>) -> Mapping {
         let slot = Arc::new(Mutex::new(None));
         let note = slot.clone();

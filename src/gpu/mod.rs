@@ -1,10 +1,13 @@
 //! In: WGSL stages, bytes, and what depends on what. Out: the same bytes computed on a GPU, with timings.
 //! Frame and unit: none; knows no lasers. The only home of `wgpu`.
 
+#[cfg_attr(not(target_os = "linux"), path = "no_alias.rs")]
+mod alias;
 mod device;
 mod recording;
 mod ring;
 mod stage;
+mod texels;
 
 pub use device::{AdapterInfo, Buffer, Device, Rates, adapters};
 pub use recording::{Dispatch, Recording, Replay, StageTime};

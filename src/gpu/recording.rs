@@ -107,6 +107,7 @@ impl Replay {
                     mapped_at_creation: false,
                 }),
                 bytes,
+                aliased: None,
             };
             Some((set, resolve, device.readback_staging("stage times", bytes)?))
         } else {

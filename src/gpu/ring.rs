@@ -68,7 +68,7 @@ impl Ring {
             });
             let outputs = outputs.collect::<Result<Vec<_>>>()?;
             let slot = Slot {
-                mapping: Some(upload.map(wgpu::MapMode::Write, 0..sizes.input)),
+                mapping: upload.open(),
                 at: None,
                 upload,
                 input,
@@ -102,13 +102,15 @@ impl Ring {
             }
             m.done()?;
         }
-        {
+        if let Some(host) = &slot.upload.aliased {
+            fill(&mut |offset, bytes| host.write(offset, bytes))?;
+        } else {
             let mut view = slot.upload.view_mut(0..slot.upload.bytes)?;
             let filled = fill(&mut |offset, bytes| view.slice(offset..offset + bytes.len()).copy_from_slice(bytes));
             drop(view);
             slot.upload.raw.unmap();
             if let Err(e) = filled {
-                slot.mapping = Some(slot.upload.map(wgpu::MapMode::Write, 0..slot.upload.bytes));
+                slot.mapping = slot.upload.open();
                 self.device.wait(None)?;
                 return Err(e);
             }
@@ -180,7 +182,7 @@ impl Ring {
             drop(view);
             source.raw.unmap();
         }
-        slot.mapping = Some(slot.upload.map(wgpu::MapMode::Write, 0..slot.upload.bytes));
+        slot.mapping = slot.upload.open();
         device.poll()?;
         self.free.push_back(at);
         Ok(())

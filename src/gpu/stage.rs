@@ -1,6 +1,7 @@
 //! In: one WGSL file with its bindings and uniform layout. Out: a compiled pipeline, and one run of it.
 //! Frame and unit: none.
 
+use super::texels::{rewrite, texel_of};
 use super::{Buffer, Device};
 use crate::fault::Result;
 
@@ -9,6 +10,8 @@ use crate::fault::Result;
 pub enum Access {
     Uniform,
     Read,
+    /// A read-only array of u32, vec2<u32> or vec4<u32> that is bound whole: read as texels where that is faster.
+    Texels,
     ReadWrite,
 }
 
@@ -48,6 +51,11 @@ impl Stage {
         std::iter::once(self.wgsl).chain(self.shared.iter().copied()).collect::<Vec<_>>().join("\n")
     }
 
+    /// The same, reading `Access::Texels` as what they are called.
+    pub fn source_of_texels(&self) -> String {
+        rewrite(self, &self.source())
+    }
+
     /// Workgroups that cover `invocations` in each direction.
     pub fn groups(&self, invocations: [u32; 3]) -> [u32; 3] {
         std::array::from_fn(|i| invocations[i].div_ceil(self.workgroup[i]))
@@ -58,7 +66,9 @@ impl Stage {
         let raw = &device.raw;
         let module = raw.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(self.name),
-            source: wgpu::ShaderSource::Wgsl(self.source().into()),
+            source: wgpu::ShaderSource::Wgsl(
+                if device.reads_texels { self.source_of_texels() } else { self.source() }.into(),
+            ),
         });
         let entries: Vec<_> = self
             .bindings
@@ -67,14 +77,21 @@ impl Stage {
             .map(|(i, b)| wgpu::BindGroupLayoutEntry {
                 binding: i as u32,
                 visibility: wgpu::ShaderStages::COMPUTE,
-                ty: wgpu::BindingType::Buffer {
-                    ty: match b.access {
-                        Access::Uniform => wgpu::BufferBindingType::Uniform,
-                        Access::Read => wgpu::BufferBindingType::Storage { read_only: true },
-                        Access::ReadWrite => wgpu::BufferBindingType::Storage { read_only: false },
+                ty: match b.access {
+                    Access::Texels if device.reads_texels => wgpu::BindingType::StorageTexture {
+                        access: wgpu::StorageTextureAccess::ReadOnly,
+                        format: texel_of(self, b.name).format(),
+                        view_dimension: wgpu::TextureViewDimension::D2,
                     },
-                    has_dynamic_offset: false,
-                    min_binding_size: None,
+                    access => wgpu::BindingType::Buffer {
+                        ty: match access {
+                            Access::Uniform => wgpu::BufferBindingType::Uniform,
+                            Access::Read | Access::Texels => wgpu::BufferBindingType::Storage { read_only: true },
+                            Access::ReadWrite => wgpu::BufferBindingType::Storage { read_only: false },
+                        },
+                        has_dynamic_offset: false,
+                        min_binding_size: None,
+                    },
                 },
                 count: None,
             })
@@ -119,11 +136,20 @@ impl Pipeline {
             .enumerate()
             .map(|(i, (b, offset, size))| wgpu::BindGroupEntry {
                 binding: i as u32,
-                resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-                    buffer: &b.raw,
-                    offset: *offset,
-                    size: std::num::NonZero::new(*size),
-                }),
+                resource: match self.stage.bindings[i].access {
+                    Access::Texels if device.reads_texels => {
+                        let name = self.stage.bindings[i].name;
+                        assert_eq!(*offset, 0, "{}: texels '{name}' are bound whole", self.stage.name);
+                        let view = device.texels(b, texel_of(&self.stage, name));
+                        // The trial at the opening of the device made one of each kind.
+                        wgpu::BindingResource::TextureView(view.expect("every storage buffer can be read as texels"))
+                    }
+                    _ => wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                        buffer: &b.raw,
+                        offset: *offset,
+                        size: std::num::NonZero::new(*size),
+                    }),
+                },
             })
             .collect();
         device.raw.create_bind_group(&wgpu::BindGroupDescriptor {

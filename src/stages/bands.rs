@@ -2,8 +2,8 @@
 //! Frame and unit: blocks of 16 x 8 pixels, 256ths of full scale.
 
 use super::frame::{self, Frame, PX_LOG2, SHARED, frame_of};
-use super::threshold::RADIUS;
 use super::stats::Block;
+use super::threshold::RADIUS;
 use crate::gpu::{Access::*, Binding, Stage};
 
 pub const STAGE: Stage = Stage {
@@ -13,7 +13,7 @@ pub const STAGE: Stage = Stage {
     workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
-        Binding { name: "stats", access: Read },
+        Binding { name: "stats", access: Texels },
         Binding { name: "bands", access: ReadWrite },
     ],
     uniform: frame::UNIFORM,
@@ -97,7 +97,8 @@ pub fn twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
             Block { sum: 8 * b.row, column: 8 * b.smallest, half_quad: 2 * b.smallest, ..b }
         };
         let whole = |of: fn(Block) -> u32| cover.whole().map(|dy| of(block(dy))).sum::<u32>();
-        let part = |of: fn(Block) -> u32| cover.partial().map(|dy| of(block(dy))).min().expect("no window ends with a block");
+        let part =
+            |of: fn(Block) -> u32| cover.partial().map(|dy| of(block(dy))).min().expect("no window ends with a block");
         let band = Band {
             sum: whole(|b| b.sum) + cover.rest * part(|b| b.row),
             largest: block(0).largest,

@@ -176,7 +176,7 @@ pub const STAGE: Stage = Stage {
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "header", access: Read },
-        Binding { name: "strongest", access: Read },
+        Binding { name: "strongest", access: Texels },
         Binding { name: "peaks", access: ReadWrite },
     ],
     ..LINES

@@ -239,7 +239,7 @@ const fn stage(name: &'static str, wgsl: &'static str, bindings: &'static [Bindi
 }
 
 const FRAME: Binding = Binding { name: "frame", access: Uniform };
-const RECORDS: Binding = Binding { name: "records", access: Read };
+const RECORDS: Binding = Binding { name: "records", access: Texels };
 
 pub const SPAN: Stage = stage(
     "grid_span",
@@ -249,15 +249,15 @@ pub const SPAN: Stage = stage(
 pub const SUM: Stage = stage(
     "grid_sum",
     include_str!("../../shaders/grid_sum.wgsl"),
-    &[FRAME, RECORDS, Binding { name: "span", access: Read }, Binding { name: "layers", access: ReadWrite }],
+    &[FRAME, RECORDS, Binding { name: "span", access: Texels }, Binding { name: "layers", access: ReadWrite }],
 );
 pub const PICK: Stage = stage(
     "grid_pick",
     include_str!("../../shaders/grid_pick.wgsl"),
     &[
         FRAME,
-        Binding { name: "span", access: Read },
-        Binding { name: "layers", access: Read },
+        Binding { name: "span", access: Texels },
+        Binding { name: "layers", access: Texels },
         Binding { name: "cells", access: ReadWrite },
     ],
 );

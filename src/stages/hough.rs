@@ -14,7 +14,7 @@ pub const STAGE: Stage = Stage {
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "header", access: Read },
-        Binding { name: "points", access: Read },
+        Binding { name: "points", access: Texels },
         Binding { name: "table", access: Read },
         Binding { name: "votes", access: ReadWrite },
     ],

@@ -132,8 +132,8 @@ pub const COPY: Stage = Stage {
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "listing", access: Read },
-        Binding { name: "list", access: Read },
-        Binding { name: "mask", access: Read },
+        Binding { name: "list", access: Texels },
+        Binding { name: "mask", access: Texels },
         Binding { name: "long", access: ReadWrite },
     ],
     uniform: frame::UNIFORM,
@@ -147,11 +147,11 @@ pub const STAGE: Stage = Stage {
     shared: &[SHARED, PIXELS],
     bindings: &[
         Binding { name: "frame", access: Uniform },
-        Binding { name: "image", access: Read },
+        Binding { name: "image", access: Texels },
         Binding { name: "listing", access: Read },
-        Binding { name: "list", access: Read },
-        Binding { name: "mask", access: Read },
-        Binding { name: "lit", access: Read },
+        Binding { name: "list", access: Texels },
+        Binding { name: "mask", access: Texels },
+        Binding { name: "lit", access: Texels },
         Binding { name: "long", access: ReadWrite },
     ],
     ..COPY

@@ -29,7 +29,7 @@ pub const CLEAR: Stage = Stage {
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "listing", access: Read },
-        Binding { name: "list", access: Read },
+        Binding { name: "list", access: Texels },
         Binding { name: "mask", access: ReadWrite },
         Binding { name: "other_mask", access: ReadWrite },
         Binding { name: "lit", access: ReadWrite },
@@ -46,8 +46,8 @@ pub const COMPACT: Stage = Stage {
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "all", access: Read },
-        Binding { name: "list", access: Read },
-        Binding { name: "stamps", access: Read },
+        Binding { name: "list", access: Texels },
+        Binding { name: "stamps", access: Texels },
         Binding { name: "listing", access: ReadWrite },
         Binding { name: "active_list", access: ReadWrite },
     ],
@@ -60,7 +60,7 @@ pub const REBASE: Stage = Stage {
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "listing", access: Read },
-        Binding { name: "list", access: Read },
+        Binding { name: "list", access: Texels },
         Binding { name: "stamps", access: ReadWrite },
     ],
     ..RESET

@@ -251,24 +251,27 @@ impl Shared {
     pub fn thinning(&self, device: &Device, p: &Pipelines) -> Vec<Recording> {
         let stamps = whole(&self.stamps);
         let begins = std::iter::once(0).chain(SHORTEN);
-        (0..).zip(begins.zip(SHORTEN)).map(|(n, (begin, end))| {
-            let mut r = Recording::default();
-            let (header, list, args) = match n {
-                0 => (self.lit(), &self.lit_list, (&self.lit_first, 0)),
-                n => (self.shortened(n), &self.active_list, (&self.active, self.shortened(n).1)),
-            };
-            for step in begin..end {
-                let (from, to) =
-                    if step % 2 == 0 { (&self.mask, &self.other_mask) } else { (&self.other_mask, &self.mask) };
-                let bindings = [self.step(step), header, whole(list), whole(from), whole(to), stamps];
-                r.indirect(device, &p.thin, &bindings, args);
-            }
-            let list = whole(&self.lit_list);
-            let bindings =
-                [self.step(end), self.lit(), list, stamps, self.shortened(n + 1), whole(&self.active_list)];
-            r.indirect(device, &p.compact, &bindings, (&self.lit_first, 0));
-            r
-        }).collect()
+        (0..)
+            .zip(begins.zip(SHORTEN))
+            .map(|(n, (begin, end))| {
+                let mut r = Recording::default();
+                let (header, list, args) = match n {
+                    0 => (self.lit(), &self.lit_list, (&self.lit_first, 0)),
+                    n => (self.shortened(n), &self.active_list, (&self.active, self.shortened(n).1)),
+                };
+                for step in begin..end {
+                    let (from, to) =
+                        if step % 2 == 0 { (&self.mask, &self.other_mask) } else { (&self.other_mask, &self.mask) };
+                    let bindings = [self.step(step), header, whole(list), whole(from), whole(to), stamps];
+                    r.indirect(device, &p.thin, &bindings, args);
+                }
+                let list = whole(&self.lit_list);
+                let bindings =
+                    [self.step(end), self.lit(), list, stamps, self.shortened(n + 1), whole(&self.active_list)];
+                r.indirect(device, &p.compact, &bindings, (&self.lit_first, 0));
+                r
+            })
+            .collect()
     }
 
     /// Between two rounds of thinning.

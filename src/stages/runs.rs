@@ -11,8 +11,8 @@ pub const STAGE: Stage = Stage {
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "listing", access: Read },
-        Binding { name: "list", access: Read },
-        Binding { name: "listed", access: Read },
+        Binding { name: "list", access: Texels },
+        Binding { name: "listed", access: Texels },
         Binding { name: "single_listing", access: ReadWrite },
         Binding { name: "singles", access: ReadWrite },
         Binding { name: "run_listing", access: ReadWrite },

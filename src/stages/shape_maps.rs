@@ -12,7 +12,7 @@ pub const QUANTISE: Stage = Stage {
     workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
-        Binding { name: "slopes", access: Read },
+        Binding { name: "slopes", access: Texels },
         Binding { name: "bits", access: ReadWrite },
     ],
     uniform: UNIFORM,
@@ -26,7 +26,7 @@ pub const SPREAD: Stage = Stage {
     workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
-        Binding { name: "bits", access: Read },
+        Binding { name: "bits", access: Texels },
         Binding { name: "responses", access: ReadWrite },
     ],
     uniform: UNIFORM,

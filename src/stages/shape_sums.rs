@@ -12,7 +12,7 @@ pub const SCORE: Stage = Stage {
     workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
-        Binding { name: "responses", access: Read },
+        Binding { name: "responses", access: Texels },
         Binding { name: "features", access: Read },
         Binding { name: "sums", access: ReadWrite },
     ],
@@ -27,7 +27,7 @@ pub const PEAKS: Stage = Stage {
     workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
-        Binding { name: "sums", access: Read },
+        Binding { name: "sums", access: Texels },
         Binding { name: "header", access: ReadWrite },
         Binding { name: "hits", access: ReadWrite },
     ],

@@ -45,8 +45,8 @@ pub const COUNT: Stage = Stage {
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "listing", access: Read },
-        Binding { name: "list", access: Read },
-        Binding { name: "mask", access: Read },
+        Binding { name: "list", access: Texels },
+        Binding { name: "mask", access: Texels },
         Binding { name: "counts", access: ReadWrite },
     ],
     uniform: frame::UNIFORM,
@@ -59,7 +59,7 @@ pub const SCAN_ROWS: Stage = Stage {
     wgsl: include_str!("../../shaders/scan_rows.wgsl"),
     bindings: &[
         Binding { name: "frame", access: Uniform },
-        Binding { name: "counts", access: Read },
+        Binding { name: "counts", access: Texels },
         Binding { name: "starts", access: ReadWrite },
         Binding { name: "rows", access: ReadWrite },
     ],
@@ -72,7 +72,7 @@ pub const SCAN_SHOTS: Stage = Stage {
     wgsl: include_str!("../../shaders/scan_shots.wgsl"),
     bindings: &[
         Binding { name: "frame", access: Uniform },
-        Binding { name: "rows", access: Read },
+        Binding { name: "rows", access: Texels },
         Binding { name: "listing", access: Read },
         Binding { name: "shortened", access: Read },
         Binding { name: "row_starts", access: ReadWrite },
@@ -88,10 +88,10 @@ pub const STAGE: Stage = Stage {
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "listing", access: Read },
-        Binding { name: "list", access: Read },
-        Binding { name: "mask", access: Read },
-        Binding { name: "starts", access: Read },
-        Binding { name: "row_starts", access: Read },
+        Binding { name: "list", access: Texels },
+        Binding { name: "mask", access: Texels },
+        Binding { name: "starts", access: Texels },
+        Binding { name: "row_starts", access: Texels },
         Binding { name: "points", access: ReadWrite },
     ],
     ..COUNT

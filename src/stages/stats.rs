@@ -11,7 +11,7 @@ pub const STAGE: Stage = Stage {
     workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
-        Binding { name: "image", access: Read },
+        Binding { name: "image", access: Texels },
         Binding { name: "stats", access: ReadWrite },
     ],
     uniform: frame::UNIFORM,

@@ -15,8 +15,8 @@ pub const STAGE: Stage = Stage {
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "listing", access: Read },
-        Binding { name: "list", access: Read },
-        Binding { name: "before", access: Read },
+        Binding { name: "list", access: Texels },
+        Binding { name: "before", access: Texels },
         Binding { name: "after", access: ReadWrite },
         Binding { name: "stamps", access: ReadWrite },
     ],

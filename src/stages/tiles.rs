@@ -15,9 +15,9 @@ pub const STAGE: Stage = Stage {
     workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
-        Binding { name: "stats", access: Read },
-        Binding { name: "bands", access: Read },
-        Binding { name: "roi", access: Read },
+        Binding { name: "stats", access: Texels },
+        Binding { name: "bands", access: Texels },
+        Binding { name: "roi", access: Texels },
         Binding { name: "listed", access: ReadWrite },
         Binding { name: "listing", access: ReadWrite },
         Binding { name: "list", access: ReadWrite },

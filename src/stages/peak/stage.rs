@@ -19,9 +19,9 @@ pub const STAGE: Stage = Stage {
     workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
-        Binding { name: "image", access: Read },
+        Binding { name: "image", access: Texels },
         Binding { name: "header", access: Read },
-        Binding { name: "points", access: Read },
+        Binding { name: "points", access: Texels },
         Binding { name: "peaks", access: ReadWrite },
     ],
     uniform: frame::UNIFORM,

@@ -1,0 +1,208 @@
+//! In: a software adapter under Vulkan. Out: memory that its stages write as a buffer and read as texels, and that the
+//! host writes where it lies. Frame and unit: bytes.
+//!
+//! Buffer and images are bound to the same bytes (VK_IMAGE_CREATE_ALIAS_BIT, linear tiling). wgpu does not know
+//! that they share them and so puts no barrier between a write of the one and a read of the other; none is needed where
+//! dispatches run one after the other, as on a software adapter, and only there is this offered. Before it is, a trial
+//! (`Device::texels`) writes and reads back.
+
+use super::texels::{ROW_LOG2, Texel};
+use ash::vk;
+use std::sync::{Arc, OnceLock};
+use wgpu::hal::api::Vulkan;
+
+/// Bytes that a buffer and images lie on; freed after the last of them.
+struct Memory {
+    device: ash::Device,
+    raw: vk::DeviceMemory,
+    host: *mut u8,
+    bytes: u64,
+}
+
+// The host's pointer is used under the rules of `Aliased::write` only; Vulkan's handles may be used by any thread.
+unsafe impl Send for Memory {}
+unsafe impl Sync for Memory {}
+
+impl Drop for Memory {
+    fn drop(&mut self) {
+        // SAFETY: buffer and images hold this memory until wgpu destroys them, which waits for the work that uses them.
+        unsafe { self.device.free_memory(self.raw, None) };
+    }
+}
+
+/// What else lies on a buffer's memory.
+pub(super) struct Aliased {
+    memory: Arc<Memory>,
+    views: [OnceLock<wgpu::TextureView>; 3],
+}
+
+impl std::fmt::Debug for Aliased {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        write!(f, "Aliased({} bytes)", self.memory.bytes)
+    }
+}
+
+/// A zeroed buffer on memory of its own; `None` where the adapter is not Vulkan's or the memory cannot be had.
+pub(super) fn buffer(
+    device: &wgpu::Device,
+    descriptor: &wgpu::BufferDescriptor,
+) -> Option<(wgpu::Buffer, Arc<Aliased>)> {
+    // SAFETY: nothing of the device is destroyed through this handle; all calls follow the order that Vulkan asks for.
+    unsafe {
+        let hal = device.as_hal::<Vulkan>()?;
+        let (raw, instance) = (hal.raw_device().clone(), hal.shared_instance().raw_instance());
+        let usage = vk::BufferUsageFlags::STORAGE_BUFFER
+            | vk::BufferUsageFlags::INDIRECT_BUFFER
+            | vk::BufferUsageFlags::UNIFORM_BUFFER
+            | vk::BufferUsageFlags::TRANSFER_SRC
+            | vk::BufferUsageFlags::TRANSFER_DST;
+        let buffer =
+            raw.create_buffer(&vk::BufferCreateInfo::default().size(descriptor.size).usage(usage), None).ok()?;
+        let needs = raw.get_buffer_memory_requirements(buffer);
+        // Room for whole groups of four rows of the largest texels, which is what images are padded to.
+        let bytes = needs.size.next_multiple_of((4 * Texel::Four.bytes()) << ROW_LOG2);
+        let kinds = instance.get_physical_device_memory_properties(hal.raw_physical_device());
+        let wanted = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
+        let kind = (0..kinds.memory_type_count).find(|&i| {
+            needs.memory_type_bits & (1 << i) != 0 && kinds.memory_types[i as usize].property_flags.contains(wanted)
+        });
+        let allocated = kind.and_then(|kind| {
+            let info = vk::MemoryAllocateInfo::default().allocation_size(bytes).memory_type_index(kind);
+            raw.allocate_memory(&info, None).ok()
+        });
+        let Some(allocated) = allocated else {
+            raw.destroy_buffer(buffer, None);
+            return None;
+        };
+        let mapped = raw.map_memory(allocated, 0, vk::WHOLE_SIZE, vk::MemoryMapFlags::empty());
+        let bound = mapped.and_then(|host| raw.bind_buffer_memory(buffer, allocated, 0).map(|()| host.cast::<u8>()));
+        let Ok(host) = bound else {
+            raw.destroy_buffer(buffer, None);
+            raw.free_memory(allocated, None);
+            return None;
+        };
+        host.write_bytes(0, bytes as usize);
+        let memory = Arc::new(Memory { device: raw.clone(), raw: allocated, host, bytes });
+        let held = memory.clone();
+        let destroy = Box::new(move || {
+            raw.destroy_buffer(buffer, None);
+            drop(held);
+        });
+        let hal_buffer = wgpu::hal::vulkan::Buffer::from_raw_externally_owned(buffer, destroy);
+        drop(hal);
+        let buffer = device.create_buffer_from_hal::<Vulkan>(hal_buffer, descriptor);
+        Some((buffer, Arc::new(Aliased { memory, views: Default::default() })))
+    }
+}
+
+impl Aliased {
+    /// The same bytes as an image, rows of 2^ROW_LOG2 texels one after the other; `None` where the adapter would lay
+    /// it out in another way.
+    pub(super) fn texels(&self, device: &wgpu::Device, texel: Texel) -> Option<&wgpu::TextureView> {
+        let slot = &self.views[texel as usize];
+        if slot.get().is_none() {
+            let _ = slot.set(self.image(device, texel)?);
+        }
+        slot.get()
+    }
+
+    fn image(&self, device: &wgpu::Device, texel: Texel) -> Option<wgpu::TextureView> {
+        let row = texel.bytes() << ROW_LOG2;
+        let (width, height) = (1 << ROW_LOG2, (self.memory.bytes / row) as u32);
+        let format = match texel {
+            Texel::One => vk::Format::R32_UINT,
+            Texel::Two => vk::Format::R32G32_UINT,
+            Texel::Four => vk::Format::R32G32B32A32_UINT,
+        };
+        let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
+        // SAFETY: as in `buffer`; the image lies within the memory, which it holds until it is destroyed.
+        unsafe {
+            let hal = device.as_hal::<Vulkan>()?;
+            let raw = hal.raw_device().clone();
+            let info = vk::ImageCreateInfo::default()
+                .flags(vk::ImageCreateFlags::ALIAS)
+                .image_type(vk::ImageType::TYPE_2D)
+                .format(format)
+                .extent(vk::Extent3D { width, height, depth: 1 })
+                .mip_levels(1)
+                .array_layers(1)
+                .samples(vk::SampleCountFlags::TYPE_1)
+                .tiling(vk::ImageTiling::LINEAR)
+                .usage(vk::ImageUsageFlags::STORAGE);
+            let image = raw.create_image(&info, None).ok()?;
+            let part = vk::ImageSubresource { aspect_mask: vk::ImageAspectFlags::COLOR, mip_level: 0, array_layer: 0 };
+            let layout = raw.get_image_subresource_layout(image, part);
+            let fits = raw.get_image_memory_requirements(image).size <= self.memory.bytes;
+            let plain = layout.offset == 0 && layout.row_pitch == row;
+            if !fits || !plain || raw.bind_image_memory(image, self.memory.raw, 0).is_err() {
+                raw.destroy_image(image, None);
+                return None;
+            }
+            let held = self.memory.clone();
+            let destroy = Box::new(move || {
+                raw.destroy_image(image, None);
+                drop(held);
+            });
+            let hal_texture = hal.texture_from_raw(
+                image,
+                &wgpu::hal::TextureDescriptor {
+                    label: None,
+                    size,
+                    mip_level_count: 1,
+                    sample_count: 1,
+                    dimension: wgpu::TextureDimension::D2,
+                    format: texel.format(),
+                    usage: wgpu::wgt::TextureUses::STORAGE_READ_ONLY,
+                    memory_flags: wgpu::hal::MemoryFlags::empty(),
+                    view_formats: vec![],
+                },
+                Some(destroy),
+                wgpu::hal::vulkan::TextureMemory::External,
+            );
+            drop(hal);
+            let texture = device.create_texture_from_hal::<Vulkan>(
+                hal_texture,
+                &wgpu::TextureDescriptor {
+                    label: None,
+                    size,
+                    mip_level_count: 1,
+                    sample_count: 1,
+                    dimension: wgpu::TextureDimension::D2,
+                    format: texel.format(),
+                    usage: wgpu::TextureUsages::STORAGE_BINDING,
+                    view_formats: &[],
+                },
+                wgpu::wgt::TextureUses::STORAGE_READ_ONLY,
+            );
+            Some(texture.create_view(&Default::default()))
+        }
+    }
+
+    /// Writes where the bytes lie. The caller sees to it that no submitted work uses the buffer.
+    pub(super) fn write(&self, offset: usize, bytes: &[u8]) {
+        assert!((offset + bytes.len()) as u64 <= self.memory.bytes, "{offset} + {} bytes", bytes.len());
+        // SAFETY: inside the mapped memory, just checked; it stays mapped as long as `self` lives.
+        unsafe { self.memory.host.add(offset).copy_from_nonoverlapping(bytes.as_ptr(), bytes.len()) };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::gpu::Device;
+    use crate::gpu::texels::Texel;
+    use std::sync::Arc;
+
+    #[test]
+    fn memory_lives_as_long_as_what_lies_on_it() {
+        let Some(device) = Device::open().ok().filter(|d| d.reads_texels) else { return };
+        let buffer = device.storage("lives", 1 << 20).unwrap();
+        let memory = Arc::downgrade(&buffer.aliased.as_ref().unwrap().memory);
+        let view = device.texels(&buffer, Texel::Four).unwrap().clone();
+        drop(buffer);
+        device.wait(None).unwrap();
+        assert!(memory.upgrade().is_some(), "an image still lies there");
+        drop(view);
+        device.wait(None).unwrap();
+        assert!(memory.upgrade().is_none(), "nothing lies there any more");
+    }
+}

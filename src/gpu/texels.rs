@@ -1,0 +1,176 @@
+//! In: WGSL that reads arrays of words. Out: the same WGSL reading the same words as texels of an image.
+//! Frame and unit: words of 32 bits, in vectors of 1, 2 or 4.
+//!
+//! Mesa's software adapter reads a storage buffer one lane after the other, in a loop with a branch (17 cycles a lane for
+//! four words); a texel it gathers for all lanes at once (4 cycles). Stores are the other way round: 10 cycles a lane to a
+//! buffer, 40 to an image. So stages write buffers, and read them as images that lie on the same memory
+//! ([`super::alias`]).
+
+use super::stage::{Access, Binding, Stage};
+use super::{Device, Recording, Replay};
+use crate::fault::Result;
+
+/// Texels a row of such an image, as a power of two: what lies behind each other in the buffer fills row after row.
+/// 16,384 rows, what every adapter has, of single words are 256 MiB.
+pub(super) const ROW_LOG2: u32 = 12;
+
+/// One texel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Texel {
+    One,
+    Two,
+    Four,
+}
+
+impl Texel {
+    pub(super) const ALL: [Texel; 3] = [Texel::One, Texel::Two, Texel::Four];
+
+    pub(super) fn bytes(self) -> u64 {
+        4 << self as u64
+    }
+    pub(super) fn format(self) -> wgpu::TextureFormat {
+        match self {
+            Texel::One => wgpu::TextureFormat::R32Uint,
+            Texel::Two => wgpu::TextureFormat::Rg32Uint,
+            Texel::Four => wgpu::TextureFormat::Rgba32Uint,
+        }
+    }
+    /// The element type of an array in WGSL, a texel's format there, and the components it has.
+    fn wgsl(self) -> (&'static str, &'static str, &'static str) {
+        match self {
+            Texel::One => ("u32", "r32uint", "x"),
+            Texel::Two => ("vec2<u32>", "rg32uint", "xy"),
+            Texel::Four => ("vec4<u32>", "rgba32uint", "xyzw"),
+        }
+    }
+}
+
+fn declaration(name: &str, texel: Texel) -> String {
+    format!("var<storage, read> {name}: array<{}>;", texel.wgsl().0)
+}
+
+/// What a binding's texels are; panics where a stage promises texels of what is none.
+pub(super) fn texel_of(stage: &Stage, binding: &str) -> Texel {
+    let found = Texel::ALL.into_iter().find(|&t| stage.wgsl.contains(&declaration(binding, t)));
+    found.unwrap_or_else(|| panic!("{}: '{binding}' is no read-only array of u32, vec2<u32> or vec4<u32>", stage.name))
+}
+
+/// The stage's text with its `Access::Texels` bindings as images.
+pub(super) fn rewrite(stage: &Stage, source: &str) -> String {
+    let mut text = source.to_string();
+    for b in stage.bindings.iter().filter(|b| b.access == Access::Texels) {
+        let (name, texel) = (b.name, texel_of(stage, b.name));
+        let (ty, format, components) = texel.wgsl();
+        let image = format!("var {name}: texture_storage_2d<{format}, read>;");
+        text = reads(&text.replace(&declaration(name, texel), &image), name);
+        let (mask, shift) = ((1 << ROW_LOG2) - 1, ROW_LOG2);
+        text += &format!(
+            "\nfn {name}_texel(i: u32) -> {ty} {{\n    return textureLoad({name}, vec2(i & {mask}u, i >> {shift}u)).{components};\n}}\n"
+        );
+    }
+    text
+}
+
+/// Every `name[index]` as `name_texel(u32(index))`.
+fn reads(text: &str, name: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    let mut rest = text;
+    while let Some(at) = rest.find(name) {
+        let (before, from) = rest.split_at(at);
+        let inside_word = before.ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == '.');
+        out += before;
+        match from[name.len()..].strip_prefix('[') {
+            Some(index) if !inside_word => {
+                let end = closing(index);
+                out += &format!("{name}_texel(u32({}))", reads(&index[..end], name));
+                rest = &index[end + 1..];
+            }
+            _ => {
+                out += name;
+                rest = &from[name.len()..];
+            }
+        }
+    }
+    out + rest
+}
+
+/// Where the bracket that was just opened closes.
+fn closing(text: &str) -> usize {
+    let mut depth = 0;
+    for (at, c) in text.char_indices() {
+        match c {
+            '[' => depth += 1,
+            ']' if depth == 0 => return at,
+            ']' => depth -= 1,
+            _ => {}
+        }
+    }
+    panic!("a bracket is not closed: {text}")
+}
+
+/// Writes a buffer and reads it as texels of every kind, one dispatch after the other.
+pub(super) fn trial(device: &Device) -> Result<bool> {
+    const WORDS: u32 = 3 << (ROW_LOG2 + 2); // three rows of the largest texels
+    const UNIFORM: (&str, &[super::Field], usize) = ("", &[], 0);
+    const WRITE: Stage = Stage {
+        name: "texels write",
+        wgsl: "@group(0) @binding(0) var<storage, read_write> words: array<u32>;
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    words[id.x] = id.x * 2654435761u;
+}",
+        shared: &[],
+        workgroup: [64, 1, 1],
+        bindings: &[Binding { name: "words", access: Access::ReadWrite }],
+        uniform: UNIFORM,
+        overrides: &[],
+    };
+    const READ: Stage = Stage {
+        name: "texels read",
+        wgsl: "@group(0) @binding(0) var<storage, read> one: array<u32>;
+@group(0) @binding(1) var<storage, read> two: array<vec2<u32>>;
+@group(0) @binding(2) var<storage, read> four: array<vec4<u32>>;
+@group(0) @binding(3) var<storage, read_write> seen: array<vec4<u32>>;
+@compute @workgroup_size(64)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    let i = id.x;
+    seen[i] = vec4(one[i], two[i / 2u][i & 1u], four[i / 4u][i & 3u], 0u);
+}",
+        shared: &[],
+        workgroup: [64, 1, 1],
+        bindings: &[
+            Binding { name: "one", access: Access::Texels },
+            Binding { name: "two", access: Access::Texels },
+            Binding { name: "four", access: Access::Texels },
+            Binding { name: "seen", access: Access::ReadWrite },
+        ],
+        uniform: UNIFORM,
+        overrides: &[],
+    };
+    let mut device = device.clone();
+    device.reads_texels = true;
+    let Ok(words) = device.storage("texels trial", 4 * u64::from(WORDS)) else { return Ok(false) };
+    if Texel::ALL.iter().any(|&t| device.texels(&words, t).is_none()) {
+        return Ok(false);
+    }
+    let seen = device.storage("texels seen", 16 * u64::from(WORDS))?;
+    let mut work = Recording::default();
+    let groups = [WORDS / 64, 1, 1];
+    work.dispatch(&device, &WRITE.pipeline(&device, &[])?, &[&words], groups);
+    work.dispatch(&device, &READ.pipeline(&device, &[])?, &[&words, &words, &words, &seen], groups);
+    Replay::new(&device, false)?.run(&[&work])?;
+    let seen: Vec<[u32; 4]> = bytemuck::pod_collect_to_vec(&device.read(&seen)?);
+    Ok((0u32..).zip(seen).all(|(i, v)| v[..3] == [i.wrapping_mul(2654435761); 3]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reads_become_texels_and_nothing_else_does() {
+        let text = "let a = list[listing[3] + list[i]] + my_list[2] + o.list[1] + lists[4] + list_index;";
+        let wanted = "let a = list_texel(u32(listing[3] + list_texel(u32(i)))) + my_list[2] + o.list[1] + lists[4] + list_index;";
+        assert_eq!(reads(text, "list"), wanted);
+    }
+}
