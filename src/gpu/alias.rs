@@ -17,6 +17,9 @@ struct Memory {
     raw: vk::DeviceMemory,
     host: *mut u8,
     bytes: u64,
+    /// Vulkan's device, and the driver that holds its code, must outlive the memory: scans with an ambient picture crashed
+    /// at their end without it (tests/inputs.rs).
+    _owner: wgpu::Device,
 }
 
 // The host's pointer is used under the rules of `Aliased::write` only; Vulkan's handles may be used by any thread.
@@ -82,7 +85,7 @@ pub(super) fn buffer(
             return None;
         };
         host.write_bytes(0, bytes as usize);
-        let memory = Arc::new(Memory { device: raw.clone(), raw: allocated, host, bytes });
+        let memory = Arc::new(Memory { device: raw.clone(), raw: allocated, host, bytes, _owner: device.clone() });
         let held = memory.clone();
         let destroy = Box::new(move || {
             raw.destroy_buffer(buffer, None);
