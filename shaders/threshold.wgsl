@@ -1,8 +1,8 @@
 // In: pictures, a list of runs of tiles. Out: the pixels brighter than the mean of the window around them, inside the
 // picture and the region of interest only, twice: `mask` is thinned, `lit` stays; and the list of the tiles that
 // hold one, which all later stages work on. One invocation a run: the sums of the columns that its
-// windows touch are carried down its rows in registers, four words of pixels a load (a load costs as much as
-// ten additions and more). The radius is a constant of the pipeline, so that every index is one too.
+// windows touch are carried down its rows, four words of pixels a load. The radius is a constant of the pipeline, so
+// that every index is one too.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> image: array<vec4<u32>>;
 @group(0) @binding(2) var<storage, read> listing: array<u32>;
