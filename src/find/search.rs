@@ -78,9 +78,9 @@ pub fn find_on(
     for level in (0..=most).rev() {
         let keep = if level == 0 { options.candidates.min(4 * options.max_matches + 100) } else { options.candidates };
         candidates = candidates
-                .into_par_iter()
-                .map(|c| climb(&levels[level], &model.levels[level], level, c, model.radius, options, level == most))
-                .collect();
+            .into_par_iter()
+            .map(|c| climb(&levels[level], &model.levels[level], level, c, model.radius, options, level == most))
+            .collect();
         let limit = options.min_score - if level == 0 { 0.05 } else { 0.12 };
         candidates.retain(|c| c.score >= limit);
         candidates = distinct(candidates, (1 << level) as f64, model.radius, keep);
