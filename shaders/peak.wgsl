@@ -230,7 +230,7 @@ fn centroid(at: vec2<i32>) -> Peak {
         moment += light * p.x;
         second += light * (p.x * p.x);
         top = max(top, light);
-        saturated = saturated || (clear_of(profile, k) < 1.0 && inside);
+        saturated = saturated || (four_clear(profile, k).x < 1.0 && inside);
         let e = select(0.0, p.x - m0, inside);
         let lit = max(p.y - base, 0.0);
         noise += (e * e) * (frame.read2 + frame.gain * p.y + frame.speckle2 * (lit * lit));

@@ -186,15 +186,6 @@ fn four_clear(p: Profile, k: i32) -> vec4<f32> {
     return clear;
 }
 
-// The share of a sample's weight that is not clipped.
-fn clear_of(p: Profile, k: i32) -> f32 {
-    var clear = 1.0;
-    for (var some = u32(p.clipped); some > 0u; some--) {
-        clear = 1.0 - samples[k + SAMPLES] * p.scale;
-    }
-    return clear;
-}
-
 // The samples whose offsets may lie within `reach` of m, and some beyond.
 fn within(p: Profile, m: f32, reach: f32) -> vec2<i32> {
     let a = (m - reach - p.offset) / p.step;

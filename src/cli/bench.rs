@@ -29,6 +29,9 @@ pub struct Args {
     /// Shots of a long run of the full chain, watched for growing memory (0: none)
     #[arg(long, default_value_t = 0)]
     soak: usize,
+    /// Let a software adapter read arrays from buffers, as all other adapters do
+    #[arg(long)]
+    from_buffers: bool,
     /// Folder for bench.json and bench.txt
     #[arg(long)]
     save: Option<PathBuf>,
@@ -53,6 +56,7 @@ fn scene(text: &str) -> std::result::Result<Scene, String> {
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let device = Device::open()?;
+    let device = if args.from_buffers { device.without_texels() } else { device };
     if args.peer_pipe {
         return bench::serve(&device, std::io::stdin().lock(), std::io::stdout().lock());
     }

@@ -3,8 +3,8 @@
 //!
 //! Buffer and images are bound to the same bytes (VK_IMAGE_CREATE_ALIAS_BIT, linear tiling). wgpu does not know
 //! that they share them and so puts no barrier between a write of the one and a read of the other; none is needed where
-//! dispatches run one after the other, as on a software adapter, and only there is this offered. Before it is, a trial
-//! (`Device::texels`) writes and reads back.
+//! dispatches run one after the other, as on a software adapter, and only there is this offered, after a trial
+//! ([`super::texels::trial`]). Reasons and figures: docs/decisions/0012.
 
 use super::texels::{ROW_LOG2, Texel};
 use ash::vk;
@@ -117,7 +117,6 @@ impl Aliased {
             Texel::Two => vk::Format::R32G32_UINT,
             Texel::Four => vk::Format::R32G32B32A32_UINT,
         };
-        let size = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
         // SAFETY: as in `buffer`; the image lies within the memory, which it holds until it is destroyed.
         unsafe {
             let hal = device.as_hal::<Vulkan>()?;
@@ -146,37 +145,32 @@ impl Aliased {
                 raw.destroy_image(image, None);
                 drop(held);
             });
-            let hal_texture = hal.texture_from_raw(
-                image,
-                &wgpu::hal::TextureDescriptor {
-                    label: None,
-                    size,
-                    mip_level_count: 1,
-                    sample_count: 1,
-                    dimension: wgpu::TextureDimension::D2,
-                    format: texel.format(),
-                    usage: wgpu::wgt::TextureUses::STORAGE_READ_ONLY,
-                    memory_flags: wgpu::hal::MemoryFlags::empty(),
-                    view_formats: vec![],
-                },
-                Some(destroy),
-                wgpu::hal::vulkan::TextureMemory::External,
-            );
+            let d = wgpu::TextureDescriptor {
+                label: None,
+                size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: texel.format(),
+                usage: wgpu::TextureUsages::STORAGE_BINDING,
+                view_formats: &[],
+            };
+            let only_read = wgpu::wgt::TextureUses::STORAGE_READ_ONLY;
+            let hal_descriptor = wgpu::hal::TextureDescriptor {
+                label: d.label,
+                size: d.size,
+                mip_level_count: d.mip_level_count,
+                sample_count: d.sample_count,
+                dimension: d.dimension,
+                format: d.format,
+                usage: only_read,
+                memory_flags: wgpu::hal::MemoryFlags::empty(),
+                view_formats: vec![],
+            };
+            let external = wgpu::hal::vulkan::TextureMemory::External;
+            let hal_texture = hal.texture_from_raw(image, &hal_descriptor, Some(destroy), external);
             drop(hal);
-            let texture = device.create_texture_from_hal::<Vulkan>(
-                hal_texture,
-                &wgpu::TextureDescriptor {
-                    label: None,
-                    size,
-                    mip_level_count: 1,
-                    sample_count: 1,
-                    dimension: wgpu::TextureDimension::D2,
-                    format: texel.format(),
-                    usage: wgpu::TextureUsages::STORAGE_BINDING,
-                    view_formats: &[],
-                },
-                wgpu::wgt::TextureUses::STORAGE_READ_ONLY,
-            );
+            let texture = device.create_texture_from_hal::<Vulkan>(hal_texture, &d, only_read);
             Some(texture.create_view(&Default::default()))
         }
     }

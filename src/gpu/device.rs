@@ -327,15 +327,14 @@ impl Device {
         let (mut ups, mut downs) = (Vec::new(), Vec::new());
         for _ in 0..9 {
             let start = Instant::now();
-            if let Some(host) = &up.aliased {
-                host.write(0, &data);
-            } else {
-                let mapped = up.map(wgpu::MapMode::Write, 0..bytes);
+            if let Some(mapped) = up.open() {
                 self.wait(None)?;
                 mapped.done()?;
-                up.view_mut(0..bytes)?.copy_from_slice(&data);
-                up.raw.unmap();
             }
+            up.fill(|put| {
+                put(0, &data);
+                Ok(())
+            })?;
             if !self.info.unified_memory {
                 let mut encoder = self.raw.create_command_encoder(&Default::default());
                 encoder.copy_buffer_to_buffer(&up.raw, 0, &target.raw, 0, bytes);
@@ -390,9 +389,20 @@ impl Mapping {
 }
 
 impl Buffer {
-    /// Asks for what the host must have before it writes: nothing where the memory lies open.
+    /// Asks for what the host must have before it fills the buffer: nothing where the memory lies open.
     pub(super) fn open(&self) -> Option<Mapping> {
         self.aliased.is_none().then(|| self.map(wgpu::MapMode::Write, 0..self.bytes))
+    }
+    /// The host's writes to an open buffer: `fill` is given a writer (byte offset, bytes). Closes it, failed or not.
+    pub(super) fn fill(&self, fill: impl FnOnce(&mut dyn FnMut(usize, &[u8])) -> Result<()>) -> Result<()> {
+        if let Some(host) = &self.aliased {
+            return fill(&mut |offset, bytes| host.write(offset, bytes));
+        }
+        let mut view = self.view_mut(0..self.bytes)?;
+        let filled = fill(&mut |offset, bytes| view.slice(offset..offset + bytes.len()).copy_from_slice(bytes));
+        drop(view);
+        self.raw.unmap();
+        filled
     }
     pub(super) fn map(&self, mode: wgpu::MapMode, range: std::ops::Range<u64>) -> Mapping {
         let slot = Arc::new(Mutex::new(None));
@@ -403,7 +413,7 @@ impl Buffer {
     pub(super) fn view(&self, range: std::ops::Range<u64>) -> Result<wgpu::BufferView> {
         self.raw.get_mapped_range(range).map_err(|e| Fault::device(format!("a mapped buffer cannot be read: {e}")))
     }
-    pub(super) fn view_mut(&self, range: std::ops::Range<u64>) -> Result<wgpu::BufferViewMut> {
+    fn view_mut(&self, range: std::ops::Range<u64>) -> Result<wgpu::BufferViewMut> {
         self.raw
             .get_mapped_range_mut(range)
             .map_err(|e| Fault::device(format!("a mapped buffer cannot be written: {e}")))

@@ -102,18 +102,10 @@ impl Ring {
             }
             m.done()?;
         }
-        if let Some(host) = &slot.upload.aliased {
-            fill(&mut |offset, bytes| host.write(offset, bytes))?;
-        } else {
-            let mut view = slot.upload.view_mut(0..slot.upload.bytes)?;
-            let filled = fill(&mut |offset, bytes| view.slice(offset..offset + bytes.len()).copy_from_slice(bytes));
-            drop(view);
-            slot.upload.raw.unmap();
-            if let Err(e) = filled {
-                slot.mapping = slot.upload.open();
-                self.device.wait(None)?;
-                return Err(e);
-            }
+        if let Err(e) = slot.upload.fill(fill) {
+            slot.mapping = slot.upload.open();
+            self.device.wait(None)?;
+            return Err(e);
         }
         self.free.pop_front();
         self.busy.push_back(at);

@@ -1,10 +1,9 @@
 //! In: WGSL that reads arrays of words. Out: the same WGSL reading the same words as texels of an image.
 //! Frame and unit: words of 32 bits, in vectors of 1, 2 or 4.
 //!
-//! Mesa's software adapter reads a storage buffer one lane after the other, in a loop with a branch (17 cycles a lane for
-//! four words); a texel it gathers for all lanes at once (4 cycles). Stores are the other way round: 10 cycles a lane to a
-//! buffer, 40 to an image. So stages write buffers, and read them as images that lie on the same memory
-//! ([`super::alias`]).
+//! Mesa's software adapter reads a storage buffer one lane after the other, in a loop with a branch; a texel it gathers for
+//! all lanes at once. Stores are the other way round. So stages write buffers, and read them as images that lie on the
+//! same memory ([`super::alias`]); figures: docs/decisions/0012.
 
 use super::stage::{Access, Binding, Stage};
 use super::{Device, Recording, Replay};
