@@ -93,8 +93,9 @@ pub fn measure_range(recording: &Recording, rig: &Rig, run: &RangeRun) -> Result
     let has_poses = run.poses.is_some() || recording.meta.pose_file.is_some();
     let poses = if has_poses { Some(recording.poses(run.poses.as_deref())?) } else { None };
     if run.one_surface && poses.is_none() {
-        return Err(Fault::usage("a surface's normal needs the robot's poses")
-            .next("name the pose file with --poses, or measure without --surface"));
+        return Err(Fault::usage("a surface's normal needs the robot's poses").next(
+            "name the recording's pose file (range: --poses, guide: --touch-poses), or range without --surface",
+        ));
     }
     let base = match (&poses, run.one_surface) {
         (Some(p), true) => Some((p, rig.need_hand_eye()?)),
