@@ -7,7 +7,7 @@
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    for (var inside = u32(id.x < header[3]); inside > 0u; inside--) {
+    if id.x < header[3] {
         let k = peaks[id.x];
         let along = i32(select(k.pixel >> 16u, k.pixel & 0xffffu, frame.columns != 0u) / frame.line_px);
         let low = max(along - frame.echo_reach, 0);

@@ -10,7 +10,7 @@
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    for (var inside = u32(id.x < all[3]); inside > 0u; inside--) {
+    if id.x < all[3] {
         let tile = list[id.x];
         for (var keep = u32(latest(tile) > frame.step); keep > 0u; keep--) {
             let at = atomicAdd(&listing.count, 1u);

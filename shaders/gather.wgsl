@@ -2,7 +2,7 @@
 // interest only, twice: `mask` is thinned, `lit` stays; and the list of the tiles that hold a lit pixel.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> listing: array<u32>;
-@group(0) @binding(2) var<storage, read> list: array<u32>;
+@group(0) @binding(2) var<storage, read> list: array<vec2<u32>>;
 @group(0) @binding(3) var<storage, read> quads: array<u32>;
 @group(0) @binding(4) var<storage, read> roi: array<u32>;
 @group(0) @binding(5) var<storage, read_write> mask: array<u32>;
@@ -12,8 +12,8 @@
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    for (var inside = u32(id.x < listing[3]); inside > 0u; inside--) {
-        let tile = list[id.x];
+    if id.x < listing[3] {
+        let tile = list[id.x].x;
         let columns = min(frame.width - 32u * tile_x(tile), 32u);
         var any_lit = 0u;
         for (var row = 0u; row < 8u; row++) {

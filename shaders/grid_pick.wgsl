@@ -8,7 +8,7 @@
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let i = id.y * 65535u * 64u + id.x;
-    for (var inside = u32(i < frame.width * frame.height); inside > 0u; inside--) {
+    if i < frame.width * frame.height {
         let s = span[i];
         let two = i32(s.y + s.x) - 65536 > frame.layer_steps;
         let below = layers[2u * i];

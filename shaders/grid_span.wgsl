@@ -6,7 +6,7 @@
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    for (var inside = u32(id.x < frame.points); inside > 0u; inside--) {
+    if id.x < frame.points {
         let i = id.x * RECORD;
         let at = place(frame, vec3(records[i], records[i + 1u], records[i + 2u]), bitcast<i32>(records[i + 5u]));
         for (var there = u32(at.y > 0u); there > 0u; there--) {

@@ -18,7 +18,7 @@ struct HoughFrame {
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    for (var inside = u32(id.x < header[3]); inside > 0u; inside--) {
+    if id.x < header[3] {
         let point = points[id.x];
         let x = i32(point.x & 0xffffu) - frame.middle_x;
         let y = i32(point.x >> 16u) - frame.middle_y;

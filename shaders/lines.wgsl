@@ -5,7 +5,7 @@
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    for (var inside = u32(id.x < frame.entries); inside > 0u; inside--) {
+    if id.x < frame.entries {
         strongest[id.x] = 0u;
     }
 }

@@ -277,7 +277,7 @@ fn derivative(at: vec2<i32>) -> Peak {
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    for (var inside = u32(id.x < header[3]); inside > 0u; inside--) {
+    if id.x < header[3] {
         let point = points[id.x];
         let at = vec2(i32(point.x & 0xffffu), i32(point.x >> 16u));
         first = point.y * frame.shot_words;

@@ -34,7 +34,7 @@ fn row(r: vec4<f32>, p: vec3<f32>) -> f32 {
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    for (var inside = u32(id.x < header[3]); inside > 0u; inside--) {
+    if id.x < header[3] {
         let k = peaks[id.x];
         let yd = (k.v - rig.cy) / rig.fy;
         let xd = (k.u - rig.cx - rig.skew * yd) / rig.fx;

@@ -16,7 +16,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         runs[id.x] = empty[id.x];
         runs[64u + id.x] = empty[id.x];
     }
-    for (var inside = u32(64u * id.x < arrayLength(&others)); inside > 0u; inside--) {
+    if 64u * id.x < arrayLength(&others) {
         others[64u * id.x] = 0u;
         others[64u * id.x + 1u] = 1u;
         others[64u * id.x + 2u] = 1u;

@@ -18,7 +18,7 @@ fn at(first: u32, x: i32, y: i32) -> u32 {
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let plane = frame.words * frame.rows;
     let first = id.y * plane;
-    for (var inside = u32(id.x < plane); inside > 0u; inside--) {
+    if id.x < plane {
         let row = id.x / frame.words;
         let column = id.x % frame.words * 4u;
         let word = sums[first + id.x];

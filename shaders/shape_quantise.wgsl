@@ -7,7 +7,7 @@
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    for (var inside = u32(id.x < frame.width * frame.height); inside > 0u; inside--) {
+    if id.x < frame.width * frame.height {
         let word = slopes[id.x];
         // Sign-extended halves; at most 8191 each, so that no product below overflows.
         let gx = i32(word << 16u) >> 16u;

@@ -16,7 +16,7 @@ fn bytes(low: u32, high: u32) -> u32 {
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let plane = frame.words * frame.rows;
-    for (var inside = u32(id.x < plane); inside > 0u; inside--) {
+    if id.x < plane {
         let row = i32(id.x / frame.words);
         let column = i32(id.x % frame.words) * 4;
         let words = i32(frame.words);

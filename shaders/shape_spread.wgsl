@@ -21,7 +21,7 @@ fn spread(x: i32, y: i32) -> u32 {
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let plane = frame.words * frame.rows;
     // y is the phase: 4 of the row, 4 of the column.
-    for (var inside = u32(id.x < plane); inside > 0u; inside--) {
+    if id.x < plane {
         let row = id.x / frame.words;
         let column = id.x % frame.words * 4u;
         let y = i32(row * 4u + id.y / 4u) - i32(frame.margin);

@@ -10,7 +10,7 @@
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    for (var inside = u32(id.x < listing[3]); inside > 0u; inside--) {
+    if id.x < listing[3] {
         let tile = list[id.x];
         let shot = tile_shot(tile);
         var at = row_starts[shot * frame.tiles_y + tile_y(tile)] + starts[tile_index(tile)];

@@ -7,7 +7,7 @@
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    for (var inside = u32(id.x < header[3]); inside > 0u; inside--) {
+    if id.x < header[3] {
         let k = peaks[id.x];
         let across = k.normal_u * frame.across_u + k.normal_v * frame.across_v;
         // The first test that fails names the reason; the numbers are those of `Reject`.

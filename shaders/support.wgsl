@@ -37,7 +37,7 @@ const FAR = 32768;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    for (var inside = u32(id.x < frame.peaks); inside > 0u; inside--) {
+    if id.x < frame.peaks {
         let k = peaks[id.x];
         let p = places[id.x];
         let shot = k.shot;

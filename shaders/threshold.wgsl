@@ -126,7 +126,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     // n^2 (value - offset) > sum + (n^2 - 1) / 2: the mean rounded to a whole level, without a division.
     let area = i32(frame.size * frame.size);
     let r = i32(radius);
-    for (var inside = u32(id.x < listing[3]); inside > 0u; inside--) {
+    if id.x < listing[3] {
         let run = list[id.x];
         let x = tile_x(run.x);
         let shot = tile_shot(run.x);

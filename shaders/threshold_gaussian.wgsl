@@ -1,9 +1,9 @@
-// In: pictures and the tile list. Out: as `threshold`, with Gaussian weights: along the row first, then
+// In: pictures and a list of tiles, each a run of one. Out: as `threshold`, with Gaussian weights: along the row first, then
 // down the rows, f32, both in ascending order as the twin does.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> image: array<u32>;
 @group(0) @binding(2) var<storage, read> listing: array<u32>;
-@group(0) @binding(3) var<storage, read> list: array<u32>;
+@group(0) @binding(3) var<storage, read> list: array<vec2<u32>>;
 @group(0) @binding(4) var<storage, read> weights: array<f32>;
 @group(0) @binding(5) var<storage, read_write> quads: array<u32>;
 
@@ -20,8 +20,8 @@ fn blurred(first: u32, x: i32, r: i32) -> vec4<f32> {
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let r = i32(frame.size / 2u);
-    for (var inside = u32(id.x < listing[3]); inside > 0u; inside--) {
-        let tile = list[id.x];
+    if id.x < listing[3] {
+        let tile = list[id.x].x;
         let shot = tile_shot(tile);
         let top = i32(8u * tile_y(tile));
         for (var q = 0u; q < 8u; q++) {

@@ -1,110 +1,235 @@
-// In: the bands of block statistics. Out: the list of tiles (32 x 8) that may hold a lit pixel, and for every tile
-// whether it is in it.
-// For every block a lower bound on the window sums around all of its pixels is put together from the bands
-// near it: whole blocks that every window covers, and smallest columns for the rest. Where even the block's
+// In: the block statistics. Out: the tiles (32 x 8) that may hold a lit pixel, as runs of up to four, one below the
+// other: those that stand alone in one list, longer ones in another, so that neighbouring invocations do as much; and
+// how many there are. Runs begin anew at every fourth row of tiles.
+// For every block a lower bound on the window sums around all of its pixels is put together from the blocks near it:
+// whole ones that every window covers, and smallest rows, columns and quads for the rest. Where even the block's
 // largest pixel does not pass against that bound, none of its pixels can pass against its true mean: the
-// block is proven dark.
+// block is proven dark. Blocks beyond the picture repeat its border. Four tiles an invocation share their loads.
 @group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<storage, read> stats: array<vec2<u32>>;
-@group(0) @binding(2) var<storage, read> bands: array<vec2<u32>>;
-@group(0) @binding(3) var<storage, read> roi: array<u32>;
-@group(0) @binding(4) var<storage, read_write> listed: array<u32>;
-@group(0) @binding(5) var<storage, read_write> listing: Listing;
-@group(0) @binding(6) var<storage, read_write> list: array<u32>;
+// The two blocks of a tile, two words each.
+@group(0) @binding(1) var<storage, read> stats: array<vec4<u32>>;
+@group(0) @binding(2) var<storage, read> roi: array<vec4<u32>>;
+// Only its count.
+@group(0) @binding(3) var<storage, read_write> listing: Listing;
+@group(0) @binding(4) var<storage, read_write> single_listing: Listing;
+// (first tile, number of tiles)
+@group(0) @binding(5) var<storage, read_write> singles: array<vec2<u32>>;
+@group(0) @binding(6) var<storage, read_write> run_listing: Listing;
+@group(0) @binding(7) var<storage, read_write> runs: array<vec2<u32>>;
 
-// Half the window's edge, less a half: a constant, so that the loop over the blocks near is written out.
+// Half the window's edge, less a half; constants, so that rows which no window reaches are not in the code.
 override radius: u32 = 15u;
+// 1: the window has weights, only the smallest pixel bounds its mean; and runs are single tiles.
+override weighted: u32 = 0u;
 
-// Lower bounds on the sums of all windows whose centre lies in the left, and in the right block of a tile,
-// in 256ths of full scale. `row` is the first block of the tile's row of blocks.
-fn bounds(row: u32, x: i32) -> vec2<u32> {
+const NONE = vec4(0xffffffffu);
+const ROWS = vec4(0, 1, 2, 3);
+
+// How the windows of all pixels of a block lie over blocks of `edge` pixels, along one axis: blocks up to `full` away
+// are covered whole, `rest` pixels more lie in the blocks beyond them up to `reach` away.
+fn full(edge: i32) -> i32 {
     let r = i32(radius);
-    let last = i32(2u * frame.tiles_x) - 1;
-    let full = select(-1, (r - 15) / 16, r >= 15);
-    let reach = (r + 15) / 16;
-    let rest = u32(2 * r + 1 - select(0, 16 * (2 * full + 1), full >= 0));
-    let full_y = select(-1, (r - 7) / 8, r >= 7);
-    let rest_y = u32(2 * r + 1 - select(0, 8 * (2 * full_y + 1), full_y >= 0));
-    // What is covered in part in both directions holds, on both sides together, this many whole quads.
-    let quads = ((rest - 1u) / 2u) * ((rest_y - 1u) / 2u);
-    let singles = rest * rest_y - 4u * quads;
-    var sums = vec2(0u);
-    var columns = vec2(0xffffffffu);
-    var least = vec2(0xffffffffu);
-    var quad = vec2(0xffffffffu);
-    for (var dx = -reach; dx <= reach + 1; dx++) {
-        let cx = clamp(x + dx, 0, last);
-        let band = bands[row + u32(cx)];
-        let column = band.y & 0x7fffu;
-        let small = (band.y >> 15u) & 0xffu;
-        // Beyond the picture its border repeats: sixteen times the least column.
-        let beyond = cx != x + dx;
-        let sum = select(band.x & 0x7fffffu, (column + rest_y * small) << 4u, beyond);
-        let four = select(band.y >> 23u, small << 1u, beyond);
-        let away = vec2(abs(dx), abs(dx - 1));
-        let whole = away <= vec2(full);
-        let part = away <= vec2(reach) & !whole;
-        sums += select(vec2(0u), vec2(sum), whole);
-        columns = min(columns, select(vec2(0xffffffffu), vec2(column), part));
-        least = min(least, select(vec2(0xffffffffu), vec2(small), part));
-        quad = min(quad, select(vec2(0xffffffffu), vec2(four), part));
-    }
-    return sums + vec2(rest) * columns + vec2(2u * quads) * quad + vec2(singles) * least;
+    return select(-1, (r - edge + 1) / edge, r >= edge - 1 && weighted == 0u);
+}
+fn reach(edge: i32) -> i32 {
+    return (i32(radius) + edge - 1) / edge;
+}
+fn rest(edge: i32) -> u32 {
+    return 2u * radius + 1u - u32(select(0, edge * (2 * full(edge) + 1), full(edge) >= 0));
 }
 
-// Smallest pixel of all blocks that a window of the tile can touch: bounds any weighted mean.
-fn darkest(x: i32, y: i32, shot: u32, go: bool) -> u32 {
-    let r = i32(radius);
-    let reach_x = (r + 15) / 16;
-    let reach_y = (r + 7) / 8;
-    let blocks_x = i32(2u * frame.tiles_x);
-    let blocks_y = i32(frame.tiles_y);
-    var least = 0xffu;
-    for (var dy = -reach_y; dy <= select(-reach_y - 1, reach_y, go); dy++) {
-        let row = (i32(shot) * blocks_y + clamp(y + dy, 0, blocks_y - 1)) * blocks_x;
-        for (var dx = -reach_x; dx <= reach_x + 1; dx++) {
-            least = min(least, stats[row + clamp(x + dx, 0, blocks_x - 1)].x >> 24u);
-        }
+// What a column of blocks gives to the windows around four of its blocks, a component each: sums of what they cover
+// whole, of the block and of its smallest column; the smallest row, pixel and half quad of what they cover in part.
+struct Band {
+    sum: vec4<u32>,
+    column: vec4<u32>,
+    row: vec4<u32>,
+    smallest: vec4<u32>,
+    quad: vec4<u32>,
+}
+const EMPTY = Band(vec4(0u), vec4(0u), NONE, NONE, NONE);
+
+// One more block, `dy` rows of blocks below the first of the four; its words as in `stats`.
+fn more(b: Band, block: vec2<u32>, dy: i32, beyond: bool) -> Band {
+    let smallest = block.x >> 24u;
+    let row = block.y & 0xfffu;
+    let sum = select(block.x & 0x7fffu, row << 3u, beyond);
+    let column = select((block.y >> 12u) & 0x7ffu, smallest << 3u, beyond);
+    let quad = select(block.y >> 23u, smallest << 1u, beyond);
+    let away = abs(vec4(dy) - ROWS);
+    let whole = away <= vec4(full(8));
+    let part = away <= vec4(reach(8)) & !whole;
+    return Band(
+        b.sum + select(vec4(0u), vec4(sum), whole),
+        b.column + select(vec4(0u), vec4(column), whole),
+        min(b.row, select(NONE, vec4(row), part)),
+        min(b.smallest, select(NONE, vec4(smallest), part)),
+        min(b.quad, select(NONE, vec4(quad), part)),
+    );
+}
+
+// Four tiles, one below the other: the column of the first, the row of it in its shot, the shot's first row of tiles and
+// last row.
+struct Strip {
+    x: i32,
+    y: i32,
+    first: u32,
+    last: i32,
+}
+
+// The bands of a column of tiles: its left and its right blocks.
+struct Bands {
+    left: Band,
+    right: Band,
+}
+// One row of blocks of the column of tiles `x`; where that lies beside the picture, the border's blocks repeat.
+fn add_row(bands: ptr<function, Bands>, strip: Strip, x: i32, dy: i32) {
+    if dy >= -reach(8) && dy <= 3 + reach(8) {
+        let y = strip.y + dy;
+        let near_x = clamp(x, 0, i32(frame.tiles_x) - 1);
+        let near_y = clamp(y, 0, strip.last);
+        let s = stats[(strip.first + u32(near_y)) * frame.tiles_x + u32(near_x)];
+        (*bands).left = more((*bands).left, select(s.xy, s.zw, x > near_x), dy, y != near_y);
+        (*bands).right = more((*bands).right, select(s.zw, s.xy, x < near_x), dy, y != near_y);
     }
-    return least;
+}
+
+// What the windows around a block get from the columns of blocks near it, four blocks below each other at once.
+struct Near {
+    sum: vec4<u32>,
+    column: vec4<u32>,
+    smallest: vec4<u32>,
+    quad: vec4<u32>,
+}
+const NOTHING = Near(vec4(0u), NONE, NONE, NONE);
+fn join(n: Near, b: Band, away: i32, beyond: bool) -> Near {
+    let whole = vec4(away <= full(16));
+    let part = vec4(away <= reach(16)) & !whole;
+    // Beyond the border its smallest column repeats sixteen times, its smallest pixel four times.
+    let column = b.column + rest(8) * b.smallest;
+    let sum = select(b.sum + rest(8) * b.row, column << vec4(4u), vec4(beyond));
+    let quad = select(b.quad, b.smallest << vec4(1u), vec4(beyond));
+    return Near(
+        n.sum + select(vec4(0u), sum, whole),
+        min(n.column, select(NONE, b.column, part)),
+        min(n.smallest, select(NONE, b.smallest, part)),
+        min(n.quad, select(NONE, quad, part)),
+    );
+}
+
+// What the windows around both blocks of a tile get.
+struct Around {
+    left: Near,
+    right: Near,
+}
+// The column of tiles `dx` beside the strip. Its rows and the columns are written out: Mesa leaves a loop as it is, and
+// half of this is constant. A radius of 50 reaches 7 rows and 2 columns of tiles.
+fn add_column(around: ptr<function, Around>, strip: Strip, dx: i32) {
+    if abs(dx) <= (reach(16) + 1) / 2 {
+        let x = strip.x + dx;
+        var bands = Bands(EMPTY, EMPTY);
+        add_row(&bands, strip, x, -7);
+        add_row(&bands, strip, x, -6);
+        add_row(&bands, strip, x, -5);
+        add_row(&bands, strip, x, -4);
+        add_row(&bands, strip, x, -3);
+        add_row(&bands, strip, x, -2);
+        add_row(&bands, strip, x, -1);
+        add_row(&bands, strip, x, 0);
+        add_row(&bands, strip, x, 1);
+        add_row(&bands, strip, x, 2);
+        add_row(&bands, strip, x, 3);
+        add_row(&bands, strip, x, 4);
+        add_row(&bands, strip, x, 5);
+        add_row(&bands, strip, x, 6);
+        add_row(&bands, strip, x, 7);
+        add_row(&bands, strip, x, 8);
+        add_row(&bands, strip, x, 9);
+        add_row(&bands, strip, x, 10);
+        let beyond = x < 0 || x >= i32(frame.tiles_x);
+        (*around).left = join((*around).left, bands.left, abs(2 * dx), beyond);
+        (*around).left = join((*around).left, bands.right, abs(2 * dx + 1), beyond);
+        (*around).right = join((*around).right, bands.left, abs(2 * dx - 1), beyond);
+        (*around).right = join((*around).right, bands.right, abs(2 * dx), beyond);
+    }
+}
+
+// Tiles whose largest pixel may pass against the least mean; the largest lies in the first word of the statistics.
+fn passes(words: vec4<u32>, n: Near) -> vec4<bool> {
+    // What is covered in part in both directions holds, on both sides together, this many whole quads.
+    let quads = ((rest(16) - 1u) / 2u) * ((rest(8) - 1u) / 2u);
+    let singles = rest(16) * rest(8) - 4u * quads;
+    let mean = n.sum + rest(16) * n.column + 2u * quads * n.quad + singles * n.smallest;
+    let area = i32(frame.size * frame.size);
+    let sum = select(mean, u32(area) * n.smallest, vec4(weighted != 0u));
+    let deep = vec4(depth_shift());
+    let largest = vec4<i32>(((words >> vec4(15u)) & vec4(511u)) << deep);
+    let limit = vec4<i32>(sum << deep) + select((area - 1) / 2, 0, weighted != 0u);
+    return (area * (largest - frame.offset) > limit) & (largest >= vec4(i32(frame.minimum)));
+}
+
+fn places_of(lit: vec4<bool>) -> u32 {
+    let bits = select(vec4(0u), vec4(1u, 2u, 4u, 8u), lit);
+    return (bits.x | bits.y) | (bits.z | bits.w);
 }
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let tiles = frame.tiles_x * frame.tiles_y * frame.shots;
-    let i = min(id.x, tiles - 1u);
-    let row = divide(i, frame.tiles_x);
-    let shot = divide(row, frame.tiles_y);
-    let y = row - shot * frame.tiles_y;
-    let x = i - row * frame.tiles_x;
-    var wanted = 0u;
-    for (var r = 0u; r < select(0u, 8u, (frame.flags & 2u) != 0u); r++) {
-        wanted |= roi[8u * (y * frame.tiles_x + x) + r];
-    }
-    let inside = wanted != 0u || (frame.flags & 2u) == 0u;
-    let all = (frame.flags & 1u) != 0u;
-    let gaussian = (frame.flags & 4u) != 0u;
-    let deep = vec2(depth_shift());
-    let largest = vec2<i32>(vec2(bands[2u * i].x >> 23u, bands[2u * i + 1u].x >> 23u) << deep);
-    let bright = largest >= vec2(i32(frame.minimum));
-    let go = inside && !all && any(bright);
-    let area = i32(frame.size * frame.size);
-    var sums = vec2(0u);
-    for (var mean = u32(go && !gaussian); mean > 0u; mean--) {
-        sums = bounds(2u * row * frame.tiles_x, i32(2u * x)) << deep;
-    }
-    let over_mean = area * (largest - vec2(frame.offset)) > vec2<i32>(sums) + vec2((area - 1) / 2);
-    let least = darkest(i32(2u * x), i32(y), shot, go && gaussian) << deep.x;
-    let over_any = largest - vec2(frame.offset) > vec2(i32(least));
-    let lit = any(select(over_mean, over_any, vec2(gaussian)) & bright);
-    // Invocations beyond the end repeat the last one: what they may not do is list it again.
-    let listed_here = u32(inside && (lit || all));
-    listed[i] = listed_here;
-    for (var once = select(0u, listed_here, id.x < tiles); once > 0u; once--) {
-        let at = atomicAdd(&listing.count, 1u);
-        list[at] = tile_pack(x, y, shot);
-        for (var group = u32(at % 64u == 0u); group > 0u; group--) {
-            atomicAdd(&listing.groups, 1u);
+    let strips = (frame.tiles_y + 3u) / 4u;
+    if id.x < frame.tiles_x * strips * frame.shots {
+        let row = divide(id.x, frame.tiles_x);
+        let x = id.x - row * frame.tiles_x;
+        let shot = divide(row, strips);
+        let y = 4u * (row - shot * strips);
+        let last = i32(frame.tiles_y) - 1;
+        let strip = Strip(i32(x), i32(y), shot * frame.tiles_y, last);
+        var around = Around(NOTHING, NOTHING);
+        add_column(&around, strip, -2);
+        add_column(&around, strip, -1);
+        add_column(&around, strip, 0);
+        add_column(&around, strip, 1);
+        add_column(&around, strip, 2);
+        let rows = min(vec4(i32(y)) + ROWS, vec4(last));
+        let places = (vec4(strip.first) + vec4<u32>(rows)) * frame.tiles_x + x;
+        let s0 = stats[places.x];
+        let s1 = stats[places.y];
+        let s2 = stats[places.z];
+        let s3 = stats[places.w];
+        var lit = passes(vec4(s0.x, s1.x, s2.x, s3.x), around.left) | passes(vec4(s0.z, s1.z, s2.z, s3.z), around.right);
+        lit |= vec4((frame.flags & 1u) != 0u);
+        lit &= vec4(i32(y)) + ROWS <= vec4(last);
+        var left = places_of(lit);
+        for (var region = frame.flags & 2u; region != 0u; region = 0u) {
+            var wanted = vec4(false);
+            for (var k = 0u; k < 4u; k++) {
+                let at = 2u * (u32(rows[k]) * frame.tiles_x + x);
+                wanted[k] = any((roi[at] | roi[at + 1u]) != vec4(0u));
+            }
+            left &= places_of(wanted);
+        }
+        for (var some = u32(left != 0u); some > 0u; some--) {
+            atomicAdd(&listing.count, countOneBits(left));
+        }
+        while left != 0u {
+            let lowest = left & (0u - left);
+            let run = select(left & ~(left + lowest), lowest, weighted != 0u);
+            left ^= run;
+            let length = countOneBits(run);
+            let tile = tile_pack(x, y + countTrailingZeros(lowest), shot);
+            for (var alone = u32(length == 1u); alone > 0u; alone--) {
+                let slot = atomicAdd(&single_listing.count, 1u);
+                singles[slot] = vec2(tile, 1u);
+                for (var group = u32(slot % 64u == 0u); group > 0u; group--) {
+                    atomicAdd(&single_listing.groups, 1u);
+                }
+            }
+            for (var longer = u32(length > 1u); longer > 0u; longer--) {
+                let slot = atomicAdd(&run_listing.count, 1u);
+                runs[slot] = vec2(tile, length);
+                for (var group = u32(slot % 64u == 0u); group > 0u; group--) {
+                    atomicAdd(&run_listing.groups, 1u);
+                }
+            }
         }
     }
 }

@@ -82,10 +82,9 @@ fn window_sums_are_never_below_their_bound() {
             frame.pack_image(&image, &mut words).unwrap();
             let n = frame.tiles() as usize;
             let uniform = bytemuck::cast_slice::<Frame, u32>(&[frame]).to_vec();
-            let mut bindings = vec![uniform.clone(), bytemuck::pod_collect_to_vec(&words), vec![0; 4 * n]];
+            let mut bindings = vec![uniform, bytemuck::pod_collect_to_vec(&words), vec![0; 4 * n]];
             stages::stats::twin(&mut bindings, &[(stages::frame::PX_LOG2, 2.0)]);
-            let mut bindings = vec![uniform, bindings.remove(2), vec![0; 4 * n]];
-            stages::bands::twin(&mut bindings, &[]);
+            let blocks = stages::bound::Blocks::new(&frame, &bindings[2], 0);
             let r = (size / 2) as i32;
             let at = |x: i32, y: i32| {
                 u32::from(image.get(x.clamp(0, width as i32 - 1) as u32, y.clamp(0, height as i32 - 1) as u32))
@@ -95,8 +94,7 @@ fn window_sums_are_never_below_their_bound() {
             for y in (0..height as i32).step_by(step) {
                 for x in (0..width as i32).step_by(step) {
                     let sum: u32 = (-r..=r).map(|dy| (-r..=r).map(|dx| at(x + dx, y + dy)).sum::<u32>()).sum();
-                    let row = &bindings[2][(y / 8 * 4 * frame.tiles_x as i32) as usize..][..4 * frame.tiles_x as usize];
-                    let bound = stages::tiles::bound(&frame, row, x / 16);
+                    let bound = blocks.least_sum(x / 16, y / 8);
                     assert!(bound <= sum, "window {size} at ({x}, {y}): bound {bound}, sum {sum}");
                     let least = if amplitude == 1 {
                         sum

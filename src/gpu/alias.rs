@@ -36,7 +36,7 @@ impl Drop for Memory {
 /// What else lies on a buffer's memory.
 pub(super) struct Aliased {
     memory: Arc<Memory>,
-    views: [OnceLock<wgpu::TextureView>; 3],
+    views: [OnceLock<wgpu::TextureView>; 2],
 }
 
 impl std::fmt::Debug for Aliased {
@@ -114,7 +114,6 @@ impl Aliased {
         let (width, height) = (1 << ROW_LOG2, (self.memory.bytes / row) as u32);
         let format = match texel {
             Texel::One => vk::Format::R32_UINT,
-            Texel::Two => vk::Format::R32G32_UINT,
             Texel::Four => vk::Format::R32G32B32A32_UINT,
         };
         // SAFETY: as in `buffer`; the image lies within the memory, which it holds until it is destroyed.

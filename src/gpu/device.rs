@@ -153,8 +153,6 @@ impl Device {
         if info.unified_memory {
             features |= wgpu::Features::MAPPABLE_PRIMARY_BUFFERS;
         }
-        // Images of two words a texel can be read.
-        features |= chosen.features() & wgpu::Features::TEXTURE_ADAPTER_SPECIFIC_FORMAT_FEATURES;
         let (raw, queue) = pollster::block_on(chosen.request_device(&wgpu::DeviceDescriptor {
             label: Some("sheetlight"),
             required_features: features,

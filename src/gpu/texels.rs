@@ -1,5 +1,5 @@
 //! In: WGSL that reads arrays of words. Out: the same WGSL reading the same words as texels of an image.
-//! Frame and unit: words of 32 bits, in vectors of 1, 2 or 4.
+//! Frame and unit: words of 32 bits, alone or in vectors of 2 or 4.
 //!
 //! Mesa's software adapter reads a storage buffer one lane after the other, in a loop with a branch; a texel it gathers for
 //! all lanes at once. Stores are the other way round. So stages write buffers, and read them as images that lie on the
@@ -13,59 +13,86 @@ use crate::fault::Result;
 /// 16,384 rows, what every adapter has, of single words are 256 MiB.
 pub(super) const ROW_LOG2: u32 = 12;
 
-/// One texel.
+/// One texel: a word or four.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Texel {
     One,
-    Two,
     Four,
 }
 
 impl Texel {
-    pub(super) const ALL: [Texel; 3] = [Texel::One, Texel::Two, Texel::Four];
+    pub(super) const ALL: [Texel; 2] = [Texel::One, Texel::Four];
 
     pub(super) fn bytes(self) -> u64 {
-        4 << self as u64
+        match self {
+            Texel::One => 4,
+            Texel::Four => 16,
+        }
     }
     pub(super) fn format(self) -> wgpu::TextureFormat {
         match self {
             Texel::One => wgpu::TextureFormat::R32Uint,
-            Texel::Two => wgpu::TextureFormat::Rg32Uint,
             Texel::Four => wgpu::TextureFormat::Rgba32Uint,
         }
     }
-    /// The element type of an array in WGSL, a texel's format there, and the components it has.
-    fn wgsl(self) -> (&'static str, &'static str, &'static str) {
+    /// The format's name in WGSL.
+    fn wgsl(self) -> &'static str {
         match self {
-            Texel::One => ("u32", "r32uint", "x"),
-            Texel::Two => ("vec2<u32>", "rg32uint", "xy"),
-            Texel::Four => ("vec4<u32>", "rgba32uint", "xyzw"),
+            Texel::One => "r32uint",
+            Texel::Four => "rgba32uint",
         }
     }
 }
 
-fn declaration(name: &str, texel: Texel) -> String {
-    format!("var<storage, read> {name}: array<{}>;", texel.wgsl().0)
+/// An array's element in WGSL, and the texels it is read as: two words a texel take the adapter three times as long as
+/// two texels of one.
+#[derive(Clone, Copy, Debug)]
+struct Element {
+    ty: &'static str,
+    texel: Texel,
+}
+const ELEMENTS: [Element; 3] = [
+    Element { ty: "u32", texel: Texel::One },
+    Element { ty: "vec2<u32>", texel: Texel::One },
+    Element { ty: "vec4<u32>", texel: Texel::Four },
+];
+
+impl Element {
+    fn declaration(self, name: &str) -> String {
+        format!("var<storage, read> {name}: array<{}>;", self.ty)
+    }
+    /// A function that reads element `i`.
+    fn reader(self, name: &str) -> String {
+        let (mask, shift) = ((1 << ROW_LOG2) - 1, ROW_LOG2);
+        let load = |index: &str| format!("textureLoad({name}, vec2(({index}) & {mask}u, ({index}) >> {shift}u))");
+        let value = match self.ty {
+            "u32" => format!("{}.x", load("i")),
+            "vec2<u32>" => format!("vec2({}.x, {}.x)", load("2u * i"), load("2u * i + 1u")),
+            _ => load("i"),
+        };
+        format!("\nfn {name}_texel(i: u32) -> {} {{\n    return {value};\n}}\n", self.ty)
+    }
 }
 
-/// What a binding's texels are; panics where a stage promises texels of what is none.
-pub(super) fn texel_of(stage: &Stage, binding: &str) -> Texel {
-    let found = Texel::ALL.into_iter().find(|&t| stage.wgsl.contains(&declaration(binding, t)));
+/// The element of a binding's array; panics where a stage promises texels of what has none.
+fn element_of(stage: &Stage, binding: &str) -> Element {
+    let found = ELEMENTS.into_iter().find(|e| stage.wgsl.contains(&e.declaration(binding)));
     found.unwrap_or_else(|| panic!("{}: '{binding}' is no read-only array of u32, vec2<u32> or vec4<u32>", stage.name))
+}
+
+/// What a binding's texels are.
+pub(super) fn texel_of(stage: &Stage, binding: &str) -> Texel {
+    element_of(stage, binding).texel
 }
 
 /// The stage's text with its `Access::Texels` bindings as images.
 pub(super) fn rewrite(stage: &Stage, source: &str) -> String {
     let mut text = source.to_string();
     for b in stage.bindings.iter().filter(|b| b.access == Access::Texels) {
-        let (name, texel) = (b.name, texel_of(stage, b.name));
-        let (ty, format, components) = texel.wgsl();
-        let image = format!("var {name}: texture_storage_2d<{format}, read>;");
-        text = reads(&text.replace(&declaration(name, texel), &image), name);
-        let (mask, shift) = ((1 << ROW_LOG2) - 1, ROW_LOG2);
-        text += &format!(
-            "\nfn {name}_texel(i: u32) -> {ty} {{\n    return textureLoad({name}, vec2(i & {mask}u, i >> {shift}u)).{components};\n}}\n"
-        );
+        let (name, element) = (b.name, element_of(stage, b.name));
+        let image = format!("var {name}: texture_storage_2d<{}, read>;", element.texel.wgsl());
+        text = reads(&text.replace(&element.declaration(name), &image), name);
+        text += &element.reader(name);
     }
     text
 }

@@ -252,13 +252,10 @@ impl<'a> Walk<'a> {
             ("image", pack(&scene.shots)),
             ("ambient", pack(scene.ambient.as_slice())),
             ("stats", vec![0; 4 * tiles]),
-            ("bands", vec![0; 4 * tiles]),
             ("roi", (0..per_shot).map(|i| if i % 5 < 3 { 0x00ff_fff0 } else { 0 }).collect()),
             ("first", vec![7; 4]),
             ("all_active", [7, 7, 0, 0, 0, 0, 0, 0].iter().flat_map(|&n| vec![n; header]).collect()),
             ("listing", vec![0, 1, 1, 0]),
-            ("listed", vec![7; tiles]),
-            ("list", vec![0; tiles]),
             ("single_listing", vec![0, 1, 1, 0]),
             ("singles", vec![0; 2 * tiles]),
             ("run_listing", vec![0, 1, 1, 0]),
@@ -297,6 +294,7 @@ impl<'a> Walk<'a> {
         let all = [
             (frame::PX_LOG2, f64::from(px_log2(self.scene.shots[0].bits))),
             (threshold::RADIUS, f64::from(self.frame.size / 2)),
+            (tiles::WEIGHTED, f64::from(u8::from(self.frame.flags & frame::GAUSSIAN != 0))),
             (thin::RULE, f64::from(self.scene.thinning.number())),
         ];
         let overrides: Vec<_> = all.into_iter().filter(|o| stage.overrides.contains(&o.0)).collect();
@@ -321,22 +319,15 @@ impl<'a> Walk<'a> {
             self.step(&ambient::STAGE, ambient::twin, &["image", "ambient"], ambient::groups(&f));
         }
         self.step(&stats::STAGE, stats::twin, &["image", "stats"], stats::groups(&f));
-        self.step(&bands::STAGE, bands::twin, &["stats", "bands"], bands::groups(&f));
-        self.step(
-            &tiles::STAGE,
-            tiles::twin,
-            &["stats", "bands", "roi", "listed", "listing", "list"],
-            tiles::groups(&f),
-        );
-        let all = listed(&self.buffers, "listing");
+        let names = ["stats", "roi", "listing", "single_listing", "singles", "run_listing", "runs"];
+        self.step(&tiles::STAGE, tiles::twin, &names, tiles::groups(&f));
         if f.flags & frame::GAUSSIAN != 0 {
-            let names = ["image", "listing", "list", "weights", "quads"];
-            self.step(&threshold::GAUSSIAN, threshold::stage_twin, &names, all);
-            let names = ["listing", "list", "quads", "roi", "mask", "lit", "lit_listing", "lit_list"];
-            self.step(&threshold::GATHER, threshold::gather_twin, &names, all);
+            let groups = listed(&self.buffers, "single_listing");
+            let names = ["image", "single_listing", "singles", "weights", "quads"];
+            self.step(&threshold::GAUSSIAN, threshold::stage_twin, &names, groups);
+            let names = ["single_listing", "singles", "quads", "roi", "mask", "lit", "lit_listing", "lit_list"];
+            self.step(&threshold::GATHER, threshold::gather_twin, &names, groups);
         } else {
-            let names = ["listing", "list", "listed", "single_listing", "singles", "run_listing", "runs"];
-            self.step(&runs::STAGE, runs::twin, &names, all);
             for [listing, list] in [["single_listing", "singles"], ["run_listing", "runs"]] {
                 let groups = listed(&self.buffers, listing);
                 let names = ["image", listing, list, "roi", "mask", "lit", "lit_listing", "lit_list"];

@@ -2,7 +2,7 @@
 //! Frame and unit: image pixels (x right, y down, an integer is a pixel's centre), grey levels.
 
 pub mod ambient;
-pub mod bands;
+pub mod bound;
 pub mod cases;
 pub mod chain;
 pub mod choose;
@@ -16,7 +16,6 @@ pub mod measured;
 pub mod peak;
 pub mod point;
 mod recorded;
-mod runs;
 pub mod shape_frame;
 pub mod shape_maps;
 pub mod shape_sums;
@@ -48,9 +47,7 @@ pub fn all() -> Vec<Entry> {
         exact(&listing::RESET, listing::reset_twin, || cases::of("reset")),
         exact(&ambient::STAGE, ambient::twin, || cases::of("ambient")),
         exact(&stats::STAGE, stats::twin, || cases::of("stats")),
-        exact(&bands::STAGE, bands::twin, || cases::of("bands")),
-        unordered(&tiles::STAGE, tiles::twin, || cases::of("tiles")),
-        Entry { compare: runs::apart, reason: UNORDERED, ..exact(&runs::STAGE, runs::twin, || cases::of("runs")) },
+        Entry { compare: tiles::apart, reason: UNORDERED, ..exact(&tiles::STAGE, tiles::twin, || cases::of("tiles")) },
         unordered(&threshold::MEAN, threshold::mean_twin, || cases::of("threshold")),
         Entry {
             compare: threshold::pixels_apart,

@@ -3,7 +3,7 @@
 
 use super::chain::ChainConfig;
 use super::frame::{PX_LOG2, px_log2};
-use super::{Frame, Window, ambient, bands, lengthen, listing, runs, skeleton, stats, thin, threshold, tiles};
+use super::{Frame, Window, ambient, lengthen, listing, skeleton, stats, thin, threshold, tiles};
 use crate::fault::Result;
 use crate::gpu::{Buffer, Device, Pipeline, Recording};
 
@@ -20,15 +20,13 @@ const STEP_BYTES: u64 = 256;
 pub struct Shared {
     uniforms: Buffer,
     stats: Buffer,
-    bands: Buffer,
     roi: Buffer,
+    /// The count of listed tiles; then headers of lists.
     first: Buffer,
     lit_first: Buffer,
     active: Buffer,
     /// Headers of the lists of tiles that stand alone, and of longer runs.
     runs_first: Buffer,
-    listed: Buffer,
-    list: Buffer,
     singles: Buffer,
     runs: Buffer,
     lit_list: Buffer,
@@ -54,9 +52,7 @@ pub struct Pipelines {
     reset: Pipeline,
     ambient: Pipeline,
     stats: Pipeline,
-    bands: Pipeline,
     tiles: Pipeline,
-    runs: Pipeline,
     threshold: Pipeline,
     /// After the Gaussian window's threshold: the words of the mask.
     gather: Option<Pipeline>,
@@ -76,6 +72,7 @@ impl Pipelines {
         let all = [
             (PX_LOG2, f64::from(px_log2(config.bits))),
             (threshold::RADIUS, f64::from(config.threshold.size / 2)),
+            (tiles::WEIGHTED, f64::from(u8::from(config.threshold.window == Window::Gaussian))),
             (thin::RULE, f64::from(config.thinning.number())),
         ];
         let build = |stage: &crate::gpu::Stage| {
@@ -87,9 +84,7 @@ impl Pipelines {
             reset: build(&listing::RESET)?,
             ambient: build(&ambient::STAGE)?,
             stats: build(&stats::STAGE)?,
-            bands: build(&bands::STAGE)?,
             tiles: build(&tiles::STAGE)?,
-            runs: build(&runs::STAGE)?,
             threshold: build(match config.threshold.window {
                 Window::Mean => &threshold::MEAN,
                 Window::Gaussian => &threshold::GAUSSIAN,
@@ -145,14 +140,11 @@ impl Shared {
         Ok(Shared {
             uniforms,
             stats: words("stats", 4 * f.tiles())?,
-            bands: words("bands", 4 * f.tiles())?,
             roi,
-            first: words("first list's header", listing::HEADER_WORDS)?,
+            first: words("listed tiles", listing::HEADER_WORDS)?,
             lit_first: words("lit list's header", listing::HEADER_WORDS)?,
             active: words("other lists' headers", listing::HEADER_WORDS * SHORTEN.len() as u32)?,
             runs_first: words("runs' headers", 2 * listing::HEADER_WORDS)?,
-            listed: words("listed", f.tiles())?,
-            list: words("list", f.tiles())?,
             singles: words("singles", 2 * f.tiles())?,
             // Two tiles and more each.
             runs: words("runs", f.tiles().max(2))?,
@@ -177,7 +169,7 @@ impl Shared {
     fn step(&self, step: u32) -> Part<'_> {
         (&self.uniforms, STEP_BYTES * u64::from(step), size_of::<Frame>() as u64)
     }
-    /// The header of the list of tiles that may be lit.
+    /// How many tiles are listed, where a header counts.
     fn all(&self) -> Part<'_> {
         (&self.first, 0, 16)
     }
@@ -211,7 +203,6 @@ impl Shared {
     pub fn front(&self, device: &Device, f: &Frame, p: &Pipelines, image: &Buffer) -> Recording {
         let mut r = Recording::default();
         let zero = self.step(0);
-        let all = (&self.first, 0);
         let masks = [whole(&self.mask), whole(&self.other_mask), whole(&self.lit)];
         let [mask, other, lit] = masks;
         let clear =
@@ -220,18 +211,14 @@ impl Shared {
         let [first, lit_first, runs, active] = self.headers();
         r.dispatch_parts(device, &p.reset, &[zero, first, lit_first, runs, active], [1, 1, 1]);
         r.dispatch_parts(device, &p.stats, &[zero, whole(image), whole(&self.stats)], stats::groups(f));
-        let (stats, bands, roi) = (whole(&self.stats), whole(&self.bands), whole(&self.roi));
-        r.dispatch_parts(device, &p.bands, &[zero, stats, bands], bands::groups(f));
-        let listed = whole(&self.listed);
-        let tiles = [zero, stats, bands, roi, listed, self.all(), whole(&self.list)];
+        let (image, roi) = (whole(image), whole(&self.roi));
+        let lists = [whole(&self.singles), whole(&self.runs)];
+        let [singles, runs] = lists;
+        let tiles = [zero, whole(&self.stats), roi, self.all(), self.run(0), singles, self.run(1), runs];
         r.dispatch_parts(device, &p.tiles, &tiles, tiles::groups(f));
-        let (list, image) = (whole(&self.list), whole(image));
         let (lit_header, lit_list) = (self.lit(), whole(&self.lit_list));
         match &p.gather {
             None => {
-                let lists = [whole(&self.singles), whole(&self.runs)];
-                let bindings = [zero, self.all(), list, listed, self.run(0), lists[0], self.run(1), lists[1]];
-                r.indirect(device, &p.runs, &bindings, all);
                 for (n, list) in (0..).zip(lists) {
                     let bindings = [zero, image, self.run(n), list, roi, mask, lit, lit_header, lit_list];
                     r.indirect(device, &p.threshold, &bindings, (&self.runs_first, STEP_BYTES * n));
@@ -240,8 +227,10 @@ impl Shared {
             Some(gather) => {
                 let quads = whole(&self.quads);
                 let weights = whole(&self.weights);
-                r.indirect(device, &p.threshold, &[zero, image, self.all(), list, weights, quads], all);
-                r.indirect(device, gather, &[zero, self.all(), list, quads, roi, mask, lit, lit_header, lit_list], all);
+                let (header, args) = (self.run(0), (&self.runs_first, 0));
+                r.indirect(device, &p.threshold, &[zero, image, header, singles, weights, quads], args);
+                let bindings = [zero, header, singles, quads, roi, mask, lit, lit_header, lit_list];
+                r.indirect(device, gather, &bindings, args);
             }
         }
         r

@@ -10,7 +10,7 @@ use crate::raster::{Image, Mask};
 /// Half the window's edge, less a half: a constant of the mean window's pipeline.
 pub const RADIUS: &str = "radius";
 
-/// Mean window; its list holds runs of tiles ([`super::runs`]).
+/// Mean window; its list holds runs of tiles ([`super::tiles`]).
 pub const MEAN: Stage = Stage {
     name: "threshold",
     wgsl: include_str!("../../shaders/threshold.wgsl"),
@@ -292,7 +292,7 @@ pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     let masks: Vec<Mask> =
         (0..f.shots).map(|s| twin(&padded_shot(&f, &b[1], overrides[0].1 as u32, s), &f.threshold())).collect();
     for slot in 0..b[2][3] as usize {
-        let (tx, ty, shot) = tile_unpack(b[3][slot]);
+        let (tx, ty, shot) = tile_unpack(b[3][2 * slot]);
         for q in 0..8 {
             let lit = |r: u32, k: u32| masks[shot as usize].get(32 * tx + 4 * q + k, 8 * ty + r);
             let bits = (0..32).filter(|&i| lit(i / 4, i % 4)).fold(0, |w, i| w | 1 << i);
@@ -305,7 +305,7 @@ pub fn gather_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, listing, list, quads, roi, mask, kept, lit_listing, lit_list] = b else { unreachable!() };
     for slot in 0..listing[3] as usize {
-        let tile = list[slot];
+        let tile = list[2 * slot];
         let (tx, ty, _) = tile_unpack(tile);
         let bits = |row: u32| {
             let lit = |x: u32| quads[8 * slot + (x / 4) as usize] >> (4 * row + x % 4) & 1 == 1;
