@@ -81,25 +81,36 @@ fn background(x: i32, y: i32, n: vec2<f32>) -> f32 {
     return min(low, high) / count;
 }
 
-// First guess of offset and amplitude.
-fn guess(profile: Profile, base: f32) -> vec2<f32> {
-    var sum = 0.0;
-    var moment = 0.0;
-    var square = 0.0;
-    let some = within(profile, 0.0, 1.5 * frame.s0 + 0.5);
-    for (var k = some.x; k < some.y; k++) {
-        let p = sample(profile, k);
-        let near = select(0.0, 1.0, abs(p.x) <= 1.5 * frame.s0 + 0.5);
-        let light = near * max(p.y - base, 0.0);
-        sum += light;
-        moment += light * p.x;
-        square += near;
+// Light above the background, by pairs of samples, and the samples that take part.
+var<private> light: array<vec2<f32>, 20>;
+var<private> base: f32;
+var<private> near: vec2<f32>;
+var<private> sum: vec2<f32>;
+var<private> moment: vec2<f32>;
+fn guess_pair(j: i32) {
+    if j < 2 * quads {
+        light[j] = level_pair(j) - base;
+        let lit = select(vec2(0.0), max(light[j], vec2(0.0)), in_span(j, near));
+        sum += lit;
+        moment += lit * pair(j);
     }
-    let m = select(0.0, moment / sum, sum > 0.0);
-    return vec2(m, max(1.25 * sum / max(square, 1e-6), 1.0));
 }
 
-fn finish(at: vec2<i32>, n: vec2<f32>, m: f32, amplitude: f32, base: f32, width: f32, sigma: f32, full: bool) -> Peak {
+// First guess of offset and amplitude.
+fn guess(profile: Profile) -> vec2<f32> {
+    sum = vec2(0.0);
+    moment = vec2(0.0);
+    near = span(profile, 0.0, 1.5 * frame.s0 + 0.5);
+    guess_pair(0); guess_pair(1); guess_pair(2); guess_pair(3); guess_pair(4); guess_pair(5); guess_pair(6);
+    guess_pair(7); guess_pair(8); guess_pair(9); guess_pair(10); guess_pair(11); guess_pair(12); guess_pair(13);
+    guess_pair(14); guess_pair(15); guess_pair(16); guess_pair(17); guess_pair(18); guess_pair(19);
+    let all = sum.x + sum.y;
+    let count = floor(near.y) - ceil(near.x) + 1.0;
+    let m = select(0.0, profile.offset + profile.step * ((moment.x + moment.y) / all), all > 0.0);
+    return vec2(m, max(1.25 * all / max(count, 1e-6), 1.0));
+}
+
+fn finish(at: vec2<i32>, n: vec2<f32>, m: f32, amplitude: f32, width: f32, sigma: f32, full: bool) -> Peak {
     var peak: Peak;
     // Along the image axis that the profile was taken on: on the line, however the direction errs.
     let columns = by_columns(n);
@@ -116,11 +127,82 @@ fn finish(at: vec2<i32>, n: vec2<f32>, m: f32, amplitude: f32, base: f32, width:
     return peak;
 }
 
+// The light of what is not clipped, and for how much a sample counts, clipped pixels with it and without.
+var<private> clear: array<vec2<f32>, 20>;
+var<private> with_all: array<vec2<f32>, 20>;
+var<private> with_clear: array<vec2<f32>, 20>;
+var<private> weight: f32;
+var<private> clipped: vec2<f32>;
+fn window_pair(j: i32) {
+    if j < 2 * quads {
+        let inside = in_span(j, near);
+        let lost = select(vec2(0.0), clipped_pair(j), inside);
+        let left = vec2(1.0) - lost;
+        clipped = max(clipped, lost);
+        clear[j] = (light[j] - (frame.full_scale - base) * lost) / max(left, vec2(1e-3));
+        with_all[j] = select(vec2(0.0), vec2(weight), inside);
+        with_clear[j] = with_all[j] * left;
+    }
+}
+
+// The model at a pair of samples and what leads to the next pair.
+var<private> model: vec2<f32>;
+var<private> ratio: vec2<f32>;
+var<private> fall: f32;
+var<private> z: vec2<f32>;
+var<private> dz: vec2<f32>;
+// Variance without light, what light adds to it, the model's light at full scale.
+var<private> quiet: f32;
+var<private> gain: f32;
+var<private> speckle2: f32;
+var<private> ceiling: f32;
+// Sums over certainty times model squared times z^0, z^1, .. z^4; certainty, residual, model and z^0, z^1, z^2; certainty
+// and residual squared; weights.
+var<private> e0: vec2<f32>;
+var<private> e1: vec2<f32>;
+var<private> e2: vec2<f32>;
+var<private> e3: vec2<f32>;
+var<private> e4: vec2<f32>;
+var<private> r0: vec2<f32>;
+var<private> r1: vec2<f32>;
+var<private> r2: vec2<f32>;
+var<private> squares: vec2<f32>;
+var<private> believed: vec2<f32>;
+fn fit_pair(j: i32) {
+    if j < 2 * quads {
+        // Clipped pixels pull while the model is below them, and are silent above.
+        let above = model >= vec2(ceiling);
+        let residual = select(light[j], clear[j], above) - model;
+        let counts = select(with_all[j], with_clear[j], above);
+        let certainty = counts / (quiet + model * (gain + speckle2 * model));
+        let pull = certainty * residual;
+        let p0 = pull * model;
+        let p1 = p0 * z;
+        let h0 = certainty * (model * model);
+        let h1 = h0 * z;
+        let h2 = h1 * z;
+        let h3 = h2 * z;
+        e0 += h0;
+        e1 += h1;
+        e2 += h2;
+        e3 += h3;
+        e4 += h3 * z;
+        r0 += p0;
+        r1 += p1;
+        r2 += p1 * z;
+        squares += pull * residual;
+        believed += counts;
+        model *= ratio;
+        ratio *= fall;
+        z += dz;
+    }
+}
+
 fn gaussian(at: vec2<i32>) -> Peak {
     let n = direction(at.x, at.y);
-    let base = background(at.x, at.y, n);
+    base = background(at.x, at.y, n);
     let profile = profile_of(at, n);
-    let begin = guess(profile, base);
+    let begin = guess(profile);
     let m0 = begin.x;
     let s0 = sqrt(frame.s0 * frame.s0 + profile.blur2);
     var a = begin.y;
@@ -128,60 +210,50 @@ fn gaussian(at: vec2<i32>) -> Peak {
     var width = s0;
     let prior = 4.0 / (s0 * s0);
     var i11 = 0.0;
-    var chi = 0.0;
-    var believed_samples = 0.0;
-    var saturated = false;
-    let some = within(profile, m0, 3.0 * s0);
+    near = span(profile, m0, 3.0 * s0);
+    weight = profile.weight;
+    clipped = vec2(0.0);
+    window_pair(0); window_pair(1); window_pair(2); window_pair(3); window_pair(4); window_pair(5); window_pair(6);
+    window_pair(7); window_pair(8); window_pair(9); window_pair(10); window_pair(11); window_pair(12); window_pair(13);
+    window_pair(14); window_pair(15); window_pair(16); window_pair(17); window_pair(18); window_pair(19);
+    quiet = frame.read2 + frame.gain * base;
+    gain = frame.gain;
+    speckle2 = frame.speckle2;
+    ceiling = frame.full_scale - base;
     var left = frame.steps;
     while left > 0u {
-        var h00 = 1e-9;
-        var h01 = 0.0;
-        var h02 = 0.0;
-        var h11 = 1e-9;
-        var h12 = 0.0;
-        var h22 = prior;
-        var g0 = 0.0;
-        var g1 = 0.0;
-        var g2 = prior * (s0 - width);
-        var sum = 0.0;
-        var number = 0.0;
-        var any_full = false;
         let inverse = 1.0 / width;
-        // Four samples a turn share what a turn costs; those beyond the end are not believed.
-        for (var k = some.x; k < some.y; k += 4) {
-            let place = vec4(k) + vec4(0, 1, 2, 3);
-            let d = profile.offset + vec4<f32>(place) * profile.step;
-            let grey = four_levels(profile, k);
-            let clear = four_clear(profile, k);
-            let z = (d - m) * inverse;
-            let shape = exp(-0.5 * (z * z));
-            let model = a * shape;
-            let inside = (abs(d - m0) <= vec4(3.0 * s0)) & (place < vec4(some.y));
-            any_full = any_full || any((clear < vec4(1.0)) & inside);
-            // Clipped pixels pull while the model is below them, and are silent above.
-            let above = model + base >= vec4(frame.full_scale);
-            let unclipped = (grey - frame.full_scale * (1.0 - clear)) / max(clear, vec4(1e-3));
-            let residual = select(grey, unclipped, above) - base - model;
-            let quiet = frame.read2 + frame.gain * (model + base);
-            let believed = select(vec4(0.0), select(vec4(1.0), clear, above), inside);
-            let certainty = (believed * profile.weight) / (quiet + frame.speckle2 * (model * model));
-            let jm = model * (z * inverse);
-            let jw = jm * z;
-            let by_shape = certainty * shape;
-            let by_m = certainty * jm;
-            let by_w = certainty * jw;
-            h00 += dot(by_shape, shape);
-            h01 += dot(by_shape, jm);
-            h02 += dot(by_shape, jw);
-            h11 += dot(by_m, jm);
-            h12 += dot(by_m, jw);
-            h22 += dot(by_w, jw);
-            g0 += dot(by_shape, residual);
-            g1 += dot(by_m, residual);
-            g2 += dot(by_w, residual);
-            sum += dot(certainty * residual, residual);
-            number += dot(believed, vec4(1.0));
-        }
+        let wide = profile.step * inverse;
+        let z0 = (profile.offset - m) * inverse;
+        z = vec2(z0, z0 - wide);
+        dz = vec2(wide, -wide);
+        // A Gaussian at equal steps: its ratio from sample to sample falls by a constant factor. From the middle to both
+        // sides, because what has become 0 stays 0.
+        model = a * exp(-0.5 * (z * z));
+        ratio = exp(-0.5 * (dz * dz) - dz * z);
+        fall = exp(-(wide * wide));
+        e0 = vec2(0.0);
+        e1 = vec2(0.0);
+        e2 = vec2(0.0);
+        e3 = vec2(0.0);
+        e4 = vec2(0.0);
+        r0 = vec2(0.0);
+        r1 = vec2(0.0);
+        r2 = vec2(0.0);
+        squares = vec2(0.0);
+        believed = vec2(0.0);
+        fit_pair(0); fit_pair(1); fit_pair(2); fit_pair(3); fit_pair(4); fit_pair(5); fit_pair(6); fit_pair(7);
+        fit_pair(8); fit_pair(9); fit_pair(10); fit_pair(11); fit_pair(12); fit_pair(13); fit_pair(14); fit_pair(15);
+        fit_pair(16); fit_pair(17); fit_pair(18); fit_pair(19);
+        let h00 = (e0.x + e0.y) + 1e-9;
+        let h01 = e1.x + e1.y;
+        let h02 = e2.x + e2.y;
+        let h11 = h02 + 1e-9;
+        let h12 = e3.x + e3.y;
+        let h22 = (e4.x + e4.y) + prior * (width * width);
+        let g0 = r0.x + r0.y;
+        let g1 = r1.x + r1.y;
+        let g2 = (r2.x + r2.y) + (prior * width) * (s0 - width);
         let c00 = h11 * h22 - h12 * h12;
         let c01 = h02 * h12 - h01 * h22;
         let c02 = h01 * h12 - h02 * h11;
@@ -189,62 +261,77 @@ fn gaussian(at: vec2<i32>) -> Peak {
         let c12 = h01 * h02 - h00 * h12;
         let c22 = h00 * h11 - h01 * h01;
         let det = h00 * c00 + (h01 * c01 + h02 * c02);
-        let da = clamp((c00 * g0 + (c01 * g1 + c02 * g2)) / det, -0.5 * a, a);
-        let dm = clamp((c01 * g0 + (c11 * g1 + c12 * g2)) / det, -0.7 * s0, 0.7 * s0);
-        let dw = clamp((c02 * g0 + (c12 * g1 + c22 * g2)) / det, -0.3 * s0, 0.3 * s0);
+        let da = clamp(a * ((c00 * g0 + (c01 * g1 + c02 * g2)) / det), -0.5 * a, a);
+        let dm = clamp(width * ((c01 * g0 + (c11 * g1 + c12 * g2)) / det), -0.7 * s0, 0.7 * s0);
+        let dw = clamp(width * ((c02 * g0 + (c12 * g1 + c22 * g2)) / det), -0.3 * s0, 0.3 * s0);
+        i11 = (width * width) * (c11 / det);
         a = max(a + da, 1.0);
         m = clamp(m + dm, m0 - 2.0 * s0, m0 + 2.0 * s0);
         width = clamp(width + dw, 0.3 * s0, 3.0 * s0);
-        i11 = c11 / det;
-        chi = sum;
-        believed_samples = number;
-        saturated = any_full;
         let still = abs(dm) < 1e-2 * s0 && abs(dw) < 3e-2 * s0 && abs(da) < 3e-2 * a;
         left = select(left - 1u, 0u, still);
     }
     let share = profile.square / profile.weight;
-    let free = max(believed_samples - 3.0, 1.0);
-    let squares = chi / share;
-    let noise = max(squares / free, (BELIEF + squares) / (BELIEF + free));
+    let free = max((believed.x + believed.y) / profile.weight - 3.0, 1.0);
+    let chi2 = (squares.x + squares.y) / share;
+    let noise = max(chi2 / free, (BELIEF + chi2) / (BELIEF + free));
     let sigma = sqrt(max(i11 * share * noise, 0.0));
     let own_width = sqrt(max(width * width - profile.blur2, 0.01 * frame.s0 * frame.s0));
-    return finish(at, n, m, a, base, own_width, sigma, saturated);
+    return finish(at, n, m, a, own_width, sigma, clipped.x + clipped.y > 0.0);
+}
+
+var<private> second: vec2<f32>;
+var<private> noise2: vec2<f32>;
+var<private> top: vec2<f32>;
+fn centroid_pair(j: i32) {
+    if j < 2 * quads {
+        let inside = in_span(j, near);
+        let here = select(vec2(0.0), light[j], inside);
+        let k = pair(j);
+        sum += here;
+        moment += here * k;
+        second += here * (k * k);
+        top = max(top, here);
+        clipped = max(clipped, select(vec2(0.0), clipped_pair(j), inside));
+        let e = select(vec2(0.0), k - vec2(z.x), inside);
+        let lit = max(here, vec2(0.0));
+        noise2 += (e * e) * (quiet + frame.gain * here + frame.speckle2 * (lit * lit));
+    }
 }
 
 fn centroid(at: vec2<i32>) -> Peak {
     let n = direction(at.x, at.y);
-    let base = background(at.x, at.y, n);
+    base = background(at.x, at.y, n);
     let profile = profile_of(at, n);
-    let m0 = guess(profile, base).x;
-    var sum = 0.0;
-    var moment = 0.0;
-    var second = 0.0;
-    var noise = 0.0;
-    var top = 0.0;
-    var saturated = false;
-    for (var k = 0; k < profile.count; k++) {
-        let p = sample(profile, k);
-        let inside = abs(p.x - m0) <= 3.0 * frame.s0;
-        let light = select(0.0, p.y - base, inside);
-        sum += light;
-        moment += light * p.x;
-        second += light * (p.x * p.x);
-        top = max(top, light);
-        saturated = saturated || (four_clear(profile, k).x < 1.0 && inside);
-        let e = select(0.0, p.x - m0, inside);
-        let lit = max(p.y - base, 0.0);
-        noise += (e * e) * (frame.read2 + frame.gain * p.y + frame.speckle2 * (lit * lit));
-    }
-    let m = select(m0, clamp(moment / sum, m0 - 2.0 * frame.s0, m0 + 2.0 * frame.s0), sum > 0.0);
-    let width = sqrt(max(second / max(sum, 1e-6) - m * m - profile.blur2, 0.0));
+    let m0 = guess(profile).x;
+    near = span(profile, m0, 3.0 * frame.s0);
+    quiet = frame.read2 + frame.gain * base;
+    // In samples.
+    z = vec2((m0 - profile.offset) / profile.step);
+    sum = vec2(0.0);
+    moment = vec2(0.0);
+    second = vec2(0.0);
+    noise2 = vec2(0.0);
+    top = vec2(0.0);
+    clipped = vec2(0.0);
+    centroid_pair(0); centroid_pair(1); centroid_pair(2); centroid_pair(3); centroid_pair(4); centroid_pair(5);
+    centroid_pair(6); centroid_pair(7); centroid_pair(8); centroid_pair(9); centroid_pair(10); centroid_pair(11);
+    centroid_pair(12); centroid_pair(13); centroid_pair(14); centroid_pair(15); centroid_pair(16); centroid_pair(17);
+    centroid_pair(18); centroid_pair(19);
+    let all = sum.x + sum.y;
+    let middle = (moment.x + moment.y) / all;
+    let m = select(m0, clamp(profile.offset + profile.step * middle, m0 - 2.0 * frame.s0, m0 + 2.0 * frame.s0), all > 0.0);
+    let spread = (second.x + second.y) / max(all, 1e-6) - middle * middle;
+    let width = sqrt(max((profile.step * profile.step) * spread - profile.blur2, 0.0));
     let share = profile.square / (profile.weight * profile.weight);
-    return finish(at, n, m, max(top, 1.0), base, width, sqrt(noise * share) / max(sum, 1e-6), saturated);
+    let sigma = abs(profile.step) * sqrt((noise2.x + noise2.y) * share) / max(all, 1e-6);
+    return finish(at, n, m, max(max(top.x, top.y), 1.0), width, sigma, clipped.x + clipped.y > 0.0);
 }
 
 fn derivative(at: vec2<i32>) -> Peak {
     let n = direction(at.x, at.y);
-    let base = background(at.x, at.y, n);
-    let m0 = guess(profile_of(at, n), base).x;
+    base = background(at.x, at.y, n);
+    let m0 = guess(profile_of(at, n)).x;
     let c = at + vec2(i32(floor(m0 * n.x + 0.5)), i32(floor(m0 * n.y + 0.5)));
     let sigma = max(frame.s0 / sqrt(3.0), 0.8);
     let r = i32(ceil(3.5 * sigma));
@@ -253,7 +340,7 @@ fn derivative(at: vec2<i32>) -> Peak {
     var d2 = 0.0;
     var smooth_level = 0.0;
     var noise = 0.0;
-    var top = 0.0;
+    var bright = 0.0;
     var saturated = false;
     for (var j = -r; j <= r; j++) {
         for (var i = -r; i <= r; i++) {
@@ -266,13 +353,13 @@ fn derivative(at: vec2<i32>) -> Peak {
             smooth_level += kernel * (v - base);
             let lit = max(v - base, 0.0);
             noise += (slope * slope) * (frame.read2 + frame.gain * v + frame.speckle2 * (lit * lit));
-            top = select(top, max(top, v - base), max(abs(i), abs(j)) <= 1);
+            bright = select(bright, max(bright, v - base), max(abs(i), abs(j)) <= 1);
             saturated = saturated || v >= frame.full_scale;
         }
     }
     let m = select(0.0, clamp(-d1 / d2, -frame.s0, frame.s0), d2 < 0.0);
     let width = sqrt(max(smooth_level / max(-d2, 1e-6) - sigma * sigma, 0.0));
-    return finish(c, n, m, max(top, 1.0), base, width, sqrt(noise) / max(-d2, 1e-6), saturated);
+    return finish(c, n, m, max(bright, 1.0), width, sqrt(noise) / max(-d2, 1e-6), saturated);
 }
 
 @compute @workgroup_size(64)

@@ -34,7 +34,7 @@ struct PeakFrame {
     line_px: u32,
     fours: i32,
     half_across: f32,
-    reserved_0: u32,
+    rows: i32,
     reserved_1: u32,
     reserved_2: u32,
 }

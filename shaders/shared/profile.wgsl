@@ -1,21 +1,26 @@
 // In: a picture, a skeleton pixel, the direction across the stripe. Out: the stripe's profile there, averaged along it.
 // Twin and reasons: src/stages/peak/profile.rs; docs/math.md, Stripe peak (2). Frame and unit: offsets from the skeleton
 // pixel, px; grey levels.
+//
+// Work on every sample is written out as calls with constant arguments, so that samples are registers: an array with an
+// index that is known only at run time lies in memory, which Mesa's software adapter reads and writes lane by lane, and
+// other adapters behind their caches. What reads pixels stays a loop, because the whole text has to fit 32 KiB of
+// instruction cache: one workgroup walks through all of it.
 
-// Sums of grey levels; behind them those of the clipped pixels' weights, which are there only if a pixel is clipped.
-const SAMPLES = 96;
-// Three more at the end: samples are read in fours.
-var<private> samples: array<f32, 195>;
+// A profile's samples by four; sample k lies at k + 2 quads.
+override quads: i32 = 10;
+// Levels, and the shares of clipped pixels' weights, which are there only if a pixel is clipped.
+var<private> levels: array<vec4<f32>, 10>;
+var<private> sums: array<vec4<f32>, 10>;
 struct Profile {
-    count: i32,
+    // First and last sample that lies in the picture; sample k is `offset + k step` off.
+    low: f32,
+    high: f32,
     offset: f32,
     step: f32,
-    // Grey level of a unit of `samples`.
-    scale: f32,
     weight: f32,
     square: f32,
     blur2: f32,
-    clipped: bool,
 }
 
 // Columns where the stripe is nearer to the horizontal, else rows; at 45 degrees rounding shall not decide.
@@ -36,40 +41,50 @@ struct Walk {
     nb: f32,
     x0: i32,
     y0: i32,
-    width: i32,
-    begin: i32,
+    // Last place, and last group's.
     end: i32,
-    // Between the places of two samples.
-    across: vec2<i32>,
+    last: i32,
+    fade: f32,
+    // Between two samples, in pixels as they lie in memory.
+    across: u32,
 }
 
-// Pixels side by side with one shift: the first one's place at the first sample, and their weights in 127ths.
+// Pixels side by side with one shift: the first one's place at sample 0; weights in 127ths, two a word, for samples k,
+// k + 1, k + 2, k + 3: along a row the place within a word changes. Sums of weight, weight squared, weight times offset
+// across and times its square.
 struct Group {
-    at: vec2<i32>,
-    weights: vec4<i32>,
+    at: u32,
+    even: vec4<u32>,
+    odd: vec4<u32>,
+    moments: vec4<f32>,
 }
 
-fn group(w: Walk, a: i32, sample: i32) -> Group {
+fn group(w: Walk, a: i32, row: i32) -> Group {
     // A place beyond the end has no weight and reads what the last one reads.
-    let last = select(w.end, w.end & -4, w.fours);
-    let place = min(a, last);
-    let i = vec4(a - w.x0) + vec4(0, 1, 2, 3);
-    let f = max(vec4(1.0) - frame.along_factor / (w.nb * w.nb) * vec4<f32>(i * i), vec4(0.0));
-    let inside = abs(i) <= vec4(frame.reach_along) & i + vec4(w.x0) <= vec4(min(w.end, w.width - 1));
-    let of_four = vec4<i32>(vec4(127.0) * (f * f) + vec4(0.5));
-    let weights = select(vec4(0), select(vec4(of_four.x, 0, 0, 0), of_four, w.fours), inside);
-    let b = w.y0 + shift(w, place);
-    return Group(select(vec2(b, place), vec2(place, b), w.columns) + sample * w.across, weights);
-}
-
-// Sums over a group of weight, weight squared, weight times offset across and times its square.
-fn moments(w: Walk, a: i32, g: Group) -> vec4<f32> {
-    let c = f32(shift(w, a)) * w.nb + f32(a - w.x0) * w.na;
-    let e = vec4(c) + vec4(0.0, 1.0, 2.0, 3.0) * w.na;
-    let f = vec4<f32>(g.weights);
-    let m = f * e;
-    let ones = vec4(1.0);
-    return vec4(dot(f, ones), dot(f, f), dot(m, ones), dot(m, e));
+    let place = min(a, w.last);
+    let t = vec4(f32(a - w.x0)) + vec4(0.0, 1.0, 2.0, 3.0);
+    let f = max(vec4(1.0) - w.fade * (t * t), vec4(0.0));
+    let limit = f32(w.end - w.x0);
+    let inside = t <= vec4(limit, vec3(select(-1e9, limit, w.fours)));
+    let weights = select(vec4(0u), vec4<u32>(vec4(127.0) * (f * f) + vec4(0.5)), inside);
+    let b = shift(w, place) + row;
+    let at = vec2<u32>(select(vec2(w.y0 + b, place), vec2(place, w.y0 + b), w.columns));
+    let first_pixel = ((first + at.y * frame.pitch) << px_log2) + at.x;
+    let g = vec4<f32>(weights);
+    let c = f32(b) * w.nb + t.x * w.na;
+    let sum = (g.x + g.y) + (g.z + g.w);
+    let run = w.na * (g.y + (2.0 * g.z + 3.0 * g.w));
+    let run2 = (w.na * w.na) * (g.y + (4.0 * g.z + 9.0 * g.w));
+    let moments = vec4(sum, dot(g, g), c * sum + run, c * (c * sum + 2.0 * run) + run2);
+    let places = vec4(first_pixel) + vec4(0u, 1u, 2u, 3u) * w.across;
+    if px_log2 == 2u {
+        let by_four = weights.z | (weights.x << 16u);
+        let even = vec4(by_four) >> (vec4(8u) * (places & vec4(2u)));
+        let is_odd = (places & vec4(1u)) == vec4(1u);
+        return Group(first_pixel, select(even, vec4(0u), is_odd), select(vec4(weights.w | (weights.y << 16u)), even, is_odd), moments);
+    }
+    let low = vec4(weights.x | (weights.y << 16u)) << (vec4(16u) * (places & vec4(1u)));
+    return Group(first_pixel, low, vec4(weights.z | (weights.w << 16u)), moments);
 }
 
 // Whole pixels by which a group follows the line. Not + 0.5: at 45 degrees rounding would decide.
@@ -77,37 +92,64 @@ fn shift(w: Walk, a: i32) -> i32 {
     return i32(floor(-((f32(a - w.x0) + select(0.0, 1.5, w.fours)) * w.na) / w.nb + 0.47));
 }
 
-// The weighted sum of a group's pixels, and whether any is clipped; or the weights of the clipped ones.
-fn sum_of(g: Group, k: i32, w: Walk, clipped_only: bool) -> vec2<u32> {
-    let p = g.at + k * w.across;
-    let x = u32(p.x);
-    let at = first + u32(p.y) * frame.pitch + (x >> px_log2);
-    let weights = vec4<u32>(g.weights);
+// What a pixel adds: its level, or 128 if it is clipped. Of bytes, (read & cut) + add, and read itself, have what counts.
+struct Sieve {
+    again: bool,
+    cut: u32,
+    add: u32,
+    keep: u32,
+}
+var<private> sieve: Sieve;
+// A high bit of a byte is set if a pixel is clipped.
+var<private> full: u32;
+var<private> groups: array<Group, 3>;
+
+// The weighted sum of a group's pixels.
+fn sum_of(p: u32, even: u32, odd: u32) -> u32 {
+    let read = image[p >> px_log2];
     if px_log2 == 2u {
-        let read = image[at];
-        // The lowest bit of every byte that is 255.
-        let full = (((read & 0x7f7f7f7fu) + 0x01010101u) & read & 0x80808080u) >> 7u;
-        let v = select(read, full, clipped_only);
+        // The highest bit of every byte that is 255.
+        full |= ((read & 0x7f7f7f7fu) + 0x01010101u) & read;
+        let v = ((read & sieve.cut) + sieve.add) & read;
         // Two products in one multiplication: 255 times 127 fits 15 bits, and the sum of two 16.
-        let even = ((v & 0x00ff00ffu) * (weights.z | (weights.x << 16u))) >> 16u;
-        let odd = (((v >> 8u) & 0x00ff00ffu) * (weights.w | (weights.y << 16u))) >> 16u;
-        let one = ((v >> (8u * (x & 3u))) & 255u) * weights.x;
-        return vec2(select(one, even + odd, w.fours), full);
+        return (((v & sieve.keep) * even) >> 16u) + ((((v >> 8u) & sieve.keep) * odd) >> 16u);
     }
-    var read = vec2(image[at], 0u);
-    for (var second = u32(w.fours); second > 0u; second--) {
-        read.y = image[at + 1u];
-    }
-    let low = read & vec2(0xffffu);
-    let high = read >> vec2(16u);
+    let words = vec2(read, image[(p >> px_log2) + 1u]);
+    let weights = vec2(even, odd);
     let limit = vec2(u32(frame.full_scale));
-    let full_low = vec2<u32>(low >= limit);
-    let full_high = vec2<u32>(high >= limit);
-    let l = select(low, full_low, clipped_only);
-    let h = select(high, full_high, clipped_only);
-    let one = select(l.x, h.x, (x & 1u) == 1u) * weights.x;
-    let sum = (l.x * weights.x + h.x * weights.y) + (l.y * weights.z + h.y * weights.w);
-    return vec2(select(one, sum, w.fours), (full_low.x | full_low.y) | (full_high.x | full_high.y));
+    let low = words & vec2(0xffffu);
+    let high = words >> vec2(16u);
+    let clipped = (vec2(128u) * vec2<u32>(low >= limit)) * (weights & vec2(0xffffu)) + (vec2(128u) * vec2<u32>(high >= limit)) * (weights >> vec2(16u));
+    full |= clipped.x | clipped.y;
+    let light = low * (weights & vec2(0xffffu)) + high * (weights >> vec2(16u));
+    let sum = select(light, clipped, sieve.again);
+    return sum.x + sum.y;
+}
+
+fn three(k: u32, q: u32) -> u32 {
+    return (sum_of(groups[0].at + k, groups[0].even[q], groups[0].odd[q]) + sum_of(groups[1].at + k, groups[1].even[q], groups[1].odd[q]))
+        + sum_of(groups[2].at + k, groups[2].even[q], groups[2].odd[q]);
+}
+
+fn clear_quad(q: i32) {
+    if q < quads {
+        sums[q] = vec4(0.0);
+    }
+}
+
+fn turn(q: i32) {
+    if q + 1 < quads {
+        sums[q] = sums[q + 1];
+    }
+}
+
+var<private> scale: f32;
+fn settle(q: i32) {
+    if q < quads {
+        let v = sums[q] * scale;
+        levels[q] = select(v, levels[q], sieve.again);
+        sums[q] = select(vec4(0.0), v, sieve.again);
+    }
 }
 
 fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
@@ -122,74 +164,76 @@ fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
     let begin = max(left, 0);
     let end = min(right, width - 1);
     let stride = frame.stride_across;
-    let across = select(vec2(stride, 0), vec2(0, stride), columns);
+    let tall = stride * frame.rows;
     let nb = select(n.x, n.y, columns);
-    let w = Walk(columns, fours, select(n.y, n.x, columns), nb, x0, y0, width, begin, end, across);
+    let last = select(end, end & -4, fours);
+    let across = u32(tall) * select(1u, frame.pitch << px_log2, columns);
+    let w = Walk(columns, fours, select(n.y, n.x, columns), nb, x0, y0, end, last, frame.along_factor / (nb * nb), across);
     // Samples whose rows all lie in the picture.
     let first_shift = shift(w, begin);
-    let last_shift = shift(w, select(end, end & -4, fours));
-    let low = min(first_shift, last_shift);
-    let high = max(first_shift, last_shift);
-    let half = i32(ceil(frame.half_across / abs(nb)));
-    let start = max(-half, -floor_div(y0 + low, stride));
-    let stop = min(half, floor_div(height - 1 - high - y0, stride));
-    let count = clamp(stop - start + 1, 0, SAMPLES);
+    let last_shift = shift(w, last);
+    let low = -floor_div(y0 + min(first_shift, last_shift), tall);
+    let high = floor_div(height - 1 - max(first_shift, last_shift) - y0 - (tall - stride), tall);
     let size = select(1, 4, fours);
     // Weight, its square, moment and second moment of the offsets across.
-    var sums = vec4(0.0);
-    var full = 0u;
-    var rounds = 1u;
-    for (var round = 0u; round < rounds; round++) {
-        let again = round == 1u;
-        for (var a = begin; a <= end; a += 3 * size) {
-            let g0 = group(w, a, start);
-            let g1 = group(w, a + size, start);
-            let g2 = group(w, a + 2 * size, start);
-            for (var once = u32(!again); once > 0u; once--) {
-                sums += (moments(w, a, g0) + moments(w, a + size, g1)) + moments(w, a + 2 * size, g2);
-            }
-            for (var k = 0; k < count; k++) {
-                // All three, also where the line ends before: a load is cheaper than a branch.
-                let l0 = sum_of(g0, k, w, again);
-                let l1 = sum_of(g1, k, w, again);
-                let l2 = sum_of(g2, k, w, again);
-                let clipped = l0.y | select(0u, l1.y, a + size <= end) | select(0u, l2.y, a + 2 * size <= end);
-                let slot = k + select(0, SAMPLES, again);
-                samples[slot] = select(0.0, samples[slot], a > begin) + f32(i32(l0.x + l1.x + l2.x));
-                full |= clipped;
+    var moments = vec4(0.0);
+    full = 0u;
+    sieve = Sieve(false, 0u, 0xffffffffu, 0x00ff00ffu);
+    clear_quad(0); clear_quad(1); clear_quad(2); clear_quad(3); clear_quad(4);
+    clear_quad(5); clear_quad(6); clear_quad(7); clear_quad(8); clear_quad(9);
+    for (var round = 0; round < 2; round++) {
+        moments = vec4(0.0);
+        for (var row = 0; row < tall; row += stride) {
+            for (var a = begin; a <= end; a += 3 * size) {
+                groups = array(group(w, a, row), group(w, a + size, row), group(w, a + 2 * size, row));
+                moments += (groups[0].moments + groups[1].moments) + groups[2].moments;
+                var k = u32(-2 * quads) * across;
+                for (var q = 0; q < quads; q++) {
+                    // The samples go round: four leave at the front and come back, with more light, at the end.
+                    let four = vec4(three(k, 0u), three(k + across, 1u), three(k + 2u * across, 2u), three(k + 3u * across, 3u));
+                    let v = sums[0] + vec4<f32>(vec4<i32>(four));
+                    turn(0); turn(1); turn(2); turn(3); turn(4); turn(5); turn(6); turn(7); turn(8);
+                    sums[quads - 1] = v;
+                    k += 4u * across;
+                }
             }
         }
-        rounds = select(1u, 2u, full != 0u);
+        scale = select(1.0, 1.0 / 128.0, sieve.again) / moments.x;
+        settle(0); settle(1); settle(2); settle(3); settle(4); settle(5); settle(6); settle(7); settle(8); settle(9);
+        // A second round for the weights of clipped pixels, where there are any.
+        round = select(round, 1, (full & 0x80808080u) == 0u);
+        sieve = Sieve(true, 0x7f7f7f7fu, 0x01010101u, 0x00800080u);
     }
-    let mean = sums.z / sums.x;
-    let step = f32(stride) * nb;
-    return Profile(count, mean + f32(start) * step, step, 1.0 / sums.x, sums.x / 127.0, sums.y / (127.0 * 127.0),
-        max(sums.w / sums.x - mean * mean, 0.0), full != 0u);
+    let mean = moments.z / moments.x;
+    return Profile(f32(low), f32(high), mean, f32(tall) * nb, moments.x / 127.0, moments.y / (127.0 * 127.0),
+        max(moments.w / moments.x - mean * mean, 0.0));
 }
 
-// Offset and grey level of a sample.
-fn sample(p: Profile, k: i32) -> vec2<f32> {
-    return vec2(p.offset + f32(k) * p.step, samples[k] * p.scale);
+// Levels of sample j and of sample -1 - j, and how much of their weights is clipped.
+fn level_pair(j: i32) -> vec2<f32> {
+    let a = u32(2 * quads + j);
+    let b = u32(2 * quads - 1 - j);
+    return vec2(levels[a >> 2u][a & 3u], levels[b >> 2u][b & 3u]);
 }
 
-// Grey levels of four samples.
-fn four_levels(p: Profile, k: i32) -> vec4<f32> {
-    return vec4(samples[k], samples[k + 1], samples[k + 2], samples[k + 3]) * p.scale;
+fn clipped_pair(j: i32) -> vec2<f32> {
+    let a = u32(2 * quads + j);
+    let b = u32(2 * quads - 1 - j);
+    return vec2(sums[a >> 2u][a & 3u], sums[b >> 2u][b & 3u]);
 }
 
-// The shares of their weights that are not clipped.
-fn four_clear(p: Profile, k: i32) -> vec4<f32> {
-    var clear = vec4(1.0);
-    for (var some = u32(p.clipped); some > 0u; some--) {
-        clear -= four_levels(p, k + SAMPLES);
-    }
-    return clear;
+// Sample numbers of a pair.
+fn pair(j: i32) -> vec2<f32> {
+    return vec2(f32(j), f32(-1 - j));
 }
 
-// The samples whose offsets may lie within `reach` of m, and some beyond.
-fn within(p: Profile, m: f32, reach: f32) -> vec2<i32> {
+// First and last number of the samples whose offsets lie within `reach` of m; not whole.
+fn span(p: Profile, m: f32, reach: f32) -> vec2<f32> {
     let a = (m - reach - p.offset) / p.step;
     let b = (m + reach - p.offset) / p.step;
-    let top = f32(p.count);
-    return vec2(i32(clamp(floor(min(a, b)), 0.0, top)), i32(clamp(ceil(max(a, b)) + 1.0, 0.0, top)));
+    return vec2(max(min(a, b), p.low), min(max(a, b), p.high));
+}
+
+fn in_span(j: i32, s: vec2<f32>) -> vec2<bool> {
+    return (pair(j) >= vec2(s.x)) & (pair(j) <= vec2(s.y));
 }

@@ -164,6 +164,7 @@ fn peak_cases(scene: &Scene, wanted: &str) -> Vec<Case> {
         let p = peak::PeakParams { method, width_px: 3.0, speckle: 0.05, ..Default::default() };
         let choice = choose::ChooseParams { echo: 0.4, ..Default::default() };
         let frame = peak::PeakFrame::new((f.width, f.height, bits), f.shots, &p, &choice, [0.1, 0.995]);
+        let quads = f64::from(frame.quads());
         let header = walk.buffers["header"].clone();
         let n = header[3] as usize;
         let groups = [(n as u32).div_ceil(64).max(1), 1, 1];
@@ -172,7 +173,7 @@ fn peak_cases(scene: &Scene, wanted: &str) -> Vec<Case> {
                         twin: fn(&mut [Vec<u32>], &[(&'static str, f64)]),
                         bindings: &mut Vec<Vec<u32>>,
                         groups: [u32; 3]| {
-            let all = [(frame::PX_LOG2, f64::from(px_log2(bits))), (peak::METHOD, method.number())];
+            let all = [(frame::PX_LOG2, f64::from(px_log2(bits))), (peak::METHOD, method.number()), (peak::QUADS, quads)];
             let overrides: Vec<_> = all.into_iter().filter(|o| stage.overrides.contains(&o.0)).collect();
             if stage.name == wanted {
                 let name = format!("{}, {method:?}", scene.name);

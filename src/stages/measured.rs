@@ -42,7 +42,8 @@ impl Measuring {
         device.write(&uniform, 0, bytemuck::bytes_of(&frame));
         let rig = device.storage("rig", size_of::<PointFrame>() as u64)?;
         device.write(&rig, 0, bytemuck::bytes_of(&PointFrame::new(&m.optics)));
-        let depth = [(PX_LOG2, f64::from(px_log2(bits))), (peak::METHOD, m.peak.method.number())];
+        let method = m.peak.method.number();
+        let depth = [(PX_LOG2, f64::from(px_log2(bits))), (peak::METHOD, method), (peak::QUADS, frame.quads().into())];
         Ok(Measuring {
             pixels: device.storage("skeleton pixels", 8 * u64::from(f.capacity))?,
             strongest: device.storage("strongest", 4 * u64::from(frame.entries))?,

@@ -1,7 +1,7 @@
 //! In: a picture, a skeleton pixel, the expected stripe. Out: the maximum-likelihood Gaussian profile across it.
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels. docs/math.md, Stripe peak (1) to (5).
 
-use super::profile::{Profile, by_columns};
+use super::profile::{Profile, SIDES, by_columns};
 use super::{Grey, Peak, PeakFrame, SATURATED};
 
 /// Places of the gradients and their weights (1 - r² / 16)²: every other one of a lattice, because a gradient looks at its
@@ -77,46 +77,59 @@ pub(super) fn gaussian<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak
     let (mut m, mut w) = (m0, s0);
     // A weak belief that the width is the expected one keeps two or three lit pixels solvable.
     let prior = 4.0 / (s0 * s0);
-    let (mut i11, mut chi, mut samples) = (0f32, 0f32, 0f32);
-    let mut saturated = false;
-    let near = profile.within(m0, 3.0 * s0);
+    let (mut i11, mut squares, mut believed) = (0f32, 0f32, 0f32);
+    let near = profile.span(m0, 3.0 * s0);
+    let saturated = (-profile.half..profile.half).any(|k| near.contains(&(k as f32)) && profile.clipped(k) > 0.0);
+    let quiet = s.read2 + s.gain * base;
+    let ceiling = s.full_scale - base;
     let mut step = 0;
     while step < s.steps {
-        let (mut h00, mut h01, mut h02, mut h11, mut h12, mut h22) = (1e-9f32, 0f32, 0f32, 1e-9f32, 0f32, prior);
-        let (mut g0, mut g1, mut g2) = (0f32, 0f32, prior * (s0 - w));
-        let (mut sum, mut count) = (0f32, 0f32);
-        let mut any = false;
         let inverse = 1.0 / w;
-        for k in near.clone() {
-            let (d, level) = profile.sample(k);
-            let clear = profile.clear(k);
-            let z = (d - m) * inverse;
-            let shape = (-0.5 * (z * z)).exp();
-            let model = a * shape;
-            let inside = (d - m0).abs() <= 3.0 * s0;
-            any = any || (clear < 1.0 && inside);
-            // Clipped pixels pull while the model is below them, and are silent above.
-            let above = model + base >= s.full_scale;
-            let unclipped = (level - s.full_scale * (1.0 - clear)) / clear.max(1e-3);
-            let residual = (if above { unclipped } else { level }) - base - model;
-            let quiet = s.read2 + s.gain * (model + base);
-            let share = if above { clear } else { 1.0 };
-            let believed = if inside { share } else { 0.0 };
-            let certainty = (believed * profile.weight) / (quiet + s.speckle2 * (model * model));
-            let jm = model * (z * inverse);
-            let jw = jm * z;
-            h00 += certainty * (shape * shape);
-            h01 += certainty * (shape * jm);
-            h02 += certainty * (shape * jw);
-            h11 += certainty * (jm * jm);
-            h12 += certainty * (jm * jw);
-            h22 += certainty * (jw * jw);
-            g0 += certainty * (shape * residual);
-            g1 += certainty * (jm * residual);
-            g2 += certainty * (jw * residual);
-            sum += certainty * (residual * residual);
-            count += believed;
+        let wide = profile.step * inverse;
+        let z0 = (profile.offset - m) * inverse;
+        // Sums over certainty times model squared times z^0, z^1, .. z^4; certainty, residual, model and z^0, z^1, z^2.
+        let (mut e, mut r) = ([[0f32; 5]; 2], [[0f32; 3]; 2]);
+        let (mut chi2, mut count) = ([0f32; 2], [0f32; 2]);
+        for (side, sample) in SIDES.into_iter().enumerate() {
+            let (mut z, dz) = if side == 0 { (z0, wide) } else { (z0 - wide, -wide) };
+            // A Gaussian at equal steps: its ratio from sample to sample falls by a constant factor. From the middle to
+            // both sides, because what has become 0 stays 0.
+            let mut model = a * (-0.5 * (z * z)).exp();
+            let mut ratio = (-0.5 * (dz * dz) - dz * z).exp();
+            let fall = (-(wide * wide)).exp();
+            for k in (0..profile.half).map(sample) {
+                if near.contains(&(k as f32)) {
+                    let (light, lost) = (profile.level(k) - base, profile.clipped(k));
+                    // Clipped pixels pull while the model is below them, and are silent above.
+                    let above = model >= ceiling;
+                    let clear = (light - ceiling * lost) / (1.0 - lost).max(1e-3);
+                    let residual = (if above { clear } else { light }) - model;
+                    let counts = if above { profile.weight * (1.0 - lost) } else { profile.weight };
+                    let certainty = counts / (quiet + model * (s.gain + s.speckle2 * model));
+                    let pull = certainty * residual;
+                    let (mut h, mut p) = (certainty * (model * model), pull * model);
+                    for sum in &mut e[side] {
+                        *sum += h;
+                        h *= z;
+                    }
+                    for sum in &mut r[side] {
+                        *sum += p;
+                        p *= z;
+                    }
+                    chi2[side] += pull * residual;
+                    count[side] += counts;
+                }
+                model *= ratio;
+                ratio *= fall;
+                z += dz;
+            }
         }
+        let e: [f32; 5] = std::array::from_fn(|i| e[0][i] + e[1][i]);
+        let r: [f32; 3] = std::array::from_fn(|i| r[0][i] + r[1][i]);
+        // In parts of amplitude, width and width; a prior of nearly nothing keeps darkness solvable.
+        let (h00, h01, h02, h11, h12) = (e[0] + 1e-9, e[1], e[2], e[2] + 1e-9, e[3]);
+        let h22 = e[4] + prior * (w * w);
+        let (g0, g1, g2) = (r[0], r[1], r[2] + (prior * w) * (s0 - w));
         let c00 = h11 * h22 - h12 * h12;
         let c01 = h02 * h12 - h01 * h22;
         let c02 = h01 * h12 - h02 * h11;
@@ -124,19 +137,15 @@ pub(super) fn gaussian<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak
         let c12 = h01 * h02 - h00 * h12;
         let c22 = h00 * h11 - h01 * h01;
         let det = h00 * c00 + (h01 * c01 + h02 * c02);
-        let da = (c00 * g0 + (c01 * g1 + c02 * g2)) / det;
-        let dm = (c01 * g0 + (c11 * g1 + c12 * g2)) / det;
-        let dw = (c02 * g0 + (c12 * g1 + c22 * g2)) / det;
         // Bounded steps: the model is not linear far from the answer.
-        let da = da.clamp(-0.5 * a, a);
-        let dm = dm.clamp(-0.7 * s0, 0.7 * s0);
-        let dw = dw.clamp(-0.3 * s0, 0.3 * s0);
+        let da = (a * ((c00 * g0 + (c01 * g1 + c02 * g2)) / det)).clamp(-0.5 * a, a);
+        let dm = (w * ((c01 * g0 + (c11 * g1 + c12 * g2)) / det)).clamp(-0.7 * s0, 0.7 * s0);
+        let dw = (w * ((c02 * g0 + (c12 * g1 + c22 * g2)) / det)).clamp(-0.3 * s0, 0.3 * s0);
+        i11 = (w * w) * (c11 / det);
         a = (a + da).max(1.0);
         m = (m + dm).clamp(m0 - 2.0 * s0, m0 + 2.0 * s0);
         w = (w + dw).clamp(0.3 * s0, 3.0 * s0);
-        i11 = c11 / det;
-        (chi, samples) = (sum, count);
-        saturated = any;
+        (squares, believed) = (chi2[0] + chi2[1], (count[0] + count[1]) / profile.weight);
         step += 1;
         // The next step would be a tenth of this one and less: far below what noise leaves.
         if dm.abs() < 1e-2 * s0 && dw.abs() < 3e-2 * s0 && da.abs() < 3e-2 * a {
@@ -147,9 +156,9 @@ pub(super) fn gaussian<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak
     let share = profile.square / profile.weight;
     // Where the noise is larger than the model says, the centre is less certain by the same factor. Few samples tell
     // little of it, so where it seems smaller the model counts for ten samples.
-    let free = (samples - 3.0).max(1.0);
-    let squares = chi / share;
-    let noise = (squares / free).max((BELIEF + squares) / (BELIEF + free));
+    let free = (believed - 3.0).max(1.0);
+    let chi2 = squares / share;
+    let noise = (chi2 / free).max((BELIEF + chi2) / (BELIEF + free));
     let sigma = (i11 * share * noise).max(0.0).sqrt();
     let width = (w * w - profile.blur2).max(0.01 * s.s0 * s.s0).sqrt();
     finish(x, y, n, m, a, base, width, sigma, saturated, s)

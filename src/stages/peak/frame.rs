@@ -2,6 +2,7 @@
 //! strongest and choose, every size worked out once. Frame and unit: pixels, grey levels of the picture's depth.
 
 use super::PeakParams;
+use super::profile::SAMPLES;
 use crate::gpu::Field;
 use crate::stages::choose::ChooseParams;
 use crate::stages::frame::px_log2;
@@ -59,7 +60,8 @@ pub struct PeakFrame {
     pub fours: i32,
     /// Half of a profile that stands upright, samples.
     pub half_across: f32,
-    pub reserved_0: u32,
+    /// Rows of a sample of the profile, each `stride_across` from the next.
+    pub rows: i32,
     pub reserved_1: u32,
     pub reserved_2: u32,
 }
@@ -68,9 +70,14 @@ pub const UNIFORM: (&str, &[Field], usize) = crate::stages::frame::uniform_field
     read2, gain, speckle2, along_factor, reach_along, stride_across, lattice_u, lattice_v, stride, steps, faintest, narrowest,
     widest, uncertain, upright, across_u, across_v, cut_width, cut_amplitude, echo, echo_reach, lines, columns, entries,
     line_px, fours, half_across,
-    reserved_0, reserved_1, reserved_2);
+    rows, reserved_1, reserved_2);
 
 impl PeakFrame {
+    /// Quads of samples of a profile, which the shader has written out. They reach as far as they should on lines up to 31
+    /// degrees off an image axis; beyond that the outermost flanks are left out, at 45 degrees from 2.5 widths on.
+    pub fn quads(&self) -> i32 {
+        ((self.half_across / (2.0 * 0.86)).ceil() as i32).clamp(1, SAMPLES as i32 / 4)
+    }
     /// `across`: unit image direction of depth ([`crate::stages::point::Optics::across`]).
     pub fn new(
         (width, height, bits): (u32, u32, u8),
@@ -93,6 +100,8 @@ impl PeakFrame {
         // between samples that far apart. Along a stripe that lies as it should there is room for half as much again.
         let (lattice_across, lattice_along) = ((1.4 * s0).round().max(1.0) as i32, (2.1 * s0).round().max(2.0) as i32);
         let stride_across = (0.25 * s0).floor().max(1.0);
+        // Rows within 0.4 widths are one sample: their spread, a hundredth of the stripe's, is known and costs 1 % of sigma.
+        let rows = (0.4 * s0 / stride_across).floor().max(1.0);
         PeakFrame {
             width: width as i32,
             height: height as i32,
@@ -130,8 +139,8 @@ impl PeakFrame {
             // 99 % of the weight, shall be there on the shorter side as well.
             fours: if reach_along >= 4 { (0.415 * radius + 1.5) as i32 } else { 0 },
             // The fit looks at three widths; the skeleton is a pixel beside the centre.
-            half_across: (4.0 * s0).min(3.0 * s0 + 1.0) / stride_across,
-            reserved_0: 0,
+            half_across: (4.0 * s0).min(3.0 * s0 + 1.0) / (stride_across * rows),
+            rows: rows as i32,
             reserved_1: 0,
             reserved_2: 0,
         }

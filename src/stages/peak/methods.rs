@@ -2,7 +2,7 @@
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels.
 
 use super::fit::{background, direction, finish};
-use super::profile::Profile;
+use super::profile::{Profile, SIDES};
 use super::{Grey, Peak, PeakFrame};
 
 /// Centre of gravity of the light above the background, within three widths of a first guess.
@@ -11,25 +11,33 @@ pub(super) fn centroid<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak
     let base = background(image, x, y, n.0, n.1, s);
     let profile = Profile::new(image, (x, y), n, s);
     let (m0, _) = profile.guess(base, s);
-    let (mut sum, mut first, mut second, mut noise, mut top) = (0f32, 0f32, 0f32, 0f32, 0f32);
-    let mut saturated = false;
-    for k in 0..profile.count {
-        let (d, level) = profile.sample(k);
-        let inside = (d - m0).abs() <= 3.0 * s.s0;
-        let light = if inside { level - base } else { 0.0 };
-        sum += light;
-        first += light * d;
-        second += light * (d * d);
-        top = top.max(light);
-        saturated = saturated || (profile.clear(k) < 1.0 && inside);
-        let e = if inside { d - m0 } else { 0.0 };
-        let lit = (level - base).max(0.0);
-        noise += (e * e) * (s.read2 + s.gain * level + s.speckle2 * (lit * lit));
+    let near = profile.span(m0, 3.0 * s.s0);
+    let quiet = s.read2 + s.gain * base;
+    // In samples.
+    let z = (m0 - profile.offset) / profile.step;
+    let (mut sum, mut moment, mut second, mut noise) = ([0f32; 2], [0f32; 2], [0f32; 2], [0f32; 2]);
+    let (mut top, mut saturated) = (0f32, false);
+    for (side, sample) in SIDES.into_iter().enumerate() {
+        for k in (0..profile.half).map(sample).filter(|&k| near.contains(&(k as f32))) {
+            let (light, d) = (profile.level(k) - base, k as f32);
+            sum[side] += light;
+            moment[side] += light * d;
+            second[side] += light * (d * d);
+            top = top.max(light);
+            saturated = saturated || profile.clipped(k) > 0.0;
+            let (e, lit) = (d - z, light.max(0.0));
+            noise[side] += (e * e) * (quiet + s.gain * light + s.speckle2 * (lit * lit));
+        }
     }
-    let m = if sum > 0.0 { (first / sum).clamp(m0 - 2.0 * s.s0, m0 + 2.0 * s.s0) } else { m0 };
-    let width = (second / sum.max(1e-6) - m * m - profile.blur2).max(0.0).sqrt();
+    let all = sum[0] + sum[1];
+    let middle = (moment[0] + moment[1]) / all;
+    let centre = (profile.offset + profile.step * middle).clamp(m0 - 2.0 * s.s0, m0 + 2.0 * s.s0);
+    let m = if all > 0.0 { centre } else { m0 };
+    let spread = (second[0] + second[1]) / all.max(1e-6) - middle * middle;
+    let width = ((profile.step * profile.step) * spread - profile.blur2).max(0.0).sqrt();
     let share = profile.square / (profile.weight * profile.weight);
-    finish(x, y, n, m, top.max(1.0), base, width, (noise * share).sqrt() / sum.max(1e-6), saturated, s)
+    let sigma = profile.step.abs() * ((noise[0] + noise[1]) * share).sqrt() / all.max(1e-6);
+    finish(x, y, n, m, top.max(1.0), base, width, sigma, saturated, s)
 }
 
 /// Steger's line point: second-order Taylor expansion of the picture smoothed with a Gaussian of sigma

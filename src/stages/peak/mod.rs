@@ -12,7 +12,7 @@ mod stage;
 pub use frame::{PeakFrame, UNIFORM};
 pub use measure::{Stripe, measure};
 pub(super) use stage::frame_of;
-pub use stage::{METHOD, SHARED, STAGE, apart, stage_twin};
+pub use stage::{METHOD, QUADS, SHARED, STAGE, apart, stage_twin};
 
 use crate::fault::{Fault, Result};
 use crate::raster::{Image, Pixels};

@@ -3,25 +3,27 @@
 
 use super::{Grey, PeakFrame};
 
-/// Most samples of a profile: three widths and a pixel to both sides of a stripe at 45 degrees, at the finest step.
-pub(super) const SAMPLES: usize = 96;
+/// Most samples of a profile, as many as the shader has written out.
+pub(super) const SAMPLES: usize = 40;
 
 /// Weights along the stripe are whole numbers up to this: sums are then exact, and four pixels of a word add up in two
 /// multiplications.
 const WEIGHT: f32 = 127.0;
 
-/// The stripe's light over the offset across, sample k at `offset + k step`, k = 0..count. Pixels beside each other along
-/// the stripe are added up along an image axis, a wide stripe's columns in groups of four, each shifted by whole pixels
-/// to follow the line; what the shifts leave widens the profile by `blur2`, which is known.
+/// The stripe's light over the offset across, sample k at `offset + k step`, k = -half..half. Pixels beside each other
+/// along the stripe are added up along an image axis, a wide stripe's columns in groups of four, each shifted by whole
+/// pixels to follow the line; what the shifts leave, and the rows of a sample, widens the profile by `blur2`, which is
+/// known.
 pub(super) struct Profile {
-    /// Weighted sums of grey levels, and of the weights of saturated pixels.
-    sums: [f32; SAMPLES],
+    /// Grey levels, and the shares of the weights of saturated pixels; sample k at k + half.
+    levels: [f32; SAMPLES],
     clipped: [f32; SAMPLES],
-    pub count: i32,
-    offset: f32,
-    step: f32,
-    /// Grey level of a unit of `sums`.
-    scale: f32,
+    pub half: i32,
+    /// First and last sample that lies in the picture.
+    low: f32,
+    high: f32,
+    pub offset: f32,
+    pub step: f32,
     /// Sum of the weights along the stripe, and of their squares.
     pub weight: f32,
     pub square: f32,
@@ -34,22 +36,23 @@ pub(super) fn by_columns((nx, ny): (f32, f32)) -> bool {
     1.001 * ny >= nx.abs()
 }
 
+/// Samples from the middle to both sides, as the shader walks: upwards k = 0, 1, .. and downwards k = -1, -2, ..
+pub(super) const SIDES: [fn(i32) -> i32; 2] = [|j| j, |j| -1 - j];
+
 impl Profile {
-    /// Offset across and grey level.
     #[inline(always)]
-    pub fn sample(&self, k: i32) -> (f32, f32) {
-        (self.offset + k as f32 * self.step, self.sums[k as usize] * self.scale)
+    pub fn level(&self, k: i32) -> f32 {
+        self.levels[(k + self.half) as usize]
     }
-    /// The share of a sample's weight that is not saturated.
+    /// The share of a sample's weight that is saturated.
     #[inline(always)]
-    pub fn clear(&self, k: i32) -> f32 {
-        1.0 - self.clipped[k as usize] * self.scale
+    pub fn clipped(&self, k: i32) -> f32 {
+        self.clipped[(k + self.half) as usize]
     }
-    /// The samples whose offsets may lie within `reach` of m, and some beyond.
-    pub fn within(&self, m: f32, reach: f32) -> std::ops::Range<i32> {
+    /// First and last number of the samples whose offsets lie within `reach` of m; not whole.
+    pub fn span(&self, m: f32, reach: f32) -> std::ops::RangeInclusive<f32> {
         let (a, b) = ((m - reach - self.offset) / self.step, (m + reach - self.offset) / self.step);
-        let top = self.count as f32;
-        (a.min(b).floor().clamp(0.0, top) as i32)..((a.max(b).ceil() + 1.0).clamp(0.0, top) as i32)
+        a.min(b).max(self.low)..=a.max(b).min(self.high)
     }
 
     pub fn new<G: Grey>(image: G, (x, y): (i32, i32), (nx, ny): (f32, f32), s: &PeakFrame) -> Profile {
@@ -66,69 +69,76 @@ impl Profile {
         let fade = s.along_factor / (nb * nb);
         let weight = |i: i32| {
             let f = (1.0 - fade * (i * i) as f32).max(0.0);
-            let inside = i.abs() <= s.reach_along && x0 + i <= end;
-            if inside { (WEIGHT * (f * f) + 0.5) as i32 } else { 0 }
+            if x0 + i <= end { (WEIGHT * (f * f) + 0.5) as i32 } else { 0 }
         };
         // Whole pixels by which a group follows the line. Not + 0.5: at 45 degrees rounding would decide.
-        let shift = |a: i32| ((-((a - x0) as f32 + middle) * na) / nb + 0.47).floor() as i32;
-        let (mut sum, mut square, mut moment, mut second) = (0f32, 0f32, 0f32, 0f32);
-        for a in (begin..=end).step_by(size) {
-            let c = shift(a) as f32 * nb + (a - x0) as f32 * na;
-            for q in 0..size as i32 {
-                let (g, e) = (weight(a + q - x0) as f32, c + q as f32 * na);
-                sum += g;
-                square += g * g;
-                moment += g * e;
-                second += (g * e) * e;
-            }
-        }
-        let mean = moment / sum;
-        // Samples whose rows all lie in the picture.
+        let shift = |a: i32| (-(((a - x0) as f32 + middle) * na) / nb + 0.47).floor() as i32;
+        let (stride, tall) = (s.stride_across, s.stride_across * s.rows);
         let last = end & mask;
-        let (low, high) = (shift(begin).min(shift(last)), shift(begin).max(shift(last)));
-        let half = (s.half_across / nb.abs()).ceil() as i32;
-        let first = (-half).max(-((y0 + low).div_euclid(s.stride_across)));
-        let final_ = half.min((height - 1 - high - y0).div_euclid(s.stride_across));
-        let count = (final_ - first + 1).clamp(0, SAMPLES as i32);
-        let (mut sums, mut clipped) = ([0f32; SAMPLES], [0f32; SAMPLES]);
-        for a in (begin..=end).step_by(size) {
-            let shifted = y0 + shift(a);
-            for q in 0..size as i32 {
-                let g = weight(a + q - x0);
-                for k in 0..if g > 0 { count } else { 0 } {
-                    let level = at(a + q, shifted + (first + k) * s.stride_across);
-                    sums[k as usize] += (g * level as i32) as f32;
-                    clipped[k as usize] += if level >= s.full_scale { g as f32 } else { 0.0 };
+        // Samples whose rows all lie in the picture.
+        let low = -(y0 + shift(begin).min(shift(last))).div_euclid(tall);
+        let high = (height - 1 - shift(begin).max(shift(last)) - y0 - (tall - stride)).div_euclid(tall);
+        let half = 2 * s.quads();
+        let (mut sum, mut square, mut moment, mut second) = (0f32, 0f32, 0f32, 0f32);
+        let (mut levels, mut clipped) = ([0f32; SAMPLES], [0f32; SAMPLES]);
+        for row in (0..tall).step_by(stride as usize) {
+            for a in (begin..=end).step_by(size) {
+                let b = shift(a) + row;
+                let c = b as f32 * nb + (a - x0) as f32 * na;
+                let mut g = [0i32; 4];
+                for q in 0..size {
+                    g[q] = weight(a + q as i32 - x0);
+                }
+                let f = g.map(|g| g as f32);
+                let all = (f[0] + f[1]) + (f[2] + f[3]);
+                let run = na * (f[1] + (2.0 * f[2] + 3.0 * f[3]));
+                let run2 = (na * na) * (f[1] + (4.0 * f[2] + 9.0 * f[3]));
+                sum += all;
+                square += (f[0] * f[0] + f[1] * f[1]) + (f[2] * f[2] + f[3] * f[3]);
+                moment += c * all + run;
+                second += c * (c * all + 2.0 * run) + run2;
+                for k in (-half).max(low)..half.min(high + 1) {
+                    let (mut light, mut full) = (0, 0);
+                    for q in 0..size {
+                        let level = at(a + q as i32, y0 + b + k * tall);
+                        light += g[q] * level as i32;
+                        full += if level >= s.full_scale { g[q] } else { 0 };
+                    }
+                    levels[(k + half) as usize] += light as f32;
+                    clipped[(k + half) as usize] += full as f32;
                 }
             }
         }
-        let step = s.stride_across as f32 * nb;
+        let (mean, scale) = (moment / sum, 1.0 / sum);
         Profile {
-            sums,
-            clipped,
-            count,
-            offset: mean + first as f32 * step,
-            step,
-            scale: 1.0 / sum,
+            levels: levels.map(|v| v * scale),
+            clipped: clipped.map(|v| v * scale),
+            half,
+            low: low as f32,
+            high: high as f32,
+            offset: mean,
+            step: tall as f32 * nb,
             weight: sum / WEIGHT,
             square: square / (WEIGHT * WEIGHT),
             blur2: (second / sum - mean * mean).max(0.0),
         }
     }
 
-    /// First guess of offset and amplitude: centre of gravity and sum above the background.
+    /// First guess of offset and amplitude: centre of gravity and sum above the background. A window of 1.5 widths:
+    /// neighbours of the stripe shall not pull.
     pub fn guess(&self, background: f32, s: &PeakFrame) -> (f32, f32) {
-        let (mut sum, mut moment, mut square) = (0f32, 0f32, 0f32);
-        for k in self.within(0.0, 1.5 * s.s0 + 0.5) {
-            let (d, level) = self.sample(k);
-            // A window of 1.5 widths: neighbours of the stripe shall not pull.
-            let near = if d.abs() <= 1.5 * s.s0 + 0.5 { 1.0 } else { 0.0 };
-            let light = near * (level - background).max(0.0);
-            sum += light;
-            moment += light * d;
-            square += near;
+        let near = self.span(0.0, 1.5 * s.s0 + 0.5);
+        let (mut sum, mut moment) = ([0f32; 2], [0f32; 2]);
+        for (side, sample) in SIDES.into_iter().enumerate() {
+            for k in (0..self.half).map(sample).filter(|&k| near.contains(&(k as f32))) {
+                let light = (self.level(k) - background).max(0.0);
+                sum[side] += light;
+                moment[side] += light * k as f32;
+            }
         }
-        let m = if sum > 0.0 { moment / sum } else { 0.0 };
-        (m, (1.25 * sum / square.max(1e-6)).max(1.0))
+        let (sum, moment) = (sum[0] + sum[1], moment[0] + moment[1]);
+        let count = near.end().floor() - near.start().ceil() + 1.0;
+        let m = if sum > 0.0 { self.offset + self.step * (moment / sum) } else { 0.0 };
+        (m, (1.25 * sum / count.max(1e-6)).max(1.0))
     }
 }

@@ -9,6 +9,9 @@ use rayon::prelude::*;
 /// Selects the method when the pipeline is built: 0 Gaussian, 1 centroid, 2 derivative.
 pub const METHOD: &str = "peak_method";
 
+/// Quads of samples of a profile, written out when the pipeline is built: [`PeakFrame::quads`].
+pub const QUADS: &str = "quads";
+
 pub const SHARED: &str = include_str!("../../../shaders/shared/peaks.wgsl");
 const PROFILE: &str = include_str!("../../../shaders/shared/profile.wgsl");
 
@@ -25,7 +28,7 @@ pub const STAGE: Stage = Stage {
         Binding { name: "peaks", access: ReadWrite },
     ],
     uniform: frame::UNIFORM,
-    overrides: &[PX_LOG2, METHOD],
+    overrides: &[PX_LOG2, METHOD, QUADS],
 };
 
 impl Method {
