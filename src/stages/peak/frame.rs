@@ -73,10 +73,12 @@ pub const UNIFORM: (&str, &[Field], usize) = crate::stages::frame::uniform_field
     rows, reserved_1, reserved_2);
 
 impl PeakFrame {
-    /// Quads of samples of a profile, which the shader has written out. They reach as far as they should on lines up to 31
-    /// degrees off an image axis; beyond that the outermost flanks are left out, at 45 degrees from 2.5 widths on.
+    /// Quads of samples of a profile, which the shader has written out: -2 quads up to 2 quads - 1, so that the shorter
+    /// side still has all of an upright profile. They hold all of it on lines up to 31 degrees off an image axis; beyond
+    /// that the outermost flanks are left out, at 45 degrees those from 2.5 widths on.
     pub fn quads(&self) -> i32 {
-        ((self.half_across / (2.0 * 0.86)).ceil() as i32).clamp(1, SAMPLES as i32 / 4)
+        let upright = self.half_across.ceil() + 1.0;
+        ((0.5 * (self.half_across / 0.86).max(upright)).ceil() as i32).clamp(1, SAMPLES as i32 / 4)
     }
     /// `across`: unit image direction of depth ([`crate::stages::point::Optics::across`]).
     pub fn new(
