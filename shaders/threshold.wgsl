@@ -16,10 +16,7 @@
 
 // Half the window's edge, less a half.
 override radius: u32 = 15u;
-// Pixels in four words; of those, how many on each side of the tile, and in all.
-fn per_load() -> u32 {
-    return 4u << px_log2;
-}
+// Loads on each side of the tile, and in all.
 fn beside() -> u32 {
     return (radius + per_load() - 1u) / per_load();
 }
@@ -27,38 +24,8 @@ fn loads() -> u32 {
     return 2u * beside() + 32u / per_load();
 }
 
-// Sums of columns over the window's height, two vectors a load: of its even and of its odd columns. In 8-bit
-// pictures each word carries two of 16 bits: 101 * 255 fits. At most 18 loads: 16 bits and a radius of 50.
-var<private> sums: array<vec4<u32>, 36>;
 // The tile's own pixels of one row.
 var<private> own: array<vec4<u32>, 4>;
-
-fn low() -> u32 {
-    return select(0x0000ffffu, 0x00ff00ffu, px_log2 == 2u);
-}
-fn half() -> u32 {
-    return select(16u, 8u, px_log2 == 2u);
-}
-
-// Four words of a row; words beyond the row repeat its border pixel.
-fn four(row: u32, i: i32) -> vec4<u32> {
-    let last = i32(frame.pitch / 4u) - 1;
-    let v = image[row + u32(clamp(i, 0, last))];
-    let bits = 32u >> px_log2;
-    let ones = select(0x01010101u, 0x00010001u, px_log2 == 1u);
-    let left = (v.x & ((1u << bits) - 1u)) * ones;
-    let right = (v.w >> (32u - bits)) * ones;
-    return select(select(v, vec4(left), i < 0), vec4(right), i > last);
-}
-
-// A row of pixels enters the sums (sign 1) or leaves them (sign -1).
-fn pass_row(row: u32, first: i32, sign: u32) {
-    for (var i = 0u; i < loads(); i++) {
-        let v = four(row, first + i32(i));
-        sums[2u * i] += (v & vec4(low())) * sign;
-        sums[2u * i + 1u] += ((v >> vec4(half())) & vec4(low())) * sign;
-    }
-}
 
 // Sum of column c, counted from the first one loaded.
 fn column(c: u32) -> u32 {
@@ -76,28 +43,6 @@ fn own_pixel(i: u32) -> u32 {
 // First column of the first pixel's window.
 fn begin() -> u32 {
     return beside() * per_load() - radius;
-}
-
-// All bits where a column is one of the 2 r that the first pixel's window begins with.
-fn early(c: vec4<u32>) -> vec4<u32> {
-    return select(vec4(0u), vec4(0xffffffffu), c >= vec4(begin()) & c < vec4(begin() + 2u * radius));
-}
-
-// Sum of those columns.
-fn early_sum() -> u32 {
-    var sum = vec4(0u);
-    for (var i = 0u; i < loads(); i++) {
-        let c = vec4(i * per_load()) + vec4(0u, 1u, 2u, 3u) * vec4(1u << px_log2);
-        let even = sums[2u * i];
-        let odd = sums[2u * i + 1u];
-        if px_log2 == 2u {
-            sum += (even & vec4(0xffffu) & early(c)) + ((even >> vec4(16u)) & early(c + vec4(2u)));
-            sum += (odd & vec4(0xffffu) & early(c + vec4(1u))) + ((odd >> vec4(16u)) & early(c + vec4(3u)));
-        } else {
-            sum += (even & early(c)) + (odd & early(c + vec4(1u)));
-        }
-    }
-    return (sum.x + sum.y) + (sum.z + sum.w);
 }
 
 // The window's sum moves on by one pixel: the last column enters, the pixel is compared, the first leaves.
@@ -135,12 +80,10 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let last_row = i32(frame.height) - 1;
         let own_first = x * (32u / per_load());
         let first = i32(own_first) - i32(beside());
-        for (var i = 0u; i < 2u * loads(); i++) {
-            sums[i] = vec4(0u);
-        }
+        clear_sums(loads());
         let begins = i32(8u * tile_y(run.x));
         for (var y = begins - r; y < begins + r; y++) {
-            pass_row(picture + u32(clamp(y, 0, last_row)) * pitch, first, 1u);
+            pass_row(picture + u32(clamp(y, 0, last_row)) * pitch, first, loads(), 1u);
         }
         let inner = min(frame.width - 32u * x, 32u);
         let wanted = 0xffffffffu >> (32u - inner);
@@ -150,12 +93,12 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             var upper = vec4(0u);
             var lower = vec4(0u);
             for (var k = 0; k < 8; k++) {
-                pass_row(picture + u32(min(top + k + r, last_row)) * pitch, first, 1u);
+                pass_row(picture + u32(min(top + k + r, last_row)) * pitch, first, loads(), 1u);
                 let row = picture + u32(min(top + k, last_row)) * pitch + own_first;
                 for (var i = 0u; i < 32u / per_load(); i++) {
                     own[i] = image[row + i];
                 }
-                sum = (area - 1) / 2 + frame.offset * area + i32(early_sum());
+                sum = (area - 1) / 2 + frame.offset * area + i32(sum_of_columns(begin(), 2u * radius, loads()));
                 bits = 0u;
                 eight_steps(0u, area);
                 eight_steps(8u, area);
@@ -164,7 +107,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
                 bits = select(0u, bits & wanted, top + k <= last_row);
                 upper = select(upper, vec4(bits), vec4(k) == vec4(0, 1, 2, 3));
                 lower = select(lower, vec4(bits), vec4(k) == vec4(4, 5, 6, 7));
-                pass_row(picture + u32(clamp(top + k - r, 0, last_row)) * pitch, first, 0xffffffffu);
+                pass_row(picture + u32(clamp(top + k - r, 0, last_row)) * pitch, first, loads(), 0xffffffffu);
             }
             for (var region = frame.flags & 2u; region != 0u; region = 0u) {
                 let at = ty * frame.tiles_x + x;

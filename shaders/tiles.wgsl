@@ -1,6 +1,6 @@
-// In: the block statistics. Out: the tiles (32 x 8) that may hold a lit pixel, as runs of up to four, one below the
-// other: those that stand alone in one list, longer ones in another, so that neighbouring invocations do as much; and
-// how many there are. Runs begin anew at every fourth row of tiles.
+// In: the block statistics. Out: the tiles (32 x 8) that may hold a lit pixel: those that stand alone, with the least sum
+// of the windows around their pixels; longer runs of up to four, one below the other; and how many there are. Runs begin
+// anew at every fourth row of tiles.
 // For every block a lower bound on the window sums around all of its pixels is put together from the blocks near it:
 // whole ones that every window covers, and smallest rows, columns and quads for the rest. Where even the block's
 // largest pixel does not pass against that bound, none of its pixels can pass against its true mean: the
@@ -12,14 +12,15 @@
 // Only its count.
 @group(0) @binding(3) var<storage, read_write> listing: Listing;
 @group(0) @binding(4) var<storage, read_write> single_listing: Listing;
-// (first tile, number of tiles)
+// (tile, least sum in 256ths of full scale)
 @group(0) @binding(5) var<storage, read_write> singles: array<vec2<u32>>;
 @group(0) @binding(6) var<storage, read_write> run_listing: Listing;
+// (first tile, number of tiles)
 @group(0) @binding(7) var<storage, read_write> runs: array<vec2<u32>>;
 
 // Half the window's edge, less a half; constants, so that rows which no window reaches are not in the code.
 override radius: u32 = 15u;
-// 1: the window has weights, only the smallest pixel bounds its mean; and runs are single tiles.
+// 1: the window has weights, only the smallest pixel bounds its mean; and every tile is listed as one alone.
 override weighted: u32 = 0u;
 
 const NONE = vec4(0xffffffffu);
@@ -154,14 +155,18 @@ fn add_column(around: ptr<function, Around>, strip: Strip, dx: i32) {
     }
 }
 
-// Tiles whose largest pixel may pass against the least mean; the largest lies in the first word of the statistics.
-fn passes(words: vec4<u32>, n: Near) -> vec4<bool> {
+// The least sum of the windows around four blocks.
+fn least_sum(n: Near) -> vec4<u32> {
     // What is covered in part in both directions holds, on both sides together, this many whole quads.
     let quads = ((rest(16) - 1u) / 2u) * ((rest(8) - 1u) / 2u);
     let singles = rest(16) * rest(8) - 4u * quads;
-    let mean = n.sum + rest(16) * n.column + 2u * quads * n.quad + singles * n.smallest;
+    let sum = n.sum + rest(16) * n.column + 2u * quads * n.quad + singles * n.smallest;
+    return select(sum, frame.size * frame.size * n.smallest, vec4(weighted != 0u));
+}
+
+// Blocks whose largest pixel may pass against that; it lies in the first word of the statistics.
+fn passes(words: vec4<u32>, sum: vec4<u32>) -> vec4<bool> {
     let area = i32(frame.size * frame.size);
-    let sum = select(mean, u32(area) * n.smallest, vec4(weighted != 0u));
     let deep = vec4(depth_shift());
     let largest = vec4<i32>(((words >> vec4(15u)) & vec4(511u)) << deep);
     let limit = vec4<i32>(sum << deep) + select((area - 1) / 2, 0, weighted != 0u);
@@ -195,8 +200,13 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let s1 = stats[places.y];
         let s2 = stats[places.z];
         let s3 = stats[places.w];
-        var lit = passes(vec4(s0.x, s1.x, s2.x, s3.x), around.left) | passes(vec4(s0.z, s1.z, s2.z, s3.z), around.right);
-        lit |= vec4((frame.flags & 1u) != 0u);
+        let sum_left = least_sum(around.left);
+        let sum_right = least_sum(around.right);
+        let least = min(sum_left, sum_right);
+        var lit = passes(vec4(s0.x, s1.x, s2.x, s3.x), sum_left) | passes(vec4(s0.z, s1.z, s2.z, s3.z), sum_right);
+        // The plain path rests on no bound.
+        let all = (frame.flags & 1u) != 0u;
+        lit |= vec4(all);
         lit &= vec4(i32(y)) + ROWS <= vec4(last);
         var left = places_of(lit);
         for (var region = frame.flags & 2u; region != 0u; region = 0u) {
@@ -215,15 +225,17 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             let run = select(left & ~(left + lowest), lowest, weighted != 0u);
             left ^= run;
             let length = countOneBits(run);
-            let tile = tile_pack(x, y + countTrailingZeros(lowest), shot);
-            for (var alone = u32(length == 1u); alone > 0u; alone--) {
+            let k = countTrailingZeros(lowest);
+            let tile = tile_pack(x, y + k, shot);
+            let alone = weighted != 0u || (length == 1u && !all);
+            for (var one = u32(alone); one > 0u; one--) {
                 let slot = atomicAdd(&single_listing.count, 1u);
-                singles[slot] = vec2(tile, 1u);
+                singles[slot] = vec2(tile, least[k]);
                 for (var group = u32(slot % 64u == 0u); group > 0u; group--) {
                     atomicAdd(&single_listing.groups, 1u);
                 }
             }
-            for (var longer = u32(length > 1u); longer > 0u; longer--) {
+            for (var longer = u32(!alone); longer > 0u; longer--) {
                 let slot = atomicAdd(&run_listing.count, 1u);
                 runs[slot] = vec2(tile, length);
                 for (var group = u32(slot % 64u == 0u); group > 0u; group--) {

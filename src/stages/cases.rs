@@ -66,6 +66,22 @@ pub fn drawn(width: u32, height: u32, bits: u8, mut f: impl FnMut(u32, u32) -> u
     image(width, height, bits, px)
 }
 
+/// Faint noise with one brighter pixel in every other tile of every other row of tiles, on the picture's border where the
+/// tile has one, some of them two, and each as bright as the threshold or one level beside it.
+fn specks(width: u32, height: u32, bits: u8) -> Image {
+    let mut noise = Noise(31);
+    let grey = |level: u32| level << (bits - 8);
+    drawn(width, height, bits, |x, y| {
+        let (tx, ty) = (x / 32, y / 8);
+        let at = |n: u32, first: u32, size: u32, last: u32| (first + n % size).min(last - 1);
+        let place = |k: u32| (at(tx * 13 + ty * 5 + k, 32 * tx, 32, width), at(tx * 3 + ty * 7 + k, 8 * ty, 8, height));
+        let spot = (tx + ty) % 2 == 0 && ((x, y) == place(0) || tx % 3 == 0 && (x, y) == place(1));
+        let border = [(0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1)].contains(&(x, y));
+        let background = grey(10) + noise.next() % grey(2);
+        if spot || border { background + grey(8) + tx % 3 * grey(1) / 2 } else { background }
+    })
+}
+
 fn image(width: u32, height: u32, bits: u8, px: Vec<u16>) -> Image {
     if bits == 8 {
         Image::from_u8(width, height, px.iter().map(|&v| v as u8).collect())
@@ -130,6 +146,19 @@ pub fn scenes() -> Vec<Scene> {
             name: "stripes on tile borders, region of interest",
             shots: vec![drawn(256, 128, 8, |x, y| if x % 32 < 2 || y % 8 == 7 { 220 } else { 20 })],
             params: p(31, 20, 40),
+            flags: frame::HAS_ROI,
+            ..base.clone()
+        },
+        Scene {
+            name: "specks at all borders",
+            shots: vec![specks(229, 122, 8), specks(229, 122, 8)],
+            params: p(31, 8, 0),
+            ..base.clone()
+        },
+        Scene {
+            name: "deep specks, window 9, region of interest",
+            shots: vec![specks(170, 99, 12)],
+            params: p(9, 200, 400),
             flags: frame::HAS_ROI,
             ..base.clone()
         },
@@ -254,14 +283,14 @@ impl<'a> Walk<'a> {
             ("ambient", pack(scene.ambient.as_slice())),
             ("stats", vec![0; 4 * tiles]),
             ("roi", (0..per_shot).map(|i| if i % 5 < 3 { 0x00ff_fff0 } else { 0 }).collect()),
-            ("first", vec![7; 4]),
+            ("first", vec![7; 2 * header]),
             ("all_active", [7, 7, 0, 0, 0, 0, 0, 0].iter().flat_map(|&n| vec![n; header]).collect()),
             ("listing", vec![0, 1, 1, 0]),
             ("single_listing", vec![0, 1, 1, 0]),
             ("singles", vec![0; 2 * tiles]),
             ("run_listing", vec![0, 1, 1, 0]),
             ("runs", vec![0; 2 * tiles]),
-            ("runs_first", vec![7; 2 * header]),
+            ("runs_first", vec![7; 4]),
             ("lit_listing", vec![0, 1, 1, 0]),
             ("lit_list", vec![0; tiles]),
             ("lit_first", vec![7; 4]),
@@ -329,11 +358,13 @@ impl<'a> Walk<'a> {
             let names = ["single_listing", "singles", "quads", "roi", "mask", "lit", "lit_listing", "lit_list"];
             self.step(&threshold::GATHER, threshold::gather_twin, &names, groups);
         } else {
-            for [listing, list] in [["single_listing", "singles"], ["run_listing", "runs"]] {
-                let groups = listed(&self.buffers, listing);
-                let names = ["image", listing, list, "roi", "mask", "lit", "lit_listing", "lit_list"];
-                self.step(&threshold::MEAN, threshold::mean_twin, &names, groups);
-            }
+            let groups = listed(&self.buffers, "single_listing");
+            let out = ["mask", "lit", "lit_listing", "lit_list"];
+            let names = [&["image", "single_listing", "singles", "roi"], &out[..], &["run_listing", "runs"]].concat();
+            self.step(&specks::STAGE, specks::twin, &names, groups);
+            let groups = listed(&self.buffers, "run_listing");
+            let names = [&["image", "run_listing", "runs", "roi"], &out[..]].concat();
+            self.step(&threshold::MEAN, threshold::mean_twin, &names, groups);
         }
         let all = listed(&self.buffers, "lit_listing");
         self.buffers.insert("active", self.buffers["lit_listing"].clone());

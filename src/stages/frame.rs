@@ -49,6 +49,7 @@ pub const UNIFORM: (&str, &[Field], usize) = uniform_fields!(Frame: width, heigh
     tiles_y, shots, size, offset, minimum, flags, step, capacity, full_scale, lengthen);
 
 pub const SHARED: &str = include_str!("../../shaders/shared/frame.wgsl");
+pub const COLUMNS: &str = include_str!("../../shaders/shared/columns.wgsl");
 pub const PIXELS: &str = include_str!("../../shaders/shared/pixels.wgsl");
 pub const ACTIVITY: &str = include_str!("../../shaders/shared/activity.wgsl");
 /// Selects 8-bit (2) or deeper (1) pictures; pixels a word as a power of two.

@@ -97,9 +97,9 @@ pub fn latest(f: &Frame, stamps: &[u32], tile: u32) -> u32 {
 pub fn reset_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     const EMPTY: [u32; 4] = [0, 1, 1, 0];
     if frame_of(b).step == 0 {
-        b[1][..4].copy_from_slice(&EMPTY);
+        b[1].chunks_mut(HEADER_WORDS as usize).for_each(|h| h[..4].copy_from_slice(&EMPTY));
         b[2][..4].copy_from_slice(&EMPTY);
-        b[3].chunks_mut(HEADER_WORDS as usize).for_each(|h| h[..4].copy_from_slice(&EMPTY));
+        b[3][..4].copy_from_slice(&EMPTY);
     }
     b[4].chunks_mut(HEADER_WORDS as usize).for_each(|h| h[..4].copy_from_slice(&EMPTY));
 }

@@ -20,6 +20,7 @@ pub mod shape_frame;
 pub mod shape_maps;
 pub mod shape_sums;
 pub mod skeleton;
+mod specks;
 pub mod stats;
 pub mod support;
 pub mod thin;
@@ -48,6 +49,7 @@ pub fn all() -> Vec<Entry> {
         exact(&ambient::STAGE, ambient::twin, || cases::of("ambient")),
         exact(&stats::STAGE, stats::twin, || cases::of("stats")),
         Entry { compare: tiles::apart, reason: UNORDERED, ..exact(&tiles::STAGE, tiles::twin, || cases::of("tiles")) },
+        Entry { compare: specks::apart, reason: UNORDERED, ..exact(&specks::STAGE, specks::twin, || cases::of("specks")) },
         unordered(&threshold::MEAN, threshold::mean_twin, || cases::of("threshold")),
         Entry {
             compare: threshold::pixels_apart,

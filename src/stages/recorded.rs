@@ -3,7 +3,7 @@
 
 use super::chain::ChainConfig;
 use super::frame::{PX_LOG2, px_log2};
-use super::{Frame, Window, ambient, lengthen, listing, skeleton, stats, thin, threshold, tiles};
+use super::{Frame, Window, ambient, lengthen, listing, skeleton, specks, stats, thin, threshold, tiles};
 use crate::fault::Result;
 use crate::gpu::{Buffer, Device, Pipeline, Recording};
 
@@ -21,12 +21,11 @@ pub struct Shared {
     uniforms: Buffer,
     stats: Buffer,
     roi: Buffer,
-    /// The count of listed tiles; then headers of lists.
+    /// The header of the list of tiles that stand alone, and the count of all that are listed; headers of other lists.
     first: Buffer,
+    runs_first: Buffer,
     lit_first: Buffer,
     active: Buffer,
-    /// Headers of the lists of tiles that stand alone, and of longer runs.
-    runs_first: Buffer,
     singles: Buffer,
     runs: Buffer,
     lit_list: Buffer,
@@ -53,6 +52,7 @@ pub struct Pipelines {
     ambient: Pipeline,
     stats: Pipeline,
     tiles: Pipeline,
+    specks: Pipeline,
     threshold: Pipeline,
     /// After the Gaussian window's threshold: the words of the mask.
     gather: Option<Pipeline>,
@@ -85,6 +85,7 @@ impl Pipelines {
             ambient: build(&ambient::STAGE)?,
             stats: build(&stats::STAGE)?,
             tiles: build(&tiles::STAGE)?,
+            specks: build(&specks::STAGE)?,
             threshold: build(match config.threshold.window {
                 Window::Mean => &threshold::MEAN,
                 Window::Gaussian => &threshold::GAUSSIAN,
@@ -141,13 +142,12 @@ impl Shared {
             uniforms,
             stats: words("stats", 4 * f.tiles())?,
             roi,
-            first: words("listed tiles", listing::HEADER_WORDS)?,
+            first: words("first list's header", 2 * listing::HEADER_WORDS)?,
             lit_first: words("lit list's header", listing::HEADER_WORDS)?,
             active: words("other lists' headers", listing::HEADER_WORDS * SHORTEN.len() as u32)?,
-            runs_first: words("runs' headers", 2 * listing::HEADER_WORDS)?,
+            runs_first: words("runs' header", listing::HEADER_WORDS)?,
             singles: words("singles", 2 * f.tiles())?,
-            // Two tiles and more each.
-            runs: words("runs", f.tiles().max(2))?,
+            runs: words("runs", 2 * f.tiles())?,
             lit_list: words("lit list", f.tiles())?,
             active_list: words("active list", f.tiles())?,
             weights,
@@ -171,6 +171,10 @@ impl Shared {
     }
     /// How many tiles are listed, where a header counts.
     fn all(&self) -> Part<'_> {
+        (&self.first, STEP_BYTES, 16)
+    }
+    /// The header of the list of tiles that stand alone.
+    fn alone(&self) -> Part<'_> {
         (&self.first, 0, 16)
     }
     /// The header of the list of tiles that are.
@@ -181,9 +185,9 @@ impl Shared {
     fn headers(&self) -> [Part<'_>; 4] {
         [whole(&self.first), whole(&self.lit_first), whole(&self.runs_first), whole(&self.active)]
     }
-    /// The header of the list of tiles that stand alone (0), or of longer runs (1).
-    fn run(&self, n: u64) -> Part<'_> {
-        (&self.runs_first, STEP_BYTES * n, 16)
+    /// The header of the list of runs of tiles.
+    fn run(&self) -> Part<'_> {
+        (&self.runs_first, 0, 16)
     }
     /// The header of the list after `n` shortenings, n >= 1.
     fn shortened(&self, n: u32) -> Part<'_> {
@@ -212,22 +216,22 @@ impl Shared {
         r.dispatch_parts(device, &p.reset, &[zero, first, lit_first, runs, active], [1, 1, 1]);
         r.dispatch_parts(device, &p.stats, &[zero, whole(image), whole(&self.stats)], stats::groups(f));
         let (image, roi) = (whole(image), whole(&self.roi));
-        let lists = [whole(&self.singles), whole(&self.runs)];
-        let [singles, runs] = lists;
-        let tiles = [zero, whole(&self.stats), roi, self.all(), self.run(0), singles, self.run(1), runs];
+        let (singles, runs) = (whole(&self.singles), whole(&self.runs));
+        let tiles = [zero, whole(&self.stats), roi, self.all(), self.alone(), singles, self.run(), runs];
         r.dispatch_parts(device, &p.tiles, &tiles, tiles::groups(f));
         let (lit_header, lit_list) = (self.lit(), whole(&self.lit_list));
         match &p.gather {
             None => {
-                for (n, list) in (0..).zip(lists) {
-                    let bindings = [zero, image, self.run(n), list, roi, mask, lit, lit_header, lit_list];
-                    r.indirect(device, &p.threshold, &bindings, (&self.runs_first, STEP_BYTES * n));
-                }
+                let out = [roi, mask, lit, lit_header, lit_list];
+                let bindings = [&[zero, image, self.alone(), singles], &out[..], &[self.run(), runs]].concat();
+                r.indirect(device, &p.specks, &bindings, (&self.first, 0));
+                let bindings = [&[zero, image, self.run(), runs], &out[..]].concat();
+                r.indirect(device, &p.threshold, &bindings, (&self.runs_first, 0));
             }
             Some(gather) => {
                 let quads = whole(&self.quads);
                 let weights = whole(&self.weights);
-                let (header, args) = (self.run(0), (&self.runs_first, 0));
+                let (header, args) = (self.alone(), (&self.first, 0));
                 r.indirect(device, &p.threshold, &[zero, image, header, singles, weights, quads], args);
                 let bindings = [zero, header, singles, quads, roi, mask, lit, lit_header, lit_list];
                 r.indirect(device, gather, &bindings, args);

@@ -1,7 +1,7 @@
 //! In: a grey picture. Out: a mask, lit where a pixel is brighter than the mean of its surroundings.
 //! Frame and unit: pixels; offset and minimum in grey levels of the picture's own depth.
 
-use super::frame::{self, Frame, PIXELS, PX_LOG2, SHARED, frame_of, tile_unpack};
+use super::frame::{self, COLUMNS, Frame, PIXELS, PX_LOG2, SHARED, frame_of, tile_unpack};
 use super::stats::padded_pixel;
 use crate::fault::{Fault, Result};
 use crate::gpu::{Access::*, Binding, Stage};
@@ -14,7 +14,7 @@ pub const RADIUS: &str = "radius";
 pub const MEAN: Stage = Stage {
     name: "threshold",
     wgsl: include_str!("../../shaders/threshold.wgsl"),
-    shared: &[SHARED],
+    shared: &[SHARED, COLUMNS],
     workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },

@@ -1,7 +1,9 @@
-//! In: block statistics. Out: the tiles that may hold a lit pixel, as runs one below the other: (first tile, number of
-//! tiles); the others are proven dark. Frame and unit: tiles of 32 x 8 pixels, blocks of 16 x 8.
+//! In: block statistics. Out: the tiles that may hold a lit pixel: those that stand alone, (tile, least sum of its
+//! windows), and runs one below the other, (first tile, number of tiles); the others are proven dark.
+//! Frame and unit: tiles of 32 x 8 pixels, blocks of 16 x 8, sums in 256ths of full scale.
 
 use super::bound::Blocks;
+use super::listing::append;
 use super::frame::{self, ALL_TILES, Frame, GAUSSIAN, HAS_ROI, PX_LOG2, SHARED, frame_of, tile_pack};
 use super::stats::depth_shift;
 use super::threshold::RADIUS;
@@ -36,19 +38,22 @@ pub fn groups(f: &Frame) -> [u32; 3] {
     STAGE.groups([f.tiles_x * f.tiles_y.div_ceil(LONGEST) * f.shots, 1, 1])
 }
 
-/// Some pixel of the block may pass against the least that its window can come to.
+/// The least that the sums of a block's windows can come to.
+fn least_sum(f: &Frame, blocks: &Blocks, x: i32, y: i32) -> u32 {
+    match f.flags & GAUSSIAN {
+        0 => blocks.least_sum(x, y),
+        _ => f.size * f.size * blocks.darkest(x, y),
+    }
+}
+
+/// Some pixel of the block may pass against that.
 fn may_be_lit(f: &Frame, blocks: &Blocks, x: i32, y: i32) -> bool {
     let deep = depth_shift(f);
     let largest = blocks.block(x, y).largest << deep;
-    if largest < f.minimum {
-        return false;
-    }
-    let largest = largest as i32 - f.offset;
-    if f.flags & GAUSSIAN != 0 {
-        return largest > (blocks.darkest(x, y) << deep) as i32;
-    }
     let area = (f.size * f.size) as i32;
-    area * largest > (blocks.least_sum(x, y) << deep) as i32 + (area - 1) / 2
+    let half = if f.flags & GAUSSIAN != 0 { 0 } else { (area - 1) / 2 };
+    let sum = (least_sum(f, blocks, x, y) << deep) as i32;
+    area * (largest as i32 - f.offset) > sum + half && largest >= f.minimum
 }
 
 pub fn twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
@@ -69,11 +74,15 @@ pub fn twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
             while y < f.tiles_y {
                 let room = longest.min(LONGEST - y % LONGEST).min(f.tiles_y - y);
                 let length = (y..y + room).take_while(|&y| listed[y as usize]).count() as u32;
-                let run = [tile_pack(x, y, shot), length];
+                let tile = tile_pack(x, y, shot);
+                let least = || (0..2).map(|side| least_sum(&f, &blocks, 2 * x as i32 + side, y as i32)).min();
                 match length {
                     0 => {}
-                    1 => super::listing::append(single_listing, singles, run),
-                    _ => super::listing::append(run_listing, runs, run),
+                    // The plain path rests on no bound.
+                    1 if f.flags & ALL_TILES == 0 || f.flags & GAUSSIAN != 0 => {
+                        append(single_listing, singles, [tile, least().expect("two blocks")]);
+                    }
+                    _ => append(run_listing, runs, [tile, length]),
                 }
                 listing[3] += length;
                 y += length.max(1);
