@@ -125,7 +125,7 @@ pub fn scenes() -> Vec<Scene> {
         },
         Scene {
             name: "noise, every tile",
-            shots: vec![drawn(97, 61, 8, |_, _| noise.next() % 256)],
+            shots: vec![drawn(97, 69, 8, |_, _| noise.next() % 256)],
             params: p(3, 0, 0),
             flags: frame::ALL_TILES,
             ..base.clone()
@@ -158,8 +158,15 @@ pub fn scenes() -> Vec<Scene> {
         Scene {
             name: "deep specks, window 9, region of interest",
             shots: vec![specks(170, 99, 12)],
-            params: p(9, 200, 400),
+            params: p(9, 124, 160),
             flags: frame::HAS_ROI,
+            ..base.clone()
+        },
+        Scene {
+            // 9 (25 - 4) is 9 * 20 + 5 + 4: one level brighter would pass.
+            name: "specks that just do not pass",
+            shots: vec![drawn(96, 40, 8, |x, y| if x % 64 == 17 && y % 16 == 3 { 25 + y / 32 } else { 20 })],
+            params: p(3, 4, 0),
             ..base.clone()
         },
         Scene {
@@ -202,7 +209,8 @@ fn peak_cases(scene: &Scene, wanted: &str) -> Vec<Case> {
                         twin: fn(&mut [Vec<u32>], &[(&'static str, f64)]),
                         bindings: &mut Vec<Vec<u32>>,
                         groups: [u32; 3]| {
-            let all = [(frame::PX_LOG2, f64::from(px_log2(bits))), (peak::METHOD, method.number()), (peak::QUADS, quads)];
+            let all =
+                [(frame::PX_LOG2, f64::from(px_log2(bits))), (peak::METHOD, method.number()), (peak::QUADS, quads)];
             let overrides: Vec<_> = all.into_iter().filter(|o| stage.overrides.contains(&o.0)).collect();
             if stage.name == wanted {
                 let name = format!("{}, {method:?}", scene.name);

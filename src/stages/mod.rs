@@ -49,7 +49,11 @@ pub fn all() -> Vec<Entry> {
         exact(&ambient::STAGE, ambient::twin, || cases::of("ambient")),
         exact(&stats::STAGE, stats::twin, || cases::of("stats")),
         Entry { compare: tiles::apart, reason: UNORDERED, ..exact(&tiles::STAGE, tiles::twin, || cases::of("tiles")) },
-        Entry { compare: specks::apart, reason: UNORDERED, ..exact(&specks::STAGE, specks::twin, || cases::of("specks")) },
+        Entry {
+            compare: specks::apart,
+            reason: UNORDERED,
+            ..exact(&specks::STAGE, specks::twin, || cases::of("specks"))
+        },
         unordered(&threshold::MEAN, threshold::mean_twin, || cases::of("threshold")),
         Entry {
             compare: threshold::pixels_apart,

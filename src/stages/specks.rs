@@ -58,7 +58,7 @@ pub fn twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
         let row = |dy: i32| (-r..=r).map(|dx| pixel(x as i32 + dx, y as i32 + dy)).sum::<u32>();
         let passes = passes_mean(pixel(x as i32, y as i32), (-r..=r).map(row).sum(), &f.threshold());
         let wanted = f.flags & HAS_ROI == 0 || roi[f.mask_word(0, x, y)] >> (x % 32) & 1 == 1;
-        if passes && wanted && x < f.width && y < f.height {
+        if passes && wanted {
             let at = mask_index(&f, tile, y % 8);
             mask[at] = 1 << (x % 32);
             lit[at] = mask[at];

@@ -3,8 +3,8 @@
 //! Frame and unit: tiles of 32 x 8 pixels, blocks of 16 x 8, sums in 256ths of full scale.
 
 use super::bound::Blocks;
-use super::listing::append;
 use super::frame::{self, ALL_TILES, Frame, GAUSSIAN, HAS_ROI, PX_LOG2, SHARED, frame_of, tile_pack};
+use super::listing::append;
 use super::stats::depth_shift;
 use super::threshold::RADIUS;
 use crate::gpu::{Access::*, Binding, Stage};
