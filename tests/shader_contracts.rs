@@ -58,6 +58,47 @@ fn valid(name: &str, source: &str) -> naga::Module {
     module
 }
 
+/// Loops run without a limit on their turns (gpu::Stage): each has to count to its end, or stands here with the reason why it
+/// ends.
+#[test]
+fn every_loop_ends() {
+    let others = [
+        ("lengthen", "while bits != 0u", "a bit is cleared a turn"),
+        ("lengthen", "while t <= last", "t grows by one a turn, last is set to less than t at most"),
+        ("peak", "while left > 0u", "left shrinks by one a turn, or is set to zero"),
+        ("skeleton", "while bits != 0u && at < frame.capacity", "a bit is cleared a turn"),
+        ("support", "for (var left = end - i; left > 0u;)", "left is halved a turn"),
+        ("support", "for (; i < end; i++)", "i counts to end"),
+        ("tiles", "while left != 0u", "at least the lowest bit is cleared a turn"),
+    ];
+    let mut seen = BTreeSet::new();
+    let mut counted = 0;
+    for stage in stages::all().iter().map(|e| e.stage) {
+        for line in stage.source().lines().map(|l| l.split("//").next().unwrap().trim()) {
+            let word = line.split([' ', '(', '{']).next().unwrap();
+            assert!(word != "loop", "{}: {line}", stage.name);
+            if !matches!(word, "for" | "while") {
+                continue;
+            }
+            let head = line.trim_end_matches('{').trim();
+            if others.iter().any(|o| (o.0, o.1) == (stage.name, head)) {
+                seen.insert((stage.name, head.to_string()));
+                continue;
+            }
+            let parts: Vec<&str> = head.trim_start_matches("for (").trim_end_matches(')').split("; ").collect();
+            let name = parts[0].strip_prefix("var ").and_then(|p| p.split_once(" = ")).map_or("?", |p| p.0);
+            let [_, until, step] = parts[..] else { panic!("{}: {head}", stage.name) };
+            let steps = step.strip_prefix(name).is_some_and(|s| {
+                ["++", "--", " = 0u"].contains(&s) || s.strip_prefix(" += ").is_some_and(|by| by != "0" && by != "0u")
+            });
+            let tested = until.split(' ').any(|w| w == name);
+            assert!(steps && tested, "{}: no loop that counts to its end: {head}", stage.name);
+            counted += 1;
+        }
+    }
+    assert!(counted > 80 && seen.len() == others.len(), "{counted} loops that count; seen {seen:?}");
+}
+
 #[test]
 fn no_shader_is_an_orphan() {
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");

@@ -45,10 +45,11 @@ impl std::fmt::Debug for Aliased {
     }
 }
 
-/// A zeroed buffer on memory of its own; `None` where the adapter is not Vulkan's or the memory cannot be had.
+/// A buffer on memory of its own; `None` where the adapter is not Vulkan's or the memory cannot be had.
 pub(super) fn buffer(
     device: &wgpu::Device,
     descriptor: &wgpu::BufferDescriptor,
+    zeroed: bool,
 ) -> Option<(wgpu::Buffer, Arc<Aliased>)> {
     // SAFETY: nothing of the device is destroyed through this handle; all calls follow the order that Vulkan asks for.
     unsafe {
@@ -84,7 +85,9 @@ pub(super) fn buffer(
             raw.free_memory(allocated, None);
             return None;
         };
-        host.write_bytes(0, bytes as usize);
+        if zeroed {
+            host.write_bytes(0, bytes as usize);
+        }
         let memory = Arc::new(Memory { device: raw.clone(), raw: allocated, host, bytes, _owner: device.clone() });
         let held = memory.clone();
         let destroy = Box::new(move || {
@@ -172,6 +175,13 @@ impl Aliased {
             let texture = device.create_texture_from_hal::<Vulkan>(hal_texture, &d, only_read);
             Some(texture.create_view(&Default::default()))
         }
+    }
+
+    /// Reads where the bytes lie. The caller sees to it that no submitted work writes the buffer.
+    pub(super) fn read(&self, range: std::ops::Range<usize>) -> &[u8] {
+        assert!(range.start <= range.end && range.end as u64 <= self.memory.bytes, "{range:?} bytes");
+        // SAFETY: as in `write`.
+        unsafe { std::slice::from_raw_parts(self.memory.host.add(range.start), range.len()) }
     }
 
     /// Writes where the bytes lie. The caller sees to it that no submitted work uses the buffer.

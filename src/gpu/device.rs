@@ -2,6 +2,7 @@
 //! Frame and unit: bytes, GB/s (1e9 bytes).
 
 use super::alias::{self, Aliased};
+use super::background::Background;
 use super::texels::{self, Texel};
 use crate::fault::{Fault, Result};
 use std::sync::{Arc, Mutex};
@@ -51,6 +52,7 @@ pub struct Device {
     lost: Arc<Mutex<Option<String>>>,
     /// Bytes of all buffers made through this device.
     allocated: Arc<std::sync::atomic::AtomicU64>,
+    pub(super) background: Arc<Background>,
 }
 
 fn instance() -> wgpu::Instance {
@@ -178,7 +180,16 @@ impl Device {
             }
         }));
         let tick_ns = info.timestamps.then(|| queue.get_timestamp_period());
-        let mut device = Device { raw, queue, info, reads_texels: false, tick_ns, lost, allocated: Default::default() };
+        let mut device = Device {
+            raw,
+            queue,
+            info,
+            reads_texels: false,
+            tick_ns,
+            lost,
+            allocated: Default::default(),
+            background: Default::default(),
+        };
         device.reads_texels = !device.has_own_processors() && device.info.unified_memory && texels::trial(&device)?;
         Ok(device)
     }
@@ -196,29 +207,31 @@ impl Device {
     /// A zeroed storage buffer that stages, indirect dispatches and copies can use.
     pub fn storage(&self, label: &str, bytes: u64) -> Result<Buffer> {
         use wgpu::BufferUsages as U;
-        self.buffer(label, bytes, U::STORAGE | U::INDIRECT | U::UNIFORM | U::COPY_SRC | U::COPY_DST)
+        self.buffer(label, bytes, U::STORAGE | U::INDIRECT | U::UNIFORM | U::COPY_SRC | U::COPY_DST, true)
     }
     /// Where stages read what the host writes, on unified memory.
     pub fn mapped_storage(&self, label: &str, bytes: u64) -> Result<Buffer> {
         use wgpu::BufferUsages as U;
         let access = if self.reads_texels { U::COPY_DST } else { U::MAP_WRITE };
-        self.buffer(label, bytes, U::STORAGE | access | U::COPY_SRC)
+        self.buffer(label, bytes, U::STORAGE | access | U::COPY_SRC, true)
     }
-    /// Where the host reads what stages wrote, on unified memory.
+    /// Where the host reads what stages wrote, on unified memory. What they did not write is undefined: such a buffer is sized
+    /// for the worst case, and memory that is never touched costs nothing.
     pub fn readable_storage(&self, label: &str, bytes: u64) -> Result<Buffer> {
         use wgpu::BufferUsages as U;
-        self.buffer(label, bytes, U::STORAGE | U::MAP_READ | U::COPY_SRC)
+        let access = if self.reads_texels { U::COPY_DST } else { U::MAP_READ };
+        self.buffer(label, bytes, U::STORAGE | access | U::COPY_SRC, false)
     }
     /// Written by the host, copied to a storage buffer.
     pub fn upload_staging(&self, label: &str, bytes: u64) -> Result<Buffer> {
-        self.buffer(label, bytes, wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC)
+        self.buffer(label, bytes, wgpu::BufferUsages::MAP_WRITE | wgpu::BufferUsages::COPY_SRC, true)
     }
     /// Copied to from a storage buffer, read by the host.
     pub fn readback_staging(&self, label: &str, bytes: u64) -> Result<Buffer> {
-        self.buffer(label, bytes, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST)
+        self.buffer(label, bytes, wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST, true)
     }
 
-    fn buffer(&self, label: &str, bytes: u64, usage: wgpu::BufferUsages) -> Result<Buffer> {
+    fn buffer(&self, label: &str, bytes: u64, usage: wgpu::BufferUsages, zeroed: bool) -> Result<Buffer> {
         let limit = self.raw.limits().max_buffer_size;
         let binding = self.info.max_binding_bytes;
         let size = bytes.max(16).next_multiple_of(16);
@@ -235,7 +248,7 @@ impl Device {
         let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
         let maps = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::MAP_WRITE;
         if self.reads_texels && usage.contains(wgpu::BufferUsages::STORAGE) && !usage.intersects(maps) {
-            let (raw, aliased) = alias::buffer(&self.raw, &descriptor).ok_or_else(|| {
+            let (raw, aliased) = alias::buffer(&self.raw, &descriptor, zeroed).ok_or_else(|| {
                 Fault::device(format!("{}: {size} bytes for '{label}' cannot be had", self.info.name))
                     .cause("the memory ran out")
                     .next("lower the shots per batch")

@@ -3,6 +3,7 @@
 
 #[cfg_attr(not(target_os = "linux"), path = "no_alias.rs")]
 mod alias;
+mod background;
 mod device;
 mod recording;
 mod ring;

@@ -1,14 +1,16 @@
 //! In: dispatches with their buffers, as data. Out: the same work replayed shot after shot, timed on request.
 //! Frame and unit: none; times in seconds.
 
+use super::stage::Compiled;
 use super::{Buffer, Device, Pipeline};
 use crate::fault::Result;
+use std::sync::Arc;
 
 /// One step of a recording.
 #[derive(Clone, Debug)]
 pub struct Dispatch {
     pub label: &'static str,
-    pipeline: wgpu::ComputePipeline,
+    pipeline: Arc<Compiled>,
     bind: wgpu::BindGroup,
     size: Size,
 }
@@ -63,7 +65,7 @@ impl Recording {
     fn push(&mut self, device: &Device, pipeline: &Pipeline, parts: &[(&Buffer, u64, u64)], size: Size) {
         self.steps.push(Dispatch {
             label: pipeline.stage.name,
-            pipeline: pipeline.raw.clone(),
+            pipeline: pipeline.compiled.clone(),
             bind: pipeline.bind(device, parts),
             size,
         });

@@ -4,6 +4,7 @@
 use super::texels::{rewrite, texel_of};
 use super::{Buffer, Device};
 use crate::fault::Result;
+use std::sync::{Arc, LazyLock};
 
 /// How a stage uses a binding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,15 +62,9 @@ impl Stage {
         std::array::from_fn(|i| invocations[i].div_ceil(self.workgroup[i]))
     }
 
-    /// Compiles the stage with its override constants.
+    /// The stage with its override constants, compiled on another thread: who uses it first waits for it, or compiles it where
+    /// no thread was free.
     pub fn pipeline(&self, device: &Device, overrides: &[(&str, f64)]) -> Result<Pipeline> {
-        let raw = &device.raw;
-        let module = raw.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(self.name),
-            source: wgpu::ShaderSource::Wgsl(
-                if device.reads_texels { self.source_of_texels() } else { self.source() }.into(),
-            ),
-        });
         let entries: Vec<_> = self
             .bindings
             .iter()
@@ -96,34 +91,65 @@ impl Stage {
                 count: None,
             })
             .collect();
-        let layout = raw
+        let layout = device
+            .raw
             .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(self.name), entries: &entries });
-        let pipeline = raw.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        device.alive()?;
+        let (stage, raw, texels, bound) = (*self, device.raw.clone(), device.reads_texels, layout.clone());
+        let overrides: Vec<(String, f64)> = overrides.iter().map(|&(name, value)| (name.into(), value)).collect();
+        let compile = move || stage.compile(&raw, texels, &bound, &overrides);
+        let compiled: Arc<Compiled> = Arc::new(LazyLock::new(Box::new(compile)));
+        let ahead = compiled.clone();
+        // A panic poisons it: who uses it panics as well.
+        device.background.begin(move || {
+            LazyLock::force(&ahead);
+        });
+        Ok(Pipeline { stage: *self, compiled, layout })
+    }
+
+    fn compile(
+        &self,
+        device: &wgpu::Device,
+        texels: bool,
+        layout: &wgpu::BindGroupLayout,
+        overrides: &[(String, f64)],
+    ) -> wgpu::ComputePipeline {
+        let source = if texels { self.source_of_texels() } else { self.source() };
+        let source =
+            wgpu::ShaderModuleDescriptor { label: Some(self.name), source: wgpu::ShaderSource::Wgsl(source.into()) };
+        // A counter of turns in every loop keeps the driver from writing short loops out: on lavapipe stages compile in two
+        // thirds of the time without, and a fifth less where it has no stage in its cache.
+        let checks = wgpu::ShaderRuntimeChecks { force_loop_bounding: false, ..wgpu::ShaderRuntimeChecks::checked() };
+        // SAFETY: every loop ends (tests/shader_contracts.rs); all other checks stay.
+        let module = unsafe { device.create_shader_module_trusted(source, checks) };
+        let constants: Vec<(&str, f64)> = overrides.iter().map(|(name, value)| (name.as_str(), *value)).collect();
+        device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(self.name),
-            layout: Some(&raw.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            layout: Some(&device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 label: Some(self.name),
-                bind_group_layouts: &[Some(&layout)],
+                bind_group_layouts: &[Some(layout)],
                 immediate_size: 0,
             })),
             module: &module,
             entry_point: Some("main"),
             compilation_options: wgpu::PipelineCompilationOptions {
-                constants: overrides,
+                constants: &constants,
                 // No stage uses workgroup memory.
                 zero_initialize_workgroup_memory: false,
             },
             cache: None,
-        });
-        device.alive()?;
-        Ok(Pipeline { stage: *self, raw: pipeline, layout })
+        })
     }
 }
 
-/// A compiled stage.
+/// What was compiled, or is yet to be.
+pub(super) type Compiled = LazyLock<wgpu::ComputePipeline, Box<dyn FnOnce() -> wgpu::ComputePipeline + Send>>;
+
+/// A stage with its override constants; clones share what is compiled.
 #[derive(Clone, Debug)]
 pub struct Pipeline {
     pub stage: Stage,
-    pub(super) raw: wgpu::ComputePipeline,
+    pub(super) compiled: Arc<Compiled>,
     pub(super) layout: wgpu::BindGroupLayout,
 }
 
@@ -185,7 +211,7 @@ pub fn run_once(device: &Device, stage: &Stage, load: &Workload) -> Result<Vec<V
     let mut encoder = device.raw.create_command_encoder(&Default::default());
     {
         let mut pass = encoder.begin_compute_pass(&Default::default());
-        pass.set_pipeline(&pipeline.raw);
+        pass.set_pipeline(&pipeline.compiled);
         pass.set_bind_group(0, &group, &[]);
         pass.dispatch_workgroups(load.groups[0], load.groups[1], load.groups[2]);
     }

@@ -1,0 +1,60 @@
+//! In: work for a device that nobody waits for yet. Out: it is done on other threads, and none is under way when the device is
+//! gone: the process must not end, and take the driver down, while its compiler runs. Frame and unit: none.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Arc, PoisonError, RwLock};
+
+/// Whether work may begin; who works holds the lock for reading.
+pub(super) struct Background(Arc<RwLock<bool>>);
+
+impl Default for Background {
+    fn default() -> Background {
+        Background(Arc::new(RwLock::new(true)))
+    }
+}
+
+impl Background {
+    /// Does work as soon as a thread is free, or never where the device is dropped before. What panics there has to panic
+    /// again where its result is used.
+    pub(super) fn begin(&self, work: impl FnOnce() + Send + 'static) {
+        let allowed = self.0.clone();
+        rayon::spawn_fifo(move || {
+            let allowed = allowed.read().unwrap_or_else(PoisonError::into_inner);
+            if *allowed {
+                let _ = catch_unwind(AssertUnwindSafe(work));
+            }
+        });
+    }
+}
+
+impl Drop for Background {
+    fn drop(&mut self) {
+        *self.0.write().unwrap_or_else(PoisonError::into_inner) = false;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::sync::mpsc::channel;
+    use std::time::Duration;
+
+    #[test]
+    fn no_work_is_under_way_when_the_device_is_gone_and_a_panic_stays_where_it_is() {
+        let background = Background::default();
+        background.begin(|| panic!("expected by the test"));
+        let done = Arc::new(AtomicBool::new(false));
+        let (told, begun) = channel();
+        let ends = done.clone();
+        background.begin(move || {
+            told.send(()).unwrap();
+            std::thread::sleep(Duration::from_millis(100));
+            ends.store(true, Ordering::SeqCst);
+        });
+        begun.recv_timeout(Duration::from_secs(60)).unwrap();
+        assert!(!done.load(Ordering::SeqCst));
+        drop(background);
+        assert!(done.load(Ordering::SeqCst));
+    }
+}
