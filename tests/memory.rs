@@ -95,7 +95,7 @@ fn a_long_scan_needs_no_more_memory_than_a_short_one() {
             resume: false,
         };
         let open = |_| Ok(Box::new(Repeating { pictures: pictures.clone(), next: 0, shots }) as Box<dyn Source>);
-        let report = scan_on(processor.clone(), "id", "test", open, &rig, &options, |_, _| {}).unwrap();
+        let report = scan_on(|| Ok(processor.clone()), "id", "test", open, &rig, &options, |_, _| {}).unwrap();
         assert!(report.points > shots as u64 * 250, "{} points of {shots} shots", report.points);
         high_water()
     };

@@ -123,9 +123,15 @@ fn a_lost_device_costs_no_finished_shot() {
                 None => Box::new(inner),
             })
         };
-        scan_on(Processor::Gpu(device.clone()), "id", "test", source, &rig, &options(&b.at(out)), |done, _| {
-            *told = done
-        })
+        scan_on(
+            || Ok(Processor::Gpu(device.clone())),
+            "id",
+            "test",
+            source,
+            &rig,
+            &options(&b.at(out)),
+            |done, _| *told = done,
+        )
     };
     let mut told = 0;
     let fault = run("lost", device, Some(140), &mut told).expect_err("the device was lost");

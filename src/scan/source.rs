@@ -45,8 +45,9 @@ pub trait Source {
     fn next(&mut self) -> Option<std::result::Result<Shot, BadShot>>;
 }
 
-/// Shots decoded ahead: enough for two threads to stay busy, 200 MB at 12 MP.
-const AHEAD: usize = 8;
+/// Memory for shots that are decoded ahead: at 640x480 two batches of the GPU's chain, eight shots at 12 MP and 8 bits. Half as
+/// much again holds those that are being decoded.
+const AHEAD_BYTES: usize = 100 << 20;
 
 /// A recording folder as a source.
 pub struct RecordingSource {
@@ -86,10 +87,12 @@ impl RecordingSource {
         }
         let jobs = jobs.split_off(first.min(jobs.len()));
         let format = Format { width: meta.image.width, height: meta.image.height, bits: meta.image.bits };
-        let (send, shots) = sync_channel(AHEAD);
+        let bytes = format.width as usize * format.height as usize * if format.bits > 8 { 2 } else { 1 };
+        let ahead = (AHEAD_BYTES / bytes.max(1)).clamp(8, 64);
+        let (send, shots) = sync_channel(ahead);
         let (remaining, recording) = (jobs.len(), recording.clone());
         std::thread::spawn(move || {
-            for chunk in jobs.chunks(AHEAD / 2) {
+            for chunk in jobs.chunks((ahead / 2).max(rayon::current_num_threads())) {
                 let decoded: Vec<_> = chunk
                     .par_iter()
                     .map(|(index, name, pose)| match recording.picture(name) {

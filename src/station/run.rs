@@ -104,7 +104,7 @@ pub struct HeightMapFigures {
 /// Points and shots between two checkpoints: what a crash can cost.
 const CHECKPOINT_SHOTS: usize = 64;
 
-/// [`scan_on`] where the options say.
+/// [`scan_on`] where the options say; the device is opened while the first pictures are decoded.
 pub fn scan(
     id: &str,
     label: &str,
@@ -113,15 +113,15 @@ pub fn scan(
     options: &ScanOptions,
     progress: impl FnMut(usize, Option<usize>),
 ) -> Result<ScanReport> {
-    scan_on(options.place.open()?, id, label, open, rig, options, progress)
+    scan_on(|| options.place.open(), id, label, open, rig, options, progress)
 }
 
-/// Runs a scan from the first shot to the last file. `id` names the recording (a hash of its
+/// Runs a scan from the first shot to the last file. `processor` is asked for once the source is open; `id` names the recording (a hash of its
 /// meta.json, poses and ambient picture), so that a resumed scan cannot continue another one; `open` gives the source
 /// from a shot on; `progress` is told (shots done, shots in all). Whatever ends it early, the shots that were done stay
 /// done and the next run can resume there.
 pub fn scan_on(
-    processor: Processor,
+    processor: impl FnOnce() -> Result<Processor>,
     id: &str,
     label: &str,
     open: impl FnOnce(usize) -> Result<Box<dyn Source>>,
@@ -146,14 +146,15 @@ pub fn scan_on(
         }
         None => Checkpoint::new(identity),
     };
+    // A resumed scan reads the last finished shot again, because points are judged by the shots around them.
+    let repeated = state.shots.min(1);
+    let mut source = open(state.shots - repeated)?;
+    let processor = processor()?;
     let cloud = if state.shots > 0 {
         CloudWriter::resume(&cloud_path, state.points)?
     } else {
         CloudWriter::create(&cloud_path)?
     };
-    // A resumed scan reads the last finished shot again, because points are judged by the shots around them.
-    let repeated = state.shots.min(1);
-    let mut source = open(state.shots - repeated)?;
     let total = source.remaining().map(|n| n + state.shots - repeated);
     let scanner = Scanner::new(
         rig,
