@@ -205,12 +205,12 @@ fn sample(source: &(impl PointSource + ?Sized), min_quality: f32) -> Result<Samp
 /// 0.02 % of the points on either side may be strays and do not widen the grid.
 fn extent(points: &[Vec3], axis: usize) -> (f64, f64) {
     let mut values: Vec<f64> = points.iter().map(|p| p[axis]).collect();
-    values.sort_unstable_by(f64::total_cmp);
-    let cut = values.len() / 5_000;
-    let (low, high) = (values[cut], values[values.len() - 1 - cut]);
+    let mut at = |i: usize| *values.select_nth_unstable_by(i, f64::total_cmp).1;
+    let (last, cut) = (points.len() - 1, points.len() / 5_000);
+    let [least, low, high, most] = [0, cut, last - cut, last].map(&mut at);
     // Strays are those that leave a gap; a dense edge is kept whole.
     let margin = 0.01 * (high - low) + 0.5;
-    (values[0].max(low - margin), values[values.len() - 1].min(high + margin))
+    (least.max(low - margin), most.min(high + margin))
 }
 
 /// The scan's best plane: the one with most points within 0.2 mm (seeded consensus over 400 triples),

@@ -54,12 +54,14 @@ impl HeightMap {
     }
     /// The heights between which the given share of the measured cells lies, e.g. 0.01 and 0.99.
     pub fn quantiles(&self, low: f64, high: f64) -> Option<(f32, f32)> {
-        let mut z: Vec<f32> = self.z.iter().copied().filter(|z| z.is_finite()).collect();
-        if z.is_empty() {
-            return None;
-        }
-        z.sort_unstable_by(f32::total_cmp);
-        let at = |q: f64| z[((z.len() - 1) as f64 * q).round() as usize];
-        Some((at(low), at(high)))
+        quantiles(&self.z, low, high)
     }
+}
+
+/// The values below which the given shares of the finite ones lie; `None` where none is finite.
+pub(super) fn quantiles(values: &[f32], low: f64, high: f64) -> Option<(f32, f32)> {
+    let mut finite: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    let last = finite.len().checked_sub(1)?;
+    let mut at = |q: f64| *finite.select_nth_unstable_by((last as f64 * q).round() as usize, f32::total_cmp).1;
+    Some((at(low), at(high)))
 }

@@ -8,6 +8,7 @@ use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Grid, Rigid};
 use crate::raster::{Image, float_tiff, png, read_float_tiff};
 use crate::rig::write_atomically;
+use rayon::prelude::*;
 use std::path::Path;
 
 /// `height.json`: what the pixels of `height.tif` and `height.png` mean.
@@ -39,23 +40,24 @@ impl HeightMap {
         std::fs::create_dir_all(folder).map_err(|e| Fault::write(folder, e))?;
         let put = |name: &str, bytes: &[u8]| write_atomically(&folder.join(name), bytes);
         let (w, h) = (self.width, self.height);
-        put("height.tif", &float_tiff(w, h, &self.z, "height above the grid plane, mm; NaN is missing"))?;
-        put("intensity.tif", &float_tiff(w, h, &self.intensity, "stripe amplitude, grey levels; NaN is missing"))?;
-        put("sigma.tif", &float_tiff(w, h, &self.sigma, "standard deviation of the height, mm; NaN is missing"))?;
-        let count = self.count.iter().map(|&n| n.min(65_535) as u16).collect();
-        put("count.png", &png(&Image::from_u16(w, h, 16, count)))?;
         let (scale, pixels) = self.to_u16();
-        put("height.png", &png(&Image::from_u16(w, h, 16, pixels)))?;
         put("height.json", serde_json::to_string_pretty(&scale).expect("plain numbers").as_bytes())?;
-        for (what, name) in [
-            (Shown::Height, "height_picture.png"),
-            (Shown::Intensity, "intensity_picture.png"),
-            (Shown::Sigma, "sigma_picture.png"),
-            (Shown::Coverage, "coverage_picture.png"),
-        ] {
-            put(name, &self.picture(what).0.to_png())?;
-        }
-        Ok(())
+        let map = |values: &[f32], what: &str| float_tiff(w, h, values, &format!("{what}; NaN is missing"));
+        let deep = |levels: Vec<u16>| png(&Image::from_u16(w, h, 16, levels));
+        let picture = |what: Shown| self.picture(what).0.to_png();
+        // Every file takes some milliseconds, most of them for its compression or on the way to the disk.
+        let files: [(&str, &(dyn Fn() -> Vec<u8> + Sync)); 9] = [
+            ("height_picture.png", &|| picture(Shown::Height)),
+            ("intensity_picture.png", &|| picture(Shown::Intensity)),
+            ("sigma_picture.png", &|| picture(Shown::Sigma)),
+            ("coverage_picture.png", &|| picture(Shown::Coverage)),
+            ("height.png", &|| deep(pixels.clone())),
+            ("count.png", &|| deep(self.count.iter().map(|&n| n.min(65_535) as u16).collect())),
+            ("height.tif", &|| map(&self.z, "height above the grid plane, mm")),
+            ("intensity.tif", &|| map(&self.intensity, "stripe amplitude, grey levels")),
+            ("sigma.tif", &|| map(&self.sigma, "standard deviation of the height, mm")),
+        ];
+        files.par_iter().try_for_each(|(name, bytes)| put(name, &bytes()))
     }
 
     /// 16-bit heights with their scale: 1..=65535 spans the map, 0 is missing.

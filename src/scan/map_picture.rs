@@ -3,6 +3,7 @@
 //! Frame and unit: the grid seen from above, x to the right, y up; mm and grey levels on the scales.
 
 use super::HeightMap;
+use super::heightmap::quantiles;
 use crate::raster::{Rgb, RgbImage, colour, text_width};
 
 /// Which of a height map's values is shown.
@@ -102,13 +103,8 @@ impl MapPlace {
 
 /// The values between which 99 % of the cells lie; from zero where zero means something.
 fn span(values: &[f32], what: Shown) -> (f32, f32) {
-    let mut sorted: Vec<f32> = values.iter().copied().filter(|v| v.is_finite()).collect();
-    if sorted.is_empty() {
-        return (0.0, 1.0);
-    }
-    sorted.sort_unstable_by(f32::total_cmp);
-    let at = |q: f64| sorted[((sorted.len() - 1) as f64 * q).round() as usize];
-    let (low, high) = (if what == Shown::Height { at(0.005) } else { 0.0 }, at(0.995));
+    let Some((low, high)) = quantiles(values, 0.005, 0.995) else { return (0.0, 1.0) };
+    let low = if what == Shown::Height { low } else { 0.0 };
     let high = if high > low { high } else { low + 1.0 };
     // The lowest tenth of the colours is nearly black: a plate that fills the map shall not be lost in it.
     (if what == Shown::Height { low - 0.12 * (high - low) } else { low }, high)

@@ -317,15 +317,20 @@ fn escape(text: &str) -> String {
 /// RFC 4648, with padding.
 fn base64(bytes: &[u8]) -> String {
     const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut out = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for chunk in bytes.chunks(3) {
-        let word = chunk.iter().fold(0u32, |w, &b| w << 8 | u32::from(b)) << (8 * (3 - chunk.len()));
-        for i in 0..4 {
-            let letter = LETTERS[(word >> (18 - 6 * i) & 63) as usize];
-            out.push(if i <= chunk.len() { letter as char } else { '=' });
-        }
+    let letters = |a: u8, b: u8, c: u8| {
+        let word = u32::from_be_bytes([0, a, b, c]);
+        [18, 12, 6, 0].map(|shift| LETTERS[(word >> shift & 63) as usize])
+    };
+    let mut out = Vec::with_capacity(bytes.len().div_ceil(3) * 4);
+    let threes = bytes.chunks_exact(3);
+    let rest = threes.remainder();
+    threes.for_each(|t| out.extend_from_slice(&letters(t[0], t[1], t[2])));
+    if let Some(&first) = rest.first() {
+        let last = letters(first, rest.get(1).copied().unwrap_or(0), 0);
+        out.extend_from_slice(&last[..=rest.len()]);
+        out.resize(out.len().next_multiple_of(4), b'=');
     }
-    out
+    String::from_utf8(out).expect("letters")
 }
 
 #[cfg(test)]

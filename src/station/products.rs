@@ -22,10 +22,14 @@ pub fn write(
         return Ok(None);
     }
     let source = CloudFile::open(cloud)?;
-    let map = grid_on(&source, &GridOptions { up, ..options.clone() }, device)?;
+    let heights = || {
+        let map = grid_on(&source, &GridOptions { up, ..options.clone() }, device)?;
+        map.save(out)?;
+        Ok(map)
+    };
+    let (map, pcd) = rayon::join(heights, || write_pcd(&out.join("cloud.pcd"), &source, points));
+    let map = pcd.and(map)?;
     let (low, high) = map.quantiles(0.01, 0.99).unwrap_or((f32::NAN, f32::NAN));
-    map.save(out)?;
-    write_pcd(&out.join("cloud.pcd"), &source, points)?;
     Ok(Some(HeightMapFigures {
         width: map.width,
         height: map.height,

@@ -4,7 +4,7 @@
 
 use crate::fault::{Fault, Result};
 use crate::scan::{CloudWriter, Profile};
-use crate::stages::peak::Stripe;
+use crate::stages::peak::{Reject, Stripe};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -79,8 +79,11 @@ impl Checkpoint {
     pub fn add(&mut self, profile: &Profile) {
         // A skipped shot leaves a gap in the indices; resuming goes on behind the last one done.
         self.shots = profile.shot as usize + 1;
-        for peak in &profile.peaks {
-            *self.peaks.entry(peak.reject().words().to_owned()).or_default() += 1;
+        for fate in Reject::ALL {
+            let n = profile.peaks.iter().filter(|peak| peak.reject() == fate).count();
+            if n > 0 {
+                *self.peaks.entry(fate.words().to_owned()).or_default() += n as u64;
+            }
         }
         if profile.points.is_empty() {
             self.dark.push(profile.shot);
