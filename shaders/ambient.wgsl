@@ -19,7 +19,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let q = (a >> vec4(shift)) & mask;
         out |= select(p - min(p, q), p, p >= full) << vec4(shift);
     }
-    for (var once = u32(id.x < words); once > 0u; once--) {
+    if id.x < words {
         image[i] = out;
     }
 }

@@ -12,10 +12,10 @@
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x < all[3] {
         let tile = list[id.x];
-        for (var keep = u32(latest(tile) > frame.step); keep > 0u; keep--) {
+        if latest(tile) > frame.step {
             let at = atomicAdd(&listing.count, 1u);
             active_list[at] = tile;
-            for (var group = u32(at % 64u == 0u); group > 0u; group--) {
+            if at % 64u == 0u {
                 atomicAdd(&listing.groups, 1u);
             }
         }

@@ -23,17 +23,17 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             }
             bits &= 0xffffffffu >> (32u - columns);
             bits = select(0u, bits, 8u * tile_y(tile) + row < frame.height);
-            for (var region = frame.flags & 2u; region != 0u; region = 0u) {
+            if (frame.flags & 2u) != 0u {
                 bits &= roi[8u * (tile_y(tile) * frame.tiles_x + tile_x(tile)) + row];
             }
             mask[mask_index(tile, row)] = bits;
             lit[mask_index(tile, row)] = bits;
             any_lit |= bits;
         }
-        for (var some = u32(any_lit != 0u); some > 0u; some--) {
+        if any_lit != 0u {
             let place = atomicAdd(&lit_listing.count, 1u);
             lit_list[place] = tile;
-            for (var group = u32(place % 64u == 0u); group > 0u; group--) {
+            if place % 64u == 0u {
                 atomicAdd(&lit_listing.groups, 1u);
             }
         }

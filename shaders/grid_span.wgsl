@@ -9,7 +9,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x < frame.points {
         let i = id.x * RECORD;
         let at = place(frame, vec3(records[i], records[i + 1u], records[i + 2u]), bitcast<i32>(records[i + 5u]));
-        for (var there = u32(at.y > 0u); there > 0u; there--) {
+        if at.y > 0u {
             atomicMax(&span[2u * at.x], 65536u - at.y);
             atomicMax(&span[2u * at.x + 1u], at.y);
         }

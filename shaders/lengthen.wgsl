@@ -127,7 +127,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
                 var t = 1;
                 var last = select(0, i32(frame.lengthen & 0xffffu), length2 > 0.0);
                 var limit = 0u;
-                for (var once = u32(last > 0); once > 0u; once--) {
+                if last > 0 {
                     limit = (frame.lengthen >> 16u) * nine(shot, x, y);
                 }
                 while t <= last {
@@ -139,7 +139,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
                     let word = mask_word(shot, u32(c), u32(d));
                     let bit = 1u << (u32(c) & 31u);
                     let on = there && (lit[word] & bit) != 0u && 4096u * nine(shot, c, d) >= limit;
-                    for (var once = u32(on); once > 0u; once--) {
+                    if on {
                         atomicOr(&long[word], bit);
                     }
                     last = select(0, last, on);

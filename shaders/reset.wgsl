@@ -10,7 +10,7 @@
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let empty = vec4(0u, 1u, 1u, 0u);
-    for (var once = u32(id.x < 4u && frame.step == 0u); once > 0u; once--) {
+    if id.x < 4u && frame.step == 0u {
         first[id.x] = empty[id.x];
         first[64u + id.x] = empty[id.x];
         runs[id.x] = empty[id.x];

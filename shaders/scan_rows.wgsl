@@ -14,7 +14,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         starts[at] = sum;
         sum += counts[at];
     }
-    for (var once = u32(id.x < n); once > 0u; once--) {
+    if id.x < n {
         rows[row] = sum;
     }
 }

@@ -25,9 +25,9 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         row_starts[at] = sum;
         sum += rows[at];
     }
-    for (var once = u32(id.x < frame.shots); once > 0u; once--) {
+    if id.x < frame.shots {
         header[8u + shot] = before;
-        for (var last = u32(shot + 1u == frame.shots); last > 0u; last--) {
+        if shot + 1u == frame.shots {
             let kept = min(sum, frame.capacity);
             header[0] = (kept + 63u) / 64u;
             header[1] = 1u;

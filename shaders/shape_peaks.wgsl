@@ -26,16 +26,16 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             let x = i32(column + k);
             let y = i32(row);
             let value = (word >> (8u * k)) & 255u;
-            for (var high = u32(value >= frame.least && column + k < frame.columns); high > 0u; high--) {
+            if value >= frame.least && column + k < frame.columns {
                 var highest = 0u;
                 for (var dy = -1; dy <= 1; dy++) {
                     for (var dx = -1; dx <= 1; dx++) {
                         highest = max(highest, at(first, x + dx, y + dy));
                     }
                 }
-                for (var peak = u32(highest <= value); peak > 0u; peak--) {
+                if highest <= value {
                     let place = atomicAdd(&header[3], 1u);
-                    for (var room = u32(place < frame.capacity); room > 0u; room--) {
+                    if place < frame.capacity {
                         hits[place] = vec2<u32>(id.y | (value << 24u), (column + k) | (row << 16u));
                     }
                 }

@@ -63,10 +63,10 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let found = candidates(own, i32(8u * tile_y(tile)), max(passing, i32(frame.minimum)));
         let count = (found.count.x + found.count.y) + (found.count.z + found.count.w);
         let place = (found.place.x + found.place.y) + (found.place.z + found.place.w);
-        for (var crowded = u32(count > 1u); crowded > 0u; crowded--) {
+        if count > 1u {
             let slot = atomicAdd(&run_listing.count, 1u);
             runs[slot] = vec2(tile, 1u);
-            for (var group = u32(slot % 64u == 0u); group > 0u; group--) {
+            if slot % 64u == 0u {
                 atomicAdd(&run_listing.groups, 1u);
             }
         }
@@ -91,16 +91,16 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         // One alone lies in the picture: beyond its border the same pixel repeats, in the same tile.
         var passes = count == 1u && i32(area) * (i32(value) - frame.offset) > i32(sum + (area - 1u) / 2u);
         let bit = 1u << column;
-        for (var region = frame.flags & 2u; region != 0u; region = 0u) {
+        if (frame.flags & 2u) != 0u {
             passes = passes && (roi[mask_word(0u, u32(x), u32(y))] & bit) != 0u;
         }
-        for (var speck = u32(passes); speck > 0u; speck--) {
+        if passes {
             let at = mask_index(tile, row);
             mask[at] = bit;
             lit[at] = bit;
             let slot = atomicAdd(&lit_listing.count, 1u);
             lit_list[slot] = tile;
-            for (var group = u32(slot % 64u == 0u); group > 0u; group--) {
+            if slot % 64u == 0u {
                 atomicAdd(&lit_listing.groups, 1u);
             }
         }

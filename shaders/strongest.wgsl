@@ -20,7 +20,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let flags = select(k.flags, k.flags | why, (k.flags & 255u) == 0u);
         peaks[id.x].flags = flags;
         let along = select(k.pixel >> 16u, k.pixel & 0xffffu, frame.columns != 0u) / frame.line_px;
-        for (var kept = u32((flags & 255u) == 0u); kept > 0u; kept--) {
+        if (flags & 255u) == 0u {
             atomicMax(&strongest[k.shot * frame.lines + along], bitcast<u32>(k.amplitude));
         }
     }

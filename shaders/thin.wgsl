@@ -127,7 +127,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         after[2u * at + 1u] = here1 & ~gone1;
         // Only its own: shortening the list looks at the stamps around, eight stores here would cost a third of the stage.
         let both = gone0 | gone1;
-        for (var changed = u32(((both.x | both.y) | (both.z | both.w)) != 0u); changed > 0u; changed--) {
+        if ((both.x | both.y) | (both.z | both.w)) != 0u {
             stamps[at] = frame.step + 3u;
         }
     }

@@ -109,7 +109,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
                 lower = select(lower, vec4(bits), vec4(k) == vec4(4, 5, 6, 7));
                 pass_row(picture + u32(clamp(top + k - r, 0, last_row)) * pitch, first, loads(), 0xffffffffu);
             }
-            for (var region = frame.flags & 2u; region != 0u; region = 0u) {
+            if (frame.flags & 2u) != 0u {
                 let at = ty * frame.tiles_x + x;
                 upper &= roi[2u * at];
                 lower &= roi[2u * at + 1u];
@@ -120,10 +120,10 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             mask[2u * at + 1u] = lower;
             lit[2u * at] = upper;
             lit[2u * at + 1u] = lower;
-            for (var some = u32(any((upper | lower) != vec4(0u))); some > 0u; some--) {
+            if any((upper | lower) != vec4(0u)) {
                 let place = atomicAdd(&lit_listing.count, 1u);
                 lit_list[place] = tile;
-                for (var group = u32(place % 64u == 0u); group > 0u; group--) {
+                if place % 64u == 0u {
                     atomicAdd(&lit_listing.groups, 1u);
                 }
             }

@@ -209,7 +209,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         lit |= vec4(all);
         lit &= vec4(i32(y)) + ROWS <= vec4(last);
         var left = places_of(lit);
-        for (var region = frame.flags & 2u; region != 0u; region = 0u) {
+        if (frame.flags & 2u) != 0u {
             var wanted = vec4(false);
             for (var k = 0u; k < 4u; k++) {
                 let at = 2u * (u32(rows[k]) * frame.tiles_x + x);
@@ -217,7 +217,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             }
             left &= places_of(wanted);
         }
-        for (var some = u32(left != 0u); some > 0u; some--) {
+        if left != 0u {
             atomicAdd(&listing.count, countOneBits(left));
         }
         while left != 0u {
@@ -228,17 +228,17 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             let k = countTrailingZeros(lowest);
             let tile = tile_pack(x, y + k, shot);
             let alone = weighted != 0u || (length == 1u && !all);
-            for (var one = u32(alone); one > 0u; one--) {
+            if alone {
                 let slot = atomicAdd(&single_listing.count, 1u);
                 singles[slot] = vec2(tile, least[k]);
-                for (var group = u32(slot % 64u == 0u); group > 0u; group--) {
+                if slot % 64u == 0u {
                     atomicAdd(&single_listing.groups, 1u);
                 }
             }
-            for (var longer = u32(!alone); longer > 0u; longer--) {
+            if !alone {
                 let slot = atomicAdd(&run_listing.count, 1u);
                 runs[slot] = vec2(tile, length);
-                for (var group = u32(slot % 64u == 0u); group > 0u; group--) {
+                if slot % 64u == 0u {
                     atomicAdd(&run_listing.groups, 1u);
                 }
             }
