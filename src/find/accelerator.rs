@@ -2,7 +2,7 @@
 //! the same numbers as the CPU's. Frame and unit: strided places of the level; a perfect feature scores 4.
 
 use super::coarse::{Level, Placed};
-use crate::fault::Result;
+use crate::fault::{Fault, Result};
 use crate::gpu::{Device, Pipeline, Recording, Replay};
 use crate::stages::shape_frame::ShapeFrame;
 use crate::stages::shape_maps::{QUANTISE, SPREAD};
@@ -51,6 +51,7 @@ const TRIAL: usize = 320;
 const TRIAL_FEATURES: usize = 32;
 const TRIAL_TURNS: [usize; 2] = [8, 72];
 const TRIAL_RUNS: usize = 3;
+const TRIAL_ROUNDS: usize = 4;
 
 impl Accelerator {
     /// The best adapter if it is a GPU, with the rule of this machine. A software adapter runs the sums on the very cores
@@ -80,7 +81,8 @@ impl Accelerator {
         fits && self.rule.is_none_or(|r| r.pays(features as u64 * u64::from(frame.columns * frame.rows)))
     }
 
-    /// Times the same small searches here and on the CPU: the slope is an addition's cost, what is left is fixed.
+    /// Times the same small searches here and on the CPU. Here the slope is an addition's cost, what is left is fixed; on the
+    /// CPU nothing is.
     pub fn measured(&self) -> Result<Rule> {
         let level = Level::trial(TRIAL);
         let placed = TRIAL_TURNS.map(|turns| Level::trial_turns(turns, TRIAL_FEATURES));
@@ -98,14 +100,21 @@ impl Accelerator {
         };
         let places = f64::from(level.frame.columns * level.frame.rows);
         let additions = TRIAL_TURNS.map(|t| (t * TRIAL_FEATURES) as f64 * places);
-        let slope = |t: [f64; 2]| ((t[1] - t[0]) / (additions[1] - additions[0])).max(0.0);
-        let here = [
-            best(&|| self.peaks(&level, &placed[0], LEAST).map(drop))?,
-            best(&|| self.peaks(&level, &placed[1], LEAST).map(drop))?,
-        ];
-        let cpu = [0, 1].map(|k| best(&|| Ok(drop(level.peaks(&placed[k], LEAST)))).expect("it cannot fail"));
-        let here_s = slope(here);
-        Ok(Rule { fixed_s: (here[0] - here_s * additions[0]).max(0.0), here_s, cpu_s: slope(cpu) })
+        let cpu_s = best(&|| Ok(drop(level.peaks(&placed[1], LEAST))))? / additions[1];
+        // Where more work took no longer, or so much longer that less would take none, something else had the processors.
+        for _ in 0..TRIAL_ROUNDS {
+            let few = best(&|| self.peaks(&level, &placed[0], LEAST).map(drop))?;
+            let many = best(&|| self.peaks(&level, &placed[1], LEAST).map(drop))?;
+            let here_s = (many - few) / (additions[1] - additions[0]);
+            let fixed_s = few - here_s * additions[0];
+            if here_s > 0.0 && fixed_s > 0.0 {
+                return Ok(Rule { fixed_s, here_s, cpu_s });
+            }
+        }
+        let times = additions[1] / additions[0];
+        Err(Fault::device(format!("what {times} times the work costs makes no sense, {TRIAL_ROUNDS} times in turn"))
+            .cause("other programs keep the GPU busy")
+            .next("search on the CPU, or wait until the GPU is free"))
     }
 
     /// The peaks in the order of turn, row, column; `None` where there are more than the list holds.
