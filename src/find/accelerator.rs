@@ -55,7 +55,7 @@ const TRIAL_ROUNDS: usize = 4;
 
 impl Accelerator {
     /// The best adapter if it is a GPU, with the rule of this machine. A software adapter runs the sums on the very cores
-    /// that the CPU's own code would use, without its tables in the cache: it is not even measured.
+    /// that the CPU's own code would use: it is not even measured.
     pub fn open() -> Option<Accelerator> {
         let device = Device::open().ok().filter(|d| d.info.kind != "CPU")?;
         let mut accelerator = Accelerator::on(&device).ok()?;
