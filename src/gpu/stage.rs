@@ -117,8 +117,7 @@ impl Stage {
         let source = if texels { self.source_of_texels() } else { self.source() };
         let source =
             wgpu::ShaderModuleDescriptor { label: Some(self.name), source: wgpu::ShaderSource::Wgsl(source.into()) };
-        // A counter of turns in every loop keeps the driver from writing short loops out: on lavapipe stages compile in two
-        // thirds of the time without, and a fifth less where it has no stage in its cache.
+        // A counter of turns in every loop keeps the driver from writing short loops out, and takes it longer to compile.
         let checks = wgpu::ShaderRuntimeChecks { force_loop_bounding: false, ..wgpu::ShaderRuntimeChecks::checked() };
         // SAFETY: every loop ends (tests/shader_contracts.rs); all other checks stay.
         let module = unsafe { device.create_shader_module_trusted(source, checks) };

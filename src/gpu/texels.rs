@@ -44,8 +44,8 @@ impl Texel {
     }
 }
 
-/// An array's element in WGSL, and the texels it is read as: two words a texel take the adapter three times as long as
-/// two texels of one.
+/// An array's element in WGSL, and the texels it is read as: two words a texel take the adapter longer than two
+/// texels of one.
 #[derive(Clone, Copy, Debug)]
 struct Element {
     ty: &'static str,

@@ -83,13 +83,17 @@ pub fn differing_words(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
         .sum::<usize>() as f64
 }
 
-/// As `differing_words`, where the last binding is a list in any order whose length is word 3 of the
-/// binding before it: which tile takes which place is up to the GPU's scheduler.
-pub fn differing_words_unordered(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
+/// As `differing_words`, where some bindings are lists in any order: (binding, words an entry). The number of entries is
+/// word 3 of the binding before the list; which tile takes which place is up to the GPU's scheduler.
+pub fn differing_words_beside_order(gpu: &[Vec<u32>], twin: &[Vec<u32>], lists: &[(usize, usize)]) -> f64 {
     let sorted = |b: &[Vec<u32>]| {
         let mut b = b.to_vec();
-        let count = b[b.len() - 2][3] as usize;
-        b.last_mut().unwrap()[..count].sort_unstable();
+        for &(list, words) in lists {
+            let count = b[list - 1][3] as usize * words;
+            let mut entries: Vec<Vec<u32>> = b[list][..count].chunks(words).map(<[u32]>::to_vec).collect();
+            entries.sort_unstable();
+            b[list][..count].copy_from_slice(&entries.concat());
+        }
         b
     };
     differing_words(&sorted(gpu), &sorted(twin))

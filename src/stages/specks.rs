@@ -2,17 +2,15 @@
 //! passes against that are settled; those with more go on as runs of one.
 //! Frame and unit: pixels, tiles of 32 x 8; sums in 256ths of full scale.
 
-use super::frame::{self, COLUMNS, Frame, HAS_ROI, PX_LOG2, SHARED, frame_of, tile_unpack};
+use super::frame::{Frame, HAS_ROI, frame_of, tile_unpack};
 use super::listing::{append, mask_index};
 use super::stats::{depth_shift, padded_pixel};
-use super::threshold::{RADIUS, passes_mean};
+use super::threshold::{self, passes_mean};
 use crate::gpu::{Access::*, Binding, Stage};
 
 pub const STAGE: Stage = Stage {
     name: "specks",
     wgsl: include_str!("../../shaders/specks.wgsl"),
-    shared: &[SHARED, COLUMNS],
-    workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "image", access: Texels },
@@ -26,8 +24,7 @@ pub const STAGE: Stage = Stage {
         Binding { name: "run_listing", access: ReadWrite },
         Binding { name: "runs", access: ReadWrite },
     ],
-    uniform: frame::UNIFORM,
-    overrides: &[PX_LOG2, RADIUS],
+    ..threshold::MEAN
 };
 
 /// Least brightness that passes against a window of that sum.
@@ -65,18 +62,4 @@ pub fn twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
             append(lit_listing, lit_list, [tile]);
         }
     }
-}
-
-/// Words in which two results differ; the order of both lists is up to the GPU's scheduler.
-pub fn apart(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
-    let sorted = |b: &[Vec<u32>]| {
-        let mut b = b.to_vec();
-        let (tiles, runs) = (b[7][3] as usize, 2 * b[9][3] as usize);
-        b[8][..tiles].sort_unstable();
-        let mut pairs: Vec<[u32; 2]> = bytemuck::cast_slice(&b[10][..runs]).to_vec();
-        pairs.sort_unstable();
-        b[10][..runs].copy_from_slice(bytemuck::cast_slice(&pairs));
-        b
-    };
-    super::entry::differing_words(&sorted(gpu), &sorted(twin))
 }

@@ -90,18 +90,3 @@ pub fn twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
         }
     }
 }
-
-/// Words in which two results differ; the order of the runs is up to the GPU's scheduler.
-pub fn apart(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
-    let sorted = |b: &[Vec<u32>]| {
-        let mut b = b.to_vec();
-        for (listing, list) in [(4, 5), (6, 7)] {
-            let count = b[listing][3] as usize;
-            let mut pairs: Vec<[u32; 2]> = bytemuck::cast_slice(&b[list][..2 * count]).to_vec();
-            pairs.sort_unstable();
-            b[list][..2 * count].copy_from_slice(bytemuck::cast_slice(&pairs));
-        }
-        b
-    };
-    super::entry::differing_words(&sorted(gpu), &sorted(twin))
-}

@@ -102,7 +102,7 @@ impl PeakFrame {
         // between samples that far apart. Along a stripe that lies as it should there is room for half as much again.
         let (lattice_across, lattice_along) = ((1.4 * s0).round().max(1.0) as i32, (2.1 * s0).round().max(2.0) as i32);
         let stride_across = (0.25 * s0).floor().max(1.0);
-        // Rows within 0.4 widths are one sample: their spread, a hundredth of the stripe's, is known and costs 1 % of sigma.
+        // Rows within 0.4 widths are one sample: their spread is known and costs little of sigma.
         let rows = (0.4 * s0 / stride_across).floor().max(1.0);
         PeakFrame {
             width: width as i32,
