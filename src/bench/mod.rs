@@ -4,9 +4,13 @@
 mod machine;
 mod peer;
 mod run;
+mod scaling;
 mod scenes;
+mod table;
 
 pub use machine::{Ceilings, cpu_seconds, peak_memory_bytes};
 pub use peer::serve;
-pub use run::{BenchOptions, Latency, Report, Row, Soak, Stage, run, table};
+pub use run::{BenchOptions, Latency, Report, Row, Soak, Stage, run};
+pub use scaling::Scaling;
 pub use scenes::{Scene, pictures};
+pub use table::table;

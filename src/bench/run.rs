@@ -2,6 +2,7 @@
 //! memory, stage times. Frame and unit: as the fields say.
 
 use super::machine::{self, Ceilings};
+use super::scaling::{self, Scaling};
 use super::scenes::{Scene, pictures};
 use crate::fault::{Fault, Result};
 use crate::gpu::{AdapterInfo, Device};
@@ -25,6 +26,8 @@ pub struct BenchOptions {
     pub seconds: f64,
     /// Shots of a long run of the full chain that is watched for growing memory, a row; 0 is none.
     pub soak: usize,
+    /// Measure pictures of one size with more and more lit pixels as well.
+    pub lit_shares: bool,
 }
 
 impl Default for BenchOptions {
@@ -34,6 +37,7 @@ impl Default for BenchOptions {
             scenes: Scene::ALL.to_vec(),
             seconds: 2.0,
             soak: 0,
+            lit_shares: true,
         }
     }
 }
@@ -117,6 +121,9 @@ pub struct Report {
     pub threads: usize,
     pub ceilings: Ceilings,
     pub rows: Vec<Row>,
+    /// How the time a shot grows with the pixels, for scenes of two sizes and more; and with the share of lit pixels.
+    pub with_pixels: Vec<Scaling>,
+    pub with_light: Option<Scaling>,
 }
 
 /// Measures on the given device. `progress` hears the row that begins.
@@ -130,12 +137,20 @@ pub fn run(device: &Device, options: &BenchOptions, mut progress: impl FnMut(&st
             rows.push(row(device, width, height, scene, options, &ceilings)?);
         }
     }
+    let with_pixels = scaling::with_pixels(&rows);
+    let with_light = if options.lit_shares {
+        progress("more and more light");
+        Some(scaling::with_light(device, options.seconds / 2.0)?)
+    } else {
+        None
+    };
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
-    Ok(Report { version: env!("CARGO_PKG_VERSION"), adapter: device.info.clone(), threads, ceilings, rows })
+    let (version, adapter) = (env!("CARGO_PKG_VERSION"), device.info.clone());
+    Ok(Report { version, adapter, threads, ceilings, rows, with_pixels, with_light })
 }
 
 /// OpenCV's definition, four sigmas above the scenes' background noise.
-const THRESHOLD: ThresholdParams = ThresholdParams { window: Window::Mean, size: 31, offset: 8, minimum: 0 };
+pub(super) const THRESHOLD: ThresholdParams = ThresholdParams { window: Window::Mean, size: 31, offset: 8, minimum: 0 };
 
 /// Percentile of times in seconds, as ms.
 fn percentile(times: &mut [f64], p: f64) -> f64 {
@@ -227,9 +242,9 @@ fn row(
 }
 
 /// What a run in steady state gave.
-struct Steady {
+pub(super) struct Steady {
     shots: usize,
-    ms_per_shot: f64,
+    pub ms_per_shot: f64,
     cpu_ms_per_shot: Option<f64>,
     /// Skeleton pixels a shot, listed tiles a batch.
     points: f64,
@@ -237,7 +252,7 @@ struct Steady {
 }
 
 /// Keeps every place of the ring busy for so many seconds.
-fn steady<'a>(
+pub(super) fn steady<'a>(
     chain: &mut Chain,
     seconds: f64,
     batch_of: &impl Fn(usize) -> Vec<&'a Image>,
@@ -358,81 +373,4 @@ fn stage_times(device: &Device, config: &ChainConfig, batch: &[&Image]) -> Resul
         }
     }
     Ok(stages)
-}
-
-/// The report as a table that a person reads.
-pub fn table(report: &Report) -> String {
-    use std::fmt::Write;
-    let mut out = String::new();
-    let c = &report.ceilings;
-    let a = &report.adapter;
-    let _ = writeln!(out, "{} ({}), {}, {} threads", a.name, a.kind, a.driver, report.threads);
-    let _ = writeln!(
-        out,
-        "plain read {:.1} GB/s on one thread, {:.1} on all; upload {:.1}, readback {:.1} GB/s",
-        c.read_gb_s,
-        c.read_all_gb_s,
-        c.upload_gb_s.unwrap_or(f64::NAN),
-        c.readback_gb_s.unwrap_or(f64::NAN)
-    );
-    let _ = writeln!(
-        out,
-        "{:11} {:16} {:>5} {:>8} {:>8} {:>6} {:>8} {:>8} {:>8} {:>7} {:>7} {:>7} {:>7} {:>8} {:>8}",
-        "size",
-        "scene",
-        "batch",
-        "ms/shot",
-        "full ms",
-        "ratio",
-        "shots/s",
-        "Mpx/s",
-        "CPU ms",
-        "x read",
-        "memory",
-        "upload",
-        "tiles",
-        "p50 ms",
-        "p99 ms"
-    );
-    for r in &report.rows {
-        let _ = writeln!(
-            out,
-            "{:11} {:16} {:>5} {:>8.3} {:>8.3} {:>6.2} {:>8.1} {:>8.0} {:>8.2} {:>7.1} {:>6.1}% {:>6.1}% {:>6.1}% {:>8.2} {:>8.2}",
-            format!("{}x{}", r.width, r.height),
-            r.scene.name(),
-            r.shots_per_batch,
-            r.ms_per_shot,
-            r.full_ms_per_shot.unwrap_or(f64::NAN),
-            r.full_over_skeleton.unwrap_or(f64::NAN),
-            r.shots_per_s,
-            r.mpx_per_s,
-            r.cpu_ms_per_shot.unwrap_or(f64::NAN),
-            r.cpu_over_plain_read.unwrap_or(f64::NAN),
-            100.0 * r.share_of_memory,
-            100.0 * r.share_of_upload.unwrap_or(f64::NAN),
-            100.0 * r.listed,
-            r.latency.p50_ms,
-            r.latency.p99_ms
-        );
-    }
-    for (r, s) in report.rows.iter().filter_map(|r| Some((r, r.soak?))) {
-        let _ = writeln!(
-            out,
-            "{}x{} {}: {} shots of the full chain: {:.1} MB after a tenth, {:.1} MB at the end",
-            r.width,
-            r.height,
-            r.scene.name(),
-            s.shots,
-            s.early_mb,
-            s.late_mb
-        );
-    }
-    for r in &report.rows {
-        let _ = write!(out, "{}x{} {}: GPU ms a shot:", r.width, r.height, r.scene.name());
-        for s in &r.stages {
-            let _ = write!(out, " {} {:.3}", s.name, s.ms_per_shot);
-        }
-        let _ = writeln!(out);
-    }
-    out
 }

@@ -37,14 +37,17 @@ pub fn pictures(scene: Scene, width: u32, height: u32, count: u32) -> Vec<Image>
             Scene::OneStripe => stripe(width, height, 8, 2.5, 3, seed),
             Scene::ThickStripe => stripe(width, height, 8, 6.0, 3, seed),
             Scene::ReflectionHeavy => stripe(width, height, 8, 2.5, 60, seed),
-            Scene::NoiseHeavy => {
-                let clean = stripe(width, height, 8, 2.5, 3, seed);
-                let mut noise = Noise(seed + 100);
-                // Sigma 7 levels: an offset of 8 levels is passed by about a tenth of the pixels.
-                drawn(width, height, 8, |x, y| {
-                    (f64::from(clean.get(x, y)) + 20.0 + 7.0 * noise.normal()).round().clamp(0.0, 255.0) as u32
-                })
-            }
+            // An offset of 8 levels is passed by about a tenth of the pixels.
+            Scene::NoiseHeavy => noisy(width, height, 7.0, seed),
         })
         .collect()
+}
+
+/// A stripe in noise of so many grey levels, 1 sigma.
+pub fn noisy(width: u32, height: u32, sigma: f64, seed: u64) -> Image {
+    let clean = stripe(width, height, 8, 2.5, 3, seed);
+    let mut noise = Noise(seed + 100);
+    drawn(width, height, 8, |x, y| {
+        (f64::from(clean.get(x, y)) + 20.0 + sigma * noise.normal()).round().clamp(0.0, 255.0) as u32
+    })
 }

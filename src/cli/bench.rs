@@ -10,7 +10,9 @@ use std::path::{Path, PathBuf};
 /// Measure how fast the stripe chain is on this machine
 ///
 /// Every row is one size and one scene: time a shot in steady state with several batches in flight, CPU time,
-/// shares of what memory and upload could carry, latency of a single shot, and the GPU's time per stage.
+/// shares of what memory and upload could carry, latency of a single shot, and the GPU's time per stage. Below the table
+/// stands what a shot costs by itself and what every further megapixel and, where all scenes are measured, every further per
+/// cent of lit pixels adds.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight bench
@@ -66,6 +68,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     }
     if !args.scene.is_empty() {
         options.scenes = args.scene.clone();
+        options.lit_shares = false;
     }
     let bar = console.bar("", (options.sizes.len() * options.scenes.len()) as u64);
     let mut begun = 0;
