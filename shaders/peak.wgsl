@@ -1,10 +1,12 @@
-// In: the pictures of a batch and their skeleton pixels. Out: one peak a pixel. Twin: src/stages/peak/fit.rs,
-// profile.rs and methods.rs, where the reasons stand; docs/math.md, Stripe peak (1) to (5). Frame and unit: pixels, grey levels.
+// In: the pictures of a batch and their skeleton pixels. Out: one peak a pixel, with the reason where it fails by itself; the
+// strongest of the others on each line across the stripe. Twin: src/stages/peak/fit.rs, profile.rs, methods.rs and src/stages/choose.rs,
+// where the reasons stand; docs/math.md, Stripe peak (1) to (5). Frame and unit: pixels, grey levels.
 @group(0) @binding(0) var<uniform> frame: PeakFrame;
 @group(0) @binding(1) var<storage, read> image: array<u32>;
 @group(0) @binding(2) var<storage, read> header: array<u32>;
 @group(0) @binding(3) var<storage, read> points: array<vec2<u32>>;
 @group(0) @binding(4) var<storage, read_write> peaks: array<Peak>;
+@group(0) @binding(5) var<storage, read_write> strongest: array<atomic<u32>>;
 
 // Pixels a word as a power of two: 2 for 8-bit pictures, 1 for deeper ones.
 override px_log2: u32 = 2u;
@@ -364,6 +366,17 @@ fn derivative(at: vec2<i32>) -> Peak {
     return finish(c, n, m, max(bright, 1.0), width, sqrt(noise) / max(-d2, 1e-6), saturated);
 }
 
+// The first test that fails names the reason; the numbers are those of `Reject`.
+fn alone(k: Peak) -> u32 {
+    let across = k.normal_u * frame.across_u + k.normal_v * frame.across_v;
+    var why = 0u;
+    why = select(why, 6u, abs(across) < frame.upright);
+    why = select(why, 5u, !(k.sigma_px <= frame.uncertain));
+    why = select(why, 4u, k.width_px > frame.widest);
+    why = select(why, 3u, k.width_px < frame.narrowest);
+    return select(why, 2u, k.amplitude < frame.faintest);
+}
+
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x < header[3] {
@@ -381,6 +394,11 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         }
         peak.pixel = point.x;
         peak.shot = point.y;
+        let why = alone(peak);
+        peak.flags |= why;
         peaks[id.x] = peak;
+        if why == 0u {
+            atomicMax(&strongest[point.y * frame.lines + line_of(point.x)], bitcast<u32>(peak.amplitude));
+        }
     }
 }

@@ -1,4 +1,4 @@
-// What the stages peak, lines, strongest and choose know: pictures, stripe, noise, limits of the choice.
+// What the stages lines and peak know: pictures, stripe, noise, limits of a peak by itself.
 // The fields are explained beside the struct of the same name, src/stages/peak/frame.rs.
 struct PeakFrame {
     width: i32,
@@ -24,10 +24,6 @@ struct PeakFrame {
     upright: f32,
     across_u: f32,
     across_v: f32,
-    cut_width: f32,
-    cut_amplitude: f32,
-    echo: f32,
-    echo_reach: i32,
     lines: u32,
     columns: u32,
     entries: u32,
@@ -53,4 +49,9 @@ struct Peak {
     flags: u32,
     pixel: u32,
     shot: u32,
+}
+
+// The line across the stripe that a skeleton pixel lies on, in its shot.
+fn line_of(pixel: u32) -> u32 {
+    return select(pixel >> 16u, pixel & 0xffffu, frame.columns != 0u) / frame.line_px;
 }

@@ -219,20 +219,16 @@ fn peak_cases(scene: &Scene, wanted: &str) -> Vec<Case> {
             twin(bindings, &overrides);
         };
         let (image, points) = (walk.buffers["image"].clone(), walk.buffers["points"][..2 * n.max(1)].to_vec());
-        let mut b = vec![frame_words.clone(), image, header.clone(), points, vec![0; 12 * n.max(1)]];
-        step(&peak::STAGE, peak::stage_twin, &mut b, groups);
-        let peaks = b.pop().expect("the peaks");
         let mut b = vec![frame_words.clone(), vec![7; frame.entries as usize]];
         step(&choose::LINES, choose::lines_twin, &mut b, choose::lines_groups(&frame));
-        let mut b = vec![frame_words.clone(), header.clone(), peaks, b.pop().expect("the lines")];
-        step(&choose::STRONGEST, choose::strongest_twin, &mut b, groups);
+        let lines = b.pop().expect("the lines");
+        let mut b = vec![frame_words, image, header.clone(), points, vec![0; 12 * n.max(1)], lines];
+        step(&peak::STAGE, peak::stage_twin, &mut b, groups);
         let (strongest, peaks) = (b.pop().expect("the strongest"), b.pop().expect("the peaks"));
-        let mut b = vec![frame_words, header.clone(), strongest, peaks];
-        step(&choose::STAGE, choose::stage_twin, &mut b, groups);
-        let rig = point::PointFrame::new(&optics(f.width, f.height));
+        let rig = point::PointFrame::new(&optics(f.width, f.height), &choose::Lines::new(&frame, &choice));
         let poses = (0..f.shots).flat_map(|i| pose(i).map(f32::to_bits)).collect();
         let words = bytemuck::cast_slice::<point::PointFrame, u32>(&[rig]).to_vec();
-        let mut b = vec![words, header, poses, b.pop().expect("the peaks"), vec![0; 4 * n.max(1)]];
+        let mut b = vec![words, header, poses, strongest, peaks, vec![0; 4 * n.max(1)]];
         step(&point::STAGE, point::stage_twin, &mut b, groups);
     }
     cases

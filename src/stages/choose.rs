@@ -1,5 +1,5 @@
-//! In: the peaks of one shot. Out: the same peaks, those not believed marked with the reason.
-//! Frame and unit: image pixels; grey levels of the picture's depth; widths relative to the stripe's.
+//! In: the peaks of one shot. Out: the same peaks, those not believed marked with the reason. On the GPU the stages peak and
+//! point do it. Frame and unit: image pixels; grey levels of the picture's depth; widths relative to the stripe's.
 
 use super::peak::{Peak, PeakFrame, PeakParams, Reject, SHARED, UNIFORM, frame_of};
 use crate::fault::{Fault, Result};
@@ -94,27 +94,33 @@ impl Scene {
 /// weak beside another.
 pub fn choose(peaks: &mut [Peak], scene: &Scene, p: &ChooseParams) {
     let frame = scene.frame(p);
+    let lines = Lines::new(&frame, p);
     let mut strongest = vec![0u32; frame.lines as usize];
     for k in peaks.iter_mut() {
-        let why = alone(k, &frame);
-        k.refuse(why);
-        if k.kept() {
-            let s = &mut strongest[line(k, &frame)];
-            *s = (*s).max(k.amplitude.to_bits());
-        }
+        alone(k, &frame, &mut strongest);
     }
     for k in peaks.iter_mut() {
-        beside(k, &strongest, line(k, &frame), 0, &frame);
+        beside(k, &strongest, &lines);
     }
 }
 
-/// The line across the stripe that a peak lies on.
-fn line(k: &Peak, f: &PeakFrame) -> usize {
-    ((if f.columns != 0 { k.pixel & 0xffff } else { k.pixel >> 16 }) / f.line_px) as usize
+/// The line across the stripe that a skeleton pixel lies on.
+fn line_of(pixel: u32, columns: u32, line_px: u32) -> usize {
+    ((if columns != 0 { pixel & 0xffff } else { pixel >> 16 }) / line_px) as usize
 }
 
-/// The tests that need no other peak.
-fn alone(k: &Peak, f: &PeakFrame) -> Reject {
+/// The tests that need no other peak; who passes them counts among the strongest of the lines of its shot. Amplitudes are
+/// positive, so their bits are in the order of their values.
+pub(super) fn alone(k: &mut Peak, f: &PeakFrame, strongest: &mut [u32]) {
+    k.refuse(reason(k, f));
+    if k.kept() {
+        let s = &mut strongest[line_of(k.pixel, f.columns, f.line_px)];
+        *s = (*s).max(k.amplitude.to_bits());
+    }
+}
+
+/// What the numbers of a peak say by themselves.
+pub(super) fn reason(k: &Peak, f: &PeakFrame) -> Reject {
     let across = k.normal_u * f.across_u + k.normal_v * f.across_v;
     if k.amplitude < f.faintest {
         Reject::Faint
@@ -131,16 +137,44 @@ fn alone(k: &Peak, f: &PeakFrame) -> Reject {
     }
 }
 
-/// The tests against the strongest peak of the lines nearby; the shot's lines start at `from`. Amplitudes are
-/// positive, so their bits are in the order of their values.
-fn beside(k: &mut Peak, strongest: &[u32], at: usize, from: usize, f: &PeakFrame) {
-    let reach = f.echo_reach as usize;
-    let low = at.saturating_sub(reach).max(from);
-    let high = (at + reach).min(from + f.lines as usize - 1);
-    let top = f32::from_bits(strongest[low..=high].iter().fold(0, |a, &b| a.max(b)));
-    if k.amplitude < f.echo * top {
+/// The lines across the stripe of a shot, and what a peak needs beside the strongest of those nearby.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lines {
+    /// As in [`PeakFrame`].
+    pub lines: u32,
+    pub columns: u32,
+    pub line_px: u32,
+    /// Half window of lines.
+    pub reach: i32,
+    pub echo: f32,
+    /// px
+    pub cut_width: f32,
+    pub cut_amplitude: f32,
+}
+
+impl Lines {
+    pub fn new(f: &PeakFrame, p: &ChooseParams) -> Lines {
+        Lines {
+            lines: f.lines,
+            columns: f.columns,
+            line_px: f.line_px,
+            reach: (p.echo_reach * f.s0 / f.line_px as f32 + 0.5).floor() as i32,
+            echo: p.echo,
+            cut_width: p.cut_width * f.s0,
+            cut_amplitude: p.cut_amplitude,
+        }
+    }
+}
+
+/// The tests against the strongest peak of the lines nearby; `strongest` are those of its shot.
+pub(super) fn beside(k: &mut Peak, strongest: &[u32], l: &Lines) {
+    let at = line_of(k.pixel, l.columns, l.line_px);
+    let reach = l.reach as usize;
+    let near = &strongest[at.saturating_sub(reach)..=(at + reach).min(l.lines as usize - 1)];
+    let top = f32::from_bits(near.iter().fold(0, |a, &b| a.max(b)));
+    if k.amplitude < l.echo * top {
         k.refuse(Reject::Echo);
-    } else if k.width_px < f.cut_width && k.amplitude < f.cut_amplitude * top {
+    } else if k.width_px < l.cut_width && k.amplitude < l.cut_amplitude * top {
         k.refuse(Reject::Narrow);
     }
 }
@@ -156,32 +190,6 @@ pub const LINES: Stage = Stage {
     overrides: &[],
 };
 
-/// Judges each peak by itself and notes the strongest of each line.
-pub const STRONGEST: Stage = Stage {
-    name: "strongest",
-    wgsl: include_str!("../../shaders/strongest.wgsl"),
-    bindings: &[
-        Binding { name: "frame", access: Uniform },
-        Binding { name: "header", access: Read },
-        Binding { name: "peaks", access: ReadWrite },
-        Binding { name: "strongest", access: ReadWrite },
-    ],
-    ..LINES
-};
-
-/// Judges each peak beside the strongest of the lines nearby.
-pub const STAGE: Stage = Stage {
-    name: "choose",
-    wgsl: include_str!("../../shaders/choose.wgsl"),
-    bindings: &[
-        Binding { name: "frame", access: Uniform },
-        Binding { name: "header", access: Read },
-        Binding { name: "strongest", access: Texels },
-        Binding { name: "peaks", access: ReadWrite },
-    ],
-    ..LINES
-};
-
 /// Workgroups that empty the list.
 pub fn lines_groups(f: &PeakFrame) -> [u32; 3] {
     LINES.groups([f.entries, 1, 1])
@@ -190,27 +198,6 @@ pub fn lines_groups(f: &PeakFrame) -> [u32; 3] {
 pub fn lines_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     b[1][..f.entries as usize].fill(0);
-}
-
-pub fn strongest_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
-    let f = frame_of(b);
-    let [_, header, peaks, strongest] = b else { unreachable!() };
-    for k in bytemuck::cast_slice_mut::<u32, Peak>(peaks).iter_mut().take(header[3] as usize) {
-        k.refuse(alone(k, &f));
-        if k.kept() {
-            let s = &mut strongest[(k.shot * f.lines) as usize + line(k, &f)];
-            *s = (*s).max(k.amplitude.to_bits());
-        }
-    }
-}
-
-pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
-    let f = frame_of(b);
-    let [_, header, strongest, peaks] = b else { unreachable!() };
-    for k in bytemuck::cast_slice_mut::<u32, Peak>(peaks).iter_mut().take(header[3] as usize) {
-        let from = (k.shot * f.lines) as usize;
-        beside(k, strongest, from + line(k, &f), from, &f);
-    }
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use super::frame::{PX_LOG2, px_log2};
 use super::peak::{self, Peak, PeakFrame, PeakParams};
 use super::point::{self, Optics, Point, PointFrame};
 use super::recorded::{Part, whole};
-use super::{Frame, choose, choose::ChooseParams};
+use super::{Frame, choose, choose::ChooseParams, choose::Lines};
 use crate::fault::Result;
 use crate::gpu::{Buffer, Device, Pipeline, Recording};
 
@@ -30,8 +30,6 @@ pub struct Measuring {
     strongest: Buffer,
     peak: Pipeline,
     lines: Pipeline,
-    strong: Pipeline,
-    choose: Pipeline,
     point: Pipeline,
 }
 
@@ -41,7 +39,7 @@ impl Measuring {
         let uniform = device.storage("peak frame", size_of::<PeakFrame>() as u64)?;
         device.write(&uniform, 0, bytemuck::bytes_of(&frame));
         let rig = device.storage("rig", size_of::<PointFrame>() as u64)?;
-        device.write(&rig, 0, bytemuck::bytes_of(&PointFrame::new(&m.optics)));
+        device.write(&rig, 0, bytemuck::bytes_of(&PointFrame::new(&m.optics, &Lines::new(&frame, &m.choose))));
         let method = m.peak.method.number();
         let depth = [(PX_LOG2, f64::from(px_log2(bits))), (peak::METHOD, method), (peak::QUADS, frame.quads().into())];
         Ok(Measuring {
@@ -49,8 +47,6 @@ impl Measuring {
             strongest: device.storage("strongest", 4 * u64::from(frame.entries))?,
             peak: peak::STAGE.pipeline(device, &depth)?,
             lines: choose::LINES.pipeline(device, &[])?,
-            strong: choose::STRONGEST.pipeline(device, &[])?,
-            choose: choose::STAGE.pipeline(device, &[])?,
             point: point::STAGE.pipeline(device, &[])?,
             frame,
             uniform,
@@ -78,11 +74,9 @@ impl Measuring {
         let (uniform, head, peaks, strongest) =
             (whole(&self.uniform), whole(header), whole(peaks), whole(&self.strongest));
         let each = (header, 0);
-        r.indirect(device, &self.peak, &[uniform, whole(image), head, whole(&self.pixels), peaks], each);
         r.dispatch_parts(device, &self.lines, &[uniform, strongest], choose::lines_groups(&self.frame));
-        r.indirect(device, &self.strong, &[uniform, head, peaks, strongest], each);
-        r.indirect(device, &self.choose, &[uniform, head, strongest, peaks], each);
-        r.indirect(device, &self.point, &[whole(&self.rig), head, poses, peaks, whole(points)], each);
+        r.indirect(device, &self.peak, &[uniform, whole(image), head, whole(&self.pixels), peaks, strongest], each);
+        r.indirect(device, &self.point, &[whole(&self.rig), head, poses, strongest, peaks, whole(points)], each);
         r
     }
 }

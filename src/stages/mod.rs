@@ -83,8 +83,6 @@ pub fn all() -> Vec<Entry> {
             ..exact(&peak::STAGE, peak::stage_twin, || cases::peaks("peak"))
         },
         exact(&choose::LINES, choose::lines_twin, || cases::peaks("lines")),
-        exact(&choose::STRONGEST, choose::strongest_twin, || cases::peaks("strongest")),
-        exact(&choose::STAGE, choose::stage_twin, || cases::peaks("choose")),
         Entry {
             compare: point::apart,
             limit: 1.0,

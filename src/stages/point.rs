@@ -1,6 +1,8 @@
-//! In: chosen peaks, the camera, the laser plane, the shot's pose. Out: points with their standard deviation.
+//! In: chosen peaks, the camera, the laser plane, the shot's pose. Out: points with their standard deviation. The stage also
+//! makes the last choice: peaks that are weak beside another.
 //! Frame and unit: the frame that the given transform leads to (base or grid), mm. docs/math.md, Stripe peak (7), (8).
 
+use super::choose::{Lines, beside};
 use super::peak::{Peak, Reject, SHARED as PEAKS};
 use crate::camera::Intrinsics;
 use crate::geometry::{Camera, Frame, Plane, Rigid, Vec2};
@@ -137,11 +139,20 @@ pub struct PointFrame {
     pub offset: f32,
     /// Bits of the number that stands for no point; a shader cannot write them down.
     pub none: u32,
-    pub reserved: u32,
+    /// As in [`Lines`].
+    pub lines: u32,
+    pub columns: u32,
+    pub line_px: u32,
+    pub echo_reach: i32,
+    pub echo: f32,
+    pub cut_width: f32,
+    pub cut_amplitude: f32,
+    pub reserved_1: u32,
+    pub reserved_2: u32,
 }
 
 impl PointFrame {
-    pub fn new(o: &Optics) -> PointFrame {
+    pub fn new(o: &Optics, l: &Lines) -> PointFrame {
         let ([fx, fy, cx, cy, skew], [k1, k2, p1, p2, k3]) = (o.pinhole, o.distortion);
         let [normal_x, normal_y, normal_z] = o.normal;
         let none = f32::NAN.to_bits();
@@ -161,7 +172,15 @@ impl PointFrame {
             normal_z,
             offset: o.offset,
             none,
-            reserved: 0,
+            lines: l.lines,
+            columns: l.columns,
+            line_px: l.line_px,
+            echo_reach: l.reach,
+            echo: l.echo,
+            cut_width: l.cut_width,
+            cut_amplitude: l.cut_amplitude,
+            reserved_1: 0,
+            reserved_2: 0,
         }
     }
     pub fn optics(&self) -> Optics {
@@ -172,6 +191,17 @@ impl PointFrame {
             offset: self.offset,
         }
     }
+    pub fn lines(&self) -> Lines {
+        Lines {
+            lines: self.lines,
+            columns: self.columns,
+            line_px: self.line_px,
+            reach: self.echo_reach,
+            echo: self.echo,
+            cut_width: self.cut_width,
+            cut_amplitude: self.cut_amplitude,
+        }
+    }
 }
 
 pub const STAGE: Stage = Stage {
@@ -180,14 +210,15 @@ pub const STAGE: Stage = Stage {
     shared: &[PEAKS],
     workgroup: [64, 1, 1],
     bindings: &[
-        Binding { name: "rig", access: Uniform },
+        Binding { name: "frame", access: Uniform },
         Binding { name: "header", access: Read },
         Binding { name: "poses", access: Read },
+        Binding { name: "strongest", access: Texels },
         Binding { name: "peaks", access: ReadWrite },
         Binding { name: "spots", access: ReadWrite },
     ],
     uniform: crate::stages::frame::uniform_fields!(PointFrame: fx, fy, cx, cy, skew, k1, k2, p1, p2, k3, normal_x, normal_y, normal_z, offset,
-        none, reserved),
+        none, lines, columns, line_px, echo_reach, echo, cut_width, cut_amplitude, reserved_1, reserved_2),
     overrides: &[],
 };
 
@@ -198,12 +229,15 @@ pub fn pose_words<To: Frame>(to_from_camera: &Rigid<To, Camera>) -> [f32; 12] {
 }
 
 pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
-    let optics = bytemuck::from_bytes::<PointFrame>(bytemuck::cast_slice(&b[0])).optics();
-    let [_, header, poses, peaks, spots] = b else { unreachable!() };
+    let frame: PointFrame = *bytemuck::from_bytes(bytemuck::cast_slice(&b[0]));
+    let (optics, lines) = (frame.optics(), frame.lines());
+    let [_, header, poses, strongest, peaks, spots] = b else { unreachable!() };
     let (poses, n): (&[f32], usize) = (bytemuck::cast_slice(poses), header[3] as usize);
     let peaks: &mut [Peak] = bytemuck::cast_slice_mut(peaks);
     let spots: &mut [Point] = bytemuck::cast_slice_mut(spots);
     for (k, spot) in peaks.iter_mut().zip(spots).take(n) {
+        let from = (k.shot * lines.lines) as usize;
+        beside(k, &strongest[from..from + lines.lines as usize], &lines);
         let pose = std::array::from_fn(|i| poses[12 * k.shot as usize + i]);
         *spot = one(k, &optics, &pose);
     }
@@ -213,10 +247,10 @@ pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
 /// f32 steps on both sides, and no sum is longer than five terms: a few ulps of 500 mm (0.03 um) through a fused
 /// multiply-add here and there.
 pub fn apart(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
-    if gpu[3] != twin[3] {
+    if gpu[4] != twin[4] {
         return f64::INFINITY;
     }
-    let (a, b): (&[Point], &[Point]) = (bytemuck::cast_slice(&gpu[4]), bytemuck::cast_slice(&twin[4]));
+    let (a, b): (&[Point], &[Point]) = (bytemuck::cast_slice(&gpu[5]), bytemuck::cast_slice(&twin[5]));
     a.iter().zip(b).fold(0f64, |worst, (a, b)| {
         if a.sigma_mm.is_nan() && b.sigma_mm.is_nan() {
             return worst;

@@ -1,5 +1,5 @@
-//! In: the pictures' layout, the settings of peaks and their choice. Out: the uniform block of the stages peak, lines,
-//! strongest and choose, every size worked out once. Frame and unit: pixels, grey levels of the picture's depth.
+//! In: the pictures' layout, the settings of peaks and their choice. Out: the uniform block of the stages lines and peak,
+//! every size worked out once. Frame and unit: pixels, grey levels of the picture's depth.
 
 use super::PeakParams;
 use super::profile::SAMPLES;
@@ -44,11 +44,6 @@ pub struct PeakFrame {
     pub upright: f32,
     pub across_u: f32,
     pub across_v: f32,
-    pub cut_width: f32,
-    pub cut_amplitude: f32,
-    pub echo: f32,
-    /// Half window of lines.
-    pub echo_reach: i32,
     /// Lines across the stripe in one picture; 1 where they are columns, 0 where they are rows.
     pub lines: u32,
     pub columns: u32,
@@ -68,7 +63,7 @@ pub struct PeakFrame {
 
 pub const UNIFORM: (&str, &[Field], usize) = crate::stages::frame::uniform_fields!(PeakFrame: width, height, pitch, shot_words, s0, full_scale,
     read2, gain, speckle2, along_factor, reach_along, stride_across, lattice_u, lattice_v, stride, steps, faintest, narrowest,
-    widest, uncertain, upright, across_u, across_v, cut_width, cut_amplitude, echo, echo_reach, lines, columns, entries,
+    widest, uncertain, upright, across_u, across_v, lines, columns, entries,
     line_px, fours, half_across,
     rows, reserved_1, reserved_2);
 
@@ -129,10 +124,6 @@ impl PeakFrame {
             upright: c.steepest_deg.to_radians().cos(),
             across_u: across[0],
             across_v: across[1],
-            cut_width: c.cut_width * s0,
-            cut_amplitude: c.cut_amplitude,
-            echo: c.echo,
-            echo_reach: (c.echo_reach * s0 / line_px + 0.5).floor() as i32,
             lines,
             columns: u32::from(columns),
             entries: lines * shots,

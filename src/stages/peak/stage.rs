@@ -1,7 +1,8 @@
-//! In: the bindings of the peak stage as words. Out: the same bindings with the peaks filled in, by the CPU twin.
+//! In: the bindings of the peak stage as words. Out: the same bindings with the peaks and the strongest filled in, by the CPU twin.
 //! Frame and unit: words; peaks in pixels and grey levels.
 
 use super::{Grey, Method, Peak, PeakFrame, frame, one};
+use crate::stages::choose;
 use crate::gpu::{Access::*, Binding, Stage};
 use crate::stages::frame::PX_LOG2;
 use rayon::prelude::*;
@@ -26,6 +27,7 @@ pub const STAGE: Stage = Stage {
         Binding { name: "header", access: Read },
         Binding { name: "points", access: Texels },
         Binding { name: "peaks", access: ReadWrite },
+        Binding { name: "strongest", access: ReadWrite },
     ],
     uniform: frame::UNIFORM,
     overrides: &[PX_LOG2, METHOD, QUADS],
@@ -73,8 +75,8 @@ pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     let value = |name: &str| overrides.iter().find(|o| o.0 == name).map_or(0.0, |o| o.1) as u32;
     let px_log2 = value(PX_LOG2);
     let method = [Method::Gaussian, Method::Centroid, Method::Derivative][value(METHOD) as usize];
-    let [_, image, header, points, peaks] = b else { unreachable!() };
-    let found: Vec<Peak> = points[..2 * header[3] as usize]
+    let [_, image, header, points, peaks, strongest] = b else { unreachable!() };
+    let mut found: Vec<Peak> = points[..2 * header[3] as usize]
         .par_chunks_exact(2)
         .map(|p| {
             let from = (p[1] * f.shot_words) as usize;
@@ -83,20 +85,33 @@ pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
             one(view, p[0], p[1], &f, method)
         })
         .collect();
+    for k in &mut found {
+        let from = (k.shot * f.lines) as usize;
+        choose::alone(k, &f, &mut strongest[from..from + f.lines as usize]);
+    }
     let words: &[u32] = bytemuck::cast_slice(&found);
     peaks[..words.len()].copy_from_slice(words);
 }
 
 /// Largest difference of two lists of peaks, in units of what is allowed for each number: position 0.01 px or a hundredth
-/// of its own sigma (what the light does not determine, rounding decides), width 1 %, stated sigma 2 %, amplitude and background 0.5 % or a hundredth of a grey level; everything else exact.
+/// of its own sigma (what the light does not determine, rounding decides), width 1 %, stated sigma 2 %, amplitude and
+/// background 0.5 % or a hundredth of a grey level, the strongest amplitudes alike; everything else exact. Where a number is so
+/// near to a limit that only one of the two is refused, each has to have the reason that its own number gives.
 pub fn apart(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
-    let (a, b) = (gpu.last().expect("peaks"), twin.last().expect("peaks"));
-    let (a, b): (&[Peak], &[Peak]) = (bytemuck::cast_slice(a), bytemuck::cast_slice(b));
+    let frame = frame_of(gpu);
+    let (a, b): (&[Peak], &[Peak]) = (bytemuck::cast_slice(&gpu[4]), bytemuck::cast_slice(&twin[4]));
     let near = |x: f32, y: f32, relative: f32, least: f32| {
         f64::from((x - y).abs() / (relative * x.abs().max(y.abs())).max(least))
     };
-    a.iter().zip(b).fold(if a.len() == b.len() { 0.0 } else { f64::INFINITY }, |worst, (a, b)| {
-        let same = a.flags == b.flags && a.pixel == b.pixel && a.shot == b.shot;
+    let (top_a, top_b) = (&gpu[5], &twin[5]);
+    let lengths = a.len() == b.len() && top_a.len() == top_b.len();
+    let tops = top_a.iter().zip(top_b).fold(if lengths { 0.0 } else { f64::INFINITY }, |worst: f64, (&a, &b)| {
+        worst.max(near(f32::from_bits(a), f32::from_bits(b), 5e-3, 0.01))
+    });
+    let judged = |k: &Peak| k.flags & 0xff == choose::reason(k, &frame) as u32;
+    a.iter().zip(b).fold(tops, |worst, (a, b)| {
+        let flags = a.flags == b.flags || (a.flags >> 8 == b.flags >> 8 && judged(a) && judged(b));
+        let same = flags && a.pixel == b.pixel && a.shot == b.shot;
         // A centre that is uncertain by a pixel is refused; where a fit without an answer stops, rounding decides.
         if same && a.sigma_px.min(b.sigma_px) >= 1.0 {
             return worst;
