@@ -7,6 +7,7 @@ mod background;
 mod device;
 mod recording;
 mod ring;
+mod specialise;
 mod stage;
 mod texels;
 

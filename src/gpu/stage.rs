@@ -1,6 +1,7 @@
 //! In: one WGSL file with its bindings and uniform layout. Out: a compiled pipeline, and one run of it.
 //! Frame and unit: none.
 
+use super::specialise::specialised;
 use super::texels::{rewrite, texel_of};
 use super::{Buffer, Device};
 use crate::fault::Result;
@@ -115,13 +116,12 @@ impl Stage {
         overrides: &[(String, f64)],
     ) -> wgpu::ComputePipeline {
         let source = if texels { self.source_of_texels() } else { self.source() };
-        let source =
-            wgpu::ShaderModuleDescriptor { label: Some(self.name), source: wgpu::ShaderSource::Wgsl(source.into()) };
+        let module = std::borrow::Cow::Owned(specialised(&source, overrides));
+        let source = wgpu::ShaderModuleDescriptor { label: Some(self.name), source: wgpu::ShaderSource::Naga(module) };
         // A counter of turns in every loop keeps the driver from writing short loops out, and takes it longer to compile.
         let checks = wgpu::ShaderRuntimeChecks { force_loop_bounding: false, ..wgpu::ShaderRuntimeChecks::checked() };
         // SAFETY: every loop ends (tests/shader_contracts.rs); all other checks stay.
         let module = unsafe { device.create_shader_module_trusted(source, checks) };
-        let constants: Vec<(&str, f64)> = overrides.iter().map(|(name, value)| (name.as_str(), *value)).collect();
         device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
             label: Some(self.name),
             layout: Some(&device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -132,7 +132,7 @@ impl Stage {
             module: &module,
             entry_point: Some("main"),
             compilation_options: wgpu::PipelineCompilationOptions {
-                constants: &constants,
+                constants: &[],
                 // No stage uses workgroup memory.
                 zero_initialize_workgroup_memory: false,
             },

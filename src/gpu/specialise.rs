@@ -1,0 +1,84 @@
+//! In: a stage's WGSL and the values of its override constants. Out: its tree with these numbers put in, without the branches
+//! that they rule out. Frame and unit: none.
+//!
+//! A driver first writes out every call and only then finds out what is dead; until then each of its passes works on all of it.
+//! Mesa's software adapter (22.3) takes 130 ms of one core for the peak stage as it stands, 60 ms without the two methods that
+//! the third rules out; its cache on disk spares only the machine code behind that.
+
+use naga::back::pipeline_constants::process_overrides;
+use naga::compact::{KeepUnused, compact};
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use naga::{Arena, Block, Expression, Literal, Module, ShaderStage, Statement};
+use wgpu::naga;
+
+pub(super) fn specialised(source: &str, overrides: &[(String, f64)]) -> Module {
+    let module = naga::front::wgsl::parse_str(source).unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)));
+    // The device validates what comes out; here its types are asked for.
+    let info = Validator::new(ValidationFlags::empty(), Capabilities::all()).validate(&module);
+    let info = info.unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)));
+    let values = overrides.iter().cloned().collect();
+    let main = Some((ShaderStage::Compute, "main"));
+    let (module, _) = process_overrides(&module, &info, main, &values).unwrap_or_else(|e| panic!("{e}"));
+    let mut module = module.into_owned();
+    let functions = module.functions.iter_mut().map(|(_, f)| f);
+    for f in functions.chain(module.entry_points.iter_mut().map(|e| &mut e.function)) {
+        keep_live(&mut f.body, &f.expressions);
+    }
+    compact(&mut module, KeepUnused::No);
+    module
+}
+
+/// Puts the branch that is taken in place of every `if` whose condition is a constant.
+fn keep_live(block: &mut Block, expressions: &Arena<Expression>) {
+    for (mut statement, span) in std::mem::take(block).span_into_iter() {
+        match &mut statement {
+            Statement::Block(body) => keep_live(body, expressions),
+            Statement::Loop { body, continuing, .. } => {
+                keep_live(body, expressions);
+                keep_live(continuing, expressions);
+            }
+            Statement::Switch { cases, .. } => cases.iter_mut().for_each(|c| keep_live(&mut c.body, expressions)),
+            Statement::If { condition, accept, reject } => {
+                keep_live(accept, expressions);
+                keep_live(reject, expressions);
+                if let Expression::Literal(Literal::Bool(taken)) = expressions[*condition] {
+                    block.append(if taken { accept } else { reject });
+                    continue;
+                }
+            }
+            _ => {}
+        }
+        block.push(statement, span);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_constants_rule_out_is_gone_and_all_else_stays() {
+        let text = "
+@group(0) @binding(0) var<storage, read_write> words: array<u32>;
+override method: u32 = 0u;
+fn chosen(i: u32) { words[i] = 7u; }
+fn other(i: u32) { words[i] = 9u; }
+@compute @workgroup_size(1)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    for (var i = 0u; i < id.x; i++) {
+        if method == 1u { chosen(i); } else { other(i); }
+        if words[i] == 3u { break; }
+    }
+}";
+        let kept = |value: f64| {
+            let module = specialised(text, &[("method".into(), value)]);
+            assert!(module.overrides.is_empty());
+            module.functions.iter().map(|(_, f)| f.name.clone().unwrap()).collect::<Vec<_>>()
+        };
+        assert_eq!(kept(1.0), ["chosen"]);
+        assert_eq!(kept(0.0), ["other"]);
+        let main = format!("{:?}", specialised(text, &[]).entry_points[0].function.body);
+        // The loop's end, the test of the word, and the break of both; not the choice of the method.
+        assert_eq!((main.matches("If {").count(), main.matches("Break").count()), (2, 2), "{main}");
+    }
+}
