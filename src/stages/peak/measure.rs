@@ -58,44 +58,56 @@ pub fn measure(image: &Image, skeleton: &[u32], p: &PeakParams) -> Option<Stripe
 /// Width, excess of the squared residuals over read and shot noise, and squared light, of the peaks that can be
 /// believed: clipped light hides all three, and a spot of one pixel is a hot pixel.
 fn fits<G: Grey>(image: G, sample: &[(i32, i32)], s: &PeakFrame) -> Vec<(f32, f32, f32)> {
+    let mut pixels = Vec::new();
     sample
         .iter()
         .filter_map(|&(x, y)| {
             let k = fit::gaussian(image, x, y, s);
             let usable = k.flags == 0 && k.snr > 10.0 && (0.4 * s.s0..2.5 * s.s0).contains(&k.width_px);
-            let (excess, light) = if usable { excess(image, x, y, &k, s)? } else { return None };
+            let (excess, light) = if usable { excess(image, x, y, &k, s, &mut pixels)? } else { return None };
             Some((k.width_px, excess, light))
         })
         .collect()
 }
 
+/// A pixel that takes part: its weight, its residual, and what the model says of it: derivatives, light, variance without
+/// speckle and with it.
+struct Pixel {
+    weight: f32,
+    residual: f32,
+    j: nalgebra::Vector3<f32>,
+    light: f32,
+    quiet: f32,
+    variance: f32,
+}
+
 /// Sums over the window of residual² minus the noise that is no speckle, and of light². Three fitted numbers have
 /// eaten part of the noise, most where the light is: pixel by pixel the share that is left is 1 - leverage.
-fn excess<G: Grey>(image: G, x: i32, y: i32, k: &Peak, s: &PeakFrame) -> Option<(f32, f32)> {
+/// `pixels` is memory that is used again.
+fn excess<G: Grey>(image: G, x: i32, y: i32, k: &Peak, s: &PeakFrame, pixels: &mut Vec<Pixel>) -> Option<(f32, f32)> {
     let n = (k.normal_u, k.normal_v);
     let m = (k.u - x as f32) * n.0 + (k.v - y as f32) * n.1;
-    let row = |d: f32| {
+    pixels.clear();
+    window(image, (x, y), n, m, s, |d, weight, level| {
         let z = (d - m) / k.width_px;
         let shape = (-0.5 * z * z).exp();
         let light = k.amplitude * shape;
         let quiet = s.read2 + s.gain * (light + k.background);
         let j = nalgebra::Vector3::new(shape, light * z / k.width_px, light * z * z / k.width_px);
-        (j, light, quiet, quiet + s.speckle2 * light * light)
-    };
-    let mut normal = nalgebra::Matrix3::zeros();
-    window(image, (x, y), n, m, s, |d, weight, _| {
-        let (j, _, _, variance) = row(d);
-        normal += j * j.transpose() * (weight / variance);
+        let variance = quiet + s.speckle2 * light * light;
+        pixels.push(Pixel { weight, residual: level - k.background - light, j, light, quiet, variance });
     });
+    let mut normal = nalgebra::Matrix3::zeros();
+    for p in pixels.iter() {
+        normal += p.j * p.j.transpose() * (p.weight / p.variance);
+    }
     let inverse = normal.try_inverse()?;
     let (mut excess, mut sum) = (0f32, 0f32);
-    window(image, (x, y), n, m, s, |d, weight, level| {
-        let (j, light, quiet, variance) = row(d);
-        let left = (1.0 - weight / variance * (inverse * j).dot(&j)).max(0.0);
-        let residual = level - k.background - light;
-        excess += weight * (residual * residual - left * quiet);
-        sum += weight * left * light * light;
-    });
+    for p in pixels.iter() {
+        let left = (1.0 - p.weight / p.variance * (inverse * p.j).dot(&p.j)).max(0.0);
+        excess += p.weight * (p.residual * p.residual - left * p.quiet);
+        sum += p.weight * left * p.light * p.light;
+    }
     (sum > 0.0).then_some((excess, sum))
 }
 
