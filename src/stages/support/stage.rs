@@ -95,6 +95,12 @@ pub fn judge(f: &SupportFrame, shot: &Neighbourhood, sites: &[Site], p: &Site, k
     if !k.kept() {
         return k.flags;
     }
+    let right = k.sigma_px <= f.sure && k.width_px >= f.right_low && k.width_px <= f.right_high;
+    let need = match (k.background - shot.usual > f.haze * k.amplitude, right) {
+        (true, _) => shot.hazy,
+        (false, true) => shot.clean,
+        (false, false) => shot.doubtful,
+    };
     let mut found = 0;
     for side in 0..2 {
         let (reach, drop) = (shot.reach[side], shot.drop[side]);
@@ -105,14 +111,11 @@ pub fn judge(f: &SupportFrame, shot: &Neighbourhood, sites: &[Site], p: &Site, k
             let d: [i32; 3] = std::array::from_fn(|i| s[i] - p[i] >> drop);
             d.iter().all(|d| d.abs() < FAR) && d.iter().map(|d| (d * d) as u32).sum::<u32>() <= r * r
         };
-        found += sites[from..].iter().take_while(|s| s[3] <= p[3] + reach).filter(near).count() as u32;
+        // More than are needed are not counted.
+        let missing = (need - found) as usize;
+        let within = sites[from..].iter().take_while(|s| s[3] <= p[3] + reach);
+        found += within.filter(near).take(missing).count() as u32;
     }
-    let right = k.sigma_px <= f.sure && k.width_px >= f.right_low && k.width_px <= f.right_high;
-    let need = match (k.background - shot.usual > f.haze * k.amplitude, right) {
-        (true, _) => shot.hazy,
-        (false, true) => shot.clean,
-        (false, false) => shot.doubtful,
-    };
     if found < need { k.flags | Reject::Unsupported as u32 } else { k.flags }
 }
 
