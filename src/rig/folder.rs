@@ -101,12 +101,31 @@ fn load<T: DeserializeOwned>(station: &Path, kind: &str) -> Result<Option<Calibr
 
 /// Writes to a temporary file in the same folder, syncs it, and renames it over `path`.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_aside(path, bytes)?.keep()
+}
+
+/// A file that is written under another name and may not have reached the disk.
+pub struct Aside {
+    file: tempfile::NamedTempFile,
+    path: PathBuf,
+}
+
+/// The first half of [`write_atomically`]; without the second, [`Aside::keep`], nothing is left of it.
+pub fn write_aside(path: &Path, bytes: &[u8]) -> Result<Aside> {
     use std::io::Write;
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut file = named_temporary(folder).map_err(|e| Fault::write(path, e))?;
-    file.write_all(bytes).and_then(|()| file.as_file().sync_all()).map_err(|e| Fault::write(path, e))?;
-    file.persist(path).map_err(|e| Fault::write(path, e.error))?;
-    Ok(())
+    file.write_all(bytes).map_err(|e| Fault::write(path, e))?;
+    Ok(Aside { file, path: path.to_owned() })
+}
+
+impl Aside {
+    /// Waits until it is on the disk and gives it its name.
+    pub fn keep(self) -> Result<()> {
+        self.file.as_file().sync_all().map_err(|e| Fault::write(&self.path, e))?;
+        self.file.persist(&self.path).map_err(|e| Fault::write(&self.path, e.error))?;
+        Ok(())
+    }
 }
 
 /// A temporary file that others may read as they may read any other result: temporary files are private

@@ -6,4 +6,4 @@ mod calibration;
 mod folder;
 
 pub use calibration::{Calibration, Covariance, HandEye, Quality, Verdict, hash_file, hash_text};
-pub use folder::{Rig, named_temporary, write_atomically};
+pub use folder::{Rig, named_temporary, write_aside, write_atomically};

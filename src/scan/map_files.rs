@@ -7,7 +7,7 @@ use super::map_picture::Shown;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Grid, Rigid};
 use crate::raster::{Image, float_tiff, png, read_float_tiff};
-use crate::rig::write_atomically;
+use crate::rig::write_aside;
 use rayon::prelude::*;
 use std::path::Path;
 
@@ -38,15 +38,12 @@ impl HeightMap {
     /// *_picture.png into `folder`.
     pub fn save(&self, folder: &Path) -> Result<()> {
         std::fs::create_dir_all(folder).map_err(|e| Fault::write(folder, e))?;
-        let put = |name: &str, bytes: &[u8]| write_atomically(&folder.join(name), bytes);
         let (w, h) = (self.width, self.height);
         let (scale, pixels) = self.to_u16();
-        put("height.json", serde_json::to_string_pretty(&scale).expect("plain numbers").as_bytes())?;
         let map = |values: &[f32], what: &str| float_tiff(w, h, values, &format!("{what}; NaN is missing"));
         let deep = |levels: Vec<u16>| png(&Image::from_u16(w, h, 16, levels));
         let picture = |what: Shown| self.picture(what).0.to_png();
-        // Every file takes some milliseconds, most of them for its compression or on the way to the disk.
-        let files: [(&str, &(dyn Fn() -> Vec<u8> + Sync)); 9] = [
+        let files: [(&str, &(dyn Fn() -> Vec<u8> + Sync)); 10] = [
             ("height_picture.png", &|| picture(Shown::Height)),
             ("intensity_picture.png", &|| picture(Shown::Intensity)),
             ("sigma_picture.png", &|| picture(Shown::Sigma)),
@@ -56,8 +53,15 @@ impl HeightMap {
             ("height.tif", &|| map(&self.z, "height above the grid plane, mm")),
             ("intensity.tif", &|| map(&self.intensity, "stripe amplitude, grey levels")),
             ("sigma.tif", &|| map(&self.sigma, "standard deviation of the height, mm")),
+            ("height.json", &|| serde_json::to_string_pretty(&scale).expect("plain numbers").into_bytes()),
         ];
-        files.par_iter().try_for_each(|(name, bytes)| put(name, &bytes()))
+        let write = |(name, bytes): &(&str, &(dyn Fn() -> Vec<u8> + Sync))| write_aside(&folder.join(name), &bytes());
+        let written = files.par_iter().map(write).collect::<Result<Vec<_>>>()?;
+        // A thread each, not the cores' threads: files that are waited for together reach the disk together.
+        std::thread::scope(|scope| {
+            let waits: Vec<_> = written.into_iter().map(|file| scope.spawn(|| file.keep())).collect();
+            waits.into_iter().try_for_each(|wait| wait.join().expect("a file is kept without a panic"))
+        })
     }
 
     /// 16-bit heights with their scale: 1..=65535 spans the map, 0 is missing.
