@@ -134,10 +134,12 @@ impl RgbImage {
 
     /// Fills a rectangle; what lies outside the picture is cut off.
     pub fn fill(&mut self, x: i64, y: i64, width: i64, height: i64, colour: Rgb) {
-        for py in y..y + height {
-            for px in x..x + width {
-                self.set(px, py, colour);
-            }
+        let within = |from: i64, length: i64, end: u32| {
+            [from, from + length.max(0)].map(|at| at.clamp(0, i64::from(end)) as usize)
+        };
+        let ([left, right], [top, below]) = (within(x, width, self.width), within(y, height, self.height));
+        for row in (top..below).map(|y| y * self.width as usize) {
+            self.pixels[row + left..row + right].fill(colour);
         }
     }
 }

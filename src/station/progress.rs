@@ -79,11 +79,10 @@ impl Checkpoint {
     pub fn add(&mut self, profile: &Profile) {
         // A skipped shot leaves a gap in the indices; resuming goes on behind the last one done.
         self.shots = profile.shot as usize + 1;
-        for fate in Reject::ALL {
-            let n = profile.peaks.iter().filter(|peak| peak.reject() == fate).count();
-            if n > 0 {
-                *self.peaks.entry(fate.words().to_owned()).or_default() += n as u64;
-            }
+        let mut fates = [0; Reject::ALL.len()];
+        profile.peaks.iter().for_each(|peak| fates[peak.reject() as usize] += 1);
+        for (fate, n) in Reject::ALL.into_iter().zip(fates).filter(|&(_, n)| n > 0) {
+            *self.peaks.entry(fate.words().to_owned()).or_default() += n;
         }
         if profile.points.is_empty() {
             self.dark.push(profile.shot);
