@@ -50,8 +50,3 @@ struct Peak {
     pixel: u32,
     shot: u32,
 }
-
-// The line across the stripe that a skeleton pixel lies on, in its shot.
-fn line_of(pixel: u32) -> u32 {
-    return select(pixel >> 16u, pixel & 0xffffu, frame.columns != 0u) / frame.line_px;
-}

@@ -179,6 +179,9 @@ pub(super) fn beside(k: &mut Peak, strongest: &[u32], l: &Lines) {
     }
 }
 
+/// Tells the stages peak and point what [`line_of`] tells their twins.
+pub(super) const LINE_OF: &str = include_str!("../../shaders/shared/line_of.wgsl");
+
 /// Empties the list of the strongest peaks.
 pub const LINES: Stage = Stage {
     name: "lines",

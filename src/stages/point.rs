@@ -2,7 +2,7 @@
 //! makes the last choice: peaks that are weak beside another.
 //! Frame and unit: the frame that the given transform leads to (base or grid), mm. docs/math.md, Stripe peak (7), (8).
 
-use super::choose::{Lines, beside};
+use super::choose::{LINE_OF, Lines, beside};
 use super::peak::{Peak, Reject, SHARED as PEAKS};
 use crate::camera::Intrinsics;
 use crate::geometry::{Camera, Frame, Plane, Rigid, Vec2};
@@ -207,7 +207,7 @@ impl PointFrame {
 pub const STAGE: Stage = Stage {
     name: "point",
     wgsl: include_str!("../../shaders/point.wgsl"),
-    shared: &[PEAKS],
+    shared: &[PEAKS, LINE_OF],
     workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },

@@ -19,7 +19,7 @@ const PROFILE: &str = include_str!("../../../shaders/shared/profile.wgsl");
 pub const STAGE: Stage = Stage {
     name: "peak",
     wgsl: include_str!("../../../shaders/peak.wgsl"),
-    shared: &[SHARED, PROFILE],
+    shared: &[SHARED, PROFILE, choose::LINE_OF],
     workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
