@@ -90,6 +90,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         (Some(folder), None) => {
             let mut recording = Recording::open(folder)?;
             recording.channel = args.channel;
+            recording.pose_file(args.poses.as_deref())?.warnings.iter().for_each(|w| console.warn(w));
             let mut id = identity(folder, &recording, args.poses.as_deref())?;
             if let Some(name) = &args.ambient {
                 let inside = folder.join(name);

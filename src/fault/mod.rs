@@ -74,12 +74,16 @@ impl Fault {
     /// A file that could not be read.
     pub fn read(path: &Path, e: std::io::Error) -> Fault {
         Fault::input(format!("{}: cannot be read: {e}", path.display()))
-            .cause(if e.kind() == std::io::ErrorKind::NotFound {
-                "the path is wrong, or the file was moved"
-            } else {
-                "no permission, or a disk fault"
+            .cause(match e.kind() {
+                std::io::ErrorKind::NotFound => "the path is wrong, or the file was moved",
+                std::io::ErrorKind::InvalidData => "it is no text: a picture, a cloud, or a file in another encoding",
+                _ => "no permission, or a disk fault",
             })
-            .next("check the path and its permissions")
+            .next(if e.kind() == std::io::ErrorKind::InvalidData {
+                "give the text file that is meant here, in UTF-8"
+            } else {
+                "check the path and its permissions"
+            })
     }
     /// A file or folder that could not be written.
     pub fn write(path: &Path, e: std::io::Error) -> Fault {

@@ -35,7 +35,17 @@ impl Recording {
         }
         let path = folder.join("meta.json");
         if !path.exists() {
-            let files = std::fs::read_dir(folder).map_or(0, |entries| entries.count());
+            let entries: Vec<PathBuf> =
+                std::fs::read_dir(folder).map_or(Vec::new(), |all| all.flatten().map(|e| e.path()).collect());
+            let mut inside: Vec<_> = entries.iter().filter(|e| e.join("meta.json").exists()).collect();
+            if !inside.is_empty() {
+                inside.sort();
+                let names: Vec<String> = inside.iter().map(|p| p.display().to_string()).collect();
+                return Err(Fault::input(format!("{}: holds no meta.json", folder.display()))
+                    .cause("it is the folder above the recordings")
+                    .next(format!("give the recording itself: {}", names.join(", "))));
+            }
+            let files = entries.len();
             return Err(Fault::input(format!("{}: holds no meta.json; {files} other files", folder.display()))
                 .cause("an empty folder, pictures that nobody described, or the folder above the recording")
                 .next("write meta.json as docs/file-formats.md shows: the picture's size, the board, the frames"));
@@ -78,8 +88,13 @@ impl Recording {
         Ok(image)
     }
 
-    /// The poses in file `name` (without extension), or in the file that meta.json names.
+    /// The poses of [`Recording::pose_file`].
     pub fn poses(&self, name: Option<&str>) -> Result<Vec<Rigid<Base, Flange>>> {
+        self.pose_file(name).map(|f| f.poses)
+    }
+
+    /// The poses in file `name` (without extension), or in the file that meta.json names, and what a person should know of them.
+    pub fn pose_file(&self, name: Option<&str>) -> Result<PoseFile> {
         let name = match (name, &self.meta.pose_file) {
             (Some(n), _) => n,
             (None, Some(n)) => n.as_str(),
@@ -94,6 +109,6 @@ impl Recording {
                     .next("name one with --poses NAME"));
             }
         };
-        poses::find_and_load(&self.folder, name).map(|f| f.poses)
+        poses::find_and_load(&self.folder, name)
     }
 }

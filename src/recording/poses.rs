@@ -37,9 +37,30 @@ pub(super) fn find_and_load(folder: &Path, name: &str) -> Result<PoseFile> {
         Some(path) => load_poses(path),
         None => Err(Fault::input(format!("{}: no pose file {name}.json or {name}.csv", folder.display()))
             .cause("the name is misspelt or the poses were not recorded")
-            .next("list the folder and name the file with --poses")),
+            .next(match there(folder) {
+                names if names.is_empty() => "record the robot's pose at every picture".into(),
+                names => format!("name one of these with --poses: {}", names.join(", ")),
+            })),
     }
 }
+
+/// The files of a folder that can be poses by their name.
+fn there(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).map_or(Vec::new(), |all| all.flatten().map(|e| e.file_name()).collect());
+    let mut names: Vec<String> = entries
+        .iter()
+        .filter_map(|n| n.to_str())
+        .filter(|n| n.contains("pose") && (n.ends_with(".json") || n.ends_with(".csv")))
+        .map(|n| n[..n.rfind('.').unwrap_or(n.len())].to_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+/// Farthest that a flange can be from its base, mm: ten times the reach of the longest arms, on a rail.
+const FARTHEST: f64 = 1e5;
+/// Poses that all lie this near to the base's origin, mm, are in metres: no arm works inside its own foot.
+const METRES: f64 = 8.0;
 
 /// Loads a pose file by its extension: `.json`, or `.csv`/`.txt`.
 pub fn load_poses(path: &Path) -> Result<PoseFile> {
@@ -66,7 +87,23 @@ fn collect(rows: impl Iterator<Item = (usize, Convention, Vec<f64>)>) -> Result<
         if departure > ORTHONORMAL_WARN {
             out.warnings.push(format!("pose {index}: rotation repaired, it was {departure:.1e} from orthonormal (limit {ORTHONORMAL_WARN:.0e})"));
         }
-        out.poses.push(convention.read(&numbers).map_err(|e| e.at(format!("pose {index}")))?);
+        let pose = convention.read(&numbers).map_err(|e| e.at(format!("pose {index}")))?;
+        let far = pose.translation.norm();
+        if far > FARTHEST {
+            return Err(Fault::input(format!(
+                "pose {index}: the flange is {far:.0} mm from its base, at most {FARTHEST:.0} is believed"
+            ))
+            .cause("millimetres written as micrometres, a number without its decimal point, or a spoilt file")
+            .next("correct the pose, or leave its frame out of meta.json"));
+        }
+        out.poses.push(pose);
+    }
+    let reach = out.poses.iter().map(|p| p.translation.norm()).fold(0.0, f64::max);
+    if out.poses.len() > 2 && reach < METRES {
+        out.warnings.push(format!(
+            "all {} poses lie within {reach:.2} mm of the base's origin: they look like metres, and are read as millimetres",
+            out.poses.len()
+        ));
     }
     Ok(out)
 }
@@ -163,6 +200,25 @@ mod tests {
         assert_eq!(from_csv(&format!("{head}0,{row}\n1,{row}\n")).unwrap().poses.len(), 2);
         assert!(from_csv(&format!("{head}0,{row}\n2,{row}\n")).unwrap_err().what.contains("numbered 2"));
         assert!(from_csv(&format!("{head}0,{}\n", row.replacen('1', "NaN", 1))).is_err());
+    }
+
+    #[test]
+    fn metres_are_noticed_and_the_impossible_is_refused() {
+        let file = |scale: f64| {
+            let rows: Vec<String> =
+                (0..3).map(|k| format!("{k},{},{},0,0,0,0\n", 400.0 * scale, f64::from(k) * scale)).collect();
+            from_csv(&format!("# convention: denso\nframe,x,y,z,rx,ry,rz\n{}", rows.concat()))
+        };
+        assert!(file(1.0).unwrap().warnings.is_empty());
+        assert!(file(1e-3).unwrap().warnings[0].contains("metres"));
+        assert!(file(1e3).unwrap_err().what.contains("400000 mm"));
+    }
+
+    #[test]
+    fn a_misspelt_name_is_answered_with_those_that_are_there() {
+        let dir = tempfile::tempdir().unwrap();
+        std::fs::write(dir.path().join("poses_noisy.json"), "").unwrap();
+        assert!(find_and_load(dir.path(), "poses").unwrap_err().next.contains("poses_noisy"));
     }
 
     #[test]

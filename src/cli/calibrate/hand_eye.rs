@@ -48,6 +48,7 @@ pub struct Args {
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let recording = Recording::open(&args.recording)?;
+    recording.pose_file(args.poses.as_deref())?.warnings.iter().for_each(|w| console.warn(w));
     let rig = Rig::load(&args.station)?;
     let run = HandEyeRun {
         poses: args.poses.clone(),
