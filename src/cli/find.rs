@@ -69,14 +69,11 @@ pub(super) fn summary(r: &Report) -> String {
             s += &format!("{name:12} {} ({}: {})\n", numbers.join(" "), pose.convention, pose.labels.join(", "));
         }
         s += &format!(
-            "{:12} {} mm and {} degrees at 3 sigma\n",
+            "{:12} {} mm and {} degrees, {} at 3 sigma\n",
             "tolerance",
             r.tolerance_mm,
-            if r.within_tolerance {
-                format!("{} kept", r.tolerance_deg)
-            } else {
-                format!("{} NOT kept", r.tolerance_deg)
-            }
+            r.tolerance_deg,
+            if r.within_tolerance { "kept" } else { "NOT kept" }
         );
     }
     let row = |v: &[f64; 3], digits: usize| v.map(|x| format!("{x:.digits$}")).join(" ");
@@ -90,7 +87,7 @@ pub(super) fn summary(r: &Report) -> String {
         s += "  the sum is a lower bound: a term is unknown\n";
     }
     s += &format!(
-        "match        score {:.3}, next best {:.3}; {} edges to {:.3} mm, {} surface points to {:.3} mm\n",
+        "match        score {:.3}, next best pose {:.3}; {} edges to {:.3} mm, {} surface points to {:.3} mm\n",
         r.found.score, r.found.second_score, r.edges, r.edge_rms_mm, r.surface_points, r.surface_rms_mm
     );
     for c in &r.constructions {

@@ -58,7 +58,7 @@ impl std::str::FromStr for Set {
         Set::ALL
             .into_iter()
             .find(|x| x.name() == s)
-            .ok_or_else(|| format!("unknown set '{s}': {}", Set::ALL.map(Set::name).join(", ")))
+            .ok_or_else(|| format!("unknown set '{s}': {}, all", Set::ALL.map(Set::name).join(", ")))
     }
 }
 
