@@ -61,6 +61,29 @@ fn scans_of_random_stations_lie_on_the_true_surface() {
     }
 }
 
+/// Four grey levels of noise in every pixel, coarse speckle, half the light: what is noise must not become points.
+#[test]
+fn a_noisy_sensor_gives_fewer_points_and_no_false_ones() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut options = SimulateOptions { seed: 5, shots: 30, ..SimulateOptions::default() }.with_noise(2.0);
+    options.sensor.laser_white = 0.5;
+    options.sensor.speckle = 0.3;
+    let judged = scanned(dir.path(), &options);
+    let e = &judged.cloud;
+    println!(
+        "{} points, median {:.4}, 95 % {:.4} mm, {:.3} % beyond 1 mm, within sigmas {:.3?}",
+        e.points,
+        e.median_mm,
+        e.p95_mm,
+        100.0 * e.outliers_share,
+        judged.within_sigmas
+    );
+    assert!(e.points > 12_000, "{}", e.points);
+    assert!(e.outliers_share < 1e-3, "{}", e.outliers_share);
+    assert!(e.median_mm < 0.06 && e.p95_mm < 0.2, "{e:?}");
+    assert!((0.6..0.85).contains(&judged.within_sigmas[0]), "{:?}", judged.within_sigmas);
+}
+
 #[test]
 fn steps_are_right_to_four_micrometres() {
     let dir = tempfile::tempdir().unwrap();

@@ -85,15 +85,13 @@ impl Engine {
             Processor::Twins => None,
             Processor::Gpu(device) => Some(device),
         };
-        let mut extraction = extraction.clone();
-        extraction.threshold = for_depth(extraction.threshold, format.bits);
         Engine {
             format,
             region: region(format, optical),
             ambient,
             optics: Optics::new(&optical.camera, &optical.laser),
             width_px: extraction.peak.width_px,
-            extraction,
+            extraction: extraction.clone(),
             pending: Vec::new(),
             device,
             chain: None,
@@ -129,28 +127,32 @@ impl Engine {
         self.device.as_ref()
     }
 
-    /// Width and speckle of the stripe, the median over some pictures; `None` where none shows enough of it.
+    /// Noise, width and speckle of the stripe, the median over some pictures; `None` where none shows enough of it.
     pub fn measure(&self, images: &[&Image]) -> Option<Stripe> {
         let few = self.format.width * self.format.height > LARGE_PIXELS && images.len() > 3;
         let step = if few { images.len() / 3 } else { 1 };
         let images: Vec<_> = images.iter().step_by(step).collect();
+        let images: Vec<_> = images.par_iter().map(|image| self.lit(image)).collect();
+        let mut noise: Vec<f32> = images.par_iter().map(|image| peak::noise(image)).collect();
+        noise.sort_by(f32::total_cmp);
+        let noise = *noise.get(noise.len() / 2)?;
+        let seen = self.extraction.clone().in_noise(noise);
         let mut found: Vec<Stripe> = images
             .par_iter()
-            .filter_map(|image| {
-                let image = self.lit(image);
-                peak::measure(&image, &self.skeleton(&image), &self.extraction.peak)
-            })
+            .filter_map(|image| peak::measure(image, &self.skeleton(image, &seen), &seen.peak))
             .collect();
         let middle = found.len() / 2;
         found.sort_by(|a, b| a.speckle.total_cmp(&b.speckle));
         let speckle = found.get(middle)?.speckle;
         found.sort_by(|a, b| a.width_px.total_cmp(&b.width_px));
-        Some(Stripe { width_px: found[middle].width_px, speckle })
+        Some(Stripe { width_px: found[middle].width_px, speckle, noise })
     }
 
-    /// Takes over a stripe: the sizes of the fit, the least window of the threshold; builds the GPU's chain.
+    /// Takes over a stripe: the sizes of the fit, the least window of the threshold, limits above the noise; builds the GPU's
+    /// chain.
     pub fn set_stripe(&mut self, stripe: &Stripe) -> Result<()> {
         self.width_px = stripe.width_px;
+        self.extraction = self.extraction.clone().in_noise(stripe.noise);
         let window = (WINDOW_WIDTHS * stripe.width_px) as u32 | 1;
         self.extraction.threshold.size = self.extraction.threshold.size.max(window.min(101));
         self.extraction.peak = self.extraction.peak.with(stripe);
@@ -167,7 +169,7 @@ impl Engine {
         let config = ChainConfig {
             shots,
             slots,
-            threshold: e.threshold,
+            threshold: for_depth(e.threshold, f.bits),
             thinning: e.thinning,
             region: Some(self.region.clone()),
             ambient: self.ambient.as_ref().map(|a| a.image.clone()),
@@ -241,16 +243,17 @@ impl Engine {
         self.ambient.as_ref().map_or(Cow::Borrowed(image), |a| Cow::Owned(a.subtracted(image)))
     }
 
-    fn skeleton(&self, image: &Image) -> Vec<u32> {
-        let mut lit = threshold::twin(image, &self.extraction.threshold);
+    fn skeleton(&self, image: &Image, e: &Extraction) -> Vec<u32> {
+        let mut lit = threshold::twin(image, &for_depth(e.threshold, image.bits));
         lit.intersect(&self.region);
-        let thin = thin::twin(&lit, self.extraction.thinning);
-        skeleton::twin(&lengthen::twin(image, &lit, &thin, self.width_px, &self.extraction.lengthen))
+        let thin = thin::twin(&lit, e.thinning);
+        skeleton::twin(&lengthen::twin(image, &lit, &thin, self.width_px, &e.lengthen))
     }
 
     fn twins(&self, job: &Job) -> Measured {
         let image = self.lit(&job.image);
-        let mut peaks = peak::peaks(&image, &self.skeleton(&image), job.shot, &self.extraction.peak);
+        let skeleton = self.skeleton(&image, &self.extraction);
+        let mut peaks = peak::peaks(&image, &skeleton, job.shot, &self.extraction.peak);
         let scene = Scene {
             width: self.format.width,
             height: self.format.height,

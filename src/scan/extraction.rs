@@ -12,8 +12,9 @@ use crate::stages::{Thinning, ThresholdParams};
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Extraction {
-    /// Measure the stripe's width and speckle in the first shots and take the window of the threshold
-    /// and the sizes of the fit from them. Off: the numbers below are used as they stand.
+    /// Measure the stripe's width and speckle and the noise of dark pixels in the first shots and take the window of the
+    /// threshold and the sizes of the fit from them, and raise the limits of light above the noise. Off: the numbers below are
+    /// used as they stand.
     pub measure_stripe: bool,
     /// Offset and minimum in grey levels of an 8-bit picture; deeper ones scale them.
     pub threshold: ThresholdParams,
@@ -39,7 +40,25 @@ impl Default for Extraction {
     }
 }
 
+/// Standard deviations of a dark pixel by which light exceeds it: one pixel in 740 of pure noise does, and such specks have
+/// no neighbours.
+const ABOVE_NOISE: f32 = 3.0;
+/// Grey levels by which the measured noise must exceed the assumed one to replace it: the measurement comes in steps of 0.6.
+const COARSE: f32 = 1.0;
+
 impl Extraction {
+    /// The same for pictures whose dark pixels scatter by `noise` grey levels of an 8-bit picture: no limit of light lies within it.
+    pub fn in_noise(mut self, noise: f32) -> Extraction {
+        let least = (ABOVE_NOISE * noise).round().min(255.0);
+        self.threshold.offset = self.threshold.offset.max(least as i32);
+        self.threshold.minimum = self.threshold.minimum.max(least as u16);
+        self.choose.faintest = self.choose.faintest.max(least);
+        if noise > self.peak.read_noise + COARSE {
+            self.peak.read_noise = noise.min(20.0);
+        }
+        self
+    }
+
     pub fn check(&self) -> Result<()> {
         self.threshold.check()?;
         if !(-255..=255).contains(&self.threshold.offset) || self.threshold.minimum > 255 {

@@ -10,7 +10,7 @@ use crate::geometry::{Base, Camera, Flange, Plane, Rigid, Vec3};
 use crate::gpu::Device;
 use crate::raster::Image;
 use crate::rig::Rig;
-use crate::stages::peak::{Peak, SATURATED, Stripe};
+use crate::stages::peak::{Peak, PeakParams, SATURATED, Stripe};
 use crate::stages::point::{self, Optics};
 use crate::stages::support::{self, Support};
 
@@ -133,7 +133,8 @@ impl Scanner {
             if let Some(ambient) = &self.ambient {
                 ambient.suits(&self.waiting[0].image, &self.waiting[0].name)?;
             }
-            let assumed = Stripe { width_px: self.extraction.peak.width_px, speckle: self.extraction.peak.speckle };
+            let PeakParams { width_px, speckle, .. } = self.extraction.peak;
+            let assumed = Stripe { width_px, speckle, noise: 0.0 };
             let stripe = match self.stripe {
                 Some(s) => s,
                 None if self.extraction.measure_stripe => {

@@ -5,7 +5,7 @@ use super::{Grey, Peak, PeakFrame, PeakParams, View, fit};
 use crate::raster::{Image, Pixels};
 use crate::stages::choose::ChooseParams;
 
-/// What laser and lens make of a stripe: constant over a scan.
+/// What laser, lens and sensor make of a stripe: constant over a scan.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stripe {
@@ -13,6 +13,9 @@ pub struct Stripe {
     pub width_px: f32,
     /// Standard deviation over mean of the stripe's light from pixel to pixel.
     pub speckle: f32,
+    /// Standard deviation of a dark pixel, grey levels of an 8-bit picture; 0 where nothing is known of it.
+    #[serde(default)]
+    pub noise: f32,
 }
 
 /// Skeleton pixels looked at, spread over the picture; the median of 400 is good to 6 % of the spread.
@@ -20,13 +23,14 @@ const SAMPLES: usize = 400;
 /// Fewer than this many usable peaks say nothing.
 const FEWEST: usize = 20;
 
-/// Width and speckle of the stripe in one picture; `None` where there is too little of it.
+/// Width and speckle of the stripe in one picture, and the noise as it was assumed; `None` where there is too little of it.
 /// Start: half the pixels above half maximum. Then three rounds of fitting with the medians of the round before.
 pub fn measure(image: &Image, skeleton: &[u32], p: &PeakParams) -> Option<Stripe> {
     let step = (skeleton.len() / SAMPLES).max(1);
     let sample: Vec<(i32, i32)> =
         skeleton.iter().step_by(step).map(|&q| ((q & 0xffff) as i32, (q >> 16) as i32)).collect();
-    let mut stripe = Stripe { width_px: half_maximum(image, &sample)?.clamp(0.4, 12.0), speckle: p.speckle };
+    let noise = p.read_noise;
+    let mut stripe = Stripe { width_px: half_maximum(image, &sample)?.clamp(0.4, 12.0), speckle: p.speckle, noise };
     for _ in 0..3 {
         let setup = PeakFrame::new(
             (image.width, image.height, image.bits),
@@ -50,7 +54,7 @@ pub fn measure(image: &Image, skeleton: &[u32], p: &PeakParams) -> Option<Stripe
         ratios.truncate(ratios.len() * 9 / 10);
         let (excess, light) = ratios.iter().fold((0.0, 0.0), |s, r| (s.0 + r.0 / r.1, s.1 + 1.0));
         let contrast2: f32 = excess / light;
-        stripe = Stripe { width_px: width_px.clamp(0.4, 12.0), speckle: contrast2.clamp(0.0, 1.0).sqrt() };
+        stripe = Stripe { width_px: width_px.clamp(0.4, 12.0), speckle: contrast2.clamp(0.0, 1.0).sqrt(), noise };
     }
     Some(stripe)
 }

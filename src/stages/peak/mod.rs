@@ -6,11 +6,13 @@ mod fit;
 mod frame;
 mod measure;
 mod methods;
+mod noise;
 mod profile;
 mod stage;
 
 pub use frame::{PeakFrame, UNIFORM};
 pub use measure::{Stripe, measure};
+pub use noise::noise;
 pub(super) use stage::frame_of;
 pub use stage::{METHOD, QUADS, SHARED, STAGE, apart, stage_twin};
 

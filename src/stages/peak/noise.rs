@@ -1,0 +1,66 @@
+//! In: a picture, most of it dark or smooth. Out: by how much a dark pixel scatters.
+//! Frame and unit: standard deviation, grey levels of an 8-bit picture. docs/math.md, Stripe peak (6).
+
+use crate::raster::Image;
+
+/// Pixels looked at, about; the median of so many is good to 1 % of the scatter.
+const SAMPLES: u32 = 40_000;
+/// Median of |I - (left + right) / 2| over sigma: 0.6745 sqrt(1.5).
+const MEDIAN: f32 = 0.826;
+
+/// From second differences over two pixels, because neighbours may share a sensor's or a codec's smoothing. Their median: the
+/// stripe, edges and specks are few. Where black is cut off at 0, that many pixels scatter on one side only: the share of zeros,
+/// up to a half, puts it right to a fifth; of a picture that is mostly zeros this says too little. Whole grey levels make it coarse: of
+/// 8-bit pictures steps of 0.6.
+pub fn noise(image: &Image) -> f32 {
+    let (w, h) = (image.width, image.height);
+    let step = ((w * h / SAMPLES) as f32).sqrt().max(1.0) as u32;
+    let mut twice = Vec::new();
+    let mut zeros = 0;
+    for y in (0..h).step_by(step as usize) {
+        for x in (2..w.saturating_sub(2)).step_by(step as usize) {
+            let here = image.get(x, y);
+            zeros += usize::from(here == 0);
+            twice.push((2 * i32::from(here) - i32::from(image.get(x - 2, y)) - i32::from(image.get(x + 2, y))).unsigned_abs());
+        }
+    }
+    if twice.is_empty() {
+        return 0.0;
+    }
+    let middle = twice.len() / 2;
+    let cut = 1.0 + zeros as f32 / twice.len() as f32;
+    let median = *twice.select_nth_unstable(middle).1 as f32 / 2.0;
+    median / MEDIAN * cut * 255.0 / f32::from(image.full_scale())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stages::cases::{Noise, drawn, stripe};
+
+    fn noisy(bits: u8, black: f64, sigma: f64) -> f32 {
+        let clean = stripe(640, 480, bits, 2.5, 6, 3);
+        let mut random = Noise(17);
+        let full = f64::from(clean.full_scale());
+        noise(&drawn(640, 480, bits, |x, y| {
+            // The stripe alone: the picture has noise of its own.
+            let light = f64::from(clean.get(x, y));
+            let light = if light > 0.2 * full { light } else { 0.0 };
+            (light + (black + sigma * random.normal()) * full / 255.0).round().clamp(0.0, full) as u32
+        }))
+    }
+
+    #[test]
+    fn the_scatter_of_dark_pixels_is_found_beside_a_stripe() {
+        for (bits, black, sigma) in [(8, 30.0, 2.0), (8, 30.0, 8.0), (8, 0.0, 3.5), (8, 2.0, 3.5), (12, 30.0, 1.0), (12, 0.0, 1.0)] {
+            let found = f64::from(noisy(bits, black, sigma));
+            assert!((found / sigma - 1.0).abs() < 0.25, "{bits} bits, black {black}, {sigma}: {found}");
+        }
+    }
+
+    #[test]
+    fn a_quiet_picture_has_less_than_a_grey_level() {
+        assert!(noisy(8, 0.0, 0.3) < 1.0 && noisy(8, 10.0, 0.5) < 1.0);
+        assert_eq!(noise(&drawn(3, 4, 8, |_, _| 7)), 0.0);
+    }
+}
