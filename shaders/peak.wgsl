@@ -35,10 +35,9 @@ const ONE = 0.765625;
 const TWO = 0.5625;
 const FAR = 0.25;
 
-// The structure tensor from 13 gradients on 24 grey levels, every other place of a lattice.
-fn direction(x: i32, y: i32) -> vec2<f32> {
-    let u = frame.lattice_u;
-    let v = frame.lattice_v;
+// The structure tensor from 13 gradients on 24 grey levels, every other place of a lattice: half the difference of its diagonal,
+// the other element, half the difference of its eigenvalues.
+fn tensor(x: i32, y: i32, u: i32, v: i32) -> vec3<f32> {
     let a = vec3(level(x - 2 * u, y - 3 * v), level(x, y - 3 * v), level(x + 2 * u, y - 3 * v));
     let b = vec4(level(x - 3 * u, y - 2 * v), level(x - u, y - 2 * v), level(x + u, y - 2 * v), level(x + 3 * u, y - 2 * v));
     let c = vec3(level(x - 2 * u, y - v), level(x, y - v), level(x + 2 * u, y - v));
@@ -62,25 +61,55 @@ fn direction(x: i32, y: i32) -> vec2<f32> {
     let xy = (dot(far, ax * ay) + dot(far, bx * by)) + (dot(row, rx * ry) + ONE * dot(dx, dy));
     let yy = (dot(far, ay * ay) + dot(far, by * by)) + (dot(row, ry * ry) + ONE * dot(dy, dy));
     let h = 0.5 * (xx - yy);
-    let q = sqrt(h * h + xy * xy);
-    let n = select(vec2(xy, q - h), vec2(h + q, xy), h > 0.0);
+    return vec3(h, xy, sqrt(h * h + xy * xy));
+}
+
+// Cosine of twice the angle up to which a stripe is flat.
+const COS_FLAT = 0.40673664;
+
+// Across the stripe; what so far differences make of the direction is put right.
+fn direction(x: i32, y: i32) -> vec2<f32> {
+    var t = tensor(x, y, frame.lattice_u, frame.lattice_v);
+    var s2 = t.y / max(t.z, 1e-12);
+    var c2 = -t.x / max(t.z, 1e-12);
+    var s4 = 2.0 * s2 * c2;
+    var c4 = c2 * c2 - s2 * s2;
+    var turn = frame.turn_2 * s2 + frame.turn_4 * s4 + (frame.turn_6 * (s4 * c2 + c4 * s2) + frame.turn_8 * (2.0 * s4 * c4));
+    // On a steep stripe the longer differences would span its whole width.
+    if select(-c2, c2, frame.lattice_u > frame.lattice_v) < COS_FLAT {
+        let side = min(frame.lattice_u, frame.lattice_v);
+        t = tensor(x, y, side, side);
+        s2 = t.y / max(t.z, 1e-12);
+        c2 = -t.x / max(t.z, 1e-12);
+        s4 = 2.0 * s2 * c2;
+        c4 = c2 * c2 - s2 * s2;
+        turn = frame.square_4 * s4 + frame.square_8 * (2.0 * s4 * c4);
+    }
+    let h = t.x;
+    let xy = t.y;
+    let q = t.z;
+    let m = select(vec2(xy, q - h), vec2(h + q, xy), h > 0.0);
+    let n = vec2(m.x + turn * m.y, m.y - turn * m.x);
     let length = sqrt(n.x * n.x + n.y * n.y);
     let sign = select(1.0, -1.0, n.y < 0.0);
-    return select(vec2(sign * n.x / length, sign * n.y / length), vec2(0.0, 1.0), length < 1e-9);
+    return select(vec2(sign * n.x / length, sign * n.y / length), vec2(0.0, 1.0), sqrt(m.x * m.x + m.y * m.y) < 1e-9);
 }
 
 fn background(x: i32, y: i32, n: vec2<f32>) -> f32 {
     let start = i32(floor(4.0 * frame.s0 + 0.5));
     let end = start + max(i32(floor(2.0 * frame.s0 + 0.5)), 2);
+    let along = 1.2 * frame.s0;
+    let tu = i32(floor(along * n.y + 0.5));
+    let tv = i32(floor(0.5 - along * n.x));
     var low = 0.0;
     var high = 0.0;
     var count = 0.0;
     for (var q = start; q <= end; q += frame.stride) {
         let du = i32(floor(f32(q) * n.x + 0.5));
         let dv = i32(floor(f32(q) * n.y + 0.5));
-        low += level(x - du, y - dv);
-        high += level(x + du, y + dv);
-        count += 1.0;
+        low += (level(x - du, y - dv) + level(x + tu - du, y + tv - dv)) + level(x - tu - du, y - tv - dv);
+        high += (level(x + du, y + dv) + level(x + tu + du, y + tv + dv)) + level(x - tu + du, y - tv + dv);
+        count += 3.0;
     }
     return min(low, high) / count;
 }
@@ -224,6 +253,7 @@ fn gaussian(at: vec2<i32>) -> Peak {
     gain = frame.gain;
     speckle2 = frame.speckle2;
     ceiling = frame.full_scale - base;
+    var drop = 0.0;
     var left = frame.steps;
     while left > 0u {
         let inverse = 1.0 / width;
@@ -269,6 +299,8 @@ fn gaussian(at: vec2<i32>) -> Peak {
         let dm = clamp(width * ((c01 * g0 + (c11 * g1 + c12 * g2)) / det), -0.7 * s0, 0.7 * s0);
         let dw = clamp(width * ((c02 * g0 + (c12 * g1 + c22 * g2)) / det), -0.3 * s0, 0.3 * s0);
         i11 = (width * width) * (c11 / det);
+        // By what this step lowers the squares: they are wanted where the fit ends.
+        drop = (g0 * (da / a) + g1 * (dm / width)) + g2 * (dw / width);
         a = max(a + da, 1.0);
         m = clamp(m + dm, m0 - 2.0 * s0, m0 + 2.0 * s0);
         width = clamp(width + dw, 0.3 * s0, 3.0 * s0);
@@ -277,7 +309,7 @@ fn gaussian(at: vec2<i32>) -> Peak {
     }
     let share = profile.square / profile.weight;
     let free = max((believed.x + believed.y) / profile.weight - 3.0, 1.0);
-    let chi2 = (squares.x + squares.y) / share;
+    let chi2 = max(squares.x + squares.y - drop, 0.0) / share;
     let noise = max(chi2 / free, (BELIEF + chi2) / (BELIEF + free));
     let sigma = sqrt(max(i11 * share * noise, 0.0));
     let own_width = sqrt(max(width * width - profile.blur2, 0.01 * frame.s0 * frame.s0));

@@ -13,14 +13,13 @@ const ANGLES: [f64; 8] = [0.0, 15.0, 31.0, 38.0, 45.0, 52.0, 75.0, 90.0];
 /// Sub-pixel places of the line, one picture each; windows that share few pixels, in each picture.
 const PHASES: usize = 6;
 const WINDOWS: usize = 40;
-/// Limits: stated sigma over the real error, never too small; what is left of the error without noise, over the bound; width off
-/// the true one; error over the bound. The sigma of a bright steep stripe is stated up to three times too large: the direction that
-/// the structure tensor gives is off by up to 13 degrees there, which widens the profile (docs/math.md, Stripe peak (1)).
+/// Limits: stated sigma over the real error; what is left of the error without noise, over the bound; width off the true one; error
+/// over the bound.
 const OVERCONFIDENT: f64 = 0.85;
-const OVERCAUTIOUS: f64 = 3.5;
-const OWN: f64 = 0.5;
-const WIDTH: f64 = 0.3;
-const WORST: f64 = 1.25;
+const OVERCAUTIOUS: f64 = 1.25;
+const OWN: f64 = 0.3;
+const WIDTH: f64 = 0.06;
+const WORST: f64 = 1.2;
 const DARK: f64 = 6.0;
 /// Read noise with an 8-bit picture's rounding, grey levels; grey levels per photo-electron.
 const READ: f64 = 0.7;

@@ -31,8 +31,12 @@ struct PeakFrame {
     fours: i32,
     half_across: f32,
     rows: i32,
-    reserved_1: u32,
-    reserved_2: u32,
+    turn_2: f32,
+    turn_4: f32,
+    turn_6: f32,
+    turn_8: f32,
+    square_4: f32,
+    square_8: f32,
 }
 
 // One peak, 12 words.

@@ -6,7 +6,7 @@ use super::{Grey, Peak, PeakFrame, SATURATED};
 
 /// Places of the gradients and their weights (1 - r² / 16)²: every other one of a lattice, because a gradient looks at its
 /// four neighbours, which lie on the other colour of the board.
-const GRADIENTS: [(i32, i32, f32); 13] = [
+pub(super) const GRADIENTS: [(i32, i32, f32); 13] = [
     (0, 0, 1.0),
     (-1, -1, 0.765625),
     (1, -1, 0.765625),
@@ -22,11 +22,39 @@ const GRADIENTS: [(i32, i32, f32); 13] = [
     (2, 2, 0.25),
 ];
 
+/// Cosine of twice [`super::turn::FLAT`].
+const COS_FLAT: f32 = 0.40673664;
+
 /// Direction across the stripe: the strongest eigenvector of the structure tensor, on grey levels so far apart that noise
-/// of single pixels does not turn it (docs/math.md, Stripe peak (1)).
+/// of single pixels does not turn it, and what so far differences make of it is put right (docs/math.md, Stripe peak (1)).
 pub(super) fn direction<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> (f32, f32) {
-    let at = |i: i32, j: i32| image.at(x + i * s.lattice_u, y + j * s.lattice_v);
-    let ratio = s.lattice_v as f32 / s.lattice_u as f32;
+    let (mut h, mut xy, mut q) = tensor(image, x, y, s.lattice_u, s.lattice_v);
+    let (mut s2, mut c2) = (xy / q.max(1e-12), -h / q.max(1e-12));
+    let (mut s4, mut c4) = (2.0 * s2 * c2, c2 * c2 - s2 * s2);
+    let mut turn = s.turn_2 * s2 + s.turn_4 * s4 + (s.turn_6 * (s4 * c2 + c4 * s2) + s.turn_8 * (2.0 * s4 * c4));
+    // On a steep stripe the longer differences would span its whole width.
+    let flat = if s.lattice_u > s.lattice_v { c2 } else { -c2 };
+    if flat < COS_FLAT {
+        let side = s.lattice_u.min(s.lattice_v);
+        (h, xy, q) = tensor(image, x, y, side, side);
+        (s2, c2) = (xy / q.max(1e-12), -h / q.max(1e-12));
+        (s4, c4) = (2.0 * s2 * c2, c2 * c2 - s2 * s2);
+        turn = s.square_4 * s4 + s.square_8 * (2.0 * s4 * c4);
+    }
+    let (nx, ny) = if h > 0.0 { (h + q, xy) } else { (xy, q - h) };
+    if (nx * nx + ny * ny).sqrt() < 1e-9 {
+        return (0.0, 1.0);
+    }
+    let (nx, ny) = (nx + turn * ny, ny - turn * nx);
+    let l = (nx * nx + ny * ny).sqrt();
+    let sign = if ny < 0.0 { -1.0 } else { 1.0 };
+    (sign * nx / l, sign * ny / l)
+}
+
+/// Half the difference of the diagonal, the other element, and half the difference of the eigenvalues.
+fn tensor<G: Grey>(image: G, x: i32, y: i32, u: i32, v: i32) -> (f32, f32, f32) {
+    let at = |i: i32, j: i32| image.at(x + i * u, y + j * v);
+    let ratio = v as f32 / u as f32;
     let (mut xx, mut xy, mut yy) = (0f32, 0f32, 0f32);
     for (i, j, weight) in GRADIENTS {
         let gx = ratio * (at(i + 1, j) - at(i - 1, j));
@@ -36,27 +64,25 @@ pub(super) fn direction<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> (f3
         yy += weight * (gy * gy);
     }
     let d = 0.5 * (xx - yy);
-    let q = (d * d + xy * xy).sqrt();
-    let (nx, ny) = if d > 0.0 { (d + q, xy) } else { (xy, q - d) };
-    let l = (nx * nx + ny * ny).sqrt();
-    if l < 1e-9 {
-        return (0.0, 1.0);
-    }
-    let sign = if ny < 0.0 { -1.0 } else { 1.0 };
-    (sign * nx / l, sign * ny / l)
+    (d, xy, (d * d + xy * xy).sqrt())
 }
 
-/// Level beside the stripe, 4 to 6 widths out: the darker side, because a second stripe lights one side only.
+/// Level beside the stripe, 4 to 6 widths out: the darker side, because a second stripe lights one side only. On three lines
+/// 1.2 widths apart: a level with the noise of three pixels would be the largest error of a profile averaged over many.
 pub(super) fn background<G: Grey>(image: G, x: i32, y: i32, nx: f32, ny: f32, s: &PeakFrame) -> f32 {
     let from = (4.0 * s.s0 + 0.5).floor() as i32;
     let to = from + ((2.0 * s.s0 + 0.5).floor() as i32).max(2);
+    let along = 1.2 * s.s0;
+    let (along_u, along_v) = ((along * ny + 0.5).floor() as i32, (0.5 - along * nx).floor() as i32);
     let (mut low, mut high, mut n) = (0f32, 0f32, 0f32);
     let mut q = from;
     while q <= to {
         let (du, dv) = ((q as f32 * nx + 0.5).floor() as i32, (q as f32 * ny + 0.5).floor() as i32);
-        low += image.at(x - du, y - dv);
-        high += image.at(x + du, y + dv);
-        n += 1.0;
+        for (tu, tv) in [(0, 0), (along_u, along_v), (-along_u, -along_v)] {
+            low += image.at(x + tu - du, y + tv - dv);
+            high += image.at(x + tu + du, y + tv + dv);
+        }
+        n += 3.0;
         q += s.stride;
     }
     low.min(high) / n
@@ -144,10 +170,12 @@ pub(super) fn gaussian<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak
         let dm = (w * ((c01 * g0 + (c11 * g1 + c12 * g2)) / det)).clamp(-0.7 * s0, 0.7 * s0);
         let dw = (w * ((c02 * g0 + (c12 * g1 + c22 * g2)) / det)).clamp(-0.3 * s0, 0.3 * s0);
         i11 = (w * w) * (c11 / det);
+        // By what this step lowers the squares: they are wanted where the fit ends.
+        let gain = (g0 * (da / a) + g1 * (dm / w)) + g2 * (dw / w);
         a = (a + da).max(1.0);
         m = (m + dm).clamp(m0 - 2.0 * s0, m0 + 2.0 * s0);
         w = (w + dw).clamp(0.3 * s0, 3.0 * s0);
-        (squares, believed) = (chi2[0] + chi2[1], (count[0] + count[1]) / profile.weight);
+        (squares, believed) = ((chi2[0] + chi2[1] - gain).max(0.0), (count[0] + count[1]) / profile.weight);
         step += 1;
         // The next step would be a tenth of this one and less: far below what noise leaves.
         if dm.abs() < 1e-2 * s0 && dw.abs() < 3e-2 * s0 && da.abs() < 3e-2 * a {

@@ -3,6 +3,7 @@
 
 use super::PeakParams;
 use super::profile::SAMPLES;
+use super::turn::{FLAT, turn};
 use crate::gpu::Field;
 use crate::stages::choose::ChooseParams;
 use crate::stages::frame::px_log2;
@@ -57,15 +58,21 @@ pub struct PeakFrame {
     pub half_across: f32,
     /// Rows of a sample of the profile, each `stride_across` from the next.
     pub rows: i32,
-    pub reserved_1: u32,
-    pub reserved_2: u32,
+    /// Turn of the direction that was seen, rad: times sine of twice, four, six and eight times its angle; and for steep stripes,
+    /// on a square lattice, times sine of four and eight times.
+    pub turn_2: f32,
+    pub turn_4: f32,
+    pub turn_6: f32,
+    pub turn_8: f32,
+    pub square_4: f32,
+    pub square_8: f32,
 }
 
 pub const UNIFORM: (&str, &[Field], usize) = crate::stages::frame::uniform_fields!(PeakFrame: width, height, pitch, shot_words, s0, full_scale,
     read2, gain, speckle2, along_factor, reach_along, stride_across, lattice_u, lattice_v, stride, steps, faintest, narrowest,
     widest, uncertain, upright, across_u, across_v, lines, columns, entries,
     line_px, fours, half_across,
-    rows, reserved_1, reserved_2);
+    rows, turn_2, turn_4, turn_6, turn_8, square_4, square_8);
 
 impl PeakFrame {
     /// Quads of samples of a profile, which the shader has written out: -2 quads up to 2 quads - 1, so that the shorter
@@ -96,6 +103,11 @@ impl PeakFrame {
         // Differences over nearly three widths: noise and speckle turn the direction least, and a Gaussian has little left
         // between samples that far apart. Along a stripe that lies as it should there is room for half as much again.
         let (lattice_across, lattice_along) = ((1.4 * s0).round().max(1.0) as i32, (2.1 * s0).round().max(2.0) as i32);
+        let lattice = if columns { (lattice_along, lattice_across) } else { (lattice_across, lattice_along) };
+        // What is seen as flat may stand three degrees steeper.
+        let [turn_2, turn_4, turn_6, turn_8] = turn(s0, lattice, [2.0, 4.0, 6.0, 8.0], FLAT + 0.05, !columns);
+        let square = (lattice_across, lattice_across);
+        let [square_4, square_8] = turn(s0, square, [4.0, 8.0], std::f64::consts::FRAC_PI_4, false);
         let stride_across = (0.25 * s0).floor().max(1.0);
         // Rows within 0.4 widths are one sample: their spread is known and costs little of sigma.
         let rows = (0.4 * s0 / stride_across).floor().max(1.0);
@@ -113,8 +125,8 @@ impl PeakFrame {
             along_factor: if p.along > 0.0 { 1.0 / (radius * radius) } else { 0.0 },
             reach_along,
             stride_across: stride_across as i32,
-            lattice_u: if columns { lattice_along } else { lattice_across },
-            lattice_v: if columns { lattice_across } else { lattice_along },
+            lattice_u: lattice.0,
+            lattice_v: lattice.1,
             stride: (0.7 * s0).round().max(1.0) as i32,
             steps: p.steps,
             faintest: c.faintest * scale,
@@ -134,8 +146,12 @@ impl PeakFrame {
             // The fit looks at three widths; the skeleton is a pixel beside the centre.
             half_across: (4.0 * s0).min(3.0 * s0 + 1.0) / (stride_across * rows),
             rows: rows as i32,
-            reserved_1: 0,
-            reserved_2: 0,
+            turn_2,
+            turn_4,
+            turn_6,
+            turn_8,
+            square_4,
+            square_8,
         }
     }
 }

@@ -9,6 +9,7 @@ mod methods;
 mod noise;
 mod profile;
 mod stage;
+mod turn;
 
 pub use frame::{PeakFrame, UNIFORM};
 pub use measure::{Stripe, measure};
