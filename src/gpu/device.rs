@@ -134,7 +134,7 @@ impl Device {
                 }
                 _ => Fault::device("0 Vulkan, Metal or DX12 adapters found, 1 needed")
                     .cause("no GPU driver is installed")
-                    .next("install one (Debian: apt install mesa-vulkan-drivers), or run on the CPU twins"),
+                    .next("install one (Debian: apt install mesa-vulkan-drivers); what has --on runs without one, with --on cpu"),
             })?;
         let info = describe(&chosen);
         let offered = chosen.limits();
