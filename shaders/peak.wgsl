@@ -16,7 +16,7 @@ override peak_method: u32 = 0u;
 const SATURATED = 256u;
 // Samples for which the noise model counts.
 const BELIEF = 10.0;
-// Grey levels that are no light, but whose square is no denormal number: those take a CPU a hundred times as long.
+// Grey levels that are no light, but whose square is no denormal number: those take a CPU many times as long.
 const DARK = 1e-9;
 
 // First word of the picture; set once.

@@ -2,8 +2,7 @@
 //! that they rule out. Frame and unit: none.
 //!
 //! A driver first writes out every call and only then finds out what is dead; until then each of its passes works on all of it.
-//! Mesa's software adapter (22.3) takes 130 ms of one core for the peak stage as it stands, 60 ms without the two methods that
-//! the third rules out; its cache on disk spares only the machine code behind that.
+//! Mesa's software adapter (22.3) pays for that at every start: its cache on disk spares only the machine code behind it.
 
 use naga::back::pipeline_constants::process_overrides;
 use naga::compact::{KeepUnused, compact};

@@ -90,7 +90,7 @@ pub(super) fn background<G: Grey>(image: G, x: i32, y: i32, nx: f32, ny: f32, s:
 
 /// Samples for which the noise model counts.
 const BELIEF: f32 = 10.0;
-/// Grey levels that are no light, but whose square is no denormal number: those take a CPU a hundred times as long.
+/// Grey levels that are no light, but whose square is no denormal number: those take a CPU many times as long.
 const DARK: f32 = 1e-9;
 
 /// Fisher scoring of amplitude, offset and width on the profile. Variance of a pixel: read noise + gain · level +
