@@ -37,7 +37,7 @@ fn chain(c: &mut Criterion) {
         return;
     };
     for (width, height) in [(640, 480), (1280, 960), (4096, 3072)] {
-        let config = ChainConfig { threshold: THRESHOLD, ..ChainConfig::new(width, height, 8) };
+        let config = ChainConfig { threshold: THRESHOLD, ..ChainConfig::new(width, height, 8).on(&device) };
         let images = pictures(Scene::OneStripe, width, height, config.shots);
         let refs: Vec<&Image> = images.iter().collect();
         let mut chain = Chain::new(&device, &config).expect("the sizes fit every adapter");

@@ -186,6 +186,31 @@ fn ambient_light_is_subtracted_once_however_often_a_batch_starts_over() {
     }
 }
 
+/// Where memory is not shared, pictures go through staging buffers that several threads fill, and results come back
+/// through others that grow with them.
+#[test]
+fn a_device_with_memory_of_its_own_gives_the_same() {
+    let Some(device) = common::device() else { return };
+    let device = device.as_discrete();
+    let mut config = ChainConfig::new(1270, 960, 8);
+    config.shots = 4;
+    config.threshold = ThresholdParams { size: 5, offset: 12, minimum: 0, ..Default::default() };
+    let images: Vec<Image> = (0..9)
+        .map(|n| {
+            let mut grain = Noise(n);
+            let noisy = |_, _| 90 + grain.next() % 30;
+            if n % 2 == 0 { stripe(1270, 960, 8, 2.5, 3, n) } else { drawn(1270, 960, 8, noisy) }
+        })
+        .collect();
+    check(&device, "own memory", &config, &images);
+    let mut chain = Chain::new(&device, &ChainConfig { slots: 1, ..config }).unwrap();
+    chain.submit(7, &images[..4].iter().collect::<Vec<_>>()).unwrap();
+    let first = chain.collect(true).unwrap().unwrap();
+    assert!(8 * first.points.len() > 1 << 20, "{} points need no larger buffer to come back", first.points.len());
+    chain.submit_again(7, 4).unwrap();
+    assert_eq!(chain.collect(true).unwrap().unwrap(), first, "the same pictures once more");
+}
+
 #[test]
 fn a_lost_device_ends_in_an_error() {
     let Some(device) = common::device() else { return };

@@ -16,6 +16,8 @@ pub struct Ceilings {
     /// Host to where the stages read.
     pub upload_gb_s: Option<f64>,
     pub readback_gb_s: Option<f64>,
+    /// Within the device's own memory, where it has its own: bytes read and written.
+    pub device_gb_s: Option<f64>,
 }
 
 /// Sum of a slice in wide words; compiles to one vector load and one vector addition per 32 bytes.
@@ -59,6 +61,7 @@ impl Ceilings {
             read_all_gb_s: bytes / all / 1e9,
             upload_gb_s: rates.map(|r| r.upload_gb_s),
             readback_gb_s: rates.map(|r| r.readback_gb_s),
+            device_gb_s: rates.and_then(|r| r.device_gb_s),
         })
     }
 }

@@ -92,6 +92,11 @@ pub struct Row {
     pub full_ms_per_shot: Option<f64>,
     /// That against the skeleton alone, median of runs in turns.
     pub full_over_skeleton: Option<f64>,
+    /// Wall time a shot with the pictures already where the stages read them, results brought back; and of the full chain.
+    pub device_ms_per_shot: f64,
+    pub full_device_ms_per_shot: Option<f64>,
+    /// Gigapixels a second of the first of them.
+    pub device_gpx_per_s: f64,
     pub shots_per_s: f64,
     pub mpx_per_s: f64,
     /// CPU time of all threads a shot; on a software adapter the GPU's work is in it.
@@ -100,7 +105,8 @@ pub struct Row {
     pub cpu_over_plain_read: Option<f64>,
     /// Bytes that the stages move a pixel, from the buffers' sizes and the listed tiles.
     pub bytes_per_px: f64,
-    /// Share of the memory ceiling (all threads) and of the upload ceiling that is reached.
+    /// Share of the memory ceiling that is reached, of all threads, or of the device's own memory with the pictures there; and
+    /// of the upload ceiling.
     pub share_of_memory: f64,
     pub share_of_upload: Option<f64>,
     pub points_per_shot: f64,
@@ -167,7 +173,7 @@ fn row(
     ceilings: &Ceilings,
 ) -> Result<Row> {
     let before = device.allocated_bytes();
-    let config = ChainConfig { threshold: THRESHOLD, ..ChainConfig::new(width, height, 8) };
+    let config = ChainConfig { threshold: THRESHOLD, ..ChainConfig::new(width, height, 8).on(device) };
     let images = pictures(scene, width, height, (2 * config.shots).min(16).max(3));
     let refs: Vec<&Image> = images.iter().collect();
     let batch_of =
@@ -182,6 +188,7 @@ fn row(
 
     let steady = steady(&mut chain, options.seconds, &batch_of, &[])?;
     let (cpu_ms, ms_per_shot) = (steady.cpu_ms_per_shot, steady.ms_per_shot);
+    let device_ms_per_shot = resident(&mut chain, options.seconds / 4.0)?;
 
     // The full chain in turns with the skeleton alone, so that both see the same machine. Every speck of a
     // noise-heavy picture would be measured: that is no scan.
@@ -214,7 +221,11 @@ fn row(
     // out of the cache; a listed tile's surroundings and masks.
     let bytes_per_px = 2.0 + 64.0 / 256.0 + listed * (62.0 * 38.0 / 256.0 + 1.0);
     let mpx = px / (ms_per_shot * 1e3);
-    let gb_s = mpx * 1e6 * bytes_per_px / 1e9;
+    let share_of_memory = match ceilings.device_gb_s {
+        None => 1e-3 * mpx * bytes_per_px / ceilings.read_all_gb_s,
+        // Not written by the stages, but by the upload.
+        Some(own) => 1e-6 * px / device_ms_per_shot * (bytes_per_px - 1.0) / own,
+    };
     Ok(Row {
         width,
         height,
@@ -222,14 +233,17 @@ fn row(
         shots_per_batch: config.shots,
         shots: steady.shots,
         ms_per_shot,
-        full_ms_per_shot: full.map(|f| f.0),
-        full_over_skeleton: full.map(|f| f.1),
+        full_ms_per_shot: full.map(|f| f.ms_per_shot),
+        full_over_skeleton: full.map(|f| f.over_skeleton),
+        device_ms_per_shot,
+        full_device_ms_per_shot: full.map(|f| f.device_ms_per_shot),
+        device_gpx_per_s: px / (device_ms_per_shot * 1e6),
         shots_per_s: 1e3 / ms_per_shot,
         mpx_per_s: mpx,
         cpu_ms_per_shot: cpu_ms,
         cpu_over_plain_read: cpu_ms.map(|ms| ms * 1e-3 / (px / (ceilings.read_gb_s * 1e9))),
         bytes_per_px,
-        share_of_memory: gb_s / ceilings.read_all_gb_s,
+        share_of_memory,
         share_of_upload: ceilings.upload_gb_s.map(|u| mpx * 1e6 / 1e9 / u),
         points_per_shot: steady.points,
         listed,
@@ -289,6 +303,24 @@ pub(super) fn steady<'a>(
     })
 }
 
+/// Time a shot, ms, of the pictures that lie in the ring's places since a run before, every place busy.
+fn resident(chain: &mut Chain, seconds: f64) -> Result<f64> {
+    let shots = chain.frame.shots;
+    let (mut per_batch, mut batch) = (Vec::new(), Batch::default());
+    let start = Instant::now();
+    let mut last = start;
+    while start.elapsed().as_secs_f64() < seconds || per_batch.len() < 3 {
+        while chain.has_room() {
+            chain.submit_again(0, shots)?;
+        }
+        chain.collect_into(true, &mut batch)?;
+        per_batch.push(last.elapsed().as_secs_f64());
+        last = Instant::now();
+    }
+    while chain.collect_into(true, &mut batch)? {}
+    Ok(percentile(&mut per_batch, 0.5) / f64::from(shots))
+}
+
 /// The chain with peaks, their choice and points, and poses for a batch.
 fn full(device: &Device, config: &ChainConfig, scene: Scene) -> Result<(Chain, Vec<[f32; 12]>)> {
     let peak = PeakParams { width_px: if scene == Scene::ThickStripe { 6.0 } else { 2.5 }, ..PeakParams::default() };
@@ -296,6 +328,14 @@ fn full(device: &Device, config: &ChainConfig, scene: Scene) -> Result<(Chain, V
     let lengthen = LengthenParams::default().word(peak.width_px);
     let chain = Chain::new(device, &ChainConfig { measure: Some(measure), lengthen, ..config.clone() })?;
     Ok((chain, (0..config.shots).map(cases::pose).collect()))
+}
+
+/// What the full chain takes.
+#[derive(Clone, Copy)]
+struct Full {
+    ms_per_shot: f64,
+    over_skeleton: f64,
+    device_ms_per_shot: f64,
 }
 
 /// Time a shot of the full chain, and its ratio to the skeleton alone, in five turns.
@@ -306,7 +346,7 @@ fn full_chain<'a>(
     skeleton: &mut Chain,
     batch_of: &impl Fn(usize) -> Vec<&'a Image>,
     options: &BenchOptions,
-) -> Result<(f64, f64)> {
+) -> Result<Full> {
     let (mut full, poses) = full(device, config, scene)?;
     steady(&mut full, 0.0, batch_of, &poses)?;
     let (mut times, mut ratios) = (Vec::new(), Vec::new());
@@ -316,7 +356,11 @@ fn full_chain<'a>(
         times.push(with * 1e-3);
         ratios.push(with / without * 1e-3);
     }
-    Ok((percentile(&mut times, 0.5), percentile(&mut ratios, 0.5)))
+    Ok(Full {
+        ms_per_shot: percentile(&mut times, 0.5),
+        over_skeleton: percentile(&mut ratios, 0.5),
+        device_ms_per_shot: resident(&mut full, options.seconds / 4.0)?,
+    })
 }
 
 /// Runs the full chain for so many shots and asks the system what the process holds.

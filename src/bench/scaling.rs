@@ -71,7 +71,7 @@ const SIZE: (u32, u32) = (1280, 960);
 
 /// Over the share of lit pixels, `seconds` a share: pictures of one size, a stripe in more and more noise.
 pub fn with_light(device: &Device, seconds: f64) -> Result<Scaling> {
-    let config = ChainConfig { threshold: THRESHOLD, ..ChainConfig::new(SIZE.0, SIZE.1, 8) };
+    let config = ChainConfig { threshold: THRESHOLD, ..ChainConfig::new(SIZE.0, SIZE.1, 8).on(device) };
     let mut points = Vec::new();
     for noise in NOISE {
         let images: Vec<Image> = (0..u64::from(config.shots)).map(|seed| noisy(SIZE.0, SIZE.1, noise, seed)).collect();

@@ -12,15 +12,16 @@ pub fn table(report: &Report) -> String {
     let _ = writeln!(out, "{} ({}), {}, {} threads", a.name, a.kind, a.driver, report.threads);
     let _ = writeln!(
         out,
-        "plain read {:.1} GB/s on one thread, {:.1} on all; upload {:.1}, readback {:.1} GB/s",
+        "plain read {:.1} GB/s on one thread, {:.1} on all; upload {:.1}, readback {:.1} GB/s{}",
         c.read_gb_s,
         c.read_all_gb_s,
         c.upload_gb_s.unwrap_or(f64::NAN),
-        c.readback_gb_s.unwrap_or(f64::NAN)
+        c.readback_gb_s.unwrap_or(f64::NAN),
+        c.device_gb_s.map_or(String::new(), |own| format!("; within the device {own:.0} GB/s"))
     );
     let _ = writeln!(
         out,
-        "{:11} {:16} {:>5} {:>8} {:>8} {:>6} {:>8} {:>8} {:>8} {:>7} {:>7} {:>7} {:>7} {:>8} {:>8}",
+        "{:11} {:16} {:>5} {:>8} {:>8} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7} {:>7} {:>7} {:>7} {:>8} {:>8}",
         "size",
         "scene",
         "batch",
@@ -29,6 +30,8 @@ pub fn table(report: &Report) -> String {
         "ratio",
         "shots/s",
         "Mpx/s",
+        "resident",
+        "and full",
         "CPU ms",
         "x read",
         "memory",
@@ -40,7 +43,7 @@ pub fn table(report: &Report) -> String {
     for r in &report.rows {
         let _ = writeln!(
             out,
-            "{:11} {:16} {:>5} {:>8.3} {:>8.3} {:>6.2} {:>8.1} {:>8.0} {:>8.2} {:>7.1} {:>6.1}% {:>6.1}% {:>6.1}% {:>8.2} {:>8.2}",
+            "{:11} {:16} {:>5} {:>8.3} {:>8.3} {:>6.2} {:>8.1} {:>8.0} {:>8.0} {:>8.0} {:>8.2} {:>7.1} {:>6.1}% {:>6.1}% {:>6.1}% {:>8.2} {:>8.2}",
             format!("{}x{}", r.width, r.height),
             r.scene.name(),
             r.shots_per_batch,
@@ -49,6 +52,8 @@ pub fn table(report: &Report) -> String {
             r.full_over_skeleton.unwrap_or(f64::NAN),
             r.shots_per_s,
             r.mpx_per_s,
+            1e3 * r.device_gpx_per_s,
+            r.full_device_ms_per_shot.map_or(f64::NAN, |ms| 1e3 * r.device_gpx_per_s * r.device_ms_per_shot / ms),
             r.cpu_ms_per_shot.unwrap_or(f64::NAN),
             r.cpu_over_plain_read.unwrap_or(f64::NAN),
             100.0 * r.share_of_memory,

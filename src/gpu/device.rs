@@ -5,8 +5,10 @@ use super::alias::{self, Aliased};
 use super::background::Background;
 use super::texels::{self, Texel};
 use crate::fault::{Fault, Result};
+use rayon::ThreadPool;
+use rayon::prelude::*;
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// The longest a single submission may take before the device counts as lost.
 const TIMEOUT: Duration = Duration::from_secs(60);
@@ -199,6 +201,12 @@ impl Device {
         Device { reads_texels: false, ..self.clone() }
     }
 
+    /// The same device, used as one with memory and processors of its own: for tests where there is no such device.
+    pub fn as_discrete(&self) -> Device {
+        let info = AdapterInfo { kind: "discrete GPU".into(), unified_memory: false, ..self.info.clone() };
+        Device { info, reads_texels: false, ..self.clone() }
+    }
+
     /// False for a software adapter, which takes the cores that the CPU twins would use.
     pub fn has_own_processors(&self) -> bool {
         self.info.kind != "CPU"
@@ -324,63 +332,23 @@ impl Device {
         let _ = self.raw.poll(wgpu::PollType::Poll);
         self.lost.lock().unwrap().get_or_insert("destroyed".into());
     }
+}
 
-    /// Measures how fast this machine moves `bytes` to the device and back; medians of nine.
-    pub fn measure_rates(&self, bytes: u64) -> Result<Rates> {
-        let data = vec![0x5au8; bytes as usize];
-        let target = self.storage("rate target", bytes)?;
-        let up = if self.info.unified_memory {
-            self.mapped_storage("rate upload", bytes)?
-        } else {
-            self.upload_staging("rate upload", bytes)?
-        };
-        let down = self.readback_staging("rate readback", bytes)?;
-        let (mut ups, mut downs) = (Vec::new(), Vec::new());
-        for _ in 0..9 {
-            let start = Instant::now();
-            if let Some(mapped) = up.open() {
-                self.wait(None)?;
-                mapped.done()?;
-            }
-            up.fill(|put| {
-                put(0, &data);
-                Ok(())
-            })?;
-            if !self.info.unified_memory {
-                let mut encoder = self.raw.create_command_encoder(&Default::default());
-                encoder.copy_buffer_to_buffer(&up.raw, 0, &target.raw, 0, bytes);
-                let at = self.queue.submit([encoder.finish()]);
-                self.wait(Some(at))?;
-            }
-            ups.push(start.elapsed().as_secs_f64());
-            let start = Instant::now();
-            let mut encoder = self.raw.create_command_encoder(&Default::default());
-            encoder.copy_buffer_to_buffer(&target.raw, 0, &down.raw, 0, bytes);
-            self.queue.submit([encoder.finish()]);
-            let mapped = down.map(wgpu::MapMode::Read, 0..bytes);
-            self.wait(None)?;
-            mapped.done()?;
-            std::hint::black_box(down.view(0..bytes)?.to_vec());
-            down.raw.unmap();
-            downs.push(start.elapsed().as_secs_f64());
-        }
-        let median = |v: &mut Vec<f64>| {
-            v.sort_by(f64::total_cmp);
-            v[v.len() / 2]
-        };
-        Ok(Rates {
-            upload_gb_s: bytes as f64 / median(&mut ups) / 1e9,
-            readback_gb_s: bytes as f64 / median(&mut downs) / 1e9,
-        })
+/// A part of an open buffer.
+struct Place<'a>(wgpu::WriteOnly<'a, [u8]>);
+
+// SAFETY: it is the only way to its bytes, as `&mut [u8]` would be, which may go to another thread. wgpu says so of all
+// elements of a known size; of slices it says nothing.
+unsafe impl Send for Place<'_> {}
+
+impl Place<'_> {
+    fn put(&mut self, offset: usize, bytes: &[u8]) {
+        self.0.slice(offset..offset + bytes.len()).copy_from_slice(bytes);
     }
 }
 
-/// Transfer rates between host and device, 1e9 bytes a second.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Rates {
-    pub upload_gb_s: f64,
-    pub readback_gb_s: f64,
-}
+/// What writes the part of a buffer with this number.
+pub(super) type Fill<'a> = dyn Fn(usize, &mut dyn FnMut(usize, &[u8])) -> Result<()> + Sync + 'a;
 
 /// A mapping that was asked for; `done` after the device was polled.
 pub(super) struct Mapping(Arc<Mutex<Option<std::result::Result<(), wgpu::BufferAsyncError>>>>);
@@ -404,13 +372,32 @@ impl Buffer {
     pub(super) fn open(&self) -> Option<Mapping> {
         self.aliased.is_none().then(|| self.map(wgpu::MapMode::Write, 0..self.bytes))
     }
-    /// The host's writes to an open buffer: `fill` is given a writer (byte offset, bytes). Closes it, failed or not.
-    pub(super) fn fill(&self, fill: impl FnOnce(&mut dyn FnMut(usize, &[u8])) -> Result<()>) -> Result<()> {
+    /// The host's writes to an open buffer, which is divided into parts of so many bytes: `fill` is given a part's number and
+    /// its writer (byte offset in the part, bytes), by several threads where there are `writers`. Closes it, failed or not.
+    pub(super) fn fill(&self, parts: &[usize], writers: Option<&ThreadPool>, fill: &Fill) -> Result<()> {
         if let Some(host) = &self.aliased {
-            return fill(&mut |offset, bytes| host.write(offset, bytes));
+            let mut begin = 0;
+            return parts.iter().enumerate().try_for_each(|(i, bytes)| {
+                let first = begin;
+                begin += bytes;
+                fill(i, &mut |offset, bytes| host.write(first + offset, bytes))
+            });
         }
         let mut view = self.view_mut(0..self.bytes)?;
-        let filled = fill(&mut |offset, bytes| view.slice(offset..offset + bytes.len()).copy_from_slice(bytes));
+        let mut rest = view.slice(..);
+        let places: Vec<_> = parts
+            .iter()
+            .map(|&bytes| {
+                let (place, behind) = std::mem::take(&mut rest).split_at(bytes);
+                rest = behind;
+                Place(place)
+            })
+            .collect();
+        let write = |(i, mut place): (usize, Place)| fill(i, &mut |offset, bytes| place.put(offset, bytes));
+        let filled = match writers {
+            None => places.into_iter().enumerate().try_for_each(write),
+            Some(pool) => pool.install(|| places.into_par_iter().enumerate().try_for_each(write)),
+        };
         drop(view);
         self.raw.unmap();
         filled

@@ -5,13 +5,15 @@
 mod alias;
 mod background;
 mod device;
+mod rates;
 mod recording;
 mod ring;
 mod specialise;
 mod stage;
 mod texels;
 
-pub use device::{AdapterInfo, Buffer, Device, Rates, adapters};
+pub use device::{AdapterInfo, Buffer, Device, adapters};
+pub use rates::Rates;
 pub use recording::{Dispatch, Recording, Replay, StageTime};
-pub use ring::{Ring, RingSizes, Slot};
+pub use ring::{PART, Ring, RingSizes, Slot};
 pub use stage::{Access, Binding, Field, Pipeline, Stage, Workload, run_once};

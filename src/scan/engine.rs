@@ -164,7 +164,7 @@ impl Engine {
     fn build(&mut self) -> Result<()> {
         let Some(device) = &self.device else { return Ok(()) };
         let (e, f) = (&self.extraction, self.format);
-        let usual = ChainConfig::new(f.width, f.height, f.bits);
+        let usual = ChainConfig::new(f.width, f.height, f.bits).on(device);
         let (shots, slots) = self.at_once.unwrap_or((usual.shots, usual.slots));
         let config = ChainConfig {
             shots,

@@ -311,6 +311,7 @@ impl<'a> Walk<'a> {
             ("starts", vec![0; tiles]),
             ("rows", vec![0; rows]),
             ("row_starts", vec![0; rows]),
+            ("totals", vec![0; f.shots as usize]),
             ("header", vec![0; skeleton::HEADER + f.shots as usize + 1]),
             ("points", vec![0; 2 * f.capacity as usize]),
         ]);
@@ -395,9 +396,11 @@ impl<'a> Walk<'a> {
         self.step(&skeleton::COUNT, skeleton::count_twin, &["lit_listing", "lit_list", "mask", "counts"], all);
         let groups = skeleton::rows_groups(&f);
         self.step(&skeleton::SCAN_ROWS, skeleton::scan_rows_twin, &["counts", "starts", "rows"], groups);
-        let names = ["rows", "listing", "all_active", "row_starts", "header"];
-        self.step(&skeleton::SCAN_SHOTS, skeleton::scan_shots_twin, &names, skeleton::shots_groups(&f));
-        let names = ["lit_listing", "lit_list", "mask", "starts", "row_starts", "points"];
+        let (names, groups) = (["rows", "row_starts", "totals"], skeleton::shots_groups(&f));
+        self.step(&skeleton::SCAN_SHOTS, skeleton::scan_shots_twin, &names, groups);
+        let names = ["totals", "listing", "all_active", "header"];
+        self.step(&skeleton::HEAD, skeleton::head_twin, &names, groups);
+        let names = ["lit_listing", "lit_list", "mask", "starts", "row_starts", "header", "points"];
         self.step(&skeleton::STAGE, skeleton::stage_twin, &names, all);
         if wanted == "clear" {
             let names = ["lit_listing", "lit_list", "mask", "other_mask", "lit", "stamps", "counts"];

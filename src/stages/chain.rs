@@ -8,7 +8,7 @@ use super::point::Point;
 use super::recorded::{Pipelines, Shared};
 use super::{Frame, Thinning, ThresholdParams, skeleton};
 use crate::fault::{Fault, Result};
-use crate::gpu::{Device, Recording, Replay, Ring, RingSizes, StageTime};
+use crate::gpu::{Device, PART, Recording, Replay, Ring, RingSizes, StageTime};
 use crate::raster::{Image, Mask};
 use std::collections::VecDeque;
 
@@ -62,6 +62,16 @@ impl ChainConfig {
     pub fn shots_for(width: u32, height: u32) -> u32 {
         (10_000_000 / (width * height).max(1)).clamp(1, 32)
     }
+
+    /// With the batch that hides the fixed cost on this device: one with processors of its own has more of them to keep busy,
+    /// and a dispatch of any size takes it as long as 400,000 pixels.
+    pub fn on(self, device: &Device) -> ChainConfig {
+        if device.has_own_processors() {
+            let shots = (40_000_000 / (self.width * self.height).max(1)).clamp(1, 64);
+            return ChainConfig { shots, ..self };
+        }
+        self
+    }
 }
 
 /// The chain on one GPU for one kind of picture.
@@ -84,6 +94,9 @@ pub struct Chain {
     shared: Shared,
     /// Where the poses begin in the input, if points are wanted.
     poses: Option<usize>,
+    /// Rows of a picture that are written at a time, and the input's bytes in such parts.
+    band: u32,
+    parts: Vec<usize>,
 }
 
 /// The chain's work in pieces.
@@ -157,11 +170,12 @@ impl Chain {
         };
         // The poses lie behind the pictures, where every adapter can bind.
         let poses = (frame.image_bytes() as u64 * u64::from(frame.shots)).next_multiple_of(256);
+        let input = poses + measuring.as_ref().map_or(0, |_| POSE_BYTES * u64::from(frame.shots));
         let ring = Ring::new(
             device,
             RingSizes {
                 slots: config.slots,
-                input: poses + measuring.as_ref().map_or(0, |_| POSE_BYTES * u64::from(frame.shots)),
+                input,
                 header: 4 * (skeleton::HEADER as u64 + u64::from(frame.shots) + 1),
                 outputs: match &measuring {
                     Some(_) => Measuring::output_bytes(&frame),
@@ -169,6 +183,7 @@ impl Chain {
                 },
             },
         )?;
+        let (band, parts) = parts(&frame, input);
         let pipelines = Pipelines::new(device, config)?;
         let mut runs = Runs {
             prepare: Vec::new(),
@@ -203,6 +218,8 @@ impl Chain {
             shots_in: VecDeque::new(),
             shared,
             poses: measuring.is_some().then_some(poses as usize),
+            band,
+            parts,
         })
     }
 
@@ -225,26 +242,45 @@ impl Chain {
     pub fn submit_posed(&mut self, tag: u64, images: &[&Image], poses: &[[f32; 12]]) -> Result<()> {
         assert!(self.poses.is_none() || poses.len() == images.len(), "one pose a picture");
         assert!((1..=self.frame.shots as usize).contains(&images.len()), "1 to {} pictures a batch", self.frame.shots);
-        let (frame, bytes, behind) = (self.frame, self.frame.image_bytes(), self.poses);
-        let at = self.ring.fill(|put| {
-            for (i, image) in images.iter().enumerate() {
-                frame.put_image(image, &mut |at, piece| put(i * bytes + at, piece))?;
-            }
-            // What an unfilled place held before must not be found again.
-            let dark = [0u8; 4096];
-            for from in (images.len() * bytes..frame.shots as usize * bytes).step_by(dark.len()) {
-                put(from, &dark[..dark.len().min(frame.shots as usize * bytes - from)]);
-            }
-            if let Some(at) = behind {
-                put(at, bytemuck::cast_slice(poses));
+        let (frame, band, parts) = (self.frame, self.band, &self.parts);
+        // From the last picture's end to the poses.
+        let gap = self.poses.map(|at| at - frame.image_bytes() * frame.shots as usize);
+        let bands = frame.height.div_ceil(band) as usize;
+        let at = self.ring.fill(parts, &|i, put| {
+            let top = (i % bands) as u32 * band;
+            match images.get(i / bands) {
+                _ if i == parts.len() - 1 => {
+                    if let Some(gap) = gap {
+                        put(gap, bytemuck::cast_slice(poses));
+                    }
+                }
+                Some(image) => frame.put_rows(image, top..(top + band).min(frame.height), put)?,
+                // What an unfilled place held before must not be found again.
+                None => {
+                    let dark = [0u8; 4096];
+                    for from in (0..parts[i]).step_by(dark.len()) {
+                        put(from, &dark[..dark.len().min(parts[i] - from)]);
+                    }
+                }
             }
             Ok(())
         })?;
+        self.start(at, tag, images.len() as u32, true)
+    }
+
+    /// As `submit_posed` with the pictures and poses that lie in the next place since it was last filled: work without an
+    /// upload, to measure what the device does by itself. The ambient light is not subtracted a second time.
+    pub fn submit_again(&mut self, tag: u64, shots: u32) -> Result<()> {
+        let at = self.ring.keep()?;
+        self.start(at, tag, shots, false)
+    }
+
+    fn start(&mut self, at: usize, tag: u64, shots: u32, upload: bool) -> Result<()> {
         let sections = self.sections();
-        self.run(at, true, sections)?;
+        self.run(at, upload, sections)?;
         self.given.push_back(sections);
         self.tags.push_back(tag);
-        self.shots_in.push_back(images.len() as u32);
+        self.shots_in.push_back(shots);
         Ok(())
     }
 
@@ -324,6 +360,16 @@ impl Chain {
     pub fn times(&self) -> Result<Vec<StageTime>> {
         self.replay.times()
     }
+}
+
+/// Rows of a picture that are written at a time, and the bytes of all such parts of the input; the last one holds the poses.
+fn parts(f: &Frame, input: u64) -> (u32, Vec<usize>) {
+    let row = 4 * f.pitch as usize;
+    let band = (PART / row).clamp(1, f.height as usize);
+    let bands = (0..f.height as usize).step_by(band).map(|top| row * band.min(f.height as usize - top));
+    let mut parts: Vec<usize> = (0..f.shots).flat_map(|_| bands.clone()).collect();
+    parts.push(input as usize - parts.iter().sum::<usize>());
+    (band as u32, parts)
 }
 
 /// Replaces the content by what the bytes say, in the same memory if it is large enough.

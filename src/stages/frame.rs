@@ -5,6 +5,7 @@ use super::{ThresholdParams, Window};
 use crate::fault::{Fault, Result};
 use crate::gpu::Field;
 use crate::raster::{Image, Mask, Pixels};
+use std::ops::Range;
 
 /// The WGSL struct of the same name, shaders/shared/frame.wgsl.
 #[repr(C)]
@@ -115,15 +116,16 @@ impl Frame {
         }
     }
 
-    /// Hands a picture to `put` piece by piece (byte offset in the shot, bytes): rows padded to whole
-    /// tiles with their last pixel.
-    pub fn put_image(&self, image: &Image, put: &mut dyn FnMut(usize, &[u8])) -> Result<()> {
+    /// Hands rows of a picture to `put` piece by piece (byte offset behind the first of them, bytes): padded to whole tiles
+    /// with their last pixel.
+    pub fn put_rows(&self, image: &Image, rows: Range<u32>, put: &mut dyn FnMut(usize, &[u8])) -> Result<()> {
         self.accept(image)?;
         let (bytes, px): (&[u8], usize) = match &image.pixels {
             Pixels::U8(p) => (p, 1),
             Pixels::U16(p) => (bytemuck::cast_slice(p), 2),
         };
         let (row, pitch) = (self.width as usize * px, self.pitch as usize * 4);
+        let bytes = &bytes[rows.start as usize * row..rows.end as usize * row];
         if row == pitch {
             put(0, bytes);
             return Ok(());
@@ -137,9 +139,9 @@ impl Frame {
         Ok(())
     }
 
-    /// As `put_image`, into a slice of `image_bytes()`.
+    /// A whole picture, into a slice of `image_bytes()`.
     pub fn pack_image(&self, image: &Image, out: &mut [u8]) -> Result<()> {
-        self.put_image(image, &mut |at, bytes| out[at..at + bytes.len()].copy_from_slice(bytes))
+        self.put_rows(image, 0..self.height, &mut |at, bytes| out[at..at + bytes.len()].copy_from_slice(bytes))
     }
 
     fn accept(&self, image: &Image) -> Result<()> {

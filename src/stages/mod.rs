@@ -72,6 +72,7 @@ pub fn all() -> Vec<Entry> {
         exact(&skeleton::COUNT, skeleton::count_twin, || cases::of("count")),
         exact(&skeleton::SCAN_ROWS, skeleton::scan_rows_twin, || cases::of("scan_rows")),
         exact(&skeleton::SCAN_SHOTS, skeleton::scan_shots_twin, || cases::of("scan_shots")),
+        exact(&skeleton::HEAD, skeleton::head_twin, || cases::of("header")),
         exact(&hough::STAGE, hough::stage_twin, hough::cases),
         exact(&skeleton::STAGE, skeleton::stage_twin, || cases::of("skeleton")),
         exact(&lengthen::COPY, lengthen::copy_twin, || cases::of("skeleton_copy")),

@@ -42,6 +42,7 @@ pub struct Shared {
     starts: Buffer,
     rows: Buffer,
     row_starts: Buffer,
+    totals: Buffer,
     ambient: Option<Buffer>,
 }
 
@@ -64,6 +65,7 @@ pub struct Pipelines {
     count: Pipeline,
     scan_rows: Pipeline,
     scan_shots: Pipeline,
+    head: Pipeline,
     skeleton: Pipeline,
 }
 
@@ -102,6 +104,7 @@ impl Pipelines {
             count: build(&skeleton::COUNT)?,
             scan_rows: build(&skeleton::SCAN_ROWS)?,
             scan_shots: build(&skeleton::SCAN_SHOTS)?,
+            head: build(&skeleton::HEAD)?,
             skeleton: build(&skeleton::STAGE)?,
         })
     }
@@ -161,6 +164,7 @@ impl Shared {
             starts: words("starts", f.tiles())?,
             rows: words("rows", rows)?,
             row_starts: words("row starts", rows)?,
+            totals: words("totals", f.shots)?,
             ambient,
         })
     }
@@ -302,10 +306,11 @@ impl Shared {
         r.indirect(device, &p.count, &[zero, lit, list, mask, whole(&self.counts)], all);
         let (starts, rows) = (whole(&self.starts), whole(&self.rows));
         r.dispatch_parts(device, &p.scan_rows, &[zero, whole(&self.counts), starts, rows], skeleton::rows_groups(f));
-        let row_starts = whole(&self.row_starts);
-        let shots = [zero, rows, self.all(), whole(&self.active), row_starts, whole(header)];
-        r.dispatch_parts(device, &p.scan_shots, &shots, skeleton::shots_groups(f));
-        r.indirect(device, &p.skeleton, &[zero, lit, list, mask, starts, row_starts, whole(points)], all);
+        let (row_starts, totals, header) = (whole(&self.row_starts), whole(&self.totals), whole(header));
+        let shots = skeleton::shots_groups(f);
+        r.dispatch_parts(device, &p.scan_shots, &[zero, rows, row_starts, totals], shots);
+        r.dispatch_parts(device, &p.head, &[zero, totals, self.all(), whole(&self.active), header], shots);
+        r.indirect(device, &p.skeleton, &[zero, lit, list, mask, starts, row_starts, header, whole(points)], all);
         r
     }
 }

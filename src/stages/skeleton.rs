@@ -66,16 +66,28 @@ pub const SCAN_ROWS: Stage = Stage {
     ..COUNT
 };
 
-/// Counts before each row of tiles, and the header of the point list.
+/// Counts before each row of tiles in its shot, and each shot's.
 pub const SCAN_SHOTS: Stage = Stage {
     name: "scan_shots",
     wgsl: include_str!("../../shaders/scan_shots.wgsl"),
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "rows", access: Texels },
+        Binding { name: "row_starts", access: ReadWrite },
+        Binding { name: "totals", access: ReadWrite },
+    ],
+    ..COUNT
+};
+
+/// The point list's header.
+pub const HEAD: Stage = Stage {
+    name: "header",
+    wgsl: include_str!("../../shaders/header.wgsl"),
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "totals", access: Texels },
         Binding { name: "listing", access: Read },
         Binding { name: "shortened", access: Read },
-        Binding { name: "row_starts", access: ReadWrite },
         Binding { name: "header", access: ReadWrite },
     ],
     ..COUNT
@@ -92,6 +104,7 @@ pub const STAGE: Stage = Stage {
         Binding { name: "mask", access: Texels },
         Binding { name: "starts", access: Texels },
         Binding { name: "row_starts", access: Texels },
+        Binding { name: "header", access: Read },
         Binding { name: "points", access: ReadWrite },
     ],
     ..COUNT
@@ -130,14 +143,24 @@ pub fn scan_rows_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
 
 pub fn scan_shots_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
-    let [_, rows, listing, shortened, row_starts, header] = b else { unreachable!() };
-    let mut sum = 0;
-    for shot in 0..f.shots as usize {
-        header[HEADER + shot] = sum.min(f.capacity);
-        for y in 0..f.tiles_y as usize {
+    let [_, rows, row_starts, totals] = b else { unreachable!() };
+    for (shot, rows) in rows.chunks_exact(f.tiles_y as usize).enumerate() {
+        let mut sum = 0;
+        for (y, row) in rows.iter().enumerate() {
             row_starts[shot * f.tiles_y as usize + y] = sum;
-            sum += rows[shot * f.tiles_y as usize + y];
+            sum += row;
         }
+        totals[shot] = sum;
+    }
+}
+
+pub fn head_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+    let f = frame_of(b);
+    let [_, totals, listing, shortened, header] = b else { unreachable!() };
+    let mut sum = 0;
+    for (shot, total) in totals.iter().enumerate() {
+        header[HEADER + shot] = sum.min(f.capacity);
+        sum += total;
     }
     let kept = sum.min(f.capacity);
     let left = shortened.chunks(HEADER_WORDS as usize).filter(|list| list[3] > 0).count() as u32;
@@ -147,10 +170,11 @@ pub fn scan_shots_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
 
 pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
-    let [_, listing, list, mask, starts, row_starts, points] = b else { unreachable!() };
+    let [_, listing, list, mask, starts, row_starts, header, points] = b else { unreachable!() };
     for &tile in &list[..listing[3] as usize] {
         let (tx, ty, shot) = tile_unpack(tile);
-        let mut at = (row_starts[(shot * f.tiles_y + ty) as usize] + starts[tile_index(&f, tile)]) as usize;
+        let row_start = header[HEADER + shot as usize] + row_starts[(shot * f.tiles_y + ty) as usize];
+        let mut at = (row_start + starts[tile_index(&f, tile)]) as usize;
         for row in 0..8 {
             let mut bits = mask[mask_index(&f, tile, row)];
             while bits != 0 {

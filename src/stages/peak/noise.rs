@@ -21,7 +21,9 @@ pub fn noise(image: &Image) -> f32 {
         for x in (2..w.saturating_sub(2)).step_by(step as usize) {
             let here = image.get(x, y);
             zeros += usize::from(here == 0);
-            twice.push((2 * i32::from(here) - i32::from(image.get(x - 2, y)) - i32::from(image.get(x + 2, y))).unsigned_abs());
+            twice.push(
+                (2 * i32::from(here) - i32::from(image.get(x - 2, y)) - i32::from(image.get(x + 2, y))).unsigned_abs(),
+            );
         }
     }
     if twice.is_empty() {
@@ -52,7 +54,9 @@ mod tests {
 
     #[test]
     fn the_scatter_of_dark_pixels_is_found_beside_a_stripe() {
-        for (bits, black, sigma) in [(8, 30.0, 2.0), (8, 30.0, 8.0), (8, 0.0, 3.5), (8, 2.0, 3.5), (12, 30.0, 1.0), (12, 0.0, 1.0)] {
+        for (bits, black, sigma) in
+            [(8, 30.0, 2.0), (8, 30.0, 8.0), (8, 0.0, 3.5), (8, 2.0, 3.5), (12, 30.0, 1.0), (12, 0.0, 1.0)]
+        {
             let found = f64::from(noisy(bits, black, sigma));
             assert!((found / sigma - 1.0).abs() < 0.25, "{bits} bits, black {black}, {sigma}: {found}");
         }

@@ -2,8 +2,8 @@
 //! Frame and unit: words; peaks in pixels and grey levels.
 
 use super::{Grey, Method, Peak, PeakFrame, frame, one};
-use crate::stages::choose;
 use crate::gpu::{Access::*, Binding, Stage};
+use crate::stages::choose;
 use crate::stages::frame::PX_LOG2;
 use rayon::prelude::*;
 

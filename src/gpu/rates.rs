@@ -1,0 +1,101 @@
+//! In: a device. Out: how fast this machine moves pictures there, on the path that the chain takes, and results back.
+//! Frame and unit: bytes, 1e9 bytes a second.
+
+use super::ring::{PART, Ring, RingSizes};
+use super::{Device, Recording, Replay};
+use crate::fault::Result;
+use std::time::Instant;
+
+/// Transfer rates between host and device, 1e9 bytes a second.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Rates {
+    /// Pictures in the host's memory, one after the other through the ring, without any stage.
+    pub upload_gb_s: f64,
+    /// Into a slice, one by one.
+    pub readback_gb_s: f64,
+    /// Bytes read and written by copies within the device's memory, where it has its own.
+    pub device_gb_s: Option<f64>,
+}
+
+/// Batches under way, and those that are timed.
+const SLOTS: usize = 3;
+const ROUNDS: usize = 32;
+/// Bytes of a copy within the device, more than its caches hold, and copies that are timed together.
+const COPY: u64 = 1 << 27;
+const COPIES: usize = 32;
+
+impl Device {
+    /// Rates for pictures of so many bytes; medians.
+    pub fn measure_rates(&self, bytes: u64) -> Result<Rates> {
+        let rate = |bytes: u64, mut seconds: Vec<f64>| {
+            seconds.sort_by(f64::total_cmp);
+            bytes as f64 / seconds[seconds.len() / 2] / 1e9
+        };
+        let copied = 2 * COPY * COPIES as u64;
+        Ok(Rates {
+            upload_gb_s: rate(bytes, self.uploads(bytes)?),
+            readback_gb_s: rate(bytes, self.readbacks(bytes)?),
+            device_gb_s: if self.info.unified_memory { None } else { Some(rate(copied, self.copies()?)) },
+        })
+    }
+
+    /// Seconds from the end of one upload to the end of the next, in steady state.
+    fn uploads(&self, bytes: u64) -> Result<Vec<f64>> {
+        // Together larger than most caches.
+        let pictures: Vec<Vec<u8>> = (1..=8).map(|level| vec![level; bytes as usize]).collect();
+        let parts: Vec<usize> = pictures[0].chunks(PART).map(<[u8]>::len).collect();
+        let mut ring = Ring::new(self, RingSizes { slots: SLOTS, input: bytes, header: 16, outputs: Vec::new() })?;
+        let (mut replay, nothing) = (Replay::new(self, false)?, Recording::default());
+        let mut seconds = Vec::new();
+        let mut last = Instant::now();
+        for picture in pictures.iter().cycle().take(SLOTS + ROUNDS) {
+            if !ring.has_room() {
+                ring.oldest(true, &mut [0; 4])?;
+                ring.finish(&[], |_, _| {})?;
+                seconds.push(last.elapsed().as_secs_f64());
+                last = Instant::now();
+            }
+            let at = ring.fill(&parts, &|i, put| {
+                put(0, picture.chunks(PART).nth(i).expect("as many as parts"));
+                Ok(())
+            })?;
+            ring.run(at, &mut replay, &[&nothing], true)?;
+        }
+        self.wait(None)?;
+        Ok(seconds)
+    }
+
+    /// Seconds of `COPIES` copies within the device.
+    fn copies(&self) -> Result<Vec<f64>> {
+        let (a, b) = (self.storage("rate", COPY)?, self.storage("rate copy", COPY)?);
+        let some = |_| {
+            let start = Instant::now();
+            let mut encoder = self.raw.create_command_encoder(&Default::default());
+            for n in 0..COPIES {
+                let (from, to) = if n % 2 == 0 { (&a, &b) } else { (&b, &a) };
+                encoder.copy_buffer_to_buffer(&from.raw, 0, &to.raw, 0, COPY);
+            }
+            let at = self.queue.submit([encoder.finish()]);
+            self.wait(Some(at))?;
+            Ok(start.elapsed().as_secs_f64())
+        };
+        (0..5).map(some).collect()
+    }
+
+    fn readbacks(&self, bytes: u64) -> Result<Vec<f64>> {
+        let (from, to) = (self.storage("rate", bytes)?, self.readback_staging("rate readback", bytes)?);
+        let one = |_| {
+            let start = Instant::now();
+            let mut encoder = self.raw.create_command_encoder(&Default::default());
+            encoder.copy_buffer_to_buffer(&from.raw, 0, &to.raw, 0, bytes);
+            self.queue.submit([encoder.finish()]);
+            let mapped = to.map(wgpu::MapMode::Read, 0..bytes);
+            self.wait(None)?;
+            mapped.done()?;
+            std::hint::black_box(to.view(0..bytes)?.to_vec());
+            to.raw.unmap();
+            Ok(start.elapsed().as_secs_f64())
+        };
+        (0..9).map(one).collect()
+    }
+}
