@@ -15,5 +15,5 @@ mod texels;
 pub use device::{AdapterInfo, Buffer, Device, adapters};
 pub use rates::Rates;
 pub use recording::{Dispatch, Recording, Replay, StageTime};
-pub use ring::{PART, Ring, RingSizes, Slot};
+pub use ring::{PART, Returned, Ring, RingSizes, Slot};
 pub use stage::{Access, Binding, Field, Pipeline, Stage, Workload, run_once};

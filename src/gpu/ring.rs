@@ -4,6 +4,7 @@
 use super::device::{Fill, Mapping};
 use super::{Buffer, Device, Recording, Replay};
 use crate::fault::{Fault, Result};
+use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::collections::VecDeque;
 
@@ -30,11 +31,32 @@ pub struct Output {
     staging: Option<Buffer>,
 }
 
+/// Bytes that came back, and who copies them.
+pub struct Returned<'a> {
+    bytes: &'a [u8],
+    copiers: Option<&'a ThreadPool>,
+}
+
+impl Returned<'_> {
+    /// Replaces a list by what the bytes say, in the same memory if it is large enough.
+    pub fn refill<T: bytemuck::Pod>(&self, list: &mut Vec<T>) {
+        list.resize(self.bytes.len() / size_of::<T>(), T::zeroed());
+        let to: &mut [u8] = bytemuck::cast_slice_mut(list);
+        match self.copiers.filter(|_| to.len() > PART) {
+            None => to.copy_from_slice(self.bytes),
+            Some(pool) => pool.install(|| {
+                let pieces = to.par_chunks_mut(PART).zip(self.bytes.par_chunks(PART));
+                pieces.for_each(|(to, from)| to.copy_from_slice(from));
+            }),
+        }
+    }
+}
+
 /// Batches in flight, oldest first; no buffer is made after the start.
 pub struct Ring {
     device: Device,
-    /// Write a batch together where the device works for itself.
-    writers: Option<ThreadPool>,
+    /// Copy a batch, and what comes back, together where the device works for itself.
+    copiers: Option<ThreadPool>,
     pub slots: Vec<Slot>,
     free: VecDeque<usize>,
     busy: VecDeque<usize>,
@@ -55,17 +77,17 @@ const FIRST: u64 = 1 << 20;
 /// Bytes of a batch that one thread writes at a time: large enough that handing them over costs little.
 pub const PART: usize = 1 << 20;
 
-/// Threads that write a batch. One writes 11 GB/s over PCIe 5, four 25; eight write 26 and take twice the CPU time.
-const WRITERS: usize = 4;
+/// Threads that copy a batch. One writes 11 GB/s over PCIe 5, four 25; eight write 26 and take twice the CPU time.
+const COPIERS: usize = 4;
 
 /// None where the stages run on the same cores, or there is one core only.
-fn writers(device: &Device) -> Result<Option<ThreadPool>> {
-    let threads = std::thread::available_parallelism().map_or(1, |n| n.get()).min(WRITERS);
+fn copiers(device: &Device) -> Result<Option<ThreadPool>> {
+    let threads = std::thread::available_parallelism().map_or(1, |n| n.get()).min(COPIERS);
     if threads == 1 || !device.has_own_processors() {
         return Ok(None);
     }
     let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map(Some).map_err(|e| Fault::device(format!("{threads} threads to write pictures cannot be started: {e}")))
+    pool.map(Some).map_err(|e| Fault::device(format!("{threads} threads to copy pictures cannot be started: {e}")))
 }
 
 impl Ring {
@@ -101,7 +123,7 @@ impl Ring {
         device.wait(None)?;
         Ok(Ring {
             device: device.clone(),
-            writers: writers(device)?,
+            copiers: copiers(device)?,
             free: (0..sizes.slots).collect(),
             busy: VecDeque::new(),
             slots,
@@ -129,7 +151,7 @@ impl Ring {
             }
             m.done()?;
         }
-        if let Err(e) = slot.upload.fill(parts, self.writers.as_ref(), fill) {
+        if let Err(e) = slot.upload.fill(parts, self.copiers.as_ref(), fill) {
             slot.mapping = slot.upload.open();
             self.device.wait(None)?;
             return Err(e);
@@ -190,9 +212,10 @@ impl Ring {
     }
 
     /// Gives the first `bytes[i]` bytes of each output of the oldest place to `read` and frees the place.
-    pub fn finish(&mut self, bytes: &[u64], mut read: impl FnMut(usize, &[u8])) -> Result<()> {
+    pub fn finish(&mut self, bytes: &[u64], mut read: impl FnMut(usize, Returned)) -> Result<()> {
         let at = self.busy.pop_front().expect("a place is busy");
-        let (device, slot) = (&self.device, &mut self.slots[at]);
+        let (device, copiers, slot) = (&self.device, self.copiers.as_ref(), &mut self.slots[at]);
+        let mut read = |i, bytes: &[u8]| read(i, Returned { bytes, copiers });
         for (i, (output, &bytes)) in slot.outputs.iter_mut().zip(bytes).enumerate() {
             if bytes == 0 {
                 read(i, &[]);

@@ -322,11 +322,11 @@ impl Chain {
         if self.poses.is_some() {
             let bytes = [n * size_of::<Peak>() as u64, n * size_of::<Point>() as u64];
             self.ring.finish(&bytes, |i, bytes| match i {
-                0 => refill(&mut batch.peaks, bytes),
-                _ => refill(&mut batch.spots, bytes),
+                0 => bytes.refill(&mut batch.peaks),
+                _ => bytes.refill(&mut batch.spots),
             })?;
         } else {
-            self.ring.finish(&[8 * n], |_, bytes| refill(&mut batch.points, bytes))?;
+            self.ring.finish(&[8 * n], |_, bytes| bytes.refill(&mut batch.points))?;
         }
         Ok(true)
     }
@@ -370,10 +370,4 @@ fn parts(f: &Frame, input: u64) -> (u32, Vec<usize>) {
     let mut parts: Vec<usize> = (0..f.shots).flat_map(|_| bands.clone()).collect();
     parts.push(input as usize - parts.iter().sum::<usize>());
     (band as u32, parts)
-}
-
-/// Replaces the content by what the bytes say, in the same memory if it is large enough.
-fn refill<T: bytemuck::Pod>(list: &mut Vec<T>, bytes: &[u8]) {
-    list.resize(bytes.len() / size_of::<T>(), T::zeroed());
-    bytemuck::cast_slice_mut(list).copy_from_slice(bytes);
 }
