@@ -64,26 +64,28 @@ fn tensor(x: i32, y: i32, u: i32, v: i32) -> vec3<f32> {
     return vec3(h, xy, sqrt(h * h + xy * xy));
 }
 
-// Cosine of twice the angle up to which a stripe is flat.
-const COS_FLAT = 0.40673664;
+// Sine and cosine of twice the angle that a tensor shows.
+fn twice(t: vec3<f32>) -> vec2<f32> {
+    return vec2(t.y, -t.x) / vec2(max(t.z, 1e-12));
+}
+
+// Sum of c sin(k a), k = 2, 4, 6, 8.
+fn turn_of(sc: vec2<f32>, c: vec4<f32>) -> f32 {
+    let s4 = 2.0 * sc.x * sc.y;
+    let c4 = sc.y * sc.y - sc.x * sc.x;
+    return c.x * sc.x + c.y * s4 + (c.z * (s4 * sc.y + c4 * sc.x) + c.w * (2.0 * s4 * c4));
+}
 
 // Across the stripe; what so far differences make of the direction is put right.
 fn direction(x: i32, y: i32) -> vec2<f32> {
     var t = tensor(x, y, frame.lattice_u, frame.lattice_v);
-    var s2 = t.y / max(t.z, 1e-12);
-    var c2 = -t.x / max(t.z, 1e-12);
-    var s4 = 2.0 * s2 * c2;
-    var c4 = c2 * c2 - s2 * s2;
-    var turn = frame.turn_2 * s2 + frame.turn_4 * s4 + (frame.turn_6 * (s4 * c2 + c4 * s2) + frame.turn_8 * (2.0 * s4 * c4));
+    let seen = twice(t);
+    var turn = turn_of(seen, vec4(frame.turn_2, frame.turn_4, frame.turn_6, frame.turn_8));
     // On a steep stripe the longer differences would span its whole width.
-    if select(-c2, c2, frame.lattice_u > frame.lattice_v) < COS_FLAT {
+    if select(-seen.y, seen.y, frame.lattice_u > frame.lattice_v) < frame.flat {
         let side = min(frame.lattice_u, frame.lattice_v);
         t = tensor(x, y, side, side);
-        s2 = t.y / max(t.z, 1e-12);
-        c2 = -t.x / max(t.z, 1e-12);
-        s4 = 2.0 * s2 * c2;
-        c4 = c2 * c2 - s2 * s2;
-        turn = frame.square_4 * s4 + frame.square_8 * (2.0 * s4 * c4);
+        turn = turn_of(twice(t), vec4(0.0, frame.square_4, 0.0, frame.square_8));
     }
     let h = t.x;
     let xy = t.y;

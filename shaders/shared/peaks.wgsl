@@ -37,6 +37,7 @@ struct PeakFrame {
     turn_8: f32,
     square_4: f32,
     square_8: f32,
+    flat: f32,
 }
 
 // One peak, 12 words.

@@ -64,7 +64,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     }
     let wrong: Vec<&str> = findings.stages.iter().filter(|v| !v.passed()).map(|v| v.stage).collect();
     findings.verdict = match (&findings.used, wrong.is_empty()) {
-        (None, _) => "no GPU: everything runs on the CPU twins, with the same results, slower".into(),
+        (None, _) => "no GPU: everything runs on the CPU twins, with the same results but for rounding, slower".into(),
         (Some(name), true) => format!("good: every stage on {name} agrees with its CPU twin"),
         (Some(_), false) => format!("do not trust this GPU: {} differ from their CPU twins", wrong.join(", ")),
     };

@@ -42,7 +42,7 @@ impl Returned<'_> {
     pub fn refill<T: bytemuck::Pod>(&self, list: &mut Vec<T>) {
         list.resize(self.bytes.len() / size_of::<T>(), T::zeroed());
         let to: &mut [u8] = bytemuck::cast_slice_mut(list);
-        match self.copiers.filter(|_| to.len() > PART) {
+        match self.copiers.filter(|_| to.len() > 4 * PART) {
             None => to.copy_from_slice(self.bytes),
             Some(pool) => pool.install(|| {
                 let pieces = to.par_chunks_mut(PART).zip(self.bytes.par_chunks(PART));

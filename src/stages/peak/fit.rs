@@ -22,24 +22,23 @@ pub(super) const GRADIENTS: [(i32, i32, f32); 13] = [
     (2, 2, 0.25),
 ];
 
-/// Cosine of twice [`super::turn::FLAT`].
-const COS_FLAT: f32 = 0.40673664;
-
 /// Direction across the stripe: the strongest eigenvector of the structure tensor, on grey levels so far apart that noise
 /// of single pixels does not turn it, and what so far differences make of it is put right (docs/math.md, Stripe peak (1)).
 pub(super) fn direction<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> (f32, f32) {
     let (mut h, mut xy, mut q) = tensor(image, x, y, s.lattice_u, s.lattice_v);
-    let (mut s2, mut c2) = (xy / q.max(1e-12), -h / q.max(1e-12));
-    let (mut s4, mut c4) = (2.0 * s2 * c2, c2 * c2 - s2 * s2);
-    let mut turn = s.turn_2 * s2 + s.turn_4 * s4 + (s.turn_6 * (s4 * c2 + c4 * s2) + s.turn_8 * (2.0 * s4 * c4));
+    // Sine and cosine of twice the angle that a tensor shows; sum of c sin(k a), k = 2, 4, 6, 8.
+    let twice = |h: f32, xy: f32, q: f32| (xy / q.max(1e-12), -h / q.max(1e-12));
+    let turn_of = |(s2, c2): (f32, f32), c: [f32; 4]| {
+        let (s4, c4) = (2.0 * s2 * c2, c2 * c2 - s2 * s2);
+        c[0] * s2 + c[1] * s4 + (c[2] * (s4 * c2 + c4 * s2) + c[3] * (2.0 * s4 * c4))
+    };
+    let seen = twice(h, xy, q);
+    let mut turn = turn_of(seen, [s.turn_2, s.turn_4, s.turn_6, s.turn_8]);
     // On a steep stripe the longer differences would span its whole width.
-    let flat = if s.lattice_u > s.lattice_v { c2 } else { -c2 };
-    if flat < COS_FLAT {
+    if (if s.lattice_u > s.lattice_v { seen.1 } else { -seen.1 }) < s.flat {
         let side = s.lattice_u.min(s.lattice_v);
         (h, xy, q) = tensor(image, x, y, side, side);
-        (s2, c2) = (xy / q.max(1e-12), -h / q.max(1e-12));
-        (s4, c4) = (2.0 * s2 * c2, c2 * c2 - s2 * s2);
-        turn = s.square_4 * s4 + s.square_8 * (2.0 * s4 * c4);
+        turn = turn_of(twice(h, xy, q), [0.0, s.square_4, 0.0, s.square_8]);
     }
     let (nx, ny) = if h > 0.0 { (h + q, xy) } else { (xy, q - h) };
     if (nx * nx + ny * ny).sqrt() < 1e-9 {

@@ -66,13 +66,15 @@ pub struct PeakFrame {
     pub turn_8: f32,
     pub square_4: f32,
     pub square_8: f32,
+    /// Cosine of twice the angle up to which a stripe is flat.
+    pub flat: f32,
 }
 
 pub const UNIFORM: (&str, &[Field], usize) = crate::stages::frame::uniform_fields!(PeakFrame: width, height, pitch, shot_words, s0, full_scale,
     read2, gain, speckle2, along_factor, reach_along, stride_across, lattice_u, lattice_v, stride, steps, faintest, narrowest,
     widest, uncertain, upright, across_u, across_v, lines, columns, entries,
     line_px, fours, half_across,
-    rows, turn_2, turn_4, turn_6, turn_8, square_4, square_8);
+    rows, turn_2, turn_4, turn_6, turn_8, square_4, square_8, flat);
 
 impl PeakFrame {
     /// Quads of samples of a profile, which the shader has written out: -2 quads up to 2 quads - 1, so that the shorter
@@ -152,6 +154,7 @@ impl PeakFrame {
             turn_8,
             square_4,
             square_8,
+            flat: (2.0 * FLAT).cos() as f32,
         }
     }
 }
