@@ -21,7 +21,7 @@ pub struct Rates {
 /// Batches under way, and those that are timed.
 const SLOTS: usize = 3;
 const ROUNDS: usize = 32;
-/// Bytes of a copy within the device, more than its caches hold, and copies that are timed together.
+/// Bytes of a copy within the device, more than its caches hold, where it binds as many; and copies that are timed together.
 const COPY: u64 = 1 << 28;
 const COPIES: usize = 32;
 /// A stage copies faster than the command for it.
@@ -50,11 +50,15 @@ impl Device {
             seconds.sort_by(f64::total_cmp);
             bytes as f64 / seconds[seconds.len() / 2] / 1e9
         };
-        let copied = 2 * COPY * COPIES as u64;
+        let copy = COPY.min(self.info.max_binding_bytes / 64 * 64);
         Ok(Rates {
             upload_gb_s: rate(bytes, self.uploads(bytes)?),
             readback_gb_s: rate(bytes, self.readbacks(bytes)?),
-            device_gb_s: if self.info.unified_memory { None } else { Some(rate(copied, self.copies()?)) },
+            device_gb_s: if self.info.unified_memory {
+                None
+            } else {
+                Some(rate(2 * copy * COPIES as u64, self.copies(copy)?))
+            },
         })
     }
 
@@ -85,13 +89,13 @@ impl Device {
     }
 
     /// Seconds of `COPIES` copies within the device.
-    fn copies(&self) -> Result<Vec<f64>> {
-        let (a, b) = (self.storage("rate", COPY)?, self.storage("rate copy", COPY)?);
+    fn copies(&self, bytes: u64) -> Result<Vec<f64>> {
+        let (a, b) = (self.storage("rate", bytes)?, self.storage("rate copy", bytes)?);
         let copier = COPIER.pipeline(self, &[])?;
         let mut work = Recording::default();
         for n in 0..COPIES {
             let pair = if n % 2 == 0 { [&a, &b] } else { [&b, &a] };
-            work.dispatch(self, &copier, &pair, COPIER.groups([(COPY / 64) as u32, 1, 1]));
+            work.dispatch(self, &copier, &pair, COPIER.groups([(bytes / 64) as u32, 1, 1]));
         }
         let mut replay = Replay::new(self, false)?;
         let mut some = |_| {

@@ -24,11 +24,13 @@ pub struct Slot {
     at: Option<wgpu::SubmissionIndex>,
 }
 
-/// One large result, and where the host reads it when memory is not shared: as much as any batch needed so far, for what
-/// the stages may write at most is many times that.
+/// One large result, and where the host reads it when memory is not shared: as much as a batch in this place needed so far,
+/// for what the stages may write at most is many times that.
 pub struct Output {
     pub buffer: Buffer,
     staging: Option<Buffer>,
+    /// Bytes that are sent back with the next batch.
+    sent: u64,
 }
 
 /// Bytes that came back, and who copies them.
@@ -52,7 +54,7 @@ impl Returned<'_> {
     }
 }
 
-/// Batches in flight, oldest first; no buffer is made after the start.
+/// Batches in flight, oldest first; no buffer is made after the start, but where results need more room than ever before.
 pub struct Ring {
     device: Device,
     /// Copy a batch, and what comes back, together where the device works for itself.
@@ -102,10 +104,11 @@ impl Ring {
                 (device.upload_staging("input staging", sizes.input)?, device.storage("input", sizes.input)?)
             };
             let outputs = sizes.outputs.iter().map(|&bytes| match unified {
-                true => Ok(Output { buffer: device.readable_storage("output", bytes)?, staging: None }),
+                true => Ok(Output { buffer: device.readable_storage("output", bytes)?, staging: None, sent: 0 }),
                 false => Ok(Output {
                     buffer: device.storage("output", bytes)?,
                     staging: Some(device.readback_staging("output staging", bytes.min(FIRST))?),
+                    sent: bytes.min(FIRST),
                 }),
             });
             let outputs = outputs.collect::<Result<Vec<_>>>()?;
@@ -182,11 +185,10 @@ impl Ring {
         let slot = &mut self.slots[at];
         let before = [(&slot.upload, 0, &slot.input, 0, slot.upload.raw.size())];
         let header = (&slot.header, 0, &slot.header_staging, 0, slot.header.raw.size());
-        let separate = slot.outputs.iter().any(|o| o.staging.is_some());
-        let copies = if upload && separate { &before[..] } else { &[] };
+        let copies = if upload && !self.device.info.unified_memory { &before[..] } else { &[] };
         let mut after = vec![header];
         for o in &slot.outputs {
-            after.extend(o.staging.as_ref().map(|staging| (&o.buffer, 0, staging, 0, staging.raw.size())));
+            after.extend(o.staging.as_ref().map(|staging| (&o.buffer, 0, staging, 0, o.sent)));
         }
         slot.at = Some(replay.submit(copies, recordings, &after)?);
         slot.mapping = Some(slot.header_staging.map(wgpu::MapMode::Read, 0..slot.header.raw.size()));
@@ -217,17 +219,22 @@ impl Ring {
         let (device, copiers, slot) = (&self.device, self.copiers.as_ref(), &mut self.slots[at]);
         let mut read = |i, bytes: &[u8]| read(i, Returned { bytes, copiers });
         for (i, (output, &bytes)) in slot.outputs.iter_mut().zip(bytes).enumerate() {
+            if let Some(staging) = &mut output.staging {
+                let room = bytes.next_power_of_two().min(output.buffer.raw.size());
+                if bytes > output.sent {
+                    if staging.raw.size() < room {
+                        *staging = device.readback_staging("output staging", room)?;
+                    }
+                    let mut encoder = device.raw.create_command_encoder(&Default::default());
+                    encoder.copy_buffer_to_buffer(&output.buffer.raw, 0, &staging.raw, 0, room);
+                    device.queue.submit([encoder.finish()]);
+                }
+                // The next one brings as much with it; less and less where that was noise in one batch.
+                output.sent = room.max(output.sent / 2).max(FIRST).min(staging.raw.size());
+            }
             if bytes == 0 {
                 read(i, &[]);
                 continue;
-            }
-            if let Some(staging) = output.staging.as_mut().filter(|s| s.raw.size() < bytes) {
-                // The first batch of this size asks for it by itself, all that follow bring as much with them.
-                let room = bytes.next_power_of_two().min(output.buffer.raw.size());
-                *staging = device.readback_staging("output staging", room)?;
-                let mut encoder = device.raw.create_command_encoder(&Default::default());
-                encoder.copy_buffer_to_buffer(&output.buffer.raw, 0, &staging.raw, 0, room);
-                device.queue.submit([encoder.finish()]);
             }
             let source = output.staging.as_ref().unwrap_or(&output.buffer);
             if let Some(host) = &source.aliased {

@@ -60,14 +60,14 @@ impl ChainConfig {
     }
     /// Batch that hides the fixed cost: about 10 megapixels, 1 to 32 shots.
     pub fn shots_for(width: u32, height: u32) -> u32 {
-        (10_000_000 / (width * height).max(1)).clamp(1, 32)
+        (10_000_000 / width.saturating_mul(height).max(1)).clamp(1, 32)
     }
 
     /// With the batch that hides the fixed cost on this device: one with memory of its own has more processors to keep busy, and
-    /// a dispatch of any size takes it as long as 400,000 pixels. It needs about 25 bytes of that memory a pixel.
+    /// a dispatch of any size takes it as long as 400,000 pixels. All three batches need less than a gigabyte.
     pub fn on(self, device: &Device) -> ChainConfig {
         if !device.info.unified_memory {
-            let shots = (40_000_000 / (self.width * self.height).max(1)).clamp(1, 64);
+            let shots = (40_000_000 / self.width.saturating_mul(self.height).max(1)).clamp(1, 64);
             return ChainConfig { shots, ..self };
         }
         self
@@ -315,17 +315,17 @@ impl Chain {
         batch.starts.clear();
         batch.starts.extend_from_slice(&header[skeleton::HEADER..=skeleton::HEADER + shots]);
         (batch.found, batch.listed_tiles) = (header[4], header[5]);
-        batch.points.clear();
-        batch.peaks.clear();
-        batch.spots.clear();
         let n = u64::from(header[skeleton::HEADER + shots]);
         if self.poses.is_some() {
+            batch.points.clear();
             let bytes = [n * size_of::<Peak>() as u64, n * size_of::<Point>() as u64];
             self.ring.finish(&bytes, |i, bytes| match i {
                 0 => bytes.refill(&mut batch.peaks),
                 _ => bytes.refill(&mut batch.spots),
             })?;
         } else {
+            batch.peaks.clear();
+            batch.spots.clear();
             self.ring.finish(&[8 * n], |_, bytes| bytes.refill(&mut batch.points))?;
         }
         Ok(true)

@@ -101,7 +101,7 @@ pub struct HeightMapFigures {
     pub z_high_mm: f64,
 }
 
-/// Points and shots between two checkpoints: what a crash can cost.
+/// Shots between two checkpoints: what a crash can cost beside those under way.
 const CHECKPOINT_SHOTS: usize = 64;
 
 /// [`scan_on`] where the options say; the device is opened while the first pictures are decoded.
