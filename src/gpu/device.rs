@@ -249,8 +249,8 @@ impl Device {
                 self.info.name,
                 limit.min(binding)
             ))
-            .cause("the pictures, or the number of shots in one batch, are too large for this adapter")
-            .next("lower the shots per batch"));
+            .cause("the pictures are too large for this adapter")
+            .next("choose another one with SHEETLIGHT_ADAPTER; what has --on runs without, with --on cpu"));
         }
         self.allocated.fetch_add(size, std::sync::atomic::Ordering::Relaxed);
         let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
@@ -259,7 +259,7 @@ impl Device {
             let (raw, aliased) = alias::buffer(&self.raw, &descriptor, zeroed).ok_or_else(|| {
                 Fault::device(format!("{}: {size} bytes for '{label}' cannot be had", self.info.name))
                     .cause("the memory ran out")
-                    .next("lower the shots per batch")
+                    .next("close other programs; what has --on runs in less memory with --on cpu")
             })?;
             return Ok(Buffer { raw, bytes, aliased: Some(aliased) });
         }
