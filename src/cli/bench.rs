@@ -10,7 +10,8 @@ use std::path::{Path, PathBuf};
 /// Measure how fast the stripe chain is on this machine
 ///
 /// Every row is one size and one scene: time a shot in steady state with several batches in flight, CPU time,
-/// shares of what memory and upload could carry, latency of a single shot, and the GPU's time per stage. Below the table
+/// shares of what memory and upload could carry, latency of a single shot, and the GPU's time per stage; "resident" is the
+/// rate with the pictures already where the stages read them, Mpx/s, "and full" that of the full chain. Below the table
 /// stands what a shot costs by itself and what every further megapixel and, where all scenes are measured, every further per
 /// cent of lit pixels adds.
 #[derive(clap::Args)]
