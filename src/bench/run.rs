@@ -95,8 +95,6 @@ pub struct Row {
     /// Wall time a shot with the pictures already where the stages read them, results brought back; and of the full chain.
     pub device_ms_per_shot: f64,
     pub full_device_ms_per_shot: Option<f64>,
-    /// Gigapixels a second of the first of them.
-    pub device_gpx_per_s: f64,
     pub shots_per_s: f64,
     pub mpx_per_s: f64,
     /// CPU time of all threads a shot; on a software adapter the GPU's work is in it.
@@ -237,7 +235,6 @@ fn row(
         full_over_skeleton: full.map(|f| f.over_skeleton),
         device_ms_per_shot,
         full_device_ms_per_shot: full.map(|f| f.device_ms_per_shot),
-        device_gpx_per_s: px / (device_ms_per_shot * 1e6),
         shots_per_s: 1e3 / ms_per_shot,
         mpx_per_s: mpx,
         cpu_ms_per_shot: cpu_ms,

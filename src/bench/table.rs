@@ -41,6 +41,8 @@ pub fn table(report: &Report) -> String {
         "p99 ms"
     );
     for r in &report.rows {
+        // Mpx/s.
+        let rate = |ms: f64| f64::from(r.width) * f64::from(r.height) / (1e3 * ms);
         let _ = writeln!(
             out,
             "{:11} {:16} {:>5} {:>8.3} {:>8.3} {:>6.2} {:>8.1} {:>8.0} {:>8.0} {:>8.0} {:>8.2} {:>7.1} {:>6.1}% {:>6.1}% {:>6.1}% {:>8.2} {:>8.2}",
@@ -52,8 +54,8 @@ pub fn table(report: &Report) -> String {
             r.full_over_skeleton.unwrap_or(f64::NAN),
             r.shots_per_s,
             r.mpx_per_s,
-            1e3 * r.device_gpx_per_s,
-            r.full_device_ms_per_shot.map_or(f64::NAN, |ms| 1e3 * r.device_gpx_per_s * r.device_ms_per_shot / ms),
+            rate(r.device_ms_per_shot),
+            r.full_device_ms_per_shot.map_or(f64::NAN, rate),
             r.cpu_ms_per_shot.unwrap_or(f64::NAN),
             r.cpu_over_plain_read.unwrap_or(f64::NAN),
             100.0 * r.share_of_memory,

@@ -46,7 +46,7 @@ impl ChainConfig {
             width,
             height,
             bits,
-            shots: ChainConfig::shots_for(width, height),
+            shots: shots_for(width, height, 10_000_000, 32),
             slots: 3,
             threshold: ThresholdParams::default(),
             thinning: Thinning::default(),
@@ -58,20 +58,19 @@ impl ChainConfig {
             timed: false,
         }
     }
-    /// Batch that hides the fixed cost: about 10 megapixels, 1 to 32 shots.
-    pub fn shots_for(width: u32, height: u32) -> u32 {
-        (10_000_000 / width.saturating_mul(height).max(1)).clamp(1, 32)
-    }
-
     /// With the batch that hides the fixed cost on this device: one with memory of its own has more processors to keep busy, and
     /// a dispatch of any size takes it as long as 400,000 pixels. All three batches need less than a gigabyte.
     pub fn on(self, device: &Device) -> ChainConfig {
         if !device.info.unified_memory {
-            let shots = (40_000_000 / self.width.saturating_mul(self.height).max(1)).clamp(1, 64);
-            return ChainConfig { shots, ..self };
+            return ChainConfig { shots: shots_for(self.width, self.height, 40_000_000, 64), ..self };
         }
         self
     }
+}
+
+/// Shots of a batch of about so many pixels.
+fn shots_for(width: u32, height: u32, pixels: u32, most: u32) -> u32 {
+    (pixels / width.saturating_mul(height).max(1)).clamp(1, most)
 }
 
 /// The chain on one GPU for one kind of picture.
