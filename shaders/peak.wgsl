@@ -10,7 +10,7 @@
 
 // Pixels a word as a power of two: 2 for 8-bit pictures, 1 for deeper ones.
 override px_log2: u32 = 2u;
-// 0 Gaussian, 1 centroid, 2 derivative.
+// 0 Gaussian, 1 centroid, 2 derivative, 3 the pixel itself.
 override peak_method: u32 = 0u;
 
 const SATURATED = 256u;
@@ -400,6 +400,16 @@ fn derivative(at: vec2<i32>) -> Peak {
     return finish(c, n, m, max(bright, 1.0), width, sqrt(noise) / max(-d2, 1e-6), saturated);
 }
 
+// Where nothing says in which part of the pixel the centre lies.
+const EVEN = 0.28867513;
+
+fn itself(at: vec2<i32>) -> Peak {
+    let n = select(1.0, -1.0, frame.across_v < 0.0) * vec2(frame.across_u, frame.across_v);
+    base = background(at.x, at.y, n);
+    let here = level(at.x, at.y);
+    return finish(at, n, 0.0, max(here - base, 1.0), frame.s0, EVEN, here >= frame.full_scale);
+}
+
 // The first test that fails names the reason; the numbers are those of `Reject`.
 fn alone(k: Peak) -> u32 {
     let across = k.normal_u * frame.across_u + k.normal_v * frame.across_v;
@@ -418,13 +428,15 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let at = vec2(i32(point.x & 0xffffu), i32(point.x >> 16u));
         first = point.y * frame.shot_words;
         var peak: Peak;
-        // The method is a constant of the pipeline: the other two are not in its code.
+        // The method is a constant of the pipeline: the others are not in its code.
         if peak_method == 0u {
             peak = gaussian(at);
         } else if peak_method == 1u {
             peak = centroid(at);
-        } else {
+        } else if peak_method == 2u {
             peak = derivative(at);
+        } else {
+            peak = itself(at);
         }
         peak.pixel = point.x;
         peak.shot = point.y;

@@ -1,7 +1,10 @@
 """In: pictures made here. Out: how long OpenCV's chain, a column centroid, a Steger chain and Sheetlight take
-for the same pictures, in turns within one run, and whether Sheetlight's masks are OpenCV's, pixel for pixel.
-Unit: milliseconds a shot, medians over the rounds; ratios are medians of the rounds' ratios. "by CPU" compares the
-CPU time of all threads, which says more than wall time on a machine that is busy with something else.
+for the same pictures, in turns within one run, and whether Sheetlight's masks are OpenCV's, pixel for pixel, and its points
+those of OpenCV's lens and the plane.
+Unit: milliseconds a shot, medians over the rounds; ratios are medians of the rounds' ratios. "ours" ends with the same as
+OpenCV's chain, a point for the middle of every skeleton pixel; "full" fits a peak to each, with its standard deviation, and
+looks for every reason against it. "by CPU" compares the CPU time of all threads, which says more than wall time on a machine
+that is busy with something else. "apart" is the largest distance of a point from OpenCV's ray and from the plane, in pixels.
 
     make bench-peers            (or: python run.py --sheetlight target/release/sheetlight)
 """
@@ -12,6 +15,9 @@ import numpy as np
 
 SIZE, OFFSET = 31, 8
 LENS = np.array([-0.118, 0.086, 0.00062, -0.00041, -0.017])
+NORMAL, DISTANCE = np.array([0.0, 0.8, 0.6]), 90.0
+# Distance of points from OpenCV's, px.
+APART = 1e-3
 
 
 def pictures(width, height, count, scene):
@@ -51,8 +57,7 @@ def camera(width, height):
 
 def plane(rays):
     """Rays to points on a fixed laser plane, mm."""
-    normal, offset = np.array([0.0, 0.8, 0.6]), 90.0
-    return rays * (offset / (rays @ normal))[:, None]
+    return rays * (DISTANCE / (rays @ NORMAL))[:, None]
 
 
 def opencv(image, k):
@@ -130,11 +135,13 @@ def plain_read(words):
 
 
 class Sheetlight:
-    def __init__(self, program, images, batch):
+    def __init__(self, program, images, batch, k, width_px):
         height, width = images[0].shape
         self.shape = (height, width)
         self.pipe = subprocess.Popen([program, "bench", "--peer-pipe"], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-        setup = dict(width=width, height=height, count=len(images), shots_per_batch=batch, size=SIZE, offset=OFFSET)
+        setup = dict(width=width, height=height, count=len(images), shots_per_batch=batch, size=SIZE, offset=OFFSET,
+                     pinhole=[k[0, 0], k[1, 1], k[0, 2], k[1, 2], 0.0], distortion=list(LENS),
+                     normal=list(NORMAL), offset_mm=DISTANCE, width_px=width_px)
         self.pipe.stdin.write(json.dumps(setup).encode() + b"\n")
         for image in images:
             self.pipe.stdin.write(image.tobytes())
@@ -145,9 +152,16 @@ class Sheetlight:
         self.pipe.stdin.write(json.dumps(command).encode() + b"\n")
         self.pipe.stdin.flush()
 
-    def run(self, times):
-        self.ask({"run": times})
+    def run(self, times, command="run"):
+        self.ask({command: times})
         return json.loads(self.pipe.stdout.readline())
+
+    def points(self, i):
+        """x, y, X, Y, Z of every skeleton pixel, from left to right and from above."""
+        self.ask({"points": i})
+        n = json.loads(self.pipe.stdout.readline())["points"]
+        rows = np.frombuffer(self.pipe.stdout.read(20 * n), "<f4").reshape(n, 5).astype(float)
+        return rows[np.lexsort((rows[:, 0], rows[:, 1]))]
 
     def masks(self, i):
         self.ask({"masks": i})
@@ -167,6 +181,23 @@ def clock(f, times=1):
     return (time.perf_counter() - wall) * 1e3 / times, (time.process_time() - cpu) * 1e3 / times
 
 
+def points_apart(thin, ours, k):
+    """Largest distance of our points from OpenCV's viewing rays of the same pixels and from the plane, in pixels at their depth;
+    infinite where the pixels differ."""
+    px = cv2.findNonZero(thin).reshape(-1, 2)
+    px = px[np.lexsort((px[:, 0], px[:, 1]))]
+    if len(px) != len(ours) or not np.array_equal(px, ours[:, :2]):
+        return float("inf")
+    # To the end: five steps, its default, leave more than we ask for.
+    end = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 100, 1e-12)
+    rays = cv2.undistortPointsIter(px.astype(np.float64).reshape(-1, 1, 2), k, LENS, np.eye(3), np.eye(3), end).reshape(-1, 2)
+    points = ours[:, 2:]
+    from_ray = np.linalg.norm(points[:, :2] / points[:, 2:] - rays, axis=1)
+    from_plane = np.abs(points @ NORMAL - DISTANCE) / points[:, 2]
+    off = np.maximum(from_ray, from_plane)
+    return float("inf") if np.isnan(off).any() else float(off.max() * k[0, 0])
+
+
 def compare(program, width, height, scene, rounds, images=None):
     count = 32 if width * height < 5e5 else 8 if width * height < 5e6 else 2
     batch = 32 if width * height < 5e5 else 8 if width * height < 5e6 else 1
@@ -174,15 +205,16 @@ def compare(program, width, height, scene, rounds, images=None):
     count = len(images)
     batch = min(batch, count)
     k = camera(width, height)
-    ours = Sheetlight(program, images, batch)
-    wrong_lit = wrong_thin = 0
+    ours = Sheetlight(program, images, batch, k, 6.0 if scene == "thick" else 2.5)
+    wrong_lit = wrong_thin = apart = 0
     for i, image in enumerate(images[:2]):
         lit, thin, _ = opencv(image, k)
         our_lit, our_thin = ours.masks(i)
         wrong_lit += int(np.count_nonzero(lit != our_lit))
         wrong_thin += int(np.count_nonzero(thin != our_thin))
+        apart = max(apart, points_apart(thin, ours.points(i), k))
     centroid(images[0], 40), steger(images[0]), plain_read(images[0].view(np.uint64).ravel())
-    times = {n: [] for n in ["opencv", "opencv_cpu", "centroid", "steger", "sheetlight", "sheetlight_cpu", "read"]}
+    times = {n: [] for n in ["opencv", "opencv_cpu", "centroid", "steger", "sheetlight", "sheetlight_cpu", "full", "full_cpu", "read"]}
     turns = max(1, int(100 / (count * (width * height / 1e6) + 1)))
     for r in range(rounds):
         image = images[r % count]
@@ -190,9 +222,10 @@ def compare(program, width, height, scene, rounds, images=None):
         wall, cpu = clock(lambda: opencv(image, k))
         times["opencv"].append(wall)
         times["opencv_cpu"].append(cpu)
-        answer = ours.run(turns)
-        times["sheetlight"].append(answer["wall_s"] * 1e3 / answer["shots"])
-        times["sheetlight_cpu"].append(answer["cpu_s"] * 1e3 / answer["shots"])
+        for name, command in [("sheetlight", "run"), ("full", "run_full")]:
+            answer = ours.run(turns, command)
+            times[name].append(answer["wall_s"] * 1e3 / answer["shots"])
+            times[name + "_cpu"].append(answer["cpu_s"] * 1e3 / answer["shots"])
         times["centroid"].append(clock(lambda: centroid(image, 40), 3)[0])
         times["steger"].append(clock(lambda: steger(image))[0])
         times["read"].append(clock(lambda: plain_read(words), 10)[1])
@@ -202,9 +235,11 @@ def compare(program, width, height, scene, rounds, images=None):
     return dict(
         size=f"{width}x{height}", scene=scene, batch=batch, rounds=rounds, ms=median, adapter=ours.adapter,
         opencv_over_ours=ratio("opencv", "sheetlight"), opencv_cpu_over_our_cpu=ratio("opencv_cpu", "sheetlight_cpu"),
+        opencv_over_full=ratio("opencv", "full"), opencv_cpu_over_full_cpu=ratio("opencv_cpu", "full_cpu"),
         steger_over_ours=ratio("steger", "sheetlight"),
         centroid_over_ours=ratio("centroid", "sheetlight"), cpu_over_plain_read=ratio("sheetlight_cpu", "read"),
-        lit_pixels_apart=wrong_lit, skeleton_pixels_apart=wrong_thin)
+        lit_pixels_apart=wrong_lit, skeleton_pixels_apart=wrong_thin,
+        points_apart_px=apart)
 
 
 def main():
@@ -218,8 +253,8 @@ def main():
     p.add_argument("--save", help="file for the figures as JSON")
     args = p.parse_args()
     rows = []
-    print(f"{'size':10} {'scene':12} {'OpenCV':>9} {'Steger':>9} {'centroid':>9} {'ours':>9} {'our CPU':>9} {'read':>7}"
-          f" {'OpenCV/ours':>12} {'by CPU':>8} {'CPU/read':>9}  masks")
+    print(f"{'size':10} {'scene':12} {'OpenCV':>9} {'Steger':>9} {'centroid':>9} {'ours':>9} {'our CPU':>9} {'full':>9} {'read':>7}"
+          f" {'OpenCV/ours':>12} {'by CPU':>8} {'/full':>8} {'by CPU':>8} {'CPU/read':>9}  masks      apart")
     work = []
     for size in args.size or ["640x480", "1280x960", "4096x3072", "5120x5120"]:
         width, height = map(int, size.split("x"))
@@ -236,12 +271,13 @@ def main():
         same = "identical" if r["lit_pixels_apart"] + r["skeleton_pixels_apart"] == 0 else \
             f"DIFFER in {r['lit_pixels_apart']} lit, {r['skeleton_pixels_apart']} skeleton pixels"
         print(f"{size:10} {scene:12} {m['opencv']:9.2f} {m['steger']:9.2f} {m['centroid']:9.2f}"
-              f" {m['sheetlight']:9.3f} {m['sheetlight_cpu']:9.3f} {m['read']:7.3f}"
-              f" {r['opencv_over_ours']:11.1f}x {r['opencv_cpu_over_our_cpu']:7.1f}x {r['cpu_over_plain_read']:8.1f}x  {same}", flush=True)
+              f" {m['sheetlight']:9.3f} {m['sheetlight_cpu']:9.3f} {m['full']:9.3f} {m['read']:7.3f}"
+              f" {r['opencv_over_ours']:11.1f}x {r['opencv_cpu_over_our_cpu']:7.1f}x {r['opencv_over_full']:7.1f}x"
+              f" {r['opencv_cpu_over_full_cpu']:7.1f}x {r['cpu_over_plain_read']:8.1f}x  {same}  {r['points_apart_px']:.1e} px", flush=True)
     if args.save:
         with open(args.save, "w") as f:
             json.dump(rows, f, indent=1)
-    sys.exit(any(r["lit_pixels_apart"] + r["skeleton_pixels_apart"] for r in rows))
+    sys.exit(any(r["lit_pixels_apart"] + r["skeleton_pixels_apart"] or r["points_apart_px"] > APART for r in rows))
 
 
 if __name__ == "__main__":

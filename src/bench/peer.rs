@@ -1,12 +1,17 @@
 //! In: on stdin one JSON line of settings, raw 8-bit pictures, then commands. Out: on stdout one JSON line an
-//! answer, and raw masks: another program times its chain against ours on the same pictures, in turns.
-//! Frame and unit: pixels; seconds.
+//! answer, raw masks and points: another program times its chain against ours on the same pictures, in turns.
+//! Frame and unit: pixels; points in the camera's frame, mm; seconds.
 
 use super::machine;
 use crate::fault::{Fault, Result};
 use crate::gpu::Device;
 use crate::raster::Image;
-use crate::stages::chain::{Chain, ChainConfig};
+use crate::stages::chain::{Batch, Chain, ChainConfig};
+use crate::stages::choose::ChooseParams;
+use crate::stages::lengthen::LengthenParams;
+use crate::stages::measured::Measure;
+use crate::stages::peak::{Method, PeakParams};
+use crate::stages::point::Optics;
 use crate::stages::{ThresholdParams, Window};
 use std::io::{BufRead, Write};
 use std::time::Instant;
@@ -22,13 +27,29 @@ struct Setup {
     offset: i32,
     #[serde(default)]
     minimum: u16,
+    /// fx, fy, cx, cy, skew; px.
+    pinhole: [f32; 5],
+    /// k1, k2, p1, p2, k3.
+    distortion: [f32; 5],
+    /// Laser plane: normal · X = offset, mm.
+    normal: [f32; 3],
+    offset_mm: f32,
+    /// Sigma of the stripe, px.
+    width_px: f32,
 }
+
+/// Every point in the camera's own frame.
+const STILL: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 
 #[derive(serde::Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 enum Command {
-    /// Run all pictures so many times over, several batches in flight.
+    /// Run all pictures so many times over, several batches in flight, to a point for every skeleton pixel's middle.
     Run(usize),
+    /// The same with a peak fitted to each, its standard deviation and every reason against it.
+    RunFull(usize),
+    /// x, y of the skeleton pixels of one picture and X, Y, Z of their points, little-endian f32, after their number in JSON.
+    Points(usize),
     /// The thresholded and the thinned mask of one picture, 0 and 255.
     Masks(usize),
     Quit,
@@ -50,8 +71,27 @@ pub fn serve(device: &Device, mut input: impl BufRead, mut output: impl Write) -
         input.read_exact(&mut pixels).map_err(lost)?;
         images.push(Image::from_u8(setup.width, setup.height, pixels));
     }
+    let optics = Optics {
+        pinhole: setup.pinhole,
+        distortion: setup.distortion,
+        normal: setup.normal,
+        offset: setup.offset_mm,
+    };
+    let peak = PeakParams { width_px: setup.width_px, ..PeakParams::default() };
+    // Nothing is refused: the other side refuses nothing either.
+    let every = ChooseParams {
+        faintest: 0.0,
+        narrowest: 0.0,
+        widest: 3.0,
+        cut_width: 0.0,
+        uncertain: 2.0,
+        steepest_deg: 90.0,
+        echo: 0.0,
+        ..ChooseParams::default()
+    };
     let config = ChainConfig {
         shots: setup.shots_per_batch,
+        measure: Some(Measure { peak: PeakParams { method: Method::Pixel, ..peak }, choose: every, optics }),
         threshold: ThresholdParams {
             window: Window::Mean,
             size: setup.size,
@@ -62,6 +102,10 @@ pub fn serve(device: &Device, mut input: impl BufRead, mut output: impl Write) -
     };
     let mut chain = Chain::new(device, &config)?;
     run(&mut chain, &images, 1)?;
+    let measure = Measure { peak, choose: ChooseParams::default(), optics };
+    let lengthen = LengthenParams::default().word(setup.width_px);
+    let mut full = Chain::new(device, &ChainConfig { measure: Some(measure), lengthen, ..config.clone() })?;
+    run(&mut full, &images, 1)?;
     let mut single = Chain::new(device, &ChainConfig { shots: 1, slots: 1, ..config })?;
     writeln!(output, "{}", serde_json::json!({"ready": device.info.name})).map_err(lost)?;
     output.flush().map_err(lost)?;
@@ -70,19 +114,32 @@ pub fn serve(device: &Device, mut input: impl BufRead, mut output: impl Write) -
         if input.read_line(&mut line).map_err(lost)? == 0 {
             return Ok(());
         }
-        match serde_json::from_str(&line).map_err(broken)? {
+        let command = serde_json::from_str(&line).map_err(broken)?;
+        match command {
             Command::Quit => return Ok(()),
-            Command::Run(times) => {
+            Command::Run(times) | Command::RunFull(times) => {
+                let chain = if matches!(command, Command::Run(_)) { &mut chain } else { &mut full };
                 let (cpu, start) = (machine::cpu_seconds(), Instant::now());
-                let points = run(&mut chain, &images, times)?;
+                let points = run(chain, &images, times)?;
                 let wall = start.elapsed().as_secs_f64();
                 let cpu = cpu.and_then(|c| Some(machine::cpu_seconds()? - c));
                 let answer =
                     serde_json::json!({"wall_s": wall, "cpu_s": cpu, "shots": times * images.len(), "points": points});
                 writeln!(output, "{answer}").map_err(lost)?;
             }
+            Command::Points(i) => {
+                single.submit_posed(0, &[&images[i]], &[STILL])?;
+                let mut batch = Batch::default();
+                single.collect_into(true, &mut batch)?;
+                writeln!(output, "{}", serde_json::json!({"points": batch.spots.len()})).map_err(lost)?;
+                for (k, p) in batch.peaks.iter().zip(&batch.spots) {
+                    let [x, y, z] = p.position;
+                    let row = [(k.pixel & 0xffff) as f32, (k.pixel >> 16) as f32, x, y, z];
+                    output.write_all(&row.map(f32::to_le_bytes).concat()).map_err(lost)?;
+                }
+            }
             Command::Masks(i) => {
-                single.submit(0, &[&images[i]])?;
+                single.submit_posed(0, &[&images[i]], &[STILL])?;
                 single.collect(true)?;
                 output.write_all(&single.lit(0)?.to_u8()).map_err(lost)?;
                 output.write_all(&single.mask(0)?.to_u8()).map_err(lost)?;
@@ -92,18 +149,18 @@ pub fn serve(device: &Device, mut input: impl BufRead, mut output: impl Write) -
     }
 }
 
-/// Runs all pictures; the number of skeleton pixels.
+/// Runs all pictures; the number of points.
 fn run(chain: &mut Chain, images: &[Image], times: usize) -> Result<usize> {
     let order: Vec<&Image> = (0..times).flat_map(|_| images).collect();
-    let mut points = 0;
+    let (mut points, mut done) = (0, Batch::default());
     for batch in order.chunks(chain.frame.shots as usize) {
-        if !chain.has_room() {
-            points += chain.collect(true)?.map_or(0, |b| b.points.len());
+        if !chain.has_room() && chain.collect_into(true, &mut done)? {
+            points += done.spots.len();
         }
-        chain.submit(0, batch)?;
+        chain.submit_posed(0, batch, &[STILL].repeat(batch.len()))?;
     }
-    while let Some(batch) = chain.collect(true)? {
-        points += batch.points.len();
+    while chain.collect_into(true, &mut done)? {
+        points += done.spots.len();
     }
     Ok(points)
 }

@@ -196,7 +196,7 @@ fn peak_cases(scene: &Scene, wanted: &str) -> Vec<Case> {
     walk.run("");
     let (f, bits) = (walk.frame, scene.shots[0].bits);
     let mut cases = Vec::new();
-    for method in [peak::Method::Gaussian, peak::Method::Centroid, peak::Method::Derivative] {
+    for method in peak::Method::ALL {
         let p = peak::PeakParams { method, width_px: 3.0, speckle: 0.05, ..Default::default() };
         let choice = choose::ChooseParams { echo: 0.4, ..Default::default() };
         let frame = peak::PeakFrame::new((f.width, f.height, bits), f.shots, &p, &choice, [0.1, 0.995]);

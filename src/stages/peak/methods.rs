@@ -1,4 +1,4 @@
-//! In: a picture, a skeleton pixel, the expected stripe. Out: peaks by centre of gravity and by derivatives.
+//! In: a picture, a skeleton pixel, the expected stripe. Out: peaks by centre of gravity, by derivatives, and without either.
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels.
 
 use super::fit::{background, direction, finish};
@@ -75,4 +75,16 @@ pub(super) fn derivative<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Pe
     // For a Gaussian line the curvature over the value of the smoothed profile is -1 / (w² + sigma²).
     let width = (smooth / (-d2).max(1e-6) - sigma * sigma).max(0.0).sqrt();
     finish(cx, cy, n, m, top.max(1.0), base, width, noise.sqrt() / (-d2).max(1e-6), saturated, s)
+}
+
+/// A pixel's position where nothing says in which part of it the centre lies: the standard deviation of an even distribution.
+const EVEN: f32 = 0.288_675_13;
+
+/// The pixel itself, on a stripe that lies as it should and is as wide as expected.
+pub(super) fn pixel<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak {
+    let sign = if s.across_v < 0.0 { -1.0 } else { 1.0 };
+    let n = (sign * s.across_u, sign * s.across_v);
+    let base = background(image, x, y, n.0, n.1, s);
+    let level = image.at(x, y);
+    finish(x, y, n, 0.0, (level - base).max(1.0), base, s.s0, EVEN, level >= s.full_scale, s)
 }

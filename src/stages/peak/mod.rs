@@ -33,6 +33,13 @@ pub enum Method {
     Centroid,
     /// Zero of the derivative of the Gaussian-smoothed profile ([steger98]).
     Derivative,
+    /// The skeleton pixel itself, as in the paper that this program rebuilds: for comparisons.
+    Pixel,
+}
+
+impl Method {
+    /// In the order of their numbers.
+    pub const ALL: [Method; 4] = [Method::Gaussian, Method::Centroid, Method::Derivative, Method::Pixel];
 }
 
 /// Settings of the sub-pixel step. The stripe's width and speckle are properties of laser and lens:
@@ -231,6 +238,7 @@ fn one<G: Grey>(image: G, pixel: u32, shot: u32, frame: &PeakFrame, method: Meth
         Method::Gaussian => fit::gaussian(image, x, y, frame),
         Method::Centroid => methods::centroid(image, x, y, frame),
         Method::Derivative => methods::derivative(image, x, y, frame),
+        Method::Pixel => methods::pixel(image, x, y, frame),
     };
     Peak { pixel, shot, ..peak }
 }

@@ -36,11 +36,7 @@ pub const STAGE: Stage = Stage {
 impl Method {
     /// The value of the override [`METHOD`].
     pub fn number(self) -> f64 {
-        match self {
-            Method::Gaussian => 0.0,
-            Method::Centroid => 1.0,
-            Method::Derivative => 2.0,
-        }
+        f64::from(self as u8)
     }
 }
 
@@ -74,7 +70,7 @@ pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let value = |name: &str| overrides.iter().find(|o| o.0 == name).map_or(0.0, |o| o.1) as u32;
     let px_log2 = value(PX_LOG2);
-    let method = [Method::Gaussian, Method::Centroid, Method::Derivative][value(METHOD) as usize];
+    let method = Method::ALL[value(METHOD) as usize];
     let [_, image, header, points, peaks, strongest] = b else { unreachable!() };
     let mut found: Vec<Peak> = points[..2 * header[3] as usize]
         .par_chunks_exact(2)
