@@ -3,10 +3,16 @@
 
 mod common;
 
+use sheetlight::camera::Intrinsics;
+use sheetlight::geometry::{Base, Camera, Plane, Rigid, Vec2, Vec3};
 use sheetlight::gpu::Device;
 use sheetlight::raster::{Image, Mask};
 use sheetlight::stages::cases::{self, Noise, drawn, stripe};
-use sheetlight::stages::chain::{Chain, ChainConfig};
+use sheetlight::stages::chain::{Batch, Chain, ChainConfig};
+use sheetlight::stages::choose::ChooseParams;
+use sheetlight::stages::measured::Measure;
+use sheetlight::stages::peak::{Method, PeakParams};
+use sheetlight::stages::point::pose_words;
 use sheetlight::stages::{Thinning, ThresholdParams, Window, frame, skeleton, thin, threshold};
 
 fn expected(image: &Image, c: &ChainConfig) -> (Mask, Vec<u32>) {
@@ -68,6 +74,49 @@ fn pruned_plain_and_definition_agree() {
         config.prune = false;
         let plain = check(&device, scene.name, &config, &images);
         assert!(pruned <= plain, "{}", scene.name);
+    }
+}
+
+/// The paper's points, which `make bench-peers` compares with OpenCV's: the truth is the lens and the plane in f64.
+#[test]
+fn without_a_fit_every_skeleton_pixel_gives_the_point_of_its_middle() {
+    let Some(device) = common::device() else { return };
+    for bits in [8, 12] {
+        let (width, height) = (641, 479);
+        let images = [3, 4].map(|seed| stripe(width, height, bits, 2.5, 3, seed));
+        let optics = cases::optics(width, height);
+        let measure = Measure {
+            peak: PeakParams { method: Method::Pixel, width_px: 2.5, ..PeakParams::default() },
+            choose: ChooseParams::lenient(),
+            optics,
+        };
+        let mut config = ChainConfig { shots: 2, measure: Some(measure), ..ChainConfig::new(width, height, bits) };
+        config.threshold.offset <<= bits - 8;
+        config.threshold.minimum <<= bits - 8;
+        let pose: Rigid<Base, Camera> = Rigid::from_vectors(&Vec3::new(0.2, -0.4, 1.1), Vec3::new(40.0, -60.0, 30.0));
+        let [fx, fy, cx, cy, skew] = optics.pinhole.map(f64::from);
+        let distortion = optics.distortion.map(f64::from);
+        let camera = Intrinsics { fx, fy, cx, cy, skew, distortion, width, height };
+        let plane = Plane::new(Vec3::from(optics.normal.map(f64::from)), f64::from(optics.offset)).unwrap();
+        let mut chain = Chain::new(&device, &config).unwrap();
+        let mut batch = Batch::default();
+        chain.submit_posed(0, &[&images[0], &images[1]], &[pose_words(&pose); 2]).unwrap();
+        assert!(chain.collect_into(true, &mut batch).unwrap());
+        for (i, image) in images.iter().enumerate() {
+            let part = batch.starts[i] as usize..batch.starts[i + 1] as usize;
+            let (peaks, spots) = (&batch.peaks[part.clone()], &batch.spots[part]);
+            let pixels: Vec<u32> = peaks.iter().map(|k| k.pixel).collect();
+            assert!(pixels.len() > 600 && pixels == expected(image, &config).1, "{bits} bits, shot {i}: pixels");
+            for (k, p) in peaks.iter().zip(spots) {
+                let (x, y) = (f64::from(k.pixel & 0xffff), f64::from(k.pixel >> 16));
+                assert!(k.kept() && (k.u, k.v) == (x as f32, y as f32), "{k:?}");
+                let exact = camera.ray_from_pixel(&Vec2::new(x, y)).unwrap().meet(&plane).unwrap();
+                let off = (Vec3::from(p.position.map(f64::from)) - pose.point(&exact)).norm() * fx / exact.z;
+                assert!(off < 1e-3, "pixel {x}, {y}: {off} px");
+                // An even distribution over the pixel's own height, seen along the plane.
+                assert!((k.sigma_px - 1.0 / 12f32.sqrt()).abs() < 1e-6 && p.sigma_mm > 0.0, "{k:?} {p:?}");
+            }
+        }
     }
 }
 

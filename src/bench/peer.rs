@@ -78,20 +78,15 @@ pub fn serve(device: &Device, mut input: impl BufRead, mut output: impl Write) -
         offset: setup.offset_mm,
     };
     let peak = PeakParams { width_px: setup.width_px, ..PeakParams::default() };
-    // Nothing is refused: the other side refuses nothing either.
-    let every = ChooseParams {
-        faintest: 0.0,
-        narrowest: 0.0,
-        widest: 3.0,
-        cut_width: 0.0,
-        uncertain: 2.0,
-        steepest_deg: 90.0,
-        echo: 0.0,
-        ..ChooseParams::default()
+    // The other side refuses nothing either.
+    let pixels = Measure {
+        peak: PeakParams { method: Method::Pixel, ..peak },
+        choose: ChooseParams::lenient(),
+        optics,
     };
     let config = ChainConfig {
         shots: setup.shots_per_batch,
-        measure: Some(Measure { peak: PeakParams { method: Method::Pixel, ..peak }, choose: every, optics }),
+        measure: Some(pixels),
         threshold: ThresholdParams {
             window: Window::Mean,
             size: setup.size,

@@ -49,6 +49,20 @@ impl Default for ChooseParams {
 }
 
 impl ChooseParams {
+    /// Refuses nothing but what the fit itself cannot place.
+    pub fn lenient() -> ChooseParams {
+        ChooseParams {
+            faintest: 0.0,
+            narrowest: 0.0,
+            widest: 3.0,
+            cut_width: 0.0,
+            cut_amplitude: 0.0,
+            uncertain: 2.0,
+            steepest_deg: 90.0,
+            echo: 0.0,
+            echo_reach: 0.0,
+        }
+    }
     pub fn check(&self) -> Result<()> {
         for (name, value, low, high) in [
             ("faintest", self.faintest, 0.0, 255.0),
