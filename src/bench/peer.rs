@@ -71,19 +71,12 @@ pub fn serve(device: &Device, mut input: impl BufRead, mut output: impl Write) -
         input.read_exact(&mut pixels).map_err(lost)?;
         images.push(Image::from_u8(setup.width, setup.height, pixels));
     }
-    let optics = Optics {
-        pinhole: setup.pinhole,
-        distortion: setup.distortion,
-        normal: setup.normal,
-        offset: setup.offset_mm,
-    };
+    let optics =
+        Optics { pinhole: setup.pinhole, distortion: setup.distortion, normal: setup.normal, offset: setup.offset_mm };
     let peak = PeakParams { width_px: setup.width_px, ..PeakParams::default() };
     // The other side refuses nothing either.
-    let pixels = Measure {
-        peak: PeakParams { method: Method::Pixel, ..peak },
-        choose: ChooseParams::lenient(),
-        optics,
-    };
+    let pixels =
+        Measure { peak: PeakParams { method: Method::Pixel, ..peak }, choose: ChooseParams::lenient(), optics };
     let config = ChainConfig {
         shots: setup.shots_per_batch,
         measure: Some(pixels),
