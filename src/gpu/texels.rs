@@ -3,7 +3,7 @@
 //!
 //! Mesa's software adapter reads a storage buffer one lane after the other, in a loop with a branch; a texel it gathers for
 //! all lanes at once. Stores are the other way round. So stages write buffers, and read them as images that lie on the
-//! same memory ([`super::alias`]); figures: docs/decisions/0012.
+//! same memory ([`super::alias`]); decision 0012 says how to measure it.
 
 use super::stage::{Access, Binding, Stage};
 use super::{Device, Recording, Replay};
