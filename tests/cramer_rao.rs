@@ -13,6 +13,8 @@ const GAIN: f64 = 0.05;
 const DARK: f64 = 4.0;
 const WIDTH: u32 = 1600;
 const HEIGHT: u32 = 120;
+/// The stripe moves along the columns with depth.
+const ACROSS: [f32; 2] = [0.0, 1.0];
 
 /// A straight stripe: its centre is v = 60 + slope (u - 800) + phase.
 #[derive(Clone, Copy)]
@@ -76,8 +78,8 @@ fn errors(stripe: &Stripe, method: Method, along: f32, pictures: u64) -> (f64, f
         let lit = threshold::twin(&image, &ThresholdParams { size, ..Default::default() });
         let list = skeleton::twin(&thin::twin(&lit, Thinning::ZhangSuen));
         let start = PeakParams { method, along, read_noise: 0.7, gain: GAIN as f32, ..PeakParams::default() };
-        let found = measure(&image, &list, &start).expect("a clean stripe is measured");
-        for p in peaks(&image, &list, 0, &start.with(&found)) {
+        let found = measure(&image, &list, &start, ACROSS).expect("a clean stripe is measured");
+        for p in peaks(&image, &list, 0, &start.with(&found), ACROSS) {
             let (u, v) = (f64::from(p.u), f64::from(p.v));
             let d = stripe.across(u, v, phase);
             // Ends of the stripe, and specks of noise that passed the threshold.
@@ -137,8 +139,8 @@ fn a_sloping_stripe_is_as_good() {
         let lit = threshold::twin(&image, &ThresholdParams { size: 49, ..Default::default() });
         let list = skeleton::twin(&thin::twin(&lit, Thinning::ZhangSuen));
         let start = PeakParams { along: 0.0, gain: GAIN as f32, ..PeakParams::default() };
-        let found = measure(&image, &list, &start).expect("a clean stripe is measured");
-        let d: Vec<f64> = peaks(&image, &list, 0, &start.with(&found))
+        let found = measure(&image, &list, &start, ACROSS).expect("a clean stripe is measured");
+        let d: Vec<f64> = peaks(&image, &list, 0, &start.with(&found), ACROSS)
             .iter()
             .filter(|p| (12.0..108.0).contains(&p.v))
             .map(|p| stripe.across(f64::from(p.u), f64::from(p.v), 0.3))
@@ -163,8 +165,8 @@ fn the_stated_standard_deviation_is_the_true_one() {
         let lit = threshold::twin(&image, &ThresholdParams { size, ..Default::default() });
         let list = skeleton::twin(&thin::twin(&lit, Thinning::ZhangSuen));
         let start = PeakParams { gain: GAIN as f32, ..PeakParams::default() };
-        let found = measure(&image, &list, &start).unwrap();
-        let pulls: Vec<f64> = peaks(&image, &list, 0, &start.with(&found))
+        let found = measure(&image, &list, &start, ACROSS).unwrap();
+        let pulls: Vec<f64> = peaks(&image, &list, 0, &start.with(&found), ACROSS)
             .iter()
             .filter(|p| (40.0..f64::from(WIDTH) - 40.0).contains(&f64::from(p.u)) && p.snr > 10.0)
             .map(|p| stripe.across(f64::from(p.u), f64::from(p.v), 0.6) / f64::from(p.sigma_px))

@@ -24,6 +24,8 @@ const DARK: f64 = 6.0;
 /// Read noise with an 8-bit picture's rounding, grey levels; grey levels per photo-electron.
 const READ: f64 = 0.7;
 const GAIN: f64 = 0.05;
+/// The stripe moves along the columns with depth.
+const ACROSS: [f32; 2] = [0.0, 1.0];
 
 #[derive(Clone, Copy)]
 struct Light {
@@ -187,14 +189,14 @@ fn row(sigma: f64, angle_deg: f64, light: &Light) -> Row {
         0.3,
         Some(rand_pcg::Pcg64::seed_from_u64(sigma as u64)),
     );
-    let params = start.with(&measure(&flat.image, &flat.skeleton, &start).expect("a clean stripe is measured"));
+    let params = start.with(&measure(&flat.image, &flat.skeleton, &start, ACROSS).expect("a clean stripe is measured"));
     let (mut n, mut sum, mut square, mut pulls, mut width) = (0.0, 0.0, 0.0, 0.0, 0.0);
     let (mut own, mut own_n) = (0.0, 0.0);
     for k in 0..PHASES {
         let phase = k as f64 / PHASES as f64;
         let seed = (sigma as u64) << 32 | (angle_deg as u64) << 20 | (light.peak as u64) << 8 | k as u64;
         let shot = Shot::new(&profile, light, angle_deg, phase, Some(rand_pcg::Pcg64::seed_from_u64(seed)));
-        for p in peaks(&shot.image, &shot.skeleton, 0, &params) {
+        for p in peaks(&shot.image, &shot.skeleton, 0, &params, ACROSS) {
             let d = shot.across(f64::from(p.u), f64::from(p.v));
             n += 1.0;
             sum += d;
@@ -203,7 +205,7 @@ fn row(sigma: f64, angle_deg: f64, light: &Light) -> Row {
             width += f64::from(p.width_px);
         }
         let clean = Shot::new(&profile, light, angle_deg, phase, None);
-        for p in peaks(&clean.image, &clean.skeleton, 0, &params) {
+        for p in peaks(&clean.image, &clean.skeleton, 0, &params, ACROSS) {
             own += clean.across(f64::from(p.u), f64::from(p.v)).powi(2);
             own_n += 1.0;
         }

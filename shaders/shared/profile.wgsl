@@ -49,8 +49,8 @@ struct Walk {
     across: u32,
 }
 
-// Pixels side by side with one shift: the first one's place at sample 0; weights in 127ths, two a word, for samples k,
-// k + 1, k + 2, k + 3: along a row the place within a word changes. Sums of weight, weight squared, weight times offset
+// Pixels side by side with one shift: the first one's place at the first sample, -2 quads; weights in 127ths, two a word,
+// for samples k, k + 1, k + 2, k + 3, k that one or four, eight, .. after it: along a row the place within a word changes. Sums of weight, weight squared, weight times offset
 // across and times its square.
 struct Group {
     at: u32,
@@ -69,7 +69,7 @@ fn group(w: Walk, a: i32, row: i32) -> Group {
     let weights = select(vec4(0u), vec4<u32>(vec4(127.0) * (f * f) + vec4(0.5)), inside);
     let b = shift(w, place) + row;
     let at = vec2<u32>(select(vec2(w.y0 + b, place), vec2(place, w.y0 + b), w.columns));
-    let first_pixel = ((first + at.y * frame.pitch) << px_log2) + at.x;
+    let first_pixel = ((first + at.y * frame.pitch) << px_log2) + at.x + u32(-2 * quads) * w.across;
     let g = vec4<f32>(weights);
     let c = f32(b) * w.nb + t.x * w.na;
     let sum = (g.x + g.y) + (g.z + g.w);
@@ -187,7 +187,7 @@ fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
             for (var a = begin; a <= end; a += 3 * size) {
                 groups = array(group(w, a, row), group(w, a + size, row), group(w, a + 2 * size, row));
                 moments += (groups[0].moments + groups[1].moments) + groups[2].moments;
-                var k = u32(-2 * quads) * across;
+                var k = 0u;
                 for (var q = 0; q < quads; q++) {
                     // The samples go round: four leave at the front and come back, with more light, at the end.
                     let four = vec4(three(k, 0u), three(k + across, 1u), three(k + 2u * across, 2u), three(k + 3u * across, 3u));

@@ -139,7 +139,7 @@ impl Engine {
         let seen = self.extraction.clone().in_noise(noise);
         let mut found: Vec<Stripe> = images
             .par_iter()
-            .filter_map(|image| peak::measure(image, &self.skeleton(image, &seen), &seen.peak))
+            .filter_map(|image| peak::measure(image, &self.skeleton(image, &seen), &seen.peak, self.optics.across()))
             .collect();
         let middle = found.len() / 2;
         found.sort_by(|a, b| a.speckle.total_cmp(&b.speckle));
@@ -253,7 +253,7 @@ impl Engine {
     fn twins(&self, job: &Job) -> Measured {
         let image = self.lit(&job.image);
         let skeleton = self.skeleton(&image, &self.extraction);
-        let mut peaks = peak::peaks(&image, &skeleton, job.shot, &self.extraction.peak);
+        let mut peaks = peak::peaks(&image, &skeleton, job.shot, &self.extraction.peak, self.optics.across());
         let scene = Scene {
             width: self.format.width,
             height: self.format.height,

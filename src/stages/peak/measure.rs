@@ -24,21 +24,16 @@ const SAMPLES: usize = 400;
 const FEWEST: usize = 20;
 
 /// Width and speckle of the stripe in one picture, and the noise as it was assumed; `None` where there is too little of it.
-/// Start: half the pixels above half maximum. Then three rounds of fitting with the medians of the round before.
-pub fn measure(image: &Image, skeleton: &[u32], p: &PeakParams) -> Option<Stripe> {
+/// `across` is the unit image direction of depth. Start: half the pixels above half maximum. Then three rounds of fitting with the medians of the round before.
+pub fn measure(image: &Image, skeleton: &[u32], p: &PeakParams, across: [f32; 2]) -> Option<Stripe> {
     let step = (skeleton.len() / SAMPLES).max(1);
     let sample: Vec<(i32, i32)> =
         skeleton.iter().step_by(step).map(|&q| ((q & 0xffff) as i32, (q >> 16) as i32)).collect();
     let noise = p.read_noise;
     let mut stripe = Stripe { width_px: half_maximum(image, &sample)?.clamp(0.4, 12.0), speckle: p.speckle, noise };
     for _ in 0..3 {
-        let setup = PeakFrame::new(
-            (image.width, image.height, image.bits),
-            1,
-            &p.with(&stripe),
-            &ChooseParams::default(),
-            [0.0, 1.0],
-        );
+        let size = (image.width, image.height, image.bits);
+        let setup = PeakFrame::new(size, 1, &p.with(&stripe), &ChooseParams::default(), across);
         let (width, height) = (setup.width, setup.height);
         let fits = match &image.pixels {
             Pixels::U8(pixels) => fits(View { pixels, width, height }, &sample, &setup),

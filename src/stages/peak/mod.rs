@@ -220,10 +220,11 @@ impl<T: Copy + Sync + Into<f32>> Grey for View<'_, T> {
     }
 }
 
-/// CPU twin: one peak per skeleton pixel, in the order given. `skeleton` is packed x | y << 16.
-pub fn peaks(image: &Image, skeleton: &[u32], shot: u32, p: &PeakParams) -> Vec<Peak> {
+/// CPU twin: one peak per skeleton pixel, in the order given. `skeleton` is packed x | y << 16, `across` the unit image
+/// direction of depth ([`crate::stages::point::Optics::across`]).
+pub fn peaks(image: &Image, skeleton: &[u32], shot: u32, p: &PeakParams, across: [f32; 2]) -> Vec<Peak> {
     let size = (image.width, image.height, image.bits);
-    let frame = PeakFrame::new(size, 1, p, &ChooseParams::default(), [0.0, 1.0]);
+    let frame = PeakFrame::new(size, 1, p, &ChooseParams::default(), across);
     let (width, height) = (frame.width, frame.height);
     let each = |pixel: u32| match &image.pixels {
         Pixels::U8(pixels) => one(View { pixels, width, height }, pixel, shot, &frame, p.method),
