@@ -5,6 +5,7 @@
 
 pub mod fault;
 
+pub mod bcap;
 pub mod geometry;
 pub mod gpu;
 pub mod raster;

@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 /// What each module may import, `fault` excepted, which everybody may.
 const MAY: &[(&str, &[&str])] = &[
     ("fault", &[]),
+    ("bcap", &[]),
     ("geometry", &[]),
     ("raster", &[]),
     ("solve", &[]),

@@ -1,0 +1,105 @@
+//! In: one call after the other, and every frame that comes in. Out: the bytes to send, and what each frame is to the call.
+//! No I/O and no clock: who owns the socket decides when to repeat and when to give up.
+//! Frame and unit: none. Rules as captured from Denso's client: docs/robots.md, b-CAP.
+
+use super::{Call, Frame, Outcome, Variant};
+use crate::fault::Result;
+
+/// What a frame is to the call that is under way.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Heard {
+    /// The call is at work; the answer follows.
+    Interim,
+    /// A late answer to another call, or noise. It says nothing about this one.
+    Foreign,
+    Answer(Outcome, Vec<Variant>),
+}
+
+/// The serials of one connection and the call that is under way on it.
+#[derive(Debug)]
+pub struct Exchange {
+    datagrams: bool,
+    last: u16,
+    /// The request as it was sent last, and the serials of all its sendings.
+    request: Frame,
+    sendings: Vec<u16>,
+}
+
+impl Exchange {
+    /// `datagrams`: requests name their first sending, so that a repeated one is not done twice.
+    pub fn new(datagrams: bool) -> Exchange {
+        Exchange { datagrams, last: 0, request: Frame::default(), sendings: Vec::new() }
+    }
+
+    /// The next serial; 0 is none.
+    fn serial(&mut self) -> u16 {
+        self.last = self.last.checked_add(1).unwrap_or(1);
+        self.last
+    }
+
+    /// Begins a call. Answers to the one before are foreign from now on.
+    pub fn begin(&mut self, call: Call, arguments: Vec<Variant>) -> Result<Vec<u8>> {
+        let serial = self.serial();
+        let first_serial = if self.datagrams { serial } else { 0 };
+        self.request = Frame { serial, first_serial, number: call.number(), arguments };
+        self.sendings = vec![serial];
+        self.request.encode()
+    }
+
+    /// The same call once more, under a new serial and the first one's name: it is done once.
+    pub fn again(&mut self) -> Result<Vec<u8>> {
+        self.request.serial = self.serial();
+        self.sendings.push(self.request.serial);
+        self.request.encode()
+    }
+
+    /// Sorts a frame that came in. An answer ends the call: a second one is foreign.
+    pub fn hear(&mut self, reply: Frame) -> Heard {
+        if !self.sendings.contains(&reply.serial) {
+            return Heard::Foreign;
+        }
+        match Outcome(reply.number) {
+            Outcome::INTERIM => Heard::Interim,
+            outcome => {
+                self.sendings.clear();
+                Heard::Answer(outcome, reply.arguments)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn reply(serial: u16, outcome: Outcome, value: i32) -> Frame {
+        Frame { serial, first_serial: 0, number: outcome.0, arguments: vec![Variant::I32(value)] }
+    }
+
+    #[test]
+    fn a_late_answer_to_another_call_is_foreign_and_leaves_nothing_behind() {
+        let mut e = Exchange::new(false);
+        e.begin(Call::RobotExecute, vec![]).unwrap();
+        e.begin(Call::RobotMove, vec![]).unwrap();
+        assert_eq!(e.hear(reply(1, Outcome::OK, 7)), Heard::Foreign);
+        assert_eq!(e.hear(reply(2, Outcome::INTERIM, 0)), Heard::Interim);
+        assert_eq!(e.hear(reply(2, Outcome::OK, 8)), Heard::Answer(Outcome::OK, vec![Variant::I32(8)]));
+        assert_eq!(e.hear(reply(2, Outcome::OK, 9)), Heard::Foreign);
+    }
+
+    #[test]
+    fn a_repeated_datagram_names_its_first_sending_and_either_answer_counts() {
+        let mut e = Exchange::new(true);
+        let first = Frame::decode(&e.begin(Call::RobotMove, vec![]).unwrap()).unwrap();
+        let second = Frame::decode(&e.again().unwrap()).unwrap();
+        assert_eq!((first.serial, first.first_serial, second.serial, second.first_serial), (1, 1, 2, 1));
+        assert!(matches!(e.hear(reply(1, Outcome::OK, 0)), Heard::Answer(..)));
+    }
+
+    #[test]
+    fn serials_go_round_without_zero() {
+        let mut e = Exchange::new(false);
+        e.last = u16::MAX;
+        assert_eq!(Frame::decode(&e.begin(Call::ServiceStop, vec![]).unwrap()).unwrap().serial, 1);
+    }
+}
