@@ -268,12 +268,12 @@ pub(super) mod tests {
 
     /// Variants of every type, arrays of arrays included.
     pub fn any_variant() -> impl Strategy<Value = Variant> {
-        let text = proptest::string::string_regex(".{0,12}").unwrap();
+        let text = || proptest::string::string_regex(".{0,12}").unwrap();
         let leaf = prop_oneof![
             Just(Variant::Empty),
             Just(Variant::Null),
-            text.clone().prop_map(Variant::Text),
-            proptest::collection::vec(text, 0..4).prop_map(Variant::Texts),
+            text().prop_map(Variant::Text),
+            proptest::collection::vec(text(), 0..4).prop_map(Variant::Texts),
             any::<bool>().prop_map(Variant::Bool),
             proptest::collection::vec(any::<bool>(), 0..5).prop_map(Variant::Bools),
             any::<i16>().prop_map(Variant::I16),
