@@ -5,7 +5,7 @@
 use sheetlight::fault::{Fault, Result};
 use sheetlight::raster::Image;
 use sheetlight::recording::Recording;
-use sheetlight::rig::Rig;
+use sheetlight::rig::{Rig, Volume};
 use sheetlight::scan::{Engine, Optical, RecordingSource, Source, Where, camera_for};
 use sheetlight::stages::point::pose_words;
 use sheetlight::station::{Settings, load_report};
@@ -63,7 +63,7 @@ fn measure(folder: &Path, station: &Path, rounds: usize) -> Result<()> {
     let optical = Optical {
         camera: camera_for(&rig.need_camera()?.value, format)?,
         laser: rig.need_laser_plane()?.value,
-        depth_mm: [settings.working_volume.near_mm, settings.working_volume.far_mm],
+        depth_mm: Volume::depths(sheetlight::station::volume::believed(&settings, &rig).as_ref()),
     };
     let mut engine = Engine::new(format, &optical, &settings.extraction, None, Where::Gpu.open()?);
     let first: Vec<&Image> = images.iter().take(MEASURED).collect();

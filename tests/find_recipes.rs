@@ -11,7 +11,7 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use sheetlight::find::{LocateOptions, Recipe, locate};
 use sheetlight::geometry::{Base, Part, Rigid, Vec3};
-use sheetlight::rig::Rig;
+use sheetlight::rig::{Rig, Volume};
 use sheetlight::scan::{CloudPoint, Extraction, Format, Processor, Scanner, Shot};
 use sheetlight::simulate::{
     Canvas, InScene, Scene, SceneSpec, Sensor, Station, View, above, base_from_scene, expose, flange, part_pose,
@@ -162,8 +162,9 @@ fn scan(part: &'static str, seed: u64) -> Scanned {
     let rig = Rig::load(folder.path()).unwrap();
     let base_from_scene = base_from_scene(&station);
     let format = Format { width: station.camera.width, height: station.camera.height, bits: 8 };
-    let volume = [100.0, 230.0];
-    let mut scanner = Scanner::new(&rig, format, &Extraction::default(), volume, None, Processor::Twins, None).unwrap();
+    let volume = Volume::new(100.0, 230.0, "test");
+    let mut scanner =
+        Scanner::new(&rig, format, &Extraction::default(), Some(&volume), None, Processor::Twins, None).unwrap();
     let above_scene = scene.spec.focus_height_mm + station.working_distance;
     let mut cloud: Vec<CloudPoint> = Vec::new();
     for i in 0..(2.0 * half[1] / pitch) as usize {

@@ -10,7 +10,7 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use sheetlight::find::{LocateOptions, Recipe, locate};
 use sheetlight::geometry::{Base, Part, Rigid};
-use sheetlight::rig::Rig;
+use sheetlight::rig::{Rig, Volume};
 use sheetlight::scan::{CloudPoint, Extraction, Format, Processor, Scanner, Shot};
 use sheetlight::simulate::{
     Canvas, InScene, Scene, SceneSpec, Sensor, Station, View, above, base_from_scene, expose, flange, part_pose,
@@ -112,8 +112,9 @@ fn trial(seed: u64) -> Option<Trial> {
     let rig = Rig::load(folder.path()).unwrap();
     let base_from_scene = base_from_scene(&station);
     let format = Format { width: station.camera.width, height: station.camera.height, bits: 8 };
+    let volume = Volume::new(100.0, 210.0, "test");
     let mut scanner =
-        Scanner::new(&rig, format, &Extraction::default(), [100.0, 210.0], None, Processor::Twins, None).unwrap();
+        Scanner::new(&rig, format, &Extraction::default(), Some(&volume), None, Processor::Twins, None).unwrap();
     let [_, y0, _, y1] = scene.spec.region_mm;
     let height = scene.spec.focus_height_mm + station.working_distance;
     let mut cloud: Vec<CloudPoint> = Vec::new();

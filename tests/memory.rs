@@ -88,7 +88,7 @@ fn a_long_scan_needs_no_more_memory_than_a_short_one() {
             extraction: Extraction::default(),
             // The map's size follows from the surface, not from the number of shots.
             grid: GridOptions { cell: Some(0.25), ..GridOptions::default() },
-            depth_mm: [60.0, 320.0],
+            volume: None,
             ambient: None,
             overlays: 2,
             skip_bad: false,

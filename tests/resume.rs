@@ -94,7 +94,7 @@ fn options(out: &Path) -> ScanOptions {
         place: Where::Gpu,
         extraction: Extraction::default(),
         grid: GridOptions::default(),
-        depth_mm: [60.0, 320.0],
+        volume: None,
         ambient: None,
         overlays: 0,
         skip_bad: false,

@@ -24,7 +24,7 @@ fn scanned(out: &Path, options: &SimulateOptions) -> Judged {
         place: Where::Cpu,
         extraction: Extraction::default(),
         grid: GridOptions::default(),
-        depth_mm: [60.0, 320.0],
+        volume: None,
         ambient: None,
         overlays: 1,
         skip_bad: false,

@@ -7,7 +7,7 @@ use super::hand_eye_camera::ray_error_px;
 use super::hand_eye_checks::belongs_to;
 use super::hand_eye_closed::{Pair, axis_spread};
 use super::hand_eye_expected::{ExpectedError, expected_error};
-use super::limits::{Judgement, Limits, rms};
+use super::limits::{Limits, rms};
 use super::measured_pose::change_between;
 use super::report::{Page, axis_sphere, bars};
 use crate::geometry::{Vec3, log};
@@ -32,9 +32,13 @@ pub fn judge(fit: &HandEyeFit, pairs: &[Pair], limits: &Limits) -> Quality {
     let sigma = |i: usize| fit.covariance[(i, i)].max(0.0).sqrt();
     let holdout_mm = rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.holdout_mm));
     let holdout_px = rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.holdout_px));
-    let mut j = Judgement::new(
-        limits.by_error(expected),
-        format!("a point at {:.0} mm is placed in the flange frame to {expected:.3} mm (1 sigma)", limits.middle()),
+    let mut j = limits.by_error(
+        expected,
+        format!(
+            "a point at {} mm is placed in the flange frame to {expected:.3} mm (1 sigma); depths: {}",
+            limits.working.depth(limits.middle()),
+            limits.working.from
+        ),
     );
     j.at_best(Verdict::BadlyDetermined, second < 8.0, || {
         format!("rotation about a second axis is {second:.1} degrees rms, 8 are needed to be usable")

@@ -134,6 +134,8 @@ pub struct LaserPlaneFit {
     pub neighbour_factor: f64,
     /// Largest angle between two boards' normals, rad.
     pub board_spread: f64,
+    /// Least and largest depth of a used peak, mm.
+    pub reach: [f64; 2],
     /// Spread of the stripes across their own direction, mm (rms): what holds the plane's tilt.
     pub depth_spread: f64,
 }
@@ -241,6 +243,7 @@ pub fn solve(
         sigma_ratio,
         neighbour_factor: neighbours,
         board_spread: board_spread(views, &used),
+        reach: reach(&data, &state),
         depth_spread: depth_spread(&data, &state),
     })
 }
@@ -403,6 +406,11 @@ fn board_spread(views: &[StripeView], used: &[bool]) -> f64 {
         .enumerate()
         .flat_map(|(i, a)| normals[..i].iter().map(move |b| (a, b)))
         .fold(0.0, |m, (a, b)| f64::max(m, angle(a, b)))
+}
+
+fn reach(data: &Data, s: &State) -> [f64; 2] {
+    let depths = data.peaks.iter().filter_map(|p| Some(on_board(&s.poses[p.view], &p.ray)?.z));
+    depths.fold([f64::INFINITY, 0.0], |[low, high], z| [low.min(z), high.max(z)])
 }
 
 /// rms spread of the points in their second principal direction, mm.

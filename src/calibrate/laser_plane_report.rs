@@ -3,7 +3,7 @@
 //! Frame and unit: camera frame; mm, degrees, px.
 
 use super::laser_plane::{LaserPlaneFit, PeakUse, StripeView, expected_error};
-use super::limits::{Judgement, Limits, rms};
+use super::limits::{Limits, rms};
 use super::report::{Page, axis_sphere, bars, coverage_map};
 use crate::geometry::Vec2;
 use crate::rig::{Covariance, Quality, Verdict};
@@ -17,22 +17,20 @@ pub fn covariance(fit: &LaserPlaneFit) -> Covariance {
 }
 
 /// Judges a fit.
-pub fn judge(fit: &LaserPlaneFit, views: &[StripeView], limits: &Limits) -> Quality {
-    let [near, far] = limits.working_mm;
+pub fn judge(fit: &LaserPlaneFit, limits: &Limits) -> Quality {
+    let work = &limits.working;
+    let (near, far) = (work.near_mm, work.far_mm);
     let expected = expected_error(&fit.plane, &fit.covariance, near, far);
     let exact = expected_error(&fit.plane, &fit.covariance_camera_exact, near, far);
     let camera_part = (expected * expected - exact * exact).max(0.0).sqrt();
     let used: Vec<_> = fit.views.iter().filter(|v| v.used).collect();
     let spread = fit.board_spread.to_degrees();
-    let depths: Vec<f64> =
-        fit.views.iter().zip(views).filter(|(r, _)| r.used).map(|(_, v)| v.pose.centre().z).collect();
-    let low = depths.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = depths.iter().copied().fold(0.0, f64::max);
+    let [low, high] = fit.reach;
     let tilt = (0..3).map(|i| fit.covariance[(i, i)].max(0.0)).sum::<f64>().sqrt();
-    let mut j = Judgement::new(
-        limits.by_error(expected),
+    let mut j = limits.by_error(
+        expected,
         format!(
-            "the plane is known to {expected:.4} mm (1 sigma) between {near:.0} and {far:.0} mm, its tilt to {:.4} degrees",
+            "the plane is known to {expected:.4} mm (1 sigma) at {work}, its tilt to {:.4} degrees",
             tilt.to_degrees()
         ),
     );
@@ -52,7 +50,7 @@ pub fn judge(fit: &LaserPlaneFit, views: &[StripeView], limits: &Limits) -> Qual
         format!("{} pictures, 5 are needed to be good", used.len())
     });
     j.at_best(Verdict::Usable, low > near + 0.25 * (far - near) || high < far - 0.25 * (far - near), || {
-        format!("the boards stood between {low:.0} and {high:.0} mm, the work is between {near:.0} and {far:.0} mm")
+        format!("the boards were lit at {} to {} mm, the work is at {work}", work.depth(low), work.depth(high))
     });
     for v in fit.views.iter().filter(|v| !v.used) {
         j.at_best(Verdict::Usable, true, || {
@@ -67,10 +65,10 @@ pub fn judge(fit: &LaserPlaneFit, views: &[StripeView], limits: &Limits) -> Qual
     }
     j.advise(spread < 15.0, || "tilt the board by 20 degrees or more, once to each side".into());
     j.advise(low > near + 0.15 * (far - near), || {
-        format!("show a board nearer, at {near:.0} to {:.0} mm", near + 0.15 * (far - near))
+        format!("show a board nearer, at {} to {} mm", work.depth(near), work.depth(near + 0.15 * (far - near)))
     });
     j.advise(high < far - 0.15 * (far - near), || {
-        format!("show a board farther away, at {:.0} to {far:.0} mm", far - 0.15 * (far - near))
+        format!("show a board farther away, at {} to {} mm", work.depth(far - 0.15 * (far - near)), work.depth(far))
     });
     j.advise(j.verdict != Verdict::Good && camera_part > 0.7 * expected, || {
         "calibrate the camera with more pictures first: most of the error comes from it".into()

@@ -1,51 +1,87 @@
-//! In: an expected error and reasons against trusting it. Out: the verdict.
-//! Frame and unit: mm at the working distance.
+//! In: an expected error, what the work tolerates and at which depths. Out: the verdict with its reasons.
+//! Frame and unit: along the camera's optical axis (of a profile sensor: its z), mm.
 
 use crate::fault::{Fault, Result};
-use crate::rig::Verdict;
+use crate::rig::{Verdict, Volume};
 
-/// What a calibration must promise to be called good or usable.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
-    /// Expected error (1 sigma) at the working distance up to which a calibration is good, mm; above 0.
-    pub good_mm: f64,
-    /// The same for usable, mm; at least `good_mm`.
-    pub usable_mm: f64,
-    /// Nearest and farthest working distance along the optical axis, mm.
-    pub working_mm: [f64; 2],
+/// Share of what the sensor sees that counts as the tolerance where nobody states one: the paper's 0.25 mm for
+/// insertion where its camera sees 167 mm. Parts are as large as the view that they are measured in.
+const TOLERATED_SHARE: f64 = 1.5e-3;
+
+/// What was stated beforehand; the rest follows from the data ([`Asked::limits`]).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Asked {
+    /// Depths at which the result is judged.
+    pub working: Option<Volume>,
+    /// What the work tolerates, mm; above 0.
+    pub tolerance_mm: Option<f64>,
 }
 
-impl Default for Limits {
-    /// Half and twice the insertion tolerance of 0.25 mm that the paper's parts need, at its distances.
-    fn default() -> Self {
-        Limits { good_mm: 0.12, usable_mm: 0.5, working_mm: [110.0, 210.0] }
-    }
-}
-
-impl Limits {
+impl Asked {
     pub fn check(&self) -> Result<()> {
-        let [near, far] = self.working_mm;
-        if !(self.good_mm > 0.0 && self.usable_mm >= self.good_mm && near > 0.0 && far >= near && far.is_finite()) {
+        let w = self.working.as_ref().map_or([0.0, 0.0], |w| [w.near_mm, w.far_mm]);
+        let tolerance = self.tolerance_mm.unwrap_or(1.0);
+        if !(w[0] <= w[1] && w[0].is_finite() && w[1].is_finite() && tolerance > 0.0 && tolerance.is_finite()) {
             return Err(Fault::usage(format!(
-                "limits: good_mm {} (above 0), usable_mm {} (at least good_mm), working distance {near} to {far} mm",
-                self.good_mm, self.usable_mm
+                "judged from {} to {} mm with a tolerance of {tolerance} mm: near at most far, tolerance above 0",
+                w[0], w[1]
             ))
             .next("choose values in these ranges"));
         }
         Ok(())
     }
-    pub fn middle(&self) -> f64 {
-        (self.working_mm[0] + self.working_mm[1]) / 2.0
+    /// `seen` is where the data lay, `view_mm` how wide the sensor sees at a depth.
+    pub fn limits(&self, seen: &Volume, view_mm: impl Fn(f64) -> f64) -> Limits {
+        let working = self.working.clone().unwrap_or_else(|| seen.clone());
+        let view = view_mm(working.middle());
+        let (tolerance_mm, tolerance_from) = match self.tolerance_mm {
+            Some(mm) => (mm, "stated".to_string()),
+            None => {
+                let words = format!("{} % of the view", 100.0 * TOLERATED_SHARE);
+                (TOLERATED_SHARE * view, format!("{words}, {} mm", Volume::new(0.0, view, "").depth(view)))
+            }
+        };
+        Limits { tolerance_mm, tolerance_from, working }
     }
-    /// The verdict that the expected error alone allows.
-    pub fn by_error(&self, expected_mm: f64) -> Verdict {
-        if expected_mm <= self.good_mm {
+}
+
+/// What a calibration must promise to be called good or usable, and where.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Limits {
+    /// Good where the expected error (1 sigma) is at most half of it, usable up to twice.
+    pub tolerance_mm: f64,
+    /// Where the tolerance comes from, in words.
+    pub tolerance_from: String,
+    pub working: Volume,
+}
+
+impl Limits {
+    pub fn middle(&self) -> f64 {
+        self.working.middle()
+    }
+    pub fn usable_mm(&self) -> f64 {
+        2.0 * self.tolerance_mm
+    }
+    /// The judgement that the expected error alone allows. `says` tells what is expected and where.
+    pub fn by_error(&self, expected_mm: f64, says: String) -> Judgement {
+        let verdict = if expected_mm <= 0.5 * self.tolerance_mm {
             Verdict::Good
-        } else if expected_mm <= self.usable_mm {
+        } else if expected_mm <= self.usable_mm() {
             Verdict::Usable
         } else {
             Verdict::BadlyDetermined
+        };
+        let mut j = Judgement { verdict, reasons: vec![says], advice: Vec::new() };
+        if verdict != Verdict::Good {
+            j.reasons.push(format!(
+                "good up to {:.2$} mm, usable up to {:.2$} mm: half and twice the tolerance ({3})",
+                0.5 * self.tolerance_mm,
+                self.usable_mm(),
+                (2.0 - self.tolerance_mm.log10()).ceil().clamp(2.0, 5.0) as usize,
+                self.tolerance_from
+            ));
         }
+        j
     }
 }
 
@@ -58,9 +94,6 @@ pub struct Judgement {
 }
 
 impl Judgement {
-    pub fn new(verdict: Verdict, reason: String) -> Judgement {
-        Judgement { verdict, reasons: vec![reason], advice: Vec::new() }
-    }
     /// Where `when` holds, the verdict is at best this one.
     pub fn at_best(&mut self, verdict: Verdict, when: bool, reason: impl FnOnce() -> String) {
         if when {

@@ -2,7 +2,7 @@
 //! person reads; fit and verification apart.
 //! Frame and unit: camera frame; mm, degrees, px.
 
-use super::limits::{Judgement, Limits, rms};
+use super::limits::{Limits, rms};
 use super::measured_pose::INTRINSIC_NAMES;
 use super::pointer::PointerFit;
 use super::pointer_range::range;
@@ -31,26 +31,32 @@ pub fn expected_error(fit: &PointerFit, camera: &Intrinsics, depth: f64, spot_px
 
 /// Judges a fit. `spot_px` is the usual sigma of a spot's centre.
 pub fn judge(fit: &PointerFit, camera: &Intrinsics, spot_px: f64, limits: &Limits) -> Quality {
-    let [near, far] = limits.working_mm;
+    let work = &limits.working;
+    let (near, far) = (work.near_mm, work.far_mm);
     let at = |z: f64| expected_error(fit, camera, z, spot_px).unwrap_or(f64::INFINITY);
     let expected = at(limits.middle()).max(0.0);
     let farthest = at(far);
     let used: Vec<_> = fit.spots.iter().filter(|s| s.used).collect();
-    let mut j = Judgement::new(
-        limits.by_error(expected),
+    let mut j = limits.by_error(
+        expected,
         format!(
-            "a distance of {:.0} mm is measured to {expected:.3} mm, one of {far:.0} mm to {farthest:.3} mm (1 sigma)",
-            limits.middle()
+            "a distance of {} mm is measured to {expected:.3} mm, one of {} mm to {farthest:.3} mm (1 sigma)",
+            work.depth(limits.middle()),
+            work.depth(far)
         ),
     );
-    j.at_best(Verdict::BadlyDetermined, !farthest.is_finite() || farthest > 2.0 * limits.usable_mm, || {
-        format!("at {far:.0} mm the expected error is {farthest:.2} mm")
+    j.at_best(Verdict::BadlyDetermined, !(farthest <= 2.0 * limits.usable_mm()), || {
+        format!(
+            "at {} mm the expected error is {farthest:.2} mm, {:.2} mm are allowed at the far end",
+            work.depth(far),
+            2.0 * limits.usable_mm()
+        )
     });
     j.at_best(Verdict::Usable, used.len() < 6, || format!("{} spots, 6 are needed to be good", used.len()));
     j.at_best(Verdict::BadlyDetermined, used.len() < 4, || format!("{} spots leave nothing to check", used.len()));
     let [low, high] = fit.reach;
     j.at_best(Verdict::Usable, high - low < 0.3 * (far - near), || {
-        format!("the spots lie between {low:.0} and {high:.0} mm, the work is between {near:.0} and {far:.0} mm")
+        format!("the spots lie at {} to {} mm, the work is at {work}", work.depth(low), work.depth(high))
     });
     for s in fit.spots.iter().filter(|s| !s.used) {
         j.at_best(Verdict::Usable, true, || {
@@ -60,8 +66,10 @@ pub fn judge(fit: &PointerFit, camera: &Intrinsics, spot_px: f64, limits: &Limit
     j.at_best(Verdict::Usable, fit.sigma_ratio > 3.0, || {
         format!("the spots scatter {:.1} times more than their sigmas say", fit.sigma_ratio)
     });
-    j.advise(low > near + 0.25 * (far - near), || format!("show the board nearer, at about {near:.0} mm"));
-    j.advise(high < far - 0.25 * (far - near), || format!("show the board farther away, at about {far:.0} mm"));
+    j.advise(low > near + 0.25 * (far - near), || format!("show the board nearer, at about {} mm", work.depth(near)));
+    j.advise(high < far - 0.25 * (far - near), || {
+        format!("show the board farther away, at about {} mm", work.depth(far))
+    });
     j.advise(j.verdict != Verdict::Good && used.len() < 12, || {
         "take more pictures, spread over the whole range".into()
     });

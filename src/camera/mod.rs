@@ -42,6 +42,11 @@ impl Intrinsics {
         Ok(())
     }
 
+    /// Longer side of what is seen at a depth, mm; the lens left out.
+    pub fn view_mm(&self, depth: f64) -> f64 {
+        depth.abs() * f64::max(f64::from(self.width) / self.fx, f64::from(self.height) / self.fy)
+    }
+
     /// Ideal normalised coordinates to distorted ones.
     pub fn distort(&self, n: &Vec2) -> Vec2 {
         let [k1, k2, p1, p2, k3] = self.distortion;

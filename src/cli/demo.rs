@@ -75,7 +75,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         place: args.on,
         extraction: settings.extraction.clone(),
         grid: GridOptions::default(),
-        depth_mm: [settings.working_volume.near_mm, settings.working_volume.far_mm],
+        volume: crate::station::volume::believed(&settings, &rig),
         ambient: None,
         overlays: 4,
         skip_bad: false,

@@ -52,8 +52,8 @@ struct Line {
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let (settings, rig) = (Settings::load(&args.station)?, Rig::load(&args.station)?);
-    let depth = [settings.working_volume.near_mm, settings.working_volume.far_mm];
-    let mut live = Live::new(&rig, args.raw.format, &settings.extraction, depth, args.on)?;
+    let volume = crate::station::volume::believed(&settings, &rig);
+    let mut live = Live::new(&rig, args.raw.format, &settings.extraction, volume.as_ref(), args.on)?;
     let newest = Arc::new(Newest::default());
     let (raw, filled) = (args.raw, newest.clone());
     // Not joined where measuring fails: it may wait for a camera that sends nothing.

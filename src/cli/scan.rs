@@ -71,7 +71,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         place: args.on,
         extraction: settings.extraction.clone(),
         grid: GridOptions { cell: args.cell_mm, ..GridOptions::default() },
-        depth_mm: [settings.working_volume.near_mm, settings.working_volume.far_mm],
+        volume: crate::station::volume::believed(&settings, &rig),
         ambient: None,
         overlays: args.overlays,
         skip_bad: args.skip_bad,
@@ -164,6 +164,9 @@ fn summary(r: &ScanReport, out: &Path) -> String {
     let all: u64 = r.peaks.values().sum();
     for (fate, n) in &r.peaks {
         s += &format!("  {:>9} peaks {fate} ({:.2} %)\n", n, 100.0 * *n as f64 / all.max(1) as f64);
+    }
+    if let Some(v) = &r.working_volume {
+        s += &format!("points were believed at depths of {v}\n");
     }
     if !r.dark_shots.is_empty() {
         s += &format!(

@@ -6,7 +6,7 @@ use super::{Extraction, Format, Processor, Where, camera_for};
 use crate::fault::Result;
 use crate::geometry::{Camera, Rigid};
 use crate::raster::Image;
-use crate::rig::Rig;
+use crate::rig::{Rig, Volume};
 use crate::stages::point::pose_words;
 use std::sync::{Condvar, Mutex, PoisonError};
 
@@ -70,11 +70,17 @@ pub struct Live {
 
 impl Live {
     /// Refused: a rig without camera or laser plane; another picture shape than the camera's; no GPU where one is asked for.
-    pub fn new(rig: &Rig, format: Format, extraction: &Extraction, depth_mm: [f64; 2], place: Where) -> Result<Live> {
+    pub fn new(
+        rig: &Rig,
+        format: Format,
+        extraction: &Extraction,
+        volume: Option<&Volume>,
+        place: Where,
+    ) -> Result<Live> {
         extraction.check()?;
         let camera = camera_for(&rig.need_camera()?.value, format)?;
         let laser = rig.need_laser_plane()?.value;
-        let optical = Optical { camera, laser, depth_mm };
+        let optical = Optical { camera, laser, depth_mm: Volume::depths(volume) };
         let processor: Processor = place.open()?;
         let engine = Engine::new(format, &optical, extraction, None, processor).one_at_a_time();
         Ok(Live { engine, ready: false })

@@ -6,10 +6,10 @@ use super::engine::{Engine, Measured, Optical};
 use super::{Ambient, CloudPoint, Extraction, Format, Processor, Shot};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
-use crate::geometry::{Base, Camera, Flange, Plane, Rigid, Vec3};
+use crate::geometry::{Base, Camera, Flange, Plane, Rigid, Vec2, Vec3};
 use crate::gpu::Device;
 use crate::raster::Image;
-use crate::rig::Rig;
+use crate::rig::{Rig, Volume};
 use crate::stages::peak::{Peak, PeakParams, SATURATED, Stripe};
 use crate::stages::point::{self, Optics};
 use crate::stages::support::{self, Support};
@@ -26,6 +26,8 @@ pub struct Profile {
 
 /// Shots looked at for the stripe's width before the first profile leaves.
 const MEASURED_SHOTS: usize = 8;
+/// Places of the picture, each way, at which is looked for where the sheet is seen.
+const SEEN_PLACES: u32 = 16;
 
 /// The life of a shot from picture to points, a few shots at a time; memory does not grow with the scan.
 pub struct Scanner {
@@ -53,7 +55,7 @@ impl Scanner {
         rig: &Rig,
         format: Format,
         extraction: &Extraction,
-        depth_mm: [f64; 2],
+        volume: Option<&Volume>,
         ambient: Option<Image>,
         processor: Processor,
         stripe: Option<Stripe>,
@@ -63,6 +65,7 @@ impl Scanner {
         let laser = rig.need_laser_plane()?.value;
         let flange_from_camera = rig.need_hand_eye()?.value;
         let optics = Optics::new(&camera, &laser);
+        let depth_mm = Volume::depths(volume);
         let optical = Optical { camera, laser, depth_mm };
         let ambient = ambient.map(|image| Ambient::new(image, format)).transpose()?;
         Ok(Scanner {
@@ -70,7 +73,7 @@ impl Scanner {
             ambient,
             camera_from_flange: flange_from_camera.inverse(),
             optics,
-            anchor: anchor(&laser, depth_mm),
+            anchor: anchor(&camera, &laser, depth_mm),
             extraction: extraction.clone(),
             waiting: Vec::new(),
             stripe,
@@ -220,15 +223,25 @@ pub fn camera_for(camera: &Intrinsics, format: Format) -> Result<Intrinsics> {
     Ok(camera.scaled_to(w, h))
 }
 
-fn anchor(laser: &Plane<Camera>, depth_mm: [f64; 2]) -> Vec3 {
-    // A sheet that runs along the optical axis never meets it: its foot at the middle depth serves.
+/// Where the sheet meets the optical axis if it is believed there, else the middle one of the places where it is seen.
+fn anchor(camera: &Intrinsics, laser: &Plane<Camera>, depth_mm: [f64; 2]) -> Vec3 {
+    let [near, far] = depth_mm;
     let z = laser.offset / laser.normal.z;
-    let middle = 0.5 * (depth_mm[0] + depth_mm[1]);
-    if z.is_finite() && z > 0.5 * depth_mm[0] && z < 2.0 * depth_mm[1] {
+    if z.is_finite() && z > 0.5 * near && z < 2.0 * far {
         return Vec3::new(0.0, 0.0, z);
     }
-    let p = Vec3::new(0.0, 0.0, middle);
-    p - laser.normal * laser.distance(&p)
+    let (w, h) = (f64::from(camera.width), f64::from(camera.height));
+    let mut seen: Vec<Vec3> = (0..SEEN_PLACES * SEEN_PLACES)
+        .filter_map(|i| {
+            let place = |k: u32, size: f64| (f64::from(k) + 0.5) / f64::from(SEEN_PLACES) * size - 0.5;
+            let pixel = Vec2::new(place(i % SEEN_PLACES, w), place(i / SEEN_PLACES, h));
+            let ray = camera.normalised_from_pixel(&pixel)?.push(1.0);
+            let z = laser.offset / laser.normal.dot(&ray);
+            (z > 0.0 && (near..=far).contains(&z)).then(|| ray * z)
+        })
+        .collect();
+    seen.sort_by(|a, b| a.z.total_cmp(&b.z));
+    seen.get(seen.len() / 2).copied().unwrap_or_else(|| laser.normal * laser.offset)
 }
 
 #[cfg(test)]

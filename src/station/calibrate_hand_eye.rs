@@ -8,14 +8,14 @@ use crate::calibrate::hand_eye::{HandEyeOptions, Mount, solve};
 use crate::calibrate::hand_eye_closed::Pair;
 use crate::calibrate::hand_eye_report::{covariance, judge, page};
 use crate::calibrate::hand_eye_turns::{read_with, resolve};
-use crate::calibrate::limits::Limits;
+use crate::calibrate::limits::Asked;
 use crate::calibrate::measured_pose::{AboutCamera, intrinsic_covariance};
 use crate::calibrate::report::Page;
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Camera, Flange, Rigid};
 use crate::recording::Recording;
-use crate::rig::{Calibration, HandEye, Rig, hash_text};
+use crate::rig::{Calibration, HandEye, Rig, Volume, hash_text};
 
 /// How [`calibrate_hand_eye`] is run.
 #[derive(Clone, Debug)]
@@ -24,7 +24,8 @@ pub struct HandEyeRun {
     pub poses: Option<String>,
     pub mount: Mount,
     pub solver: HandEyeOptions,
-    pub limits: Limits,
+    /// Judged where the laser plane is used, unless stated; without a laser plane where the boards stood.
+    pub asked: Asked,
 }
 
 /// What a calibration command leaves: the record to be stored, the page to be read.
@@ -49,7 +50,7 @@ pub fn calibrate_hand_eye(
     run: &HandEyeRun,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<HandEyeResult> {
-    run.limits.check()?;
+    run.asked.check()?;
     run.solver.check()?;
     let camera = rig.need_camera()?;
     let poses = recording.poses(run.poses.as_deref())?;
@@ -71,7 +72,10 @@ pub fn calibrate_hand_eye(
     let again = said_already(recording, camera, &mut pairs)?;
     let turned = one_origin(&mut pairs, &seen.found, run.solver.seed)?;
     let fit = solve(&pairs, run.mount, &intrinsic_covariance(&camera.covariance), &camera.value, &run.solver)?;
-    let mut quality = judge(&fit, &pairs, &run.limits);
+    let depths = pairs.iter().map(|p| p.seen.centre().z);
+    let work = super::volume::calibrated(rig).or_else(|| Volume::spanned(depths, "where the boards stood"));
+    let limits = run.asked.limits(&work.expect("pairs with boards"), |z| camera.value.view_mm(z));
+    let mut quality = judge(&fit, &pairs, &limits);
     quality.reasons.extend(seen.missing.iter().map(|(name, why)| format!("{name} was not used: {}", first_line(why))));
     quality.reasons.extend(turned);
     if again > 0 {

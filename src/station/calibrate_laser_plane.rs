@@ -7,14 +7,14 @@ use super::calibrate_hand_eye::{Calibrated, first_line};
 use super::straight::keep_straight;
 use crate::calibrate::laser_plane::{LaserPlaneFit, LaserPlaneOptions, StripePeak, StripeView, solve};
 use crate::calibrate::laser_plane_report::{covariance, judge, page};
-use crate::calibrate::limits::Limits;
+use crate::calibrate::limits::Asked;
 use crate::calibrate::measured_pose::{intrinsic_covariance, pooled_factor};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Camera, Plane, Rigid, Vec2, Vec3};
 use crate::raster::Image;
 use crate::recording::{Beam, Recording};
-use crate::rig::{Calibration, Rig, hash_file, hash_text};
+use crate::rig::{Calibration, Rig, Volume, hash_file, hash_text};
 use crate::scan::{Engine, Extraction, Format, Optical, Processor, Where};
 use crate::stages::point;
 
@@ -22,10 +22,8 @@ use crate::stages::point;
 #[derive(Clone, Debug)]
 pub struct LaserPlaneRun {
     pub solver: LaserPlaneOptions,
-    pub limits: Limits,
+    pub asked: Asked,
     pub extraction: Extraction,
-    /// Nearest and farthest camera depth at which the laser is believed, mm.
-    pub depth_mm: [f64; 2],
     pub place: Where,
 }
 
@@ -37,7 +35,7 @@ pub fn calibrate_laser_plane(
     run: &LaserPlaneRun,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Calibrated<Plane<Camera>>> {
-    run.limits.check()?;
+    run.asked.check()?;
     run.solver.check()?;
     let camera = rig.need_camera()?;
     recording.shows(Beam::Line)?;
@@ -88,8 +86,10 @@ pub fn calibrate_laser_plane(
     };
     let best = if used(&guesses[0]) >= used(&guesses[1]) { 0 } else { 1 };
     let guess = guesses.into_iter().nth(best).expect("two guesses")?.1.plane;
-    let (views, fit) = fit_with(&guess, run.depth_mm)?;
-    let mut quality = judge(&fit, &views, &run.limits);
+    let (views, fit) = fit_with(&guess, everywhere)?;
+    let lit = Volume::new(fit.reach[0], fit.reach[1], "where the boards were lit");
+    let limits = run.asked.limits(&lit, |z| camera.value.view_mm(z));
+    let mut quality = judge(&fit, &limits);
     quality.reasons.extend(missing.iter().map(|(name, why)| format!("{name} was not used: {}", first_line(why))));
     let page = page(&fit, &views, &quality, (camera.value.width, camera.value.height));
     let mut calibration = Calibration::new("laser_plane", "camera", fit.plane, covariance(&fit), quality);

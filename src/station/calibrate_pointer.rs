@@ -4,7 +4,7 @@
 
 use super::board_views::{Boards, boards};
 use super::calibrate_hand_eye::{Calibrated, first_line};
-use crate::calibrate::limits::Limits;
+use crate::calibrate::limits::Asked;
 use crate::calibrate::measured_pose::{intrinsic_covariance, pooled_factor};
 use crate::calibrate::pointer::{PointerOptions, SpotView, solve};
 use crate::calibrate::pointer_report::{covariance, judge, page};
@@ -12,14 +12,14 @@ use crate::calibrate::spot::{SpotOptions, SpotPicture, find_spots, hot_pixels};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Camera, Ray};
 use crate::recording::{Beam, Recording};
-use crate::rig::{Calibration, Rig, hash_file, hash_text};
+use crate::rig::{Calibration, Rig, Volume, hash_file, hash_text};
 
 /// How [`calibrate_pointer`] is run.
 #[derive(Clone, Debug)]
 pub struct PointerRun {
     pub spots: SpotOptions,
     pub solver: PointerOptions,
-    pub limits: Limits,
+    pub asked: Asked,
 }
 
 /// Calibrates the pointer from a recording with an `ambient` and a `laser` picture in each frame, the
@@ -30,7 +30,7 @@ pub fn calibrate_pointer(
     run: &PointerRun,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Calibrated<Ray<Camera>>> {
-    run.limits.check()?;
+    run.asked.check()?;
     run.solver.check()?;
     let camera = rig.need_camera()?;
     recording.shows(Beam::Pointer)?;
@@ -70,7 +70,9 @@ pub fn calibrate_pointer(
     })?;
     let mut sigmas: Vec<f64> = views.iter().map(|v| (v.covariance.trace() / 2.0).sqrt()).collect();
     sigmas.sort_by(f64::total_cmp);
-    let mut quality = judge(&fit, &camera.value, sigmas[sigmas.len() / 2], &run.limits);
+    let seen = Volume::new(fit.reach[0], fit.reach[1], "where the spots lay");
+    let limits = run.asked.limits(&seen, |z| camera.value.view_mm(z));
+    let mut quality = judge(&fit, &camera.value, sigmas[sigmas.len() / 2], &limits);
     quality.reasons.extend(missing.iter().map(|(name, why)| format!("{name} was not used: {}", first_line(why))));
     let page = page(&fit, &quality);
     let mut calibration = Calibration::new("pointer", "camera", fit.beam, covariance(&fit), quality);

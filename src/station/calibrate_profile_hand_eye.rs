@@ -4,14 +4,14 @@
 
 use super::calibrate_hand_eye::Calibrated;
 use crate::calibrate::hand_eye_report::HAND_EYE_NAMES;
-use crate::calibrate::limits::{Judgement, Limits, rms};
+use crate::calibrate::limits::{Asked, Limits, rms};
 use crate::calibrate::profile_files::load;
 use crate::calibrate::profile_hand_eye::{BallFit, BallOptions, solve};
 use crate::calibrate::report::{Page, bars};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid, Sensor, Vec3, skew};
 use crate::recording::load_poses;
-use crate::rig::{Calibration, Covariance, Quality, Verdict, hash_file};
+use crate::rig::{Calibration, Covariance, Quality, Verdict, Volume, hash_file};
 use crate::robot::fanuc_tp;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -22,13 +22,16 @@ pub fn calibrate_profile_hand_eye(
     profiles: &Path,
     poses: &Path,
     options: &BallOptions,
-    limits: &Limits,
+    asked: &Asked,
 ) -> Result<(Calibrated<Rigid<Flange, Sensor>>, Vec<String>)> {
-    limits.check()?;
+    asked.check()?;
     let all = load(profiles)?;
     let (read, warnings) = poses_of(poses)?;
     let fit = solve(&all, &read, options)?;
-    let quality = judge(&fit, limits);
+    let points = || all.iter().flat_map(|p| &p.points);
+    let span = |axis: usize| Volume::spanned(points().map(|p| p[axis]), "where the profiles' points lie");
+    let (seen, width) = (span(1).expect("profiles with points"), span(0).expect("profiles with points").length());
+    let quality = judge(&fit, &asked.limits(&seen, |_| width));
     let page = page(&fit, &quality);
     let c = fit.covariance.view((0, 0), (6, 6)).into_owned();
     let mut calibration = Calibration::new(
@@ -80,9 +83,13 @@ fn expected(fit: &BallFit, distance: f64) -> f64 {
 fn judge(fit: &BallFit, limits: &Limits) -> Quality {
     let expected = expected(fit, limits.middle());
     let used: Vec<_> = fit.profiles.iter().filter(|p| p.used).collect();
-    let mut j = Judgement::new(
-        limits.by_error(expected),
-        format!("a point at {:.0} mm is placed in the flange frame to {expected:.3} mm (1 sigma)", limits.middle()),
+    let mut j = limits.by_error(
+        expected,
+        format!(
+            "a point at {} mm is placed in the flange frame to {expected:.3} mm (1 sigma); depths: {}",
+            limits.working.depth(limits.middle()),
+            limits.working.from
+        ),
     );
     j.reasons.push(format!(
         "the ball's centre lies on the {} side of the profile plane in most profiles; the other side fits worse by {:.0}",

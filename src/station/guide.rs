@@ -124,7 +124,7 @@ pub fn guide(options: &GuideOptions, confirm: &mut dyn FnMut(&Step) -> Result<bo
         place: options.place,
         extraction: settings.extraction.clone(),
         grid: GridOptions::default(),
-        depth_mm: [settings.working_volume.near_mm, settings.working_volume.far_mm],
+        volume: super::volume::believed(&settings, &rig),
         ambient: None,
         overlays: 0,
         skip_bad: false,

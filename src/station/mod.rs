@@ -19,6 +19,7 @@ mod settings;
 mod straight;
 mod values;
 mod verify;
+pub mod volume;
 
 pub use board_views::{Boards, FrameBoard, boards};
 pub use calibrate_hand_eye::{Calibrated, HandEyeResult, HandEyeRun, calibrate_hand_eye};

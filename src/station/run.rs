@@ -5,7 +5,7 @@
 use super::progress::{Checkpoint, Lock};
 use crate::fault::{Fault, Result};
 use crate::raster::Image;
-use crate::rig::Rig;
+use crate::rig::{Rig, Volume};
 use crate::scan::{
     BadShot, CloudPoint, CloudWriter, Extraction, GridOptions, Processor, Profile, Scanner, Source, Where,
 };
@@ -22,8 +22,8 @@ pub struct ScanOptions {
     pub place: Where,
     pub extraction: Extraction,
     pub grid: GridOptions,
-    /// Nearest and farthest camera depth believed, mm.
-    pub depth_mm: [f64; 2],
+    /// Camera depths at which points are believed; `None` for all ([`super::volume::believed`]).
+    pub volume: Option<Volume>,
     /// A picture with the laser off and the shots' exposure, subtracted from every shot.
     pub ambient: Option<Image>,
     /// Shots to draw with their kept and rejected peaks, evenly spread; 0 for none.
@@ -50,6 +50,9 @@ pub struct ScanReport {
     pub image: crate::scan::Format,
     pub shots: usize,
     pub points: u64,
+    /// Depths at which points were believed; none where nothing limits them.
+    #[serde(default)]
+    pub working_volume: Option<Volume>,
     /// Peaks by fate: kept, and rejected by reason.
     pub peaks: BTreeMap<String, u64>,
     /// Shots without a single kept peak.
@@ -134,7 +137,7 @@ pub fn scan_on(
     std::fs::create_dir_all(&options.out).map_err(|e| Fault::write(&options.out, e))?;
     let _lock = Lock::take(&options.out)?;
     let cloud_path = options.out.join("cloud.ply");
-    let settings = serde_json::to_string(&options.extraction).expect("plain data");
+    let settings = serde_json::to_string(&(&options.extraction, &options.volume)).expect("plain data");
     let identity = crate::rig::hash_text(format!("{id} {} {settings}", rig.fingerprint()).as_bytes());
     let former = Checkpoint::load(&options.out)?.filter(|_| options.resume);
     let state = match former {
@@ -160,7 +163,7 @@ pub fn scan_on(
         rig,
         source.format(),
         &options.extraction,
-        options.depth_mm,
+        options.volume.as_ref(),
         options.ambient.clone(),
         processor,
         state.stripe,
@@ -199,6 +202,7 @@ pub fn scan_on(
         frame: "base".into(),
         recording: label.into(),
         rig_fingerprint: rig.fingerprint(),
+        working_volume: options.volume.clone(),
         ran_on: scanner.ran_on(),
         image: source.format(),
         shots: state.shots,

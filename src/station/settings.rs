@@ -2,6 +2,7 @@
 //! Frame and unit: camera frame for the working volume, mm; docs/file-formats.md lists every key.
 
 use crate::fault::{Fault, Result};
+use crate::rig::Volume;
 use crate::robot::Convention;
 use std::path::Path;
 
@@ -14,26 +15,24 @@ pub struct Settings {
     /// How this station's robot writes poses; needed only where poses are printed for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub robot: Option<Convention>,
-    pub working_volume: WorkingVolume,
+    /// What the work tolerates, mm: calibrations are judged by it. Without it a share of the camera's view.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tolerance_mm: Option<f64>,
+    /// Without it the volume follows from where the boards of the laser plane's calibration stood.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub working_volume: Option<WorkingVolume>,
     /// How the stripe is found; docs/file-formats.md lists every key.
     pub extraction: crate::scan::Extraction,
 }
 
 /// Where parts can be: camera-frame depths between which the laser plane is believed.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[serde(deny_unknown_fields)]
 pub struct WorkingVolume {
     /// Nearest depth along the optical axis, mm, > 0.
     pub near_mm: f64,
     /// Farthest depth, mm, > near. Points outside are rejected with reason "region".
     pub far_mm: f64,
-}
-
-impl Default for WorkingVolume {
-    /// The range of the paper's pointer, 70 to 290 mm, with a margin.
-    fn default() -> WorkingVolume {
-        WorkingVolume { near_mm: 60.0, far_mm: 320.0 }
-    }
 }
 
 impl Settings {
@@ -62,8 +61,9 @@ impl Settings {
     }
 
     pub fn check(&self) -> Result<()> {
-        let v = self.working_volume;
-        if !(v.near_mm > 0.0 && v.far_mm > v.near_mm && v.far_mm.is_finite()) {
+        if let Some(v) =
+            self.working_volume.filter(|v| !(v.near_mm > 0.0 && v.far_mm > v.near_mm && v.far_mm.is_finite()))
+        {
             return Err(Fault::input(format!(
                 "working_volume runs from near_mm = {} to far_mm = {}; 0 < near_mm < far_mm is needed",
                 v.near_mm, v.far_mm
@@ -71,7 +71,16 @@ impl Settings {
             .cause("swapped, or metres instead of millimetres")
             .next("give the camera's nearest and farthest working distance in millimetres"));
         }
+        if let Some(mm) = self.tolerance_mm.filter(|mm| !(*mm > 0.0 && mm.is_finite())) {
+            return Err(Fault::input(format!("tolerance_mm is {mm}, a length above 0 mm is needed"))
+                .next("give what the work tolerates in millimetres, or leave the key out"));
+        }
         self.extraction.check()
+    }
+
+    /// The depths that a person stated.
+    pub fn volume(&self) -> Option<Volume> {
+        self.working_volume.map(|v| Volume::new(v.near_mm, v.far_mm, "station.toml"))
     }
 
     /// Writes `station/station.toml`.
@@ -91,6 +100,7 @@ mod tests {
         assert!(Settings::parse("name = 'a'").is_ok());
         assert!(Settings::parse("nam = 'a'").unwrap_err().what.contains("nam"));
         assert!(Settings::parse("[working_volume]\nnear_mm = 300\nfar_mm = 100").is_err());
+        assert!(Settings::parse("tolerance_mm = 0").unwrap_err().what.contains("tolerance_mm"));
         let s = Settings { name: "x".into(), robot: Some(Convention::Denso), ..Settings::default() };
         assert_eq!(Settings::parse(&toml::to_string(&s).unwrap()).unwrap(), s);
     }

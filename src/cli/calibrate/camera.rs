@@ -35,7 +35,8 @@ pub struct Args {
     /// Estimate the skew too (sensors with square rows have none)
     #[arg(long)]
     skew: bool,
-    /// Distance at which the expected error is stated, mm [default: the middle of the working volume]
+    /// Distance at which the expected error is stated, mm [default: the middle of station.toml's working volume, else where
+    /// the boards stood]
     #[arg(long)]
     working_mm: Option<f64>,
     /// Part of a colour picture to use: red, green, blue or luma
@@ -49,10 +50,9 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let settings = Settings::load(&args.station)?;
     let mut recordings = args.recordings.iter().map(|r| Recording::open(r)).collect::<Result<Vec<_>>>()?;
     recordings.iter_mut().for_each(|r| r.channel = args.channel);
-    let volume = &settings.working_volume;
     let options = CameraOptions {
         solve: SolveOptions { lens: args.lens, skew: args.skew, ..SolveOptions::default() },
-        working_distance_mm: Some(args.working_mm.unwrap_or((volume.near_mm + volume.far_mm) / 2.0)),
+        working_distance_mm: args.working_mm.or(settings.volume().map(|v| v.middle())),
         ..CameraOptions::default()
     };
     let pictures: usize = recordings.iter().map(|r| r.meta.frames.len()).sum();

@@ -4,13 +4,13 @@
 use super::super::Console;
 use super::{Keep, finish};
 use crate::calibrate::hand_eye::{HandEyeOptions, Mount};
-use crate::calibrate::limits::Limits;
 use crate::fault::Result;
 use crate::geometry::{Frame, Rigid};
 use crate::recording::Recording;
 use crate::rig::Rig;
 use crate::robot::Convention;
-use crate::station::{HandEyeResult, HandEyeRun, calibrate_hand_eye};
+use crate::station::volume::asked;
+use crate::station::{HandEyeResult, HandEyeRun, Settings, calibrate_hand_eye};
 use std::path::PathBuf;
 
 /// Find the camera's pose on the flange from pictures of a fixed board and the robot's poses
@@ -39,9 +39,10 @@ pub struct Args {
     /// Sigma of the robot's orientation per axis, degrees [default: estimated]
     #[arg(long)]
     robot_sigma_deg: Option<f64>,
-    /// Distance at which the expected error is stated, mm
-    #[arg(long, default_value_t = 160.0)]
-    working_mm: f64,
+    /// Distance at which the expected error is stated, mm [default: the middle of station.toml's working volume, else of
+    /// where the laser plane's boards stood, else of where these stood]
+    #[arg(long)]
+    working_mm: Option<f64>,
     #[command(flatten)]
     keep: Keep,
 }
@@ -49,7 +50,7 @@ pub struct Args {
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let recording = Recording::open(&args.recording)?;
     recording.pose_file(args.poses.as_deref())?.warnings.iter().for_each(|w| console.warn(w));
-    let rig = Rig::load(&args.station)?;
+    let (settings, rig) = (Settings::load(&args.station)?, Rig::load(&args.station)?);
     let run = HandEyeRun {
         poses: args.poses.clone(),
         mount: if args.eye_to_hand { Mount::EyeToHand } else { Mount::EyeInHand },
@@ -58,7 +59,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
             robot_sigma_deg: args.robot_sigma_deg,
             ..HandEyeOptions::default()
         },
-        limits: Limits { working_mm: [args.working_mm, args.working_mm], ..Limits::default() },
+        asked: asked(&settings, args.working_mm.map(|mm| [mm, mm])),
     };
     let bar = console.bar("boards", 0);
     let progress = |done: usize, all: usize| {

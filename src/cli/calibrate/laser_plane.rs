@@ -4,11 +4,11 @@
 use super::super::Console;
 use super::{Keep, finish};
 use crate::calibrate::laser_plane::LaserPlaneOptions;
-use crate::calibrate::limits::Limits;
 use crate::fault::Result;
 use crate::recording::Recording;
 use crate::rig::Rig;
 use crate::scan::Where;
+use crate::station::volume::asked;
 use crate::station::{LaserPlaneRun, Settings, calibrate_laser_plane};
 use std::path::PathBuf;
 
@@ -26,12 +26,13 @@ pub struct Args {
     /// Station folder with the camera's calibration
     #[arg(long)]
     station: PathBuf,
-    /// Nearest working distance for the expected error, mm
-    #[arg(long, default_value_t = 110.0)]
-    near_mm: f64,
-    /// Farthest working distance for the expected error, mm
-    #[arg(long, default_value_t = 210.0)]
-    far_mm: f64,
+    /// Nearest depth at which the result is judged, mm [default: the working volume of station.toml, else where the boards
+    /// were lit]
+    #[arg(long, requires = "far_mm")]
+    near_mm: Option<f64>,
+    /// Farthest depth at which the result is judged, mm
+    #[arg(long, requires = "near_mm")]
+    far_mm: Option<f64>,
     /// Where the stages run: auto (GPU where there is one), gpu, or cpu (the twins)
     #[arg(long, default_value = "auto", value_parser = super::super::parse::<Where>)]
     on: Where,
@@ -44,9 +45,8 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let (settings, rig) = (Settings::load(&args.station)?, Rig::load(&args.station)?);
     let run = LaserPlaneRun {
         solver: LaserPlaneOptions::default(),
-        limits: Limits { working_mm: [args.near_mm, args.far_mm], ..Limits::default() },
+        asked: asked(&settings, args.near_mm.zip(args.far_mm).map(<[f64; 2]>::from)),
         extraction: settings.extraction.clone(),
-        depth_mm: [settings.working_volume.near_mm, settings.working_volume.far_mm],
         place: args.on,
     };
     let bar = console.bar("boards", 0);

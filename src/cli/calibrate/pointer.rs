@@ -3,13 +3,13 @@
 
 use super::super::Console;
 use super::{Keep, finish};
-use crate::calibrate::limits::Limits;
 use crate::calibrate::pointer::PointerOptions;
 use crate::calibrate::spot::SpotOptions;
 use crate::fault::Result;
 use crate::recording::Recording;
 use crate::rig::Rig;
-use crate::station::{PointerRun, calibrate_pointer};
+use crate::station::volume::asked;
+use crate::station::{PointerRun, Settings, calibrate_pointer};
 use std::path::PathBuf;
 
 /// Find the laser pointer's beam from pictures of its spot on boards
@@ -25,23 +25,24 @@ pub struct Args {
     /// Station folder with the camera's calibration
     #[arg(long)]
     station: PathBuf,
-    /// Nearest working distance for the expected error, mm
-    #[arg(long, default_value_t = 70.0)]
-    near_mm: f64,
-    /// Farthest working distance for the expected error, mm
-    #[arg(long, default_value_t = 290.0)]
-    far_mm: f64,
+    /// Nearest depth at which the result is judged, mm [default: the working volume of station.toml, else where the spots
+    /// lay]
+    #[arg(long, requires = "far_mm")]
+    near_mm: Option<f64>,
+    /// Farthest depth at which the result is judged, mm
+    #[arg(long, requires = "near_mm")]
+    far_mm: Option<f64>,
     #[command(flatten)]
     keep: Keep,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let recording = Recording::open(&args.recording)?;
-    let rig = Rig::load(&args.station)?;
+    let (settings, rig) = (Settings::load(&args.station)?, Rig::load(&args.station)?);
     let run = PointerRun {
         spots: SpotOptions::default(),
         solver: PointerOptions::default(),
-        limits: Limits { working_mm: [args.near_mm, args.far_mm], ..Limits::default() },
+        asked: asked(&settings, args.near_mm.zip(args.far_mm).map(<[f64; 2]>::from)),
     };
     let bar = console.bar("boards", 0);
     let progress = |done: usize, all: usize| {

@@ -3,11 +3,12 @@
 
 use super::super::Console;
 use super::{Keep, finish};
-use crate::calibrate::limits::Limits;
+use crate::calibrate::limits::Asked;
 use crate::calibrate::profile_hand_eye::{BallOptions, Side};
 use crate::fault::Result;
+use crate::rig::Volume;
 use crate::robot::Convention;
-use crate::station::calibrate_profile_hand_eye;
+use crate::station::{Settings, calibrate_profile_hand_eye};
 use std::path::PathBuf;
 
 /// Find a line-profile sensor's pose on the flange from profiles of a ball and the robot's poses
@@ -33,17 +34,21 @@ pub struct Args {
     /// Station folder that the result is stored in
     #[arg(long)]
     station: PathBuf,
-    /// Distance at which the expected error is stated, mm
-    #[arg(long, default_value_t = 160.0)]
-    working_mm: f64,
+    /// Depth of the sensor (its z) at which the expected error is stated, mm [default: the middle of where the profiles'
+    /// points lie]
+    #[arg(long, allow_negative_numbers = true)]
+    working_mm: Option<f64>,
     #[command(flatten)]
     keep: Keep,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
+    // The result may be the first that the station gets.
+    let settings = if args.station.exists() { Settings::load(&args.station)? } else { Settings::default() };
     let options = BallOptions { side: args.side, ..BallOptions::new(args.ball_diameter_mm) };
-    let limits = Limits { working_mm: [args.working_mm, args.working_mm], ..Limits::default() };
-    let (c, warnings) = calibrate_profile_hand_eye(&args.profiles, &args.poses, &options, &limits)?;
+    let working = args.working_mm.map(|mm| Volume::new(mm, mm, "stated"));
+    let asked = Asked { working, tolerance_mm: settings.tolerance_mm };
+    let (c, warnings) = calibrate_profile_hand_eye(&args.profiles, &args.poses, &options, &asked)?;
     warnings.iter().for_each(|w| console.warn(w));
     let n = Convention::Denso.write(&c.calibration.value);
     let text = format!(

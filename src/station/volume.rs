@@ -1,0 +1,62 @@
+//! In: station.toml, the calibrations of a rig, what the command line states. Out: the depths in which points are believed
+//! and those at which calibrations are judged, each with its origin.
+//! Frame and unit: along the camera's optical axis, mm.
+
+use super::Settings;
+use crate::calibrate::limits::Asked;
+use crate::rig::{Rig, Volume};
+
+/// Where the laser plane was held by boards; `None` for an imported one.
+pub fn calibrated(rig: &Rig) -> Option<Volume> {
+    let figures = &rig.laser_plane.as_ref()?.quality.figures;
+    let at = |name: &str| figures.get(name).copied().filter(|z| *z > 0.0);
+    let (near, far) = (at("nearest_board_mm")?, at("farthest_board_mm")?);
+    (near < far).then(|| Volume::new(near, far, "where the laser plane's boards stood"))
+}
+
+/// Depths at which a scan's points are believed: those that station.toml states, else those of the laser plane's boards and
+/// as far again. `None`: nobody knows, every depth is believed.
+pub fn believed(settings: &Settings, rig: &Rig) -> Option<Volume> {
+    settings.volume().or_else(|| calibrated(rig).map(|v| v.extended()))
+}
+
+/// What is stated about judging a calibration: on the command line, else in station.toml.
+pub fn asked(settings: &Settings, stated: Option<[f64; 2]>) -> Asked {
+    let working = stated.map(|[near, far]| Volume::new(near, far, "stated")).or_else(|| settings.volume());
+    Asked { working, tolerance_mm: settings.tolerance_mm }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Camera, Plane, Vec3};
+    use crate::rig::{Calibration, Covariance, Quality, Verdict};
+
+    #[test]
+    fn the_station_is_asked_first_then_the_laser_planes_boards() {
+        let mut rig = Rig::default();
+        let mut settings = Settings::default();
+        assert_eq!(believed(&settings, &rig), None);
+        let quality = |figures: &[(&str, f64)]| Quality {
+            verdict: Verdict::Good,
+            reasons: vec![],
+            advice: vec![],
+            figures: figures.iter().map(|(k, v)| (k.to_string(), *v)).collect(),
+            per_picture: vec![],
+        };
+        let plane = |q| {
+            let plane = Plane::<Camera>::new(Vec3::new(0.0, 0.9, 0.4), 200.0).unwrap();
+            Some(Calibration::new("laser_plane", "camera", plane, Covariance::default(), q))
+        };
+        rig.laser_plane = plane(quality(&[]));
+        assert_eq!(believed(&settings, &rig), None, "an imported plane says nothing of depths");
+        rig.laser_plane = plane(quality(&[("nearest_board_mm", 411.0), ("farthest_board_mm", 504.0)]));
+        let v = believed(&settings, &rig).unwrap();
+        assert_eq!((v.near_mm, v.far_mm), (318.0, 597.0));
+        settings.working_volume = Some(super::super::WorkingVolume { near_mm: 400.0, far_mm: 500.0 });
+        let v = believed(&settings, &rig).unwrap();
+        assert_eq!((v.near_mm, v.far_mm, v.from.as_str()), (400.0, 500.0, "station.toml"));
+        assert_eq!(asked(&settings, None).working.unwrap().from, "station.toml");
+        assert_eq!(asked(&settings, Some([1.0, 2.0])).working.unwrap().from, "stated");
+    }
+}
