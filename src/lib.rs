@@ -4,6 +4,7 @@
 //! (ARCHITECTURE.md, enforced by tests/floors.rs).
 
 pub mod fault;
+pub mod files;
 
 pub mod bcap;
 pub mod geometry;

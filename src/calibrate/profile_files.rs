@@ -2,6 +2,7 @@
 //! Frame and unit: the sensor's own plane, mm.
 
 use crate::fault::{Fault, Result};
+use crate::files::natural;
 use std::path::Path;
 
 /// The points of one profile; places without a measurement (not finite) are left out.
@@ -36,20 +37,6 @@ pub fn load(path: &Path) -> Result<Vec<Profile>> {
         out.extend(load_file(&f)?);
     }
     Ok(out)
-}
-
-/// A name as text and numbers in turn: profile_2 comes before profile_10.
-fn natural(name: &str) -> Vec<(String, u64)> {
-    let mut out = Vec::new();
-    let mut rest = name;
-    while !rest.is_empty() {
-        let text: String = rest.chars().take_while(|c| !c.is_ascii_digit()).collect();
-        rest = &rest[text.len()..];
-        let digits: String = rest.chars().take_while(char::is_ascii_digit).collect();
-        rest = &rest[digits.len()..];
-        out.push((text, digits.parse().unwrap_or(0)));
-    }
-    out
 }
 
 fn load_file(path: &Path) -> Result<Vec<Profile>> {

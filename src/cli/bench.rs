@@ -91,5 +91,5 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
 }
 
 fn write(path: &Path, text: &str) -> Result<()> {
-    crate::rig::write_atomically(path, text.as_bytes())
+    crate::files::write(path, text.as_bytes())
 }

@@ -6,7 +6,6 @@ use super::Console;
 use crate::calibrate::boards::print::sheet;
 use crate::fault::{Fault, Result};
 use crate::recording::BoardSpec;
-use crate::rig::write_atomically;
 use std::path::PathBuf;
 
 /// Draw a calibration board to print at true scale
@@ -93,10 +92,10 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         path.push(extension);
         PathBuf::from(path)
     };
-    write_atomically(&with(".svg"), drawn.svg().as_bytes())?;
-    write_atomically(&with(".pdf"), &drawn.pdf())?;
+    crate::files::write(&with(".svg"), drawn.svg().as_bytes())?;
+    crate::files::write(&with(".pdf"), &drawn.pdf())?;
     let text = serde_json::to_string_pretty(&board).expect("plain data");
-    write_atomically(&with(".json"), text.as_bytes())?;
+    crate::files::write(&with(".json"), text.as_bytes())?;
     if let BoardSpec::Chessboard { inner_corners: [a, b], .. } = board {
         if (a + b) % 2 == 0 {
             console.warn(format!(

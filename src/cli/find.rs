@@ -48,9 +48,9 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let options = LocateOptions { up, robot, accelerator: Accelerator::open() };
     let (report, picture) = find_part(&args.scan, &recipe, args.station.as_deref(), &options)?;
     let text = serde_json::to_string_pretty(&report).expect("plain data");
-    crate::rig::write_atomically(&args.out, text.as_bytes())?;
+    crate::files::write(&args.out, text.as_bytes())?;
     let image = args.out.with_extension("png");
-    crate::rig::write_atomically(&image, &picture.to_png())?;
+    crate::files::write(&image, &picture.to_png())?;
     console.result(&report, &summary(&report));
     console.say(format!("see {} and {}", args.out.display(), image.display()));
     if report.passed {

@@ -74,7 +74,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         read.origin[1]
     ));
     let text = toml::to_string(&recipe).expect("plain data");
-    crate::rig::write_atomically(&args.out, text.as_bytes())?;
+    crate::files::write(&args.out, text.as_bytes())?;
     console.result(&recipe, &text);
     console.say(format!("see {}", args.out.display()));
     Ok(())

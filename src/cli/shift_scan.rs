@@ -70,7 +70,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     std::fs::create_dir_all(&args.out).map_err(|e| Fault::write(&args.out, e))?;
     write_cloud(&args.out.join("cloud.ply"), &cloud)?;
     let text = serde_json::to_string_pretty(&report).expect("plain numbers");
-    crate::rig::write_atomically(&args.out.join("shift.json"), text.as_bytes())?;
+    crate::files::write(&args.out.join("shift.json"), text.as_bytes())?;
     if cloud.len() >= 100 {
         let far = cloud.iter().fold([0f32; 2], |m, p| [m[0].max(p.position[0]), m[1].max(p.position[1])]);
         // A cell is no finer than the travel, or rows without points would lie between the pictures.

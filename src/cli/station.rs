@@ -92,7 +92,7 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Export(a) => {
             let values = Values::of(&Rig::load(&a.station)?);
             let text = serde_json::to_string_pretty(&values).expect("plain numbers");
-            crate::rig::write_atomically(&a.out, text.as_bytes())?;
+            crate::files::write(&a.out, text.as_bytes())?;
             console.say(format!("{}: written", a.out.display()));
         }
     }

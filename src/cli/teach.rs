@@ -53,9 +53,9 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     };
     let (recipe, proof, picture) = teach_part(&args.scan, &options)?;
     let text = toml::to_string(&recipe).expect("plain data");
-    crate::rig::write_atomically(&args.out, text.as_bytes())?;
+    crate::files::write(&args.out, text.as_bytes())?;
     let image = args.out.with_extension("png");
-    crate::rig::write_atomically(&image, &picture.to_png())?;
+    crate::files::write(&image, &picture.to_png())?;
     if !proof.passed {
         console.warn(format!("the taught part misses a gate on its own scan: {}", proof.reasons.join("; ")));
     }

@@ -99,21 +99,9 @@ fn from_colour(picture: &image::DynamicImage, channel: Channel, bits: u8, width:
     Image::from_u8(width, height, rgb.pixels().map(|p| grey(&p.0.map(u16::from)) as u8).collect())
 }
 
-/// Writes a grey image as PNG, 8 or 16 bits.
+/// Writes a grey image as PNG, 8 or 16 bits. Not waited for: recordings are simulated by hundreds of pictures.
 pub fn save_png(image: &Image, path: &Path) -> Result<()> {
-    replace(path, &png(image))
-}
-
-/// Writes beside `path` and renames, so that half a picture never has its name.
-pub(super) fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
-    let mut part = path.as_os_str().to_owned();
-    part.push(".part");
-    let done = std::fs::write(&part, bytes).and_then(|()| std::fs::rename(&part, path));
-    done.map_err(|e| {
-        // What could be written of it is of no use; the first error says why.
-        let _ = std::fs::remove_file(&part);
-        Fault::write(path, e)
-    })
+    crate::files::write_unsynced(path, &png(image))
 }
 
 /// The bytes of a grey image as PNG, 8 or 16 bits.

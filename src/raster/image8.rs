@@ -55,6 +55,6 @@ impl RgbImage {
         out.into_inner()
     }
     pub fn save_png(&self, path: &Path) -> Result<()> {
-        super::file::replace(path, &self.to_png())
+        crate::files::write(path, &self.to_png())
     }
 }

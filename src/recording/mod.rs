@@ -39,7 +39,7 @@ impl Recording {
                 std::fs::read_dir(folder).map_or(Vec::new(), |all| all.flatten().map(|e| e.path()).collect());
             let mut inside: Vec<_> = entries.iter().filter(|e| e.join("meta.json").exists()).collect();
             if !inside.is_empty() {
-                inside.sort();
+                inside.sort_by_key(|p| crate::files::natural(&p.to_string_lossy()));
                 let names: Vec<String> = inside.iter().map(|p| p.display().to_string()).collect();
                 return Err(Fault::input(format!("{}: holds no meta.json", folder.display()))
                     .cause("it is the folder above the recordings")

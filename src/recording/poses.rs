@@ -53,7 +53,7 @@ fn there(folder: &Path) -> Vec<String> {
         .filter(|n| n.contains("pose") && (n.ends_with(".json") || n.ends_with(".csv")))
         .map(|n| n[..n.rfind('.').unwrap_or(n.len())].to_owned())
         .collect();
-    names.sort();
+    names.sort_by_key(|n| crate::files::natural(n));
     names
 }
 
@@ -179,7 +179,7 @@ pub fn save_poses(path: &Path, poses: &[Rigid<Base, Flange>]) -> Result<()> {
         poses: poses.iter().enumerate().map(|(frame, p)| JsonPose { frame, matrix: p.to_rows() }).collect(),
     };
     let text = serde_json::to_string_pretty(&file).expect("plain numbers");
-    std::fs::write(path, text).map_err(|e| Fault::write(path, e))
+    crate::files::write(path, text.as_bytes())
 }
 
 #[cfg(test)]

@@ -40,10 +40,10 @@ impl Rig {
         let folder = station.join("calibration");
         std::fs::create_dir_all(&folder).map_err(|e| Fault::write(&folder, e))?;
         if let Ok(former) = std::fs::read(&path) {
-            write_atomically(&path.with_extension("previous.json"), &former)?;
+            crate::files::write(&path.with_extension("previous.json"), &former)?;
         }
         let text = serde_json::to_string_pretty(calibration).expect("plain data");
-        write_atomically(&path, text.as_bytes())?;
+        crate::files::write(&path, text.as_bytes())?;
         Ok(path)
     }
 
@@ -97,44 +97,6 @@ fn load<T: DeserializeOwned>(station: &Path, kind: &str) -> Result<Option<Calibr
     })?;
     found.check(kind).map_err(|e| e.at(path.display()))?;
     Ok(Some(found))
-}
-
-/// Writes to a temporary file in the same folder, syncs it, and renames it over `path`.
-pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<()> {
-    write_aside(path, bytes)?.keep()
-}
-
-/// A file that is written under another name and may not have reached the disk.
-pub struct Aside {
-    file: tempfile::NamedTempFile,
-    path: PathBuf,
-}
-
-/// The first half of [`write_atomically`]; without the second, [`Aside::keep`], nothing is left of it.
-pub fn write_aside(path: &Path, bytes: &[u8]) -> Result<Aside> {
-    use std::io::Write;
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let mut file = named_temporary(folder).map_err(|e| Fault::write(path, e))?;
-    file.write_all(bytes).map_err(|e| Fault::write(path, e))?;
-    Ok(Aside { file, path: path.to_owned() })
-}
-
-impl Aside {
-    /// Waits until it is on the disk and gives it its name.
-    pub fn keep(self) -> Result<()> {
-        self.file.as_file().sync_all().map_err(|e| Fault::write(&self.path, e))?;
-        self.file.persist(&self.path).map_err(|e| Fault::write(&self.path, e.error))?;
-        Ok(())
-    }
-}
-
-/// A temporary file that others may read as they may read any other result: temporary files are private
-/// by default, and stay so when they are renamed.
-pub fn named_temporary(folder: &Path) -> std::io::Result<tempfile::NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder)
 }
 
 #[cfg(test)]

@@ -7,5 +7,5 @@ mod folder;
 mod volume;
 
 pub use calibration::{Calibration, Covariance, HandEye, Quality, Verdict, hash_file, hash_text};
-pub use folder::{Rig, named_temporary, write_aside, write_atomically};
+pub use folder::Rig;
 pub use volume::Volume;

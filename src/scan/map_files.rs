@@ -5,9 +5,9 @@
 use super::HeightMap;
 use super::map_picture::Shown;
 use crate::fault::{Fault, Result};
+use crate::files::write_aside;
 use crate::geometry::{Base, Grid, Rigid};
 use crate::raster::{Image, float_tiff, png, read_float_tiff};
-use crate::rig::write_aside;
 use rayon::prelude::*;
 use std::path::Path;
 

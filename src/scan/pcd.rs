@@ -22,8 +22,7 @@ struct Record {
 
 /// Writes `path` under a temporary name and renames it when it is complete.
 pub fn write_pcd(path: &Path, source: &(impl PointSource + ?Sized), count: u64) -> Result<()> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let file = crate::rig::named_temporary(folder).map_err(|e| Fault::write(path, e))?;
+    let file = crate::files::Aside::create(path)?;
     let failed = |e: pcd_rs::Error| Fault::write(path, std::io::Error::other(e.to_string()));
     let init = WriterInit {
         width: count,
@@ -33,7 +32,7 @@ pub fn write_pcd(path: &Path, source: &(impl PointSource + ?Sized), count: u64) 
         schema: None,
         version: None,
     };
-    let handle = file.reopen().map_err(|e| Fault::write(path, e))?;
+    let handle = file.file().try_clone().map_err(|e| Fault::write(path, e))?;
     let mut writer: Writer<Record, _> =
         init.build_from_writer(BufWriter::with_capacity(1 << 20, handle)).map_err(failed)?;
     let mut wrong = None;
@@ -60,9 +59,7 @@ pub fn write_pcd(path: &Path, source: &(impl PointSource + ?Sized), count: u64) 
         return Err(failed(e));
     }
     writer.finish().map_err(failed)?;
-    file.as_file().sync_all().map_err(|e| Fault::write(path, e))?;
-    file.persist(path).map_err(|e| Fault::write(path, e.error))?;
-    Ok(())
+    file.keep()
 }
 
 #[cfg(test)]

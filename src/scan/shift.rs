@@ -250,7 +250,7 @@ fn pictures(folder: &Path) -> Result<Vec<PathBuf>> {
         extension.is_some_and(|e| ["jpg", "jpeg", "png", "tif", "tiff", "pgm"].contains(&e.as_str()))
     };
     let mut names: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(known).collect();
-    names.sort();
+    names.sort_by_key(|p| crate::files::natural(&p.to_string_lossy()));
     if names.is_empty() {
         return Err(Fault::input(format!("{}: holds no pictures", folder.display()))
             .cause("another folder, or pictures of another format than JPEG, PNG, TIFF, PGM")

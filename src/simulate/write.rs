@@ -12,7 +12,6 @@ use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Board, Camera, Flange, Mat3, Rigid, Vec3};
 use crate::raster::{Image, save_png};
 use crate::recording::{AmbientRef, Beam, BoardSpec, FrameRef, ImageSpec, Meta, save_poses};
-use crate::rig::write_atomically;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
@@ -400,12 +399,12 @@ impl Plan {
         }
         if let (Set::Scan, Some(base_from_scene)) = (self.set, truth.base_from_scene) {
             let points: Vec<Vec3> = visible.iter().flatten().map(|p| base_from_scene.point(p)).collect();
-            write_atomically(&folder.join("visible.ply"), &points_ply(&points))?;
+            crate::files::write(&folder.join("visible.ply"), &points_ply(&points))?;
         }
         let json = |value: serde_json::Result<String>| value.expect("plain data").into_bytes();
-        write_atomically(&folder.join("truth.json"), &json(serde_json::to_string_pretty(&truth)))?;
+        crate::files::write(&folder.join("truth.json"), &json(serde_json::to_string_pretty(&truth)))?;
         // Last, so that a folder with a meta.json is complete.
-        write_atomically(&folder.join("meta.json"), &json(serde_json::to_string_pretty(&self.meta(station))))?;
+        crate::files::write(&folder.join("meta.json"), &json(serde_json::to_string_pretty(&self.meta(station))))?;
         Ok(self.shots.iter().map(Shot::pictures).sum())
     }
 

@@ -186,7 +186,7 @@ pub fn guide(options: &GuideOptions, confirm: &mut dyn FnMut(&Step) -> Result<bo
         report,
     };
     let text = serde_json::to_string_pretty(&guided).expect("plain data");
-    crate::rig::write_atomically(&options.out.join("guide.json"), text.as_bytes())?;
+    crate::files::write(&options.out.join("guide.json"), text.as_bytes())?;
     Ok(guided)
 }
 

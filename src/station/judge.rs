@@ -63,10 +63,10 @@ pub fn judge(scan: &Path, truth: &Path, found: &[FoundPart]) -> Result<Judged> {
     if let Ok(mut map) = HeightMap::load(scan) {
         judged.map_median_mm = error_map(&mut map, &truth);
         let picture = map.picture(crate::scan::Shown::Sigma).0;
-        crate::rig::write_atomically(&scan.join("error_picture.png"), &picture.to_png())?;
+        crate::files::write(&scan.join("error_picture.png"), &picture.to_png())?;
     }
     let text = serde_json::to_string_pretty(&judged).expect("plain numbers");
-    crate::rig::write_atomically(&scan.join("errors.json"), text.as_bytes())?;
+    crate::files::write(&scan.join("errors.json"), text.as_bytes())?;
     super::page::save(scan, Some(&judged), found)?;
     Ok(judged)
 }

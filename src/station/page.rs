@@ -60,7 +60,7 @@ pub fn save(scan: &Path, judged: Option<&Judged>, found: &[FoundPart]) -> Result
         escape(&report.created)
     );
     let path = scan.join("index.html");
-    crate::rig::write_atomically(&path, page.as_bytes())?;
+    crate::files::write(&path, page.as_bytes())?;
     Ok(path)
 }
 
@@ -178,7 +178,7 @@ fn shots(body: &mut String, scan: &Path) -> Result<()> {
         .map(|e| e.file_name().to_string_lossy().into_owned())
         .filter(|n| n.ends_with(".png"))
         .collect();
-    names.sort();
+    names.sort_by_key(|n| crate::files::natural(n));
     if names.is_empty() {
         return Ok(());
     }

@@ -64,7 +64,7 @@ impl Checkpoint {
     pub fn save(&mut self, out: &Path, cloud: &mut CloudWriter) -> Result<()> {
         self.points = cloud.checkpoint()?;
         let text = serde_json::to_string(self).expect("plain data");
-        crate::rig::write_atomically(&path_of(out), text.as_bytes())
+        crate::files::write(&path_of(out), text.as_bytes())
     }
 
     /// A finished scan needs none.

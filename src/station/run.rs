@@ -219,7 +219,7 @@ pub fn scan_on(
         height_map,
     };
     let text = serde_json::to_string_pretty(&report).expect("plain data");
-    crate::rig::write_atomically(&options.out.join("scan.json"), text.as_bytes())?;
+    crate::files::write(&options.out.join("scan.json"), text.as_bytes())?;
     super::page::save(&options.out, None, &[])?;
     Checkpoint::remove(&options.out)?;
     Ok(report)

@@ -87,7 +87,7 @@ impl Settings {
     pub fn store(&self, station: &Path) -> Result<()> {
         std::fs::create_dir_all(station).map_err(|e| Fault::write(station, e))?;
         let text = toml::to_string(self).expect("plain data");
-        crate::rig::write_atomically(&station.join("station.toml"), text.as_bytes())
+        crate::files::write(&station.join("station.toml"), text.as_bytes())
     }
 }
 

@@ -6,7 +6,7 @@ mod plots;
 pub use plots::{axis_sphere, bars, coverage_map, residual_arrows, scatter};
 
 use crate::fault::Result;
-use crate::rig::{Quality, Verdict, write_atomically};
+use crate::rig::{Quality, Verdict};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -80,7 +80,7 @@ impl Page {
         )
     }
     pub fn save(&self, path: &Path) -> Result<()> {
-        write_atomically(path, self.html().as_bytes())
+        crate::files::write(path, self.html().as_bytes())
     }
 }
 

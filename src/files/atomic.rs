@@ -1,0 +1,98 @@
+//! In: bytes and a path. Out: a file that has its name only when every byte of it is on the disk; the one way in which
+//! results are written.
+//! Frame and unit: none.
+
+use super::moment;
+use crate::fault::{Fault, Result};
+use std::io::{Result as Io, Write};
+use std::path::{Path, PathBuf};
+use tempfile::NamedTempFile;
+
+/// Writes to a temporary file in the same folder, syncs it, and renames it over `path`. A link of that name is replaced,
+/// not followed.
+pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    write_aside(path, bytes)?.keep()
+}
+
+/// [`write`] without waiting for the disk: for pictures by the hundred that can be made again. Half of one never has its
+/// name, but a power cut may take whole ones.
+pub fn write_unsynced(path: &Path, bytes: &[u8]) -> Result<()> {
+    let aside = write_aside(path, bytes)?;
+    rename(aside.file, path).map_err(|e| Fault::write(path, e))
+}
+
+/// A file that is written under another name and may not have reached the disk.
+pub struct Aside {
+    file: NamedTempFile,
+    path: PathBuf,
+}
+
+/// The first half of [`write`]; without the second, [`Aside::keep`], nothing is left of it.
+pub fn write_aside(path: &Path, bytes: &[u8]) -> Result<Aside> {
+    let mut aside = Aside::create(path)?;
+    moment().and_then(|()| aside.file.write_all(bytes)).map_err(|e| Fault::write(path, e))?;
+    Ok(aside)
+}
+
+impl Aside {
+    /// An empty one, to be filled through [`Aside::file`].
+    pub fn create(path: &Path) -> Result<Aside> {
+        let file = moment().and_then(|()| temporary(folder_of(path))).map_err(|e| Fault::write(path, e))?;
+        Ok(Aside { file, path: path.to_owned() })
+    }
+    pub fn file(&self) -> &std::fs::File {
+        self.file.as_file()
+    }
+    /// Waits until it is on the disk, gives it its name, and waits until the name is on the disk too.
+    pub fn keep(self) -> Result<()> {
+        let kept = moment()
+            .and_then(|()| self.file.as_file().sync_all())
+            .and_then(|()| rename(self.file, &self.path))
+            .and_then(|()| sync_folder(folder_of(&self.path)));
+        kept.map_err(|e| Fault::write(&self.path, e))
+    }
+}
+
+fn rename(file: NamedTempFile, path: &Path) -> Io<()> {
+    moment()?;
+    file.persist(path).map(|_| ()).map_err(|e| e.error)
+}
+
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Puts a folder's list of names on the disk; only Unix can.
+pub(super) fn sync_folder(folder: &Path) -> Io<()> {
+    if cfg!(unix) { std::fs::File::open(folder)?.sync_all() } else { Ok(()) }
+}
+
+/// A temporary file that others may read as they may read any other result: temporary files are private by default, and
+/// stay so when they are renamed.
+fn temporary(folder: &Path) -> Io<NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    #[cfg(unix)]
+    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
+    builder.tempfile_in(folder)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_replaced_whole_and_a_link_is_not_followed() {
+        let dir = tempfile::tempdir().unwrap();
+        let (path, other) = (dir.path().join("a"), dir.path().join("b"));
+        std::fs::write(&other, "kept").unwrap();
+        #[cfg(unix)]
+        std::os::unix::fs::symlink(&other, &path).unwrap();
+        write(&path, b"new").unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"new");
+        assert_eq!(std::fs::read(&other).unwrap(), b"kept");
+        drop(write_aside(&path, b"never kept").unwrap());
+        assert_eq!(std::fs::read(&path).unwrap(), b"new");
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 2, "nothing else is left");
+        assert!(write(&dir.path().join("none/a"), b"").is_err());
+    }
+}

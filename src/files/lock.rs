@@ -1,0 +1,66 @@
+//! In: a folder. Out: the right to write into it, held by one process at a time and gone with it, however it ends.
+//! Frame and unit: none.
+
+use crate::fault::{Fault, Result};
+use std::fs::{File, TryLockError};
+use std::path::{Path, PathBuf};
+
+/// A lock of the operating system on the file `NAME.lock`, which stays: a file that is taken away while another process
+/// waits for it would give two of them the lock.
+pub struct Lock {
+    _file: File,
+}
+
+impl Lock {
+    /// Refuses where another process holds it; `who` says what that process does here.
+    pub fn take(folder: &Path, name: &str, who: &str) -> Result<Lock> {
+        let (path, file) = open(folder, name)?;
+        match file.try_lock() {
+            Ok(()) => Ok(Lock { _file: file }),
+            Err(TryLockError::Error(e)) => Err(Fault::write(&path, e)),
+            Err(TryLockError::WouldBlock) => {
+                Err(Fault::output(format!("{}: another {who} writes here", folder.display()))
+                    .cause(format!(
+                        "two were started into one folder: {} is locked by a running process",
+                        path.display()
+                    ))
+                    .next("wait for it, or choose another folder"))
+            }
+        }
+    }
+
+    /// Waits for it.
+    pub fn wait(folder: &Path, name: &str) -> Result<Lock> {
+        let (path, file) = open(folder, name)?;
+        file.lock().map_err(|e| Fault::write(&path, e))?;
+        Ok(Lock { _file: file })
+    }
+}
+
+fn open(folder: &Path, name: &str) -> Result<(PathBuf, File)> {
+    let path = folder.join(format!("{name}.lock"));
+    if std::fs::symlink_metadata(&path).is_ok_and(|m| !m.is_file()) {
+        return Err(Fault::output(format!("{}: is a link or a folder where a lock is to be", path.display()))
+            .cause("somebody else made it; what it points at is left alone")
+            .next("take it away, or choose another folder"));
+    }
+    let file = File::options().create(true).truncate(false).write(true).open(&path);
+    file.map(|f| (path.clone(), f)).map_err(|e| Fault::write(&path, e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_holds_it_until_it_goes() {
+        let dir = tempfile::tempdir().unwrap();
+        let first = Lock::take(dir.path(), "scan", "scan").unwrap();
+        let said = Lock::take(dir.path(), "scan", "scan").err().unwrap();
+        assert!(said.what.contains("another scan") && !said.next.is_empty(), "{said}");
+        drop(first);
+        // What it says inside, and who wrote it, is nobody's lock.
+        std::fs::write(dir.path().join("scan.lock"), "1").unwrap();
+        Lock::take(dir.path(), "scan", "scan").unwrap();
+    }
+}

@@ -1,0 +1,153 @@
+//! In: files made in a folder of their own. Out: all of them under their names in the folder above, or none, whenever the
+//! program is stopped.
+//! Frame and unit: none.
+
+use super::atomic::sync_folder;
+use super::{Lock, moment};
+use crate::fault::{Fault, Result};
+use std::io::{ErrorKind, Result as Io};
+use std::path::{Path, PathBuf};
+
+/// A set of files that belong together, in `folder`. They are made in `NAME.part`. That folder's renaming to `NAME.whole`
+/// is the moment from which the new ones count: the former ones are put away, it becomes `NAME.moving`, and its files move
+/// up. Whoever reads the folder calls [`Together::settle`] first, which ends what a stopped process has begun.
+pub struct Together<'a> {
+    folder: &'a Path,
+    name: &'a str,
+    /// Puts away what the files in the second folder take the place of, in the first. Called again after a stop.
+    clear: fn(&Path, &Path) -> Io<()>,
+}
+
+impl<'a> Together<'a> {
+    pub fn new(folder: &'a Path, name: &'a str, clear: fn(&Path, &Path) -> Io<()>) -> Together<'a> {
+        Together { folder, name, clear }
+    }
+
+    fn at(&self, state: &str) -> PathBuf {
+        self.folder.join(format!("{}.{state}", self.name))
+    }
+
+    /// Where the files are made.
+    pub fn part(&self) -> PathBuf {
+        self.at("part")
+    }
+
+    /// An empty folder to make the files in; what a stopped process has left there goes.
+    pub fn begin(&self) -> Result<PathBuf> {
+        let part = self.part();
+        let fresh = || {
+            moment()?;
+            match std::fs::symlink_metadata(&part) {
+                Ok(m) if m.is_dir() => std::fs::remove_dir_all(&part)?,
+                Ok(_) => return Err(std::io::Error::other("it is a link or a file, and is left alone")),
+                Err(_) => {}
+            }
+            moment()?;
+            std::fs::create_dir(&part)
+        };
+        fresh().map_err(|e| Fault::write(&part, e))?;
+        Ok(part)
+    }
+
+    /// Gives the files in [`Together::part`], each of them on the disk already, their names. The caller holds the folder's
+    /// lock.
+    pub fn commit(&self) -> Result<()> {
+        let done = sync_folder(&self.part())
+            .and_then(|()| rename(&self.part(), &self.at("whole")))
+            .and_then(|()| sync_folder(self.folder))
+            .and_then(|()| self.roll());
+        done.map_err(|e| Fault::write(self.folder, e))
+    }
+
+    /// Ends a commit that a stopped process has begun; does nothing where there is none.
+    pub fn settle(&self) -> Result<()> {
+        let begun = || self.at("whole").exists() || self.at("moving").exists();
+        if !begun() {
+            return Ok(());
+        }
+        let _lock = Lock::wait(self.folder, self.name)?;
+        if begun() { self.roll().map_err(|e| Fault::write(self.folder, e)) } else { Ok(()) }
+    }
+
+    /// [`Together::settle`] by one that holds the lock already.
+    pub fn settle_locked(&self) -> Result<()> {
+        self.roll().map_err(|e| Fault::write(self.folder, e))
+    }
+
+    fn roll(&self) -> Io<()> {
+        let (whole, moving) = (self.at("whole"), self.at("moving"));
+        if whole.exists() {
+            (self.clear)(self.folder, &whole)?;
+            rename(&whole, &moving)?;
+        }
+        if moving.exists() {
+            for entry in std::fs::read_dir(&moving)? {
+                let entry = entry?;
+                rename(&entry.path(), &self.folder.join(entry.file_name()))?;
+            }
+            sync_folder(self.folder)?;
+            moment()?;
+            std::fs::remove_dir(&moving)?;
+        }
+        Ok(())
+    }
+}
+
+fn rename(from: &Path, to: &Path) -> Io<()> {
+    moment()?;
+    std::fs::rename(from, to)
+}
+
+/// Takes a file, a link or a folder away; one that is not there is no error.
+pub fn remove(path: &Path) -> Io<()> {
+    moment()?;
+    let gone = match std::fs::symlink_metadata(path) {
+        Ok(m) if m.is_dir() => std::fs::remove_dir_all(path),
+        Ok(_) => std::fs::remove_file(path),
+        Err(e) => Err(e),
+    };
+    gone.or_else(|e| if e.kind() == ErrorKind::NotFound { Ok(()) } else { Err(e) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn clear(folder: &Path, _: &Path) -> Io<()> {
+        remove(&folder.join("a")).and_then(|()| remove(&folder.join("old")))
+    }
+
+    #[test]
+    fn a_stopped_commit_is_ended_by_the_next_reader() {
+        for stopped in 0..4 {
+            let dir = tempfile::tempdir().unwrap();
+            let at = |name: &str| dir.path().join(name);
+            for name in ["a", "old", "theirs"] {
+                std::fs::write(at(name), "former").unwrap();
+            }
+            let set = Together::new(dir.path(), "set", clear);
+            let part = set.begin().unwrap();
+            for name in ["a", "b"] {
+                std::fs::write(part.join(name), "new").unwrap();
+            }
+            match stopped {
+                0 => set.commit().unwrap(),
+                1 => std::fs::rename(at("set.part"), at("set.whole")).unwrap(),
+                2 => {
+                    std::fs::rename(at("set.part"), at("set.whole")).unwrap();
+                    remove(&at("a")).unwrap();
+                }
+                _ => {
+                    std::fs::rename(at("set.part"), at("set.moving")).unwrap();
+                    remove(&at("old")).unwrap();
+                    std::fs::rename(at("set.moving/a"), at("a")).unwrap();
+                }
+            }
+            set.settle().unwrap();
+            let read = |name: &str| std::fs::read_to_string(at(name)).ok();
+            assert_eq!((read("a").as_deref(), read("b").as_deref()), (Some("new"), Some("new")), "{stopped}");
+            assert_eq!((read("old"), read("theirs").as_deref()), (None, Some("former")), "{stopped}");
+            assert!(!at("set.part").exists() && !at("set.moving").exists());
+        }
+    }
+}
