@@ -11,7 +11,7 @@ use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec2;
 use crate::recording::Recording;
-use crate::rig::{Calibration, Covariance, Quality, Verdict};
+use crate::rig::{Calibration, Covariance, Kind, Quality, Verdict};
 use std::collections::BTreeMap;
 
 /// Settings of [`calibrate`].
@@ -110,7 +110,7 @@ pub fn from_observations(
     let covariance = solved.covariance.as_ref().map_or_else(Covariance::default, |c| {
         Covariance::new(&NAMES[..count], &c.view((0, 0), (count, count)).into_owned())
     });
-    let calibration = Calibration::new("camera", "camera", solved.intrinsics, covariance, judged);
+    let calibration = Calibration::new(Kind::Camera, solved.intrinsics, None, covariance, judged);
     Ok(CameraResult { calibration, used: pictures, solved, left_out, hold_out_px, worst })
 }
 

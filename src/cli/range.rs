@@ -56,6 +56,9 @@ fn table(r: &RangeReport, robot: Convention) -> String {
     for (name, why) in &r.missing {
         s += &format!("{name:16} no distance: {why}\n");
     }
+    for remark in &r.remarks {
+        s += &format!("note: {remark}\n");
+    }
     if let Some(f) = &r.surface {
         let [x, y, z] = f.normal;
         s += &format!(

@@ -175,6 +175,9 @@ fn summary(r: &ScanReport, out: &Path) -> String {
             &r.dark_shots[..r.dark_shots.len().min(12)]
         );
     }
+    for remark in &r.remarks {
+        s += &format!("  note: {remark}\n");
+    }
     for (name, why) in &r.skipped {
         s += &format!("  left out {name}: {why}\n");
     }

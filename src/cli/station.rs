@@ -2,8 +2,11 @@
 //! Frame and unit: camera and flange frames, mm.
 
 use super::Console;
+use super::calibrate::stale;
+use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
-use crate::rig::{Calibration, Rig};
+use crate::geometry::{Camera, Plane, Ray};
+use crate::rig::{Calibration, HandEye, Kind, Rig};
 use crate::robot::Convention;
 use crate::station::{Settings, Values};
 use std::path::{Path, PathBuf};
@@ -19,6 +22,13 @@ pub enum Command {
     Import(Import),
     /// Write a station's values as one JSON file, in the keys that import reads
     Export(Export),
+    /// Vouch for a calibration file that is refused: one of a former version, edited, or of another camera
+    ///
+    /// The file gets a new seal and your reason in it, and every report made with it shows that. What is no calibration at all
+    /// (a direction that is not 1 long, a covariance that is none) is refused even so.
+    #[command(after_help = "Example:
+  sheetlight station seal --station cell3 --kind laser-plane --because \"of version 1, checked on a gauge block\"")]
+    Seal(Seal),
 }
 
 #[derive(clap::Args)]
@@ -51,6 +61,25 @@ pub struct Import {
     /// Station folder; made where there is none
     #[arg(long)]
     station: PathBuf,
+    /// The values are right although they look like another unit
+    #[arg(long)]
+    as_stated: bool,
+}
+
+#[derive(clap::Args)]
+pub struct Seal {
+    /// Station folder
+    #[arg(long)]
+    station: PathBuf,
+    /// Which one: camera, laser-plane, pointer or hand-eye
+    #[arg(long, value_parser = super::parse::<Kind>)]
+    kind: Kind,
+    /// Why it is to be believed; kept in the file and shown in every report
+    #[arg(long)]
+    because: String,
+    /// The values are right although they look like another unit
+    #[arg(long)]
+    as_stated: bool,
 }
 
 #[derive(clap::Args)]
@@ -83,17 +112,33 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
             console.result(&Values::of(&rig), &summary(&settings, &rig));
         }
         Command::Import(a) => {
+            let stored = Values::load(&a.values)?.store(&a.station, &a.values, a.as_stated)?;
             if !a.station.join("station.toml").exists() {
                 Settings { name: named(&a.station), ..Settings::default() }.store(&a.station)?;
             }
-            let stored = Values::load(&a.values)?.store(&a.station, &a.values)?;
-            console.result(&stored, &format!("{}: imported {}", a.station.display(), stored.join(", ")));
+            let names: Vec<String> = stored.iter().map(|k| k.words()).collect();
+            console.result(&stored, &format!("{}: imported {}", a.station.display(), names.join(", ")));
+            stale(&a.station, console);
         }
         Command::Export(a) => {
             let values = Values::of(&Rig::load(&a.station)?);
             let text = serde_json::to_string_pretty(&values).expect("plain numbers");
             crate::files::write(&a.out, text.as_bytes())?;
             console.say(format!("{}: written", a.out.display()));
+        }
+        Command::Seal(a) => {
+            let vouch = match a.kind {
+                Kind::Camera => Rig::vouch::<Intrinsics>,
+                Kind::LaserPlane => Rig::vouch::<Plane<Camera>>,
+                Kind::Pointer => Rig::vouch::<Ray<Camera>>,
+                _ => Rig::vouch::<HandEye>,
+            };
+            if a.because.trim().is_empty() {
+                return Err(Fault::usage("--because says nothing").next("say why the file is to be believed"));
+            }
+            let path = vouch(&a.station, a.kind, a.because.trim(), a.as_stated)?;
+            console.result(&path, &format!("{}: sealed; reports made with it say so", path.display()));
+            stale(&a.station, console);
         }
     }
     Ok(())
@@ -140,7 +185,7 @@ fn line<T>(what: &str, calibration: &Option<Calibration<T>>, value: impl Fn(&T) 
         c.program,
         c.created
     );
-    for r in &c.quality.reasons {
+    for r in c.quality.reasons.iter().chain(&c.remarks) {
         s += &format!("{:12} {r}\n", "");
     }
     s

@@ -14,4 +14,4 @@ pub use inputs::{not_over, not_over_any};
 pub use lock::Lock;
 pub use moment::moment;
 pub use natural::natural;
-pub use together::Together;
+pub use together::{Together, remove};

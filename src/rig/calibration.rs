@@ -1,8 +1,12 @@
 //! In: a calibrated value and what its solver knows about it. Out: the record that is kept on disk.
 //! Frame and unit: stated in the record; covariances in the units of their parameters squared.
 
+use super::kind::{Place, Units};
+use super::{Covariance, Kind, Measured};
+use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Camera, Flange, Rigid};
+use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -27,34 +31,6 @@ impl Verdict {
     }
 }
 
-/// Covariance of named parameters; `matrix[i][j]` belongs to `parameters[i]`, `parameters[j]`.
-/// Each name ends with its unit: `fx_px`, `tx_mm`, `rx_rad`.
-#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Covariance {
-    pub parameters: Vec<String>,
-    pub matrix: Vec<Vec<f64>>,
-}
-
-impl Covariance {
-    pub fn new(parameters: &[&str], matrix: &nalgebra::DMatrix<f64>) -> Covariance {
-        assert_eq!((parameters.len(), parameters.len()), matrix.shape());
-        Covariance {
-            parameters: parameters.iter().map(|s| s.to_string()).collect(),
-            matrix: matrix.row_iter().map(|r| r.iter().copied().collect()).collect(),
-        }
-    }
-    /// Standard deviation of one parameter.
-    pub fn sigma(&self, name: &str) -> Option<f64> {
-        let i = self.parameters.iter().position(|p| p == name)?;
-        Some(self.matrix.get(i)?.get(i)?.max(0.0).sqrt())
-    }
-    pub fn to_matrix(&self) -> nalgebra::DMatrix<f64> {
-        let n = self.parameters.len();
-        nalgebra::DMatrix::from_fn(n, n, |i, j| self.matrix[i][j])
-    }
-}
-
 /// What a solver says about its result, for people and for later error budgets.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -76,72 +52,135 @@ pub struct Quality {
 /// frame: R = exp([rx ry rz]) R̂.
 pub type HandEye = Rigid<Flange, Camera>;
 
+/// Figures of a hand-eye's quality that ranges are worked out with: the robot's sigma per axis.
+pub const ROBOT_SIGMA_MM: &str = "robot_sigma_mm";
+pub const ROBOT_SIGMA_DEG: &str = "robot_sigma_deg";
+
 /// A calibrated value with its origin. `T` is `Intrinsics`, `Plane<Camera>`, `Ray<Camera>` or `HandEye`.
 ///
-/// Covariance parameters by kind: camera `fx_px fy_px cx_px cy_px k1 k2 p1 p2 k3`; laser plane
-/// `nx ny nz offset_mm` (rank 3, along the tangent of the unit normal); pointer
-/// `ox_mm oy_mm oz_mm dx dy dz` (rank 4), then the camera's nine, because the beam was found with that
-/// camera and a range needs both; hand-eye see [`HandEye`].
+/// Covariance parameters by kind: [`Kind::parameters`]; a laser plane's has rank 3, along the tangent of the unit normal, a
+/// pointer's beam rank 4; hand-eye see [`HandEye`].
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration<T> {
     pub format: u32,
-    /// camera, laser_plane, pointer or hand_eye.
-    pub kind: String,
+    pub kind: Kind,
     /// RFC 3339.
     pub created: String,
     /// Program and version.
     pub program: String,
-    pub units: String,
-    pub frame: String,
-    /// File name to SHA-256 of everything that went in, other calibrations included.
+    pub units: Units,
+    pub frame: Place,
+    /// File name to SHA-256 of everything that went in.
     pub inputs: BTreeMap<String, String>,
+    /// The calibrations that it was made with and is of no use without: kind to [`Calibration::content`].
+    pub rests_on: BTreeMap<Kind, String>,
     pub value: T,
     pub covariance: Covariance,
     pub quality: Quality,
+    /// What a person has vouched for, and when; every report shows it.
+    pub remarks: Vec<String>,
 }
 
-impl<T> Calibration<T> {
-    pub fn new(kind: &str, frame: &str, value: T, covariance: Covariance, quality: Quality) -> Calibration<T> {
+/// Of the files that this version writes.
+pub(super) const FORMAT: u32 = 2;
+
+impl<T: Serialize> Calibration<T> {
+    /// `with`: the camera that it was measured with, where it was measured with one.
+    pub fn new(
+        kind: Kind,
+        value: T,
+        with: Option<&Calibration<Intrinsics>>,
+        covariance: Covariance,
+        mut quality: Quality,
+    ) -> Calibration<T> {
+        // JSON has no number for what is not finite: a figure that could not be worked out is not there.
+        quality.figures.retain(|_, v| v.is_finite());
+        quality.per_picture.retain(|(_, v)| v.is_finite());
         Calibration {
-            format: 1,
-            kind: kind.into(),
+            format: FORMAT,
+            kind,
             created: jiff::Timestamp::now().to_string(),
             program: format!("sheetlight {}", env!("CARGO_PKG_VERSION")),
-            units: "mm, rad, px".into(),
-            frame: frame.into(),
+            units: Units::MmRadPx,
+            frame: kind.place(),
             inputs: BTreeMap::new(),
+            rests_on: with.map(|c| (Kind::Camera, c.content())).into_iter().collect(),
             value,
             covariance,
             quality,
+            remarks: Vec::new(),
         }
     }
+    /// SHA-256 of what is calculated with: the value and its covariance. Others name it in `rests_on`.
+    pub fn content(&self) -> String {
+        let held = (self.kind, self.units, self.frame, &self.value, &self.covariance);
+        hash_text(serde_json::to_string(&held).expect("plain data").as_bytes())
+    }
+}
+
+impl<T> Calibration<T> {
     /// Records a file that went into the result.
     pub fn with_input(mut self, path: &Path) -> Result<Self> {
         let name = path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned());
         self.inputs.insert(name, hash_file(path)?);
         Ok(self)
     }
-    pub(super) fn check(&self, kind: &str) -> Result<()> {
-        if self.format != 1 || self.kind != kind {
+}
+
+impl<T: Measured> Calibration<T> {
+    /// Refuses a record of another kind, frame or format, a value or covariance that is none, and what its own solver refused.
+    pub fn check(&self, kind: Kind) -> Result<()> {
+        if self.format != FORMAT || self.kind != kind || self.frame != kind.place() {
             return Err(Fault::input(format!(
-                "holds a '{}' of format {}, expected a '{kind}' of format 1",
-                self.kind, self.format
+                "holds a '{}' of format {} in frame {:?}, expected a '{}' of format {FORMAT} in {:?}",
+                self.kind.name(),
+                self.format,
+                self.frame,
+                kind.name(),
+                kind.place()
             ))
-            .cause("calibration files were renamed or swapped")
-            .next("calibrate again, or put the former file back"));
+            .cause("calibration files were renamed or swapped"));
         }
-        Ok(())
+        if self.quality.verdict == Verdict::Refused {
+            return Err(Fault::input(format!("was refused when it was made: {}", self.quality.reasons.join("; ")))
+                .cause("a result that determines nothing was put in place by hand"));
+        }
+        self.value.check()?;
+        self.covariance.check(kind)
+    }
+}
+
+impl Calibration<HandEye> {
+    /// Sigma of the robot per axis, mm and degrees, that the calibration found; `None` where the values come from elsewhere
+    /// and nothing is known of it.
+    pub fn robot_sigma(&self) -> Result<Option<[f64; 2]>> {
+        let of = |name: &str| self.quality.figures.get(name).copied();
+        match (of(ROBOT_SIGMA_MM), of(ROBOT_SIGMA_DEG)) {
+            (Some(mm), Some(deg)) => Ok(Some([mm, deg])),
+            (None, None) if self.covariance.matrix.iter().flatten().all(|x| *x == 0.0) => Ok(None),
+            _ => Err(Fault::input(format!("the hand-eye calibration has no {ROBOT_SIGMA_MM} and {ROBOT_SIGMA_DEG}"))
+                .cause("it was made by another version, and without them the robot would count as perfect")
+                .next("run sheetlight calibrate hand-eye again")),
+        }
     }
 }
 
 /// SHA-256 of a file, hexadecimal.
 pub fn hash_file(path: &Path) -> Result<String> {
-    std::fs::read(path).map(|bytes| hash_text(&bytes)).map_err(|e| Fault::read(path, e))
+    use sha2::Digest;
+    let mut hash = sha2::Sha256::new();
+    let copied = std::fs::File::open(path).and_then(|mut f| std::io::copy(&mut f, &mut hash));
+    copied.map_err(|e| Fault::read(path, e))?;
+    Ok(hex(&hash.finalize()))
 }
 
 /// SHA-256 of bytes, hexadecimal.
 pub fn hash_text(bytes: &[u8]) -> String {
     use sha2::Digest;
-    sha2::Sha256::digest(bytes).iter().map(|b| format!("{b:02x}")).collect()
+    hex(&sha2::Sha256::digest(bytes))
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }

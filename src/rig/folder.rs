@@ -1,10 +1,13 @@
-//! In: a station folder. Out: the rig in its `calibration/` subfolder, loaded and stored so that no
-//! file is ever half-replaced and the former one stays beside it.
+//! In: a station folder. Out: the rig in its `calibration/` subfolder, loaded and stored so that no file is ever
+//! half-replaced, the former one stays beside it, and what does not belong together is not used together.
 //! Frame and unit: as in the records.
 
-use super::{Calibration, HandEye};
+use super::calibration::FORMAT;
+use super::seal::{apart, sealed, shaped, unsealed};
+use super::{Calibration, HandEye, Kind, Measured, Verdict};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
+use crate::files::Together;
 use crate::geometry::{Camera, Plane, Ray};
 use serde::{Serialize, de::DeserializeOwned};
 use std::path::{Path, PathBuf};
@@ -19,46 +22,134 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// Loads what there is in `station/calibration`.
+    /// Loads and checks what there is in `station/calibration`.
     pub fn load(station: &Path) -> Result<Rig> {
-        let rig = Rig {
-            camera: load(station, "camera")?,
-            laser_plane: load(station, "laser_plane")?,
-            pointer: load(station, "pointer")?,
-            hand_eye: load(station, "hand_eye")?,
-        };
-        if let Some(c) = &rig.camera {
-            c.value.check()?;
-        }
-        Ok(rig)
+        Ok(Rig {
+            camera: load(station, Kind::Camera)?,
+            laser_plane: load(station, Kind::LaserPlane)?,
+            pointer: load(station, Kind::Pointer)?,
+            hand_eye: load(station, Kind::HandEye)?,
+        })
+    }
+
+    /// The camera alone: for what is calibrated with it, so that a spoilt former result is not in its own way.
+    pub fn load_camera(station: &Path) -> Result<Rig> {
+        Ok(Rig { camera: load(station, Kind::Camera)?, ..Rig::default() })
     }
 
     /// Stores one calibration under `station/calibration/<kind>.json`; a former one is kept as
     /// `<kind>.previous.json`. Either the new file is complete or the old one is untouched.
-    pub fn store<T: Serialize>(station: &Path, calibration: &Calibration<T>) -> Result<PathBuf> {
-        let path = file(station, &calibration.kind);
+    pub fn store<T: Serialize + Measured>(station: &Path, calibration: &Calibration<T>) -> Result<PathBuf> {
+        calibration.check(calibration.kind)?;
         let folder = station.join("calibration");
         std::fs::create_dir_all(&folder).map_err(|e| Fault::write(&folder, e))?;
+        together(&folder).settle()?;
+        let path = file(station, calibration.kind);
         if let Ok(former) = std::fs::read(&path) {
             crate::files::write(&path.with_extension("previous.json"), &former)?;
         }
-        let text = serde_json::to_string_pretty(calibration).expect("plain data");
-        crate::files::write(&path, text.as_bytes())?;
+        crate::files::write(&path, sealed(calibration).as_bytes())?;
         Ok(path)
+    }
+
+    /// Stores every part that is there, all of them or none; former ones are kept as [`Rig::store`] keeps them.
+    pub fn store_all(&self, station: &Path) -> Result<Vec<Kind>> {
+        let mut texts = Vec::new();
+        add(&mut texts, &self.camera)?;
+        add(&mut texts, &self.laser_plane)?;
+        add(&mut texts, &self.pointer)?;
+        add(&mut texts, &self.hand_eye)?;
+        let folder = station.join("calibration");
+        std::fs::create_dir_all(&folder).map_err(|e| Fault::write(&folder, e))?;
+        let set = together(&folder);
+        let _lock = crate::files::Lock::take(&folder, "import", "import")?;
+        set.settle_locked()?;
+        let part = set.begin()?;
+        for (kind, text) in &texts {
+            crate::files::write(&part.join(format!("{}.json", kind.name())), text.as_bytes())?;
+        }
+        set.commit()?;
+        Ok(texts.into_iter().map(|(kind, _)| kind).collect())
+    }
+
+    /// Seals a file anew that has no seal, was edited, or rests on another camera, because a person says why. The remark
+    /// stays with it. What is no calibration at all is refused even so.
+    pub fn vouch<T: Serialize + DeserializeOwned + Measured>(
+        station: &Path,
+        kind: Kind,
+        why: &str,
+        as_stated: bool,
+    ) -> Result<PathBuf> {
+        let path = file(station, kind);
+        let text = std::fs::read_to_string(&path).map_err(|e| Fault::read(&path, e))?;
+        let what = path.display().to_string();
+        let redo = |e: Fault| e.next(again(kind));
+        let (mut value, _) = apart(&text, &what).map_err(redo)?;
+        let today = jiff::Timestamp::now().strftime("%Y-%m-%d");
+        let object = value.as_object_mut().expect("apart refuses all else");
+        // Format 1 named frames as each writer liked, and had neither of the two lists.
+        object.insert("format".into(), FORMAT.into());
+        object.insert("frame".into(), serde_json::to_value(kind.place()).expect("a name"));
+        object.entry("rests_on").or_insert_with(|| serde_json::json!({}));
+        object.entry("remarks").or_insert_with(|| serde_json::json!([]));
+        let mut c: Calibration<T> = shaped(value, &what).map_err(redo)?;
+        let camera = if kind.rests_on_camera() { Rig::load_camera(station)?.camera } else { None };
+        c.rests_on = camera.map(|c| (Kind::Camera, c.content())).into_iter().collect();
+        c.remarks.push(format!("vouched for on {today}: {why}"));
+        c.check(kind).map_err(|e| redo(e.at(&what)))?;
+        if !as_stated {
+            asked(&c.value).map_err(|e| e.at(&what))?;
+        }
+        Rig::store(station, &c)
     }
 
     /// The camera, or what to do about its absence.
     pub fn need_camera(&self) -> Result<&Calibration<Intrinsics>> {
-        self.camera.as_ref().ok_or_else(|| missing("camera", "sheetlight calibrate camera"))
+        self.camera.as_ref().ok_or_else(|| missing(Kind::Camera))
     }
     pub fn need_laser_plane(&self) -> Result<&Calibration<Plane<Camera>>> {
-        self.laser_plane.as_ref().ok_or_else(|| missing("laser plane", "sheetlight calibrate laser-plane"))
+        self.belonging(&self.laser_plane)?.ok_or_else(|| missing(Kind::LaserPlane))
     }
     pub fn need_pointer(&self) -> Result<&Calibration<Ray<Camera>>> {
-        self.pointer.as_ref().ok_or_else(|| missing("pointer", "sheetlight calibrate pointer"))
+        self.belonging(&self.pointer)?.ok_or_else(|| missing(Kind::Pointer))
     }
     pub fn need_hand_eye(&self) -> Result<&Calibration<HandEye>> {
-        self.hand_eye.as_ref().ok_or_else(|| missing("hand-eye transform", "sheetlight calibrate hand-eye"))
+        self.belonging(&self.hand_eye)?.ok_or_else(|| missing(Kind::HandEye))
+    }
+
+    /// Refuses parts of which one was measured with another camera than the station's.
+    pub fn belong_together(&self) -> Result<()> {
+        self.belonging(&self.laser_plane)?;
+        self.belonging(&self.pointer)?;
+        self.belonging(&self.hand_eye).map(|_| ())
+    }
+
+    fn belonging<'a, T>(&self, part: &'a Option<Calibration<T>>) -> Result<Option<&'a Calibration<T>>> {
+        let (Some(c), Some(camera)) = (part, &self.camera) else { return Ok(part.as_ref()) };
+        let (now, then) = (camera.content(), c.rests_on.get(&Kind::Camera));
+        if !c.kind.rests_on_camera() || then == Some(&now) {
+            return Ok(part.as_ref());
+        }
+        let (what, kind) = (c.kind.words(), c.kind);
+        Err(Fault::refused(match then {
+            Some(then) => format!("the {what} was measured with camera {then:.12}, the station now has {now:.12}"),
+            None => format!("the {what} names no camera, the station has camera {now:.12}"),
+        })
+        .cause("the camera was calibrated or imported anew, or files of two stations were mixed")
+        .next(again(kind)))
+    }
+
+    /// What a report must say of the calibrations it rests on: what people have vouched for, and what is badly determined.
+    pub fn remarks(&self) -> Vec<String> {
+        fn of<T>(part: &Option<Calibration<T>>) -> Vec<String> {
+            let Some(c) = part else { return Vec::new() };
+            let mut said: Vec<String> = c.remarks.iter().map(|r| format!("{}: {r}", c.kind.words())).collect();
+            if c.quality.verdict > Verdict::Usable {
+                said.push(format!("{}: {}", c.kind.words(), c.quality.verdict.words()));
+            }
+            said
+        }
+        [of(&self.camera), of(&self.laser_plane), of(&self.pointer), of(&self.hand_eye)].concat()
     }
 
     /// One hash over the values that turn pixels into points; a scan keeps it, so that a later
@@ -73,65 +164,142 @@ impl Rig {
     }
 }
 
-fn missing(what: &str, command: &str) -> Fault {
+/// Refuses what looks like another unit; for values that a person gives.
+pub fn asked(value: &impl Measured) -> Result<()> {
+    value.doubt().map_or(Ok(()), |doubt| {
+        Err(Fault::refused(doubt)
+            .cause("metres, or another unit than millimetres")
+            .next("convert it to mm, or say --as-stated where it is right as it is"))
+    })
+}
+
+fn add<T: Serialize + Measured>(texts: &mut Vec<(Kind, String)>, part: &Option<Calibration<T>>) -> Result<()> {
+    if let Some(c) = part {
+        c.check(c.kind).map_err(|e| e.at(c.kind.words()))?;
+        texts.push((c.kind, sealed(c)));
+    }
+    Ok(())
+}
+
+/// Calibrations that are stored at once; those they replace are kept.
+fn together(folder: &Path) -> Together<'_> {
+    fn keep_former(folder: &Path, new: &Path) -> std::io::Result<()> {
+        for entry in std::fs::read_dir(new)? {
+            let path = folder.join(entry?.file_name());
+            if path.exists() {
+                crate::files::moment()?;
+                std::fs::rename(&path, path.with_extension("previous.json"))?;
+            }
+        }
+        Ok(())
+    }
+    Together::new(folder, "import", keep_former)
+}
+
+fn again(kind: Kind) -> String {
+    let command = kind.words().replace(' ', "-");
+    format!(
+        "run sheetlight calibrate {command} again, put {0}.previous.json back, or vouch for it with sheetlight station seal \
+         --kind {command} --because WHY",
+        kind.name()
+    )
+}
+
+fn missing(kind: Kind) -> Fault {
+    let (what, command) = (kind.words(), kind.words().replace(' ', "-"));
     Fault::input(format!("the station has no {what} calibration"))
         .cause("it was never calibrated, or another folder was given as --station")
-        .next(format!("run {command}, or import known values with sheetlight station import"))
+        .next(format!("run sheetlight calibrate {command}, or import known values with sheetlight station import"))
 }
 
-fn file(station: &Path, kind: &str) -> PathBuf {
-    station.join("calibration").join(format!("{kind}.json"))
+fn file(station: &Path, kind: Kind) -> PathBuf {
+    station.join("calibration").join(format!("{}.json", kind.name()))
 }
 
-fn load<T: DeserializeOwned>(station: &Path, kind: &str) -> Result<Option<Calibration<T>>> {
+fn load<T: DeserializeOwned + Measured>(station: &Path, kind: Kind) -> Result<Option<Calibration<T>>> {
+    together(&station.join("calibration")).settle()?;
     let path = file(station, kind);
     let text = match std::fs::read_to_string(&path) {
         Ok(text) => text,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
         Err(e) => return Err(Fault::read(&path, e)),
     };
-    let found: Calibration<T> = serde_json::from_str(&text).map_err(|e| {
-        Fault::input(format!("{}: is not a calibration file: {e}", path.display()))
-            .cause("edited by hand, truncated, or of a newer version")
-            .next("calibrate again, or rename the .previous.json beside it")
-    })?;
-    found.check(kind).map_err(|e| e.at(path.display()))?;
+    let found: Calibration<T> = unsealed(&text, &path.display().to_string()).map_err(|e| e.next(again(kind)))?;
+    found.check(kind).map_err(|e| e.at(path.display()).next(again(kind)))?;
     Ok(Some(found))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Covariance, Quality, Verdict};
+    use super::super::{Covariance, Quality};
     use super::*;
     use crate::geometry::Vec3;
+
+    fn quality() -> Quality {
+        let (reasons, advice) = (vec![], vec![]);
+        Quality {
+            verdict: Verdict::Good,
+            reasons,
+            advice,
+            figures: [("rms_px".into(), f64::NAN)].into(),
+            per_picture: vec![],
+        }
+    }
+
+    fn camera(fx: f64) -> Calibration<Intrinsics> {
+        let (cx, cy, skew, distortion) = (315.0, 232.0, 0.0, [0.0; 5]);
+        let value = Intrinsics { fx, fy: 611.6, cx, cy, skew, distortion, width: 640, height: 480 };
+        Calibration::new(Kind::Camera, value, None, Covariance::default(), quality())
+    }
+
+    fn plane(offset: f64, with: &Calibration<Intrinsics>) -> Calibration<Plane<Camera>> {
+        let plane = Plane::new(Vec3::new(0.0, 0.9, 0.4), offset).unwrap();
+        Calibration::new(Kind::LaserPlane, plane, Some(with), Covariance::default(), quality())
+    }
 
     #[test]
     fn the_former_calibration_stays_beside_the_new_one() {
         let dir = tempfile::tempdir().unwrap();
-        let quality = Quality {
-            verdict: Verdict::Good,
-            reasons: vec![],
-            advice: vec![],
-            figures: Default::default(),
-            per_picture: vec![],
-        };
-        let plane = |offset| {
-            Calibration::new(
-                "laser_plane",
-                "camera",
-                Plane::<Camera>::new(Vec3::new(0.0, 0.9, 0.4), offset).unwrap(),
-                Covariance::default(),
-                quality.clone(),
-            )
-        };
-        Rig::store(dir.path(), &plane(70.0)).unwrap();
+        let camera = camera(611.6);
+        Rig::store(dir.path(), &plane(70.0, &camera)).unwrap();
         let first = Rig::load(dir.path()).unwrap();
-        Rig::store(dir.path(), &plane(71.0)).unwrap();
+        Rig::store(dir.path(), &plane(71.0, &camera)).unwrap();
         let second = Rig::load(dir.path()).unwrap();
         assert_ne!(first.fingerprint(), second.fingerprint());
         let former = std::fs::read_to_string(dir.path().join("calibration/laser_plane.previous.json")).unwrap();
-        let former: Calibration<Plane<Camera>> = serde_json::from_str(&former).unwrap();
+        let former: Calibration<Plane<Camera>> = unsealed(&former, "former").unwrap();
         assert_eq!(former.value, first.laser_plane.unwrap().value);
         assert!(second.camera.is_none() && second.need_camera().is_err());
+    }
+
+    #[test]
+    fn a_plane_is_used_with_its_own_camera_only() {
+        let dir = tempfile::tempdir().unwrap();
+        let (old, new) = (camera(611.6), camera(611.7));
+        Rig::store(dir.path(), &old).unwrap();
+        Rig::store(dir.path(), &plane(70.0, &old)).unwrap();
+        Rig::load(dir.path()).unwrap().need_laser_plane().unwrap();
+        Rig::store(dir.path(), &new).unwrap();
+        let rig = Rig::load(dir.path()).unwrap();
+        let said = rig.need_laser_plane().unwrap_err();
+        assert!(said.what.contains("measured with camera") && said.next.contains("calibrate laser-plane"), "{said}");
+        assert!(rig.belong_together().is_err() && rig.remarks().is_empty());
+        Rig::vouch::<Plane<Camera>>(dir.path(), Kind::LaserPlane, "only the focus was touched", false).unwrap();
+        let rig = Rig::load(dir.path()).unwrap();
+        rig.need_laser_plane().unwrap();
+        assert!(rig.remarks()[0].contains("only the focus was touched"), "{:?}", rig.remarks());
+    }
+
+    #[test]
+    fn several_are_stored_together_or_not_at_all() {
+        let dir = tempfile::tempdir().unwrap();
+        let camera = camera(611.6);
+        let mut rig = Rig { laser_plane: Some(plane(70.0, &camera)), camera: Some(camera), ..Rig::default() };
+        rig.store_all(dir.path()).unwrap();
+        let before = Rig::load(dir.path()).unwrap().fingerprint();
+        rig.camera.as_mut().unwrap().value.fx = 620.0;
+        rig.laser_plane.as_mut().unwrap().value.normal *= 1.01;
+        assert!(rig.store_all(dir.path()).is_err());
+        assert_eq!(Rig::load(dir.path()).unwrap().fingerprint(), before);
     }
 }

@@ -1,11 +1,19 @@
 //! In: calibration results and the station folder's `calibration/*.json`. Out: the measured rig —
-//! camera, laser plane, pointer, hand-eye — each with its covariance, origin and verdict.
+//! camera, laser plane, pointer, hand-eye — each with its covariance, origin, seal and verdict.
 //! Frame and unit: camera and flange; millimetres, radians, pixels (docs/file-formats.md).
 
 mod calibration;
+mod checks;
+mod covariance;
 mod folder;
+mod kind;
+mod seal;
 mod volume;
 
-pub use calibration::{Calibration, Covariance, HandEye, Quality, Verdict, hash_file, hash_text};
-pub use folder::Rig;
+pub use calibration::{Calibration, HandEye, Quality, ROBOT_SIGMA_DEG, ROBOT_SIGMA_MM, Verdict, hash_file, hash_text};
+pub use checks::Measured;
+pub use covariance::Covariance;
+pub use folder::{Rig, asked};
+pub use kind::{Kind, Place, Units};
+pub use seal::{sealed, unsealed};
 pub use volume::Volume;

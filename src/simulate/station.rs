@@ -5,7 +5,7 @@
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Camera, Flange, Plane, Ray, Rigid, Vec3, exp};
-use crate::rig::{Calibration, Covariance, HandEye, Quality, Rig, Verdict};
+use crate::rig::{Calibration, Covariance, HandEye, Kind, Quality, Rig, Verdict};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use std::path::Path;
@@ -228,11 +228,15 @@ impl Station {
         let plane = none(&["nx", "ny", "nz", "offset_mm"]);
         let pointer = none(&["ox_mm", "oy_mm", "oz_mm", "dx", "dy", "dz"]);
         let hand_eye = none(&["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"]);
-        Rig::store(folder, &Calibration::new("camera", "camera", self.camera, camera, quality.clone()))?;
-        Rig::store(folder, &Calibration::new("laser_plane", "camera", self.laser.plane(), plane, quality.clone()))?;
-        Rig::store(folder, &Calibration::new("pointer", "camera", self.pointer.ray(), pointer, quality.clone()))?;
-        let hand_eye = Calibration::new("hand_eye", "flange", self.flange_from_camera, hand_eye, quality);
-        Rig::store(folder, &hand_eye).map(|_| ())
+        let camera = Calibration::new(Kind::Camera, self.camera, None, camera, quality.clone());
+        let with = Some(&camera);
+        let rig = Rig {
+            laser_plane: Some(Calibration::new(Kind::LaserPlane, self.laser.plane(), with, plane, quality.clone())),
+            pointer: Some(Calibration::new(Kind::Pointer, self.pointer.ray(), with, pointer, quality.clone())),
+            hand_eye: Some(Calibration::new(Kind::HandEye, self.flange_from_camera, with, hand_eye, quality)),
+            camera: Some(camera),
+        };
+        rig.store_all(folder).map(|_| ())
     }
 
     /// A random stream of its own for each purpose, so that adding one does not change the others.

@@ -15,7 +15,7 @@ use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Camera, Flange, Rigid};
 use crate::recording::Recording;
-use crate::rig::{Calibration, HandEye, Rig, Volume, hash_text};
+use crate::rig::{Calibration, HandEye, Kind, Rig, Volume, hash_text};
 
 /// How [`calibrate_hand_eye`] is run.
 #[derive(Clone, Debug)]
@@ -89,7 +89,6 @@ pub fn calibrate_hand_eye(
         c.insert("meta.json".into(), crate::rig::hash_file(&recording.folder.join("meta.json"))?);
         let rows: Vec<[f64; 16]> = poses.iter().map(|p| p.to_rows()).collect();
         c.insert(format!("poses {pose_name}"), hash_text(serde_json::to_string(&rows).expect("numbers").as_bytes()));
-        c.insert("camera.json".into(), hash_text(serde_json::to_string(camera).expect("plain data").as_bytes()));
         for b in &seen.found {
             c.insert(b.pose.name.clone(), crate::rig::hash_file(&recording.folder.join(&b.pose.name))?);
         }
@@ -99,14 +98,14 @@ pub fn calibrate_hand_eye(
         Mount::EyeInHand => {
             let page = page(&fit, &pairs, &quality, "flange");
             let value = HandEye::new(x.rotation, x.translation);
-            let mut calibration = Calibration::new("hand_eye", "flange_T_camera", value, covariance(&fit), quality);
+            let mut calibration = Calibration::new(Kind::HandEye, value, Some(camera), covariance(&fit), quality);
             sources(&mut calibration.inputs)?;
             HandEyeResult::OnFlange(Calibrated { calibration, page, missing: seen.missing })
         }
         Mount::EyeToHand => {
             let page = page(&fit, &pairs, &quality, "base");
             let value = Rigid::<Base, Camera>::new(x.rotation, x.translation);
-            let mut calibration = Calibration::new("base_camera", "base_T_camera", value, covariance(&fit), quality);
+            let mut calibration = Calibration::new(Kind::BaseCamera, value, Some(camera), covariance(&fit), quality);
             sources(&mut calibration.inputs)?;
             HandEyeResult::InBase(Calibrated { calibration, page, missing: seen.missing })
         }

@@ -14,7 +14,7 @@ use crate::fault::{Fault, Result};
 use crate::geometry::{Camera, Plane, Rigid, Vec2, Vec3};
 use crate::raster::Image;
 use crate::recording::{Beam, Recording};
-use crate::rig::{Calibration, Rig, Volume, hash_file, hash_text};
+use crate::rig::{Calibration, Kind, Rig, Volume, hash_file};
 use crate::scan::{Engine, Extraction, Format, Optical, Processor, Where};
 use crate::stages::point;
 
@@ -92,10 +92,9 @@ pub fn calibrate_laser_plane(
     let mut quality = judge(&fit, &limits);
     quality.reasons.extend(missing.iter().map(|(name, why)| format!("{name} was not used: {}", first_line(why))));
     let page = page(&fit, &views, &quality, (camera.value.width, camera.value.height));
-    let mut calibration = Calibration::new("laser_plane", "camera", fit.plane, covariance(&fit), quality);
+    let mut calibration = Calibration::new(Kind::LaserPlane, fit.plane, Some(camera), covariance(&fit), quality);
     let inputs = &mut calibration.inputs;
     inputs.insert("meta.json".into(), hash_file(&recording.folder.join("meta.json"))?);
-    inputs.insert("camera.json".into(), hash_text(serde_json::to_string(camera).expect("plain data").as_bytes()));
     for (s, laser) in seen.iter().zip(&names) {
         for name in [&s.pose.name, laser] {
             inputs.insert(name.clone(), hash_file(&recording.folder.join(name))?);

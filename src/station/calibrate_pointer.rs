@@ -12,7 +12,7 @@ use crate::calibrate::spot::{SpotOptions, SpotPicture, find_spots, hot_pixels};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Camera, Ray};
 use crate::recording::{Beam, Recording};
-use crate::rig::{Calibration, Rig, Volume, hash_file, hash_text};
+use crate::rig::{Calibration, Kind, Rig, Volume, hash_file};
 
 /// How [`calibrate_pointer`] is run.
 #[derive(Clone, Debug)]
@@ -75,10 +75,9 @@ pub fn calibrate_pointer(
     let mut quality = judge(&fit, &camera.value, sigmas[sigmas.len() / 2], &limits);
     quality.reasons.extend(missing.iter().map(|(name, why)| format!("{name} was not used: {}", first_line(why))));
     let page = page(&fit, &quality);
-    let mut calibration = Calibration::new("pointer", "camera", fit.beam, covariance(&fit), quality);
+    let mut calibration = Calibration::new(Kind::Pointer, fit.beam, Some(camera), covariance(&fit), quality);
     let inputs = &mut calibration.inputs;
     inputs.insert("meta.json".into(), hash_file(&recording.folder.join("meta.json"))?);
-    inputs.insert("camera.json".into(), hash_text(serde_json::to_string(camera).expect("plain data").as_bytes()));
     for (b, laser, _, _) in &pictures {
         for name in [&b.pose.name, laser] {
             inputs.insert(name.clone(), hash_file(&recording.folder.join(name))?);

@@ -11,7 +11,7 @@ use crate::calibrate::report::{Page, bars};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid, Sensor, Vec3, skew};
 use crate::recording::load_poses;
-use crate::rig::{Calibration, Covariance, Quality, Verdict, Volume, hash_file};
+use crate::rig::{Calibration, Covariance, Kind, Quality, Verdict, Volume, hash_file};
 use crate::robot::fanuc_tp;
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
@@ -35,9 +35,9 @@ pub fn calibrate_profile_hand_eye(
     let page = page(&fit, &quality);
     let c = fit.covariance.view((0, 0), (6, 6)).into_owned();
     let mut calibration = Calibration::new(
-        "profile_hand_eye",
-        "flange_T_sensor",
+        Kind::ProfileHandEye,
         fit.flange_from_sensor,
+        None,
         Covariance::new(&HAND_EYE_NAMES, &c),
         quality,
     )

@@ -21,6 +21,7 @@ pub fn find_part(
     let scanned = load_report(scan)?;
     let rig = station.map(Rig::load).transpose()?;
     if let (Some(rig), Some(station)) = (&rig, station) {
+        rig.belong_together().map_err(|e| e.at(station.display()))?;
         let now = rig.fingerprint();
         if now != scanned.rig_fingerprint {
             return Err(Fault::refused(format!(
@@ -34,7 +35,8 @@ pub fn find_part(
         }
     }
     let cloud = cloud_of(scan)?;
-    let report = locate(&cloud, recipe, rig.as_ref(), options).map_err(|e| e.at(scan.display()))?;
+    let mut report = locate(&cloud, recipe, rig.as_ref(), options).map_err(|e| e.at(scan.display()))?;
+    report.notes.extend(scanned.remarks);
     let image = picture::draw(&report, &recipe.drawing());
     Ok((report, image))
 }

@@ -80,6 +80,7 @@ pub fn guide(options: &GuideOptions, confirm: &mut dyn FnMut(&Step) -> Result<bo
     options.check()?;
     let recipe = Recipe::load(&options.recipe)?;
     let (settings, rig) = (Settings::load(&options.station)?, Rig::load(&options.station)?);
+    rig.belong_together()?;
     let hand_eye = rig.need_hand_eye()?.value;
     let mut steps = Vec::new();
     let mut pass = |step: Step| -> Result<()> {
@@ -154,7 +155,7 @@ pub fn guide(options: &GuideOptions, confirm: &mut dyn FnMut(&Step) -> Result<bo
         ),
         format!("the part's top and the touched board differ by {tilt:.2} degrees"),
     ];
-    says.extend(report.notes.iter().cloned());
+    says.extend(report.notes.iter().chain(&scanned.remarks).cloned());
     let Some(poses) = report.poses.clone() else {
         return Err(Fault::refused(format!("no pose: {}", report.reasons.join("; ")))
             .cause("the part is hidden in part, another one, or too badly seen")

@@ -206,6 +206,9 @@ fn peaks(body: &mut String, r: &ScanReport) {
     if !r.dark_shots.is_empty() {
         let _ = write!(body, "<p>{} shots without a stripe.</p>", r.dark_shots.len());
     }
+    for remark in &r.remarks {
+        let _ = write!(body, "<p>Note: {}</p>", escape(remark));
+    }
     for (name, why) in &r.skipped {
         let _ = write!(body, "<p>Left out {}: {}</p>", escape(name), escape(why));
     }

@@ -80,6 +80,8 @@ pub struct RangeReport {
     pub surface: Option<SurfaceFound>,
     /// Pictures without a distance, with the reason.
     pub missing: Vec<(String, String)>,
+    /// What the calibrations' own files say against them, and what is not in the sigmas.
+    pub remarks: Vec<String>,
 }
 
 /// Measures a distance in every frame that has a `laser` picture.
@@ -99,9 +101,11 @@ pub fn measure_range(recording: &Recording, rig: &Rig, run: &RangeRun) -> Result
     }
     let base = match (&poses, run.one_surface) {
         (Some(p), true) => Some((p, rig.need_hand_eye()?)),
-        (Some(p), false) => rig.hand_eye.as_ref().map(|h| (p, h)),
+        (Some(p), false) if rig.hand_eye.is_some() => Some((p, rig.need_hand_eye()?)),
+        (Some(_), false) => None,
         (None, _) => None,
     };
+    let mut remarks = rig.remarks();
     let mut shared = SMatrix::<f64, 21, 21>::zeros();
     shared.fixed_view_mut::<15, 15>(0, 0).copy_from(&joint);
     let mut robot = RobotNoise::default();
@@ -109,8 +113,10 @@ pub fn measure_range(recording: &Recording, rig: &Rig, run: &RangeRun) -> Result
         if h.covariance.parameters.len() == 6 {
             shared.fixed_view_mut::<6, 6>(15, 15).copy_from(&h.covariance.to_matrix());
         }
-        let figure = |k: &str| h.quality.figures.get(k).copied().unwrap_or(0.0);
-        robot = RobotNoise { mm: figure("robot_sigma_mm"), rad: figure("robot_sigma_deg").to_radians() };
+        match h.robot_sigma()? {
+            Some([mm, deg]) => robot = RobotNoise { mm, rad: deg.to_radians() },
+            None => remarks.push("nothing is known of the robot's noise: the points' sigmas are without it".into()),
+        }
     }
     let frames: Vec<_> =
         recording.meta.frames.iter().enumerate().filter_map(|(i, f)| Some((i, f, f.laser.as_deref()?))).collect();
@@ -118,7 +124,7 @@ pub fn measure_range(recording: &Recording, rig: &Rig, run: &RangeRun) -> Result
     let hot = hot_pixels(&images.iter().collect::<Vec<_>>());
     let asked: Vec<SpotPicture<'_>> =
         frames.iter().zip(&images).map(|(f, laser)| SpotPicture { name: f.2, laser, ambient: None }).collect();
-    let mut out = RangeReport { distances: Vec::new(), surface: None, missing: Vec::new() };
+    let mut out = RangeReport { distances: Vec::new(), surface: None, missing: Vec::new(), remarks };
     let mut points: Vec<BasePoint> = Vec::new();
     let mut first_x = None;
     for ((index, frame, name), spot) in frames.iter().zip(find_spots(&asked, &hot, &run.spots)?) {

@@ -71,6 +71,9 @@ pub struct ScanReport {
     pub spent: Spent,
     pub settings: Extraction,
     pub height_map: Option<HeightMapFigures>,
+    /// What the calibrations' own files say against them, and what else a reader of the figures must know.
+    #[serde(default)]
+    pub remarks: Vec<String>,
 }
 
 /// Seconds of a scan by what its main thread did; pictures are decoded and stages run meanwhile on other threads, so
@@ -134,6 +137,8 @@ pub fn scan_on(
 ) -> Result<ScanReport> {
     let begun = Instant::now();
     options.grid.check()?;
+    rig.belong_together()?;
+    rig.reaches(options.volume.as_ref())?;
     std::fs::create_dir_all(&options.out).map_err(|e| Fault::write(&options.out, e))?;
     let _lock = Lock::take(&options.out)?;
     let cloud_path = options.out.join("cloud.ply");
@@ -217,6 +222,7 @@ pub fn scan_on(
         spent,
         settings: options.extraction.clone(),
         height_map,
+        remarks: rig.remarks(),
     };
     let text = serde_json::to_string_pretty(&report).expect("plain data");
     crate::files::write(&options.out.join("scan.json"), text.as_bytes())?;

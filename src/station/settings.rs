@@ -35,6 +35,10 @@ pub struct WorkingVolume {
     pub far_mm: f64,
 }
 
+/// No camera works at less than this, nor at more, mm.
+const METRES: f64 = 3.0;
+const MICROMETRES: f64 = 50_000.0;
+
 impl Settings {
     /// Reads `station/station.toml`; a station without one has the defaults.
     pub fn load(station: &Path) -> Result<Settings> {
@@ -71,6 +75,15 @@ impl Settings {
             .cause("swapped, or metres instead of millimetres")
             .next("give the camera's nearest and farthest working distance in millimetres"));
         }
+        if let Some(v) = self.working_volume.filter(|v| v.far_mm < METRES || v.far_mm > MICROMETRES) {
+            let unit = if v.far_mm < METRES { "metres" } else { "micrometres" };
+            return Err(Fault::input(format!(
+                "working_volume runs from near_mm = {} to far_mm = {}, which looks like {unit}",
+                v.near_mm, v.far_mm
+            ))
+            .cause(format!("{unit} instead of millimetres"))
+            .next("give the camera's nearest and farthest working distance in millimetres"));
+        }
         if let Some(mm) = self.tolerance_mm.filter(|mm| !(*mm > 0.0 && mm.is_finite())) {
             return Err(Fault::input(format!("tolerance_mm is {mm}, a length above 0 mm is needed"))
                 .next("give what the work tolerates in millimetres, or leave the key out"));
@@ -101,6 +114,8 @@ mod tests {
         assert!(Settings::parse("nam = 'a'").unwrap_err().what.contains("nam"));
         assert!(Settings::parse("[working_volume]\nnear_mm = 300\nfar_mm = 100").is_err());
         assert!(Settings::parse("tolerance_mm = 0").unwrap_err().what.contains("tolerance_mm"));
+        let metres = Settings::parse("[working_volume]\nnear_mm = 0.06\nfar_mm = 0.32").unwrap_err();
+        assert!(metres.what.contains("looks like metres"), "{metres}");
         let s = Settings { name: "x".into(), robot: Some(Convention::Denso), ..Settings::default() };
         assert_eq!(Settings::parse(&toml::to_string(&s).unwrap()).unwrap(), s);
     }

@@ -4,8 +4,8 @@
 
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
-use crate::geometry::{Camera, Plane, Ray, Vec3};
-use crate::rig::{Calibration, Covariance, HandEye, Quality, Rig, Verdict};
+use crate::geometry::{Camera, ORTHONORMAL_WARN, Plane, Ray, Vec3};
+use crate::rig::{Calibration, Covariance, HandEye, Kind, Quality, Rig, Verdict, asked};
 use std::path::Path;
 
 /// The values of a rig as one JSON object; every entry may be missing, other keys are left alone.
@@ -14,7 +14,7 @@ pub struct Values {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub intrinsics: Option<Intrinsics>,
     #[serde(rename = "flange_T_camera", default, skip_serializing_if = "Option::is_none")]
-    pub flange_from_camera: Option<HandEye>,
+    pub flange_from_camera: Option<[f64; 16]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub laser_plane_camera: Option<PlaneValue>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -48,7 +48,7 @@ impl Values {
     pub fn of(rig: &Rig) -> Values {
         Values {
             intrinsics: rig.camera.as_ref().map(|c| c.value),
-            flange_from_camera: rig.hand_eye.as_ref().map(|c| c.value),
+            flange_from_camera: rig.hand_eye.as_ref().map(|c| c.value.to_rows()),
             laser_plane_camera: rig
                 .laser_plane
                 .as_ref()
@@ -60,31 +60,40 @@ impl Values {
         }
     }
 
-    /// Stores each value as a calibration whose covariance is unknown, naming `source` as its
-    /// input. Returns the kinds stored.
-    pub fn store(&self, station: &Path, source: &Path) -> Result<Vec<&'static str>> {
-        let mut stored = Vec::new();
-        if let Some(camera) = self.intrinsics {
-            camera.check()?;
-            Rig::store(station, &imported("camera", "camera", camera, source)?)?;
-            stored.push("camera");
-        }
-        if let Some(p) = &self.laser_plane_camera {
+    /// Makes each value a calibration whose covariance is unknown, naming `source` as its input, and stores all of them or
+    /// none. What looks like another unit is refused unless it is so `as_stated`. Returns what was stored.
+    pub fn store(&self, station: &Path, source: &Path, as_stated: bool) -> Result<Vec<Kind>> {
+        let camera = self.intrinsics.map(|c| imported(Kind::Camera, c, None, None, source)).transpose()?;
+        // What comes without a camera belongs to the one that the station has.
+        let theirs = if camera.is_none() { Rig::load_camera(station)?.camera } else { None };
+        let with = camera.as_ref().or(theirs.as_ref());
+        let plane = self.laser_plane_camera.as_ref().map(|p| {
+            let (n, note) = unit("laser_plane_camera.normal", p.normal)?;
             let plane: Plane<Camera> =
-                Plane::new(Vec3::from(p.normal), p.offset_mm).ok_or_else(|| no_length("laser_plane_camera.normal"))?;
-            Rig::store(station, &imported("laser_plane", "camera", plane, source)?)?;
-            stored.push("laser_plane");
+                Plane::new(n, p.offset_mm).ok_or_else(|| no_length("laser_plane_camera.normal"))?;
+            imported(Kind::LaserPlane, plane, with, note, source)
+        });
+        let pointer = self.pointer_camera.as_ref().map(|p| {
+            let (d, note) = unit("pointer_camera.direction", p.direction)?;
+            let ray: Ray<Camera> =
+                Ray::new(Vec3::from(p.origin), d).ok_or_else(|| no_length("pointer_camera.direction"))?;
+            imported(Kind::Pointer, ray, with, note, source)
+        });
+        let hand_eye = self.flange_from_camera.as_ref().map(|rows| {
+            let (pose, departure) = HandEye::from_rows(rows).map_err(|e| e.at("flange_T_camera"))?;
+            let note = (departure > ORTHONORMAL_WARN)
+                .then(|| format!("the rotation was repaired, it was {departure:.1e} from orthonormal"));
+            imported(Kind::HandEye, pose, with, note, source)
+        });
+        let (laser_plane, pointer, hand_eye) = (plane.transpose()?, pointer.transpose()?, hand_eye.transpose()?);
+        if !as_stated {
+            laser_plane.as_ref().map_or(Ok(()), |c| asked(&c.value))?;
+            pointer.as_ref().map_or(Ok(()), |c| asked(&c.value))?;
+            hand_eye.as_ref().map_or(Ok(()), |c| asked(&c.value))?;
         }
-        if let Some(p) = &self.pointer_camera {
-            let ray: Ray<Camera> = Ray::new(Vec3::from(p.origin), Vec3::from(p.direction))
-                .ok_or_else(|| no_length("pointer_camera.direction"))?;
-            Rig::store(station, &imported("pointer", "camera", ray, source)?)?;
-            stored.push("pointer");
-        }
-        if let Some(hand_eye) = self.flange_from_camera {
-            Rig::store(station, &imported("hand_eye", "flange_from_camera", hand_eye, source)?)?;
-            stored.push("hand_eye");
-        }
+        let stored = Rig { camera, laser_plane, pointer, hand_eye }
+            .store_all(station)
+            .map_err(|e| e.at(source.display()).next("correct the file; nothing was imported of it"))?;
         if stored.is_empty() {
             return Err(Fault::input(format!("{}: holds none of the rig's values", source.display()))
                 .cause("another kind of JSON file")
@@ -98,13 +107,37 @@ fn no_length(key: &str) -> Fault {
     Fault::input(format!("{key} has no length")).cause("all zeros").next("give a direction")
 }
 
-fn imported<T>(kind: &str, frame: &str, value: T, source: &Path) -> Result<Calibration<T>> {
+/// A direction of four decimals is this far from unit length at most; beyond it is unclear what the other numbers mean.
+const ROUNDED: f64 = 5e-4;
+
+/// A direction that is made one unit long, and what is to be said of it.
+fn unit(key: &str, v: [f64; 3]) -> Result<(Vec3, Option<String>)> {
+    let v = Vec3::from(v);
+    let length = v.norm();
+    if !((length - 1.0).abs() <= ROUNDED) {
+        return Err(Fault::input(format!("{key} is {length:.6} long, it must be 1 to {ROUNDED}"))
+            .cause("edited by hand, or a vector that is no direction; an offset beside it cannot be understood")
+            .next("give a direction of unit length, and the plane's offset along it"));
+    }
+    let note = ((length - 1.0).abs() > 1e-6).then(|| format!("{key} was {length:.6} long and is taken as a direction"));
+    // The offset stays: it is measured along the direction, whose digits were rounded.
+    Ok((v / length, note))
+}
+
+fn imported<T: serde::Serialize>(
+    kind: Kind,
+    value: T,
+    with: Option<&Calibration<Intrinsics>>,
+    note: Option<String>,
+    source: &Path,
+) -> Result<Calibration<T>> {
+    let known = "imported: the values are as good as their source, their uncertainty is unknown".to_owned();
     let quality = Quality {
         verdict: Verdict::Usable,
-        reasons: vec!["imported: the values are as good as their source, their uncertainty is unknown".into()],
+        reasons: std::iter::once(known).chain(note).collect(),
         advice: vec![],
         figures: Default::default(),
         per_picture: vec![],
     };
-    Calibration::new(kind, frame, value, Covariance::default(), quality).with_input(source)
+    Calibration::new(kind, value, with, Covariance::default(), quality).with_input(source)
 }

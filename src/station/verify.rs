@@ -38,6 +38,8 @@ pub struct VerifyReport {
     pub flat: Option<FlatCheck>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub touch: Option<TouchCheck>,
+    /// What the calibrations' own files say against them.
+    pub remarks: Vec<String>,
 }
 
 fn check<T>(c: &Calibration<T>) -> CalibrationCheck {
@@ -86,5 +88,7 @@ pub fn verify(rig: &Rig, run: &VerifyRun) -> Result<VerifyReport> {
         }
     };
     let flat = if run.flats.is_empty() { None } else { Some(flat(&views)?) };
-    Ok(VerifyReport { calibrations, flat, touch })
+    let mut remarks = rig.remarks();
+    remarks.extend(rig.belong_together().err().map(|fault| fault.what));
+    Ok(VerifyReport { calibrations, flat, touch, remarks })
 }

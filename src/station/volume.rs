@@ -30,7 +30,7 @@ pub fn asked(settings: &Settings, stated: Option<[f64; 2]>) -> Asked {
 mod tests {
     use super::*;
     use crate::geometry::{Camera, Plane, Vec3};
-    use crate::rig::{Calibration, Covariance, Quality, Verdict};
+    use crate::rig::{Calibration, Covariance, Kind, Quality, Verdict};
 
     #[test]
     fn the_station_is_asked_first_then_the_laser_planes_boards() {
@@ -46,7 +46,7 @@ mod tests {
         };
         let plane = |q| {
             let plane = Plane::<Camera>::new(Vec3::new(0.0, 0.9, 0.4), 200.0).unwrap();
-            Some(Calibration::new("laser_plane", "camera", plane, Covariance::default(), q))
+            Some(Calibration::new(Kind::LaserPlane, plane, None, Covariance::default(), q))
         };
         rig.laser_plane = plane(quality(&[]));
         assert_eq!(believed(&settings, &rig), None, "an imported plane says nothing of depths");

@@ -10,7 +10,7 @@ mod profile_hand_eye;
 use super::Console;
 use crate::calibrate::report::Page;
 use crate::fault::{Fault, Result};
-use crate::rig::{Calibration, Rig, Verdict};
+use crate::rig::{Calibration, Kind, Measured, Rig, Verdict};
 use serde::Serialize;
 use std::path::Path;
 
@@ -43,7 +43,7 @@ struct Keep {
 
 /// Stores a calibration and its page beside it, and says what it came to. A badly determined one is refused:
 /// the station keeps its former calibration, the page says what was found.
-fn finish<T: Serialize>(
+fn finish<T: Serialize + Measured>(
     station: &Path,
     calibration: &Calibration<T>,
     page: &Page,
@@ -55,17 +55,16 @@ fn finish<T: Serialize>(
     if q.verdict >= Verdict::BadlyDetermined && !keep.keep_badly_determined {
         let folder = station.join("calibration");
         std::fs::create_dir_all(&folder).map_err(|e| Fault::write(&folder, e))?;
-        let html = folder.join(format!("{}.refused.html", calibration.kind));
+        let html = folder.join(format!("{}.refused.html", calibration.kind.name()));
         page.save(&html)?;
         console.say(format!("{}: what was found", html.display()));
-        let what =
-            format!("the {} is {}: {}", calibration.kind.replace('_', " "), q.verdict.words(), q.reasons.join("; "));
+        let what = format!("the {} is {}: {}", calibration.kind.words(), q.verdict.words(), q.reasons.join("; "));
         return Err(Fault::refused(what)
             .cause("too few, too similar or contradicting pictures; the station keeps its former calibration")
             .next(q.advice.first().map_or("take more pictures", String::as_str)));
     }
     let path = Rig::store(station, calibration)?;
-    let html = station.join("calibration").join(format!("{}.html", calibration.kind));
+    let html = station.join("calibration").join(format!("{}.html", calibration.kind.name()));
     page.save(&html)?;
     let mut text = format!("{value}\nverdict: {}\n", q.verdict.words());
     for r in &q.reasons {
@@ -87,5 +86,16 @@ fn finish<T: Serialize>(
     if q.verdict >= Verdict::BadlyDetermined {
         console.warn("badly determined: see the reasons before using it");
     }
+    if calibration.kind == Kind::Camera {
+        stale(station, console);
+    }
     Ok(())
+}
+
+/// Says which of a station's calibrations are of no use since it has another camera.
+pub(in crate::cli) fn stale(station: &Path, console: &Console) {
+    match Rig::load(station).and_then(|rig| rig.belong_together()) {
+        Ok(()) => {}
+        Err(fault) => console.warn(fault.to_string()),
+    }
 }

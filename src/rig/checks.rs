@@ -1,0 +1,223 @@
+//! In: calibrated values, from solvers, files and people. Out: a refusal of what no rig is, and a question about what looks
+//! like another unit.
+//! Frame and unit: as the values; mm, px.
+
+use super::{Rig, Volume};
+use crate::camera::Intrinsics;
+use crate::fault::{Fault, Result};
+use crate::geometry::{Camera, Frame, Plane, Ray, Rigid, Vec2, Vec3};
+
+/// How far from 1 the length of a direction in a file may be: rounding. Longer or shorter ones were edited.
+const UNIT: f64 = 1e-9;
+/// Focal length over the picture's longer side: a field of view of 157 degrees, and of 0.3.
+const FOCAL: [f64; 2] = [0.1, 200.0];
+/// Farthest that a sensor hangs from its flange, and a beam's foot from its camera, mm.
+const FARTHEST: f64 = 5000.0;
+/// Nearer than this to the flange's centre or to the camera's, mm, numbers look like metres.
+const METRES: f64 = 2.0;
+
+/// A value that can be calibrated.
+pub trait Measured {
+    /// Refuses numbers that no such thing has.
+    fn check(&self) -> Result<()>;
+    /// What would be odd of right numbers: asked about where a person gives them.
+    fn doubt(&self) -> Option<String> {
+        None
+    }
+}
+
+fn bad(what: String, cause: &str) -> Fault {
+    Fault::input(what).cause(cause.to_owned())
+}
+
+fn unit(v: &Vec3, what: &str) -> Result<()> {
+    let length = v.norm();
+    if (length - 1.0).abs() <= UNIT {
+        return Ok(());
+    }
+    Err(bad(
+        format!("the {what} is {length:.6} long, it must be 1 to {UNIT:.0e}"),
+        "edited by hand, or written by another program",
+    ))
+}
+
+impl Measured for Intrinsics {
+    fn check(&self) -> Result<()> {
+        Intrinsics::check(self)?;
+        let (w, h) = (f64::from(self.width), f64::from(self.height));
+        let focal = [self.fx, self.fy].map(|f| f / w.max(h));
+        let size = format!("a picture of {}x{}", self.width, self.height);
+        if focal.iter().any(|f| !(FOCAL[0]..=FOCAL[1]).contains(f)) {
+            return Err(bad(
+                format!(
+                    "focal lengths {} and {} px for {size} are outside {} to {} of its longer side",
+                    self.fx, self.fy, FOCAL[0], FOCAL[1]
+                ),
+                "focal lengths in mm or as shares of the picture instead of pixels, or another picture size",
+            ));
+        }
+        let inside = |c: f64, side: f64| c > -side && c < 2.0 * side;
+        if !inside(self.cx, w)
+            || !inside(self.cy, h)
+            || (w.min(h) > 64.0 && self.cx.abs() <= 1.0 && self.cy.abs() <= 1.0)
+        {
+            return Err(bad(
+                format!("the principal point ({}, {}) px is far from the middle of {size}", self.cx, self.cy),
+                "another picture size, or coordinates from 0 to 1 or from the middle instead of pixels",
+            ));
+        }
+        if !(0.2..=5.0).contains(&(self.fx / self.fy)) || self.skew.abs() > self.fx {
+            return Err(bad(
+                format!("fx {}, fy {} and skew {} px make no pixel", self.fx, self.fy, self.skew),
+                "numbers in another order",
+            ));
+        }
+        Ok(())
+    }
+}
+
+impl Measured for Plane<Camera> {
+    fn check(&self) -> Result<()> {
+        unit(&self.normal, "plane's normal")?;
+        let d = self.offset.abs();
+        if !(d > 1e-6 && d < 1e6) {
+            return Err(bad(
+                format!("the plane passes the camera at {} mm, 1e-6 to 1e6 is needed", self.offset),
+                "a plane through the camera's own centre measures nothing",
+            ));
+        }
+        Ok(())
+    }
+    fn doubt(&self) -> Option<String> {
+        (self.offset.abs() < METRES)
+            .then(|| format!("the laser plane's offset of {} mm looks like metres", self.offset))
+    }
+}
+
+impl Measured for Ray<Camera> {
+    fn check(&self) -> Result<()> {
+        unit(&self.direction, "beam's direction")?;
+        if !(self.origin.norm() < FARTHEST) {
+            return Err(bad(
+                format!("the beam's origin is {:.0} mm from the camera, {FARTHEST} at most", self.origin.norm()),
+                "micrometres, or a slipped decimal point",
+            ));
+        }
+        Ok(())
+    }
+    fn doubt(&self) -> Option<String> {
+        // The foot of the perpendicular: an origin may lie anywhere along the beam.
+        let beside = (self.origin - self.direction * self.origin.dot(&self.direction)).norm();
+        (beside < METRES).then(|| format!("the beam passes the camera at {beside:.4} mm, which looks like metres"))
+    }
+}
+
+impl<To: Frame, From: Frame> Measured for Rigid<To, From> {
+    fn check(&self) -> Result<()> {
+        let r = &self.rotation;
+        let departure = (r.transpose() * r - crate::geometry::Mat3::identity()).norm();
+        let far = self.translation.norm();
+        if !(departure < UNIT && r.determinant() > 0.0) {
+            return Err(bad(format!("the rotation is {departure:.1e} from orthonormal"), "edited by hand"));
+        }
+        if !(far < 1e5) {
+            return Err(bad(format!("the transform is {far:.0} mm long"), "micrometres, or a slipped decimal point"));
+        }
+        Ok(())
+    }
+    fn doubt(&self) -> Option<String> {
+        let t = self.translation.norm();
+        // Exactly nothing is a statement: the poses are the camera's own.
+        (t > 0.0 && t < METRES)
+            .then(|| format!("the camera lies {t:.4} mm from the flange's centre, which looks like metres"))
+            .or_else(|| {
+                (t > FARTHEST)
+                    .then(|| format!("the camera lies {t:.0} mm from the flange, which looks like micrometres"))
+            })
+    }
+}
+
+impl Rig {
+    /// Refuses a laser plane that the camera sees nowhere in the working volume.
+    pub fn reaches(&self, volume: Option<&Volume>) -> Result<()> {
+        let depth_mm = Volume::depths(volume);
+        let (Some(camera), Some(laser)) = (&self.camera, &self.laser_plane) else { return Ok(()) };
+        let (camera, plane) = (&camera.value, &laser.value);
+        let depths = (0..=16).flat_map(|i| (0..=16).map(move |j| (i, j))).filter_map(|(i, j)| {
+            let px = Vec2::new(
+                f64::from(i) / 16.0 * f64::from(camera.width),
+                f64::from(j) / 16.0 * f64::from(camera.height),
+            );
+            camera.ray_from_pixel(&px)?.meet(plane).map(|p| p.z)
+        });
+        let seen = depths.fold([f64::INFINITY, 0.0f64], |[a, b], z| [a.min(z), b.max(z)]);
+        if seen[0] <= depth_mm[1] && seen[1] >= depth_mm[0] {
+            return Ok(());
+        }
+        let seen =
+            if seen[1] > 0.0 { format!("at depths of {:.2} to {:.2} mm", seen[0], seen[1]) } else { "nowhere".into() };
+        let volume = volume.map_or(String::new(), |v| format!(", the working volume is {v}"));
+        Err(Fault::input(format!("the camera sees the laser plane {seen}{volume}"))
+            .cause("a plane in metres or of another camera, or a working volume that is not this station's")
+            .next("set working_volume in station.toml, or calibrate the laser plane again"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Flange;
+
+    fn camera() -> Intrinsics {
+        Intrinsics {
+            fx: 611.6,
+            fy: 611.6,
+            cx: 315.0,
+            cy: 232.0,
+            skew: 0.0,
+            distortion: [0.0; 5],
+            width: 640,
+            height: 480,
+        }
+    }
+
+    #[test]
+    fn cameras_that_are_none_are_refused() {
+        let check = |edit: fn(&mut Intrinsics)| {
+            let mut c = camera();
+            edit(&mut c);
+            Measured::check(&c)
+        };
+        check(|_| {}).unwrap();
+        check(|c| (c.fx, c.fy) = (60_000.0, 60_000.0)).unwrap();
+        for wrong in [
+            check(|c| (c.fx, c.fy) = (8.0, 8.0)),
+            check(|c| (c.fx, c.fy) = (0.95, 0.95)),
+            check(|c| (c.cx, c.cy) = (0.49, 0.51)),
+            check(|c| c.cx = 5000.0),
+            check(|c| c.fx = 100.0),
+            check(|c| c.fy = f64::NAN),
+        ] {
+            assert!(!wrong.unwrap_err().cause.is_empty());
+        }
+    }
+
+    #[test]
+    fn lengths_and_units_are_looked_at() {
+        let plane: Plane<Camera> = Plane::new(Vec3::new(0.0, 0.883, 0.469), 72.0).unwrap();
+        plane.check().unwrap();
+        for factor in [1.01, 1.002, 1.0 + 1e-7, 0.5] {
+            let mut long = plane;
+            long.normal *= factor;
+            assert!(long.check().unwrap_err().what.contains("long"));
+        }
+        assert!(plane.doubt().is_none());
+        assert!(Plane::<Camera>::new(plane.normal, 0.072).unwrap().doubt().is_some());
+        assert!(Plane::<Camera>::new(plane.normal, 0.0).unwrap().check().is_err());
+        let hand_eye =
+            |t: f64| Rigid::<Flange, Camera>::from_vectors(&Vec3::new(0.1, 0.2, 0.3), Vec3::new(t, 0.0, 0.0));
+        assert!(hand_eye(104.0).doubt().is_none() && hand_eye(0.104).doubt().unwrap().contains("metres"));
+        assert!(hand_eye(0.0).doubt().is_none() && hand_eye(104_000.0).doubt().is_some());
+        assert!(hand_eye(1e6).check().is_err());
+    }
+}

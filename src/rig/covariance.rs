@@ -1,0 +1,131 @@
+//! In: what a solver or a file says of its parameters' errors. Out: the covariance, checked to be one.
+//! Frame and unit: units of the parameters, which are in their names, multiplied.
+
+use super::Kind;
+use crate::fault::{Fault, Result};
+use nalgebra::DMatrix;
+
+/// Covariance of named parameters; `matrix[i][j]` belongs to `parameters[i]`, `parameters[j]`.
+/// Each name ends with its unit: `fx_px`, `tx_mm`, `rx_rad`. Without parameters it is not known.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Covariance {
+    pub parameters: Vec<String>,
+    pub matrix: Vec<Vec<f64>>,
+}
+
+/// What rounding may leave of symmetry and of eigenvalues below zero, in correlations.
+const ROUNDING: f64 = 1e-6;
+
+impl Covariance {
+    pub fn new(parameters: &[&str], matrix: &DMatrix<f64>) -> Covariance {
+        assert_eq!((parameters.len(), parameters.len()), matrix.shape());
+        Covariance {
+            parameters: parameters.iter().map(|s| s.to_string()).collect(),
+            matrix: matrix.row_iter().map(|r| r.iter().copied().collect()).collect(),
+        }
+    }
+    /// Standard deviation of one parameter.
+    pub fn sigma(&self, name: &str) -> Option<f64> {
+        let i = self.parameters.iter().position(|p| p == name)?;
+        Some(self.matrix.get(i)?.get(i)?.max(0.0).sqrt())
+    }
+    /// As a matrix; [`Covariance::check`] has seen to its shape.
+    pub fn to_matrix(&self) -> DMatrix<f64> {
+        let n = self.parameters.len();
+        DMatrix::from_fn(n, n, |i, j| self.matrix[i][j])
+    }
+
+    /// Refuses what is no covariance of this kind's parameters: other names or another order, another shape, numbers that
+    /// are not finite, a matrix that is not symmetric or not positive semidefinite.
+    pub fn check(&self, kind: Kind) -> Result<()> {
+        let bad = |what: String| {
+            Err(Fault::input(format!("the covariance {what}")).cause("edited by hand, or written by another program"))
+        };
+        let (names, counts) = kind.parameters();
+        let n = self.parameters.len();
+        if n > 0 && !(counts.contains(&n) && self.parameters.iter().eq(names[..n].iter())) {
+            let wanted: Vec<String> = counts.iter().map(|&n| names[..n].join(" ")).collect();
+            return bad(format!(
+                "is of {}; a {} has {}",
+                self.parameters.join(" "),
+                kind.words(),
+                wanted.join(", or ")
+            ));
+        }
+        if self.matrix.len() != n || self.matrix.iter().any(|row| row.len() != n) {
+            let rows = self.matrix.iter().map(Vec::len).max().unwrap_or(0);
+            return bad(format!("is {}x{rows}, its {n} parameters need {n}x{n}", self.matrix.len()));
+        }
+        let c = self.to_matrix();
+        if c.iter().any(|x| !x.is_finite()) {
+            return bad("holds a number that is not finite".into());
+        }
+        for (i, name) in self.parameters.iter().enumerate() {
+            if c[(i, i)] < 0.0 {
+                return bad(format!("has the variance {:.3e} for {name}; none is below 0", c[(i, i)]));
+            }
+        }
+        // In correlations, so that millimetres and radians weigh alike.
+        let correlation = DMatrix::from_fn(n, n, |i, j| {
+            let scale = (c[(i, i)] * c[(j, j)]).sqrt();
+            if scale > 0.0 { c[(i, j)] / scale } else { if c[(i, j)] == 0.0 { 0.0 } else { f64::INFINITY } }
+        });
+        let crooked = |i: usize, j: usize| {
+            let d = correlation[(i, j)] - correlation[(j, i)];
+            !(d.abs() <= ROUNDING && correlation[(i, j)].abs() <= 1.0 + ROUNDING)
+        };
+        for (i, j) in (0..n).flat_map(|i| (0..i).map(move |j| (i, j))).filter(|&(i, j)| crooked(i, j)) {
+            return bad(format!(
+                "has {:.3e} and {:.3e} between {} and {}: not symmetric, or beyond their variances",
+                c[(i, j)],
+                c[(j, i)],
+                self.parameters[i],
+                self.parameters[j]
+            ));
+        }
+        let least = if n > 0 { correlation.symmetric_eigenvalues().min() } else { 0.0 };
+        if least < -ROUNDING * n as f64 {
+            return bad(format!("has the eigenvalue {least:.3e} (of correlations); none is below 0"));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_covariances_pass() {
+        let names = Kind::LaserPlane.parameters().0;
+        // Rank 3: a unit normal's error lies along its tangent.
+        let root = DMatrix::from_fn(4, 3, |i, j| ((i * 7 + j * 3) % 5) as f64 * if i == 3 { 0.1 } else { 1e-4 });
+        let good = Covariance::new(names, &(&root * root.transpose()));
+        good.check(Kind::LaserPlane).unwrap();
+        Covariance::default().check(Kind::LaserPlane).unwrap();
+        Covariance::new(names, &DMatrix::zeros(4, 4)).check(Kind::LaserPlane).unwrap();
+        let edits: [(&str, fn(&mut Covariance)); 9] = [
+            ("below 0", |c| c.matrix[3][3] = -1e-3),
+            ("not symmetric", |c| c.matrix[0][3] *= 1.001),
+            ("beyond", |c| (c.matrix[0][3], c.matrix[3][0]) = (1.0, 1.0)),
+            ("eigenvalue", |c| {
+                let s: Vec<f64> = (0..4).map(|i| c.matrix[i][i].sqrt()).collect();
+                for (i, j, r) in [(0, 1, 0.9), (1, 2, 0.9), (0, 2, -0.9)] {
+                    (c.matrix[i][j], c.matrix[j][i]) = (r * s[i] * s[j], r * s[i] * s[j]);
+                }
+            }),
+            ("not finite", |c| c.matrix[1][1] = f64::NAN),
+            ("4x3", |c| c.matrix.iter_mut().for_each(|row| row.truncate(3))),
+            ("3x4", |c| c.matrix.truncate(3)),
+            ("a laser plane has", |c| c.parameters.swap(0, 1)),
+            ("a laser plane has", |c| c.parameters.truncate(2)),
+        ];
+        for (want, edit) in edits {
+            let mut c = good.clone();
+            edit(&mut c);
+            let said = c.check(Kind::LaserPlane).unwrap_err().what;
+            assert!(said.contains(want), "{want}: {said}");
+        }
+    }
+}

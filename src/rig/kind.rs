@@ -1,0 +1,101 @@
+//! In: what was calibrated. Out: its names in files and for people, its frame, and the parameters that its covariance has.
+//! Frame and unit: `A_T_b` maps coordinates in frame b to frame A; the unit is part of a parameter's name.
+
+use std::collections::BTreeMap;
+
+/// What a calibration is of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    Camera,
+    LaserPlane,
+    Pointer,
+    HandEye,
+    /// A camera that stands still.
+    BaseCamera,
+    /// A line-profile sensor on the flange.
+    ProfileHandEye,
+}
+
+/// The frame, or the transform between two, that a value is in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub enum Place {
+    #[serde(rename = "camera")]
+    Camera,
+    #[serde(rename = "flange_T_camera")]
+    FlangeFromCamera,
+    #[serde(rename = "base_T_camera")]
+    BaseFromCamera,
+    #[serde(rename = "flange_T_sensor")]
+    FlangeFromSensor,
+}
+
+/// Units of every calibration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub enum Units {
+    #[serde(rename = "mm, rad, px")]
+    MmRadPx,
+}
+
+const CAMERA: [&str; 10] = ["fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3", "skew_px"];
+const PLANE: [&str; 4] = ["nx", "ny", "nz", "offset_mm"];
+/// The beam's own, then the camera's: it was found with that camera, and a range needs both.
+const POINTER: [&str; 15] =
+    ["ox_mm", "oy_mm", "oz_mm", "dx", "dy", "dz", "fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"];
+const POSE: [&str; 6] = ["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"];
+
+impl Kind {
+    /// Those that a station's scans and ranges are made with.
+    pub const OF_A_RIG: [Kind; 4] = [Kind::Camera, Kind::LaserPlane, Kind::Pointer, Kind::HandEye];
+
+    /// In files and their names.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Camera => "camera",
+            Kind::LaserPlane => "laser_plane",
+            Kind::Pointer => "pointer",
+            Kind::HandEye => "hand_eye",
+            Kind::BaseCamera => "base_camera",
+            Kind::ProfileHandEye => "profile_hand_eye",
+        }
+    }
+    /// For people, and as `sheetlight calibrate` calls it with dashes for spaces.
+    pub fn words(self) -> String {
+        if self == Kind::HandEye { "hand-eye".into() } else { self.name().replace('_', " ") }
+    }
+    pub fn place(self) -> Place {
+        match self {
+            Kind::Camera | Kind::LaserPlane | Kind::Pointer => Place::Camera,
+            Kind::HandEye => Place::FlangeFromCamera,
+            Kind::BaseCamera => Place::BaseFromCamera,
+            Kind::ProfileHandEye => Place::FlangeFromSensor,
+        }
+    }
+    /// The covariance's parameters in their order, and how many of the first of them a file may have: a camera may be without
+    /// skew, a pointer (imported, simulated) without its camera.
+    pub fn parameters(self) -> (&'static [&'static str], &'static [usize]) {
+        match self {
+            Kind::Camera => (&CAMERA, &[9, 10]),
+            Kind::LaserPlane => (&PLANE, &[4]),
+            Kind::Pointer => (&POINTER, &[6, 15]),
+            Kind::HandEye | Kind::BaseCamera | Kind::ProfileHandEye => (&POSE, &[6]),
+        }
+    }
+    /// Whether it was measured with the camera, and is of no use with another.
+    pub fn rests_on_camera(self) -> bool {
+        !matches!(self, Kind::Camera | Kind::ProfileHandEye)
+    }
+}
+
+impl std::str::FromStr for Kind {
+    type Err = String;
+    /// The file's name or the command's: `laser_plane`, `laser-plane`.
+    fn from_str(s: &str) -> Result<Kind, String> {
+        let name = s.replace('-', "_");
+        let known = BTreeMap::from(Kind::OF_A_RIG.map(|k| (k.name(), k)));
+        known
+            .get(name.as_str())
+            .copied()
+            .ok_or_else(|| format!("unknown calibration '{s}': camera, laser-plane, pointer or hand-eye"))
+    }
+}
