@@ -147,8 +147,11 @@ fn mixed_sizes_and_empty_folders_are_named() {
     // A station whose camera has another resolution.
     let c = Case::new("handeye");
     let camera = Path::new(&c.station).join("calibration/camera.json");
-    let other = std::fs::read_to_string(&camera).unwrap().replace("\"width\": 640", "\"width\": 1280");
-    std::fs::write(&camera, other).unwrap();
+    let text = std::fs::read_to_string(&camera).unwrap();
+    let mut other: serde_json::Value = serde_json::from_str(&text).unwrap();
+    other.as_object_mut().unwrap().remove("seal");
+    other["value"]["width"] = 1280.into();
+    std::fs::write(&camera, sheetlight::rig::sealed(&other)).unwrap();
     c.fails("hand-eye", &NOISY, &["640x480", "1280x480"]);
     for what in ["camera", "hand-eye", "laser-plane", "pointer"] {
         let c = Case::new("intrinsics");
