@@ -32,7 +32,13 @@ impl Rig {
         })
     }
 
-    /// The camera alone: for what is calibrated with it, so that a spoilt former result is not in its own way.
+    /// For a calibration made with the camera: a spoilt former result is not in its own way, nor in another's. The laser plane,
+    /// where it can be read, says where the station works.
+    pub fn load_to_calibrate(station: &Path) -> Result<Rig> {
+        Ok(Rig { laser_plane: load(station, Kind::LaserPlane).unwrap_or(None), ..Rig::load_camera(station)? })
+    }
+
+    /// The camera alone.
     pub fn load_camera(station: &Path) -> Result<Rig> {
         Ok(Rig { camera: load(station, Kind::Camera)?, ..Rig::default() })
     }

@@ -50,7 +50,7 @@ pub struct Args {
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let recording = Recording::open(&args.recording)?;
     recording.pose_file(args.poses.as_deref())?.warnings.iter().for_each(|w| console.warn(w));
-    let (settings, rig) = (Settings::load(&args.station)?, Rig::load_camera(&args.station)?);
+    let (settings, rig) = (Settings::load(&args.station)?, Rig::load_to_calibrate(&args.station)?);
     let run = HandEyeRun {
         poses: args.poses.clone(),
         mount: if args.eye_to_hand { Mount::EyeToHand } else { Mount::EyeInHand },

@@ -42,7 +42,7 @@ pub struct Args {
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let recording = Recording::open(&args.recording)?;
-    let (settings, rig) = (Settings::load(&args.station)?, Rig::load_camera(&args.station)?);
+    let (settings, rig) = (Settings::load(&args.station)?, Rig::load_to_calibrate(&args.station)?);
     let run = LaserPlaneRun {
         solver: LaserPlaneOptions::default(),
         asked: asked(&settings, args.near_mm.zip(args.far_mm).map(<[f64; 2]>::from)),

@@ -38,7 +38,7 @@ pub struct Args {
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let recording = Recording::open(&args.recording)?;
-    let (settings, rig) = (Settings::load(&args.station)?, Rig::load_camera(&args.station)?);
+    let (settings, rig) = (Settings::load(&args.station)?, Rig::load_to_calibrate(&args.station)?);
     let run = PointerRun {
         spots: SpotOptions::default(),
         solver: PointerOptions::default(),
