@@ -4,7 +4,6 @@
 use super::Format;
 use crate::fault::{Fault, Result};
 use crate::raster::{Image, Pixels};
-use crate::stages::ambient::subtract;
 
 /// Grey levels (8 bits) by which a pixel of the ambient picture may exceed that of a shot: noise, and a robot that moved
 /// on under a leak of room light.
@@ -53,23 +52,6 @@ impl Ambient {
         }
         Ok(())
     }
-
-    /// A shot without the ambient light.
-    pub fn subtracted(&self, shot: &Image) -> Image {
-        let full = u32::from(shot.full_scale());
-        let left = |(s, a): (u32, u32)| subtract(s, a, full);
-        match (&shot.pixels, &self.image.pixels) {
-            (Pixels::U8(s), Pixels::U8(a)) => {
-                let px = s.iter().zip(a).map(|(&s, &a)| left((s.into(), a.into())) as u8).collect();
-                Image::from_u8(shot.width, shot.height, px)
-            }
-            (Pixels::U16(s), Pixels::U16(a)) => {
-                let px = s.iter().zip(a).map(|(&s, &a)| left((s.into(), a.into())) as u16).collect();
-                Image::from_u16(shot.width, shot.height, shot.bits, px)
-            }
-            _ => unreachable!("the depths were compared"),
-        }
-    }
 }
 
 fn darker<T: Copy + Into<u32>>(ambient: &[T], shot: &[T], spare: u32) -> usize {
@@ -79,6 +61,7 @@ fn darker<T: Copy + Into<u32>>(ambient: &[T], shot: &[T], spare: u32) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::stages::ambient::without;
 
     #[test]
     fn what_does_not_fit_the_shots_is_refused() {
@@ -89,7 +72,7 @@ mod tests {
         let a = Ambient::new(flat(30), format).unwrap();
         assert!(a.suits(&flat(22), "shot").is_ok());
         assert!(a.suits(&flat(21), "shot").unwrap_err().what.contains("100 %"));
-        assert_eq!(a.subtracted(&flat(50)), flat(20));
-        assert_eq!((a.subtracted(&flat(20)), a.subtracted(&flat(255))), (flat(0), flat(255)));
+        assert_eq!(without(&flat(50), &a.image), flat(20));
+        assert_eq!((without(&flat(20), &a.image), without(&flat(255), &a.image)), (flat(0), flat(255)));
     }
 }

@@ -1,5 +1,5 @@
 //! In: pictures in order with their poses. Out: their peaks, chosen, and their points, in the same order; on the GPU
-//! or on the CPU twins, with the same results.
+//! or on this machine's processor, with the same results.
 //! Frame and unit: peaks in pixels and grey levels, points in the poses' frame, mm.
 
 use super::{Ambient, Extraction, Format, Processor};
@@ -9,11 +9,11 @@ use crate::geometry::{Camera, Plane};
 use crate::gpu::Device;
 use crate::raster::{Image, Mask};
 use crate::stages::chain::{Batch, Chain, ChainConfig};
-use crate::stages::choose::{self, Scene};
+use crate::stages::host::Host;
 use crate::stages::measured::Measure;
 use crate::stages::peak::{self, Peak, Stripe};
-use crate::stages::point::{self, Optics, Point, plane_in_view};
-use crate::stages::{ThresholdParams, lengthen, skeleton, thin, threshold};
+use crate::stages::point::{Optics, Point, plane_in_view};
+use crate::stages::{ThresholdParams, ambient};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::VecDeque;
@@ -29,7 +29,7 @@ pub struct Measured {
 struct Job {
     shot: u32,
     image: Image,
-    /// base_from_camera as [`point::pose_words`].
+    /// base_from_camera as [`crate::stages::point::pose_words`].
     pose: [f32; 12],
 }
 
@@ -41,6 +41,12 @@ pub struct Optical {
     pub depth_mm: [f64; 2],
 }
 
+/// What does the work, built when the stripe is known, because its sizes follow from the stripe.
+enum Way {
+    Gpu(Box<Chain>),
+    Host(Box<Host>),
+}
+
 /// The per-pixel work of a scan.
 pub struct Engine {
     format: Format,
@@ -50,10 +56,9 @@ pub struct Engine {
     extraction: Extraction,
     width_px: f32,
     pending: Vec<Job>,
-    /// `None` runs the twins.
+    /// `None` runs on this machine's processor.
     device: Option<Device>,
-    /// Built when the stripe is known, because its sizes follow from the stripe.
-    chain: Option<Chain>,
+    way: Option<Way>,
     /// Pictures that are started together, and batches under way; `None` is what the size asks for.
     at_once: Option<(u32, usize)>,
     /// Shots of the batches under way, oldest first.
@@ -67,8 +72,8 @@ pub struct Engine {
 /// Least window of the threshold in stripe sigmas: the stripe fills a sixth of it, so the mean stays that
 /// of the surroundings and the flanks stay lit.
 const WINDOW_WIDTHS: f32 = 24.0;
-/// Shots that the twins work on together.
-const TWIN_BATCH: usize = 4;
+/// Shots that the processor works on together, at least: as many as it has threads, and enough for their ends to overlap.
+const HOST_BATCH: usize = 4;
 /// Of pictures above this size three are enough to measure the stripe: each has thousands of peaks.
 const LARGE_PIXELS: u32 = 2_000_000;
 
@@ -94,7 +99,7 @@ impl Engine {
             extraction: extraction.clone(),
             pending: Vec::new(),
             device,
-            chain: None,
+            way: None,
             batches: VecDeque::new(),
             at_once: None,
             batch: Batch::default(),
@@ -137,10 +142,12 @@ impl Engine {
         noise.sort_by(f32::total_cmp);
         let noise = *noise.get(noise.len() / 2)?;
         let seen = self.extraction.clone().in_noise(noise);
-        let mut found: Vec<Stripe> = images
-            .par_iter()
-            .filter_map(|image| peak::measure(image, &self.skeleton(image, &seen), &seen.peak, self.optics.across()))
-            .collect();
+        let host = Host::new(&ChainConfig { ambient: None, measure: None, ..self.config(&seen) }).ok()?;
+        let stripe = |image: &Cow<Image>| {
+            let pixels = host.run(0, image, &[0.0; 12]).ok()?.pixels;
+            peak::measure(image, &pixels, &seen.peak, self.optics.across())
+        };
+        let mut found: Vec<Stripe> = images.par_iter().filter_map(stripe).collect();
         let middle = found.len() / 2;
         found.sort_by(|a, b| a.speckle.total_cmp(&b.speckle));
         let speckle = found.get(middle)?.speckle;
@@ -149,7 +156,7 @@ impl Engine {
     }
 
     /// Takes over a stripe: the sizes of the fit, the least window of the threshold, limits above the noise; builds the GPU's
-    /// chain.
+    /// chain or the processor's.
     pub fn set_stripe(&mut self, stripe: &Stripe) -> Result<()> {
         self.width_px = stripe.width_px;
         self.extraction = self.extraction.clone().in_noise(stripe.noise);
@@ -160,31 +167,41 @@ impl Engine {
         self.build()
     }
 
-    /// The GPU's chain for the present settings, if there is a GPU.
-    fn build(&mut self) -> Result<()> {
-        let Some(device) = &self.device else { return Ok(()) };
-        let (e, f) = (&self.extraction, self.format);
-        let usual = ChainConfig::new(f.width, f.height, f.bits).on(device);
-        let (shots, slots) = self.at_once.unwrap_or((usual.shots, usual.slots));
-        let config = ChainConfig {
-            shots,
-            slots,
+    /// The chain's settings for an extraction: the same on a GPU and without one.
+    fn config(&self, e: &Extraction) -> ChainConfig {
+        let f = self.format;
+        ChainConfig {
             threshold: for_depth(e.threshold, f.bits),
             thinning: e.thinning,
             region: Some(self.region.clone()),
             ambient: self.ambient.as_ref().map(|a| a.image.clone()),
             lengthen: e.lengthen.word(self.width_px),
             measure: Some(Measure { peak: e.peak, choose: e.choose, optics: self.optics }),
-            ..usual
-        };
-        self.chain = Some(Chain::new(device, &config)?);
+            ..ChainConfig::new(f.width, f.height, f.bits)
+        }
+    }
+
+    /// The chain for the present settings.
+    fn build(&mut self) -> Result<()> {
+        let config = self.config(&self.extraction);
+        self.way = Some(match &self.device {
+            None => Way::Host(Box::new(Host::new(&config)?)),
+            Some(device) => {
+                let usual = config.on(device);
+                let (shots, slots) = self.at_once.unwrap_or((usual.shots, usual.slots));
+                Way::Gpu(Box::new(Chain::new(device, &ChainConfig { shots, slots, ..usual })?))
+            }
+        });
         Ok(())
     }
 
-    /// Takes a picture; `pose` is base_from_camera as [`point::pose_words`].
+    /// Takes a picture; `pose` is base_from_camera as [`crate::stages::point::pose_words`].
     pub fn submit(&mut self, shot: u32, image: Image, pose: [f32; 12]) -> Result<()> {
         self.pending.push(Job { shot, image, pose });
-        let usual = self.chain.as_ref().map_or(TWIN_BATCH, |c| c.frame.shots as usize);
+        let usual = match &self.way {
+            Some(Way::Gpu(chain)) => chain.frame.shots as usize,
+            _ => rayon::current_num_threads().max(HOST_BATCH),
+        };
         let full = self.at_once.map_or(usual, |(shots, _)| shots as usize);
         if self.pending.len() >= full { self.start() } else { Ok(()) }
     }
@@ -194,7 +211,7 @@ impl Engine {
         if all && !self.pending.is_empty() {
             self.start()?;
         }
-        while let Some(chain) = &mut self.chain
+        while let Some(Way::Gpu(chain)) = &mut self.way
             && chain.collect_into(all, &mut self.batch)?
         {
             self.take();
@@ -202,24 +219,31 @@ impl Engine {
         Ok(std::mem::take(&mut self.done))
     }
 
-    /// Works on what is pending: on the GPU it is started, on the twins it is done.
+    /// Works on what is pending: on the GPU it is started, on the processor it is done.
     fn start(&mut self) -> Result<()> {
-        if self.chain.is_none() {
+        if self.way.is_none() {
             self.build()?;
         }
         let jobs = std::mem::take(&mut self.pending);
-        let Some(chain) = &mut self.chain else {
-            let done: Vec<_> = jobs.par_iter().map(|job| self.twins(job)).collect();
-            self.done.extend(done);
-            return Ok(());
-        };
-        let waited = !chain.has_room() && chain.collect_into(true, &mut self.batch)?;
-        let images: Vec<_> = jobs.iter().map(|j| &j.image).collect();
-        let poses: Vec<_> = jobs.iter().map(|j| j.pose).collect();
-        chain.submit_posed(u64::from(jobs[0].shot), &images, &poses)?;
-        self.batches.push_back(jobs.iter().map(|j| j.shot).collect());
-        if waited {
-            self.take();
+        match self.way.as_mut().expect("it was built") {
+            Way::Host(host) => {
+                let one = |job: &Job| -> Result<Measured> {
+                    let found = host.run(job.shot, &job.image, &job.pose)?;
+                    Ok(Measured { shot: job.shot, peaks: found.peaks, points: found.points })
+                };
+                let done: Result<Vec<_>> = jobs.par_iter().map(one).collect();
+                self.done.extend(done?);
+            }
+            Way::Gpu(chain) => {
+                let waited = !chain.has_room() && chain.collect_into(true, &mut self.batch)?;
+                let images: Vec<_> = jobs.iter().map(|j| &j.image).collect();
+                let poses: Vec<_> = jobs.iter().map(|j| j.pose).collect();
+                chain.submit_posed(u64::from(jobs[0].shot), &images, &poses)?;
+                self.batches.push_back(jobs.iter().map(|j| j.shot).collect());
+                if waited {
+                    self.take();
+                }
+            }
         }
         Ok(())
     }
@@ -240,30 +264,7 @@ impl Engine {
 
     /// The picture without the ambient light.
     fn lit<'a>(&self, image: &'a Image) -> Cow<'a, Image> {
-        self.ambient.as_ref().map_or(Cow::Borrowed(image), |a| Cow::Owned(a.subtracted(image)))
-    }
-
-    fn skeleton(&self, image: &Image, e: &Extraction) -> Vec<u32> {
-        let mut lit = threshold::twin(image, &for_depth(e.threshold, image.bits));
-        lit.intersect(&self.region);
-        let thin = thin::twin(&lit, e.thinning);
-        skeleton::twin(&lengthen::twin(image, &lit, &thin, self.width_px, &e.lengthen))
-    }
-
-    fn twins(&self, job: &Job) -> Measured {
-        let image = self.lit(&job.image);
-        let skeleton = self.skeleton(&image, &self.extraction);
-        let mut peaks = peak::peaks(&image, &skeleton, job.shot, &self.extraction.peak, self.optics.across());
-        let scene = Scene {
-            width: self.format.width,
-            height: self.format.height,
-            full_scale: f32::from(job.image.full_scale()),
-            width_px: self.width_px,
-            across: self.optics.across(),
-        };
-        choose::choose(&mut peaks, &scene, &self.extraction.choose);
-        let points = point::posed(&mut peaks, &self.optics, &job.pose);
-        Measured { shot: job.shot, peaks, points }
+        self.ambient.as_ref().map_or(Cow::Borrowed(image), |a| Cow::Owned(ambient::without(image, &a.image)))
     }
 }
 

@@ -3,6 +3,7 @@
 
 use super::frame::{self, Frame, PX_LOG2, SHARED, frame_of};
 use crate::gpu::{Access::*, Binding, Stage};
+use crate::raster::{Image, Pixels};
 
 pub const STAGE: Stage = Stage {
     name: "ambient",
@@ -26,6 +27,21 @@ pub fn groups(f: &Frame) -> [u32; 3] {
 /// What is left of a pixel: never below 0, and a saturated one stays, its true value is not known.
 pub fn subtract(value: u32, ambient: u32, full_scale: u32) -> u32 {
     if value >= full_scale { value } else { value.saturating_sub(ambient) }
+}
+
+/// A picture without the ambient light; both of one size and depth.
+pub fn without(image: &Image, ambient: &Image) -> Image {
+    let full = image.full_scale();
+    let left = |(s, a): (&u16, &u16)| if *s >= full { *s } else { s.saturating_sub(*a) };
+    let pixels = match (&image.pixels, &ambient.pixels) {
+        (Pixels::U8(s), Pixels::U8(a)) => {
+            let left = |(s, a): (&u8, &u8)| if *s == u8::MAX { *s } else { s.saturating_sub(*a) };
+            Pixels::U8(s.iter().zip(a).map(left).collect())
+        }
+        (Pixels::U16(s), Pixels::U16(a)) => Pixels::U16(s.iter().zip(a).map(left).collect()),
+        _ => unreachable!("the depths were compared"),
+    };
+    Image { pixels, ..*image }
 }
 
 pub fn twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {

@@ -144,7 +144,8 @@ impl Frame {
         self.put_rows(image, 0..self.height, &mut |at, bytes| out[at..at + bytes.len()].copy_from_slice(bytes))
     }
 
-    fn accept(&self, image: &Image) -> Result<()> {
+    /// Refuses a picture of another size or depth.
+    pub fn accept(&self, image: &Image) -> Result<()> {
         let full = u32::from(image.full_scale());
         if (image.width, image.height, full) == (self.width, self.height, self.full_scale) {
             return Ok(());

@@ -67,7 +67,7 @@ pub fn twin(image: &Image, lit: &Mask, skeleton: &Mask, width_px: f32, p: &Lengt
 
 /// Adds the pixels beyond one end, if the pixel is an end.
 #[allow(clippy::too_many_arguments)]
-fn carry(
+pub(super) fn carry(
     x: i32,
     y: i32,
     (w, h): (i32, i32),

@@ -9,6 +9,7 @@ pub mod choose;
 mod entry;
 pub mod frame;
 pub mod grid;
+pub mod host;
 pub mod hough;
 pub mod lengthen;
 pub mod listing;

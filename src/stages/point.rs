@@ -67,7 +67,7 @@ pub fn posed(peaks: &mut [Peak], optics: &Optics, pose: &[f32; 12]) -> Vec<Point
     peaks.iter_mut().map(|k| one(k, optics, pose)).collect()
 }
 
-fn one(k: &mut Peak, optics: &Optics, pose: &[f32; 12]) -> Point {
+pub(super) fn one(k: &mut Peak, optics: &Optics, pose: &[f32; 12]) -> Point {
     if !k.kept() {
         return Point::NONE;
     }

@@ -24,6 +24,7 @@ pub(super) const GRADIENTS: [(i32, i32, f32); 13] = [
 
 /// Direction across the stripe: the strongest eigenvector of the structure tensor, on grey levels so far apart that noise
 /// of single pixels does not turn it, and what so far differences make of it is put right (docs/math.md, Stripe peak (1)).
+#[inline(always)]
 pub(super) fn direction<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> (f32, f32) {
     let (mut h, mut xy, mut q) = tensor(image, x, y, s.lattice_u, s.lattice_v);
     // Sine and cosine of twice the angle that a tensor shows; sum of c sin(k a), k = 2, 4, 6, 8.
@@ -51,6 +52,7 @@ pub(super) fn direction<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> (f3
 }
 
 /// Half the difference of the diagonal, the other element, and half the difference of the eigenvalues.
+#[inline(always)]
 fn tensor<G: Grey>(image: G, x: i32, y: i32, u: i32, v: i32) -> (f32, f32, f32) {
     let at = |i: i32, j: i32| image.at(x + i * u, y + j * v);
     let ratio = v as f32 / u as f32;
@@ -68,6 +70,7 @@ fn tensor<G: Grey>(image: G, x: i32, y: i32, u: i32, v: i32) -> (f32, f32, f32) 
 
 /// Level beside the stripe, 4 to 6 widths out: the darker side, because a second stripe lights one side only. On three lines
 /// 1.2 widths apart: a level with the noise of three pixels would be the largest error of a profile averaged over many.
+#[inline(always)]
 pub(super) fn background<G: Grey>(image: G, x: i32, y: i32, nx: f32, ny: f32, s: &PeakFrame) -> f32 {
     let from = (4.0 * s.s0 + 0.5).floor() as i32;
     let to = from + ((2.0 * s.s0 + 0.5).floor() as i32).max(2);
@@ -94,6 +97,7 @@ const DARK: f32 = 1e-9;
 
 /// Fisher scoring of amplitude, offset and width on the profile. Variance of a pixel: read noise + gain · level +
 /// speckle² · light². A saturated pixel says only "at least this bright".
+#[inline(always)]
 pub(super) fn gaussian<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak {
     let n = direction(image, x, y, s);
     let base = background(image, x, y, n.0, n.1, s);
@@ -193,6 +197,7 @@ pub(super) fn gaussian<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak
     finish(x, y, n, m, a, base, width, sigma, saturated, s)
 }
 
+#[inline(always)]
 #[allow(clippy::too_many_arguments)]
 pub(super) fn finish(
     x: i32,

@@ -6,6 +6,7 @@ use super::profile::{Profile, SIDES};
 use super::{Grey, Peak, PeakFrame};
 
 /// Centre of gravity of the light above the background, within three widths of a first guess.
+#[inline(always)]
 pub(super) fn centroid<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak {
     let n = direction(image, x, y, s);
     let base = background(image, x, y, n.0, n.1, s);
@@ -42,6 +43,7 @@ pub(super) fn centroid<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak
 
 /// Steger's line point: second-order Taylor expansion of the picture smoothed with a Gaussian of sigma
 /// width / √3 or more, which is where the response to a bar has one maximum ([steger98] sec. 2.2).
+#[inline(always)]
 pub(super) fn derivative<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak {
     let n = direction(image, x, y, s);
     let base = background(image, x, y, n.0, n.1, s);
@@ -81,6 +83,7 @@ pub(super) fn derivative<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Pe
 const EVEN: f32 = 0.288_675_13;
 
 /// The pixel itself, on a stripe that lies as it should and is as wide as expected.
+#[inline(always)]
 pub(super) fn pixel<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak {
     let sign = if s.across_v < 0.0 { -1.0 } else { 1.0 };
     let n = (sign * s.across_u, sign * s.across_v);

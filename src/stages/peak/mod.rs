@@ -20,6 +20,7 @@ pub use stage::{METHOD, QUADS, SHARED, STAGE, apart, stage_twin};
 use crate::fault::{Fault, Result};
 use crate::raster::{Image, Pixels};
 use crate::stages::choose::ChooseParams;
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 /// How the centre across the stripe is found.
@@ -225,14 +226,33 @@ impl<T: Copy + Sync + Into<f32>> Grey for View<'_, T> {
 pub fn peaks(image: &Image, skeleton: &[u32], shot: u32, p: &PeakParams, across: [f32; 2]) -> Vec<Peak> {
     let size = (image.width, image.height, image.bits);
     let frame = PeakFrame::new(size, 1, p, &ChooseParams::default(), across);
-    let (width, height) = (frame.width, frame.height);
-    let each = |pixel: u32| match &image.pixels {
-        Pixels::U8(pixels) => one(View { pixels, width, height }, pixel, shot, &frame, p.method),
-        Pixels::U16(pixels) => one(View { pixels, width, height }, pixel, shot, &frame, p.method),
-    };
-    skeleton.par_iter().with_min_len(256).map(|&pixel| each(pixel)).collect()
+    fitted(image, skeleton, shot, &frame, p.method)
 }
 
+/// The same with the sizes worked out before.
+pub fn fitted(image: &Image, skeleton: &[u32], shot: u32, frame: &PeakFrame, method: Method) -> Vec<Peak> {
+    let (width, height) = (frame.width, frame.height);
+    let some = |pixels: &[u32]| match &image.pixels {
+        Pixels::U8(px) => each(View { pixels: px, width, height }, pixels, shot, frame, method),
+        Pixels::U16(px) => each(View { pixels: px, width, height }, pixels, shot, frame, method),
+    };
+    skeleton.par_chunks(TOGETHER).flat_map_iter(some).collect()
+}
+
+/// Skeleton pixels that a thread takes at least.
+const TOGETHER: usize = 256;
+
+/// Compiled for what processors can do; none of it rounds otherwise.
+#[multiversion(targets = "simd")]
+fn each<G: Grey>(image: G, pixels: &[u32], shot: u32, frame: &PeakFrame, method: Method) -> Vec<Peak> {
+    let mut peaks = Vec::with_capacity(pixels.len());
+    for &pixel in pixels {
+        peaks.push(one(image, pixel, shot, frame, method));
+    }
+    peaks
+}
+
+#[inline(always)]
 fn one<G: Grey>(image: G, pixel: u32, shot: u32, frame: &PeakFrame, method: Method) -> Peak {
     let (x, y) = ((pixel & 0xffff) as i32, (pixel >> 16) as i32);
     let peak = match method {

@@ -50,11 +50,13 @@ impl Profile {
         self.clipped[(k + self.half) as usize]
     }
     /// First and last number of the samples whose offsets lie within `reach` of m; not whole.
+    #[inline(always)]
     pub fn span(&self, m: f32, reach: f32) -> std::ops::RangeInclusive<f32> {
         let (a, b) = ((m - reach - self.offset) / self.step, (m + reach - self.offset) / self.step);
         a.min(b).max(self.low)..=a.max(b).min(self.high)
     }
 
+    #[inline(always)]
     pub fn new<G: Grey>(image: G, (x, y): (i32, i32), (nx, ny): (f32, f32), s: &PeakFrame) -> Profile {
         let columns = by_columns((nx, ny));
         let (na, nb) = if columns { (nx, ny) } else { (ny, nx) };
@@ -126,6 +128,7 @@ impl Profile {
 
     /// First guess of offset and amplitude: centre of gravity and sum above the background. A window of 1.5 widths:
     /// neighbours of the stripe shall not pull.
+    #[inline(always)]
     pub fn guess(&self, background: f32, s: &PeakFrame) -> (f32, f32) {
         let near = self.span(0.0, 1.5 * s.s0 + 0.5);
         let (mut sum, mut moment) = ([0f32; 2], [0f32; 2]);

@@ -1,0 +1,252 @@
+//! In: a picture. Out: which blocks of 8 x 8 pixels may hold a lit pixel, and the least sum that a window around any of
+//! their pixels can come to; all others are proven dark.
+//! Frame and unit: blocks of pixels, four of them a tile; 256ths of full scale. docs/math.md, Stripe stages.
+
+use super::sample::Sample;
+use crate::stages::Frame;
+use crate::stages::frame::{ALL_TILES, GAUSSIAN};
+use crate::stages::stats::depth_shift;
+use multiversion::multiversion;
+
+/// Edge of a block, px.
+pub const EDGE: usize = 8;
+/// Blocks of a tile.
+const FOUR: usize = 4;
+
+/// Statistics of a row of blocks, one array each: what the proof needs of every block.
+#[derive(Clone, Default)]
+struct Row {
+    sum: Vec<u16>,
+    largest: Vec<u16>,
+    smallest: Vec<u16>,
+    /// Smallest sums of a row and of a column of the block.
+    row: Vec<u16>,
+    column: Vec<u16>,
+}
+
+/// The rows of blocks of a picture, with `margin` blocks of its repeated border around them.
+#[derive(Clone, Default)]
+pub struct Blocks {
+    rows: Vec<Row>,
+    margin: usize,
+}
+
+/// How the windows of all pixels of a block lie over the blocks, along one axis: blocks up to `full` away are covered
+/// whole, `rest` pixels more lie in the blocks beyond them up to `reach` away.
+#[derive(Clone, Copy)]
+struct Cover {
+    full: isize,
+    reach: isize,
+    rest: u32,
+}
+
+impl Cover {
+    fn new(size: u32) -> Cover {
+        let (r, edge) = ((size / 2) as isize, EDGE as isize);
+        let full = if r >= edge - 1 { (r - edge + 1) / edge } else { -1 };
+        Cover { full, reach: (r + edge - 1) / edge, rest: (size as isize - edge * (2 * full + 1).max(0)) as u32 }
+    }
+    fn whole(self) -> std::ops::RangeInclusive<isize> {
+        -self.full..=self.full
+    }
+    /// Distances of the blocks that are covered in part.
+    fn partial(self) -> impl Iterator<Item = isize> + Clone {
+        (-self.reach..=self.reach).filter(move |d| d.abs() > self.full)
+    }
+}
+
+/// What a row of blocks may hold: `lit` is not 0 where a pixel may pass, against a window of at least `least`.
+#[derive(Clone, Default)]
+pub struct Proof {
+    pub lit: Vec<u8>,
+    pub least: Vec<u32>,
+    /// Of columns of blocks: least sums of their part of a window, over a block's width and over one column of pixels.
+    bands: [Vec<u32>; 2],
+    part: Vec<u16>,
+}
+
+impl Blocks {
+    /// Makes room for pictures of a frame.
+    pub fn fit(&mut self, f: &Frame) {
+        self.margin = Cover::new(f.size).reach as usize;
+        let (across, down) = (FOUR * f.tiles_x as usize + 2 * self.margin, f.tiles_y as usize + 2 * self.margin);
+        let of = || vec![0; across];
+        let row = || Row { sum: of(), largest: of(), smallest: of(), row: of(), column: of() };
+        self.rows = (0..down).map(|_| row()).collect();
+    }
+
+    /// Takes the statistics of a picture, its rows of blocks divided among the threads that are free.
+    pub fn gather<T: Sample>(&mut self, px: &[T], f: &Frame) {
+        use rayon::prelude::*;
+        let (margin, down) = (self.margin, f.tiles_y as usize);
+        let rows = &mut self.rows[margin..margin + down];
+        let least = super::rows_at_least(f.width);
+        rows.par_iter_mut().enumerate().with_min_len(least).for_each(|(y, row)| {
+            statistics(px, f, y, margin, row);
+            row.repeat_sides(margin);
+        });
+        let (top, bottom) = (self.rows[margin].beyond(), self.rows[margin + down - 1].beyond());
+        self.rows[..margin].iter_mut().for_each(|r| r.clone_from(&top));
+        self.rows[margin + down..].iter_mut().for_each(|r| r.clone_from(&bottom));
+    }
+
+    /// What row `y` of blocks may hold.
+    pub fn prove(&self, f: &Frame, y: usize, out: &mut Proof) {
+        let across = FOUR * f.tiles_x as usize;
+        out.lit.resize(across, 0);
+        out.least.resize(across, 0);
+        if f.flags & ALL_TILES != 0 {
+            // The plain path rests on no bound.
+            out.lit.fill(1);
+            return;
+        }
+        bound(self, f, y + self.margin, out);
+        passing(f, &self.rows[y + self.margin].largest[self.margin..], out);
+    }
+}
+
+impl Row {
+    /// Beside the picture each row repeats its last pixel: a block there is eight times a column of the border's.
+    fn repeat_sides(&mut self, margin: usize) {
+        let last = self.sum.len() - margin - 1;
+        for (from, to) in [(margin, 0..margin), (last, last + 1..last + 1 + margin)] {
+            let (column, smallest) = (self.column[from], self.smallest[from]);
+            self.sum[to.clone()].fill(8 * column);
+            self.row[to.clone()].fill(8 * smallest);
+            self.column[to.clone()].fill(column);
+            self.smallest[to].fill(smallest);
+        }
+    }
+    /// Above and below it each column does.
+    fn beyond(&self) -> Row {
+        let eight = |v: &[u16]| v.iter().map(|v| 8 * v).collect();
+        Row { sum: eight(&self.row), column: eight(&self.smallest), ..self.clone() }
+    }
+}
+
+/// One row of blocks; pixels beyond the border repeat the border's.
+#[multiversion(targets = "simd")]
+fn statistics<T: Sample>(px: &[T], f: &Frame, y: usize, margin: usize, out: &mut Row) {
+    let (w, deep) = (f.width as usize, depth_shift(f));
+    let line = |r: usize| {
+        let from = (EDGE * y + r).min(f.height as usize - 1) * w;
+        &px[from..from + w]
+    };
+    let lines: [&[T]; EDGE] = std::array::from_fn(line);
+    for tx in 0..f.tiles_x as usize {
+        let at = margin + FOUR * tx;
+        let mut columns = [T::Wide::default(); 32];
+        let first = pixels(lines[0], 32 * tx);
+        let (mut largest, mut smallest) = (first, first);
+        let mut least = T::eights(&first);
+        let mut sum = [T::Wide::default(); FOUR];
+        for line in lines {
+            let row = pixels(line, 32 * tx);
+            for i in 0..32 {
+                columns[i] += row[i].wide();
+                largest[i] = largest[i].max(row[i]);
+                smallest[i] = smallest[i].min(row[i]);
+            }
+            let eights = T::eights(&row);
+            for i in 0..FOUR {
+                least[i] = least[i].min(eights[i]);
+                sum[i] += eights[i];
+            }
+        }
+        let eight = |b: usize| EDGE * b..EDGE * b + EDGE;
+        let down = |v: T::Wide| (T::number(v) >> deep) as u16;
+        for (b, at) in (at..at + FOUR).enumerate() {
+            out.sum[at] = down(sum[b]);
+            out.row[at] = down(least[b]);
+            let column = columns[eight(b)].iter().copied().fold(columns[EDGE * b], Ord::min);
+            out.column[at] = down(column);
+            // Rounded to the safe side.
+            let top = largest[eight(b)].iter().copied().fold(largest[EDGE * b], Ord::max);
+            out.largest[at] = ((T::number(top.wide()) + ((1 << deep) - 1)) >> deep) as u16;
+            out.smallest[at] = down(smallest[eight(b)].iter().copied().fold(smallest[EDGE * b], Ord::min).wide());
+        }
+    }
+}
+
+/// A tile's part of a row, the last pixel repeated beyond the border.
+#[inline(always)]
+fn pixels<T: Sample>(line: &[T], from: usize) -> [T; 32] {
+    let mut row = [line[line.len() - 1]; 32];
+    match line.get(from..from + 32) {
+        Some(all) => row.copy_from_slice(all),
+        None => {
+            let rest = line.get(from..).unwrap_or_default();
+            row[..rest.len()].copy_from_slice(rest);
+        }
+    }
+    row
+}
+
+/// Lower bounds on the sums of the windows around a row's pixels: windows hold the blocks near them whole, and of those
+/// further away a part.
+#[multiversion(targets = "simd")]
+fn bound(blocks: &Blocks, f: &Frame, y: usize, out: &mut Proof) {
+    let cover = Cover::new(f.size);
+    let at = |d: isize| &blocks.rows[(y as isize + d) as usize];
+    let across = out.least.len() + 2 * blocks.margin;
+    let smallest_of = |part: &mut Vec<u16>, distances: &mut dyn Iterator<Item = isize>, of: fn(&Row) -> &[u16]| {
+        part.clear();
+        part.resize(across, u16::MAX);
+        for d in distances {
+            part.iter_mut().zip(of(at(d))).for_each(|(p, &v)| *p = (*p).min(v));
+        }
+    };
+    if f.flags & GAUSSIAN != 0 {
+        // The smallest pixel that a window can touch bounds any weighted mean.
+        smallest_of(&mut out.part, &mut (-cover.reach..=cover.reach), |r| &r.smallest);
+        for (x, least) in out.least.iter_mut().enumerate() {
+            let near = &out.part[x..=x + 2 * blocks.margin];
+            *least = f.size * f.size * u32::from(near.iter().copied().fold(u16::MAX, u16::min));
+        }
+        return;
+    }
+    let sums: [(fn(&Row) -> &[u16], fn(&Row) -> &[u16]); 2] =
+        [(|r| &r.sum, |r| &r.row), (|r| &r.column, |r| &r.smallest)];
+    for (band, (whole, part)) in out.bands.iter_mut().zip(sums) {
+        smallest_of(&mut out.part, &mut cover.partial(), part);
+        band.clear();
+        band.extend(out.part.iter().map(|&p| cover.rest * u32::from(p)));
+        for d in cover.whole() {
+            band.iter_mut().zip(whole(at(d))).for_each(|(b, &v)| *b += u32::from(v));
+        }
+    }
+    let beside = |d: isize| (blocks.margin as isize + d) as usize;
+    out.least.fill(u32::MAX);
+    for d in cover.partial() {
+        out.least.iter_mut().zip(&out.bands[1][beside(d)..]).for_each(|(l, &b)| *l = (*l).min(b));
+    }
+    out.least.iter_mut().for_each(|l| *l *= cover.rest);
+    for d in cover.whole() {
+        out.least.iter_mut().zip(&out.bands[0][beside(d)..]).for_each(|(l, &b)| *l += b);
+    }
+}
+
+/// Where even the block's largest pixel does not pass against that bound, none of its pixels passes against its true mean.
+#[multiversion(targets = "simd")]
+fn passing(f: &Frame, largest: &[u16], out: &mut Proof) {
+    let deep = depth_shift(f);
+    let area = (f.size * f.size) as i32;
+    let half = half(f);
+    for ((lit, &least), &top) in out.lit.iter_mut().zip(&out.least).zip(largest) {
+        let top = i32::from(top) << deep;
+        let passes = area * (top - f.offset) > ((least << deep) as i32) + half && top >= f.minimum as i32;
+        *lit = u8::from(passes);
+    }
+}
+
+/// What rounding adds to a sum before it is compared.
+fn half(f: &Frame) -> i32 {
+    if f.flags & GAUSSIAN != 0 { 0 } else { ((f.size * f.size) as i32 - 1) / 2 }
+}
+
+/// Least brightness that passes against a window of that sum, in the picture's own grey levels.
+pub fn level(f: &Frame, least: u32) -> u32 {
+    let area = (f.size * f.size) as i32;
+    let mean = (((least << depth_shift(f)) as i32) + half(f)) / area;
+    (mean + f.offset + 1).max(f.minimum as i32).max(0) as u32
+}

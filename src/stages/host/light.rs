@@ -1,0 +1,277 @@
+//! In: a picture, what a row of tiles may hold. Out: the lit pixels of that row of tiles, by exact window means, looked for
+//! only where they were not ruled out.
+//! Frame and unit: pixels, tiles of 32 x 8 as eight words; grey levels of the picture's depth.
+
+use super::blocks::{EDGE, Proof, level};
+use super::sample::Sample;
+use crate::stages::frame::{ALL_TILES, GAUSSIAN};
+use crate::stages::threshold::passes_mean;
+use crate::stages::{Frame, ThresholdParams};
+use multiversion::multiversion;
+
+/// The lit pixels of a tile, a word a row.
+pub type Tile = [u32; 8];
+/// Pixels of a tile's row.
+const WIDE: usize = 32;
+/// Pixels in question of a tile up to which each window is added up by itself. Beyond that the tile's columns are added up
+/// once for all.
+const FEW: u32 = 6;
+/// Tiles beside each other that are added up together.
+const MOST: usize = 16;
+
+/// A picture as the threshold sees it.
+#[derive(Clone, Copy)]
+pub struct View<'a, T> {
+    pub px: &'a [T],
+    pub f: &'a Frame,
+    pub p: ThresholdParams,
+    /// One axis of the Gaussian window.
+    pub weights: &'a [f32],
+}
+
+impl<'a, T: Sample> View<'a, T> {
+    fn row(&self, y: isize) -> &'a [T] {
+        let (w, h) = (self.f.width as usize, self.f.height as isize);
+        let from = y.clamp(0, h - 1) as usize * w;
+        &self.px[from..from + w]
+    }
+}
+
+/// Sums along the columns, and what is made of them.
+#[derive(Default)]
+pub struct Sums<W> {
+    columns: Vec<W>,
+    line: Vec<W>,
+    doubled: [Vec<u32>; 2],
+    sums: Vec<u32>,
+    blurred: Vec<f32>,
+    wide: Vec<f32>,
+}
+
+/// The lit pixels of the row `ty` of tiles; `region` and `out` are that row's tiles.
+pub fn row<T: Sample>(
+    v: View<T>,
+    ty: usize,
+    proof: &Proof,
+    region: Option<&[Tile]>,
+    sums: &mut Sums<T::Wide>,
+    out: &mut [Tile],
+) {
+    let tiles = v.f.tiles_x as usize;
+    let wanted = |tx: usize| region.is_none_or(|r| r[tx] != [0; 8]);
+    // Tiles whose columns are to be added up wait for their neighbours.
+    let mut run = 0..0;
+    for tx in 0..tiles {
+        let four: [u8; 4] = proof.lit[4 * tx..4 * tx + 4].try_into().expect("four blocks a tile");
+        if u32::from_ne_bytes(four) == 0 || !wanted(tx) {
+            continue;
+        }
+        let whole = if v.f.flags & ALL_TILES != 0 {
+            true
+        } else {
+            let question = in_question(v, tx, ty, four, &proof.least[4 * tx..4 * tx + 4]);
+            let count: u32 = question.iter().map(|w| w.count_ones()).sum();
+            if count <= FEW && v.f.flags & GAUSSIAN == 0 {
+                out[tx] = one_by_one(v, tx, ty, &question);
+            }
+            count > FEW || v.f.flags & GAUSSIAN != 0 && count > 0
+        };
+        if whole && run.end == tx && run.len() < MOST {
+            run.end = tx + 1;
+        } else if whole {
+            settle(v, ty, run, sums, out);
+            run = tx..tx + 1;
+        }
+    }
+    settle(v, ty, run, sums, out);
+    if let Some(region) = region {
+        for (tile, region) in out.iter_mut().zip(region) {
+            (0..8).for_each(|r| tile[r] &= region[r]);
+        }
+    }
+}
+
+/// Pixels of a tile that pass against the least window of their block, which is more than those that are lit.
+#[multiversion(targets = "simd")]
+fn in_question<T: Sample>(v: View<T>, tx: usize, ty: usize, four: [u8; 4], least: &[u32]) -> Tile {
+    let (w, h) = (v.f.width as usize, v.f.height as usize);
+    let mut levels = [u32::MAX; WIDE];
+    for b in (0..4).filter(|&b| four[b] != 0) {
+        levels[EDGE * b..EDGE * b + EDGE].fill(level(v.f, least[b]));
+    }
+    let (from, rows) = (WIDE * tx, (h - EDGE * ty).min(EDGE));
+    let mut tile = [0; 8];
+    for (r, word) in tile.iter_mut().enumerate().take(rows) {
+        let row = &v.row((EDGE * ty + r) as isize)[from..w.min(from + WIDE)];
+        *word = match <&[T; WIDE]>::try_from(row) {
+            Ok(row) => bits(|i| T::number(row[i].wide()) >= levels[i]),
+            Err(_) => bits(|i| i < row.len() && T::number(row[i].wide()) >= levels[i]),
+        };
+    }
+    tile
+}
+
+/// A word of 32 answers.
+#[inline(always)]
+fn bits(of: impl Fn(usize) -> bool) -> u32 {
+    (0..WIDE).fold(0, |word, i| word | u32::from(of(i)) << i)
+}
+
+fn one_by_one<T: Sample>(v: View<T>, tx: usize, ty: usize, question: &Tile) -> Tile {
+    let mut tile = [0; 8];
+    for r in 0..8 {
+        let mut left = question[r];
+        while left != 0 {
+            let i = left.trailing_zeros();
+            left &= left - 1;
+            let (x, y) = (WIDE * tx + i as usize, EDGE * ty + r);
+            let value = T::number(v.row(y as isize)[x].wide());
+            tile[r] |= u32::from(passes_mean(value, window(v, x, y), &v.p)) << i;
+        }
+    }
+    tile
+}
+
+/// The sum of the window around a pixel.
+#[multiversion(targets = "simd")]
+fn window<T: Sample>(v: View<T>, x: usize, y: usize) -> u32 {
+    let (w, r) = (v.f.width as usize, (v.f.size / 2) as usize);
+    let (from, to) = (x.saturating_sub(r), (x + r + 1).min(w));
+    let (left, right) = ((r - (x - from)) as u32, (x + r + 1 - to) as u32);
+    let mut sum = 0;
+    for y in y as isize - r as isize..=(y + r) as isize {
+        let row = v.row(y);
+        sum += row[from..to].iter().map(|&v| T::number(v.wide())).sum::<u32>();
+        sum += left * T::number(row[0].wide()) + right * T::number(row[w - 1].wide());
+    }
+    sum
+}
+
+/// A run of tiles, every pixel of them.
+fn settle<T: Sample>(v: View<T>, ty: usize, run: std::ops::Range<usize>, sums: &mut Sums<T::Wide>, out: &mut [Tile]) {
+    if run.is_empty() {
+        return;
+    }
+    if v.f.flags & GAUSSIAN != 0 {
+        gaussian(v, ty, run, sums, out);
+    } else {
+        mean(v, ty, run, sums, out);
+    }
+}
+
+/// Column sums of all rows of the window, from row to row by what enters and what leaves; then sums of one, two, four
+/// columns and so on, put together to the window's width.
+#[multiversion(targets = "simd")]
+fn mean<T: Sample>(v: View<T>, ty: usize, run: std::ops::Range<usize>, s: &mut Sums<T::Wide>, out: &mut [Tile]) {
+    let (w, h, r) = (v.f.width as usize, v.f.height as usize, (v.f.size / 2) as isize);
+    let (from, n) = ((WIDE * run.start) as isize - r, WIDE * run.len() + 2 * r as usize);
+    let (top, rows) = (EDGE * ty, (h - EDGE * ty).min(EDGE));
+    s.columns.clear();
+    s.columns.resize(n, T::Wide::default());
+    for y in top as isize - r..=top as isize + r {
+        widened(v.row(y), from, &mut s.line, n);
+        s.columns.iter_mut().zip(&s.line).for_each(|(c, &v)| *c += v);
+    }
+    for k in 0..rows {
+        let y = (top + k) as isize;
+        if k > 0 {
+            widened(v.row(y + r), from, &mut s.line, n);
+            s.columns.iter_mut().zip(&s.line).for_each(|(c, &v)| *c += v);
+            widened(v.row(y - 1 - r), from, &mut s.line, n);
+            s.columns.iter_mut().zip(&s.line).for_each(|(c, &v)| *c -= v);
+        }
+        across(&s.columns, v.f.size as usize, &mut s.doubled, &mut s.sums);
+        let row = v.row(y);
+        for (i, tile) in out[run.clone()].iter_mut().enumerate() {
+            let at = WIDE * (run.start + i);
+            let row = &row[at..w.min(at + WIDE)];
+            let sums: &[u32; WIDE] = s.sums[WIDE * i..WIDE * i + WIDE].try_into().expect("32 sums");
+            let passes = |i: usize| passes_mean(T::number(row[i].wide()), sums[i], &v.p);
+            tile[k] = match <&[T; WIDE]>::try_from(row) {
+                Ok(row) => bits(|i| passes_mean(T::number(row[i].wide()), sums[i], &v.p)),
+                Err(_) => bits(|i| i < row.len() && passes(i)),
+            };
+        }
+    }
+}
+
+/// `n` pixels of a row from `from` on, the border's repeated.
+#[inline(always)]
+fn widened<T: Sample>(row: &[T], from: isize, out: &mut Vec<T::Wide>, n: usize) {
+    let left = (-from).clamp(0, n as isize) as usize;
+    let first = from.max(0) as usize;
+    let inside = (n - left).min(row.len().saturating_sub(first));
+    out.resize(n, T::Wide::default());
+    out[..left].fill(row[0].wide());
+    out[left + inside..].fill(row[row.len() - 1].wide());
+    for (out, v) in out[left..].iter_mut().zip(&row[first.min(row.len())..][..inside]) {
+        *out = v.wide();
+    }
+}
+
+/// Sums of `size` columns beside each other.
+#[inline(always)]
+fn across<W: Copy + Into<u32>>(columns: &[W], size: usize, doubled: &mut [Vec<u32>; 2], sums: &mut Vec<u32>) {
+    let n = columns.len() - size + 1;
+    let [now, next] = doubled;
+    now.resize(columns.len(), 0);
+    next.resize(columns.len(), 0);
+    for (now, &c) in now.iter_mut().zip(columns) {
+        *now = c.into();
+    }
+    sums.clear();
+    sums.resize(n, 0);
+    let (mut bit, mut done) = (1, 0);
+    loop {
+        if size & bit != 0 {
+            for (sum, &v) in sums.iter_mut().zip(&now[done..]) {
+                *sum += v;
+            }
+            done += bit;
+        }
+        if 2 * bit > size {
+            return;
+        }
+        for ((next, a), b) in next.iter_mut().zip(&*now).zip(&now[bit..]) {
+            *next = a + b;
+        }
+        std::mem::swap(now, next);
+        bit *= 2;
+    }
+}
+
+/// Along the row first, then down the columns, both in f32 and in ascending order, as the shader does.
+#[multiversion(targets = "simd")]
+fn gaussian<T: Sample>(v: View<T>, ty: usize, run: std::ops::Range<usize>, s: &mut Sums<T::Wide>, out: &mut [Tile]) {
+    let (w, h, r) = (v.f.width as usize, v.f.height as usize, (v.f.size / 2) as isize);
+    let (from, n) = ((WIDE * run.start) as isize - r, WIDE * run.len());
+    let (top, rows) = (EDGE * ty, (h - EDGE * ty).min(EDGE));
+    let reached = rows + 2 * r as usize;
+    s.blurred.clear();
+    s.blurred.resize(n * reached, 0.0);
+    for (y, line) in (top as isize - r..).zip(s.blurred.chunks_exact_mut(n)) {
+        widened(v.row(y), from, &mut s.line, n + 2 * r as usize);
+        s.wide.clear();
+        s.wide.extend(s.line.iter().map(|&v| T::number(v) as f32));
+        for (k, &weight) in v.weights.iter().enumerate() {
+            line.iter_mut().zip(&s.wide[k..]).for_each(|(o, &v)| *o += weight * v);
+        }
+    }
+    for k in 0..rows {
+        s.wide.clear();
+        s.wide.resize(n, 0.0);
+        for (j, &weight) in v.weights.iter().enumerate() {
+            s.wide.iter_mut().zip(&s.blurred[(k + j) * n..]).for_each(|(s, &v)| *s += weight * v);
+        }
+        let row = v.row((top + k) as isize);
+        for (i, tile) in out[run.clone()].iter_mut().enumerate() {
+            let at = WIDE * (run.start + i);
+            let row = &row[at..w.min(at + WIDE)];
+            tile[k] = (0..).zip(row).fold(0, |word, (j, &value)| {
+                let value = T::number(value.wide()) as i32;
+                let mean = s.wide[WIDE * i + j].round_ties_even() as i32;
+                word | u32::from(value - v.p.offset > mean && value >= i32::from(v.p.minimum)) << j
+            });
+        }
+    }
+}

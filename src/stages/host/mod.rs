@@ -1,0 +1,233 @@
+//! In: pictures, one at a time. Out: their skeleton pixels, peaks and points, from the processor of this machine, in the
+//! order and by the proofs of the GPU's chain: statistics of every pixel, then only the tiles that may hold a lit one.
+//! Frame and unit: pixels; points in the poses' frame, mm.
+
+mod blocks;
+mod light;
+mod sample;
+mod thinning;
+
+use super::chain::ChainConfig;
+use super::choose::{self, Lines};
+use super::frame::{ALL_TILES, Frame, HAS_ROI};
+use super::measured::Measure;
+use super::peak::{self, Peak, PeakFrame};
+use super::point::{self, Point};
+use super::{Thinning, ThresholdParams, ambient, lengthen, skeleton, threshold};
+use crate::fault::Result;
+use crate::raster::{Image, Mask, Pixels};
+use blocks::{Blocks, Proof};
+use light::{Sums, Tile, View};
+use rayon::prelude::*;
+use sample::Sample;
+use std::sync::Mutex;
+use thinning::{Tiles, Worn};
+
+/// The chain for one kind of picture. Shared among threads, each of which works on a picture of its own; a large picture
+/// is divided among those that are free.
+pub struct Host {
+    frame: Frame,
+    threshold: ThresholdParams,
+    thinning: Thinning,
+    weights: Vec<f32>,
+    /// Tiles of the region of interest, row by row.
+    region: Option<Vec<Tile>>,
+    ambient: Option<Image>,
+    measure: Option<(PeakFrame, Lines, Measure)>,
+    /// Memory that is used again.
+    spare: Mutex<Vec<Work>>,
+}
+
+/// What one shot came to.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Found {
+    /// Skeleton pixels x | y << 16, in the order of the GPU's list.
+    pub pixels: Vec<u32>,
+    /// One peak a skeleton pixel, and its point, where they are measured.
+    pub peaks: Vec<Peak>,
+    pub points: Vec<Point>,
+}
+
+/// What is remembered from picture to picture.
+#[derive(Default)]
+struct Work {
+    blocks: Blocks,
+    lit: Tiles,
+    thin: Tiles,
+    /// Places of the tiles with a lit pixel, in the order of the skeleton's list.
+    list: Vec<u32>,
+    worn: Worn,
+    added: Vec<(i32, i32)>,
+}
+
+/// Pixels that one thread takes at least: handing work to another costs as much as a tenth of this.
+const LEAST: usize = 1 << 17;
+
+/// So many rows of blocks or tiles.
+fn rows_at_least(width: u32) -> usize {
+    LEAST.div_ceil(8 * width as usize)
+}
+
+impl Host {
+    pub fn new(config: &ChainConfig) -> Result<Host> {
+        let mut frame = Frame::new(config.width, config.height, config.bits, 1, &config.threshold)?;
+        frame.flags |= if config.prune { 0 } else { ALL_TILES };
+        frame.flags |= if config.region.is_some() { HAS_ROI } else { 0 };
+        frame.lengthen = config.lengthen;
+        let tiles = |region: &Mask| {
+            let words = frame.pack_mask(region);
+            words.chunks_exact(8).map(|t| t.try_into().expect("eight words")).collect()
+        };
+        let measure = config.measure.as_ref().map(|m| {
+            let size = (config.width, config.height, config.bits);
+            let peaks = PeakFrame::new(size, 1, &m.peak, &m.choose, m.optics.across());
+            let lines = Lines::new(&peaks, &m.choose);
+            (peaks, lines, m.clone())
+        });
+        if let Some(image) = &config.ambient {
+            frame.accept(image).map_err(|e| e.at("ambient picture"))?;
+        }
+        Ok(Host {
+            threshold: config.threshold,
+            thinning: config.thinning,
+            weights: threshold::gaussian_weights(frame.size),
+            region: config.region.as_ref().map(tiles),
+            ambient: config.ambient.clone(),
+            measure,
+            spare: Mutex::default(),
+            frame,
+        })
+    }
+
+    /// Skeleton pixels of a picture and, where they are measured, peaks and points; `pose` as [`point::pose_words`].
+    pub fn run(&self, shot: u32, image: &Image, pose: &[f32; 12]) -> Result<Found> {
+        self.work(image, true, |work, image| {
+            let pixels = work.pixels();
+            let Some((frame, lines, m)) = &self.measure else { return Found { pixels, ..Found::default() } };
+            let mut peaks = peak::fitted(image, &pixels, shot, frame, m.peak.method);
+            let mut strongest = vec![0u32; frame.lines as usize];
+            peaks.iter_mut().for_each(|k| choose::alone(k, frame, &mut strongest));
+            let point = |k: &mut Peak| {
+                choose::beside(k, &strongest, lines);
+                point::one(k, &m.optics, pose)
+            };
+            let points = peaks.par_iter_mut().with_min_len(4096).map(point).collect();
+            Found { pixels, peaks, points }
+        })
+    }
+
+    /// The lit pixels of a picture and their skeleton before its ends are carried on, for tests and pictures.
+    pub fn masks(&self, image: &Image) -> Result<[Mask; 2]> {
+        self.work(image, false, |work, _| [&work.lit, &work.thin].map(|m| mask(m, &self.frame)))
+    }
+
+    /// Finds the skeleton of a picture without the ambient light, with its ends carried on or not, and hands both on.
+    fn work<R>(&self, image: &Image, ends: bool, then: impl FnOnce(&Work, &Image) -> R) -> Result<R> {
+        self.frame.accept(image)?;
+        let spare = self.spare.lock().unwrap_or_else(|e| e.into_inner()).pop();
+        let mut work = spare.unwrap_or_else(|| Work::new(&self.frame));
+        let without = self.ambient.as_ref().map(|a| ambient::without(image, a));
+        let image = without.as_ref().unwrap_or(image);
+        match &image.pixels {
+            Pixels::U8(px) => self.find(px, ends, &mut work),
+            Pixels::U16(px) => self.find(px, ends, &mut work),
+        }
+        let found = then(&work, image);
+        work.clear();
+        self.spare.lock().unwrap_or_else(|e| e.into_inner()).push(work);
+        Ok(found)
+    }
+
+    fn find<T: Sample>(&self, px: &[T], ends: bool, work: &mut Work) {
+        let f = &self.frame;
+        work.blocks.gather(px, f);
+        let (stride, blocks) = (work.lit.stride, &work.blocks);
+        let view = View { px, f, p: self.threshold, weights: &self.weights };
+        let tiles = f.tiles_x as usize;
+        let row = |(proof, sums): &mut (Proof, Sums<T::Wide>), (ty, out): (usize, &mut [Tile])| -> Vec<u32> {
+            blocks.prove(f, ty, proof);
+            let region = self.region.as_ref().map(|r| &r[ty * tiles..(ty + 1) * tiles]);
+            let out = &mut out[1..=tiles];
+            light::row(view, ty, proof, region, sums, out);
+            let first = ((ty + 1) * stride + 1) as u32;
+            (first..).zip(&*out).filter(|(_, t)| **t != [0; 8]).map(|(at, _)| at).collect()
+        };
+        let rows = work.lit.words[stride..].par_chunks_exact_mut(stride).take(f.tiles_y as usize);
+        let lists: Vec<Vec<u32>> =
+            rows.enumerate().with_min_len(rows_at_least(f.width)).map_init(Default::default, row).collect();
+        work.list.clear();
+        lists.iter().for_each(|l| work.list.extend_from_slice(l));
+        for &at in &work.list {
+            work.thin.words[at as usize] = work.lit.words[at as usize];
+        }
+        thinning::thin(&mut work.thin, &work.list, (f.width, f.height), self.thinning, &mut work.worn);
+        if ends && f.lengthen != 0 {
+            self.lengthen(px, work);
+        }
+    }
+
+    /// Carries the skeleton's ends on; only lit pixels are added, so they lie in listed tiles.
+    fn lengthen<T: Sample>(&self, px: &[T], work: &mut Work) {
+        let (w, h) = (self.frame.width as i32, self.frame.height as i32);
+        work.added.clear();
+        let (lit, thin, added) = (&work.lit, &work.thin, &mut work.added);
+        for &at in &work.list {
+            let (tx, ty) = thin.tile(at);
+            for (r, mut left) in thin.ends(at as usize).into_iter().enumerate() {
+                while left != 0 {
+                    let (x, y) = (32 * tx as i32 + left.trailing_zeros() as i32, 8 * ty as i32 + r as i32);
+                    left &= left - 1;
+                    if x < 3 || y < 3 || x >= w - 3 || y >= h - 3 {
+                        continue;
+                    }
+                    let level = |x: i32, y: i32| T::number(px[(y * w + x) as usize].wide());
+                    let lit = |x: i32, y: i32| lit.get(x, y);
+                    let skeleton = |x: i32, y: i32| thin.get(x, y);
+                    lengthen::carry(x, y, (w, h), self.frame.lengthen, skeleton, lit, level, |a, b| added.push((a, b)));
+                }
+            }
+        }
+        for &(x, y) in &work.added {
+            work.thin.set(x, y);
+        }
+    }
+}
+
+impl Work {
+    fn new(f: &Frame) -> Work {
+        let tiles = Tiles::new(f.tiles_x, f.tiles_y);
+        let mut work = Work { lit: tiles.clone(), thin: tiles, ..Work::default() };
+        work.blocks.fit(f);
+        work
+    }
+
+    fn pixels(&self) -> Vec<u32> {
+        let mut pixels = Vec::new();
+        for &at in &self.list {
+            let (tx, ty) = self.thin.tile(at);
+            for (r, &word) in (0..).zip(&self.thin.words[at as usize]) {
+                let mut left = word;
+                while left != 0 {
+                    pixels.push(skeleton::pack(32 * tx + left.trailing_zeros(), 8 * ty + r));
+                    left &= left - 1;
+                }
+            }
+        }
+        pixels
+    }
+
+    /// Only listed tiles hold anything.
+    fn clear(&mut self) {
+        for &at in &self.list {
+            self.lit.words[at as usize] = [0; 8];
+            self.thin.words[at as usize] = [0; 8];
+        }
+    }
+}
+
+fn mask(tiles: &Tiles, f: &Frame) -> Mask {
+    Mask::from_fn(f.width, f.height, |x, y| tiles.get(x as i32, y as i32))
+}
+
+#[cfg(test)]
+mod tests;

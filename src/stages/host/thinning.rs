@@ -1,0 +1,161 @@
+//! In: the lit tiles of a picture. Out: the same thinned to lines one pixel wide, nothing left to delete.
+//! Frame and unit: tiles of 32 x 8 pixels as eight words, with a border of dark ones. The rule is that of the stage `thin`.
+
+use super::light::Tile;
+use crate::stages::Thinning;
+use crate::stages::thin::{Neighbours, deletions, interior};
+use multiversion::multiversion;
+
+/// A mask tile by tile, with a dark tile beyond every border.
+#[derive(Clone, Default)]
+pub struct Tiles {
+    pub words: Vec<Tile>,
+    /// From one row of tiles to the next.
+    pub stride: usize,
+}
+
+impl Tiles {
+    pub fn new(tiles_x: u32, tiles_y: u32) -> Tiles {
+        let stride = tiles_x as usize + 2;
+        Tiles { words: vec![[0; 8]; stride * (tiles_y as usize + 2)], stride }
+    }
+    /// A pixel within the picture or at most 8 beyond it.
+    #[inline(always)]
+    pub fn get(&self, x: i32, y: i32) -> bool {
+        let at = ((y >> 3) + 1) as usize * self.stride + ((x >> 5) + 1) as usize;
+        self.words[at][(y & 7) as usize] >> (x & 31) & 1 == 1
+    }
+    pub fn set(&mut self, x: i32, y: i32) {
+        let at = ((y >> 3) + 1) as usize * self.stride + ((x >> 5) + 1) as usize;
+        self.words[at][(y & 7) as usize] |= 1 << (x & 31);
+    }
+    /// Column and row of the tile at a place.
+    pub fn tile(&self, at: u32) -> (u32, u32) {
+        (at % self.stride as u32 - 1, at / self.stride as u32 - 1)
+    }
+    /// Skeleton pixels of a tile with one or two neighbours: among them are all ends.
+    #[inline(always)]
+    pub fn ends(&self, at: usize) -> Tile {
+        let around = self.around(at);
+        std::array::from_fn(|r| {
+            // Counted up to three with a chain of bit adders.
+            let (mut one, mut two, mut more) = (0, 0, 0);
+            for n in around[r] {
+                more |= two & one & n;
+                let carry = one & n;
+                one ^= n;
+                two |= carry;
+            }
+            self.words[at][r] & (one ^ two) & !more
+        })
+    }
+    /// The eight neighbours of every pixel of a tile, row by row.
+    #[inline(always)]
+    pub fn around(&self, at: usize) -> [Neighbours; 8] {
+        // Rows -1 to 8 of a tile and of those beside it.
+        let column = |at: usize| -> [u32; 10] {
+            let own = self.words[at];
+            std::array::from_fn(|r| match r {
+                0 => self.words[at - self.stride][7],
+                9 => self.words[at + self.stride][0],
+                r => own[r - 1],
+            })
+        };
+        let (west, own, east) = (column(at - 1), column(at), column(at + 1));
+        let right: [u32; 10] = std::array::from_fn(|r| own[r] >> 1 | east[r] << 31);
+        let left: [u32; 10] = std::array::from_fn(|r| own[r] << 1 | west[r] >> 31);
+        std::array::from_fn(|r| {
+            let (above, below) = (r, r + 2);
+            let own_row = r + 1;
+            [
+                own[above],
+                right[above],
+                right[own_row],
+                right[below],
+                own[below],
+                left[below],
+                left[own_row],
+                left[above],
+            ]
+        })
+    }
+}
+
+/// What thinning remembers between two pictures.
+#[derive(Default)]
+pub struct Worn {
+    /// Up to which sub-iteration a tile has to be looked at, because it or a neighbour changed.
+    due: Vec<u32>,
+    active: Vec<u32>,
+    gone: Vec<Tile>,
+}
+
+/// Thins the listed tiles of a picture of that size: sub-iterations until two in a row delete nothing. A tile whose
+/// surroundings did not change in the last two is left alone: the same rule was applied to the same pixels before.
+pub fn thin(mask: &mut Tiles, list: &[u32], (width, height): (u32, u32), rule: Thinning, worn: &mut Worn) {
+    if width < 3 || height < 3 {
+        return;
+    }
+    worn.due.resize(mask.words.len(), 0);
+    for &at in list {
+        worn.due[at as usize] = 1;
+    }
+    for step in 0.. {
+        worn.active.clear();
+        worn.active.extend(list.iter().filter(|&&at| worn.due[at as usize] >= step));
+        if worn.active.is_empty() {
+            break;
+        }
+        worn.gone.clear();
+        worn.gone.resize(worn.active.len(), [0; 8]);
+        match rule {
+            Thinning::ZhangSuen => decide::<true>(mask, &worn.active, (width, height), step, &mut worn.gone),
+            Thinning::GuoHall => decide::<false>(mask, &worn.active, (width, height), step, &mut worn.gone),
+        }
+        for (&at, gone) in worn.active.iter().zip(&worn.gone) {
+            if *gone == [0; 8] {
+                continue;
+            }
+            let at = at as usize;
+            (0..8).for_each(|r| mask.words[at][r] &= !gone[r]);
+            for row in [at - mask.stride, at, at + mask.stride] {
+                worn.due[row - 1..=row + 1].fill(step + 2);
+            }
+        }
+    }
+    // Neighbours of listed tiles may have been marked that are not listed: they are dark and stay so.
+    for &at in list {
+        for row in [at as usize - mask.stride, at as usize, at as usize + mask.stride] {
+            worn.due[row - 1..=row + 1].fill(0);
+        }
+    }
+}
+
+/// Pixels that go in one sub-iteration, of every listed tile.
+#[multiversion(targets = "simd")]
+fn decide<const ZHANG_SUEN: bool>(
+    mask: &Tiles,
+    list: &[u32],
+    (width, height): (u32, u32),
+    step: u32,
+    gone: &mut [Tile],
+) {
+    let rule = if ZHANG_SUEN { Thinning::ZhangSuen } else { Thinning::GuoHall };
+    for (&at, gone) in list.iter().zip(gone) {
+        let (tx, ty) = mask.tile(at);
+        let around = mask.around(at as usize);
+        let own = mask.words[at as usize];
+        // OpenCV never touches the outermost rows and columns.
+        let inside = interior(width, tx as usize);
+        for r in 0..8 {
+            gone[r] = own[r] & inside & deletions(rule, &around[r], step % 2 == 1);
+        }
+        if ty == 0 {
+            gone[0] = 0;
+        }
+        let last = (height - 1) as usize;
+        if last / 8 == ty as usize {
+            gone[last % 8..].fill(0);
+        }
+    }
+}
