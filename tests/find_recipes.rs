@@ -164,7 +164,7 @@ fn scan(part: &'static str, seed: u64) -> Scanned {
     let format = Format { width: station.camera.width, height: station.camera.height, bits: 8 };
     let volume = Volume::new(100.0, 230.0, "test");
     let mut scanner =
-        Scanner::new(&rig, format, &Extraction::default(), Some(&volume), None, Processor::Twins, None).unwrap();
+        Scanner::new(&rig, format, &Extraction::default(), Some(&volume), None, Processor::host(), None).unwrap();
     let above_scene = scene.spec.focus_height_mm + station.working_distance;
     let mut cloud: Vec<CloudPoint> = Vec::new();
     for i in 0..(2.0 * half[1] / pitch) as usize {

@@ -114,7 +114,7 @@ fn trial(seed: u64) -> Option<Trial> {
     let format = Format { width: station.camera.width, height: station.camera.height, bits: 8 };
     let volume = Volume::new(100.0, 210.0, "test");
     let mut scanner =
-        Scanner::new(&rig, format, &Extraction::default(), Some(&volume), None, Processor::Twins, None).unwrap();
+        Scanner::new(&rig, format, &Extraction::default(), Some(&volume), None, Processor::host(), None).unwrap();
     let [_, y0, _, y1] = scene.spec.region_mm;
     let height = scene.spec.focus_height_mm + station.working_distance;
     let mut cloud: Vec<CloudPoint> = Vec::new();

@@ -99,7 +99,7 @@ fn a_long_scan_needs_no_more_memory_than_a_short_one() {
         assert!(report.points > shots as u64 * 250, "{} points of {shots} shots", report.points);
         high_water()
     };
-    let mut processors = vec![("twins", Processor::Twins, None)];
+    let mut processors = vec![("host", Processor::host(), None)];
     match Device::open() {
         Ok(device) => processors.push(("GPU", Processor::Gpu(device.clone()), Some(device))),
         Err(e) => assert!(std::env::var_os("SHEETLIGHT_REQUIRE_GPU").is_none(), "{e}"),

@@ -7,6 +7,7 @@ mod run;
 mod scaling;
 mod scenes;
 mod table;
+mod ways;
 
 pub use machine::{Ceilings, cpu_seconds, peak_memory_bytes};
 pub use peer::serve;
@@ -14,3 +15,4 @@ pub use run::{BenchOptions, Latency, Report, Row, Soak, Stage, run};
 pub use scaling::Scaling;
 pub use scenes::{Scene, pictures};
 pub use table::table;
+pub use ways::{WayTime, way_times};

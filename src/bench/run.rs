@@ -7,11 +7,9 @@ use super::scenes::{Scene, pictures};
 use crate::fault::{Fault, Result};
 use crate::gpu::{AdapterInfo, Device};
 use crate::raster::Image;
+use crate::scan::{Extraction, Format};
 use crate::stages::chain::{Batch, Chain, ChainConfig};
-use crate::stages::choose::ChooseParams;
-use crate::stages::lengthen::LengthenParams;
-use crate::stages::measured::Measure;
-use crate::stages::peak::PeakParams;
+use crate::stages::peak::{self, PeakParams, Stripe};
 use crate::stages::{ThresholdParams, Window, cases};
 use std::collections::VecDeque;
 use std::time::Instant;
@@ -157,7 +155,7 @@ pub fn run(device: &Device, options: &BenchOptions, mut progress: impl FnMut(&st
 pub(super) const THRESHOLD: ThresholdParams = ThresholdParams { window: Window::Mean, size: 31, offset: 8, minimum: 0 };
 
 /// Percentile of times in seconds, as ms.
-fn percentile(times: &mut [f64], p: f64) -> f64 {
+pub(super) fn percentile(times: &mut [f64], p: f64) -> f64 {
     times.sort_by(f64::total_cmp);
     1e3 * times[((times.len() - 1) as f64 * p).round() as usize]
 }
@@ -318,12 +316,18 @@ fn resident(chain: &mut Chain, seconds: f64) -> Result<f64> {
     Ok(percentile(&mut per_batch, 0.5) / f64::from(shots))
 }
 
-/// The chain with peaks, their choice and points, and poses for a batch.
-fn full(device: &Device, config: &ChainConfig, scene: Scene) -> Result<(Chain, Vec<[f32; 12]>)> {
-    let peak = PeakParams { width_px: if scene == Scene::ThickStripe { 6.0 } else { 2.5 }, ..PeakParams::default() };
-    let measure = Measure { peak, choose: ChooseParams::default(), optics: cases::optics(config.width, config.height) };
-    let lengthen = LengthenParams::default().word(peak.width_px);
-    let chain = Chain::new(device, &ChainConfig { measure: Some(measure), lengthen, ..config.clone() })?;
+/// What `scan` would run on pictures of a scene whose dark pixels scatter by `noise` grey levels.
+pub(super) fn scan_chain(width: u32, height: u32, scene: Scene, noise: f32) -> ChainConfig {
+    let width_px = if scene == Scene::ThickStripe { 6.0 } else { 2.5 };
+    let stripe = Stripe { width_px, speckle: PeakParams::default().speckle, noise };
+    let optics = cases::optics(width, height);
+    Extraction::default().for_stripe(&stripe).chain(Format { width, height, bits: 8 }, optics, width_px)
+}
+
+/// The chain with peaks, their choice and points, with the settings of a scan, and poses for a batch.
+fn full(device: &Device, config: &ChainConfig, scene: Scene, image: &Image) -> Result<(Chain, Vec<[f32; 12]>)> {
+    let scan = scan_chain(config.width, config.height, scene, peak::noise(image));
+    let chain = Chain::new(device, &ChainConfig { shots: config.shots, slots: config.slots, ..scan })?;
     Ok((chain, (0..config.shots).map(cases::pose).collect()))
 }
 
@@ -344,7 +348,7 @@ fn full_chain<'a>(
     batch_of: &impl Fn(usize) -> Vec<&'a Image>,
     options: &BenchOptions,
 ) -> Result<Full> {
-    let (mut full, poses) = full(device, config, scene)?;
+    let (mut full, poses) = full(device, config, scene, batch_of(0)[0])?;
     steady(&mut full, 0.0, batch_of, &poses)?;
     let (mut times, mut ratios) = (Vec::new(), Vec::new());
     for _ in 0..5 {
@@ -368,7 +372,7 @@ fn soak<'a>(
     batch_of: &impl Fn(usize) -> Vec<&'a Image>,
     shots: usize,
 ) -> Result<Option<Soak>> {
-    let (mut chain, poses) = full(device, config, scene)?;
+    let (mut chain, poses) = full(device, config, scene, batch_of(0)[0])?;
     let mut batch = Batch::default();
     let batches = shots.div_ceil(config.shots as usize).max(10);
     let mut early = None;

@@ -30,7 +30,7 @@ pub struct Args {
     /// Sensor width, px; the height is three quarters of it
     #[arg(long, default_value_t = 640)]
     width: u32,
-    /// Where the stages run: auto (GPU where there is one), gpu, or cpu (the twins)
+    /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
     #[arg(long, default_value = "auto", value_parser = super::parse::<Where>)]
     on: Where,
 }

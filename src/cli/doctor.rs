@@ -3,17 +3,18 @@
 //! Frame and unit: words that differ, or the stage's own measure; GB/s.
 
 use super::Console;
+use crate::bench::{WayTime, way_times};
 use crate::fault::Result;
 use crate::gpu::{AdapterInfo, Device, Rates, adapters};
 use crate::stages::{self, Verdict};
 
-/// Check this machine: adapters, every stage against its CPU twin, transfer rates
+/// Check this machine: adapters, every stage against its CPU twin, transfer rates, the time of a shot with and without the GPU
 ///
 /// Exit code 0 when the GPU chain can be trusted or when there is no GPU at all (everything then runs
-/// on the CPU twins); 1 when a stage differs from its twin.
+/// on this machine's processor); 1 when a stage differs from its twin.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Leave out the transfer rates (they take a second)
+    /// Leave out the transfer rates and the times of a shot (they take some seconds)
     #[arg(long)]
     no_rates: bool,
 }
@@ -28,6 +29,8 @@ struct Findings {
     no_device_because: Option<String>,
     stages: Vec<Verdict>,
     rates: Option<Rates>,
+    /// The whole chain on this machine's processor, and on the adapter.
+    ways: Vec<WayTime>,
     verdict: String,
 }
 
@@ -43,9 +46,14 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         no_device_because: None,
         stages: Vec::new(),
         rates: None,
+        ways: Vec::new(),
         verdict: String::new(),
     };
-    match Device::open() {
+    let device = Device::open();
+    if !args.no_rates {
+        findings.ways = way_times(device.as_ref().ok())?;
+    }
+    match device {
         Ok(device) => {
             findings.used = Some(device.info.name.clone());
             findings.reads_texels = device.reads_texels;
@@ -64,7 +72,9 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     }
     let wrong: Vec<&str> = findings.stages.iter().filter(|v| !v.passed()).map(|v| v.stage).collect();
     findings.verdict = match (&findings.used, wrong.is_empty()) {
-        (None, _) => "no GPU: everything runs on the CPU twins, with the same results but for rounding, slower".into(),
+        (None, _) => {
+            "no GPU: everything runs on this machine's processor, with the same results but for rounding".into()
+        }
         (Some(name), true) => format!("good: every stage on {name} agrees with its CPU twin"),
         (Some(_), false) => format!("do not trust this GPU: {} differ from their CPU twins", wrong.join(", ")),
     };
@@ -115,6 +125,10 @@ fn text(f: &Findings) -> String {
             "upload {:.1} GB/s, readback {:.1} GB/s in pieces of a 12-megapixel shot\n",
             r.upload_gb_s, r.readback_gb_s
         );
+    }
+    for w in &f.ways {
+        let cpu = w.cpu_ms_per_shot.map_or(String::new(), |c| format!(", {c:.2} ms of CPU time"));
+        s += &format!("full chain, {}x{}: {:.2} ms a shot{cpu} on {}\n", w.width, w.height, w.ms_per_shot, w.on);
     }
     s + &f.verdict
 }

@@ -44,7 +44,7 @@ pub struct Args {
     /// the station's robot, else matrix]
     #[arg(long, value_parser = super::parse::<Convention>)]
     robot: Option<Convention>,
-    /// Where the stages run: auto (GPU where there is one), gpu, or cpu (the twins)
+    /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
     #[arg(long, default_value = "auto", value_parser = super::parse::<Where>)]
     on: Where,
     /// Distance of the camera from the board when it looks at it squarely, mm

@@ -32,7 +32,7 @@ pub struct Args {
     /// Print the points too: [x, y, z, sigma] in the camera frame, mm
     #[arg(long)]
     points: bool,
-    /// Where the stages run: auto (GPU where there is one), gpu, or cpu (the twins)
+    /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
     #[arg(long, default_value = "auto", value_parser = super::parse::<Where>)]
     on: Where,
 }

@@ -44,7 +44,7 @@ pub struct Args {
     /// or a path. Never taken by itself: the `ambient` picture that meta.json names may be exposed for room light
     #[arg(long)]
     ambient: Option<PathBuf>,
-    /// Where the stages run: auto (GPU where there is one), gpu, or cpu (the twins)
+    /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
     #[arg(long, default_value = "auto", value_parser = super::parse::<Where>)]
     on: Where,
     /// Edge of a height map cell, mm [default: about 1.5 points a cell]

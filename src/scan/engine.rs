@@ -2,18 +2,17 @@
 //! or on this machine's processor, with the same results.
 //! Frame and unit: peaks in pixels and grey levels, points in the poses' frame, mm.
 
-use super::{Ambient, Extraction, Format, Processor};
+use super::{Ambient, Extraction, Format, Processor, Why};
 use crate::camera::Intrinsics;
 use crate::fault::Result;
 use crate::geometry::{Camera, Plane};
 use crate::gpu::Device;
 use crate::raster::{Image, Mask};
+use crate::stages::ambient;
 use crate::stages::chain::{Batch, Chain, ChainConfig};
 use crate::stages::host::Host;
-use crate::stages::measured::Measure;
 use crate::stages::peak::{self, Peak, Stripe};
 use crate::stages::point::{Optics, Point, plane_in_view};
-use crate::stages::{ThresholdParams, ambient};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::VecDeque;
@@ -56,8 +55,9 @@ pub struct Engine {
     extraction: Extraction,
     width_px: f32,
     pending: Vec<Job>,
-    /// `None` runs on this machine's processor.
+    /// `None` runs on this machine's processor, and why.
     device: Option<Device>,
+    why: Why,
     way: Option<Way>,
     /// Pictures that are started together, and batches under way; `None` is what the size asks for.
     at_once: Option<(u32, usize)>,
@@ -69,9 +69,6 @@ pub struct Engine {
     cut: u64,
 }
 
-/// Least window of the threshold in stripe sigmas: the stripe fills a sixth of it, so the mean stays that
-/// of the surroundings and the flanks stay lit.
-const WINDOW_WIDTHS: f32 = 24.0;
 /// Shots that the processor works on together, at least: as many as it has threads, and enough for their ends to overlap.
 const HOST_BATCH: usize = 4;
 /// Of pictures above this size three are enough to measure the stripe: each has thousands of peaks.
@@ -86,9 +83,9 @@ impl Engine {
         ambient: Option<Ambient>,
         processor: Processor,
     ) -> Engine {
-        let device = match processor {
-            Processor::Twins => None,
-            Processor::Gpu(device) => Some(device),
+        let (device, why) = match processor {
+            Processor::Host(why) => (None, why),
+            Processor::Gpu(device) => (Some(device), Why::Asked),
         };
         Engine {
             format,
@@ -99,6 +96,7 @@ impl Engine {
             extraction: extraction.clone(),
             pending: Vec::new(),
             device,
+            why,
             way: None,
             batches: VecDeque::new(),
             at_once: None,
@@ -119,11 +117,11 @@ impl Engine {
         self.cut
     }
 
-    /// Adapter and driver, or "CPU twins".
+    /// Adapter and driver, or this machine's processor and why.
     pub fn ran_on(&self) -> String {
         match &self.device {
             Some(d) => format!("{}, {}", d.info.name, d.info.driver),
-            None => "CPU twins".into(),
+            None => format!("CPU, {} threads ({})", rayon::current_num_threads(), self.why),
         }
     }
 
@@ -159,25 +157,17 @@ impl Engine {
     /// chain or the processor's.
     pub fn set_stripe(&mut self, stripe: &Stripe) -> Result<()> {
         self.width_px = stripe.width_px;
-        self.extraction = self.extraction.clone().in_noise(stripe.noise);
-        let window = (WINDOW_WIDTHS * stripe.width_px) as u32 | 1;
-        self.extraction.threshold.size = self.extraction.threshold.size.max(window.min(101));
-        self.extraction.peak = self.extraction.peak.with(stripe);
+        self.extraction = self.extraction.clone().for_stripe(stripe);
         self.extraction.peak.check()?;
         self.build()
     }
 
     /// The chain's settings for an extraction: the same on a GPU and without one.
     fn config(&self, e: &Extraction) -> ChainConfig {
-        let f = self.format;
         ChainConfig {
-            threshold: for_depth(e.threshold, f.bits),
-            thinning: e.thinning,
             region: Some(self.region.clone()),
             ambient: self.ambient.as_ref().map(|a| a.image.clone()),
-            lengthen: e.lengthen.word(self.width_px),
-            measure: Some(Measure { peak: e.peak, choose: e.choose, optics: self.optics }),
-            ..ChainConfig::new(f.width, f.height, f.bits)
+            ..e.chain(self.format, self.optics, self.width_px)
         }
     }
 
@@ -266,12 +256,6 @@ impl Engine {
     fn lit<'a>(&self, image: &'a Image) -> Cow<'a, Image> {
         self.ambient.as_ref().map_or(Cow::Borrowed(image), |a| Cow::Owned(ambient::without(image, &a.image)))
     }
-}
-
-/// Grey levels are set for 8 bits and hold for every depth.
-fn for_depth(p: ThresholdParams, bits: u8) -> ThresholdParams {
-    let shift = bits - 8;
-    ThresholdParams { offset: p.offset << shift, minimum: ((u32::from(p.minimum) << shift).min(0xffff)) as u16, ..p }
 }
 
 /// Pixels of a block whose corners are looked at first.

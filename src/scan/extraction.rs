@@ -1,10 +1,14 @@
 //! In: nothing. Out: all settings of the way from picture to points, one group a step.
 //! Frame and unit: each field says; sizes are in stripe widths where the physics scales with the stripe.
 
+use super::Format;
 use crate::fault::{Fault, Result};
+use crate::stages::chain::ChainConfig;
 use crate::stages::choose::ChooseParams;
 use crate::stages::lengthen::LengthenParams;
-use crate::stages::peak::PeakParams;
+use crate::stages::measured::Measure;
+use crate::stages::peak::{PeakParams, Stripe};
+use crate::stages::point::Optics;
 use crate::stages::support::SupportParams;
 use crate::stages::{Thinning, ThresholdParams};
 
@@ -40,6 +44,9 @@ impl Default for Extraction {
     }
 }
 
+/// Least window of the threshold in stripe sigmas: the stripe fills a sixth of it, so the mean stays that
+/// of the surroundings and the flanks stay lit.
+const WINDOW_WIDTHS: f32 = 24.0;
 /// Standard deviations of a dark pixel by which light exceeds it: one pixel in 740 of pure noise does, and such specks have
 /// no neighbours.
 const ABOVE_NOISE: f32 = 3.0;
@@ -57,6 +64,34 @@ impl Extraction {
             self.peak.read_noise = noise.min(20.0);
         }
         self
+    }
+
+    /// The same for pictures with such a stripe: the sizes of the fit, the least window of the threshold, limits above the noise.
+    pub fn for_stripe(self, stripe: &Stripe) -> Extraction {
+        let mut e = self.in_noise(stripe.noise);
+        let window = (WINDOW_WIDTHS * stripe.width_px) as u32 | 1;
+        e.threshold.size = e.threshold.size.max(window.min(101));
+        e.peak = e.peak.with(stripe);
+        e
+    }
+
+    /// What a chain is built for: `scan`, `bench` and the peers run the same. Ends of lines are carried on by widths of `width_px`.
+    pub fn chain(&self, format: Format, optics: Optics, width_px: f32) -> ChainConfig {
+        let shift = format.bits - 8;
+        let ThresholdParams { offset, minimum, .. } = self.threshold;
+        // Grey levels are set for 8 bits and hold for every depth.
+        let threshold = ThresholdParams {
+            offset: offset << shift,
+            minimum: ((u32::from(minimum) << shift).min(0xffff)) as u16,
+            ..self.threshold
+        };
+        ChainConfig {
+            threshold,
+            thinning: self.thinning,
+            lengthen: self.lengthen.word(width_px),
+            measure: Some(Measure { peak: self.peak, choose: self.choose, optics }),
+            ..ChainConfig::new(format.width, format.height, format.bits)
+        }
     }
 
     pub fn check(&self) -> Result<()> {

@@ -86,7 +86,7 @@ impl Live {
         Ok(Live { engine, ready: false })
     }
 
-    /// Adapter and driver, or "CPU twins".
+    /// Adapter and driver, or this machine's processor and why.
     pub fn ran_on(&self) -> String {
         self.engine.ran_on()
     }

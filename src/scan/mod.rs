@@ -28,7 +28,7 @@ pub use live::{Live, Newest};
 pub use map_files::MapScale;
 pub use map_picture::{MapPlace, Shown};
 pub use pcd::write_pcd;
-pub use processor::{Processor, Where};
+pub use processor::{Processor, Where, Why};
 pub use scanner::{Profile, Scanner, camera_for};
 pub use shift::{Plateau, ShiftReport, ShiftRig, Side, shift_scan};
 pub use source::{BadShot, Format, RawFormat, RawFrames, RawSource, RecordingSource, Shot, Source};

@@ -1,13 +1,13 @@
-//! In: where the stages shall run. Out: the GPU, opened, or the CPU twins.
+//! In: where the stages shall run, the adapters of this machine. Out: the GPU, opened, or this machine's own processor, and why.
 //! Frame and unit: none.
 
 use crate::fault::Result;
-use crate::gpu::Device;
+use crate::gpu::{AdapterInfo, Device, adapters};
 
 /// Where the stages run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Where {
-    /// On the GPU where there is one, else on the CPU twins, which give the same results.
+    /// On the GPU where there is one with processors of its own, else on this machine's, which gives the same results.
     #[default]
     Auto,
     Gpu,
@@ -26,21 +26,95 @@ impl std::str::FromStr for Where {
     }
 }
 
+/// Why the stages run without a GPU.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Why {
+    Asked,
+    NoAdapter,
+    /// The best adapter is software of this name: it has the same cores and a longer way to them.
+    Software(String),
+    /// The adapter did not open.
+    Failed(String),
+}
+
+impl std::fmt::Display for Why {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match self {
+            Why::Asked => write!(f, "as asked"),
+            Why::NoAdapter => write!(f, "no GPU adapter found"),
+            Why::Software(name) => write!(f, "{name} is software on the same cores, which is slower"),
+            Why::Failed(what) => write!(f, "the GPU did not open: {what}"),
+        }
+    }
+}
+
 /// What the stages run on.
 #[derive(Clone)]
 pub enum Processor {
-    Twins,
+    /// This machine's own.
+    Host(Why),
     Gpu(Device),
+}
+
+impl Processor {
+    /// This machine's own, as asked.
+    pub fn host() -> Processor {
+        Processor::Host(Why::Asked)
+    }
 }
 
 impl Where {
     /// Refused: `Where::Gpu` on a machine without one.
     pub fn open(self) -> Result<Processor> {
+        // Who names an adapter asks for it.
+        let named = std::env::var_os("SHEETLIGHT_ADAPTER").is_some_and(|name| !name.is_empty());
         Ok(match self {
-            Where::Cpu => Processor::Twins,
+            Where::Cpu => Processor::host(),
             Where::Gpu => Processor::Gpu(Device::open()?),
-            // The twins give the same results, so a machine without a GPU is no error.
-            Where::Auto => Device::open().map_or(Processor::Twins, Processor::Gpu),
+            Where::Auto => match without_gpu(&adapters(), named) {
+                Some(why) => Processor::Host(why),
+                // The results are the same, so a GPU that does not open is no error.
+                None => Device::open().map_or_else(|fault| Processor::Host(Why::Failed(fault.what)), Processor::Gpu),
+            },
         })
+    }
+}
+
+/// Why the best of these adapters is passed over, if it is: a software adapter was slower at every size (`sheetlight doctor`
+/// times both).
+fn without_gpu(adapters: &[AdapterInfo], named: bool) -> Option<Why> {
+    match adapters.first() {
+        _ if named => None,
+        None => Some(Why::NoAdapter),
+        Some(best) => (best.kind == "CPU").then(|| Why::Software(best.name.clone())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn adapter(kind: &str) -> AdapterInfo {
+        AdapterInfo {
+            name: format!("a {kind}"),
+            kind: kind.into(),
+            backend: String::new(),
+            driver: String::new(),
+            max_binding_bytes: 0,
+            max_workgroup: 0,
+            storage_buffers_per_stage: 0,
+            timestamps: false,
+            unified_memory: false,
+        }
+    }
+
+    #[test]
+    fn a_software_adapter_is_taken_only_by_name() {
+        let (gpu, software) = (adapter("discrete GPU"), adapter("CPU"));
+        assert_eq!(without_gpu(&[], false), Some(Why::NoAdapter));
+        assert_eq!(without_gpu(&[software.clone()], false), Some(Why::Software("a CPU".into())));
+        assert_eq!(without_gpu(&[software.clone()], true), None);
+        assert_eq!(without_gpu(&[gpu, software], false), None);
+        assert_eq!(without_gpu(&[adapter("integrated GPU")], false), None);
     }
 }

@@ -123,7 +123,7 @@ impl Scanner {
         self.engine.device().filter(|d| d.has_own_processors())
     }
 
-    /// Adapter and driver, or "CPU twins".
+    /// Adapter and driver, or this machine's processor and why.
     pub fn ran_on(&self) -> String {
         self.engine.ran_on()
     }

@@ -63,7 +63,7 @@ pub fn calibrate_laser_plane(
     let processor = run.place.open()?;
     let device = match &processor {
         Processor::Gpu(device) => Some(device),
-        Processor::Twins => None,
+        Processor::Host(_) => None,
     };
     let fit_with = |laser: &Plane<Camera>, depth_mm: [f64; 2]| -> Result<(Vec<StripeView>, LaserPlaneFit)> {
         let peaks = stripes(&images, &camera.value, laser, depth_mm, run, &processor)?;

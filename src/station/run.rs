@@ -18,7 +18,7 @@ use std::time::Instant;
 pub struct ScanOptions {
     /// Folder for the results; made where it is missing.
     pub out: PathBuf,
-    /// GPU, CPU twins, or the GPU where there is one.
+    /// GPU, this machine's processor, or whichever of them is faster.
     pub place: Where,
     pub extraction: Extraction,
     pub grid: GridOptions,
@@ -45,7 +45,7 @@ pub struct ScanReport {
     pub recording: String,
     /// [`Rig::fingerprint`] of the calibration used.
     pub rig_fingerprint: String,
-    /// Adapter and driver, or "CPU twins".
+    /// Adapter and driver, or this machine's processor and why.
     pub ran_on: String,
     pub image: crate::scan::Format,
     pub shots: usize,

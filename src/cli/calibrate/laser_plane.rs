@@ -33,7 +33,7 @@ pub struct Args {
     /// Farthest depth at which the result is judged, mm
     #[arg(long, requires = "near_mm")]
     far_mm: Option<f64>,
-    /// Where the stages run: auto (GPU where there is one), gpu, or cpu (the twins)
+    /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
     #[arg(long, default_value = "auto", value_parser = super::super::parse::<Where>)]
     on: Where,
     #[command(flatten)]

@@ -1,0 +1,77 @@
+//! In: a device, if there is one. Out: the time of a shot through the whole chain, as `scan` runs it, on this machine's
+//! processor and on the device, in turns. Frame and unit: ms a shot, median of the turns.
+
+use super::machine;
+use super::run::{percentile, scan_chain};
+use super::scenes::{Scene, pictures};
+use crate::fault::Result;
+use crate::gpu::Device;
+use crate::raster::Image;
+use crate::stages::cases;
+use crate::stages::chain::{Batch, Chain, ChainConfig};
+use crate::stages::host::Host;
+use rayon::prelude::*;
+use std::time::Instant;
+
+/// One way through the chain.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct WayTime {
+    pub on: String,
+    pub width: u32,
+    pub height: u32,
+    pub ms_per_shot: f64,
+    /// Of all threads; on a software adapter the GPU's work is in it.
+    pub cpu_ms_per_shot: Option<f64>,
+}
+
+const SIZES: [(u32, u32); 2] = [(640, 480), (2048, 1536)];
+const TURNS: usize = 5;
+
+/// Both ways at two sizes, one clean stripe.
+pub fn way_times(device: Option<&Device>) -> Result<Vec<WayTime>> {
+    let mut found = Vec::new();
+    for (width, height) in SIZES {
+        let config = scan_chain(width, height, Scene::OneStripe, 2.0);
+        let config = device.map_or(config.clone(), |d| config.on(d));
+        let images = pictures(Scene::OneStripe, width, height, config.shots.min(8));
+        let batch: Vec<&Image> = (0..config.shots as usize).map(|i| &images[i % images.len()]).collect();
+        let poses: Vec<_> = (0..config.shots).map(cases::pose).collect();
+        let host = Host::new(&config)?;
+        let mut chain = device.map(|d| Chain::new(d, &ChainConfig { slots: 1, ..config.clone() })).transpose()?;
+        let mut out = Batch::default();
+        let name = format!("CPU, {} threads", rayon::current_num_threads());
+        let names = std::iter::once(name).chain(device.map(|d| d.info.name.clone()));
+        for (way, on) in names.enumerate() {
+            let (mut walls, mut cpus) = (Vec::new(), Vec::new());
+            // The first turn compiles and touches everything.
+            for turn in 0..=TURNS {
+                let (cpu, start) = (machine::cpu_seconds(), Instant::now());
+                match &mut chain {
+                    Some(chain) if way == 1 => {
+                        chain.submit_posed(0, &batch, &poses)?;
+                        chain.collect_into(true, &mut out)?;
+                    }
+                    _ => {
+                        let done: Result<Vec<_>> =
+                            batch.par_iter().zip(&poses).map(|(image, pose)| host.run(0, image, pose)).collect();
+                        done?;
+                    }
+                }
+                if turn > 0 {
+                    walls.push(start.elapsed().as_secs_f64());
+                    cpus.extend(cpu.and_then(|c| Some(machine::cpu_seconds()? - c)));
+                }
+            }
+            let shots = f64::from(config.shots);
+            let cpu_ms_per_shot = (!cpus.is_empty()).then(|| percentile(&mut cpus, 0.5) / shots);
+            found.push(WayTime {
+                on,
+                width,
+                height,
+                ms_per_shot: percentile(&mut walls, 0.5) / shots,
+                cpu_ms_per_shot,
+            });
+        }
+    }
+    Ok(found)
+}
