@@ -3,8 +3,9 @@
 
 mod common;
 
+use sheetlight::fault::Result;
 use sheetlight::gpu::Device;
-use sheetlight::stages::{self, Frame, ThresholdParams, cases, skeleton, thin, threshold};
+use sheetlight::stages::{self, Entry, Frame, ThresholdParams, Verdict, cases, skeleton, thin, threshold};
 
 #[test]
 fn every_stage_equals_its_twin() {
@@ -21,10 +22,25 @@ fn every_stage_that_reads_buffers_equals_its_twin() {
     agree(&device.without_texels());
 }
 
+/// What every rig makes of a stripe: widths, directions and depths, both ways of reading arrays.
+#[test]
+fn peaks_of_every_width_direction_and_depth_equal_their_twin() {
+    let Some(device) = common::device() else { return };
+    let space = if std::env::var_os("SHEETLIGHT_LONG").is_some() { cases::Space::Whole } else { cases::Space::Pairs };
+    for device in [&device, &device.without_texels()] {
+        judge(&["lines", "peak", "point"], |e| e.judge(device, cases::ruled(e.stage.name, space)));
+    }
+}
+
 fn agree(device: &Device) {
+    judge(&[], |e| e.verify(device));
+}
+
+/// The stages of these names, or all.
+fn judge(names: &[&str], verdict: impl Fn(&Entry) -> Result<Verdict>) {
     let mut failed = Vec::new();
-    for entry in stages::all() {
-        let v = entry.verify(device).unwrap();
+    for entry in stages::all().iter().filter(|e| names.is_empty() || names.contains(&e.stage.name)) {
+        let v = verdict(entry).unwrap();
         println!("{:20} {:3} cases, largest difference {} of {}", v.stage, v.cases, v.largest_difference, v.limit);
         assert!(v.cases > 0, "{} has no case", v.stage);
         if !v.passed() {

@@ -2,7 +2,8 @@
 //! Frame and unit: pixels, grey levels.
 
 use crate::raster::Image;
-use crate::stages::cases::{Noise, drawn, stripe};
+use crate::stages::cases::{Noise, drawn, optics, stripe};
+use crate::stages::point::Optics;
 
 /// What the pictures show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -12,6 +13,9 @@ pub enum Scene {
     OneStripe,
     /// The same, sigma 6 px.
     ThickStripe,
+    /// As `OneStripe` and `ThickStripe`, seen by a camera that is turned by 90 degrees.
+    UprightStripe,
+    UprightThick,
     /// A stripe in noise so dense that a tenth of all pixels is lit.
     NoiseHeavy,
     /// A stripe and 60 bright spots.
@@ -19,14 +23,34 @@ pub enum Scene {
 }
 
 impl Scene {
-    pub const ALL: [Scene; 4] = [Scene::OneStripe, Scene::ThickStripe, Scene::NoiseHeavy, Scene::ReflectionHeavy];
+    pub const ALL: [Scene; 6] = [
+        Scene::OneStripe,
+        Scene::ThickStripe,
+        Scene::UprightStripe,
+        Scene::UprightThick,
+        Scene::NoiseHeavy,
+        Scene::ReflectionHeavy,
+    ];
     pub fn name(self) -> &'static str {
         match self {
             Scene::OneStripe => "one stripe",
             Scene::ThickStripe => "thick stripe",
+            Scene::UprightStripe => "upright stripe",
+            Scene::UprightThick => "upright thick",
             Scene::NoiseHeavy => "noise-heavy",
             Scene::ReflectionHeavy => "reflection-heavy",
         }
+    }
+    /// Gaussian sigma of the stripe's profile, px.
+    pub fn width_px(self) -> f32 {
+        if matches!(self, Scene::ThickStripe | Scene::UprightThick) { 6.0 } else { 2.5 }
+    }
+    /// The rig that sees it.
+    pub fn optics(self, width: u32, height: u32) -> Optics {
+        let lying = optics(width, height);
+        let [x, y, z] = lying.normal;
+        let upright = matches!(self, Scene::UprightStripe | Scene::UprightThick);
+        if upright { Optics { normal: [y, x, z], ..lying } } else { lying }
     }
 }
 
@@ -34,8 +58,11 @@ impl Scene {
 pub fn pictures(scene: Scene, width: u32, height: u32, count: u32) -> Vec<Image> {
     (0..u64::from(count))
         .map(|seed| match scene {
-            Scene::OneStripe => stripe(width, height, 8, 2.5, 3, seed),
-            Scene::ThickStripe => stripe(width, height, 8, 6.0, 3, seed),
+            Scene::OneStripe | Scene::ThickStripe => stripe(width, height, 8, scene.width_px().into(), 3, seed),
+            Scene::UprightStripe | Scene::UprightThick => {
+                let lying = stripe(height, width, 8, scene.width_px().into(), 3, seed);
+                drawn(width, height, 8, |x, y| u32::from(lying.get(y, x)))
+            }
             Scene::ReflectionHeavy => stripe(width, height, 8, 2.5, 60, seed),
             // An offset of 8 levels is passed by about a tenth of the pixels.
             Scene::NoiseHeavy => noisy(width, height, 7.0, seed),

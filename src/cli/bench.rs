@@ -23,7 +23,7 @@ pub struct Args {
     /// Picture size in pixels, may be repeated [default: 640x480, 1280x960, 4096x3072, 5120x5120]
     #[arg(long, value_parser = size)]
     size: Vec<(u32, u32)>,
-    /// one-stripe, thick-stripe, noise-heavy or reflection-heavy, may be repeated [default: all]
+    /// one-stripe, thick-stripe, upright-stripe, upright-thick, noise-heavy or reflection-heavy, may be repeated [default: all]
     #[arg(long, value_parser = scene)]
     scene: Vec<Scene>,
     /// Seconds a row runs

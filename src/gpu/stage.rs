@@ -186,19 +186,17 @@ impl Pipeline {
 }
 
 /// What one run of one stage needs: bytes per binding (the uniform's too) and the workgroups.
-pub struct Workload<'a> {
-    pub overrides: &'a [(&'a str, f64)],
+pub struct Workload {
     pub bindings: Vec<Vec<u8>>,
     pub groups: [u32; 3],
 }
 
 /// Runs one stage once and returns the bytes of every binding afterwards. For tests and self-tests.
-pub fn run_once(device: &Device, stage: &Stage, load: &Workload) -> Result<Vec<Vec<u8>>> {
-    let pipeline = stage.pipeline(device, load.overrides)?;
+pub fn run_once(device: &Device, pipeline: &Pipeline, load: &Workload) -> Result<Vec<Vec<u8>>> {
     let buffers = load
         .bindings
         .iter()
-        .zip(stage.bindings)
+        .zip(pipeline.stage.bindings)
         .map(|(bytes, b)| {
             let buffer = device.storage(b.name, bytes.len() as u64)?;
             device.write(&buffer, 0, bytes);

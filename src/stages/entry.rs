@@ -2,7 +2,7 @@
 //! Frame and unit: words of the stage's bindings; the difference's unit is the stage's own.
 
 use crate::fault::Result;
-use crate::gpu::{Device, Stage, Workload, run_once};
+use crate::gpu::{Device, Pipeline, Stage, Workload, run_once};
 
 /// One stage as the tests and `sheetlight doctor` see it.
 pub struct Entry {
@@ -46,6 +46,13 @@ impl Verdict {
 impl Entry {
     /// Runs every case on the GPU and on the twin.
     pub fn verify(&self, device: &Device) -> Result<Verdict> {
+        self.judge(device, (self.cases)())
+    }
+
+    /// The same with other cases.
+    pub fn judge(&self, device: &Device, cases: Vec<Case>) -> Result<Verdict> {
+        // Cases with the same constants share what is compiled for them.
+        let mut compiled: Vec<(Vec<(&str, f64)>, Pipeline)> = Vec::new();
         let mut verdict = Verdict {
             stage: self.stage.name,
             cases: 0,
@@ -54,14 +61,17 @@ impl Entry {
             reason: self.reason,
             worst_case: String::new(),
         };
-        for case in (self.cases)() {
+        for case in cases {
+            if !compiled.iter().any(|(constants, _)| *constants == case.overrides) {
+                compiled.push((case.overrides.clone(), self.stage.pipeline(device, &case.overrides)?));
+            }
+            let (_, pipeline) = compiled.iter().find(|c| c.0 == case.overrides).expect("just compiled");
             let load = Workload {
-                overrides: &case.overrides,
                 bindings: case.bindings.iter().map(|b| bytemuck::cast_slice(b).to_vec()).collect(),
                 groups: case.groups,
             };
             let gpu: Vec<Vec<u32>> =
-                run_once(device, self.stage, &load)?.iter().map(|b| bytemuck::pod_collect_to_vec(b)).collect();
+                run_once(device, pipeline, &load)?.iter().map(|b| bytemuck::pod_collect_to_vec(b)).collect();
             let mut twin = case.bindings;
             (self.twin)(&mut twin, &case.overrides);
             let difference = (self.compare)(&gpu, &twin);

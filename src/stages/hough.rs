@@ -125,13 +125,13 @@ const RUN_BYTES: usize = 64 << 20;
 pub fn vote(device: Option<&Device>, frame: &HoughFrame, shots: &[Vec<u32>]) -> Result<Vec<Vec<u32>>> {
     let Some(device) = device else { return Ok(shots.iter().map(|pixels| votes(frame, pixels)).collect()) };
     let each = (frame.angles * frame.cells) as usize;
+    let pipeline = STAGE.pipeline(device, &[])?;
     let mut out = Vec::new();
     for run in shots.chunks((RUN_BYTES / 4 / each).max(1)) {
         let points: Vec<[u32; 2]> =
             run.iter().enumerate().flat_map(|(i, pixels)| pixels.iter().map(move |&p| [p, i as u32])).collect();
         let n = points.len() as u32;
         let load = Workload {
-            overrides: &[],
             bindings: vec![
                 bytemuck::bytes_of(frame).to_vec(),
                 bytemuck::cast_slice(&[0, 0, 0, n]).to_vec(),
@@ -141,7 +141,7 @@ pub fn vote(device: Option<&Device>, frame: &HoughFrame, shots: &[Vec<u32>]) -> 
             ],
             groups: STAGE.groups([n.max(1), 1, 1]),
         };
-        let bytes = run_once(device, &STAGE, &load)?.pop().expect("the votes");
+        let bytes = run_once(device, &pipeline, &load)?.pop().expect("the votes");
         out.extend(bytemuck::pod_collect_to_vec::<u8, u32>(&bytes).chunks_exact(each).map(<[u32]>::to_vec));
     }
     Ok(out)

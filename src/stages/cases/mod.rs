@@ -1,6 +1,10 @@
 //! In: pictures chosen to break things. Out: the buffers of every stage of the chain at the moment it
 //! runs, made by walking the chain on the CPU twins. Frame and unit: pixels, words.
 
+mod peaks;
+
+pub use peaks::{Space, peaks, ruled};
+
 use super::entry::Case;
 use super::frame::{self, Frame, px_log2};
 use super::*;
@@ -183,55 +187,6 @@ pub fn scenes() -> Vec<Scene> {
         },
         Scene { name: "one pixel", shots: vec![drawn(1, 1, 8, |_, _| 9)], params: p(3, -1, 0), ..base },
     ]
-}
-
-/// The cases of one of the stages after the skeleton, with every method: the scenes with a stripe. The others are noise
-/// and edges, on which a fit ends anywhere.
-pub fn peaks(stage: &str) -> Vec<Case> {
-    scenes().iter().filter(|s| s.name.contains("stripe")).flat_map(|s| peak_cases(s, stage)).collect()
-}
-
-fn peak_cases(scene: &Scene, wanted: &str) -> Vec<Case> {
-    let mut walk = Walk::new(scene);
-    walk.run("");
-    let (f, bits) = (walk.frame, scene.shots[0].bits);
-    let mut cases = Vec::new();
-    for method in peak::Method::ALL {
-        let p = peak::PeakParams { method, width_px: 3.0, speckle: 0.05, ..Default::default() };
-        let choice = choose::ChooseParams { echo: 0.4, ..Default::default() };
-        let frame = peak::PeakFrame::new((f.width, f.height, bits), f.shots, &p, &choice, [0.1, 0.995]);
-        let quads = f64::from(frame.quads());
-        let header = walk.buffers["header"].clone();
-        let n = header[3] as usize;
-        let groups = [(n as u32).div_ceil(64).max(1), 1, 1];
-        let frame_words = bytemuck::cast_slice::<peak::PeakFrame, u32>(&[frame]).to_vec();
-        let mut step = |stage: &crate::gpu::Stage,
-                        twin: fn(&mut [Vec<u32>], &[(&'static str, f64)]),
-                        bindings: &mut Vec<Vec<u32>>,
-                        groups: [u32; 3]| {
-            let all =
-                [(frame::PX_LOG2, f64::from(px_log2(bits))), (peak::METHOD, method.number()), (peak::QUADS, quads)];
-            let overrides: Vec<_> = all.into_iter().filter(|o| stage.overrides.contains(&o.0)).collect();
-            if stage.name == wanted {
-                let name = format!("{}, {method:?}", scene.name);
-                cases.push(Case { name, overrides: overrides.clone(), bindings: bindings.clone(), groups });
-            }
-            twin(bindings, &overrides);
-        };
-        let (image, points) = (walk.buffers["image"].clone(), walk.buffers["points"][..2 * n.max(1)].to_vec());
-        let mut b = vec![frame_words.clone(), vec![7; frame.entries as usize]];
-        step(&choose::LINES, choose::lines_twin, &mut b, choose::lines_groups(&frame));
-        let lines = b.pop().expect("the lines");
-        let mut b = vec![frame_words, image, header.clone(), points, vec![0; 12 * n.max(1)], lines];
-        step(&peak::STAGE, peak::stage_twin, &mut b, groups);
-        let (strongest, peaks) = (b.pop().expect("the strongest"), b.pop().expect("the peaks"));
-        let rig = point::PointFrame::new(&optics(f.width, f.height), &choose::Lines::new(&frame, &choice));
-        let poses = (0..f.shots).flat_map(|i| pose(i).map(f32::to_bits)).collect();
-        let words = bytemuck::cast_slice::<point::PointFrame, u32>(&[rig]).to_vec();
-        let mut b = vec![words, header, poses, strongest, peaks, vec![0; 4 * n.max(1)]];
-        step(&point::STAGE, point::stage_twin, &mut b, groups);
-    }
-    cases
 }
 
 /// A camera of 55 degrees with a common lens, a sheet that crosses its axis at 155 mm.

@@ -1,0 +1,135 @@
+//! In: the scenes with a stripe; straight stripes of every width, direction and depth. Out: the cases of the stages after the
+//! skeleton. Frame and unit: pixels, words.
+
+use super::{Case, Noise, Scene, Walk, drawn, optics, pose};
+use crate::stages::frame::{self, px_log2};
+use crate::stages::peak::{Method, PeakParams};
+use crate::stages::point::Optics;
+use crate::stages::{Thinning, ThresholdParams, choose, peak, point};
+
+/// What the stages are told of a stripe and its rig.
+struct Told {
+    width_px: f32,
+    optics: Optics,
+}
+
+/// The cases of one of the stages after the skeleton, with every method: the scenes with a stripe. The others are noise
+/// and edges, on which a fit ends anywhere.
+pub fn peaks(stage: &str) -> Vec<Case> {
+    let scenes = super::scenes();
+    let striped = scenes.iter().filter(|s| s.name.contains("stripe"));
+    let told = |s: &Scene| Told { width_px: 3.0, optics: optics(s.shots[0].width, s.shots[0].height) };
+    striped.flat_map(|s| cases(s.name, s, &told(s), &Method::ALL, stage)).collect()
+}
+
+/// Profile sigmas, px: every number of quads and of rows a sample.
+const WIDTHS: [f64; 8] = [0.8, 1.0, 1.5, 2.0, 2.5, 3.3, 5.0, 9.0];
+/// A few degrees off the image axes, so that the skeleton comes by every place within a word. The angle of the stripe, then
+/// that of a stripe on a level surface: a wall stands upright where the rig's stripe lies.
+const DIRECTIONS: [(&str, f64, f32); 4] =
+    [("lying", 4.0, 0.0), ("upright", 86.0, 90.0), ("at 45 degrees", 45.0, 45.0), ("a wall", 86.0, 0.0)];
+const DEPTHS: [u8; 4] = [8, 10, 12, 16];
+
+/// How much of widths, directions, depths and methods is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Space {
+    /// Every two of width, direction and depth meet once.
+    Pairs,
+    Whole,
+}
+
+/// Cases of straight stripes of every width, direction and depth.
+pub fn ruled(stage: &str, space: Space) -> Vec<Case> {
+    let mut all = Vec::new();
+    for (i, sigma) in WIDTHS.into_iter().enumerate() {
+        for (j, bits) in DEPTHS.into_iter().enumerate() {
+            for (k, (name, angle_deg, level_deg)) in DIRECTIONS.into_iter().enumerate() {
+                let methods = match space {
+                    Space::Whole => &Method::ALL[..],
+                    Space::Pairs if k != (i + j) % 4 => continue,
+                    Space::Pairs if i % 4 == j => &[Method::Gaussian, Method::ALL[1 + i % 3]],
+                    Space::Pairs => &[Method::Gaussian],
+                };
+                let name = format!("{sigma} px, {name}, {bits} bits");
+                let scene = straight(sigma, angle_deg, bits);
+                let told = Told { width_px: sigma as f32, optics: rig(scene.shots[0].width, level_deg) };
+                all.extend(cases(&name, &scene, &told, methods, stage));
+            }
+        }
+    }
+    all
+}
+
+/// A narrow field of view, so that the sheet is at a working distance all over the picture, and the direction of depth.
+fn rig(width: u32, level_deg: f32) -> Optics {
+    let (sin, cos) = level_deg.to_radians().sin_cos();
+    let [f, c] = [4.0 * width as f32, 0.5 * width as f32];
+    Optics { pinhole: [f, f, c, c, 0.0], normal: [0.8828 * sin, 0.8828 * cos, 0.4694], ..optics(width, width) }
+}
+
+/// A straight stripe through the middle of a picture that holds its background on both sides.
+fn straight(sigma: f64, angle_deg: f64, bits: u8) -> Scene {
+    let (sin, cos) = angle_deg.to_radians().sin_cos();
+    let full = f64::from((1u32 << bits) - 1);
+    let size = (15.0 * sigma) as u32 + 40;
+    let middle = 0.5 * f64::from(size);
+    let mut noise = Noise(u64::from(size));
+    let shot = drawn(size, size + 3, bits, |x, y| {
+        let d = ((f64::from(x) - middle) * sin + (f64::from(y) - middle) * cos) / sigma;
+        let light = 0.7 * (-0.5 * d * d).exp();
+        let read = 0.008 * noise.normal() + (0.0003 * light).sqrt() * noise.normal();
+        (full * (0.04 + light + read)).round().clamp(0.0, full) as u32
+    });
+    let window = ((24.0 * sigma) as u32 | 1).clamp(31, 101);
+    Scene {
+        name: "",
+        shots: vec![shot],
+        params: ThresholdParams { size: window, offset: 8 << (bits - 8), minimum: 0, ..Default::default() },
+        thinning: Thinning::ZhangSuen,
+        flags: 0,
+        ambient: None,
+    }
+}
+
+fn cases(name: &str, scene: &Scene, told: &Told, methods: &[Method], wanted: &str) -> Vec<Case> {
+    let mut walk = Walk::new(scene);
+    walk.run("");
+    let (f, bits) = (walk.frame, scene.shots[0].bits);
+    let mut cases = Vec::new();
+    for &method in methods {
+        let p = PeakParams { method, width_px: told.width_px, speckle: 0.05, ..Default::default() };
+        let choice = choose::ChooseParams { echo: 0.4, ..Default::default() };
+        let frame = peak::PeakFrame::new((f.width, f.height, bits), f.shots, &p, &choice, told.optics.across());
+        let quads = f64::from(frame.quads());
+        let header = walk.buffers["header"].clone();
+        let n = header[3] as usize;
+        let groups = [(n as u32).div_ceil(64).max(1), 1, 1];
+        let frame_words = bytemuck::cast_slice::<peak::PeakFrame, u32>(&[frame]).to_vec();
+        let mut step = |stage: &crate::gpu::Stage,
+                        twin: fn(&mut [Vec<u32>], &[(&'static str, f64)]),
+                        bindings: &mut Vec<Vec<u32>>,
+                        groups: [u32; 3]| {
+            let all =
+                [(frame::PX_LOG2, f64::from(px_log2(bits))), (peak::METHOD, method.number()), (peak::QUADS, quads)];
+            let overrides: Vec<_> = all.into_iter().filter(|o| stage.overrides.contains(&o.0)).collect();
+            if stage.name == wanted {
+                let name = format!("{name}, {method:?}");
+                cases.push(Case { name, overrides: overrides.clone(), bindings: bindings.clone(), groups });
+            }
+            twin(bindings, &overrides);
+        };
+        let (image, points) = (walk.buffers["image"].clone(), walk.buffers["points"][..2 * n.max(1)].to_vec());
+        let mut b = vec![frame_words.clone(), vec![7; frame.entries as usize]];
+        step(&choose::LINES, choose::lines_twin, &mut b, choose::lines_groups(&frame));
+        let lines = b.pop().expect("the lines");
+        let mut b = vec![frame_words, image, header.clone(), points, vec![0; 12 * n.max(1)], lines];
+        step(&peak::STAGE, peak::stage_twin, &mut b, groups);
+        let (strongest, peaks) = (b.pop().expect("the strongest"), b.pop().expect("the peaks"));
+        let rig = point::PointFrame::new(&told.optics, &choose::Lines::new(&frame, &choice));
+        let poses = (0..f.shots).flat_map(|i| pose(i).map(f32::to_bits)).collect();
+        let words = bytemuck::cast_slice::<point::PointFrame, u32>(&[rig]).to_vec();
+        let mut b = vec![words, header, poses, strongest, peaks, vec![0; 4 * n.max(1)]];
+        step(&point::STAGE, point::stage_twin, &mut b, groups);
+    }
+    cases
+}
