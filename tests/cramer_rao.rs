@@ -176,3 +176,105 @@ fn the_stated_standard_deviation_is_the_true_one() {
         assert!((0.85..1.15).contains(&rms), "{rms}");
     }
 }
+
+/// Spread of the lens, px: what it has blurred along the stripe no method brings back.
+const LENS: f64 = 0.7;
+/// Grooves along the stripe, px.
+const PERIODS: [f64; 10] = [2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0];
+/// Half depth of the grooves in the picture, px; 0 is a flat stripe.
+const DEPTH: f64 = 0.4;
+
+/// A stripe whose centre follows a comb of grooves, blurred by the lens along the stripe as it is across.
+fn comb(stripe: &Stripe, period: f64, depth: f64, seed: u64) -> Image {
+    let mut rng = rand_pcg::Pcg64::seed_from_u64(seed);
+    let normal = Normal::new(0.0, 1.0).unwrap();
+    // The lens along u, in quarter pixels out to four of its widths.
+    let reach = (16.0 * LENS).ceil() as i32;
+    let lens: Vec<(f64, f64)> =
+        (-reach..=reach).map(|k| 0.25 * f64::from(k)).map(|d| (d, (-0.5 * (d / LENS).powi(2)).exp())).collect();
+    let all: f64 = lens.iter().map(|l| l.1).sum();
+    let columns: Vec<Vec<(f64, f64)>> = (0..WIDTH)
+        .map(|u| lens.iter().map(|&(d, w)| (groove(f64::from(u) + d, period, depth), w / all)).collect())
+        .collect();
+    let mut pixels = Vec::with_capacity((WIDTH * HEIGHT) as usize);
+    for v in 0..HEIGHT {
+        for column in &columns {
+            let light: f64 = if (f64::from(v) - 60.0).abs() < 6.0 * stripe.sigma {
+                column.iter().map(|&(centre, w)| w * stripe.light(f64::from(v) - centre)).sum()
+            } else {
+                0.0
+            };
+            let level = light + DARK;
+            let noise = (READ * READ + GAIN * level).sqrt() * normal.sample(&mut rng);
+            pixels.push((level + noise).round().clamp(0.0, 255.0) as u8);
+        }
+    }
+    Image::from_u8(WIDTH, HEIGHT, pixels)
+}
+
+fn groove(u: f64, period: f64, depth: f64) -> f64 {
+    60.3 + depth * (std::f64::consts::TAU * u / period).sin()
+}
+
+/// Share of the grooves' depth that a method sees, and the standard deviation of its centres.
+fn response(stripe: &Stripe, method: Method, along: f32, period: f64, depth: f64) -> (f64, f64) {
+    let image = comb(stripe, period, depth, 31);
+    let lit = threshold::twin(&image, &ThresholdParams { size: 49, ..Default::default() });
+    let list = skeleton::twin(&thin::twin(&lit, Thinning::ZhangSuen));
+    let start = PeakParams { method, along, width_px: stripe.sigma as f32, speckle: 0.0, ..PeakParams::default() };
+    let found: Vec<(f64, f64)> = peaks(&image, &list, 0, &PeakParams { gain: GAIN as f32, ..start }, ACROSS)
+        .iter()
+        .map(|p| (f64::from(p.u), f64::from(p.v) - 60.3))
+        .filter(|(u, d)| (40.0..f64::from(WIDTH) - 40.0).contains(u) && d.abs() < 2.0 * stripe.sigma)
+        .collect();
+    assert!(found.len() > 1400, "{} peaks", found.len());
+    let n = found.len() as f64;
+    let mean = found.iter().map(|f| f.1).sum::<f64>() / n;
+    let wave = |u: f64| (std::f64::consts::TAU * u / period).sin();
+    let power: f64 = found.iter().map(|f| wave(f.0).powi(2)).sum();
+    let seen = found.iter().map(|f| (f.1 - mean) * wave(f.0)).sum::<f64>() / power;
+    let rest = found.iter().map(|f| (f.1 - mean - seen * wave(f.0)).powi(2)).sum::<f64>() / n;
+    (seen / depth.max(1e-9), rest.sqrt())
+}
+
+/// How fine a structure along the stripe is seen, beside the noise that is paid for it. A centre of gravity that is averaged along
+/// the stripe, with the same nearly Gaussian weight, until it is as quiet as the fit has lost more of the grooves.
+#[test]
+fn the_fit_keeps_more_detail_than_a_centroid_of_the_same_noise() {
+    let mut faults = Vec::new();
+    println!("share of the grooves' depth by their period, px; half depth {DEPTH} px, lens {LENS} px; noise of a flat stripe");
+    println!("sigma px  method    along  noise px  {}", PERIODS.map(|p| format!("{p:5.0}")).join(" "));
+    for sigma in [1.5, 2.5] {
+        let stripe = Stripe { sigma, peak: 120.0, slope: 0.0 };
+        let noise = |method, along| response(&stripe, method, along, 20.0, 0.0).1;
+        let row = |name: &str, method, along| {
+            let shares = PERIODS.map(|p| response(&stripe, method, along, p, DEPTH).0);
+            let noise = noise(method, along);
+            let shown = shares.map(|s| format!("{s:5.2}")).join(" ");
+            println!("{sigma:8.1}  {name:8}  {along:5.2}  {noise:8.4}  {shown}");
+            shares
+        };
+        let fit = row("fit", Method::Gaussian, 1.0);
+        // The least averaging that brings the centroid to the fit's noise.
+        let quiet = noise(Method::Gaussian, 1.0);
+        let (mut low, mut high) = (0.0f32, 4.0f32);
+        for _ in 0..6 {
+            let middle = 0.5 * (low + high);
+            if noise(Method::Centroid, middle) > quiet { low = middle } else { high = middle }
+        }
+        let centroid = row("centroid", Method::Centroid, high);
+        row("centroid", Method::Centroid, 1.0);
+        row("pixel", Method::Pixel, 0.0);
+        for (k, period) in PERIODS.into_iter().enumerate() {
+            // Grooves that neither sees are noise.
+            if fit[k] < centroid[k] && centroid[k] > 0.02 {
+                faults.push(format!("{sigma} px, period {period}: fit {:.3}, centroid {:.3}", fit[k], centroid[k]));
+            }
+        }
+        // What is 12 px long is seen: the fit averages over about one sigma.
+        if fit[7] < 0.5 {
+            faults.push(format!("{sigma} px: the fit sees {:.2} of grooves of 12 px", fit[7]));
+        }
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}

@@ -126,6 +126,23 @@ fn sum_of(p: u32, even: u32, odd: u32) -> u32 {
     return sum.x + sum.y;
 }
 
+// Of an upright stripe four samples are four pixels of a word, or of two: the weighted sums of two rows, the pixels in pairs as
+// `even` and `odd` of a word are. The words that the next ones begin in are kept.
+var<private> begun: vec2<u32>;
+fn four_of(word: vec2<u32>, bits: vec2<u32>, weights: vec2<u32>) -> vec4<u32> {
+    let next = vec2(image[word.x], image[word.y]);
+    let read = (begun >> bits) | ((next << (vec2(31u) - bits)) << vec2(1u));
+    begun = next;
+    let top = ((read & vec2(0x7f7f7f7fu)) + vec2(0x01010101u)) & read;
+    full |= top.x | top.y;
+    let v = ((read & vec2(sieve.cut)) + vec2(sieve.add)) & read;
+    // 255 times 127, twice, fits 16 bits.
+    let even = (v & vec2(sieve.keep)) * weights;
+    let odd = ((v >> vec2(8u)) & vec2(sieve.keep)) * weights;
+    let sums = vec2(even.x + even.y, odd.x + odd.y);
+    return vec4(sums & vec2(0xffffu), sums >> vec2(16u));
+}
+
 fn three(k: u32, q: u32) -> u32 {
     return (sum_of(groups[0].at + k, groups[0].even[q], groups[0].odd[q]) + sum_of(groups[1].at + k, groups[1].even[q], groups[1].odd[q]))
         + sum_of(groups[2].at + k, groups[2].even[q], groups[2].odd[q]);
@@ -175,6 +192,8 @@ fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
     let low = -floor_div(y0 + min(first_shift, last_shift), tall);
     let high = floor_div(height - 1 - max(first_shift, last_shift) - y0 - (tall - stride), tall);
     let size = select(1, 4, fours);
+    // Samples are pixels side by side.
+    let by_words = px_log2 == 2u && !columns && tall == 1;
     // Weight, its square, moment and second moment of the offsets across.
     var moments = vec4(0.0);
     full = 0u;
@@ -184,7 +203,7 @@ fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
     for (var round = 0; round < 2; round++) {
         moments = vec4(0.0);
         for (var row = 0; row < tall; row += stride) {
-            for (var a = begin; a <= end; a += 3 * size) {
+            for (var a = select(begin, end + 1, by_words); a <= end; a += 3 * size) {
                 groups = array(group(w, a, row), group(w, a + size, row), group(w, a + 2 * size, row));
                 moments += (groups[0].moments + groups[1].moments) + groups[2].moments;
                 var k = 0u;
@@ -196,6 +215,21 @@ fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
                     sums[quads - 1] = v;
                     k += 4u * across;
                 }
+            }
+        }
+        for (var a = select(end + 1, begin, by_words); a <= end; a += 2) {
+            let one = group(w, a, 0);
+            let two = group(w, a + 1, 0);
+            moments += one.moments + two.moments;
+            var word = vec2(one.at, two.at) >> vec2(px_log2);
+            let bits = vec2(8u) * (vec2(one.at, two.at) & vec2(3u));
+            let weights = vec2(u32(one.moments.x), u32(two.moments.x));
+            begun = vec2(image[word.x], image[word.y]);
+            for (var q = 0; q < quads; q++) {
+                word += vec2(1u);
+                let v = sums[0] + vec4<f32>(vec4<i32>(four_of(word, bits, weights)));
+                turn(0); turn(1); turn(2); turn(3); turn(4); turn(5); turn(6); turn(7); turn(8);
+                sums[quads - 1] = v;
             }
         }
         scale = select(1.0, 1.0 / 128.0, sieve.again) / moments.x;
