@@ -6,7 +6,7 @@ mod common;
 
 use common::turned::{self, Step};
 use common::{figure, reference, rigs, score, sheetlight};
-use sheetlight::geometry::{Base, Vec3, fit_plane};
+use sheetlight::geometry::{Base, Plane, Vec3, fit_plane};
 use sheetlight::scan::{CloudPoint, read_cloud, write_cloud};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -130,7 +130,8 @@ fn turned_back(mut cloud: Vec<CloudPoint>, steps: &[Step]) -> Vec<CloudPoint> {
 fn a_turned_camera_sees_the_same_plate_on_both_processors() {
     let Some(reference) = reference("turned cameras") else { return };
     let (inputs, truth) = rigs(&reference).remove(0);
-    let truth = serde_json::from_slice(&std::fs::read(truth.join("flat/truth.json")).unwrap()).unwrap();
+    let truth: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(truth.join("flat/truth.json")).unwrap()).unwrap();
     let dir = tempfile::tempdir().unwrap();
     let cloud = |steps: &[Step], on: &str| {
         let name = format!("{steps:?} {on}");
@@ -141,9 +142,13 @@ fn a_turned_camera_sees_the_same_plate_on_both_processors() {
         turned::recording(&inputs.join("flat"), &at("pictures"), steps, Some(18..28));
         turned_back(scan(&at("pictures"), &station, on, &at(on)), steps)
     };
+    let known = &truth["plane_base"];
+    let normal = Vec3::from_fn(|i, _| known["normal"][i].as_f64().unwrap());
+    let known = Plane::<Base>::new(normal, known["offset_mm"].as_f64().unwrap()).unwrap();
+    // The plate without the table beside it.
     let own_plane = |cloud: &[CloudPoint]| {
-        let points: Vec<Vec3> = cloud.iter().map(|p| Vec3::from(p.position.map(f64::from))).collect();
-        fit_plane::<Base>(&points).expect("a plate")
+        let points = cloud.iter().map(|p| Vec3::from(p.position.map(f64::from)));
+        fit_plane::<Base>(&points.filter(|p| known.distance(p).abs() < 1.0).collect::<Vec<_>>()).expect("a plate")
     };
     let straight = cloud(&[], "cpu");
     let (plane, rms) = own_plane(&straight);
@@ -151,8 +156,9 @@ fn a_turned_camera_sees_the_same_plate_on_both_processors() {
     for steps in [&quarter[..1], &quarter[..2], &quarter, &[Step::Mirror], &[Step::Mirror, Step::Quarter]] {
         let twins = cloud(steps, "cpu");
         let (own, own_rms) = own_plane(&twins);
-        let middle = Vec3::from(twins[twins.len() / 2].position.map(f64::from));
-        let (height, angle) = (plane.distance(&middle) - own.distance(&middle), plane.normal.cross(&own.normal).norm());
+        let middle = Vec3::from(straight[straight.len() / 2].position.map(f64::from));
+        let height = own.distance(&middle) * own.normal.dot(&plane.normal).signum() - plane.distance(&middle);
+        let angle = plane.normal.cross(&own.normal).norm();
         println!(
             "{steps:?}: {} of {} points, rms {own_rms:.5} of {rms:.5} mm, {height:.5} mm off",
             twins.len(),
