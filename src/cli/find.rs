@@ -7,18 +7,23 @@ use crate::fault::{Fault, Result};
 use crate::find::{Accelerator, LocateOptions, Recipe, Report};
 use crate::geometry::Vec3;
 use crate::robot::Convention;
-use crate::station::{Settings, find_part};
+use crate::station::{Settings, find_part_in_all};
 use std::path::PathBuf;
 
 /// Find a part in a scan and say where the robot inserts
 ///
 /// No pose leaves when a gate of the recipe is missed; the report says which, and the exit code is 1.
+///
+/// One scan cannot show what calibrations, delay, convention or robot got wrong. With a second scan of the same part from
+/// another side (sheetlight second-look plans it) the pose comes from both, and what they disagree about is a gate.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
-  sheetlight find scans/board7 --recipe data/recipes/led.toml --station cell3 --out led.json")]
+  sheetlight find scans/board7 --recipe data/recipes/led.toml --station cell3 --out led.json
+  sheetlight find scans/board7 scans/board7b --recipe data/recipes/led.toml --station cell3 --out led.json")]
 pub struct Args {
-    /// Folder that sheetlight scan --out wrote
-    scan: PathBuf,
+    /// Folders that sheetlight scan --out wrote: one, or several looks at the same part
+    #[arg(required = true)]
+    scans: Vec<PathBuf>,
     /// Recipe (TOML): the part's drawing, constructions, insertion, gates
     #[arg(long)]
     recipe: PathBuf,
@@ -46,7 +51,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     }
     let robot = args.robot.or(of_station).unwrap_or(Convention::Matrix);
     let options = LocateOptions { up, robot, accelerator: Accelerator::open() };
-    let (report, picture) = find_part(&args.scan, &recipe, args.station.as_deref(), &options)?;
+    let (report, picture) = find_part_in_all(&args.scans, &recipe, args.station.as_deref(), &options)?;
     let text = serde_json::to_string_pretty(&report).expect("plain data");
     crate::files::write(&args.out, text.as_bytes())?;
     let image = args.out.with_extension("png");
@@ -102,6 +107,30 @@ pub(super) fn summary(r: &Report) -> String {
     }
     if let Some(d) = r.disagreement_mm {
         s += &format!("  the two-pin construction and the lattice fit disagree by {d:.3} mm\n");
+    }
+    if let Some(l) = &r.looks {
+        s += &format!(
+            "looks        {} of them, turned by {:.0} and tilted by {:.0} degrees; looks {} and {} disagree by {} mm, {} degrees; \
+             {} mm, {} degrees are expected{}\n",
+            l.looks,
+            l.turn_deg,
+            l.tilt_deg,
+            l.between[0],
+            l.between[1],
+            row(&l.difference_mm, 4),
+            row(&l.difference_deg, 4),
+            row(&l.expected_mm, 4),
+            row(&l.expected_deg, 4),
+            if l.complete { "" } else { " at least (a calibration does not know its uncertainty)" }
+        );
+        for e in &l.explained_by {
+            s += &format!(
+                "  {:12} would explain {:.0} % of it, if it were wrong by {:.1} of its own sigmas\n",
+                e.name,
+                100.0 * e.share,
+                e.off_by_sigmas
+            );
+        }
     }
     for g in &r.gates {
         s += &format!(

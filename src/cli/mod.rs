@@ -14,6 +14,7 @@ mod live;
 mod model;
 mod range;
 mod scan;
+mod second_look;
 mod shift_scan;
 mod simulate;
 mod station;
@@ -65,6 +66,7 @@ enum Command {
     Model(model::Args),
     Range(range::Args),
     Scan(scan::Args),
+    SecondLook(second_look::Args),
     ShiftScan(shift_scan::Args),
     /// Simulate a station with known truth: recordings, poses, true calibration
     Simulate(simulate::Args),
@@ -88,6 +90,7 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Model(a) => model::run(a, console),
         Command::Range(a) => range::run(a, console),
         Command::Scan(a) => scan::run(a, console),
+        Command::SecondLook(a) => second_look::run(a, console),
         Command::ShiftScan(a) => shift_scan::run(a, console),
         Command::Simulate(a) => simulate::run(a, console),
         Command::Verify(a) => verify::run(a, console),

@@ -7,7 +7,7 @@ use super::points::Ordered;
 use super::recipe::RobotSpec;
 use crate::geometry::{Base, Camera, Mat3, Rigid, Vec2, Vec3};
 use crate::rig::{Covariance, Rig};
-use nalgebra::{DMatrix, Matrix6, SMatrix};
+use nalgebra::{DMatrix, Matrix6};
 
 /// One line of the budget.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -20,6 +20,28 @@ pub struct Term {
     pub note: String,
 }
 
+/// What an error of one calibration does to the pose. Two looks share the error; where their levers differ, they disagree.
+#[derive(Clone, Debug)]
+pub struct Lever {
+    pub name: &'static str,
+    /// The calibration's parameters, with units.
+    pub parameters: &'static [&'static str],
+    /// Motion of the part over an error of each parameter, base axes: shift of the part's origin, mm, then turn, rad; 6 x n.
+    pub jacobian: DMatrix<f64>,
+    /// Of the parameters; `None` where the calibration does not know it (imported values).
+    pub covariance: Option<DMatrix<f64>>,
+}
+
+impl Lever {
+    /// Covariance that the calibration adds to the pose, base axes; zero where it is unknown.
+    pub fn of_pose(&self) -> Matrix6<f64> {
+        match &self.covariance {
+            Some(c) => Matrix6::from_iterator((&self.jacobian * c * self.jacobian.transpose()).iter().copied()),
+            None => Matrix6::zeros(),
+        }
+    }
+}
+
 /// The budget and its sum over the terms that are known.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Budget {
@@ -30,40 +52,55 @@ pub struct Budget {
     pub complete: bool,
     #[serde(skip)]
     pub covariance: Matrix6<f64>,
+    /// What belongs to this look alone: match and robot, the part's axes.
+    #[serde(skip)]
+    pub own: Matrix6<f64>,
+    /// What all looks of this rig share; none where the scan does not fit the rig.
+    #[serde(skip)]
+    pub levers: Vec<Lever>,
+    /// How the camera stood over the middle of the part.
+    #[serde(skip)]
+    pub base_from_camera: Option<Rigid<Base, Camera>>,
 }
 
 /// Adds up the budget. `rig` may be missing or have imported values of unknown uncertainty.
 pub fn budget(points: &Ordered, measured: &Measured, rig: Option<&Rig>, robot: &RobotSpec) -> Budget {
-    let mut covariance = measured.covariance;
+    let (p, r) = (robot.sigma_mm.powi(2), robot.sigma_deg.to_radians().powi(2));
+    let repeatability = Matrix6::from_diagonal(&nalgebra::Vector6::new(p, p, p, r, r, r));
+    let own = measured.covariance + repeatability;
+    let mut covariance = own;
     let mut terms = vec![
         peak_noise(points, measured),
         term("match", &measured.covariance, "edges and surfaces of the part, peak noise included".into()),
     ];
     let mut complete = true;
     let geometry = rig.and_then(|r| Geometry::at(points, measured, r));
-    for (name, part) in
-        [("laser plane", laser_plane(geometry.as_ref(), rig)), ("hand-eye", hand_eye(geometry.as_ref(), rig))]
-    {
-        match part {
-            Ok((c, note)) => {
+    let levers = geometry.as_ref().zip(rig).map_or(Vec::new(), |(g, rig)| levers(&g.base_from_camera, &g.target, rig));
+    for name in ["laser plane", "hand-eye"] {
+        let known = levers.iter().find(|l| l.name == name);
+        match (known.filter(|l| l.covariance.is_some()), &geometry) {
+            (Some(lever), Some(g)) => {
+                let c = lever.of_pose();
+                let shift = c.fixed_view::<3, 3>(0, 0).trace().max(0.0).sqrt();
+                let c = g.in_part(&c);
                 covariance += c;
-                terms.push(term(name, &c, note));
+                terms.push(term(name, &c, format!("{shift:.4} mm at {:.0} mm from the camera", g.target.norm())));
             }
-            Err(note) => {
+            _ => {
                 complete = false;
+                let note = if known.is_some() { NO_COVARIANCE } else { NO_GEOMETRY }.into();
                 terms.push(Term { name, sigma_mm: None, sigma_deg: None, note });
             }
         }
     }
-    let (p, r) = (robot.sigma_mm.powi(2), robot.sigma_deg.to_radians().powi(2));
-    let c = Matrix6::from_diagonal(&nalgebra::Vector6::new(p, p, p, r, r, r));
-    covariance += c;
-    terms.push(term("robot", &c, "repeatability, from the recipe".into()));
+    terms.push(term("robot", &repeatability, "repeatability, from the recipe".into()));
     let [sigma_mm, sigma_deg] = sigmas(&covariance);
-    Budget { terms, sigma_mm, sigma_deg, complete, covariance }
+    let base_from_camera = geometry.map(|g| g.base_from_camera);
+    Budget { terms, sigma_mm, sigma_deg, complete, covariance, own, levers, base_from_camera }
 }
 
-fn sigmas(c: &Matrix6<f64>) -> [[f64; 3]; 2] {
+/// Standard deviations of a pose's covariance: x y z in mm, turns about them in degrees.
+pub(super) fn sigmas(c: &Matrix6<f64>) -> [[f64; 3]; 2] {
     let sd = |k: usize| c[(k, k)].max(0.0).sqrt();
     [[sd(0), sd(1), sd(2)], [sd(3), sd(4), sd(5)].map(f64::to_degrees)]
 }
@@ -166,55 +203,62 @@ fn align(from: &[Vec3], to: &[Vec3]) -> Option<Rigid<Base, Camera>> {
     (rms < 0.2).then_some(t)
 }
 
-type Part = std::result::Result<(Matrix6<f64>, String), String>;
-
 const NO_GEOMETRY: &str = "unknown: the scan does not fit the station's calibration, or none was given";
+const NO_COVARIANCE: &str = "unknown: the calibration has no covariance (imported values)";
 
-fn laser_plane(geometry: Option<&Geometry>, rig: Option<&Rig>) -> Part {
-    let (Some(g), Some(plane)) = (geometry, rig.and_then(|r| r.laser_plane.as_ref())) else {
-        return Err(NO_GEOMETRY.into());
-    };
-    let c = square(&plane.covariance, 4).ok_or("unknown: the calibration has no covariance (imported values)")?;
-    let n = plane.value.normal;
-    let ray = g.target.normalize();
+/// The levers of the calibrations that a rig has, for a camera that sees the part's origin at `target` (camera frame).
+pub(super) fn levers(base_from_camera: &Rigid<Base, Camera>, target: &Vec3, rig: &Rig) -> Vec<Lever> {
+    let plane = rig
+        .laser_plane
+        .as_ref()
+        .map(|p| Lever { covariance: square(&p.covariance, 4), ..plane_lever(base_from_camera, target, &p.value) });
+    let hand_eye = rig
+        .hand_eye
+        .as_ref()
+        .map(|h| Lever { covariance: square(&h.covariance, 6), ..hand_eye_lever(base_from_camera, target, &h.value) });
+    plane.into_iter().chain(hand_eye).collect()
+}
+
+/// How the part at `target` (camera frame) moves with the laser plane: P = ray offset / (n ray), so that
+/// dP = ray (d offset - P dn) / (n ray).
+pub(super) fn plane_lever(
+    base_from_camera: &Rigid<Base, Camera>,
+    target: &Vec3,
+    plane: &crate::geometry::Plane<Camera>,
+) -> Lever {
+    let n = plane.normal;
+    let ray = target.normalize();
     let slope = n.dot(&ray);
-    // P = ray * offset / (n . ray): dP = ray * (d offset - P . dn) / (n . ray).
-    let mut j = SMatrix::<f64, 6, 4>::zeros();
-    let direction = g.base_from_camera.direction(&ray) / slope;
+    let mut jacobian = DMatrix::zeros(6, 4);
+    let direction = base_from_camera.direction(&ray) / slope;
     for k in 0..3 {
-        let column = direction * -g.target[k];
-        j.fixed_view_mut::<3, 1>(0, k).copy_from(&column);
+        jacobian.fixed_view_mut::<3, 1>(0, k).copy_from(&(direction * -target[k]));
     }
-    j.fixed_view_mut::<3, 1>(0, 3).copy_from(&direction);
+    jacobian.fixed_view_mut::<3, 1>(0, 3).copy_from(&direction);
     // A tilt of the plane by dn tilts what is scanned by up to |dn| / |slope| about n x dn.
     for k in 0..3 {
         let mut e = Vec3::zeros();
         e[k] = 1.0;
-        let turn = g.base_from_camera.direction(&n.cross(&e));
-        j.fixed_view_mut::<3, 1>(3, k).copy_from(&turn);
+        jacobian.fixed_view_mut::<3, 1>(3, k).copy_from(&base_from_camera.direction(&n.cross(&e)));
     }
-    let c4 = SMatrix::<f64, 4, 4>::from_fn(|i, k| c[(i, k)]);
-    let shift = (j * c4 * j.transpose()).fixed_view::<3, 3>(0, 0).trace().max(0.0).sqrt();
-    Ok((g.in_part(&(j * c4 * j.transpose())), format!("{shift:.4} mm at {:.0} mm from the camera", g.target.norm())))
+    Lever { name: "laser plane", parameters: &["nx", "ny", "nz", "offset mm"], jacobian, covariance: None }
 }
 
-fn hand_eye(geometry: Option<&Geometry>, rig: Option<&Rig>) -> Part {
-    let (Some(g), Some(hand_eye)) = (geometry, rig.and_then(|r| r.hand_eye.as_ref())) else {
-        return Err(NO_GEOMETRY.into());
-    };
-    let c = square(&hand_eye.covariance, 6).ok_or("unknown: the calibration has no covariance (imported values)")?;
-    // R = exp(w) R0, so a camera point moves by dt + w x (R0 p) in the flange frame.
-    let x = hand_eye.value;
-    let base_from_flange = g.base_from_camera.rotation * x.rotation.transpose();
-    let lever = crate::geometry::skew(&(x.rotation * g.target));
-    let mut j = Matrix6::zeros();
-    j.fixed_view_mut::<3, 3>(0, 0).copy_from(&base_from_flange);
-    j.fixed_view_mut::<3, 3>(0, 3).copy_from(&(base_from_flange * -lever));
-    j.fixed_view_mut::<3, 3>(3, 3).copy_from(&base_from_flange);
-    let c6 = Matrix6::from_fn(|i, k| c[(i, k)]);
-    let moved = j * c6 * j.transpose();
-    let shift = moved.fixed_view::<3, 3>(0, 0).trace().max(0.0).sqrt();
-    Ok((g.in_part(&moved), format!("{shift:.4} mm at {:.0} mm from the camera", g.target.norm())))
+/// How the part at `target` (camera frame) moves with the hand-eye transform: R = exp(w) R0, so a camera point moves by
+/// dt + w x (R0 p) in the flange frame.
+pub(super) fn hand_eye_lever(
+    base_from_camera: &Rigid<Base, Camera>,
+    target: &Vec3,
+    hand_eye: &crate::rig::HandEye,
+) -> Lever {
+    let base_from_flange = base_from_camera.rotation * hand_eye.rotation.transpose();
+    let arm = crate::geometry::skew(&(hand_eye.rotation * target));
+    let mut jacobian = DMatrix::zeros(6, 6);
+    jacobian.fixed_view_mut::<3, 3>(0, 0).copy_from(&base_from_flange);
+    jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&(base_from_flange * -arm));
+    jacobian.fixed_view_mut::<3, 3>(3, 3).copy_from(&base_from_flange);
+    let parameters = &["tx mm", "ty mm", "tz mm", "rx rad", "ry rad", "rz rad"];
+    Lever { name: "hand-eye", parameters, jacobian, covariance: None }
 }
 
 fn square(c: &Covariance, n: usize) -> Option<DMatrix<f64>> {

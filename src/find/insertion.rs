@@ -5,6 +5,7 @@
 use super::accelerator::Accelerator;
 use super::budget::{Budget, budget, towards_camera};
 use super::construct::{Built, build, features};
+use super::looks::{self, Agreed, Disagreement, Look};
 use super::measure::{Measured, localise, measure};
 use super::model::ShapeModel;
 use super::points::Ordered;
@@ -93,6 +94,12 @@ pub struct Report {
     pub surface_rms_mm: f64,
     pub growth_mm: [f64; 2],
     pub notes: Vec<String>,
+    /// What further looks at the part said; `None`: one look alone, not cross-checked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub looks: Option<Disagreement>,
+    /// The part's pose moved by what was constructed: the tool goes by it.
+    #[serde(skip)]
+    pub base_from_constructed: Rigid<Base, Part>,
     #[serde(skip)]
     pub map: HeightMap,
 }
@@ -276,7 +283,7 @@ fn conclude(
     agreement: Agreement,
     turns: Vec<TurnVote>,
     constructions: Vec<Built>,
-    notes: Vec<String>,
+    mut notes: Vec<String>,
 ) -> Report {
     let spec = &recipe.insertion;
     let budget = budget(points, &measured, rig, &recipe.robot);
@@ -285,11 +292,7 @@ fn conclude(
         .zip(named(&spec.lattice))
         .map(|(a, b)| (a.deviation_mm[0] - b.deviation_mm[0]).hypot(a.deviation_mm[1] - b.deviation_mm[1]));
     let gates = gates(&recipe.gates, &found, recipe, &budget, &agreement, &turns, disagreement_mm);
-    let reasons: Vec<String> = gates
-        .iter()
-        .filter(|g| !g.passed)
-        .map(|g| format!("{} is {:.3}, limit {:.3}", g.name, g.value, g.limit))
-        .collect();
+    let reasons: Vec<String> = gates.iter().filter(|g| !g.passed).map(Gate::words).collect();
     // The construction's deviation moves the part pose in its plane.
     let moved = constructions.iter().find(|b| b.name == spec.construction).map_or_else(Rigid::identity, |b| {
         let turn = b.deviation_deg.unwrap_or(0.0).to_radians();
@@ -300,29 +303,15 @@ fn conclude(
             Vec3::new(b.measured.x - (c * x - s * y), b.measured.y - (s * x + c * y), 0.0),
         )
     });
-    let part_from_tool: Rigid<Part, Tool> =
-        Rigid::from_vectors(&Vec3::new(0.0, 0.0, spec.turn_deg.to_radians()), Vec3::from(spec.offset_mm));
-    let base_from_tool = measured.base_from_part * moved * part_from_tool;
-    let above = |mm: f64| base_from_tool * Rigid::<Tool, Tool>::from_vectors(&Vec3::zeros(), Vec3::new(0.0, 0.0, mm));
-    let write = |pose: Rigid<Base, Tool>| RobotPose {
-        base_from_tool: pose,
-        convention: options.robot.name(),
-        labels: options.robot.labels(),
-        numbers: options.robot.write(&pose),
-    };
+    let base_from_constructed = measured.base_from_part * moved;
+    notes.push(ONE_LOOK.into());
     let passed = reasons.is_empty();
-    let plane_sigma = budget.sigma_mm[0].max(budget.sigma_mm[1]);
-    let turn_sigma = budget.sigma_deg.iter().copied().fold(0.0, f64::max);
     Report {
         recipe: recipe.name.clone(),
         passed,
         reasons,
-        poses: passed.then(|| Poses {
-            insertion: write(base_from_tool),
-            approach: write(above(spec.approach_mm)),
-            retract: write(above(spec.retract_mm)),
-        }),
-        within_tolerance: 3.0 * plane_sigma <= spec.tolerance_mm && 3.0 * turn_sigma <= spec.tolerance_deg,
+        poses: passed.then(|| poses_at(&base_from_constructed, recipe, options.robot)),
+        within_tolerance: within_tolerance(recipe, budget.sigma_mm, budget.sigma_deg),
         tolerance_mm: spec.tolerance_mm,
         tolerance_deg: spec.tolerance_deg,
         sigma_mm: budget.sigma_mm,
@@ -341,7 +330,81 @@ fn conclude(
         surface_rms_mm: measured.surface_rms,
         growth_mm: measured.growth,
         notes,
+        looks: None,
+        base_from_constructed,
         map,
+    }
+}
+
+/// What is said of a pose that rests on one look.
+const ONE_LOOK: &str = "not cross-checked: one look cannot show what calibrations, delay, convention or robot got wrong; \
+    plan a second one with sheetlight second-look";
+
+/// The tool's poses for a part whose pose is known.
+fn poses_at(base_from_part: &Rigid<Base, Part>, recipe: &Recipe, robot: Convention) -> Poses {
+    let spec = &recipe.insertion;
+    let part_from_tool: Rigid<Part, Tool> =
+        Rigid::from_vectors(&Vec3::new(0.0, 0.0, spec.turn_deg.to_radians()), Vec3::from(spec.offset_mm));
+    let base_from_tool = *base_from_part * part_from_tool;
+    let above = |mm: f64| base_from_tool * Rigid::<Tool, Tool>::from_vectors(&Vec3::zeros(), Vec3::new(0.0, 0.0, mm));
+    let write = |pose: Rigid<Base, Tool>| RobotPose {
+        base_from_tool: pose,
+        convention: robot.name(),
+        labels: robot.labels(),
+        numbers: robot.write(&pose),
+    };
+    Poses {
+        insertion: write(base_from_tool),
+        approach: write(above(spec.approach_mm)),
+        retract: write(above(spec.retract_mm)),
+    }
+}
+
+/// True where the insertion bears three standard deviations.
+fn within_tolerance(recipe: &Recipe, sigma_mm: [f64; 3], sigma_deg: [f64; 3]) -> bool {
+    let turn = sigma_deg.iter().copied().fold(0.0, f64::max);
+    3.0 * sigma_mm[0].max(sigma_mm[1]) <= recipe.insertion.tolerance_mm && 3.0 * turn <= recipe.insertion.tolerance_deg
+}
+
+/// One report from several looks at the same part: the agreed pose, what the looks disagree about, and the gates on it. Every
+/// look must have met its own gates. Errors: none of the looks, or a covariance that cannot be inverted.
+pub fn agree(reports: Vec<Report>, recipe: &Recipe, robot: Convention) -> Result<Report> {
+    let looks: Vec<Look> =
+        reports.iter().map(|r| Look { base_from_part: r.base_from_constructed, budget: &r.budget }).collect();
+    let Agreed { base_from_part, covariance, disagreement } = looks::agree(&looks)?;
+    let reasons: Vec<String> =
+        (1..).zip(&reports).flat_map(|(k, r)| r.reasons.iter().map(move |why| format!("look {k}: {why}"))).collect();
+    let mut report = reports.into_iter().next().expect("looks agree about one part at least");
+    report.notes.retain(|n| n != ONE_LOOK);
+    let second = disagreement.gates(&recipe.gates);
+    report.reasons = reasons;
+    report.reasons.extend(second.iter().filter(|g| !g.passed).map(Gate::words));
+    report.gates.retain(|g| g.name != LOOKS);
+    report.reasons.retain(|why| !why.contains(LOOKS));
+    report.gates.extend(second);
+    report.passed = report.reasons.is_empty();
+    [report.sigma_mm, report.sigma_deg] = super::budget::sigmas(&covariance);
+    report.base_from_part = base_from_part;
+    report.base_from_constructed = base_from_part;
+    report.within_tolerance = within_tolerance(recipe, report.sigma_mm, report.sigma_deg);
+    report.poses = report.passed.then(|| poses_at(&base_from_part, recipe, robot));
+    report.looks = Some(disagreement);
+    Ok(report)
+}
+
+/// The gate of recipes that ask for more than one look.
+const LOOKS: &str = "looks";
+
+impl Gate {
+    pub fn least(name: &'static str, value: f64, limit: f64) -> Gate {
+        Gate { name, value, limit, passed: value >= limit }
+    }
+    pub fn most(name: &'static str, value: f64, limit: f64) -> Gate {
+        Gate { name, value, limit, passed: value <= limit }
+    }
+    /// What was missed.
+    fn words(&self) -> String {
+        format!("{} is {:.3}, limit {:.3}", self.name, self.value, self.limit)
     }
 }
 
@@ -354,8 +417,7 @@ fn gates(
     turns: &[TurnVote],
     disagreement: Option<f64>,
 ) -> Vec<Gate> {
-    let least = |name, value, limit| Gate { name, value, limit, passed: value >= limit };
-    let most = |name, value: f64, limit| Gate { name, value, limit, passed: value <= limit };
+    let (least, most) = (Gate::least, Gate::most);
     let margin = 1.0 - rival_score(found, recipe) / found.score.max(1e-9);
     let mut out = vec![
         least("score", found.score, g.min_score),
@@ -372,6 +434,9 @@ fn gates(
     }
     if g.turn_must_be_told {
         out.extend(turns.iter().map(TurnVote::gate));
+    }
+    if g.second_look {
+        out.push(least(LOOKS, 1.0, 2.0));
     }
     out
 }

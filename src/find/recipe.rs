@@ -135,6 +135,14 @@ pub struct Gates {
     pub max_disagreement_mm: f64,
     /// False lets a part pass whose alike turns could not be told apart.
     pub turn_must_be_told: bool,
+    /// True refuses a pose that rests on one look alone.
+    pub second_look: bool,
+    /// Largest disagreement of two looks over what all covariances make expect, 1 to 10.
+    pub max_look_ratio: f64,
+    /// Least turn about the part's normal and least tilt against it from one look to the other, degrees, 0 to 180 and 0 to 60:
+    /// looks from one side make the same error twice.
+    pub min_look_turn_deg: f64,
+    pub min_look_tilt_deg: f64,
 }
 
 impl Default for Gates {
@@ -150,6 +158,10 @@ impl Default for Gates {
             max_crossed: 0.05,
             max_disagreement_mm: 0.2,
             turn_must_be_told: true,
+            second_look: false,
+            max_look_ratio: 3.0,
+            min_look_turn_deg: 60.0,
+            min_look_tilt_deg: 10.0,
         }
     }
 }
@@ -256,6 +268,9 @@ impl Recipe {
         range("gates.max_sigma_mm", g.max_sigma_mm, 1e-4, 10.0)?;
         range("gates.max_sigma_deg", g.max_sigma_deg, 1e-4, 10.0)?;
         range("gates.max_disagreement_mm", g.max_disagreement_mm, 1e-4, 10.0)?;
+        range("gates.max_look_ratio", g.max_look_ratio, 1.0, 10.0)?;
+        range("gates.min_look_turn_deg", g.min_look_turn_deg, 0.0, 180.0)?;
+        range("gates.min_look_tilt_deg", g.min_look_tilt_deg, 0.0, 60.0)?;
         range("robot.sigma_mm", self.robot.sigma_mm, 0.0, 10.0)?;
         range("robot.sigma_deg", self.robot.sigma_deg, 0.0, 10.0)
     }

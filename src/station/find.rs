@@ -5,11 +5,59 @@
 use super::run::{cloud_of, load_report};
 use crate::fault::{Fault, Result};
 use crate::find::teach::{TeachOptions, teach};
-use crate::find::{LocateOptions, Recipe, Report, locate, picture};
+use crate::find::{LocateOptions, LookPlan, Recipe, Report, agree, locate, picture, plan_look};
+use crate::geometry::{Base, Flange, Rigid, Vec3};
 use crate::raster::RgbImage;
 use crate::rig::Rig;
 use crate::scan::{GridOptions, grid};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// Finds the recipe's part in one or more finished scans of it and brings them together ([`agree`]); the picture is the first
+/// scan's. Errors: those of each scan; of several, the first.
+pub fn find_part_in_all(
+    scans: &[PathBuf],
+    recipe: &Recipe,
+    station: Option<&Path>,
+    options: &LocateOptions,
+) -> Result<(Report, RgbImage)> {
+    let Some((first, more)) = scans.split_first() else {
+        return Err(Fault::usage("no scan was named").next("name the folder that sheetlight scan --out wrote"));
+    };
+    let (report, picture) = find_part(first, recipe, station, options)?;
+    if more.is_empty() {
+        return Ok((report, picture));
+    }
+    let mut reports = vec![report];
+    for scan in more {
+        // From another side the heights are still those above the first look's part.
+        let up = options.up.or_else(|| Some(reports[0].base_from_part.direction(&Vec3::z())));
+        reports.push(find_part(scan, recipe, station, &LocateOptions { up, ..options.clone() })?.0);
+    }
+    Ok((agree(reports, recipe, options.robot)?, picture))
+}
+
+/// Where the robot goes for a second look at the part of a scan, shot by shot, and what the two looks can show.
+pub struct SecondLook {
+    pub report: Report,
+    pub plan: LookPlan,
+    /// base_from_flange for each shot of the first scan that saw the part's surroundings.
+    pub flanges: Vec<Rigid<Base, Flange>>,
+}
+
+/// Plans a second look ([`plan_look`]) from a finished scan and the poses of its recording.
+pub fn second_look(
+    scan: &Path,
+    poses: &[Rigid<Base, Flange>],
+    recipe: &Recipe,
+    station: &Path,
+    turn_deg: f64,
+    tilt_deg: f64,
+) -> Result<SecondLook> {
+    let (report, _) = find_part(scan, recipe, Some(station), &LocateOptions::default())?;
+    let plan = plan_look(&report, &Rig::load(station)?, turn_deg, tilt_deg)?;
+    let flanges = poses.iter().map(|p| plan.base_from_base * *p).collect();
+    Ok(SecondLook { report, plan, flanges })
+}
 
 /// Finds the recipe's part in a finished scan. Without `station` the budget lacks the calibrations.
 pub fn find_part(

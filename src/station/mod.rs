@@ -26,7 +26,7 @@ pub use calibrate_hand_eye::{Calibrated, HandEyeResult, HandEyeRun, calibrate_ha
 pub use calibrate_laser_plane::{LaserPlaneRun, calibrate_laser_plane};
 pub use calibrate_pointer::{PointerRun, calibrate_pointer};
 pub use calibrate_profile_hand_eye::calibrate_profile_hand_eye;
-pub use find::{find_part, teach_part};
+pub use find::{SecondLook, find_part, find_part_in_all, second_look, teach_part};
 pub use guide::{GuideOptions, Guided, Step, guide};
 pub use judge::{Judged, judge};
 pub use judge_parts::{FoundPart, judge_parts};
