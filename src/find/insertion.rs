@@ -31,11 +31,22 @@ pub struct LocateOptions {
     pub robot: Convention,
     /// A GPU for the coarse search; the result is the same without.
     pub accelerator: Option<Accelerator>,
+    /// Where another look found the part: tried before what the search finds. From the side a part hides some of its own
+    /// edges, and the best match may lie beside it.
+    pub expected: Option<Rigid<Base, Part>>,
 }
 
 impl Default for LocateOptions {
     fn default() -> Self {
-        LocateOptions { up: None, robot: Convention::Matrix, accelerator: None }
+        LocateOptions { up: None, robot: Convention::Matrix, accelerator: None, expected: None }
+    }
+}
+
+impl LocateOptions {
+    /// For another look at the part of `first`: heights stay those above that part, which is expected where it was.
+    pub fn again(self, first: &Report) -> LocateOptions {
+        let up = self.up.or_else(|| Some(first.base_from_part.direction(&Vec3::z())));
+        LocateOptions { up, expected: Some(first.base_from_part), ..self }
     }
 }
 
@@ -135,7 +146,8 @@ pub fn locate(cloud: &[CloudPoint], recipe: &Recipe, rig: Option<&Rig>, options:
         ));
     }
     let gate = recipe.measure.height_gate_mm;
-    let Judged { found: best, mut measured } = best_hypothesis(&points, &map, recipe, &best, &matches)?;
+    let Judged { found: best, mut measured } =
+        best_hypothesis(&points, &map, recipe, options.expected.as_ref(), &best, &matches)?;
     let mut turns = vote(&points, &drawing, &measured.base_from_part, recipe.alike_turns, gate);
     if let Some(t) = turns.iter().find(|t| t.told() == Some(false)) {
         notes.push(format!(
@@ -178,6 +190,7 @@ fn best_hypothesis(
     points: &Ordered,
     map: &HeightMap,
     recipe: &Recipe,
+    expected: Option<&Rigid<Base, Part>>,
     best: &Match,
     matches: &[Match],
 ) -> Result<Judged> {
@@ -191,8 +204,10 @@ fn best_hypothesis(
     });
     let mut kept: Option<(f64, Judged)> = None;
     let mut trouble = None;
-    for found in std::iter::once(best.clone()).chain(rivals).chain(matches.iter().skip(1).cloned()).take(MOST) {
-        let start = slide(points, &drawing, lift(&found.pose, map, points, recipe), &recipe.measure);
+    let searched = std::iter::once(best.clone()).chain(rivals).chain(matches.iter().skip(1).cloned()).take(MOST);
+    let starts = expected.map(|e| (best.clone(), *e)).into_iter();
+    for (found, start) in starts.chain(searched.map(|m| (m.clone(), lift(&m.pose, map, points, recipe)))) {
+        let start = slide(points, &drawing, start, &recipe.measure);
         let measured = match measure(points, &drawing, start, &recipe.measure) {
             Ok(measured) => measured,
             Err(e) => {
@@ -292,7 +307,8 @@ fn conclude(
         .zip(named(&spec.lattice))
         .map(|(a, b)| (a.deviation_mm[0] - b.deviation_mm[0]).hypot(a.deviation_mm[1] - b.deviation_mm[1]));
     let gates = gates(&recipe.gates, &found, recipe, &budget, &agreement, &turns, disagreement_mm);
-    let reasons: Vec<String> = gates.iter().filter(|g| !g.passed).map(Gate::words).collect();
+    let reasons: Vec<String> =
+        missed(&gates).chain(gates.iter().filter(|g| g.name == LOOKS).map(Gate::words)).collect();
     // The construction's deviation moves the part pose in its plane.
     let moved = constructions.iter().find(|b| b.name == spec.construction).map_or_else(Rigid::identity, |b| {
         let turn = b.deviation_deg.unwrap_or(0.0).to_radians();
@@ -373,14 +389,13 @@ pub fn agree(reports: Vec<Report>, recipe: &Recipe, robot: Convention) -> Result
         reports.iter().map(|r| Look { base_from_part: r.base_from_constructed, budget: &r.budget }).collect();
     let Agreed { base_from_part, covariance, disagreement } = looks::agree(&looks)?;
     let reasons: Vec<String> =
-        (1..).zip(&reports).flat_map(|(k, r)| r.reasons.iter().map(move |why| format!("look {k}: {why}"))).collect();
+        (1..).zip(&reports).flat_map(|(k, r)| missed(&r.gates).map(move |why| format!("look {k}: {why}"))).collect();
     let mut report = reports.into_iter().next().expect("looks agree about one part at least");
     report.notes.retain(|n| n != ONE_LOOK);
     let second = disagreement.gates(&recipe.gates);
     report.reasons = reasons;
     report.reasons.extend(second.iter().filter(|g| !g.passed).map(Gate::words));
     report.gates.retain(|g| g.name != LOOKS);
-    report.reasons.retain(|why| !why.contains(LOOKS));
     report.gates.extend(second);
     report.passed = report.reasons.is_empty();
     [report.sigma_mm, report.sigma_deg] = super::budget::sigmas(&covariance);
@@ -392,8 +407,13 @@ pub fn agree(reports: Vec<Report>, recipe: &Recipe, robot: Convention) -> Result
     Ok(report)
 }
 
-/// The gate of recipes that ask for more than one look.
-const LOOKS: &str = "looks";
+/// The gate of recipes that ask for more than one look; several looks meet it together.
+const LOOKS: &str = "number of looks";
+
+/// The gates that a look missed by itself, in words.
+fn missed(gates: &[Gate]) -> impl Iterator<Item = String> {
+    gates.iter().filter(|g| !g.passed && g.name != LOOKS).map(Gate::words)
+}
 
 impl Gate {
     pub fn least(name: &'static str, value: f64, limit: f64) -> Gate {

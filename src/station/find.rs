@@ -6,7 +6,7 @@ use super::run::{cloud_of, load_report};
 use crate::fault::{Fault, Result};
 use crate::find::teach::{TeachOptions, teach};
 use crate::find::{LocateOptions, LookPlan, Recipe, Report, agree, locate, picture, plan_look};
-use crate::geometry::{Base, Flange, Rigid, Vec3};
+use crate::geometry::{Base, Flange, Rigid};
 use crate::raster::RgbImage;
 use crate::rig::Rig;
 use crate::scan::{GridOptions, grid};
@@ -29,9 +29,7 @@ pub fn find_part_in_all(
     }
     let mut reports = vec![report];
     for scan in more {
-        // From another side the heights are still those above the first look's part.
-        let up = options.up.or_else(|| Some(reports[0].base_from_part.direction(&Vec3::z())));
-        reports.push(find_part(scan, recipe, station, &LocateOptions { up, ..options.clone() })?.0);
+        reports.push(find_part(scan, recipe, station, &options.clone().again(&reports[0]))?.0);
     }
     Ok((agree(reports, recipe, options.robot)?, picture))
 }
