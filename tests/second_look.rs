@@ -12,7 +12,7 @@ use rand_pcg::Pcg64;
 use sheetlight::find::looks::other_side;
 use sheetlight::find::{LocateOptions, Recipe, Report, agree, locate};
 use sheetlight::geometry::{Base, Camera, Flange, Mat3, Part, Plane, Rigid, Vec2, Vec3, exp};
-use sheetlight::rig::{Calibration, Covariance, Quality, Rig, Verdict};
+use sheetlight::rig::{Calibration, Covariance, Kind, Quality, Rig, Verdict};
 use sheetlight::robot::{Convention, zyx_deg, zyx_of};
 use sheetlight::scan::CloudPoint;
 use sheetlight::simulate::{InScene, Scene, SceneSpec, Station, base_from_scene, part_pose, scan};
@@ -217,11 +217,12 @@ fn rig(b: &Believed) -> Rig {
     let names = ["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"];
     let hand_eye = Covariance::new(&names, &DMatrix::from_diagonal(&DVector::from_vec(vec![t, t, t, w, w, w])));
     let none = Covariance::default();
+    let camera = Calibration::new(Kind::Camera, b.station.camera, None, none, quality.clone());
     Rig {
-        camera: Some(Calibration::new("camera", "camera", b.station.camera, none, quality.clone())),
-        laser_plane: Some(Calibration::new("laser_plane", "camera", b.plane, plane, quality.clone())),
+        laser_plane: Some(Calibration::new(Kind::LaserPlane, b.plane, Some(&camera), plane, quality.clone())),
+        hand_eye: Some(Calibration::new(Kind::HandEye, b.hand_eye, Some(&camera), hand_eye, quality)),
         pointer: None,
-        hand_eye: Some(Calibration::new("hand_eye", "flange", b.hand_eye, hand_eye, quality)),
+        camera: Some(camera),
     }
 }
 

@@ -50,7 +50,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         return Err(Fault::usage("--up has no direction").next("give three numbers, e.g. 0,0,1"));
     }
     let robot = args.robot.or(of_station).unwrap_or(Convention::Matrix);
-    let options = LocateOptions { up, robot, accelerator: Accelerator::open() };
+    let options = LocateOptions { up, robot, accelerator: Accelerator::open(), expected: None };
     let (report, picture) = find_part_in_all(&args.scans, &recipe, args.station.as_deref(), &options)?;
     let text = serde_json::to_string_pretty(&report).expect("plain data");
     crate::files::write(&args.out, text.as_bytes())?;
