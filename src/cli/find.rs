@@ -125,10 +125,11 @@ pub(super) fn summary(r: &Report) -> String {
         );
         for e in &l.explained_by {
             s += &format!(
-                "  {:12} would explain {:.0} % of it, if it were wrong by {:.1} of its own sigmas\n",
+                "  {:12} would explain {:.0} % of it, if it were wrong by {:.1} of its own sigmas; however wrong, it could hide {} mm\n",
                 e.name,
                 100.0 * e.share,
-                e.off_by_sigmas
+                e.off_by_sigmas,
+                row(&e.unseen_mm, 3)
             );
         }
     }

@@ -18,7 +18,7 @@ pub struct Look<'a> {
     pub budget: &'a Budget,
 }
 
-/// How much of the disagreement one calibration would explain, if it were free to be wrong.
+/// How much of the disagreement one calibration would explain, if it were free to be wrong, and what it could hide.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Explanation {
     pub name: &'static str,
@@ -26,6 +26,10 @@ pub struct Explanation {
     pub share: f64,
     /// By how much it would have to be wrong, in its own sigmas (root mean square over its parameters).
     pub off_by_sigmas: f64,
+    /// Three standard deviations of the agreed pose if this calibration is not believed at all and the others are: how far off
+    /// it can make the pose without the looks showing it. Along the part's axes.
+    pub unseen_mm: [f64; 3],
+    pub unseen_deg: [f64; 3],
 }
 
 /// What the looks disagree about.
@@ -128,6 +132,18 @@ impl Stack {
         Stack { motions, covariance }
     }
 
+    /// The motion of least variance that all looks share, and its covariance.
+    fn agreed(&self) -> Result<(Vector6, Matrix6<f64>)> {
+        let weights = self.covariance.clone().cholesky().ok_or_else(singular)?;
+        let mut each = DMatrix::zeros(self.motions.len(), 6);
+        for i in 0..self.motions.len() / 6 {
+            each.view_mut((6 * i, 0), (6, 6)).fill_with_identity();
+        }
+        let covariance = (each.transpose() * weights.solve(&each)).cholesky().ok_or_else(singular)?.inverse();
+        let step = &covariance * each.transpose() * weights.solve(&self.motions);
+        Ok((Vector6::from_iterator(step.iter().copied()), Matrix6::from_iterator(covariance.iter().copied())))
+    }
+
     /// Motions and covariance of the looks' differences from the first look.
     fn differences(&self) -> (DVector<f64>, DMatrix<f64>) {
         let n = self.motions.len() - 6;
@@ -155,21 +171,14 @@ pub fn agree(looks: &[Look]) -> Result<Agreed> {
             .next("name the second scan's folder behind the first"));
     }
     let stack = Stack::new(looks, None);
-    let weights = stack.covariance.clone().cholesky().ok_or_else(singular)?;
-    let mut each = DMatrix::zeros(stack.motions.len(), 6);
-    for i in 0..looks.len() {
-        each.view_mut((6 * i, 0), (6, 6)).fill_with_identity();
-    }
-    let normal = each.transpose() * weights.solve(&each);
-    let covariance = normal.cholesky().ok_or_else(singular)?.inverse();
-    let step = &covariance * each.transpose() * weights.solve(&stack.motions);
+    let (step, covariance) = stack.agreed()?;
     let first = looks[0].base_from_part;
     let base_from_part = Rigid::new(
         exp(&Vec3::new(step[3], step[4], step[5])) * first.rotation,
         first.translation + Vec3::new(step[0], step[1], step[2]),
     );
     let into_part = both(&base_from_part.rotation.transpose());
-    let covariance = into_part * Matrix6::from_iterator(covariance.iter().copied()) * into_part.transpose();
+    let covariance = into_part * covariance * into_part.transpose();
     Ok(Agreed { base_from_part, covariance, disagreement: disagreement(looks, &stack, &into_part)? })
 }
 
@@ -202,13 +211,13 @@ fn disagreement(looks: &[Look], stack: &Stack, into_part: &Matrix6<f64>) -> Resu
         ratio,
         turn_deg,
         tilt_deg,
-        explained_by: explanations(looks, stack)?,
+        explained_by: explanations(looks, stack, into_part)?,
         complete: looks.iter().all(|l| l.budget.complete),
     })
 }
 
 /// For each calibration: the disagreement that is left when it may be wrong by anything, against that of all as stated.
-fn explanations(looks: &[Look], stack: &Stack) -> Result<Vec<Explanation>> {
+fn explanations(looks: &[Look], stack: &Stack, into_part: &Matrix6<f64>) -> Result<Vec<Explanation>> {
     let (d, c) = stack.differences();
     let all = d.dot(&c.cholesky().ok_or_else(singular)?.solve(&d));
     let mut out = Vec::new();
@@ -228,8 +237,12 @@ fn explanations(looks: &[Look], stack: &Stack) -> Result<Vec<Explanation>> {
         let error = (&own * 1e6) * shown.transpose() * whitened;
         let sigmas: f64 =
             (0..error.len()).filter(|&k| own[(k, k)] > 0.0).map(|k| error[k].powi(2) / own[(k, k)]).sum::<f64>();
+        let unseen = into_part * freed.agreed()?.1 * into_part.transpose();
+        let unseen = unseen.diagonal().map(|v| 3.0 * v.max(0.0).sqrt());
         out.push(Explanation {
             name,
+            unseen_mm: [unseen[0], unseen[1], unseen[2]],
+            unseen_deg: [unseen[3], unseen[4], unseen[5]].map(f64::to_degrees),
             share: if all > 0.0 { (1.0 - left / all).clamp(0.0, 1.0) } else { 0.0 },
             off_by_sigmas: (sigmas / error.len() as f64).sqrt(),
         });
