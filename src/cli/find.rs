@@ -3,6 +3,7 @@
 //! Frame and unit: base frame; mm, degrees.
 
 use super::Console;
+use super::outputs::{self, Inputs};
 use crate::fault::{Fault, Result};
 use crate::find::{Accelerator, LocateOptions, Recipe, Report};
 use crate::geometry::Vec3;
@@ -38,6 +39,9 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let image = args.out.with_extension("png");
+    let inputs = Inputs { files: &[&args.recipe], scan: Some(&args.scan), station: args.station.as_deref() };
+    outputs::check(&[&args.out, &image], &inputs)?;
     let recipe = Recipe::load(&args.recipe)?;
     let of_station = args.station.as_deref().map(Settings::load).transpose()?.and_then(|s| s.robot);
     let up = args.up.map(Vec3::from);
@@ -49,7 +53,6 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let (report, picture) = find_part(&args.scan, &recipe, args.station.as_deref(), &options)?;
     let text = serde_json::to_string_pretty(&report).expect("plain data");
     crate::files::write(&args.out, text.as_bytes())?;
-    let image = args.out.with_extension("png");
     crate::files::write(&image, &picture.to_png())?;
     console.result(&report, &summary(&report));
     console.say(format!("see {} and {}", args.out.display(), image.display()));

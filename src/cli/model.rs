@@ -3,6 +3,7 @@
 
 use super::Console;
 use super::insertion::InsertionArgs;
+use super::outputs::{self, Inputs};
 use crate::fault::{Fault, Result};
 use crate::find::dxf::{self, DxfOptions, Unit};
 use crate::find::{TaskOptions, recipe_of};
@@ -49,6 +50,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
+    outputs::check(&[&args.out], &Inputs { files: &[&args.drawing], ..Inputs::default() })?;
     let bytes = std::fs::read(&args.drawing).map_err(|e| Fault::read(&args.drawing, e))?;
     let options = DxfOptions { unit: args.unit, layers: args.layers.clone(), origin: args.origin };
     let read = dxf::read(&bytes, &options).map_err(|e| e.at(args.drawing.display()))?;

@@ -53,6 +53,12 @@ pub struct Args {
     /// Shots to draw with their peaks
     #[arg(long, default_value_t = 6)]
     overlays: usize,
+    /// With --raw: numbers of the frames that never came, from 0; frames and poses must then be as many
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', requires = "raw")]
+    missing: Vec<usize>,
+    /// Read pictures and poses that meta.json names outside the recording's folder
+    #[arg(long)]
+    pictures_outside: bool,
     /// Leave out shots that cannot be read, and list them
     #[arg(long)]
     skip_bad: bool,
@@ -76,6 +82,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         overlays: args.overlays,
         skip_bad: args.skip_bad,
         resume: args.resume,
+        stop: super::interrupt::asked_for(),
     };
     if let Some(truth) = &args.truth {
         // A wrong path shall not cost a scan.
@@ -90,12 +97,13 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         (Some(folder), None) => {
             let mut recording = Recording::open(folder)?;
             recording.channel = args.channel;
+            recording.outside = args.pictures_outside;
             recording.pose_file(args.poses.as_deref())?.warnings.iter().for_each(|w| console.warn(w));
             let mut id = identity(folder, &recording, args.poses.as_deref())?;
             if let Some(name) = &args.ambient {
                 let inside = folder.join(name);
                 let path = if inside.is_file() { inside } else { name.clone() };
-                options.ambient = Some(load(&path, args.channel, recording.meta.image.bits)?);
+                options.ambient = Some(recording.load(&path)?);
                 id += &hash_file(&path)?;
             }
             let open = |first| Ok(Box::new(RecordingSource::open(&recording, args.poses.as_deref(), first)?) as Box<_>);
@@ -112,7 +120,8 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
             if let Some(path) = &args.ambient {
                 options.ambient = Some(load(path, args.channel, raw.format.bits)?);
             }
-            let open = |_| Ok(Box::new(RawSource::new(raw, std::io::stdin().lock(), file.poses)) as Box<_>);
+            let missing = args.missing.iter().copied().collect();
+            let open = |_| Ok(Box::new(RawSource::new(raw, std::io::stdin().lock(), file.poses, missing)?) as Box<_>);
             crate::station::scan("pipe", "standard input", open, &rig, &options, progress)?
         }
         _ => {
@@ -122,9 +131,9 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         }
     };
     bar.finish_and_clear();
-    let Some(truth) = &args.truth else {
+    let Some(truth) = args.truth.as_ref().filter(|_| report.points > 0) else {
         console.result(&report, &summary(&report, &args.out));
-        return Ok(());
+        return report.has_points();
     };
     let errors = judge(&args.out, truth, &[])?;
     let e = &errors.cloud;
@@ -160,7 +169,9 @@ fn summary(r: &ScanReport, out: &Path) -> String {
         "{} points from {} shots of {}x{} in {:.1} s ({:.1} shots/s, {})\n",
         r.points, r.shots, r.image.width, r.image.height, r.seconds, r.shots_per_second, r.ran_on
     );
-    s += &format!("each point good to {:.3} mm (median standard deviation)\n", r.median_sigma_mm);
+    if let Some(sigma) = r.median_sigma_mm {
+        s += &format!("each point good to {sigma:.3} mm (median standard deviation)\n");
+    }
     let all: u64 = r.peaks.values().sum();
     for (fate, n) in &r.peaks {
         s += &format!("  {:>9} peaks {fate} ({:.2} %)\n", n, 100.0 * *n as f64 / all.max(1) as f64);

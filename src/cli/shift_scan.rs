@@ -61,6 +61,11 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         bed_rows: args.bed_rows.iter().map(|r| rows(r)).collect::<Result<_>>()?,
         channel: args.channel,
     };
+    if args.out.join("scan.json").exists() {
+        return Err(crate::fault::Fault::usage(format!("{}: holds a scan", args.out.display()))
+            .cause("a shift scan would replace its points")
+            .next("give another --out"));
+    }
     let bar = console.bar("measuring shifts", 0);
     let (report, cloud) = shift_scan(&args.pictures, &rig, args.min_height_mm, &mut |done, of| {
         bar.set_length(of as u64);

@@ -62,6 +62,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
+    super::outputs::check_simulation(&args.out)?;
     let mut sets = Vec::new();
     for name in &args.sets {
         match name.as_str() {

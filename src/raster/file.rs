@@ -1,4 +1,4 @@
-//! In: PNG, JPEG, TIFF and PGM files, grey or colour. Out: grey images with the depth the sensor had.
+//! In: PNG, JPEG, TIFF, BMP and PGM files, grey or colour. Out: grey images with the depth the sensor had.
 //! Frame and unit: pixels, grey levels. The only place that names the `image` crate with `image8`.
 
 use super::{Image, Pixels};
@@ -43,7 +43,7 @@ pub fn decode(bytes: &[u8], channel: Channel, bits: u8) -> Result<Image> {
     }
     let picture = image::load_from_memory(bytes).map_err(|e| {
         Fault::input(format!("is not a readable picture ({} bytes): {e}", bytes.len()))
-            .cause("the file is truncated, empty, or of a format other than PNG, JPEG, TIFF and PGM")
+            .cause("the file is truncated, empty, or of a format other than PNG, JPEG, TIFF, BMP and PGM")
             .next("record the shot again, or pass --skip-bad to leave it out")
     })?;
     let (width, height) = (picture.width(), picture.height());

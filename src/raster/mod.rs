@@ -7,12 +7,14 @@ mod float;
 mod image8;
 mod mask;
 mod pgm;
+mod response;
 mod text;
 
 pub use file::{Channel, decode, load, png, save_png};
 pub use float::{float_tiff, read_float_tiff};
 pub use image8::{Rgb, RgbImage};
 pub use mask::Mask;
+pub use response::Response;
 pub use text::text_width;
 
 /// Grey levels, row-major.

@@ -72,6 +72,12 @@ impl Measured for Intrinsics {
                 "numbers in another order",
             ));
         }
+        if self.normalised_from_pixel(&Vec2::new(w / 2.0, h / 2.0)).is_none() {
+            return Err(bad(
+                format!("the lens k1 k2 p1 p2 k3 = {:?} cannot be undone in the picture's middle", self.distortion),
+                "coefficients of another lens model, or in another order",
+            ));
+        }
         Ok(())
     }
 }
@@ -197,6 +203,7 @@ mod tests {
             check(|c| c.cx = 5000.0),
             check(|c| c.fx = 100.0),
             check(|c| c.fy = f64::NAN),
+            check(|c| (c.cx, c.distortion[0]) = (100.0, 1e300)),
         ] {
             assert!(!wrong.unwrap_err().cause.is_empty());
         }

@@ -45,6 +45,8 @@ pub struct Scanner {
     /// Poses of shots that the engine works on, oldest first.
     poses: std::collections::VecDeque<(u32, Rigid<Base, Camera>)>,
     up: Vec3,
+    /// Where the scan's first shot was taken, if this is not its first part.
+    first: Option<Rigid<Base, Flange>>,
 }
 
 impl Scanner {
@@ -80,7 +82,13 @@ impl Scanner {
             support: None,
             poses: Default::default(),
             up: Vec3::z(),
+            first: None,
         })
+    }
+
+    /// Where the first shot of a resumed scan was taken: what follows from it stays what it was.
+    pub fn began_at(&mut self, first: Option<Rigid<Base, Flange>>) {
+        self.first = first;
     }
 
     /// Takes the next shot. Profiles become ready some shots later.
@@ -148,7 +156,8 @@ impl Scanner {
             };
             self.stripe = Some(stripe);
             self.engine.set_stripe(&stripe)?;
-            let base_from_camera = self.waiting[0].base_from_flange * self.camera_from_flange.inverse();
+            let first = self.first.unwrap_or(self.waiting[0].base_from_flange);
+            let base_from_camera = first * self.camera_from_flange.inverse();
             self.up = -base_from_camera.direction(&Vec3::z());
             let [nx, ny, _] = self.optics.normal.map(f64::from);
             let along = Vec3::new(ny, -nx, 0.0).try_normalize(1e-9).unwrap_or(Vec3::x());

@@ -247,13 +247,13 @@ fn pictures(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(folder).map_err(|e| Fault::read(folder, e))?;
     let known = |p: &PathBuf| {
         let extension = p.extension().map(|e| e.to_string_lossy().to_lowercase());
-        extension.is_some_and(|e| ["jpg", "jpeg", "png", "tif", "tiff", "pgm"].contains(&e.as_str()))
+        extension.is_some_and(|e| ["jpg", "jpeg", "png", "tif", "tiff", "bmp", "pgm"].contains(&e.as_str()))
     };
     let mut names: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(known).collect();
     names.sort_by_key(|p| crate::files::natural(&p.to_string_lossy()));
     if names.is_empty() {
         return Err(Fault::input(format!("{}: holds no pictures", folder.display()))
-            .cause("another folder, or pictures of another format than JPEG, PNG, TIFF, PGM")
+            .cause("another folder, or pictures of another format than JPEG, PNG, TIFF, BMP, PGM")
             .next("give the folder with the pictures"));
     }
     Ok(names)

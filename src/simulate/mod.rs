@@ -17,6 +17,6 @@ pub use pattern::Pattern;
 pub use picture::{expose, hot_pixels};
 pub use plan::{Views, above, base_from_scene, board_views, flange, reported, scan};
 pub use scene::{CutSpec, Hit, Material, PartSpec, Scene, SceneSpec, ShapeSpec, SolidSpec, part_pose};
-pub use station::{LineLaser, Pointer, Sensor, Station};
+pub use station::{LineLaser, Pointer, Sensor, Station, TRUE_VALUES};
 pub use truth::{CloudErrors, PartTruth, PointerTruth, Truth, TruthFile};
 pub use write::{DEFAULT_SCENE, Set, SimulateOptions, Simulated, simulate};

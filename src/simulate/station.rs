@@ -135,6 +135,9 @@ pub struct Station {
     pub seed: u64,
 }
 
+/// What a simulated calibration says of itself.
+pub const TRUE_VALUES: &str = "true values of a simulated station";
+
 impl Station {
     /// The design: a 5.08 mm lens on 8.3 µm pixels, the laser 77 mm below the camera at 28 degrees,
     /// the pointer 40 mm beside it; the flange 94 mm behind the camera.
@@ -218,7 +221,7 @@ impl Station {
     pub fn store(&self, folder: &Path) -> Result<()> {
         let quality = Quality {
             verdict: Verdict::Good,
-            reasons: vec!["true values of a simulated station".into()],
+            reasons: vec![TRUE_VALUES.into()],
             advice: vec![],
             figures: Default::default(),
             per_picture: vec![],

@@ -316,7 +316,7 @@ impl Plan {
                 height: station.camera.height,
                 bits: station.sensor.bits,
                 channels: 1,
-                response: "linear".into(),
+                response: crate::raster::Response::Linear,
                 pixel_centre: "integer coordinates".into(),
             },
             beam,

@@ -57,12 +57,7 @@ pub fn calibrate_hand_eye(
     let seen = boards(recording, &camera.value, progress)?;
     let mut pairs = Vec::new();
     for b in &seen.found {
-        let index = recording.meta.frames[b.frame].pose.unwrap_or(b.frame);
-        let pose: &Rigid<Base, Flange> = poses.get(index).ok_or_else(|| {
-            Fault::input(format!("{}: asks for pose {index}, the pose file has {}", b.pose.name, poses.len()))
-                .cause("the pose file belongs to another recording, or ends early")
-                .next("export the poses of all pictures again")
-        })?;
+        let pose: &Rigid<Base, Flange> = recording.pose_of(b.frame, &poses).map_err(|e| e.at(&b.pose.name))?;
         let (r, t) = match run.mount {
             Mount::EyeInHand => (pose.inverse().rotation, pose.inverse().translation),
             Mount::EyeToHand => (pose.rotation, pose.translation),

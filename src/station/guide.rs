@@ -130,12 +130,13 @@ pub fn guide(options: &GuideOptions, confirm: &mut dyn FnMut(&Step) -> Result<bo
         overlays: 0,
         skip_bad: false,
         resume: false,
+        stop: Default::default(),
     };
     let open = |first| Ok(Box::new(RecordingSource::open(&recording, poses, first)?) as Box<_>);
     let id = hash_file(&options.scan.join("meta.json"))?;
     let scanned = scan(&id, &options.scan.display().to_string(), open, &rig, &run, |_, _| {})?;
 
-    let cloud = super::run::cloud_of(&scan_folder)?;
+    let cloud = super::report::cloud_of(&scan_folder)?;
     let accelerator = (options.place != Where::Cpu).then(Accelerator::open).flatten();
     let locate_options = LocateOptions { up: Some(normal), robot: options.robot, accelerator };
     let report = locate(&cloud, &recipe, Some(&rig), &locate_options)?;
