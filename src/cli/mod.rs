@@ -14,12 +14,14 @@ mod interrupt;
 mod live;
 mod model;
 mod outputs;
+mod printable;
 mod range;
 mod scan;
 mod shift_scan;
 mod simulate;
 mod station;
 mod teach;
+mod threads;
 mod verify;
 
 pub use console::Console;
@@ -109,7 +111,8 @@ pub fn main() -> u8 {
         }
     };
     let console = Console::new(cli.json, cli.quiet);
-    match run(&cli.command, &console) {
+    let done = threads::start().and_then(|()| run(&cli.command, &console));
+    match done.and_then(|()| console.finish()) {
         Ok(()) => 0,
         Err(fault) => {
             console.fault(&fault);

@@ -112,7 +112,7 @@ pub fn features(observations: &[Observation], growth: [f64; 2]) -> BTreeMap<(usi
 /// Refuses constructions that refer to nothing, have too few inputs, or cannot be built.
 pub fn check(list: &[Construction], drawing: &Drawing) -> Result<()> {
     let measured = drawing.shape.iter().enumerate().flat_map(|(shape, s)| {
-        let n = s.grid.map_or(1, |g| g.count[0] * g.count[1]) as usize;
+        let n = s.elements();
         (0..n).map(move |element| ((shape, element), Feature { offset: [0.0, 0.0], sigma: 0.0 }))
     });
     for (i, c) in list.iter().enumerate() {
@@ -272,7 +272,7 @@ fn moved(p: &Value, d: &Value, by: [f64; 2]) -> Result<Value> {
 fn lattice(name: &str, drawing: &Drawing, measured: &BTreeMap<(usize, usize), Feature>) -> Result<Pair> {
     let shape = drawing.shape.iter().position(|s| s.name.as_deref() == Some(name));
     let shape = shape.ok_or_else(|| Fault::input(format!("'{name}' names no shape")).cause("a misspelt name"))?;
-    let elements = drawing.shape[shape].grid.map_or(1, |g| g.count[0] * g.count[1]) as usize;
+    let elements = drawing.shape[shape].elements();
     if elements < 2 {
         return Err(Fault::input(format!("a lattice of '{name}', which has {elements} element, needs at least 2"))
             .cause("an impossible construction")

@@ -3,8 +3,8 @@
 //! Frame and unit: a correction in the part frame: z mm, turns about x and y rad.
 
 use super::drawing::Drawing;
-use super::drawn_edges::Face;
 use super::edge_index::EdgeIndex;
+use super::face::Face;
 use super::measure::{MeasureOptions, localise};
 use super::points::Ordered;
 use super::robust::robust;

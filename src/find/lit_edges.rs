@@ -2,9 +2,10 @@
 //! how much of the sheet's light each sample beside an edge still sends back (docs/math.md, Insertion (3) and (4)).
 //! Frame and unit: a correction in the part frame: x y mm, turn about z rad; light as a share of a fully lit sample's.
 
-use super::drawn_edges::{EdgeSample, Face};
+use super::drawn_edges::EdgeSample;
 use super::edge_index::EdgeIndex;
 use super::edge_pieces::{Row, solve};
+use super::face::Face;
 use super::measure::MeasureOptions;
 use super::points::Ordered;
 use crate::geometry::Vec3;

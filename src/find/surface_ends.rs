@@ -2,8 +2,8 @@
 //! (docs/math.md, Insertion (2)).
 //! Frame and unit: part frame, mm; light as a share of a fully lit sample's.
 
-use super::drawn_edges::Face;
 use super::edge_index::EdgeIndex;
+use super::face::Face;
 use super::measure::MeasureOptions;
 use super::points::Ordered;
 use crate::geometry::Vec3;

@@ -40,6 +40,17 @@ pub fn teach(cloud: &[CloudPoint], map: &HeightMap, options: &TeachOptions) -> R
         .cause("corners swapped, or cells given for millimetres")
         .next("give x0 y0 x1 y1 in mm from the map's corner, smaller numbers first"));
     }
+    // A notch may reach over the outline.
+    let spare = 0.5 * (x1 - x0).max(y1 - y0);
+    let inside = |x: f64, y: f64| (x0 - spare..=x1 + spare).contains(&x) && (y0 - spare..=y1 + spare).contains(&y);
+    let windows = options.windows.iter().flat_map(|w| [[w[0], w[1], 0.0], [w[2], w[3], 0.0]]);
+    if let Some([x, y, _]) = options.holes.iter().copied().chain(windows).find(|p| !inside(p[0], p[1])) {
+        return Err(Fault::usage(format!(
+            "a hole or window lies at {x} {y}, more than {spare:.1} mm outside the outline {x0} {y0} {x1} {y1}"
+        ))
+        .cause("cells given for millimetres, or numbers from another corner than the map's")
+        .next("give places in mm from the map's corner, inside the outline"));
+    }
     let centre = [0.5 * (x0 + x1), 0.5 * (y0 + y1)];
     let place = Vec3::new(centre[0], centre[1], 0.0);
     let grid_from_part: Rigid<Grid, Part> =

@@ -3,8 +3,8 @@
 //! Frame and unit: part frame, mm.
 
 use super::drawing::Drawing;
-use super::drawn_edges::Face;
 use super::edge_index::EdgeIndex;
+use super::face::Face;
 use super::insertion::Gate;
 use super::measure::{Measured, localise};
 use super::points::Ordered;

@@ -114,6 +114,9 @@ pub fn hot_pixels(sensor: &Sensor, pixels: usize, rng: &mut Pcg64) -> Vec<(usize
     (0..count).map(|_| (rng.random_range(0..pixels), rng.random_range(0.02f32..0.5))).collect()
 }
 
+/// A speckle contrast below this changes no level of 16 bits, and the Gamma distribution's shape leaves what f32 holds.
+const FAINTEST_SPECKLE: f64 = 1e-6;
+
 /// Turns light (share of full scale) into grey levels. `laser` has speckle, `room` has none.
 pub fn expose(
     sensor: &Sensor,
@@ -123,7 +126,7 @@ pub fn expose(
     hot: &[(usize, f32)],
     rng: &mut Pcg64,
 ) -> Image {
-    let speckle = (sensor.speckle > 0.0).then(|| {
+    let speckle = (sensor.speckle > FAINTEST_SPECKLE).then(|| {
         let grains = 1.0 / (sensor.speckle * sensor.speckle);
         Gamma::new(grains as f32, (1.0 / grains) as f32).expect("positive")
     });
