@@ -40,7 +40,7 @@ pub fn load(path: &Path) -> Result<Vec<Profile>> {
 }
 
 fn load_file(path: &Path) -> Result<Vec<Profile>> {
-    let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+    let text = crate::files::read_text(path)?;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let yaml = text.trim_start().starts_with("%YAML") || text.contains("opencv-matrix");
     let read = if yaml { from_yaml(&text, &stem) } else { from_csv(&text, &stem) };

@@ -51,7 +51,7 @@ pub struct Args {
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     outputs::check(&[&args.out], &Inputs { files: &[&args.drawing], ..Inputs::default() })?;
-    let bytes = std::fs::read(&args.drawing).map_err(|e| Fault::read(&args.drawing, e))?;
+    let bytes = crate::files::read(&args.drawing, dxf::LARGEST)?;
     let options = DxfOptions { unit: args.unit, layers: args.layers.clone(), origin: args.origin };
     let read = dxf::read(&bytes, &options).map_err(|e| e.at(args.drawing.display()))?;
     let [x0, y0, x1, y1] = read.drawing.bounds();

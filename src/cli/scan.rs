@@ -4,7 +4,7 @@
 
 use super::Console;
 use crate::fault::{Fault, Result};
-use crate::raster::{Channel, load};
+use crate::raster::{Channel, Image, load_sized};
 use crate::recording::{Recording, load_poses};
 use crate::rig::{Rig, hash_file, hash_text};
 use crate::scan::{GridOptions, RawFormat, RawSource, RecordingSource, Where};
@@ -103,7 +103,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
             if let Some(name) = &args.ambient {
                 let inside = folder.join(name);
                 let path = if inside.is_file() { inside } else { name.clone() };
-                options.ambient = Some(recording.load(&path)?);
+                options.ambient = Some(recording.load(&path).map_err(no_ambient)?);
                 id += &hash_file(&path)?;
             }
             let open = |first| Ok(Box::new(RecordingSource::open(&recording, args.poses.as_deref(), first)?) as Box<_>);
@@ -118,7 +118,8 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
                 );
             }
             if let Some(path) = &args.ambient {
-                options.ambient = Some(load(path, args.channel, raw.format.bits)?);
+                let f = raw.format;
+                options.ambient = Some(ambient(path, args.channel, f.bits, [f.width, f.height])?);
             }
             let missing = args.missing.iter().copied().collect();
             let open = |_| Ok(Box::new(RawSource::new(raw, std::io::stdin().lock(), file.poses, missing)?) as Box<_>);
@@ -146,6 +147,15 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     );
     console.result(&WithErrors { scan: report, errors }, &text);
     Ok(())
+}
+
+/// The picture with the laser off, of the shots' size.
+fn ambient(path: &Path, channel: Channel, bits: u8, size: [u32; 2]) -> Result<Image> {
+    load_sized(path, channel, bits, size).map_err(|e| {
+        e.at("the ambient picture")
+            .cause("a picture of another camera or another setting, or no picture")
+            .next("take one picture with the laser off and nothing else changed")
+    })
 }
 
 /// What `--json` prints with `--truth`.

@@ -128,7 +128,7 @@ mod tests {
     #[test]
     fn the_diameter_is_that_of_all_pairs() {
         let mut rng = rand_pcg::Pcg64::seed_from_u64(3);
-        let mut check = |points: &[[f64; 2]]| {
+        let check = |points: &[[f64; 2]]| {
             let pairs = points.iter().flat_map(|a| points.iter().map(move |b| (a[0] - b[0]).hypot(a[1] - b[1])));
             let want = pairs.fold(0.0, f64::max);
             let got = diameter(points);

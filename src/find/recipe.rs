@@ -181,7 +181,7 @@ fn pose() -> String {
 
 impl Recipe {
     pub fn load(path: &Path) -> Result<Recipe> {
-        let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+        let text = crate::files::read_text(path)?;
         Recipe::parse(&text).map_err(|e| e.at(path.display()))
     }
 

@@ -49,7 +49,7 @@ fn black() -> String {
 impl BoardSpec {
     /// Reads a board's description file, as `sheetlight board` writes it.
     pub fn load(path: &Path) -> Result<BoardSpec> {
-        let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+        let text = crate::files::read_text(path)?;
         let board: BoardSpec = serde_json::from_str(&text).map_err(|e| {
             Fault::input(format!("{}: is no board description: {e}", path.display()))
                 .cause("a misspelt key or a missing size")

@@ -3,7 +3,7 @@
 
 use super::BoardSpec;
 use crate::fault::{Fault, Result};
-use crate::raster::Response;
+use crate::raster::{MOST_PIXELS, MOST_SIDE, Response};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -88,7 +88,7 @@ pub struct AmbientRef {
 
 impl Meta {
     pub fn load(path: &Path) -> Result<Meta> {
-        let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+        let text = crate::files::read_text(path)?;
         Meta::parse(&text).map_err(|e| e.at(path.display()))
     }
 
@@ -133,6 +133,13 @@ impl Meta {
                     self.image.width, self.image.height, self.image.bits
                 ),
                 "bits must be 8 to 16 and the size at least 1x1",
+            );
+        }
+        let [w, h] = [self.image.width, self.image.height];
+        if w.max(h) > MOST_SIDE || u64::from(w) * u64::from(h) > MOST_PIXELS {
+            return refuse(
+                format!("image {w}x{h} is too large: limit {MOST_SIDE} a side, {MOST_PIXELS} pixels in all"),
+                "give the size of the sensor's pictures",
             );
         }
         if self.frames.is_empty() {

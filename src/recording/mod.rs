@@ -95,28 +95,17 @@ impl Recording {
             .next("copy the pictures into the recording, or scan with --pictures-outside where that is meant"))
     }
 
-    /// Reads a picture of the recording's camera from anywhere, its levels made linear.
+    /// Reads a picture of the recording's camera from anywhere, its levels made linear; of another size than meta.json says
+    /// none is decoded.
     pub fn load(&self, path: &Path) -> Result<Image> {
-        let image = crate::raster::load(path, self.channel, self.meta.image.bits)?;
-        Ok(self.meta.image.response.linear(image))
+        let spec = &self.meta.image;
+        let image = crate::raster::load_sized(path, self.channel, spec.bits, [spec.width, spec.height])?;
+        Ok(spec.response.linear(image))
     }
 
     /// Reads one of the recording's pictures and checks its size against `meta.json`.
     pub fn picture(&self, name: &str) -> Result<Image> {
-        let path = self.inside(name)?;
-        let image = self.load(&path)?;
-        let (w, h) = (self.meta.image.width, self.meta.image.height);
-        if (image.width, image.height) != (w, h) {
-            return Err(Fault::input(format!(
-                "{}: is {}x{}, meta.json says {w}x{h}",
-                path.display(),
-                image.width,
-                image.height
-            ))
-            .cause("pictures of two cameras or two resolutions in one folder")
-            .next("correct meta.json, or take the odd pictures out"));
-        }
-        Ok(image)
+        self.load(&self.inside(name)?)
     }
 
     /// Which of `poses` the robot stood at in frame `index`. Frames that do not say are paired in order, and then there must

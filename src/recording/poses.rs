@@ -92,7 +92,7 @@ const METRES: f64 = 8.0;
 
 /// Loads a pose file by its extension: `.json`, or `.csv`/`.txt`.
 pub fn load_poses(path: &Path) -> Result<PoseFile> {
-    let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+    let text = crate::files::read_text(path)?;
     let json = path.extension().is_some_and(|e| e == "json");
     let parsed = if json { from_json(text.trim_start_matches('\u{feff}')) } else { from_csv(&text) };
     parsed.map_err(|e| e.at(path.display()))

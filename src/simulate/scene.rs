@@ -208,7 +208,7 @@ pub struct Scene {
 
 impl SceneSpec {
     pub fn load(path: &Path) -> Result<SceneSpec> {
-        let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+        let text = crate::files::read_text(path)?;
         SceneSpec::parse(&text).map_err(|e| e.at(path.display()))
     }
     pub fn parse(text: &str) -> Result<SceneSpec> {

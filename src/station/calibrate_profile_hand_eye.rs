@@ -59,7 +59,7 @@ fn poses_of(path: &Path) -> Result<(Vec<Rigid<Base, Flange>>, Vec<String>)> {
     if !listing {
         return load_poses(path).map(|f| (f.poses, f.warnings));
     }
-    let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+    let text = crate::files::read_text(path)?;
     let read = fanuc_tp::read::<Base, Flange>(&text).map_err(|e| e.at(path.display()))?;
     let mut warnings = Vec::new();
     let (uf, ut) = (read[0].user_frame, read[0].tool_frame);

@@ -40,6 +40,8 @@ impl std::str::FromStr for Unit {
     }
 }
 
+/// More is no drawing of a part but an assembly, bytes.
+pub const LARGEST: u64 = 64 << 20;
 /// How far a polyline may lie from the curve it stands for, mm: well below what a scan can tell.
 const FLAT: f64 = 0.002;
 

@@ -4,9 +4,6 @@
 use crate::fault::{Fault, Result};
 use std::collections::BTreeMap;
 
-/// More is no drawing of a part, bytes.
-const LARGEST: usize = 64 << 20;
-
 /// One group: a code and its value.
 #[derive(Clone, Debug)]
 pub struct Tag {
@@ -111,11 +108,6 @@ fn damaged(fault: Fault) -> Fault {
 /// Reads a file's groups; what is not needed is passed over unread.
 pub fn read(bytes: &[u8]) -> Result<File> {
     const NEXT: &str = "save the drawing as ASCII DXF";
-    if bytes.len() > LARGEST {
-        return Err(Fault::input(format!("is {} MiB large, at most {} are read", bytes.len() >> 20, LARGEST >> 20))
-            .cause("a whole assembly instead of one part")
-            .next("export the part alone"));
-    }
     if bytes.starts_with(b"AutoCAD Binary DXF") {
         return Err(Fault::input("is a binary DXF, which is not read").next(NEXT));
     }
