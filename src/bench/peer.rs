@@ -62,7 +62,9 @@ enum Command {
 }
 
 fn broken(what: impl std::fmt::Display) -> Fault {
-    Fault::input(format!("peer: {what}")).cause("the other program and this one speak different versions")
+    Fault::input(format!("peer: {what}"))
+        .cause("the other program and this one speak different versions")
+        .next("build both from the same commit")
 }
 
 /// Serves one peer until it says quit or closes the pipe.

@@ -72,7 +72,9 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     bar.finish_and_clear();
     Settings { name: "demo".into(), ..Settings::default() }.store(&made.station)?;
     let folder = made.recordings.first().map(|(_, folder, _)| folder.clone());
-    let folder = folder.ok_or_else(|| Fault::output("nothing was simulated"))?;
+    let folder = folder.ok_or_else(|| {
+        Fault::output("nothing was simulated").next("choose an --out folder that you may write to, and run it again")
+    })?;
     let out = args.out.clone();
     let (settings, rig) = (Settings::load(&made.station)?, Rig::load(&made.station)?);
     let scan = ScanOptions {

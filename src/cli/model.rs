@@ -4,7 +4,7 @@
 use super::Console;
 use super::insertion::InsertionArgs;
 use super::outputs::{self, Inputs};
-use crate::fault::{Fault, Result};
+use crate::fault::Result;
 use crate::find::dxf::{self, DxfOptions, Unit};
 use crate::find::{TaskOptions, recipe_of};
 use std::path::PathBuf;

@@ -29,6 +29,10 @@ fn pool(processors: usize, asked: Option<usize>) -> Result<()> {
             Err(e) => failed = Some(e),
         }
     }
+    if failed.is_some() {
+        // What the last of them took is needed for the work itself.
+        waiting.truncate(waiting.len().div_ceil(2));
+    }
     if let (true, Some(e)) = (waiting.is_empty(), failed) {
         return Err(Fault::device(format!("0 of {wanted} threads could be started, at least 1 is needed: {e}"))
             .cause("the memory ran out, or the number of processes is limited")

@@ -154,7 +154,8 @@ fn one(
             .next("correct 'of' in the recipe"))
     };
     if (c.by_mm.is_some() || c.along.is_some()) != (c.kind == Build::Offset) {
-        return Err(Fault::input("by_mm and along belong to an offset, and an offset needs both"));
+        return Err(Fault::input("by_mm and along belong to an offset, and an offset needs both")
+            .next("give both, or another kind of construction"));
     }
     let point = |name: &String| -> Result<Pair> {
         if let Some(b) = earlier.iter().find(|b| b.name == *name) {
@@ -235,7 +236,9 @@ fn line_through(points: &[Value]) -> Result<Value> {
         yy += dy * dy;
     }
     if xx + yy < 1e-9 {
-        return Err(Fault::input("a line through points that coincide").cause("an impossible construction"));
+        return Err(Fault::input("a line through points that coincide")
+            .cause("an impossible construction")
+            .next("name points that lie apart in 'of'"));
     }
     let mut angle = 0.5 * (2.0 * xy).atan2(xx - yy);
     let (first, last) = (points[0], points[points.len() - 1]);
@@ -246,8 +249,11 @@ fn line_through(points: &[Value]) -> Result<Value> {
 }
 
 fn direction(v: &Value) -> Result<f64> {
-    v.direction
-        .ok_or_else(|| Fault::input("a point where a line or a lattice is needed").cause("an impossible construction"))
+    v.direction.ok_or_else(|| {
+        Fault::input("a point where a line or a lattice is needed")
+            .cause("an impossible construction")
+            .next("name a line or a lattice there")
+    })
 }
 
 fn meet(a: &Value, b: &Value) -> Result<Value> {
@@ -255,7 +261,8 @@ fn meet(a: &Value, b: &Value) -> Result<Value> {
     let det = sa * cb - ca * sb;
     if det.abs() < 0.05 {
         return Err(Fault::input("two lines that are parallel to within 3 degrees do not meet")
-            .cause("an impossible construction"));
+            .cause("an impossible construction")
+            .next("name lines that cross at more than 3 degrees in 'of'"));
     }
     let (dx, dy) = (b.x - a.x, b.y - a.y);
     let s = (dy * cb - dx * sb) / det;
@@ -271,7 +278,11 @@ fn moved(p: &Value, d: &Value, by: [f64; 2]) -> Result<Value> {
 /// Rigid fit of all measured elements of a grid to their nominal places.
 fn lattice(name: &str, drawing: &Drawing, measured: &BTreeMap<(usize, usize), Feature>) -> Result<Pair> {
     let shape = drawing.shape.iter().position(|s| s.name.as_deref() == Some(name));
-    let shape = shape.ok_or_else(|| Fault::input(format!("'{name}' names no shape")).cause("a misspelt name"))?;
+    let shape = shape.ok_or_else(|| {
+        Fault::input(format!("'{name}' names no shape"))
+            .cause("a misspelt name")
+            .next("name a shape of the recipe that has a grid")
+    })?;
     let elements = drawing.shape[shape].elements();
     if elements < 2 {
         return Err(Fault::input(format!("a lattice of '{name}', which has {elements} element, needs at least 2"))

@@ -38,7 +38,11 @@ impl Default for MeasureOptions {
 impl MeasureOptions {
     pub fn check(&self) -> Result<()> {
         let range = |name: &str, v: f64, a: f64, b: f64| {
-            if (a..=b).contains(&v) { Ok(()) } else { Err(Fault::usage(format!("{name} is {v}, wanted {a} to {b}"))) }
+            if (a..=b).contains(&v) {
+                Ok(())
+            } else {
+                Err(Fault::usage(format!("{name} is {v}, wanted {a} to {b}")).next("correct [measure] in the recipe"))
+            }
         };
         range("height_gate_mm", self.height_gate_mm, 0.05, 2.0)?;
         range("edge_gate_mm", self.edge_gate_mm, 0.1, 3.0)?;

@@ -305,9 +305,10 @@ impl Device {
 
     /// Waits for a submission, or for all of them.
     pub(super) fn wait(&self, at: Option<wgpu::SubmissionIndex>) -> Result<()> {
-        self.raw
-            .poll(wgpu::PollType::Wait { submission_index: at, timeout: Some(TIMEOUT) })
-            .map_err(|e| Fault::device(format!("{}: no answer within {} s: {e}", self.info.name, TIMEOUT.as_secs())))?;
+        self.raw.poll(wgpu::PollType::Wait { submission_index: at, timeout: Some(TIMEOUT) }).map_err(|e| {
+            Fault::device(format!("{}: no answer within {} s: {e}", self.info.name, TIMEOUT.as_secs()))
+                .next("run `sheetlight doctor`; what has --on runs without the GPU with --on cpu")
+        })?;
         self.alive()
     }
     /// Runs the callbacks of what has finished; does not wait.
@@ -409,11 +410,15 @@ impl Buffer {
         Mapping(slot)
     }
     pub(super) fn view(&self, range: std::ops::Range<u64>) -> Result<wgpu::BufferView> {
-        self.raw.get_mapped_range(range).map_err(|e| Fault::device(format!("a mapped buffer cannot be read: {e}")))
+        self.raw.get_mapped_range(range).map_err(|e| {
+            Fault::device(format!("a mapped buffer cannot be read: {e}"))
+                .next("run the same command again; finished shots are kept")
+        })
     }
     fn view_mut(&self, range: std::ops::Range<u64>) -> Result<wgpu::BufferViewMut> {
-        self.raw
-            .get_mapped_range_mut(range)
-            .map_err(|e| Fault::device(format!("a mapped buffer cannot be written: {e}")))
+        self.raw.get_mapped_range_mut(range).map_err(|e| {
+            Fault::device(format!("a mapped buffer cannot be written: {e}"))
+                .next("run the same command again; finished shots are kept")
+        })
     }
 }

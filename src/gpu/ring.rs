@@ -89,7 +89,10 @@ fn copiers(device: &Device) -> Result<Option<ThreadPool>> {
         return Ok(None);
     }
     let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map(Some).map_err(|e| Fault::device(format!("{threads} threads to copy pictures cannot be started: {e}")))
+    pool.map(Some).map_err(|e| {
+        Fault::device(format!("{threads} threads to copy pictures cannot be started: {e}"))
+            .next("close other programs, or raise the limits (ulimit -v, ulimit -u)")
+    })
 }
 
 impl Ring {

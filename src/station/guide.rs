@@ -67,7 +67,7 @@ impl GuideOptions {
         for (name, v, a, b) in [("view_mm", self.view_mm, 20.0, 2000.0), ("max_tilt_deg", self.max_tilt_deg, 0.1, 20.0)]
         {
             if !(a..=b).contains(&v) {
-                return Err(Fault::usage(format!("{name} is {v}, wanted {a} to {b}")));
+                return Err(Fault::usage(format!("{name} is {v}, wanted {a} to {b}")).next("correct the option"));
             }
         }
         Ok(())

@@ -87,7 +87,8 @@ pub struct RangeReport {
 /// Measures a distance in every frame that has a `laser` picture.
 pub fn measure_range(recording: &Recording, rig: &Rig, run: &RangeRun) -> Result<RangeReport> {
     if !(3.0..=100.0).contains(&run.max_off_beam) {
-        return Err(Fault::usage(format!("max_off_beam is {}, 3 to 100 sigmas are allowed", run.max_off_beam)));
+        return Err(Fault::usage(format!("max_off_beam is {}, 3 to 100 sigmas are allowed", run.max_off_beam))
+            .next("correct max_off_beam"));
     }
     let (camera, pointer) = (rig.need_camera()?, rig.need_pointer()?);
     recording.shows(Beam::Pointer)?;

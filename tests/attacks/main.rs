@@ -6,5 +6,11 @@
 mod common;
 
 mod bench;
+mod clouds;
 mod crashes;
+mod drawings;
 mod files;
+mod messages;
+mod pictures;
+mod table;
+mod terminal;

@@ -72,7 +72,8 @@ impl SupportParams {
             ("right_width[1]", self.right_width[1], 1.0, 3.0),
         ] {
             if !(low..=high).contains(&value) {
-                return Err(Fault::usage(format!("support {name} is {value}, it must be in {low}..={high}")));
+                return Err(Fault::usage(format!("support {name} is {value}, it must be in {low}..={high}"))
+                    .next("correct [extraction] in station.toml"));
             }
         }
         Ok(())
