@@ -29,6 +29,13 @@ impl Console {
         }
     }
 
+    /// A piece of the result that is known before the rest; with --json it comes with the rest.
+    pub fn part(&self, text: &str) {
+        if !self.json {
+            self.data(&printable(text.trim_end()));
+        }
+    }
+
     /// One of many results, as one line of JSON, at once. False where nobody reads them any more.
     pub fn line(&self, value: &impl serde::Serialize) -> bool {
         self.data(&printable_json(&serde_json::to_string(value).expect("plain data")));

@@ -22,6 +22,7 @@ mod simulate;
 mod station;
 mod teach;
 mod threads;
+mod trial;
 mod verify;
 
 pub use console::Console;

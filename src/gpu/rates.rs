@@ -8,7 +8,7 @@ use crate::fault::Result;
 use std::time::Instant;
 
 /// Transfer rates between host and device, 1e9 bytes a second.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Rates {
     /// Pictures in the host's memory, one after the other through the ring, without any stage.
     pub upload_gb_s: f64,

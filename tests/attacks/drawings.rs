@@ -130,8 +130,17 @@ fn dxf_drawings() {
     for (i, p) in corners.iter().enumerate() {
         let q = corners[(i + 1) % corners.len()];
         writeln!(line, "10\n{:.9}\n20\n{:.9}", p[0], p[1]).unwrap();
-        writeln!(pieces, "0\nLINE\n10\n{:.9}\n20\n{:.9}\n11\n{:.9}\n21\n{:.9}", p[0], p[1], q[0], q[1]).unwrap();
+        writeln!(
+            pieces,
+            "0\nLINE\n10\n{:.9}\n20\n{:.9}\n11\n{:.9}\n21\n{:.9}",
+            40.0 * p[0],
+            40.0 * p[1],
+            40.0 * q[0],
+            40.0 * q[1]
+        )
+        .unwrap();
     }
+    let frame = "0\nLWPOLYLINE\n90\n4\n70\n1\n10\n-9\n20\n-9\n10\n120\n20\n-9\n10\n120\n20\n120\n10\n-9\n20\n120\n";
     let circles: String = (0..10_000)
         .map(|i| format!("0\nCIRCLE\n10\n{}\n20\n{}\n40\n{}\n", i % 100, i / 100, 0.2 + 0.00001 * i as f64))
         .collect();
@@ -145,7 +154,7 @@ fn dxf_drawings() {
     check(vec![
         case("an outline of 50,000 vertices", Good, move || read(dxf_of(&line))),
         case("an outline of 50,000 lines", Good, move || read(dxf_of(&pieces))),
-        case("10,000 circles of as many radii", Good, move || read(dxf_of(&circles))),
+        case("10,000 circles of as many radii", Good, move || read(dxf_of(&(circles + frame)))),
         case("an array of 900 million blocks", Says(&[]), move || read(inserted)),
         case("circles 100,000 km apart", Says(&[]), move || read(dxf_of(far))),
         case("an outline 100,000 km away", Says(&[]), move || read(dxf_of(&tiny))),
