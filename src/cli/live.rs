@@ -3,6 +3,7 @@
 
 use super::Console;
 use crate::fault::Result;
+use crate::raster::Light;
 use crate::rig::Rig;
 use crate::scan::{Live, Newest, RawFormat, RawFrames, Where};
 use crate::stages::point::Point;
@@ -70,10 +71,13 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         filled.close();
         end
     });
-    let (mut waits, mut without_stripe) = (Vec::new(), 0);
+    let (mut waits, mut without_stripe, mut unlit) = (Vec::new(), 0, None);
     while let Some((frame, image, arrived)) = newest.take() {
+        // Looked at only while nothing was seen: it takes as long as a stage.
+        let light = waits.is_empty().then(|| Light::of(&image));
         let Some(measured) = live.measure(frame, image)? else {
             without_stripe += 1;
+            unlit = light.or(unlit);
             continue;
         };
         let latency_ms = 1e3 * arrived.elapsed().as_secs_f64();
@@ -103,5 +107,8 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         ms(0.99),
         live.ran_on()
     ));
+    if let Some(light) = unlit.filter(|_| waits.is_empty()) {
+        console.warn(format!("no frame showed a stripe; the last one: {light}"));
+    }
     Ok(())
 }

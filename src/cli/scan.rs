@@ -4,7 +4,7 @@
 
 use super::Console;
 use crate::fault::{Fault, Result};
-use crate::raster::{Channel, Image, load_sized};
+use crate::raster::{Channel, Image, Light, load_sized};
 use crate::recording::{Recording, load_poses};
 use crate::rig::{Rig, hash_file, hash_text};
 use crate::scan::{GridOptions, RawFormat, RawSource, RecordingSource, Where};
@@ -132,6 +132,9 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         }
     };
     bar.finish_and_clear();
+    if let (0, Some(folder)) = (report.points, &args.recording) {
+        console.warn(format!("the scan has 0 points{}", seen(folder, args.channel)));
+    }
     let Some(truth) = args.truth.as_ref().filter(|_| report.points > 0) else {
         console.result(&report, &summary(&report, &args.out));
         return report.has_points();
@@ -147,6 +150,22 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     );
     console.result(&WithErrors { scan: report, errors }, &text);
     Ok(())
+}
+
+/// What the middle shot of a recording shows, and what is asked of it; nothing where it cannot be read.
+fn seen(folder: &Path, channel: Channel) -> String {
+    let read = || {
+        let mut recording = Recording::open(folder).ok()?;
+        recording.channel = channel;
+        let names: Vec<&String> = recording.meta.frames.iter().filter_map(|f| f.laser.as_ref()).collect();
+        let name = names.get(names.len() / 2)?;
+        Some(format!(
+            "; {name}: {}. Asked for is a stripe that stands out from its surroundings and crosses the working volume: \
+             compare exposure, laser and volume with docs/file-formats.md, station.toml",
+            Light::of(&recording.picture(name).ok()?)
+        ))
+    };
+    read().unwrap_or_default()
 }
 
 /// The picture with the laser off, of the shots' size.

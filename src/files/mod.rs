@@ -15,5 +15,5 @@ pub use inputs::{not_over, not_over_any};
 pub use lock::Lock;
 pub use moment::moment;
 pub use natural::natural;
-pub use read::{read, read_text, read_text_if_there};
+pub use read::{length, read, read_text, read_text_if_there};
 pub use together::{Together, remove};

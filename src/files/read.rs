@@ -12,23 +12,27 @@ const MOST_TEXT: u64 = 64 << 20;
 /// The byte order mark.
 const MARK: char = '\u{feff}';
 
-/// The bytes of a file, refused where there are more than `most`. A pipe, a device or a folder is no file: its bytes may
-/// never come, or never end.
-pub fn read(path: &Path, most: u64) -> Result<Vec<u8>> {
-    let failed = |e| Fault::read(path, e);
-    let found = std::fs::metadata(path).map_err(failed)?;
+/// Bytes of a file. A pipe, a device or a folder is none: its bytes may never come, or never end.
+pub fn length(path: &Path) -> Result<u64> {
+    let found = std::fs::metadata(path).map_err(|e| Fault::read(path, e))?;
     if !found.is_file() {
         let kind = if found.is_dir() { "a folder" } else { "a pipe or a device" };
         return Err(Fault::input(format!("{}: is {kind}, not a file", path.display()))
             .cause("the path is wrong")
             .next("give a file; what comes through a pipe has to be stored in one first"));
     }
-    let mut bytes = Vec::new();
+    Ok(found.len())
+}
+
+/// The bytes of a file, refused where there are more than `most`.
+pub fn read(path: &Path, most: u64) -> Result<Vec<u8>> {
+    let (found, mut bytes) = (length(path)?, Vec::new());
     // It may grow meanwhile.
-    if found.len() <= most {
-        std::fs::File::open(path).and_then(|f| f.take(most + 1).read_to_end(&mut bytes)).map_err(failed)?;
+    if found <= most {
+        let read = std::fs::File::open(path).and_then(|f| f.take(most + 1).read_to_end(&mut bytes));
+        read.map_err(|e| Fault::read(path, e))?;
     }
-    let length = found.len().max(bytes.len() as u64);
+    let length = found.max(bytes.len() as u64);
     if length > most {
         return Err(Fault::input(format!("{}: is {length} bytes long, at most {most} are read", path.display()))
             .cause("another file than the one that is meant here, or a damaged one")

@@ -113,7 +113,7 @@ impl Device {
             let start = Instant::now();
             let mut encoder = self.raw.create_command_encoder(&Default::default());
             encoder.copy_buffer_to_buffer(&from.raw, 0, &to.raw, 0, bytes);
-            self.queue.submit([encoder.finish()]);
+            self.submit(encoder.finish());
             let mapped = to.map(wgpu::MapMode::Read, 0..bytes);
             self.wait(None)?;
             mapped.done()?;

@@ -185,6 +185,7 @@ pub struct CloudFile {
 impl CloudFile {
     /// Opens a PLY that this program wrote; other layouts are refused.
     pub fn open(path: &Path) -> Result<CloudFile> {
+        let length = crate::files::length(path)?;
         let mut file = File::open(path).map_err(|e| Fault::read(path, e))?;
         let mut bytes = vec![0; header(0).len()];
         let strange = |what: &str| {
@@ -195,9 +196,8 @@ impl CloudFile {
         file.read_exact(&mut bytes).map_err(|_| strange("is too short for a cloud"))?;
         let count = count_in(&bytes).ok_or_else(|| strange("has another header than a sheetlight cloud"))?;
         let start = bytes.len() as u64;
-        let length = file.metadata().map_err(|e| Fault::read(path, e))?.len();
-        let needed = u128::from(start) + u128::from(count) * u128::from(RECORD);
-        if u128::from(length) != needed {
+        let needed = count.saturating_mul(RECORD).saturating_add(start);
+        if length != needed {
             return Err(strange(&format!("is {length} bytes long, {count} points need {needed}")));
         }
         Ok(CloudFile { path: path.to_owned(), count, start })
