@@ -234,7 +234,7 @@ fn calibrations() {
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("values.json"), VALUES).unwrap();
     let values = Values::load(&dir.path().join("values.json")).unwrap();
-    values.store(dir.path(), &dir.path().join("values.json")).unwrap();
+    values.store(dir.path(), &dir.path().join("values.json"), false).unwrap();
     for kind in ["camera", "laser_plane", "pointer", "hand_eye"] {
         let station = tempfile::tempdir().unwrap();
         let folder = station.path().join("calibration");
@@ -251,7 +251,7 @@ fn calibrations() {
         seeds(&[VALUES]),
         through_file("values.json", |p| {
             let station = tempfile::tempdir().expect("a folder");
-            Values::load(p)?.store(station.path(), p).map(drop)
+            Values::load(p)?.store(station.path(), p, true).map(drop)
         }),
     );
 }
