@@ -32,7 +32,7 @@ const VALUES: &str = r#"{"intrinsics": {"fx": 611.6, "fy": 611.6, "cx": 315, "cy
  "distortion_k1_k2_p1_p2_k3": [0, 0, 0, 0, 0]}, "flange_T_camera": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1],
  "laser_plane_camera": {"normal": [0, 0.883, 0.469], "offset_mm": 72}, "pointer_camera": {"origin": [1, 2, 3], "direction": [0, 0.6, 0.8]}}"#;
 const DRAWING: &str = "[[shape]]\nkind = 'rectangle'\ncentre = [0, 0]\nsize = [20, 10]\n[[shape]]\nkind = 'circle'\nname = 'hole'\ncentre = [1, 0]\nradius = 0.5\ninside = 'low'\ngrid = { count = [4, 2], pitch = [3, 6] }\n[[shape]]\nkind = 'polygon'\npoints = [[0, 0], [3, 1], [2, 4]]\nz_mm = 2.5\n[[shape]]\nkind = 'arc'\ncentre = [0, 0]\nradius = 5\nspan_deg = [0, 90]\n";
-const DXF: &str = "0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n4\n0\nENDSEC\n0\nSECTION\n2\nBLOCKS\n0\nBLOCK\n2\nA\n10\n0\n20\n0\n0\nCIRCLE\n10\n0\n20\n0\n40\n1\n0\nINSERT\n2\nB\n10\n2\n20\n2\n0\nENDBLK\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n0\nLWPOLYLINE\n90\n4\n70\n1\n10\n0\n20\n0\n42\n0.5\n10\n30\n20\n0\n10\n30\n20\n20\n10\n0\n20\n20\n0\nINSERT\n2\nA\n10\n9\n20\n9\n41\n1\n42\n1\n50\n30\n70\n2\n71\n2\n44\n4\n45\n4\n0\nARC\n10\n5\n20\n5\n40\n2\n50\n0\n51\n270\n0\nELLIPSE\n10\n15\n20\n10\n11\n3\n21\n0\n40\n0.5\n41\n0\n42\n6.283185\n0\nSPLINE\n70\n8\n71\n3\n72\n8\n73\n4\n40\n0\n40\n0\n40\n0\n40\n0\n40\n1\n40\n1\n40\n1\n40\n1\n10\n1\n20\n1\n10\n2\n20\n3\n10\n4\n20\n3\n10\n5\n20\n1\n0\nENDSEC\n0\nEOF\n";
+const DXF: &str = "0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n4\n0\nENDSEC\n0\nSECTION\n2\nBLOCKS\n0\nBLOCK\n2\nA\n10\n0\n20\n0\n0\nCIRCLE\n10\n0\n20\n0\n40\n1\n0\nENDBLK\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n0\nLWPOLYLINE\n90\n4\n70\n1\n10\n0\n20\n0\n42\n0.5\n10\n30\n20\n0\n10\n30\n20\n20\n10\n0\n20\n20\n0\nINSERT\n2\nA\n10\n9\n20\n9\n41\n1\n42\n1\n50\n30\n70\n2\n71\n2\n44\n4\n45\n4\n0\nARC\n10\n5\n20\n5\n40\n2\n50\n0\n51\n270\n0\nELLIPSE\n10\n15\n20\n10\n11\n3\n21\n0\n40\n0.5\n41\n0\n42\n6.283185\n0\nSPLINE\n70\n8\n71\n3\n72\n8\n73\n4\n40\n0\n40\n0\n40\n0\n40\n0\n40\n1\n40\n1\n40\n1\n40\n1\n10\n1\n20\n1\n10\n2\n20\n3\n10\n4\n20\n3\n10\n5\n20\n1\n0\nENDSEC\n0\nEOF\n";
 const LISTING: &str = "/PROG  BALL\n/MN\n   1:J P[1] 100% FINE    ;\n/POS\nP[1]{\n   GP1:\n\tUF : 0, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n\tX =   500.125  mm,\tY =   -20.500  mm,\tZ =   300.000  mm,\n\tW =   180.000 deg,\tP =    10.000 deg,\tR =   -90.000 deg\n};\nP[2:\"over the ball\"]{\n   GP1:\n\tUF : 0, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n\tX =  1.0  mm,\tY =  2.0  mm,\tZ =  3.0  mm,\n\tW =  0.0 deg,\tP =  0.0 deg,\tR =  90.0 deg\n};\n/END\n";
 const BOARDS: [&str; 3] = [
     r#"{"type": "chessboard", "inner_corners": [9, 6], "square_mm": 10.0, "border_mm": 7.0, "first_square": "black"}"#,
@@ -234,7 +234,7 @@ fn calibrations() {
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("values.json"), VALUES).unwrap();
     let values = Values::load(&dir.path().join("values.json")).unwrap();
-    values.store(dir.path(), &dir.path().join("values.json"), false).unwrap();
+    values.store(dir.path(), &dir.path().join("values.json"), true).unwrap();
     for kind in ["camera", "laser_plane", "pointer", "hand_eye"] {
         let station = tempfile::tempdir().unwrap();
         let folder = station.path().join("calibration");

@@ -153,7 +153,8 @@ pub fn from_yaml(text: &str, stem: &str) -> Result<Vec<Profile>> {
             })
             .collect::<std::result::Result<Vec<f64>, _>>()
             .map_err(|_| bad(&name, "holds something that is no number".into()))?;
-        if numbers.len() != rows * cols * channels {
+        let wanted = rows.checked_mul(cols).and_then(|n| n.checked_mul(channels));
+        if wanted != Some(numbers.len()) {
             return Err(bad(&name, format!("{} numbers for {rows}x{cols} of {channels} channels", numbers.len())));
         }
         let points: Vec<[f64; 2]> = match (rows, cols, channels) {

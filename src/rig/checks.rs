@@ -26,8 +26,11 @@ pub trait Measured {
     }
 }
 
+/// For values of which the caller says no more.
+const AGAIN: &str = "calibrate again, or import right values with sheetlight station import";
+
 fn bad(what: String, cause: &str) -> Fault {
-    Fault::input(what).cause(cause.to_owned())
+    Fault::input(what).cause(cause).next(AGAIN)
 }
 
 fn unit(v: &Vec3, what: &str) -> Result<()> {

@@ -113,6 +113,12 @@ impl Convention {
                     .next("export the pose again"));
             }
         }
+        let limits = self.labels().iter().zip(numbers).filter_map(|(label, x)| Some((label, x, most(label)?)));
+        if let Some((label, x, most)) = limits.into_iter().find(|(_, x, most)| x.abs() > *most) {
+            return Err(Fault::input(format!("a pose holds {label} = {x:e}, limit {most:e}"))
+                .cause("a slipped decimal point, another unit, or a damaged file")
+                .next("export the pose again, or name the convention that the robot really writes"));
+        }
         if self == Convention::Matrix {
             let rows: [f64; 16] = numbers.try_into().expect("counted above");
             return Rigid::from_rows(&rows).map(|(pose, _)| pose);
@@ -154,6 +160,15 @@ impl Convention {
             Convention::Matrix => unreachable!("returned above"),
         });
         out
+    }
+}
+
+/// Largest size of a length with this label: a kilometre; `None` for what is no length.
+fn most(label: &str) -> Option<f64> {
+    match label.split_once(' ')?.1 {
+        "mm" => Some(1e6),
+        "m" => Some(1e3),
+        _ => None,
     }
 }
 

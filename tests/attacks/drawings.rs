@@ -127,18 +127,13 @@ fn dxf_drawings() {
     let corners = star(50_000);
     let mut line = format!("0\nLWPOLYLINE\n90\n{}\n70\n1\n", corners.len());
     let mut pieces = String::new();
-    for (i, p) in corners.iter().enumerate() {
-        let q = corners[(i + 1) % corners.len()];
+    for p in &corners {
         writeln!(line, "10\n{:.9}\n20\n{:.9}", p[0], p[1]).unwrap();
-        writeln!(
-            pieces,
-            "0\nLINE\n10\n{:.9}\n20\n{:.9}\n11\n{:.9}\n21\n{:.9}",
-            40.0 * p[0],
-            40.0 * p[1],
-            40.0 * q[0],
-            40.0 * q[1]
-        )
-        .unwrap();
+    }
+    for i in 0..50_000 {
+        let [p, q] = [i, i + 1].map(|i| (std::f64::consts::TAU * f64::from(i % 50_000) / 5e4).sin_cos());
+        let [a, b, c, d] = [p.1, p.0, q.1, q.0].map(|v| 600.0 * v);
+        writeln!(pieces, "0\nLINE\n10\n{a:.9}\n20\n{b:.9}\n11\n{c:.9}\n21\n{d:.9}").unwrap();
     }
     let frame = "0\nLWPOLYLINE\n90\n4\n70\n1\n10\n-9\n20\n-9\n10\n120\n20\n-9\n10\n120\n20\n120\n10\n-9\n20\n120\n";
     let circles: String = (0..10_000)
