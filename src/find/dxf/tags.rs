@@ -92,7 +92,7 @@ impl Tag {
     pub fn number(&self) -> Result<f64> {
         let value = self.value.trim().parse::<f64>().ok().filter(|v| v.is_finite() && v.abs() < 1e12);
         value.ok_or_else(|| {
-            Fault::input(format!("line {}: '{}' is no number below 1e12", self.line, self.short()))
+            Fault::input(format!("line {}: '{}' is no usable number (finite, below 1e12)", self.line, self.short()))
                 .cause(DAMAGED)
                 .next(EXPORT)
         })
