@@ -1,20 +1,21 @@
-//! In: this machine. Out: its adapters, every stage compared with its CPU twin, transfer rates, and a
+//! In: this machine. Out: its adapters, every stage compared with its CPU twin, transfer rates, the time of a shot, and a
 //! plain verdict, each as soon as it is known.
-//! Frame and unit: words that differ, or the stage's own measure; GB/s.
+//! Frame and unit: words that differ, or the stage's own measure; GB/s, ms.
 
 use super::Console;
 use super::trial::{self, Event, Limits, StageFinding};
+use crate::bench::WayTime;
 use crate::fault::{Fault, Result};
 use crate::gpu::{AdapterInfo, Rates, adapters};
 
-/// Check this machine: adapters, every stage against its CPU twin, transfer rates
+/// Check this machine: adapters, every stage against its CPU twin, transfer rates, the time of a shot with and without the GPU
 ///
 /// Exit code 0 when the GPU chain can be trusted or when there is no GPU at all (everything then runs
-/// on the CPU twins); 1 when a stage differs from its twin, or its driver takes too long or too much memory
+/// on this machine's processor); 1 when a stage differs from its twin, or its driver takes too long or too much memory
 /// to compile it.
 #[derive(clap::Args)]
 pub struct Args {
-    /// Leave out the transfer rates (they take a second)
+    /// Leave out the transfer rates and the times of a shot (they take some seconds)
     #[arg(long)]
     no_rates: bool,
     /// Processor time that one stage may take, s
@@ -38,6 +39,8 @@ struct Findings {
     no_device_because: Option<String>,
     stages: Vec<StageFinding>,
     rates: Option<Rates>,
+    /// The whole chain on this machine's processor, and on the adapter.
+    ways: Vec<WayTime>,
     verdict: String,
 }
 
@@ -55,6 +58,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         no_device_because: None,
         stages: Vec::new(),
         rates: None,
+        ways: Vec::new(),
         verdict: String::new(),
     };
     console.part(&format!("{}\n{}", findings.program, findings.adapters.iter().map(adapter).collect::<String>()));
@@ -83,10 +87,16 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
             ));
             findings.rates = Some(r);
         }
+        Event::Ways(ways) => {
+            console.part(&ways.iter().map(way).collect::<String>());
+            findings.ways = ways;
+        }
     })?;
     let wrong: Vec<&str> = findings.stages.iter().filter(|s| !s.passed()).map(|s| s.stage.as_str()).collect();
     findings.verdict = match (&findings.used, wrong.is_empty()) {
-        (None, _) => "no GPU: everything runs on the CPU twins, with the same results but for rounding, slower".into(),
+        (None, _) => {
+            "no GPU: everything runs on this machine's processor, with the same results but for rounding".into()
+        }
         (Some(name), true) => format!("good: every stage on {name} agrees with its CPU twin"),
         (Some(_), false) => format!("do not use this GPU: {} failed; scan with --on cpu", wrong.join(", ")),
     };
@@ -112,6 +122,11 @@ fn adapter(a: &AdapterInfo) -> String {
         if a.timestamps { "" } else { "no " },
         if a.unified_memory { "unified" } else { "separate" }
     )
+}
+
+fn way(w: &WayTime) -> String {
+    let cpu = w.cpu_ms_per_shot.map_or(String::new(), |c| format!(", {c:.2} ms of CPU time"));
+    format!("full chain, {}x{}: {:.2} ms a shot{cpu} on {}\n", w.width, w.height, w.ms_per_shot, w.on)
 }
 
 fn line(s: &StageFinding) -> String {

@@ -3,6 +3,7 @@
 //! Frame and unit: processor seconds, MiB.
 
 use super::Console;
+use crate::bench::{WayTime, way_times};
 use crate::fault::{Fault, Result};
 use crate::gpu::{Device, Rates};
 use crate::stages;
@@ -65,12 +66,13 @@ pub enum Event {
     Begin { stage: String },
     Stage(StageFinding),
     Rates(Rates),
+    Ways(Vec<WayTime>),
 }
 
 /// Bytes of one transfer: a 12-megapixel shot of 8 bits.
 const SHOT: u64 = 4096 * 3072;
 
-/// The process that tries: the stages from a number on, then the rates.
+/// The process that tries: the stages from a number on, then the rates and the time of a shot.
 pub fn run(from: usize, rates: bool, console: &Console) -> Result<()> {
     // Nobody reads any more: the process that asked has ended.
     let tell = |event: Event| console.line(&event);
@@ -78,6 +80,9 @@ pub fn run(from: usize, rates: bool, console: &Console) -> Result<()> {
         Ok(device) => device,
         Err(fault) => {
             tell(Event::NoDevice { why: fault.what });
+            if rates {
+                tell(Event::Ways(way_times(None)?));
+            }
             return Ok(());
         }
     };
@@ -103,6 +108,7 @@ pub fn run(from: usize, rates: bool, console: &Console) -> Result<()> {
     }
     if rates {
         tell(Event::Rates(device.measure_rates(SHOT)?));
+        tell(Event::Ways(way_times(Some(&device))?));
     }
     Ok(())
 }
@@ -110,8 +116,8 @@ pub fn run(from: usize, rates: bool, console: &Console) -> Result<()> {
 /// Looks at a process this often.
 const LOOK: Duration = Duration::from_millis(100);
 
-/// Tries every stage, each within the limits; `tell` is told at once.
-pub fn watch(limits: &Limits, rates: bool, tell: &mut dyn FnMut(Event)) -> Result<()> {
+/// Tries every stage, each within the limits; `tell` is told at once. No rates where a stage was ended: the chain needs it.
+pub fn watch(limits: &Limits, mut rates: bool, tell: &mut dyn FnMut(Event)) -> Result<()> {
     let names: Vec<&str> = stages::all().iter().map(|e| e.stage.name).collect();
     let mut next = 0;
     loop {
@@ -142,7 +148,7 @@ pub fn watch(limits: &Limits, rates: bool, tell: &mut dyn FnMut(Event)) -> Resul
             tell(Event::NoDevice { why: format!("before {at}: {why}") });
             return Ok(());
         };
-        next += 1;
+        (next, rates) = (next + 1, false);
         tell(Event::Stage(StageFinding { stage, failed: Some(why), ..StageFinding::default() }));
         if next == names.len() {
             return Ok(());

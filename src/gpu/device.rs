@@ -219,12 +219,6 @@ impl Device {
         self.info.kind != "CPU"
     }
 
-    /// True of a GPU, and of the software adapter whose compiler the stages are tested with, Mesa's. Another one may take
-    /// minutes and gigabytes to compile a stage (`sheetlight doctor` finds out), for work that its cores do as fast without.
-    pub fn pays(&self) -> bool {
-        self.has_own_processors() || self.info.name.contains("llvmpipe")
-    }
-
     /// A zeroed storage buffer that stages, indirect dispatches and copies can use.
     pub fn storage(&self, label: &str, bytes: u64) -> Result<Buffer> {
         use wgpu::BufferUsages as U;
