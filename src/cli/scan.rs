@@ -170,11 +170,14 @@ fn seen(folder: &Path, channel: Channel) -> String {
 
 /// The picture with the laser off, of the shots' size.
 fn ambient(path: &Path, channel: Channel, bits: u8, size: [u32; 2]) -> Result<Image> {
-    load_sized(path, channel, bits, size).map_err(|e| {
-        e.at("the ambient picture")
-            .cause("a picture of another camera or another setting, or no picture")
-            .next("take one picture with the laser off and nothing else changed")
-    })
+    load_sized(path, channel, bits, size).map_err(no_ambient)
+}
+
+fn no_ambient(fault: Fault) -> Fault {
+    fault
+        .at("the ambient picture")
+        .cause("a picture of another camera or another setting, or no picture")
+        .next("take one picture with the laser off and nothing else changed")
 }
 
 /// What `--json` prints with `--truth`.
