@@ -162,7 +162,7 @@ impl Station {
         let mut off = |x: f64, by: f64| if seed == 0 { x } else { x + by * rng.random_range(-1.0..1.0) };
         let (c, l, m) = (&rig.camera, &rig.laser, &rig.mount);
         let (width, height) = (f64::from(c.width_px), f64::from(c.height_px));
-        let f = off(rig.focal_px(), 0.049 * rig.focal_px());
+        let f = off(rig.focal_px(), 30.0 / 611.6 * rig.focal_px());
         let [k1, k2, p1, p2, k3] = c.distortion;
         let camera = Intrinsics {
             fx: f,
@@ -170,19 +170,26 @@ impl Station {
             cx: off((width - 1.0) / 2.0, width / 80.0),
             cy: off((height - 1.0) / 2.0, height / 60.0),
             skew: 0.0,
-            distortion: [off(k1, 0.27 * k1), off(k2, 0.375 * k2), off(p1, 8e-4), off(p2, 8e-4), off(k3, 0.667 * k3)],
+            distortion: [
+                off(k1, 3.0 / 11.0 * k1.abs()),
+                off(k2, 3.0 / 8.0 * k2.abs()),
+                off(p1, 8e-4),
+                off(p2, 8e-4),
+                off(k3, 2.0 / 3.0 * k3.abs()),
+            ],
             width: c.width_px,
             height: c.height_px,
         };
         // The sheet crosses the optical axis at the design's distance for it; the source lies on the laser's side.
         let (baseline, angle) =
-            (off(l.baseline_mm, 0.052 * l.baseline_mm), off(l.angle_deg, (0.0714 * l.angle_deg).min(2.0)));
+            (off(l.baseline_mm, 4.0 / 77.0 * l.baseline_mm), off(l.angle_deg, (l.angle_deg / 14.0).min(2.0)));
         let (angle, roll) = (angle.to_radians(), off(0.0, 1.5).to_radians());
         let crossing = rig.crossing();
-        let crossing = off(crossing, 0.0258 * crossing);
+        let crossing = off(crossing, 4.0 / 155.0 * crossing);
         let working_distance = crossing * rig.working.distance_mm / rig.crossing();
         let side = exp(&(Vec3::z() * (l.side_deg - 90.0).to_radians()));
-        let source = side * Vec3::new(off(0.0, 0.039 * l.baseline_mm), baseline, crossing - baseline / angle.tan());
+        let source =
+            side * Vec3::new(off(0.0, 3.0 / 77.0 * l.baseline_mm), baseline, crossing - baseline / angle.tan());
         let axis = side * Vec3::new(0.0, -angle.sin(), angle.cos());
         let normal = exp(&(axis * roll)) * (side * Vec3::new(0.0, angle.cos(), angle.sin()));
         let laser = LineLaser {
@@ -190,14 +197,15 @@ impl Station {
             axis,
             normal,
             half_fan_deg: l.fan_deg / 2.0,
-            waist_radius: off(l.waist_radius_mm, 0.095 * l.waist_radius_mm),
-            waist_distance: off(l.waist_at_mm, 0.047 * l.waist_at_mm),
+            waist_radius: off(l.waist_radius_mm, 2.0 / 21.0 * l.waist_radius_mm),
+            waist_distance: off(l.waist_at_mm, 8.0 / 170.0 * l.waist_at_mm),
             wavelength_nm: l.wavelength_nm,
         };
         let p = rig.pointer_spec();
-        let unit = rig.working.distance_mm / 155.0;
+        let (wide, far) = (rig.board_scale(), rig.working.distance_mm / 155.0);
+        let scales = [wide, wide, far];
         let mut near =
-            |at: [f64; 3], by: [f64; 3]| Vec3::from(std::array::from_fn::<_, 3, _>(|i| off(at[i], by[i] * unit)));
+            |at: [f64; 3], by: [f64; 3]| Vec3::from(std::array::from_fn::<_, 3, _>(|i| off(at[i], by[i] * scales[i])));
         let (spot, aim) = (near(p.source_mm, [2.0, 3.0, 2.0]), near(p.aim_mm, [3.0, 2.0, 8.0]));
         let pointer = Pointer {
             source: spot,
