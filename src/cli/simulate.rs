@@ -101,8 +101,8 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         bar.set_position(n as u64);
     })?;
     bar.finish_and_clear();
-    let rig = options.design();
-    let working_volume = WorkingVolume { near_mm: rig.working.near_mm, far_mm: rig.working.far_mm };
+    let volume = |r: &RigSpec| WorkingVolume { near_mm: r.working.near_mm, far_mm: r.working.far_mm };
+    let working_volume = options.rig.as_ref().map(volume);
     let name = format!("simulated {}", args.seed);
     Settings { name, working_volume, ..Settings::default() }.store(&done.station)?;
     let mut text = format!("{}: station with the true calibration\n", done.station.display());

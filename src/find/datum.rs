@@ -70,8 +70,9 @@ pub(super) fn fit_datum(
     }
     if rows.len() < MIN_SURFACE {
         return Err(Fault::refused(format!(
-            "{} points lie on the part's level surfaces, at least {MIN_SURFACE} are needed",
-            rows.len()
+            "{} points lie on the part's level surfaces (to {} mm, from height_gate_mm), at least {MIN_SURFACE} are needed",
+            rows.len(),
+            gate
         ))
         .cause("the part is hidden, is another one, or the search was misled")
         .next("look at the picture of the match, then scan the part again"));

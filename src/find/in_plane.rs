@@ -35,8 +35,9 @@ pub(super) fn fit_edges(
     let locating = axes[0] + axes[1];
     if locating < MIN_EDGES {
         return Err(Fault::refused(format!(
-            "{} ends of surfaces lie at the drawn edges ({} along the stripe, {} from shot to shot), at least {MIN_EDGES} are needed",
+            "{} ends of surfaces lie within edge_gate_mm = {} of the drawn edges ({} along the stripe, {} from shot to shot), at least {MIN_EDGES} are needed",
             locating,
+            options.edge_gate_mm,
             axes[0],
             axes[1]
         ))
