@@ -175,7 +175,7 @@ pub fn simulate(out: &Path, options: &SimulateOptions, progress: &(dyn Fn(usize,
     std::fs::create_dir_all(&folder).map_err(|e| Fault::write(&folder, e))?;
     station.store(&folder)?;
     if let (None, Some(rig)) = (&options.scene, &options.rig) {
-        write_atomically(&out.join("notched.toml"), rig.recipe(options.shots).as_bytes())?;
+        crate::files::write(&out.join("notched.toml"), rig.recipe(options.shots).as_bytes())?;
     }
     let plans: Vec<Plan> =
         options.sets.iter().map(|set| Plan::new(*set, &station, &scene, options)).collect::<Result<_>>()?;
