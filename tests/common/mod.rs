@@ -6,6 +6,7 @@ pub mod hand_eye;
 pub mod judge;
 pub mod pose;
 pub mod turned;
+pub mod sheets;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
