@@ -240,32 +240,36 @@ pub fn solve(
     // Total least squares in space weighs far spots wrongly; the fit in pixels starts from it.
     let none = SVector::<f64, 9>::zeros();
     let mut used: Vec<usize> = near_line(&points, &pixel_mm, &start);
-    let mut solved = None;
-    for _ in 0..views.len() {
-        if used.len() < o.min_spots {
-            return Err(refused(format!("only {} of {} spots lie on one line", used.len(), views.len())));
-        }
+    let fit_to = |used: &[usize]| -> Result<(Solved, Vec<f64>, Vec<f64>)> {
         let chosen: Vec<&SpotView> = used.iter().map(|&i| &views[i]).collect();
         let s = fit(&chosen, camera, &none, &start, feature_factor)
             .ok_or_else(|| refused("the beam is not determined by these spots".into()))?;
-        let distances: Vec<f64> =
-            (0..views.len()).map(|i| distance2(&views[i], camera, &s, used.contains(&i), feature_factor)).collect();
+        let distance = |i| distance2(&views[i], camera, &s, used.contains(&i), feature_factor);
+        let distances: Vec<f64> = (0..views.len()).map(distance).collect();
         let beside = beside(&distances, |i| used.contains(&i));
-        solved = Some((s, distances));
-        let next: Vec<usize> = (0..views.len()).filter(|&i| beside[i] <= o.gate).collect();
-        if next == used || next.len() < o.min_spots {
+        Ok((s, distances, beside))
+    };
+    for _ in 0..2 * views.len() {
+        if used.len() < o.min_spots {
+            return Err(refused(format!("only {} of {} spots lie on one line", used.len(), views.len())));
+        }
+        let (_, distances, beside) = fit_to(&used)?;
+        // One at a time, judged by the beam of the others: a wrong spot pulls its neighbours out with it.
+        let worst = used.iter().copied().max_by(|a, b| distances[*a].total_cmp(&distances[*b])).expect("not empty");
+        if distances[worst] > o.gate && used.len() > o.min_spots {
+            let rest: Vec<usize> = used.iter().copied().filter(|&i| i != worst).collect();
+            if fit_to(&rest)?.2[worst] > o.gate {
+                used = rest;
+                continue;
+            }
+        }
+        let next: Vec<usize> = (0..views.len()).filter(|i| used.contains(i) || beside[*i] <= o.gate).collect();
+        if next == used {
             break;
         }
-        // One at a time: a wrong spot pulls its neighbours out with it.
-        let worst = used.iter().copied().max_by(|a, b| beside[*a].total_cmp(&beside[*b])).expect("not empty");
-        if beside[worst] > o.gate {
-            used.retain(|&i| i != worst);
-        } else {
-            used = next;
-        }
+        used = next;
     }
-    let (whole, distances) = solved.expect("at least one round");
-    let beside = beside(&distances, |i| used.contains(&i));
+    let (whole, distances, beside) = fit_to(&used)?;
     let chosen: Vec<&SpotView> = used.iter().map(|&i| &views[i]).collect();
     let along: Vec<f64> = used.iter().map(|&i| points[i].z).collect();
     let reach = [along.iter().copied().fold(f64::INFINITY, f64::min), along.iter().copied().fold(0.0, f64::max)];

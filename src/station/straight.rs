@@ -1,5 +1,6 @@
 //! In: stripe peaks of pictures, boards of known pose in them. Out: of each picture the peaks along the strongest straight
-//! line on its board, and along a second one nearly as strong: which of them is the sheet only all pictures together can tell (stage `hough`): a flat board cuts the sheet in a line, dots, halos and reflections do not lie on it.
+//! line on its board (stage `hough`) and along a second one nearly as strong: a flat board cuts the sheet in a line, dots and
+//! halos do not lie on it; which of two lines is the sheet only all pictures together can tell.
 //! Frame and unit: pixels of a camera without lens distortion, in which the line is straight.
 
 use crate::calibrate::board_print::inside;
