@@ -35,7 +35,7 @@ pub struct PointerOptions {
 
 impl Default for PointerOptions {
     fn default() -> Self {
-        PointerOptions { gate: 20.0, gate_px: 2.0, min_spots: 4, min_spread: 0.02 }
+        PointerOptions { gate: 20.0, gate_px: 2.0, min_spots: 4, min_spread: 0.05 }
     }
 }
 

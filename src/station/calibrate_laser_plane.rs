@@ -49,7 +49,7 @@ pub fn calibrate_laser_plane(
             Some(name) => {
                 let (laser, ambient) = (recording.picture(name)?, recording.picture(&b.pose.name)?);
                 let share = room_light::share(&laser, &ambient, &b.board, &b.pose.camera_from_board, &camera.value);
-                images.push(if share > 0.0 { room_light::without(&laser, &ambient, share)? } else { laser });
+                images.push(if share > 0.0 { room_light::without(&laser, &ambient, share) } else { laser });
                 names.push(name.clone());
                 seen.push(b);
             }
