@@ -5,8 +5,8 @@
 pub mod hand_eye;
 pub mod judge;
 pub mod pose;
-pub mod turned;
 pub mod sheets;
+pub mod turned;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
