@@ -7,6 +7,7 @@ mod common;
 use common::{figure, sheetlight, sheetlight_fails};
 use nalgebra::Matrix4;
 use serde_json::Value;
+use sheetlight::raster::{Channel, load};
 use std::path::{Path, PathBuf};
 
 fn text(path: &Path) -> &str {
@@ -64,6 +65,31 @@ fn pose(v: &Value) -> Matrix4<f64> {
     Matrix4::from_row_slice(&rows)
 }
 
+/// The same recording as a colour camera takes it with the lamps on: room light of another exposure in the laser's pictures, the
+/// laser in the red alone.
+fn with_lamps_on(from: &Path, to: &Path) {
+    std::fs::create_dir_all(to).unwrap();
+    let mut meta = json(&from.join("meta.json"));
+    meta["image"]["channels"] = 3.into();
+    let load = |name: &Value| load(&from.join(name.as_str().unwrap()), Channel::Luma, 8).unwrap();
+    for (i, frame) in meta["frames"].as_array_mut().unwrap().iter_mut().enumerate() {
+        let (ambient, laser) = (load(&frame["ambient"]), load(&frame["laser"]));
+        let header = format!("P6\n{} {}\n255\n", ambient.width, ambient.height).into_bytes();
+        let (mut room, mut lit) = (header.clone(), header);
+        for (&a, &l) in ambient.to_u8().iter().zip(&laser.to_u8()) {
+            let dim = (0.5 * f32::from(a)).round() as u8;
+            room.extend([a, a, a]);
+            lit.extend([dim.saturating_add(l), dim, dim]);
+        }
+        for (kind, bytes) in [("ambient", room), ("laser", lit)] {
+            let name = format!("{kind}{i}.ppm");
+            std::fs::write(to.join(&name), bytes).unwrap();
+            frame[kind] = name.into();
+        }
+    }
+    std::fs::write(to.join("meta.json"), meta.to_string()).unwrap();
+}
+
 /// Distance in mm and angle in degrees between two poses.
 fn apart(a: &Value, b: &Value) -> (f64, f64) {
     let (a, b) = (pose(a), pose(b));
@@ -110,6 +136,18 @@ fn a_station_is_calibrated_ranged_and_verified_by_its_commands() {
     let truth = s.truth("laser_plane");
     let angle = normal(&plane).cross(&normal(&truth)).norm().atan2(normal(&plane).dot(&normal(&truth))).to_degrees();
     assert!(angle < 0.02, "laser plane: {angle} degrees");
+    for recording in ["laserplane", "pointer_cal"] {
+        with_lamps_on(&s.at.join(recording), &s.at.join(format!("{recording}_lamps")));
+    }
+    let lamps = s.calibrate("laser-plane", "laserplane_lamps", &["--on", "cpu", "--channel", "red"]);
+    let angle = normal(&lamps).cross(&normal(&truth)).norm().asin().to_degrees();
+    assert!(angle < 0.02, "laser plane with the lamps on: {angle} degrees");
+    let lamps = s.calibrate("pointer", "pointer_cal_lamps", &["--channel", "red"]);
+    let aims =
+        |v: &Value| nalgebra::Vector3::from_iterator((0..3).map(|i| v["value"]["direction"][i].as_f64().unwrap()));
+    let (found, wanted) = (aims(&lamps), aims(&s.truth("pointer")));
+    let angle = found.cross(&wanted).norm().asin().to_degrees();
+    assert!(angle < 0.05, "pointer with the lamps on: {angle} degrees");
 
     s.calibrate("pointer", "pointer_cal", &[]);
     let ranges = s.run(&["range"], "pointer", &[]);

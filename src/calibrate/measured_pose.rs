@@ -36,6 +36,9 @@ impl AboutCamera {
     }
 }
 
+/// The features of a picture may fit their board this many times worse than those of the others.
+pub const MISFIT: f64 = 3.0;
+
 /// A small motion in the camera frame: translation (mm) then rotation vector (rad);
 /// a point P goes to exp(w) P + v.
 pub type Step = Vector6<f64>;
@@ -108,6 +111,10 @@ impl MeasuredPose {
     /// Centre of the features, camera frame, mm.
     pub fn centre(&self) -> Vec3 {
         self.camera_from_board.point(&self.landmarks[4])
+    }
+    /// Its own factor where it fits far worse than usual, of a blurred picture or of another camera, else the usual one.
+    pub fn factor_among(&self, usual: f64) -> f64 {
+        if self.sigma_factor > MISFIT * usual { self.sigma_factor } else { usual }
     }
     /// Covariance of a step, the features' sigmas being this factor times the stated ones.
     pub fn covariance(&self, sigma_factor: f64) -> Matrix6<f64> {
@@ -239,10 +246,16 @@ pub fn measure_view(name: &str, camera: &Intrinsics, board: &BoardSpec, view: &B
     measure(&SeenBoard::from_view(name, board, view), camera, &start.camera_from_board)
 }
 
-/// One factor for all pictures: their residuals pooled by degrees of freedom.
+/// One factor for all pictures: their residuals pooled by degrees of freedom. A picture that fits more than three times as
+/// badly as the middle one, blurred or of another camera, does not speak for the others.
 pub fn pooled_factor(poses: &[MeasuredPose]) -> f64 {
-    let (sum, freedom) =
-        poses.iter().fold((0.0, 0.0), |(s, f), p| (s + p.sigma_factor * p.sigma_factor * p.freedom, f + p.freedom));
+    let mut factors: Vec<f64> = poses.iter().map(|p| p.sigma_factor).collect();
+    factors.sort_by(f64::total_cmp);
+    let limit = MISFIT * factors.get((factors.len().max(1) - 1) / 2).copied().unwrap_or(f64::NAN);
+    let (sum, freedom) = poses
+        .iter()
+        .filter(|p| p.sigma_factor <= limit)
+        .fold((0.0, 0.0), |(s, f), p| (s + p.sigma_factor * p.sigma_factor * p.freedom, f + p.freedom));
     if freedom > 0.0 { (sum / freedom).sqrt() } else { f64::NAN }
 }
 

@@ -47,9 +47,10 @@ pub struct Args {
     /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
     #[arg(long, default_value = "auto", value_parser = super::parse::<Where>)]
     on: Where,
-    /// Distance of the camera from the board when it looks at it squarely, mm
-    #[arg(long, default_value_t = 150.0)]
-    view_mm: f64,
+    /// Distance of the camera from the board when it looks at it squarely, mm [default: the middle of the working volume, else
+    /// where the sheet meets the camera's axis]
+    #[arg(long)]
+    view_mm: Option<f64>,
     /// Largest angle between the touched board and the found part, degrees
     #[arg(long, default_value_t = 3.0)]
     max_tilt_deg: f64,

@@ -3,6 +3,7 @@
 //! Frame and unit: the part frame of the measured pose; mm, rad.
 
 use super::drawing::Drawing;
+use super::measure::MeasureOptions;
 use super::surface_ends::Observation;
 use crate::fault::{Fault, Result};
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
@@ -78,7 +79,13 @@ const MIN_EDGES: usize = 2;
 
 /// Measures every element of every named closed shape that is seen well enough, by least squares on its
 /// own edges with the surface growth that the whole part showed.
-pub fn features(observations: &[Observation], growth: [f64; 2]) -> BTreeMap<(usize, usize), Feature> {
+pub fn features(
+    observations: &[Observation],
+    growth: [f64; 2],
+    options: &MeasureOptions,
+) -> BTreeMap<(usize, usize), Feature> {
+    // An end is not known better, whatever its few neighbours say.
+    let least = 0.03 * options.unit();
     let mut groups: BTreeMap<(usize, usize), Vec<&Observation>> = BTreeMap::new();
     for o in observations.iter().filter(|o| o.weight > 0.0) {
         groups.entry((o.shape, o.element)).or_default().push(o);
@@ -103,7 +110,7 @@ pub fn features(observations: &[Observation], growth: [f64; 2]) -> BTreeMap<(usi
         let Some(inverse) = a.try_inverse() else { continue };
         let t = inverse * b;
         let sum: f64 = list.iter().map(|o| (o.residual - growth[o.axis] - o.nx * t.x - o.ny * t.y).powi(2)).sum();
-        let s2 = (sum / (list.len() as f64 - 2.0).max(1.0)).max(0.03f64.powi(2));
+        let s2 = (sum / (list.len() as f64 - 2.0).max(1.0)).max(least * least);
         out.insert(key, Feature { offset: [t.x, t.y], sigma: (0.5 * inverse.trace() * s2).sqrt() });
     }
     out
@@ -120,7 +127,7 @@ pub fn check(list: &[Construction], drawing: &Drawing) -> Result<()> {
             return Err(Fault::input(format!("the name '{}' is used twice", c.name)).next("rename one of them"));
         }
     }
-    build(list, drawing, &measured.collect()).map(|_| ())
+    build(list, drawing, &measured.collect(), &MeasureOptions::default()).map(|_| ())
 }
 
 /// Evaluates the constructions on measured shapes, in their order.
@@ -128,10 +135,11 @@ pub fn build(
     list: &[Construction],
     drawing: &Drawing,
     measured: &BTreeMap<(usize, usize), Feature>,
+    options: &MeasureOptions,
 ) -> Result<Vec<Built>> {
     let mut out: Vec<Built> = Vec::new();
     for c in list {
-        let built = one(c, drawing, measured, &out).map_err(|e| e.at(format!("construction '{}'", c.name)))?;
+        let built = one(c, drawing, measured, &out, options).map_err(|e| e.at(format!("construction '{}'", c.name)))?;
         out.push(built);
     }
     Ok(out)
@@ -144,6 +152,7 @@ fn one(
     drawing: &Drawing,
     measured: &BTreeMap<(usize, usize), Feature>,
     earlier: &[Built],
+    options: &MeasureOptions,
 ) -> Result<Built> {
     let needs = |least: usize, most: usize| {
         if (least..=most).contains(&c.of.len()) {
@@ -197,7 +206,7 @@ fn one(
         }
         Build::Lattice => {
             needs(1, 1)?;
-            lattice(&c.of[0], drawing, measured)?
+            lattice(&c.of[0], drawing, measured, options)?
         }
     };
     let turn = m.direction.zip(n.direction).map(|(a, b)| {
@@ -276,7 +285,12 @@ fn moved(p: &Value, d: &Value, by: [f64; 2]) -> Result<Value> {
 }
 
 /// Rigid fit of all measured elements of a grid to their nominal places.
-fn lattice(name: &str, drawing: &Drawing, measured: &BTreeMap<(usize, usize), Feature>) -> Result<Pair> {
+fn lattice(
+    name: &str,
+    drawing: &Drawing,
+    measured: &BTreeMap<(usize, usize), Feature>,
+    options: &MeasureOptions,
+) -> Result<Pair> {
     let shape = drawing.shape.iter().position(|s| s.name.as_deref() == Some(name));
     let shape = shape.ok_or_else(|| {
         Fault::input(format!("'{name}' names no shape"))
@@ -324,7 +338,7 @@ fn lattice(name: &str, drawing: &Drawing, measured: &BTreeMap<(usize, usize), Fe
         t = inverse * b;
         let mut size: Vec<f64> = seen.iter().map(|(p, f)| off(p, f, &t)).map(|r| r.0.hypot(r.1)).collect();
         size.sort_unstable_by(f64::total_cmp);
-        limit = (3.0 * size[size.len() / 2]).max(0.05);
+        limit = (3.0 * size[size.len() / 2]).max(0.05 * options.unit());
     }
     let s = limit / 3.0;
     let centre = drawing.shape[shape].centre.unwrap_or([0.0, 0.0]);

@@ -64,7 +64,7 @@ pub(super) fn surface_ends(
                 let p = local[b].expect("on the face");
                 let (dx, dy) = (q.x - p.x, q.y - p.y);
                 let length = dx.hypot(dy);
-                if !(0.005..2.0).contains(&length) {
+                if !(0.005..2.0).contains(&(length / options.unit())) {
                     continue;
                 }
                 if n.is_some_and(on) {

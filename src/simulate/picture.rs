@@ -17,7 +17,7 @@ impl View<'_> {
         let along = Vec3::new(n.x, n.y, 1.0).normalize();
         let eye = self.scene_from_camera.translation;
         let direction = self.scene_from_camera.direction(&along);
-        let Some(hit) = self.scene.hit(&eye, &direction, 2000.0) else { return 0.02 };
+        let Some(hit) = self.scene.hit(&eye, &direction, self.far()) else { return 0.02 };
         let lamp = self.scene_from_camera.direction(&Vec3::new(-0.35, -0.25, -0.9)).normalize();
         let shade = 0.55 + 0.45 * hit.normal.dot(&lamp).max(0.0);
         // cos⁴ of the angle to the axis: natural vignetting of a lens.

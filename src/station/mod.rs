@@ -16,6 +16,7 @@ mod products;
 mod progress;
 mod range;
 mod report;
+mod room_light;
 mod run;
 mod scan_folder;
 mod seen;
