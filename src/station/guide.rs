@@ -70,7 +70,9 @@ impl GuideOptions {
             return Err(Fault::usage(format!("max_tilt_deg is {tilt}, wanted 0.1 to 20")).next("correct the option"));
         }
         if !(view > 0.0 && view.is_finite()) {
-            return Err(Fault::usage(format!("view_mm is {view}, a distance above 0 is wanted")).next("correct the option"));
+            return Err(
+                Fault::usage(format!("view_mm is {view}, a distance above 0 is wanted")).next("correct the option")
+            );
         }
         Ok(())
     }

@@ -17,7 +17,7 @@ use std::fmt::Write;
 fn used(text: &str) -> Result<(), Fault> {
     let drawing = Drawing::parse(text)?;
     let model = ShapeModel::from_drawing(&drawing, 0.4, Kind::Height, &ModelOptions::default())?;
-    let edges = EdgeIndex::new(&drawing);
+    let edges = EdgeIndex::new(&drawing, 1.0);
     let faces = drawing.faces();
     let [x0, y0, x1, y1] = drawing.bounds();
     for i in 0..20_000 {
