@@ -70,9 +70,12 @@ pub fn load_poses(path: &Path) -> Result<PoseFile> {
     parsed.map_err(|e| e.at(path.display()))
 }
 
-fn collect(rows: impl Iterator<Item = (usize, Convention, Vec<f64>)>) -> Result<PoseFile> {
+/// A pose as its file states it: its number, and how its numbers are to be read.
+pub(super) type Row = (usize, Convention, Vec<f64>);
+
+fn collect(rows: Vec<Row>) -> Result<PoseFile> {
     let mut out = PoseFile { poses: Vec::new(), warnings: Vec::new() };
-    for (expected, (index, convention, numbers)) in rows.enumerate() {
+    for (expected, (index, convention, numbers)) in rows.into_iter().enumerate() {
         if index != expected {
             return Err(Fault::input(format!("pose {expected} is numbered {index}"))
                 .cause("a pose is missing, or the file was sorted")
@@ -109,6 +112,11 @@ fn collect(rows: impl Iterator<Item = (usize, Convention, Vec<f64>)>) -> Result<
 }
 
 fn from_json(text: &str) -> Result<PoseFile> {
+    collect(json_rows(text, "base_T_flange")?)
+}
+
+/// Poses written as matrices of the transform that is named.
+pub(super) fn json_rows(text: &str, transform: &str) -> Result<Vec<Row>> {
     let file: JsonPoses = serde_json::from_str(text).map_err(|e| {
         Fault::input(format!("is not a pose file: {e}"))
             .cause("a misspelt key, NaN, or a truncated file")
@@ -117,7 +125,7 @@ fn from_json(text: &str) -> Result<PoseFile> {
     for (key, value, want) in [
         ("units", &file.units, "mm"),
         ("layout", &file.layout, "row-major 4x4"),
-        ("transform", &file.transform, "base_T_flange"),
+        ("transform", &file.transform, transform),
     ] {
         if value != want {
             return Err(Fault::input(format!("{key} is '{value}', only '{want}' is read"))
@@ -125,12 +133,16 @@ fn from_json(text: &str) -> Result<PoseFile> {
                 .next("convert the poses first"));
         }
     }
-    collect(file.poses.into_iter().map(|p| (p.frame, Convention::Matrix, p.matrix.to_vec())))
+    Ok(file.poses.into_iter().map(|p| (p.frame, Convention::Matrix, p.matrix.to_vec())).collect())
+}
+
+fn from_csv(text: &str) -> Result<PoseFile> {
+    collect(csv_rows(text)?)
 }
 
 /// A CSV has a header; `frame,m00,...,m33` is a matrix in mm, every other layout is preceded by a
 /// line `# convention: NAME`.
-fn from_csv(text: &str) -> Result<PoseFile> {
+pub(super) fn csv_rows(text: &str) -> Result<Vec<Row>> {
     let mut convention = None;
     let mut header = false;
     let mut rows = Vec::new();
@@ -167,7 +179,7 @@ fn from_csv(text: &str) -> Result<PoseFile> {
         }
     }
     let convention = convention.unwrap_or(Convention::Matrix);
-    collect(rows.into_iter().map(|(i, numbers)| (i, convention, numbers)))
+    Ok(rows.into_iter().map(|(i, numbers)| (i, convention, numbers)).collect())
 }
 
 /// Writes poses as JSON matrices.
