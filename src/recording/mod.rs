@@ -2,12 +2,14 @@
 //! Frame and unit: poses are base_from_flange in mm; boards in mm; see docs/file-formats.md.
 
 mod board;
+mod board_poses;
 mod markers;
 mod meta;
 mod pose_csv;
 mod poses;
 
 pub use board::BoardSpec;
+pub use board_poses::load_board_poses;
 pub use markers::Markers;
 pub use meta::{AmbientRef, Beam, FrameRef, ImageSpec, Meta};
 pub use poses::{PoseFile, load_poses, save_poses};

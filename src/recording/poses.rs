@@ -98,9 +98,9 @@ pub fn load_poses(path: &Path) -> Result<PoseFile> {
     parsed.map_err(|e| e.at(path.display()))
 }
 
-fn collect(rows: impl Iterator<Item = (usize, Convention, Vec<f64>)>) -> Result<PoseFile> {
+fn collect(rows: Vec<Row>) -> Result<PoseFile> {
     let mut out = PoseFile { poses: Vec::new(), warnings: Vec::new() };
-    for (expected, (index, convention, numbers)) in rows.enumerate() {
+    for (expected, (index, convention, numbers)) in rows.into_iter().enumerate() {
         if index != expected {
             return Err(Fault::input(format!("pose {expected} is numbered {index}"))
                 .cause("a pose is missing, or the file was sorted")
@@ -185,6 +185,11 @@ fn looks_like_another_unit(convention: Convention, rows: &[Row]) -> Result<()> {
 }
 
 fn from_json(text: &str) -> Result<PoseFile> {
+    collect(json_rows(text, "base_T_flange")?)
+}
+
+/// Poses written as matrices of the transform that is named.
+pub(super) fn json_rows(text: &str, transform: &str) -> Result<Vec<Row>> {
     let file: JsonPoses = serde_json::from_str(text).map_err(|e| {
         Fault::input(format!("is not a pose file: {e}"))
             .cause("a misspelt key, NaN, or a truncated file")
@@ -193,7 +198,7 @@ fn from_json(text: &str) -> Result<PoseFile> {
     for (key, value, want) in [
         ("units", &file.units, "mm"),
         ("layout", &file.layout, "row-major 4x4"),
-        ("transform", &file.transform, "base_T_flange"),
+        ("transform", &file.transform, transform),
     ] {
         if value != want {
             return Err(Fault::input(format!("{key} is '{value}', only '{want}' is read"))
@@ -201,7 +206,7 @@ fn from_json(text: &str) -> Result<PoseFile> {
                 .next("convert the poses first"));
         }
     }
-    collect(file.poses.into_iter().map(|p| (p.frame, Convention::Matrix, p.matrix.to_vec())))
+    Ok(file.poses.into_iter().map(|p| (p.frame, Convention::Matrix, p.matrix.to_vec())).collect())
 }
 
 /// Writes poses as JSON matrices.

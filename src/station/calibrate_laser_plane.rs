@@ -62,7 +62,7 @@ pub fn calibrate_laser_plane(
             .next("record an ambient and a laser picture of each board pose"));
     }
     let c = intrinsic_covariance(&camera.covariance);
-    let factor = pooled_factor(&seen.iter().map(|s| s.pose.clone()).collect::<Vec<_>>());
+    let factor = pooled_factor(seen.iter().map(|s| &s.pose)).unwrap_or(f64::NAN);
     let processor = run.place.open()?;
     let device = match &processor {
         Processor::Gpu(device) => Some(device),

@@ -63,7 +63,7 @@ pub fn calibrate_pointer(
             Err(fault) => missing.push((name.clone(), fault.to_string())),
         }
     }
-    let factor = pooled_factor(&views.iter().map(|v| v.pose.clone()).collect::<Vec<_>>());
+    let factor = pooled_factor(views.iter().map(|v| &v.pose)).unwrap_or(f64::NAN);
     let c = intrinsic_covariance(&camera.covariance);
     let fit = solve(&views, &camera.value, &c, factor, &run.solver).map_err(|mut fault| {
         if let Some((name, why)) = missing.first() {

@@ -27,10 +27,12 @@ mod verify;
 pub mod volume;
 
 pub use board_views::{Boards, FrameBoard, boards};
-pub use calibrate_hand_eye::{Calibrated, HandEyeResult, HandEyeRun, calibrate_hand_eye};
+pub use calibrate_hand_eye::{
+    Calibrated, HandEyeResult, HandEyeRun, PosePairs, calibrate_hand_eye, calibrate_hand_eye_from_poses,
+};
 pub use calibrate_laser_plane::{LaserPlaneRun, calibrate_laser_plane};
 pub use calibrate_pointer::{PointerRun, calibrate_pointer};
-pub use calibrate_profile_hand_eye::calibrate_profile_hand_eye;
+pub use calibrate_profile_hand_eye::{calibrate_profile_hand_eye, evaluate_profile_hand_eye};
 pub use find::{find_part, teach_part};
 pub use guide::{GuideOptions, Guided, Step, guide};
 pub use judge::{Judged, judge};
