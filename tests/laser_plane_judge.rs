@@ -312,7 +312,7 @@ fn call(seed: u64, flaw: Flaw) -> Called {
     let s = Sheet::random(rng, count);
     let views = set(rng, &s, flaw);
     let refused = Called { flaw, count, seed, verdict: None, error: 0.0, sigma: 0.0, says: Vec::new() };
-    let factor = pooled_factor(&views.iter().map(|v| v.pose.clone()).collect::<Vec<_>>());
+    let factor = pooled_factor(views.iter().map(|v| &v.pose)).unwrap_or(f64::NAN);
     let Ok(fit) = solve(&views, &s.camera, &SMatrix::zeros(), factor, &LaserPlaneOptions::default()) else {
         return refused;
     };

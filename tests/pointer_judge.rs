@@ -367,7 +367,7 @@ fn judged(seed: u64, wrong: Wrong, count: usize) -> Judged {
             _ => {}
         }
     }
-    let factor = pooled_factor(&v.iter().map(|v| v.pose.clone()).collect::<Vec<_>>());
+    let factor = pooled_factor(v.iter().map(|v| &v.pose)).unwrap_or(f64::NAN);
     let Ok(fit) = solve(&v, &s.camera, &SMatrix::zeros(), factor, &PointerOptions::default()) else {
         return (None, 0.0, 0.0, vec![]);
     };

@@ -150,7 +150,7 @@ fn from_csv(text: &str) -> Result<PoseFile> {
     if !read.angle_stated {
         looks_like_another_unit(convention, &read.rows)?;
     }
-    let file = collect(read.rows.into_iter())?;
+    let file = collect(read.rows)?;
     match file.metres() {
         Some(what) if !read.length_stated => Err(Fault::refused(what)
             .cause("positions in metres under a convention in millimetres")
