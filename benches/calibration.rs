@@ -72,7 +72,11 @@ fn corners(side: &str) -> Vec<Observation> {
             sigma_px: 0.1,
         };
         let points = c.iter().enumerate().map(point).collect();
-        Observation { name: i.to_string(), features: features.clone(), view: BoardView { points, ambiguous: false } }
+        Observation {
+            name: i.to_string(),
+            features: features.clone(),
+            view: BoardView { points, ambiguous: false, dot_diameter: None },
+        }
     };
     corners.into_iter().enumerate().map(observation).collect()
 }

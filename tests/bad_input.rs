@@ -180,11 +180,17 @@ fn stations_and_outputs_are_checked() {
 }
 
 #[test]
-#[cfg(target_os = "linux")]
-fn a_full_disk_is_said_to_be_full() {
-    let b = Bench::new(12);
-    std::fs::create_dir(&b.out).unwrap();
-    // Writing to this device fails as on a full disk.
-    std::os::unix::fs::symlink("/dev/full", Path::new(&b.out).join("cloud.ply.part")).unwrap();
-    b.fails(&[], &["cloud.ply", "No space left on device", "the disk is full", "free some space"]);
+fn a_scan_without_any_stripe_says_what_was_seen() {
+    for (level, wants) in [(0u8, ["black", "the pictures are dark"]), (255, ["white", "the pictures are white"])] {
+        let b = Bench::new(4);
+        for i in 0..4 {
+            save_png(&Image::from_u8(640, 480, vec![level; 640 * 480]), &b.recording.join(format!("{i}.png"))).unwrap();
+        }
+        let (code, text) = sheetlight_fails(&b.args(&["--json"]));
+        assert!(code == 1 && text.contains("no point in 4 shots") && text.contains(wants[1]), "{}: {text}", wants[0]);
+        assert!(text.contains(&format!("brightest {level} of 255")) && text.contains("next step"), "{text}");
+        let report = sheetlight::station::load_report(Path::new(&b.out)).unwrap();
+        assert_eq!((report.points, report.median_sigma_mm, report.dark_shots.len()), (0, None, 4));
+        assert!(Path::new(&b.out).join("index.html").exists());
+    }
 }

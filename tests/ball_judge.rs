@@ -8,8 +8,9 @@ use common::judge::{Trial, between, gauss, gauss3, judge};
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
+use sheetlight::calibrate::profile_evaluate::evaluate;
 use sheetlight::calibrate::profile_files::Profile;
-use sheetlight::calibrate::profile_hand_eye::{BallOptions, Side, solve};
+use sheetlight::calibrate::profile_hand_eye::{BallFit, BallOptions, Side, solve};
 use sheetlight::geometry::{Base, Flange, Mat3, Rigid, Sensor, Vec3, exp, log};
 
 const RADIUS: f64 = 20.0;
@@ -17,6 +18,10 @@ const RADIUS: f64 = 20.0;
 struct Rig {
     sensor: Rigid<Flange, Sensor>,
     ball: Vec3,
+    /// Where the ball's centre is along the sensor's z, mm.
+    depth: [f64; 2],
+    /// Noise of the robot's orientation per axis, degrees.
+    robot_deg: f64,
 }
 
 /// Profiles and reported poses. `heights`: range of the ball's centre over the profile plane, mm.
@@ -31,7 +36,11 @@ fn scans(
 ) -> (Vec<Profile>, Vec<Rigid<Base, Flange>>) {
     let mut out = (Vec::new(), Vec::new());
     for i in 0..count {
-        let q = Vec3::new(between(rng, -15.0, 15.0), between(rng, heights[0], heights[1]), between(rng, 140.0, 180.0));
+        let q = Vec3::new(
+            between(rng, -15.0, 15.0),
+            between(rng, heights[0], heights[1]),
+            between(rng, rig.depth[0], rig.depth[1]),
+        );
         let turn: Mat3 = exp(&gauss3(rng, tilt));
         let base_from_sensor: Rigid<Base, Sensor> = Rigid::new(turn, rig.ball - turn * q);
         let r = (RADIUS * RADIUS - q.y * q.y).sqrt();
@@ -48,13 +57,15 @@ fn scans(
         }
         out.0.push(Profile { name: format!("profile {i}"), points });
         let pose = base_from_sensor * rig.sensor.inverse();
-        out.1.push(Rigid::new(pose.rotation, pose.translation + gauss3(rng, robot_mm)));
+        let off = if rig.robot_deg > 0.0 { exp(&gauss3(rng, rig.robot_deg.to_radians())) } else { Mat3::identity() };
+        out.1.push(Rigid::new(off * pose.rotation, pose.translation + gauss3(rng, robot_mm)));
     }
     out
 }
 
 fn rig(rng: &mut Pcg64) -> Rig {
-    Rig { sensor: Rigid::from_vectors(&gauss3(rng, 1.0), gauss3(rng, 80.0)), ball: gauss3(rng, 300.0) }
+    let sensor = Rigid::from_vectors(&gauss3(rng, 1.0), gauss3(rng, 80.0));
+    Rig { sensor, ball: gauss3(rng, 300.0), depth: [140.0, 180.0], robot_deg: 0.0 }
 }
 
 /// Cramer-Rao bound of sensor and ball (9 numbers), from numerical derivatives of each profile's circle; what
@@ -97,12 +108,60 @@ fn the_sensors_pose_comes_with_its_true_sigma_and_near_the_bound() {
         let rig = rig(&mut Pcg64::seed_from_u64(*k));
         let (profiles, poses) = scans(rng, &rig, 20, [-14.0, 14.0], 0.35, *point, *robot);
         let found = solve(&profiles, &poses, &BallOptions::new(2.0 * RADIUS)).unwrap();
-        let w = log(&(found.flange_from_sensor.rotation * rig.sensor.rotation.transpose()));
-        let t = found.flange_from_sensor.translation - rig.sensor.translation;
-        let p = found.ball - rig.ball;
-        let error = DVector::from_iterator(9, t.iter().chain(w.iter()).chain(p.iter()).copied());
-        Trial::new(error, &found.covariance, &bound(&rig, &poses, *point, *robot))
+        Trial::new(error(&found, &rig), &found.covariance, &bound(&rig, &poses, *point, *robot))
     });
+}
+
+fn error(found: &BallFit, rig: &Rig) -> DVector<f64> {
+    let w = log(&(found.flange_from_sensor.rotation * rig.sensor.rotation.transpose()));
+    let t = found.flange_from_sensor.translation - rig.sensor.translation;
+    let p = found.ball - rig.ball;
+    DVector::from_iterator(9, t.iter().chain(w.iter()).chain(p.iter()).copied())
+}
+
+/// Few profiles, a robot that scatters in place and orientation, sensors that count z from the middle of their field
+/// and such that count it from their window: the sigma holds.
+#[test]
+fn few_and_noisy_profiles_come_with_an_honest_sigma() {
+    let sets = if std::env::var_os("SHEETLIGHT_LONG").is_some() { 600 } else { 120 };
+    let (mut sum, mut by) = (0.0, [(0.0, 0.0); 4]);
+    for k in 0..sets {
+        let rng = &mut Pcg64::seed_from_u64(700 + k);
+        let case = (k % 4) as usize;
+        let depth = if case % 2 == 0 { [-23.0, 19.0] } else { [300.0, 420.0] };
+        let rig = Rig { depth, robot_deg: if case < 2 { 0.0 } else { 0.03 }, ..rig(rng) };
+        let count = [10, 14, 24][(k / 4 % 3) as usize];
+        let (profiles, poses) = scans(rng, &rig, count, [-14.0, 14.0], 0.35, 0.02, 0.15);
+        let found = solve(&profiles, &poses, &BallOptions::new(2.0 * RADIUS)).unwrap();
+        let e = error(&found, &rig);
+        let share = (0..6).map(|i| e[i] * e[i] / found.covariance[(i, i)]).sum::<f64>() / 6.0;
+        sum += share;
+        by[case] = (by[case].0 + share, by[case].1 + 1.0);
+    }
+    let by = by.map(|(s, n)| f64::sqrt(s / n));
+    let all = f64::sqrt(sum / sets as f64);
+    println!("{sets} sets: error over sigma {all:.3}; by case {by:.3?}");
+    assert!((0.8..=1.25).contains(&all), "{all:.3}, {by:.3?}");
+}
+
+/// The transform that was found beats one that is a millimetre and a degree off, and the figures say by how much.
+#[test]
+fn a_transform_from_elsewhere_is_judged_by_the_ball() {
+    let rng = &mut Pcg64::seed_from_u64(31);
+    let rig = Rig { depth: [-23.0, 19.0], ..rig(rng) };
+    let (profiles, poses) = scans(rng, &rig, 16, [-14.0, 14.0], 0.35, 0.02, 0.02);
+    let o = BallOptions::new(2.0 * RADIUS);
+    let judged = |sensor: &Rigid<Flange, Sensor>| evaluate(&profiles, &poses, sensor, &o).unwrap();
+    let truth = judged(&rig.sensor);
+    let off = judged(&Rigid::new(rig.sensor.rotation, rig.sensor.translation + Vec3::new(1.0, 0.0, 0.0)));
+    let turned = judged(&Rigid::new(exp(&Vec3::new(0.0, 0.0175, 0.0)) * rig.sensor.rotation, rig.sensor.translation));
+    println!("rms: truth {:.4}, 1 mm off {:.4}, 1 degree off {:.4} mm", truth.rms, off.rms, turned.rms);
+    assert!(truth.rms < 0.035 && (truth.free_diameter - 2.0 * RADIUS).abs() < 0.1, "{truth:?}");
+    assert!((truth.ball - rig.ball).norm() < 0.05);
+    assert!(off.rms > 5.0 * truth.rms && turned.rms > 5.0 * truth.rms);
+    // A wrong diameter shows in the one that is left free.
+    let other = evaluate(&profiles, &poses, &rig.sensor, &BallOptions::new(2.0 * RADIUS + 0.5)).unwrap();
+    assert!(other.rms > 3.0 * other.free_rms && (other.free_diameter - 2.0 * RADIUS).abs() < 0.1, "{other:?}");
 }
 
 #[test]

@@ -102,7 +102,11 @@ fn golden(side: &str) -> (Vec<Observation>, serde_json::Value) {
                 sigma_px: 0.1,
             };
             let points = c.iter().enumerate().map(point).collect();
-            Observation { name, features: features.clone(), view: BoardView { points, ambiguous: false } }
+            Observation {
+                name,
+                features: features.clone(),
+                view: BoardView { points, ambiguous: false, dot_diameter: None },
+            }
         })
         .collect();
     (pictures, set)

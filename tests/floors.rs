@@ -65,7 +65,8 @@ const MAY: &[(&str, &[&str])] = &[
 ];
 
 /// Outside crates with one home; named anywhere else they would spread.
-const HOMES: &[(&str, &str)] = &[("wgpu::", "gpu"), ("image::", "raster"), ("clap::", "cli"), ("indicatif::", "cli")];
+const HOMES: &[(&str, &str)] =
+    &[("wgpu::", "gpu"), ("image::", "raster"), ("clap::", "cli"), ("indicatif::", "cli"), ("signal_hook::", "cli")];
 
 fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()) {

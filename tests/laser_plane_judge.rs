@@ -5,14 +5,19 @@
 mod common;
 
 use common::judge::{Trial, between, gauss, judge};
+use common::sheets::{FLAWS, Flaw, Sheet, set};
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
-use rand::SeedableRng;
+use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
+use rayon::prelude::*;
 use sheetlight::calibrate::laser_plane::{LaserPlaneFit, LaserPlaneOptions, PeakUse, StripePeak, StripeView, solve};
-use sheetlight::calibrate::measured_pose::{SeenBoard, changed, measure};
+use sheetlight::calibrate::laser_plane_report::judge as judge_plane;
+use sheetlight::calibrate::limits::Asked;
+use sheetlight::calibrate::measured_pose::{SeenBoard, changed, measure, pooled_factor};
 use sheetlight::camera::Intrinsics;
 use sheetlight::geometry::{Board, Camera, Plane, Rigid, Vec2, Vec3, exp};
 use sheetlight::recording::BoardSpec;
+use sheetlight::rig::{Verdict, Volume};
 
 struct Station {
     camera: Intrinsics,
@@ -288,4 +293,85 @@ fn stripes_on_one_line_are_refused() {
         Err(_) => {}
         Ok(f) => assert!(f.depth_spread < 0.5 && f.board_spread < 0.01, "depth {} mm", f.depth_spread),
     }
+}
+
+/// One calibration of a random station: what it was called, and the plane's error and stated sigma over the boards, mm.
+struct Called {
+    flaw: Flaw,
+    count: usize,
+    seed: u64,
+    verdict: Option<Verdict>,
+    error: f64,
+    sigma: f64,
+    says: Vec<String>,
+}
+
+fn call(seed: u64, flaw: Flaw) -> Called {
+    let rng = &mut Pcg64::seed_from_u64(seed);
+    let count = rng.random_range(1..=14);
+    let s = Sheet::random(rng, count);
+    let views = set(rng, &s, flaw);
+    let refused = Called { flaw, count, seed, verdict: None, error: 0.0, sigma: 0.0, says: Vec::new() };
+    let factor = pooled_factor(views.iter().map(|v| &v.pose)).unwrap_or(f64::NAN);
+    let Ok(fit) = solve(&views, &s.camera, &SMatrix::zeros(), factor, &LaserPlaneOptions::default()) else {
+        return refused;
+    };
+    let lit = Volume::new(fit.reach[0], fit.reach[1], "where the boards were lit");
+    let quality = judge_plane(&fit, &views, &s.camera, &Asked::default().limits(&lit, |z| s.camera.view_mm(z)));
+    let places: Vec<Vec3> = s.boards.iter().flat_map(|b| s.line(&s.plane, b, 9)).collect();
+    let mean = |of: &dyn Fn(&Vec3) -> f64| (places.iter().map(of).sum::<f64>() / places.len() as f64).sqrt();
+    let variance = |p: &Vec3| {
+        let u = DVector::from_vec(vec![p.x, p.y, p.z, -1.0]);
+        (&fit.covariance * &u).dot(&u)
+    };
+    Called {
+        verdict: Some(quality.verdict),
+        error: mean(&|p| fit.plane.distance(p).powi(2)),
+        sigma: mean(&variance),
+        says: quality.reasons,
+        ..refused
+    }
+}
+
+/// Users live in a space of rigs and of mistakes: any depth from 60 mm to 1.5 m, lying, upright and diagonal stripes, the
+/// laser on every side, 1 to 14 boards, narrow and wide ranges of depth.
+#[test]
+fn a_flawed_set_never_passes_with_an_error_above_three_sigmas() {
+    let each = if std::env::var_os("SHEETLIGHT_LONG").is_some() { 300 } else { 50 };
+    let all: Vec<Called> = FLAWS
+        .into_par_iter()
+        .flat_map(|flaw| (0..each).into_par_iter().map(move |k| call(7000 + 1000 * flaw as u64 + k, flaw)))
+        .collect();
+    let passed = |c: &&Called| c.verdict.is_some_and(|v| v <= Verdict::Usable);
+    for flaw in FLAWS {
+        let of: Vec<&Called> = all.iter().filter(|c| c.flaw == flaw).collect();
+        let count = |v| of.iter().filter(|c| c.verdict == v).count();
+        let over: Vec<f64> = of.iter().copied().filter(passed).map(|c| c.error / c.sigma).collect();
+        println!(
+            "{flaw:?}: good {}, usable {}, badly determined {}, refused {}; error over sigma of those that passed: rms {:.2}, \
+             worst {:.2}",
+            count(Some(Verdict::Good)),
+            count(Some(Verdict::Usable)),
+            count(Some(Verdict::BadlyDetermined)),
+            count(None),
+            (over.iter().map(|x| x * x).sum::<f64>() / over.len().max(1) as f64).sqrt(),
+            over.iter().copied().fold(0.0, f64::max)
+        );
+    }
+    let wrong: Vec<String> = all
+        .iter()
+        .filter(passed)
+        .filter(|c| c.error > 3.0 * c.sigma)
+        .map(|c| {
+            format!(
+                "{:?}, {} boards, seed {}: {:.4} mm of {:.4}: {:?}",
+                c.flaw, c.count, c.seed, c.error, c.sigma, c.says
+            )
+        })
+        .collect();
+    assert!(wrong.is_empty(), "{} of {}: {wrong:#?}", wrong.len(), all.len());
+    // Sound sets of five boards or more are taken.
+    let sound: Vec<&Called> = all.iter().filter(|c| c.flaw == Flaw::None && c.count >= 5).collect();
+    let taken = sound.iter().copied().filter(passed).count();
+    assert!(taken as f64 >= 0.9 * sound.len() as f64, "{taken} of {} sound sets were taken", sound.len());
 }

@@ -5,14 +5,19 @@
 mod common;
 
 use common::judge::{Trial, between, gauss, gauss2, gauss3, judge};
+use common::sheets::{Sheet, log_between};
 use nalgebra::{DMatrix, DVector, Matrix2, SMatrix, SVector};
-use rand::SeedableRng;
+use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
-use sheetlight::calibrate::measured_pose::{SeenBoard, changed, measure};
+use rayon::prelude::*;
+use sheetlight::calibrate::limits::Asked;
+use sheetlight::calibrate::measured_pose::{SeenBoard, changed, measure, pooled_factor};
 use sheetlight::calibrate::pointer::{PointerOptions, SpotView, solve};
 use sheetlight::calibrate::pointer_range::{RobotNoise, range, surface, to_base};
+use sheetlight::calibrate::pointer_report::judge as judge_pointer;
 use sheetlight::camera::Intrinsics;
 use sheetlight::geometry::{Base, Board, Camera, Flange, Plane, Ray, Rigid, Vec2, Vec3, exp};
+use sheetlight::rig::{Verdict, Volume};
 
 struct Station {
     camera: Intrinsics,
@@ -276,4 +281,172 @@ fn a_surfaces_normal_comes_with_its_true_sigma() {
     let (tilt, height) = ((tilt / n as f64).sqrt(), (height / n as f64).sqrt());
     println!("normal {tilt:.3}, height {height:.3} of sigma");
     assert!((0.8..=1.25).contains(&tilt) && (0.8..=1.25).contains(&height), "normal {tilt}, height {height}");
+}
+
+/// A station of any size, the beam on any side of the camera and tilted, its boards along the beam.
+fn any_station(rng: &mut Pcg64, count: usize) -> Station {
+    let one = Sheet::random(rng, 1);
+    let (camera, depth) = (one.camera, one.pixel_mm * one.camera.fx);
+    let view = camera.view_mm(depth);
+    let (side, baseline) = (between(rng, 0.0, std::f64::consts::TAU), depth * between(rng, 0.1, 0.6));
+    let origin = Vec3::new(side.cos() * baseline, side.sin() * baseline, depth * between(rng, -0.2, 0.3));
+    let aim = Vec3::new(gauss(rng, 0.05 * view), gauss(rng, 0.05 * view), depth);
+    let beam = Ray::new(origin, aim - origin).unwrap();
+    let square = view * between(rng, 0.03, 0.07);
+    let points = (0..54).map(|i| Vec3::new(f64::from(i % 9), f64::from(i / 9), 0.0) * square).collect();
+    let range = log_between(rng, 0.05, 0.4);
+    let boards = (0..count)
+        .map(|_| {
+            let place = loop {
+                let z = depth * (1.0 + range * between(rng, -1.0, 1.0));
+                let p = beam.at((z - beam.origin.z) / beam.direction.z);
+                let q = camera.pixel_from_point(&p).unwrap();
+                let inside = |v: f64, size: u32| (0.05..0.95).contains(&(v / f64::from(size)));
+                if inside(q.x, camera.width) && inside(q.y, camera.height) {
+                    break p;
+                }
+            };
+            let tilt = exp(&Vec3::new(between(rng, -0.4, 0.4), between(rng, -0.4, 0.4), 0.0));
+            let turn = exp(&Vec3::new(0.0, 0.0, between(rng, -3.0, 3.0))) * tilt;
+            let middle = Vec3::new(between(rng, 2.0, 6.0), between(rng, 1.0, 4.0), 0.0) * square;
+            Rigid::new(turn, place - turn * middle)
+        })
+        .collect();
+    Station { camera, beam, boards, points }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Wrong {
+    Nothing,
+    /// Boards moved between their two pictures.
+    Moved,
+    /// Another place is brighter than the spot: a reflection.
+    Reflected,
+    /// The last pictures are of another camera and pointer.
+    OtherRig,
+    /// Saturated or clipped spots: centres off by more than their sigmas say.
+    Saturated,
+}
+
+const WRONGS: [Wrong; 5] = [Wrong::Nothing, Wrong::Moved, Wrong::Reflected, Wrong::OtherRig, Wrong::Saturated];
+
+/// Verdict, the beam's error and stated sigma over the boards (mm), and of distances their errors over their sigmas.
+type Judged = (Option<Verdict>, f64, f64, Vec<f64>);
+
+fn judged(seed: u64, wrong: Wrong, count: usize) -> Judged {
+    let rng = &mut Pcg64::seed_from_u64(seed);
+    let s = any_station(rng, count);
+    let (corner, px) = (log_between(rng, 0.02, 0.15), log_between(rng, 0.02, 0.2));
+    let mut v = views(rng, &s, &s.camera, corner, px);
+    let (size, share) = (log_between(rng, 0.5, 100.0), between(rng, 0.1, 0.5));
+    let other = Station {
+        camera: Intrinsics {
+            fx: s.camera.fx * between(rng, 0.97, 1.03),
+            cx: s.camera.cx + gauss(rng, 8.0),
+            ..s.camera
+        },
+        beam: {
+            let mm = size * s.beam.origin.norm() / s.camera.fx;
+            Ray::new(s.beam.origin + gauss3(rng, mm), s.beam.direction + gauss3(rng, 0.02)).unwrap()
+        },
+        boards: s.boards.clone(),
+        points: s.points.clone(),
+    };
+    let others = (wrong == Wrong::OtherRig).then(|| views(rng, &other, &s.camera, corner, px));
+    for i in 0..count {
+        match wrong {
+            Wrong::Nothing => {}
+            Wrong::OtherRig if i as f64 >= (1.0 - share) * count as f64 => {
+                v[i].clone_from(&others.as_ref().unwrap()[i]);
+            }
+            Wrong::Moved | Wrong::Reflected if rng.random::<f64>() < share => {
+                let size = if wrong == Wrong::Moved { size.min(20.0) } else { 2.0 * size };
+                v[i].pixel += gauss2(rng, size);
+            }
+            Wrong::Saturated => v[i].pixel += gauss2(rng, 0.1 * size.min(20.0)),
+            _ => {}
+        }
+    }
+    let factor = pooled_factor(v.iter().map(|v| &v.pose)).unwrap_or(f64::NAN);
+    let Ok(fit) = solve(&v, &s.camera, &SMatrix::zeros(), factor, &PointerOptions::default()) else {
+        return (None, 0.0, 0.0, vec![]);
+    };
+    let lay = Volume::new(fit.reach[0], fit.reach[1], "where the spots lay");
+    let quality = judge_pointer(&fit, &s.camera, px, &Asked::default().limits(&lay, |z| s.camera.view_mm(z)));
+    let c = fit.covariance.view((0, 0), (6, 6)).into_owned();
+    let at = |b: &Ray<Camera>, z: f64| b.at((z - b.origin.z) / b.direction.z);
+    let (mut error, mut variance) = (0.0, 0.0);
+    for b in &s.boards {
+        let z = b.point(&Vec3::zeros()).z;
+        error += (at(&fit.beam, z) - at(&s.beam, z)).norm_squared() / count as f64;
+        let o = fit.beam.origin;
+        let d = fit.beam.direction;
+        let t = (z - o.z) / d.z;
+        // Of the crossing's x and y by origin and direction.
+        let j = SMatrix::<f64, 2, 6>::from_row_slice(&[
+            1.0,
+            0.0,
+            -d.x / d.z,
+            t,
+            0.0,
+            -t * d.x / d.z,
+            0.0,
+            1.0,
+            -d.y / d.z,
+            0.0,
+            t,
+            -t * d.y / d.z,
+        ]);
+        variance += (j * SMatrix::<f64, 6, 6>::from_fn(|i, k| c[(i, k)]) * j.transpose()).trace() / count as f64;
+    }
+    let joint = SMatrix::<f64, 15, 15>::from_fn(|i, j| fit.covariance[(i, j)]);
+    let ranged = (0..3)
+        .map(|i| {
+            let z = fit.reach[0] + (fit.reach[1] - fit.reach[0]) * f64::from(i) / 2.0;
+            let pixel = s.camera.pixel_from_point(&at(&s.beam, z)).unwrap() + gauss2(rng, px);
+            let r = range(&pixel, &(Matrix2::identity() * px * px), &s.camera, &fit.beam, &joint).unwrap();
+            (r.along_axis - z) / r.along_axis_sigma
+        })
+        .collect();
+    (Some(quality.verdict), error.sqrt(), variance.sqrt(), ranged)
+}
+
+#[test]
+fn a_flawed_set_never_passes_with_an_error_above_three_sigmas() {
+    let each = if std::env::var_os("SHEETLIGHT_LONG").is_some() { 300 } else { 60 };
+    let mut wrong_ones = Vec::new();
+    for wrong in WRONGS {
+        let all: Vec<(u64, usize, Judged)> = (0..each)
+            .into_par_iter()
+            .map(|k| {
+                let (seed, count) = (20_000 + 1000 * wrong as u64 + k, 3 + (k as usize * 7) % 12);
+                (seed, count, judged(seed, wrong, count))
+            })
+            .collect();
+        let passed: Vec<_> = all.iter().filter(|a| a.2.0.is_some_and(|v| v <= Verdict::Usable)).collect();
+        let rms = |x: &[f64]| (x.iter().map(|v| v * v).sum::<f64>() / x.len().max(1) as f64).sqrt();
+        let over: Vec<f64> = passed.iter().map(|a| a.2.1 / a.2.2).collect();
+        let ranged: Vec<f64> = passed.iter().filter(|a| a.1 >= 7).flat_map(|a| a.2.3.iter().copied()).collect();
+        println!(
+            "{wrong:?}: {} of {} passed, error over sigma rms {:.2}, worst {:.2}; distances of 7 spots and more {:.2}",
+            passed.len(),
+            all.len(),
+            rms(&over),
+            over.iter().copied().fold(0.0, f64::max),
+            rms(&ranged)
+        );
+        wrong_ones.extend(
+            passed
+                .iter()
+                .filter(|a| a.2.1 > 3.0 * a.2.2)
+                .map(|a| format!("{wrong:?}, {} spots, seed {}: {:.4} mm of {:.4}", a.1, a.0, a.2.1, a.2.2)),
+        );
+        if wrong == Wrong::Nothing {
+            let many = all.iter().filter(|a| a.1 >= 6).count();
+            let taken = passed.iter().filter(|a| a.1 >= 6).count();
+            assert!(taken as f64 >= 0.9 * many as f64, "{taken} of {many} sound sets were taken");
+            assert!((0.8..=1.25).contains(&rms(&ranged)), "distances: {:.2} of their sigmas", rms(&ranged));
+        }
+    }
+    assert!(wrong_ones.is_empty(), "{wrong_ones:#?}");
 }

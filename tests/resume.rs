@@ -56,7 +56,7 @@ impl Bench {
     }
     /// Shots that an interrupted scan says are done.
     fn done(&self, out: &str) -> u64 {
-        let text = std::fs::read_to_string(self.at(out).join("scan.progress.json")).unwrap();
+        let text = std::fs::read_to_string(self.at(out).join("scan.part/progress.json")).unwrap();
         serde_json::from_str::<serde_json::Value>(&text).unwrap()["shots"].as_u64().unwrap()
     }
     fn unfinished(&self, out: &str) {
@@ -99,6 +99,7 @@ fn options(out: &Path) -> ScanOptions {
         overlays: 0,
         skip_bad: false,
         resume: true,
+        stop: Default::default(),
     }
 }
 
@@ -180,7 +181,7 @@ fn a_killed_scan_resumes() {
     let b = Bench::new();
     let whole = b.whole();
     let mut child = Command::new(env!("CARGO_BIN_EXE_sheetlight")).args(b.command("killed", &[])).spawn().unwrap();
-    let checkpoint = b.at("killed/scan.progress.json");
+    let checkpoint = b.at("killed/scan.part/progress.json");
     for _ in 0..6000 {
         if checkpoint.exists() || child.try_wait().unwrap().is_some() {
             break;

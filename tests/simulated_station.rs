@@ -29,6 +29,7 @@ fn scanned(out: &Path, options: &SimulateOptions) -> Judged {
         overlays: 1,
         skip_bad: false,
         resume: false,
+        stop: Default::default(),
     };
     let open = |first| Ok(Box::new(RecordingSource::open(&recording, None, first)?) as Box<_>);
     sheetlight::station::scan("test", "test", open, &rig, &scan, |_, _| {}).unwrap();

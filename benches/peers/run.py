@@ -69,6 +69,31 @@ def opencv(image, k):
     return lit, thin, points
 
 
+# Thinning travels a pixel a sub-iteration: a lit tile with this much around it has the pixels of the whole picture.
+TILE, AROUND = 256, 32
+
+
+def opencv_tiles(image, k):
+    """The same with thinning only where tiles of 256 pixels are lit: OpenCV as it can be used, and not as it mostly is."""
+    lit = cv2.adaptiveThreshold(image, 255, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY, SIZE, -OFFSET)
+    thin = np.zeros_like(lit)
+    for y in range(0, lit.shape[0], TILE):
+        for x in range(0, lit.shape[1], TILE):
+            if cv2.hasNonZero(lit[y:y + TILE, x:x + TILE]):
+                top, left = max(y - AROUND, 0), max(x - AROUND, 0)
+                part = lit[top:y + TILE + AROUND, left:x + TILE + AROUND]
+                part = cv2.ximgproc.thinning(part, thinningType=cv2.ximgproc.THINNING_ZHANGSUEN)
+                to = thin[y:y + TILE, x:x + TILE]
+                to[:] = part[y - top:y - top + to.shape[0], x - left:x - left + to.shape[1]]
+    px = cv2.findNonZero(thin)
+    rays = cv2.undistortPoints(px.astype(np.float32), k, LENS).reshape(-1, 2)
+    return lit, thin, plane(np.column_stack([rays, np.ones(len(rays))]))
+
+
+def threshold_alone(image):
+    return cv2.adaptiveThreshold(image, 255, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY, SIZE, -OFFSET)
+
+
 @numba.njit(cache=True, parallel=True)
 def centroid(image, least):
     height, width = image.shape
@@ -206,27 +231,31 @@ def compare(program, width, height, scene, rounds, images=None):
     batch = min(batch, count)
     k = camera(width, height)
     ours = Sheetlight(program, images, batch, k, 6.0 if scene == "thick" else 2.5)
-    wrong_lit = wrong_thin = apart = 0
+    wrong_lit = wrong_thin = apart = tiles_differ = 0
     for i, image in enumerate(images[:2]):
         lit, thin, _ = opencv(image, k)
+        tiles_differ = max(tiles_differ, int(np.count_nonzero(thin != opencv_tiles(image, k)[1])))
         our_lit, our_thin = ours.masks(i)
         wrong_lit += int(np.count_nonzero(lit != our_lit))
         wrong_thin += int(np.count_nonzero(thin != our_thin))
         apart = max(apart, points_apart(thin, ours.points(i), k))
     centroid(images[0], 40), steger(images[0]), plain_read(images[0].view(np.uint64).ravel())
-    times = {n: [] for n in ["opencv", "opencv_cpu", "centroid", "steger", "sheetlight", "sheetlight_cpu", "full", "full_cpu", "read"]}
+    names = ["opencv", "tiles", "threshold", "centroid", "sheetlight", "full", "host", "host_singly"]
+    times = {n: [] for n in names + [n + "_cpu" for n in names] + ["steger", "read"]}
     turns = max(1, int(100 / (count * (width * height / 1e6) + 1)))
     for r in range(rounds):
         image = images[r % count]
         words = image.view(np.uint64).ravel()
-        wall, cpu = clock(lambda: opencv(image, k))
-        times["opencv"].append(wall)
-        times["opencv_cpu"].append(cpu)
-        for name, command in [("sheetlight", "run"), ("full", "run_full")]:
+        peers = [("opencv", lambda: opencv(image, k), 1), ("tiles", lambda: opencv_tiles(image, k), 1),
+                 ("threshold", lambda: threshold_alone(image), 3), ("centroid", lambda: centroid(image, 40), 3)]
+        for name, peer, repeats in peers:
+            wall, cpu = clock(peer, repeats)
+            times[name].append(wall)
+            times[name + "_cpu"].append(cpu)
+        for name, command in [("sheetlight", "run"), ("full", "run_full"), ("host", "run_host"), ("host_singly", "run_host_singly")]:
             answer = ours.run(turns, command)
             times[name].append(answer["wall_s"] * 1e3 / answer["shots"])
             times[name + "_cpu"].append(answer["cpu_s"] * 1e3 / answer["shots"])
-        times["centroid"].append(clock(lambda: centroid(image, 40), 3)[0])
         times["steger"].append(clock(lambda: steger(image))[0])
         times["read"].append(clock(lambda: plain_read(words), 10)[1])
     ours.close()
@@ -236,6 +265,10 @@ def compare(program, width, height, scene, rounds, images=None):
         size=f"{width}x{height}", scene=scene, batch=batch, rounds=rounds, ms=median, adapter=ours.adapter,
         opencv_over_ours=ratio("opencv", "sheetlight"), opencv_cpu_over_our_cpu=ratio("opencv_cpu", "sheetlight_cpu"),
         opencv_over_full=ratio("opencv", "full"), opencv_cpu_over_full_cpu=ratio("opencv_cpu", "full_cpu"),
+        tiles_over_host=ratio("tiles", "host_singly"), tiles_cpu_over_host_cpu=ratio("tiles_cpu", "host_cpu"),
+        host_over_threshold=ratio("host_singly", "threshold"), host_cpu_over_centroid_cpu=ratio("host_cpu", "centroid_cpu"),
+        host_cpu_over_plain_read=ratio("host_cpu", "read"), cv2_threads=cv2.getNumThreads(),
+        tiles_pixels_apart=tiles_differ,
         steger_over_ours=ratio("steger", "sheetlight"),
         centroid_over_ours=ratio("centroid", "sheetlight"), cpu_over_plain_read=ratio("sheetlight_cpu", "read"),
         lit_pixels_apart=wrong_lit, skeleton_pixels_apart=wrong_thin,
@@ -274,10 +307,15 @@ def main():
               f" {m['sheetlight']:9.3f} {m['sheetlight_cpu']:9.3f} {m['full']:9.3f} {m['read']:7.3f}"
               f" {r['opencv_over_ours']:11.1f}x {r['opencv_cpu_over_our_cpu']:7.1f}x {r['opencv_over_full']:7.1f}x"
               f" {r['opencv_cpu_over_full_cpu']:7.1f}x {r['cpu_over_plain_read']:8.1f}x  {same}  {r['points_apart_px']:.1e} px", flush=True)
+        print(f"{'':10} on the processor, settings and result of a scan: batch {m['host']:.3f} ms (CPU {m['host_cpu']:.3f}), one at a time"
+              f" {m['host_singly']:.3f} (CPU {m['host_singly_cpu']:.3f}); OpenCV on lit tiles {m['tiles']:.2f} (CPU {m['tiles_cpu']:.2f}), its threshold"
+              f" alone {m['threshold']:.3f} ({r['cv2_threads']} threads); centroid CPU {m['centroid_cpu']:.3f}\n{'':10} by CPU: OpenCV on lit tiles / ours"
+              f" {r['tiles_cpu_over_host_cpu']:.1f}x, ours / centroid {r['host_cpu_over_centroid_cpu']:.2f}, ours / read"
+              f" {r['host_cpu_over_plain_read']:.1f}; wall: ours one at a time / threshold {r['host_over_threshold']:.2f}", flush=True)
     if args.save:
         with open(args.save, "w") as f:
             json.dump(rows, f, indent=1)
-    sys.exit(any(r["lit_pixels_apart"] + r["skeleton_pixels_apart"] or r["points_apart_px"] > APART for r in rows))
+    sys.exit(any(r["lit_pixels_apart"] + r["skeleton_pixels_apart"] + r["tiles_pixels_apart"] or r["points_apart_px"] > APART for r in rows))
 
 
 if __name__ == "__main__":

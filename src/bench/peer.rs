@@ -6,13 +6,16 @@ use super::machine;
 use crate::fault::{Fault, Result};
 use crate::gpu::Device;
 use crate::raster::Image;
+use crate::scan::{Extraction, Format};
 use crate::stages::chain::{Batch, Chain, ChainConfig};
 use crate::stages::choose::ChooseParams;
+use crate::stages::host::Host;
 use crate::stages::lengthen::LengthenParams;
 use crate::stages::measured::Measure;
-use crate::stages::peak::{Method, PeakParams};
+use crate::stages::peak::{Method, PeakParams, Stripe, noise};
 use crate::stages::point::Optics;
 use crate::stages::{ThresholdParams, Window};
+use rayon::prelude::*;
 use std::io::{BufRead, Write};
 use std::time::Instant;
 
@@ -48,6 +51,9 @@ enum Command {
     Run(usize),
     /// The same with a peak fitted to each, its standard deviation and every reason against it.
     RunFull(usize),
+    /// As RunFull on this machine's processor with the settings of a scan, all pictures at once, or one after the other.
+    RunHost(usize),
+    RunHostSingly(usize),
     /// x, y of the skeleton pixels of one picture and X, Y, Z of their points, little-endian f32, after their number in JSON.
     Points(usize),
     /// The thresholded and the thinned mask of one picture, 0 and 255.
@@ -56,7 +62,9 @@ enum Command {
 }
 
 fn broken(what: impl std::fmt::Display) -> Fault {
-    Fault::input(format!("peer: {what}")).cause("the other program and this one speak different versions")
+    Fault::input(format!("peer: {what}"))
+        .cause("the other program and this one speak different versions")
+        .next("build both from the same commit")
 }
 
 /// Serves one peer until it says quit or closes the pipe.
@@ -95,6 +103,10 @@ pub fn serve(device: &Device, mut input: impl BufRead, mut output: impl Write) -
     let mut full = Chain::new(device, &ChainConfig { measure: Some(measure), lengthen, ..config.clone() })?;
     run(&mut full, &images, 1)?;
     let mut single = Chain::new(device, &ChainConfig { shots: 1, slots: 1, ..config })?;
+    let stripe = Stripe { width_px: setup.width_px, speckle: peak.speckle, noise: noise(&images[0]) };
+    let format = Format { width: setup.width, height: setup.height, bits: 8 };
+    let scan = Extraction::default().for_stripe(&stripe).chain(format, optics, setup.width_px);
+    let host = Host::new(&scan)?;
     writeln!(output, "{}", serde_json::json!({"ready": device.info.name})).map_err(lost)?;
     output.flush().map_err(lost)?;
     loop {
@@ -105,10 +117,13 @@ pub fn serve(device: &Device, mut input: impl BufRead, mut output: impl Write) -
         let command = serde_json::from_str(&line).map_err(broken)?;
         match command {
             Command::Quit => return Ok(()),
-            Command::Run(times) | Command::RunFull(times) => {
-                let chain = if matches!(command, Command::Run(_)) { &mut chain } else { &mut full };
+            Command::Run(times) | Command::RunFull(times) | Command::RunHost(times) | Command::RunHostSingly(times) => {
                 let (cpu, start) = (machine::cpu_seconds(), Instant::now());
-                let points = run(chain, &images, times)?;
+                let points = match command {
+                    Command::Run(_) => run(&mut chain, &images, times)?,
+                    Command::RunFull(_) => run(&mut full, &images, times)?,
+                    _ => run_host(&host, &images, times, matches!(command, Command::RunHost(_)))?,
+                };
                 let wall = start.elapsed().as_secs_f64();
                 let cpu = cpu.and_then(|c| Some(machine::cpu_seconds()? - c));
                 let answer =
@@ -135,6 +150,20 @@ pub fn serve(device: &Device, mut input: impl BufRead, mut output: impl Write) -
         }
         output.flush().map_err(lost)?;
     }
+}
+
+/// The same on the processor.
+fn run_host(host: &Host, images: &[Image], times: usize, at_once: bool) -> Result<usize> {
+    let one = |image: &Image| Ok(host.run(0, image, &STILL)?.points.len());
+    let mut points = 0;
+    for _ in 0..times {
+        points += if at_once {
+            images.par_iter().map(one).sum::<Result<usize>>()?
+        } else {
+            images.iter().map(one).sum::<Result<usize>>()?
+        };
+    }
+    Ok(points)
 }
 
 /// Runs all pictures; the number of points.

@@ -43,10 +43,13 @@ impl Default for BenchOptions {
 impl BenchOptions {
     pub fn check(&self) -> Result<()> {
         if !(0.1..=600.0).contains(&self.seconds) {
-            return Err(Fault::usage(format!("{} seconds a row, 0.1 to 600 are possible", self.seconds)));
+            return Err(Fault::usage(format!("{} seconds a row, 0.1 to 600 are possible", self.seconds))
+                .next("correct the option"));
         }
         if self.sizes.is_empty() || self.scenes.is_empty() {
-            return Err(Fault::usage("0 sizes or 0 scenes to measure, 1 or more needed"));
+            return Err(
+                Fault::usage("0 sizes or 0 scenes to measure, 1 or more needed").next("give at least one of each")
+            );
         }
         Ok(())
     }

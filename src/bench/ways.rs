@@ -14,7 +14,7 @@ use rayon::prelude::*;
 use std::time::Instant;
 
 /// One way through the chain.
-#[derive(Clone, Debug, serde::Serialize)]
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct WayTime {
     pub on: String,
     pub width: u32,

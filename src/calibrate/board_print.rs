@@ -32,11 +32,17 @@ pub fn to_print_edge(board: &BoardSpec, x: f64, y: f64) -> f64 {
                 square
             }
         }
-        BoardSpec::Circles { diameter_mm, .. } => board
-            .features()
-            .iter()
-            .map(|c| ((x - c.x).hypot(y - c.y) - diameter_mm / 2.0).abs())
-            .fold(f64::INFINITY, f64::min),
+        // A marker's own cells are all edges: only the white round the markers is plain.
+        BoardSpec::MarkerGrid { marker_mm, .. } => {
+            let out = |d: f64| (-d).max(d - marker_mm).max(0.0);
+            let first = board.features().into_iter().step_by(4);
+            first.map(|c| out(x - c.x).hypot(out(y - c.y))).fold(f64::INFINITY, f64::min)
+        }
+        // Dots of unknown size: no place near them is known to be plain.
+        BoardSpec::Circles { diameter_mm: None, .. } => 0.0,
+        BoardSpec::Circles { diameter_mm: Some(d), .. } => {
+            board.features().iter().map(|c| ((x - c.x).hypot(y - c.y) - d / 2.0).abs()).fold(f64::INFINITY, f64::min)
+        }
     }
 }
 

@@ -20,10 +20,6 @@ pub struct HandEyeOptions {
     pub robot_sigma_mm: Option<f64>,
     /// Sigma of the robot's orientation per axis, degrees; `None`: estimated. 1e-7..=5.
     pub robot_sigma_deg: Option<f64>,
-    /// An estimated robot noise above this means that pictures and poses do not belong together, mm; above 0.
-    pub max_robot_sigma_mm: f64,
-    /// The same for orientation, degrees; above 0.
-    pub max_robot_sigma_deg: f64,
     /// A pair is wrong where its squared Mahalanobis distance (6 degrees of freedom) exceeds this;
     /// 26.1 leaves one good pair in 5,000 out. 12..=1000.
     pub gate: f64,
@@ -31,6 +27,8 @@ pub struct HandEyeOptions {
     pub min_second_axis_deg: f64,
     /// Fewest agreeing pairs; 3..=1000.
     pub min_pairs: usize,
+    /// What states the board's lengths, as a message names it.
+    pub board_length: String,
     /// Seed of the draws among more than 25 pairs.
     pub seed: u64,
 }
@@ -40,11 +38,10 @@ impl Default for HandEyeOptions {
         HandEyeOptions {
             robot_sigma_mm: None,
             robot_sigma_deg: None,
-            max_robot_sigma_mm: 1.0,
-            max_robot_sigma_deg: 0.5,
             gate: 26.1,
             min_second_axis_deg: 3.0,
             min_pairs: 4,
+            board_length: "the board's description".into(),
             seed: 1,
         }
     }
@@ -61,12 +58,6 @@ impl HandEyeOptions {
         if let Some(s) = self.robot_sigma_deg.filter(|s| !(1e-7..=5.0).contains(s)) {
             return bad("robot_sigma_deg", s, "1e-7 to 5");
         }
-        if !(self.max_robot_sigma_mm > 0.0) {
-            return bad("max_robot_sigma_mm", self.max_robot_sigma_mm, "above 0");
-        }
-        if !(self.max_robot_sigma_deg > 0.0) {
-            return bad("max_robot_sigma_deg", self.max_robot_sigma_deg, "above 0");
-        }
         if !(12.0..=1000.0).contains(&self.gate) {
             return bad("gate", self.gate, "12 to 1000");
         }
@@ -80,7 +71,8 @@ impl HandEyeOptions {
     }
 }
 
-/// Standard deviations of the robot's reported poses per axis, and the factor of the features' sigmas.
+/// Standard deviations of the robot's reported poses per axis, and the factor of the features' sigmas; for board poses
+/// that were given without sigmas the factor is their turn's, rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
     pub robot_mm: f64,
@@ -179,13 +171,14 @@ pub fn solve(
     let given = CameraBelief::given(camera);
     let mispaired = || checks::explain(pairs, "pictures and robot poses do not belong together".into(), o);
     let agreement = start(pairs, o).map_err(|_| mispaired())?;
-    let seen: Vec<_> = pairs.iter().map(|p| p.seen.clone()).collect();
+    let seen = || pairs.iter().map(|p| &p.seen);
     let scatter = agreement.spread.max(1e-3);
+    // The scatter of the board's corners seen as a rotation over the board's distance.
+    let turn = scatter / mean(seen().map(|s| s.centre().norm()));
     let noise = Noise {
         robot_mm: o.robot_sigma_mm.unwrap_or(scatter),
-        // The scatter of the board's corners seen as a rotation over the board's distance.
-        robot_rad: o.robot_sigma_deg.map_or(scatter / mean(seen.iter().map(|s| s.centre().norm())), f64::to_radians),
-        feature_factor: pooled_factor(&seen),
+        robot_rad: o.robot_sigma_deg.map_or(turn, f64::to_radians),
+        feature_factor: pooled_factor(seen()).unwrap_or(turn),
     };
     let chosen = |used: &[usize]| -> Vec<&Pair> { used.iter().map(|&i| &pairs[i]).collect() };
     let mut used = agreement.agreeing.clone();

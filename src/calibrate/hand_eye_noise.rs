@@ -7,6 +7,7 @@ use super::hand_eye::{HandEyeOptions, Mount, Noise};
 use super::hand_eye_camera::{CameraBelief, Sharpened};
 use super::hand_eye_closed::{Chain, Pair};
 use super::hand_eye_terms::{Refined, refine, robot_parts, with_camera};
+use super::measured_pose::pooled_factor;
 use nalgebra::{DMatrix, DVector, SVector};
 
 /// One round of variance components at a fitted chain.
@@ -28,7 +29,8 @@ fn components(
         known: DMatrix::zeros(n, n),
         parts: Vec::new(),
     };
-    let mut parts = [DMatrix::zeros(n, n), DMatrix::zeros(n, n)];
+    let mut parts = [DMatrix::zeros(n, n), DMatrix::zeros(n, n), DMatrix::zeros(n, n)];
+    let boards_open = open(pairs);
     let mut by_camera = DMatrix::zeros(n, 9);
     for (i, pair) in pairs.iter().enumerate() {
         let (e, j) = with_camera(chain, &SVector::zeros(), pair, camera);
@@ -36,7 +38,12 @@ fn components(
         model.residual.rows_mut(at, 6).copy_from(&e);
         model.jacobian.view_mut((at, 0), (6, 12)).copy_from(&j.fixed_columns::<12>(0));
         by_camera.view_mut((at, 0), (6, 9)).copy_from(&j.fixed_columns::<9>(12));
-        let mut known = pair.seen.covariance(noise.feature_factor);
+        let mut known = nalgebra::Matrix6::zeros();
+        if boards_open {
+            parts[2].view_mut((at, at), (6, 6)).copy_from(&pair.seen.covariance(1.0));
+        } else {
+            known += pair.seen.covariance(noise.feature_factor);
+        }
         let [t, r] = robot_parts(&mount.flange(chain, &pair.near_from_far));
         for (k, (part, given)) in
             [(t, o.robot_sigma_mm), (r, o.robot_sigma_deg.map(f64::to_radians))].into_iter().enumerate()
@@ -57,6 +64,7 @@ fn components(
         let (given, now, low) = [
             (o.robot_sigma_mm.is_some(), noise.robot_mm, floor_mm),
             (o.robot_sigma_deg.is_some(), noise.robot_rad, floor_rad),
+            (!boards_open, noise.feature_factor, floor_rad),
         ][k];
         if !given {
             model.parts.push(part);
@@ -73,10 +81,15 @@ fn components(
     if !theta.is_empty() {
         let next = model.step(&theta, &floor)?;
         for (k, t) in estimated.iter().zip(next) {
-            *[&mut out.robot_mm, &mut out.robot_rad][*k] = t.sqrt();
+            *[&mut out.robot_mm, &mut out.robot_rad, &mut out.feature_factor][*k] = t.sqrt();
         }
     }
     Some(out)
+}
+
+/// Whether the boards' own scatter is left open: their poses were given without sigmas.
+fn open(pairs: &[&Pair]) -> bool {
+    pooled_factor(pairs.iter().map(|p| &p.seen)).is_none()
 }
 
 /// A fit of some pairs.
@@ -102,7 +115,8 @@ pub(super) fn fit(
         chain = refine(pairs, &chain, &noise, mount, &camera.belief)?.chain;
         let next = components(pairs, &chain, &noise, mount, &camera.belief, o)?;
         let settled = (next.robot_mm / noise.robot_mm - 1.0).abs() < 1e-3
-            && (next.robot_rad / noise.robot_rad - 1.0).abs() < 1e-3;
+            && (next.robot_rad / noise.robot_rad - 1.0).abs() < 1e-3
+            && (next.feature_factor / noise.feature_factor - 1.0).abs() < 1e-3;
         noise = next;
         if settled {
             break;

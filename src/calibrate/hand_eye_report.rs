@@ -31,7 +31,7 @@ pub fn judge(fit: &HandEyeFit, pairs: &[Pair], limits: &Limits) -> Quality {
         expected_error(fit, limits.middle());
     let sigma = |i: usize| fit.covariance[(i, i)].max(0.0).sqrt();
     let holdout_mm = rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.holdout_mm));
-    let holdout_px = rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.holdout_px));
+    let pixels = in_pixels(pairs);
     let mut j = limits.by_error(
         expected,
         format!(
@@ -57,10 +57,20 @@ pub fn judge(fit: &HandEyeFit, pairs: &[Pair], limits: &Limits) -> Quality {
         });
     }
     j.reasons.push(format!(
-        "the robot's poses scatter by {:.3} mm and {:.4} degrees per axis; the camera's own uncertainty makes {camera_part:.3} mm of the error",
+        "the robot's poses{} scatter by {:.3} mm and {:.4} degrees per axis{}",
+        if pixels { "" } else { ", with what the boards' places scatter beyond what is stated," },
         fit.noise.robot_mm,
-        fit.noise.robot_rad.to_degrees()
+        fit.noise.robot_rad.to_degrees(),
+        if pixels {
+            format!("; the camera's own uncertainty makes {camera_part:.3} mm of the error")
+        } else {
+            String::new()
+        }
     ));
+    let boards = rms(used.iter().map(|p| p.seen.rms_px));
+    if pixels {
+        j.reasons.push(format!("each board fits its own picture to {boards:.3} px rms, whatever the robot says"));
+    }
     let change = change_between(&fit.camera, &fit.joint_camera);
     let moved = ray_error_px(&fit.camera, &(change * change.transpose()));
     let before = ray_error_px(&fit.camera, &fit.given.covariance());
@@ -114,9 +124,7 @@ pub fn judge(fit: &HandEyeFit, pairs: &[Pair], limits: &Limits) -> Quality {
         ("expected_error_from_camera_mm".into(), camera_part),
         ("expected_error_with_joint_camera_mm".into(), with_joint_camera),
         ("working_distance_mm".into(), limits.middle()),
-        ("rms_px".into(), rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.px))),
         ("rms_mm".into(), rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.mm))),
-        ("holdout_rms_px".into(), holdout_px),
         ("holdout_rms_mm".into(), holdout_mm),
         (crate::rig::ROBOT_SIGMA_MM.into(), fit.noise.robot_mm),
         (crate::rig::ROBOT_SIGMA_DEG.into(), fit.noise.robot_rad.to_degrees()),
@@ -132,6 +140,11 @@ pub fn judge(fit: &HandEyeFit, pairs: &[Pair], limits: &Limits) -> Quality {
         ("board_y_mm".into(), t.y),
         ("board_z_mm".into(), t.z),
     ]);
+    if pixels {
+        figures.insert("rms_px".into(), rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.px)));
+        figures.insert("holdout_rms_px".into(), rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.holdout_px)));
+        figures.insert("board_rms_px".into(), rms(used.iter().map(|p| p.seen.rms_px)));
+    }
     if before > 0.0 {
         figures.extend(camera_figures.map(|(name, value)| (name.to_string(), value)));
     }
@@ -140,8 +153,13 @@ pub fn judge(fit: &HandEyeFit, pairs: &[Pair], limits: &Limits) -> Quality {
         reasons: j.reasons,
         advice: j.advice,
         figures,
-        per_picture: fit.pairs.iter().map(|p| (p.name.clone(), p.px)).collect(),
+        per_picture: fit.pairs.iter().map(|p| (p.name.clone(), if pixels { p.px } else { p.mm })).collect(),
     }
+}
+
+/// Whether the boards were seen in pictures; false: their poses were given, and nothing is known in px.
+fn in_pixels(pairs: &[Pair]) -> bool {
+    pairs.iter().all(|p| p.seen.rms_px.is_finite())
 }
 
 /// The report: what was found, how it fits, how it predicts pictures that it did not see.
@@ -171,22 +189,26 @@ pub fn page(fit: &HandEyeFit, pairs: &[Pair], quality: &Quality, carrier: &str) 
     page.table(&format!("The camera on the {carrier}"), &["", "value", "sigma"], &rows);
     let figures: Vec<Vec<String>> = quality.figures.iter().map(|(k, v)| vec![k.clone(), format!("{v:.5}")]).collect();
     page.table("Figures", &["figure (unit in the name)", "value"], &figures);
+    let pixels = in_pixels(pairs);
     let fits: Vec<Vec<String>> = fit
         .pairs
         .iter()
-        .map(|p| {
+        .zip(pairs)
+        .map(|(p, pair)| {
             let fate = if p.used { "used" } else { "left out" };
+            let in_px = |px: f64| if pixels { format!("{px:.3}") } else { "-".into() };
             vec![
                 p.name.clone(),
-                format!("{:.3}", p.px),
+                in_px(pair.seen.rms_px),
+                in_px(p.px),
                 format!("{:.4}", p.mm),
                 format!("{:.1}", p.distance2),
                 fate.into(),
             ]
         })
         .collect();
-    page.paragraph("Fit: how the pictures agree with the chain that was fitted to them. A small residual does not prove a small error.");
-    page.table("Fit", &["picture", "px", "mm", "distance² (6 expected)", ""], &fits);
+    page.paragraph("Fit: how the pictures agree with the chain that was fitted to them. A small residual does not prove a small error. The board's own px: how its corners fit a flat board in that picture, the robot aside.");
+    page.table("Fit", &["picture", "the board's own px", "px", "mm", "distance² (6 expected)", ""], &fits);
     let bar = |f: &dyn Fn(&super::hand_eye::PairResidual) -> f64| -> Vec<(String, f64)> {
         fit.pairs.iter().map(|p| (p.name.clone(), f(p))).filter(|(_, v)| v.is_finite()).collect()
     };

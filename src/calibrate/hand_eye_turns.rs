@@ -9,8 +9,9 @@ use crate::geometry::angle_between;
 use rand::SeedableRng;
 
 /// Two pictures' boards are rotated against each other as far as the robot turned between them. Readings that
-/// miss it by more than this cannot both be right: five times the largest robot noise that is accepted.
-const SAME_ANGLE: f64 = 0.05;
+/// miss it by more than this cannot both be right: 5.7 degrees, a fifteenth of what two readings differ by, four times
+/// what a robot that scatters by a degree makes of it.
+const SAME_ANGLE: f64 = 0.1;
 /// Another reading of the set must fit this many times worse than the one that is taken.
 const MARGIN: f64 = 3.0;
 /// Rotations nearer than this count as equally good, whatever their ratio: 0.6 degrees.

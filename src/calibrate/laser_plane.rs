@@ -3,16 +3,18 @@
 //! Frame and unit: camera frame, mm; peaks in px (docs/math.md, Laser plane (1) to (6)).
 
 use super::board_print::{inside, to_print_edge};
-use super::laser_plane_terms::{
-    Data, Seen, State, basis, by_camera, look, mm_per_px, on_board, ratio, strain, tangents, without,
-};
+pub use super::laser_plane_agree::SecondPlane;
+use super::laser_plane_agree::{agreeing, majority, near, second_plane};
+use super::laser_plane_checks::{Consistency, board_spread, consistency, depth_spread, from_camera, reach};
+use super::laser_plane_terms::{Data, Seen, State, basis, by_camera, look, mm_per_px, on_board, ratio};
 use super::measured_pose::MeasuredPose;
+use super::scatter::inflation;
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
-use crate::geometry::{Board, Camera, Plane, Rigid, Vec2, Vec3, fit_plane};
+use crate::geometry::{Board, Camera, Plane, Rigid, Vec2};
 use crate::recording::BoardSpec;
-use crate::solve::{ConsensusOptions, Loss, consensus};
-use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix};
+use crate::solve::Loss;
+use nalgebra::{DMatrix, Matrix6, SMatrix};
 
 /// One place where the stripe was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,13 +40,14 @@ pub struct StripeView {
 pub struct LaserPlaneOptions {
     /// Peaks nearer to an edge of the print or the board than this many stripe widths are not used; 0..=20.
     pub edge_widths: f64,
-    /// Peaks farther than this from the plane that most agree with never enter, mm; 0.01..=10.
-    pub gate_mm: f64,
+    /// Peaks farther than this from the stripe of the plane that most agree with never enter, px; 0.5..=50.
+    pub gate_px: f64,
     /// Peaks with a larger residual than this many sigmas are left out; 2.5..=10.
     pub gate_sigmas: f64,
-    /// A picture whose squared pose strain (two degrees of freedom) exceeds this is left out; 9..=1000.
-    pub gate_strain: f64,
-    /// Share of a picture's peaks that must agree for it to count; 0.1..=0.95.
+    /// A picture is left out whose stripe lies farther than this from where the others predict it: squared, in sigmas of
+    /// both, two degrees of freedom; 9..=1000.
+    pub gate_surprise: f64,
+    /// Share of the length of a picture's stripe that must agree for it to count; 0.1..=0.95.
     pub min_share: f64,
     /// Fewest peaks a picture needs; 2..=10000.
     pub min_peaks: usize,
@@ -56,9 +59,9 @@ impl Default for LaserPlaneOptions {
     fn default() -> Self {
         LaserPlaneOptions {
             edge_widths: 2.5,
-            gate_mm: 0.5,
+            gate_px: 2.0,
             gate_sigmas: 4.0,
-            gate_strain: 25.0,
+            gate_surprise: 25.0,
             min_share: 0.6,
             min_peaks: 10,
             seed: 1,
@@ -70,9 +73,9 @@ impl LaserPlaneOptions {
     pub fn check(&self) -> Result<()> {
         let ranges = [
             ("edge_widths", self.edge_widths, 0.0, 20.0),
-            ("gate_mm", self.gate_mm, 0.01, 10.0),
+            ("gate_px", self.gate_px, 0.5, 50.0),
             ("gate_sigmas", self.gate_sigmas, 2.5, 10.0),
-            ("gate_strain", self.gate_strain, 9.0, 1000.0),
+            ("gate_surprise", self.gate_surprise, 9.0, 1000.0),
             ("min_share", self.min_share, 0.1, 0.95),
             ("min_peaks", self.min_peaks as f64, 2.0, 10000.0),
         ];
@@ -114,15 +117,21 @@ pub struct ViewResidual {
     /// The same against the plane fitted without this picture.
     pub holdout_px: f64,
     pub holdout_mm: f64,
-    /// Squared strain of the board's pose in units of its own uncertainty.
-    pub strain: f64,
+    /// Squared distance of its stripe from where the others predict it, in sigmas of both; 2 is usual.
+    pub surprise: f64,
+    /// The same over what is usual among these pictures, where that is more than chance.
+    pub beside: f64,
+    /// It was left out although it shows a stripe: its light lies elsewhere.
+    pub contradicts: bool,
+    /// How much worse its features fit the board than those of the other pictures.
+    pub board_misfit: f64,
 }
 
 /// What [`solve`] found.
 #[derive(Clone, Debug)]
 pub struct LaserPlaneFit {
     pub plane: Plane<Camera>,
-    /// nx ny nz offset_mm, rank 3, camera uncertainty included.
+    /// nx ny nz offset_mm, rank 3; what pixels, poses and the pictures' scatter say, camera uncertainty included.
     pub covariance: DMatrix<f64>,
     pub covariance_camera_exact: DMatrix<f64>,
     pub views: Vec<ViewResidual>,
@@ -132,6 +141,12 @@ pub struct LaserPlaneFit {
     pub sigma_ratio: f64,
     /// Neighbouring peaks share speckle: variance counts this often; 1 where they are independent.
     pub neighbour_factor: f64,
+    /// How much farther the pictures' stripes lie from the plane than their own sigmas say; 1 where these are right.
+    pub scatter: f64,
+    /// What the variance was multiplied by for it.
+    pub inflation: f64,
+    /// Another plane that the light left over agrees on.
+    pub second: Option<SecondPlane>,
     /// Largest angle between two boards' normals, rad.
     pub board_spread: f64,
     /// Least and largest depth of a used peak, mm.
@@ -140,7 +155,7 @@ pub struct LaserPlaneFit {
     pub depth_spread: f64,
 }
 
-fn refused(what: String) -> Fault {
+pub(super) fn refused(what: String) -> Fault {
     Fault::refused(what)
         .cause("the boards were too few, too alike, or hardly lit by the laser")
         .next("show the board at five or more distances and tilts, the stripe right across it")
@@ -171,11 +186,10 @@ pub fn solve(
         measured: views.iter().map(|v| v.pose.camera_from_board).collect(),
         roots: views.iter().map(|v| root(&v.pose, feature_factor)).collect::<Result<_>>()?,
     };
-    let first = majority(&peaks, &data.measured, o)?;
-    let mut used = vec![true; views.len()];
+    let first = majority(&peaks, &data.measured, camera, o)?;
     let all = peaks.clone();
-    peaks.retain(|p| near(p, &first, &data.measured, o.gate_mm));
-    leave_out_disagreeing(&all, &peaks, &mut used, o);
+    peaks.retain(|p| near(p, &first, &data.measured, o.gate_px));
+    let mut used = agreeing(&all, &peaks, views.len(), o);
     data.peaks = peaks.into_iter().filter(|p| used[p.view]).collect();
     let mut state = State { plane: first, poses: data.measured.clone() };
     let (mut factor, mut neighbours, mut sigma_ratio) = (1.0, 1.0, 1.0);
@@ -197,17 +211,15 @@ pub fn solve(
         state = s.state.clone();
         let ratios: Vec<f64> = data.peaks.iter().map(|p| ratio(p, &state, 1.0)).collect();
         sigma_ratio = (ratios.iter().map(|r| r * r).sum::<f64>() / ratios.len() as f64).sqrt();
-        neighbours = neighbour_factor(&data.peaks, &ratios, views);
+        neighbours = neighbour_factor(&data.peaks, &ratios);
         let next = sigma_ratio.max(1e-3) * neighbours.sqrt();
         let settled = (next / factor - 1.0).abs() < 0.01;
         factor = next;
-        let worst = (0..views.len())
-            .filter(|&i| used[i])
-            .map(|i| (i, strain(&data, &state, i)))
-            .max_by(|a, b| a.1.total_cmp(&b.1));
+        let beside = consistency(&data, &state, factor).beside(&used);
+        let worst = (0..views.len()).filter(|&i| used[i]).max_by(|&a, &b| beside[a].total_cmp(&beside[b]));
         solution = Some(s);
         match worst {
-            Some((i, strain)) if strain > o.gate_strain && used.iter().filter(|u| **u).count() > 3 => {
+            Some(i) if beside[i] > o.gate_surprise && used.iter().filter(|u| **u).count() > 3 => {
                 used[i] = false;
                 data.peaks.retain(|p| p.view != i);
             }
@@ -228,21 +240,32 @@ pub fn solve(
     for p in &data.peaks {
         uses[p.view][p.index] = PeakUse::Used;
     }
+    let basis = basis(&state.plane);
     let by_camera = by_camera(&data, &state, views, camera, factor)
         .ok_or_else(|| refused("the laser plane is not determined by these stripes".into()))?;
-    let c = DMatrix::from_column_slice(9, 9, camera_covariance.as_slice());
-    let basis = basis(&state.plane);
-    let exact = &basis * &local * basis.transpose();
-    let covariance = &exact + &by_camera * c * by_camera.transpose();
+    let mut checks = consistency(&data, &state, factor);
+    if checks.freedom > 0.0 {
+        let explained = from_camera(&data, &state, factor, &by_camera, camera_covariance);
+        checks.scatter2 *= checks.freedom / (checks.freedom + explained);
+    }
+    let inflation = inflation(checks.scatter2, checks.freedom);
+    let exact = &basis * &local * basis.transpose() * inflation;
+    let follows = by_camera.plane * camera_covariance * by_camera.plane.transpose();
+    let covariance = &exact + &basis * DMatrix::from_column_slice(3, 3, follows.as_slice()) * basis.transpose();
+    let rest: Vec<Seen> = all.iter().filter(|p| uses[p.view][p.index] != PeakUse::Used).copied().collect();
+    let second = second_plane(&rest, &data, &state, views, camera, o);
     Ok(LaserPlaneFit {
         plane: state.plane,
         covariance,
         covariance_camera_exact: exact,
-        views: residuals(&data, &state, views, &used, factor, &all, o),
+        views: residuals(&data, &state, views, &used, &checks, &all, o),
         uses,
         sigma_ratio,
         neighbour_factor: neighbours,
-        board_spread: board_spread(views, &used),
+        scatter: checks.scatter2.sqrt(),
+        inflation,
+        second,
+        board_spread: board_spread(&state, &used),
         reach: reach(&data, &state),
         depth_spread: depth_spread(&data, &state),
     })
@@ -274,50 +297,12 @@ fn select(views: &[StripeView], camera: &Intrinsics, o: &LaserPlaneOptions, uses
     out
 }
 
-fn root(pose: &MeasuredPose, sigma_px: f64) -> Result<Matrix6<f64>> {
-    (pose.information / (sigma_px * sigma_px))
+fn root(pose: &MeasuredPose, factor: f64) -> Result<Matrix6<f64>> {
+    let own = pose.factor_among(factor);
+    (pose.information / (own * own))
         .cholesky()
         .map(|c| c.l().transpose())
         .ok_or_else(|| refused(format!("{}: the board's pose is not determined", pose.name)))
-}
-
-/// The plane that most peaks lie on: consensus over triples from different pictures.
-fn majority(peaks: &[Seen], measured: &[Rigid<Camera, Board>], o: &LaserPlaneOptions) -> Result<Plane<Camera>> {
-    let points: Vec<Vec3> = peaks.iter().map(|s| on_board(&measured[s.view], &s.ray).expect("selected")).collect();
-    let options = ConsensusOptions { threshold: o.gate_mm, max_draws: 20000, seed: o.seed, ..Default::default() };
-    let found = consensus(
-        points.len(),
-        3,
-        &options,
-        |c| {
-            let views = [peaks[c[0]].view, peaks[c[1]].view, peaks[c[2]].view];
-            if views[0] == views[1] && views[1] == views[2] {
-                return None;
-            }
-            let normal = (points[c[1]] - points[c[0]]).cross(&(points[c[2]] - points[c[0]]));
-            let plane = Plane::<Camera>::new(normal, normal.dot(&points[c[0]]))?;
-            (normal.norm() > 1.0).then_some(plane)
-        },
-        |plane, i| plane.distance(&points[i]),
-    )
-    .ok_or_else(|| refused("no plane goes through the stripes of several pictures".into()))?;
-    let agreeing: Vec<Vec3> = found.inliers.iter().map(|&i| points[i]).collect();
-    let plane = fit_plane::<Camera>(&agreeing)
-        .ok_or_else(|| refused("the stripes of all pictures lie on one line in space".into()))?
-        .0;
-    // The normal points away from the camera, as the format's examples do.
-    Ok(if plane.offset < 0.0 { plane.flipped() } else { plane })
-}
-
-fn near(p: &Seen, plane: &Plane<Camera>, measured: &[Rigid<Camera, Board>], gate: f64) -> bool {
-    on_board(&measured[p.view], &p.ray).is_some_and(|x| plane.distance(&x).abs() < gate)
-}
-
-fn leave_out_disagreeing(all: &[Seen], near: &[Seen], used: &mut [bool], o: &LaserPlaneOptions) {
-    for (v, used) in used.iter_mut().enumerate() {
-        let (n, k) = (all.iter().filter(|p| p.view == v).count(), near.iter().filter(|p| p.view == v).count());
-        *used = k >= o.min_peaks && k as f64 >= o.min_share * n as f64;
-    }
 }
 
 fn robust_ratio(data: &Data, s: &State, factor: f64) -> f64 {
@@ -325,23 +310,23 @@ fn robust_ratio(data: &Data, s: &State, factor: f64) -> f64 {
     crate::solve::robust_scale(&mut r, 1)
 }
 
-/// 1 + 2 Σ ρₖ over the lags along the stripe whose correlation stands out of the noise.
-fn neighbour_factor(peaks: &[Seen], ratios: &[f64], views: &[StripeView]) -> f64 {
+/// Longest correlation along the stripe that is looked for, peaks.
+const LONGEST_LAG: usize = 40;
+
+/// 1 + 2 Σ ρₖ over the lags along the stripe whose correlation stands out of the noise: speckle, and broken pieces of a
+/// stripe that lie off it as a whole.
+fn neighbour_factor(peaks: &[Seen], ratios: &[f64]) -> f64 {
     let variance = ratios.iter().map(|r| r * r).sum::<f64>() / ratios.len() as f64;
+    let apart = |a: &Seen, b: &Seen| (a.view == b.view).then(|| (b.pixel - a.pixel).norm());
+    let mut steps: Vec<f64> = peaks.windows(2).filter_map(|w| apart(&w[0], &w[1])).collect();
+    steps.sort_by(f64::total_cmp);
+    let Some(step) = steps.get(steps.len() / 2) else { return 1.0 };
     let mut factor = 1.0;
-    for lag in 1..=8usize {
-        let (mut sum, mut n) = (0.0, 0.0);
-        for i in lag..peaks.len() {
-            let (a, b) = (&peaks[i - lag], &peaks[i]);
-            if a.view != b.view {
-                continue;
-            }
-            let at = |p: &Seen| views[p.view].peaks[p.index].pixel;
-            if (at(b) - at(a)).norm() < 1.6 * lag as f64 {
-                sum += ratios[i - lag] * ratios[i];
-                n += 1.0;
-            }
-        }
+    for lag in 1..=LONGEST_LAG {
+        let near = |i: &usize| apart(&peaks[i - lag], &peaks[*i]).is_some_and(|d| d < 1.6 * step * lag as f64);
+        let (sum, n) = (lag..peaks.len())
+            .filter(near)
+            .fold((0.0, 0.0), |(sum, n), i| (sum + ratios[i - lag] * ratios[i], n + 1.0));
         let rho = if n > 20.0 { sum / n / variance } else { 0.0 };
         if rho < 2.5 / f64::max(n, 1.0).sqrt() {
             break;
@@ -356,10 +341,13 @@ fn residuals(
     state: &State,
     views: &[StripeView],
     used: &[bool],
-    factor: f64,
+    checks: &Consistency,
     all: &[Seen],
     o: &LaserPlaneOptions,
 ) -> Vec<ViewResidual> {
+    let mut misfits: Vec<f64> = views.iter().map(|v| v.pose.sigma_factor).collect();
+    misfits.sort_by(f64::total_cmp);
+    let usual = misfits[(misfits.len() - 1) / 2].max(1e-12);
     let rms = |peaks: &[&Seen], plane: &Plane<Camera>, pose: &Rigid<Camera, Board>| -> (f64, f64) {
         let (mut px, mut mm) = (0.0, 0.0);
         for p in peaks {
@@ -371,6 +359,7 @@ fn residuals(
         let n = f64::max(peaks.len() as f64, 1.0);
         ((px / n).sqrt(), (mm / n).sqrt())
     };
+    let beside = checks.beside(used);
     (0..views.len())
         .map(|v| {
             let used_here: Vec<&Seen> = data.peaks.iter().filter(|p| p.view == v).collect();
@@ -378,74 +367,24 @@ fn residuals(
             let shown: Vec<&Seen> =
                 if used[v] { used_here.clone() } else { all.iter().filter(|p| p.view == v).collect() };
             let (px, mm) = rms(&shown, &state.plane, &state.poses[v]);
-            let (holdout_px, holdout_mm) = without(data, state, v, factor)
+            let (holdout_px, holdout_mm) = checks.views[v]
+                .plane
                 .map_or((f64::INFINITY, f64::INFINITY), |plane| rms(&shown, &plane, &data.measured[v]));
+            let used_now = used[v] && used_here.len() >= o.min_peaks.min(3);
             ViewResidual {
                 name: views[v].pose.name.clone(),
-                used: used[v] && used_here.len() >= o.min_peaks.min(3),
+                used: used_now,
                 peaks: views[v].peaks.len(),
                 peaks_used: if used[v] { used_here.len() } else { 0 },
                 px,
                 mm,
                 holdout_px,
                 holdout_mm,
-                strain: strain(data, state, v),
+                surprise: checks.views[v].surprise,
+                beside: beside[v],
+                contradicts: !used_now && all.iter().filter(|p| p.view == v).count() >= o.min_peaks,
+                board_misfit: views[v].pose.sigma_factor / usual,
             }
         })
         .collect()
-}
-
-fn board_spread(views: &[StripeView], used: &[bool]) -> f64 {
-    let normals: Vec<Vec3> = (0..views.len())
-        .filter(|&i| used[i])
-        .map(|i| views[i].pose.camera_from_board.rotation.column(2).into())
-        .collect();
-    let angle = |a: &Vec3, b: &Vec3| a.cross(b).norm().atan2(a.dot(b));
-    normals
-        .iter()
-        .enumerate()
-        .flat_map(|(i, a)| normals[..i].iter().map(move |b| (a, b)))
-        .fold(0.0, |m, (a, b)| f64::max(m, angle(a, b)))
-}
-
-fn reach(data: &Data, s: &State) -> [f64; 2] {
-    let depths = data.peaks.iter().filter_map(|p| Some(on_board(&s.poses[p.view], &p.ray)?.z));
-    depths.fold([f64::INFINITY, 0.0], |[low, high], z| [low.min(z), high.max(z)])
-}
-
-/// rms spread of the points in their second principal direction, mm.
-fn depth_spread(data: &Data, s: &State) -> f64 {
-    let points: Vec<Vec3> = data.peaks.iter().filter_map(|p| on_board(&s.poses[p.view], &p.ray)).collect();
-    let n = f64::max(points.len() as f64, 1.0);
-    let c = points.iter().sum::<Vec3>() / n;
-    let m = points.iter().map(|p| (p - c) * (p - c).transpose()).sum::<Matrix3<f64>>() / n;
-    let mut e: Vec<f64> = m.symmetric_eigenvalues().iter().copied().collect();
-    e.sort_by(f64::total_cmp);
-    e[1].max(0.0).sqrt()
-}
-
-/// Sigma of the distance between the fitted and the true plane, rms over a field of view of
-/// ±0.4 rad across at distances `near..=far` along the optical axis, mm.
-pub fn expected_error(plane: &Plane<Camera>, covariance: &DMatrix<f64>, near: f64, far: f64) -> f64 {
-    let [a, b] = tangents(&plane.normal);
-    // In the plane: across = the direction with the least z, along = the other.
-    let across = (a * b.z - b * a.z).normalize();
-    let along = plane.normal.cross(&across);
-    let mut sum = 0.0;
-    let mut n = 0.0;
-    for i in 0..=10 {
-        let z = near + (far - near) * f64::from(i) / 10.0;
-        let middle = {
-            let foot = plane.normal * plane.offset;
-            let k = if along.z.abs() > 1e-6 { (z - foot.z) / along.z } else { 0.0 };
-            foot + along * k
-        };
-        for k in -4..=4 {
-            let p = middle + across * (z * 0.1 * f64::from(k)) - across * across.dot(&middle);
-            let u = nalgebra::DVector::from_vec(vec![p.x, p.y, p.z, -1.0]);
-            sum += (covariance * &u).dot(&u).max(0.0);
-            n += 1.0;
-        }
-    }
-    f64::sqrt(sum / n)
 }

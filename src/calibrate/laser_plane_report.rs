@@ -2,9 +2,13 @@
 //! page a person reads; fit and verification apart.
 //! Frame and unit: camera frame; mm, degrees, px.
 
-use super::laser_plane::{LaserPlaneFit, PeakUse, StripeView, expected_error};
-use super::limits::{Limits, rms};
+use super::laser_plane::{LaserPlaneFit, LaserPlaneOptions, PeakUse, StripeView};
+use super::laser_plane_checks::{expected_error, places_in_view};
+use super::limits::{Judgement, Limits, rms};
+use super::measured_pose::MISFIT;
 use super::report::{Page, axis_sphere, bars, coverage_map};
+use super::scatter::{ENOUGH, overrule};
+use crate::camera::Intrinsics;
 use crate::geometry::Vec2;
 use crate::rig::{Covariance, Quality, Verdict};
 use std::collections::BTreeMap;
@@ -16,12 +20,18 @@ pub fn covariance(fit: &LaserPlaneFit) -> Covariance {
     Covariance::new(&PLANE_NAMES, &fit.covariance)
 }
 
+/// Beyond this many times their own sigmas the pictures' scatter is no more what pixels explain.
+const SCATTER: f64 = 3.0;
+/// Least spread of the stripes across their own direction, a share of the view.
+const LEAST_SPREAD: f64 = 0.02;
+
 /// Judges a fit.
-pub fn judge(fit: &LaserPlaneFit, limits: &Limits) -> Quality {
+pub fn judge(fit: &LaserPlaneFit, views: &[StripeView], camera: &Intrinsics, limits: &Limits) -> Quality {
     let work = &limits.working;
     let (near, far) = (work.near_mm, work.far_mm);
-    let expected = expected_error(&fit.plane, &fit.covariance, near, far);
-    let exact = expected_error(&fit.plane, &fit.covariance_camera_exact, near, far);
+    let places = places_in_view(&fit.plane, camera, work);
+    let expected = expected_error(&fit.covariance, &places);
+    let exact = expected_error(&fit.covariance_camera_exact, &places);
     let camera_part = (expected * expected - exact * exact).max(0.0).sqrt();
     let used: Vec<_> = fit.views.iter().filter(|v| v.used).collect();
     let spread = fit.board_spread.to_degrees();
@@ -34,6 +44,8 @@ pub fn judge(fit: &LaserPlaneFit, limits: &Limits) -> Quality {
             tilt.to_degrees()
         ),
     );
+    j.at_best(Verdict::BadlyDetermined, places.is_empty(), || format!("the camera does not see the sheet at {work}"));
+    contradictions(fit, views, &mut j);
     j.at_best(Verdict::BadlyDetermined, spread < 5.0, || {
         format!(
             "all boards are parallel to {spread:.1} degrees: an error that they share would stay unseen; 5 are needed"
@@ -42,24 +54,22 @@ pub fn judge(fit: &LaserPlaneFit, limits: &Limits) -> Quality {
     j.at_best(Verdict::Usable, (5.0..15.0).contains(&spread), || {
         format!("the boards' tilts spread over {spread:.1} degrees, 15 are needed to be good")
     });
-    j.at_best(Verdict::BadlyDetermined, fit.depth_spread < 3.0, || {
-        format!("the stripes spread by {:.1} mm across their own direction: they are nearly one line", fit.depth_spread)
+    let least = LEAST_SPREAD * camera.view_mm(limits.middle());
+    j.at_best(Verdict::BadlyDetermined, fit.depth_spread < least, || {
+        format!(
+            "the stripes spread by {:.2} mm across their own direction, {least:.2} mm ({:.0} % of the view) are needed: they \
+             are nearly one line",
+            fit.depth_spread,
+            100.0 * LEAST_SPREAD
+        )
     });
     j.at_best(Verdict::BadlyDetermined, used.len() < 3, || "two pictures leave nothing to check".into());
-    j.at_best(Verdict::Usable, (3..5).contains(&used.len()), || {
-        format!("{} pictures, 5 are needed to be good", used.len())
+    j.at_best(Verdict::Usable, (3..ENOUGH).contains(&used.len()), || {
+        format!("{} pictures, {ENOUGH} are needed to be good", used.len())
     });
     j.at_best(Verdict::Usable, low > near + 0.25 * (far - near) || high < far - 0.25 * (far - near), || {
         format!("the boards were lit at {} to {} mm, the work is at {work}", work.depth(low), work.depth(high))
     });
-    for v in fit.views.iter().filter(|v| !v.used) {
-        j.at_best(Verdict::Usable, true, || {
-            format!(
-                "{} was left out: {:.3} px from the plane of the others (a board that moved, or too few peaks)",
-                v.name, v.px
-            )
-        });
-    }
     if camera_part > 0.0 {
         j.reasons.push(format!("the camera's own uncertainty makes {camera_part:.4} mm of the error"));
     }
@@ -95,6 +105,9 @@ pub fn judge(fit: &LaserPlaneFit, limits: &Limits) -> Quality {
         ("peaks_disagreeing".into(), count(PeakUse::Disagrees)),
         ("residual_over_sigma".into(), fit.sigma_ratio),
         ("neighbour_factor".into(), fit.neighbour_factor),
+        ("scatter_over_sigma".into(), fit.scatter),
+        ("variance_factor".into(), fit.inflation),
+        ("pictures_contradicting".into(), fit.views.iter().filter(|v| v.contradicts).count() as f64),
     ]);
     Quality {
         verdict: j.verdict,
@@ -102,6 +115,65 @@ pub fn judge(fit: &LaserPlaneFit, limits: &Limits) -> Quality {
         advice: j.advice,
         figures,
         per_picture: fit.views.iter().map(|v| (v.name.clone(), v.px)).collect(),
+    }
+}
+
+/// What the pictures say against each other, and who says it.
+fn contradictions(fit: &LaserPlaneFit, views: &[StripeView], j: &mut Judgement) {
+    for v in fit.views.iter().filter(|v| !v.used) {
+        j.at_best(Verdict::Usable, true, || {
+            let why = if v.contradicts { "a board that moved, a reflection, another rig" } else { "too little light" };
+            format!("{} was left out: {:.3} px from the plane of the others ({why})", v.name, v.px)
+        });
+    }
+    let against = fit.views.iter().filter(|v| v.contradicts).count();
+    overrule(fit.views.iter().filter(|v| v.used).count(), against, j);
+    if let Some(s) = &fit.second {
+        j.at_best(Verdict::BadlyDetermined, true, || {
+            format!(
+                "{} pictures show light on a second plane, {:.3} mm from this one, and it is not known which is the sheet: {}",
+                s.views.len(),
+                s.mm,
+                s.views.join(", ")
+            )
+        });
+    }
+    for v in fit.views.iter().filter(|v| v.used && v.board_misfit > MISFIT) {
+        j.at_best(Verdict::Usable, true, || {
+            format!(
+                "{}: its features fit the board {:.1} times worse than those of the others (another camera, or blurred)",
+                v.name, v.board_misfit
+            )
+        });
+    }
+    // The plane's stripe, drawn into pictures that it was not fitted to, must lie within their light.
+    let mut widths: Vec<f64> = views.iter().flat_map(|v| v.peaks.iter().map(|p| p.width_px)).collect();
+    widths.sort_by(f64::total_cmp);
+    let width = widths.get(widths.len() / 2).copied().unwrap_or(0.0);
+    let off = rms(fit.views.iter().filter(|v| v.used).map(|v| v.holdout_px));
+    j.at_best(Verdict::BadlyDetermined, off > width, || {
+        format!(
+            "predicted by the other pictures, a stripe lies {off:.2} px (rms) from its light, which is {width:.2} px wide (sigma)"
+        )
+    });
+    j.at_best(Verdict::Usable, fit.scatter > SCATTER, || {
+        format!(
+            "the pictures scatter {:.1} times more than their pixels explain, {SCATTER} times are allowed for good; the stated \
+             error contains it",
+            fit.scatter
+        )
+    });
+    let gate = LaserPlaneOptions::default().gate_surprise;
+    for v in fit.views.iter().filter(|v| v.used && v.beside > gate) {
+        j.at_best(Verdict::BadlyDetermined, true, || {
+            format!(
+                "{}: its stripe lies {:.1} sigmas from where the others predict it, {:.0} are allowed, and too few pictures \
+                 are left to do without it",
+                v.name,
+                v.beside.sqrt(),
+                gate.sqrt()
+            )
+        });
     }
 }
 
@@ -129,12 +201,12 @@ pub fn page(fit: &LaserPlaneFit, views: &[StripeView], quality: &Quality, size: 
                 format!("{} of {}", v.peaks_used, v.peaks),
                 format!("{:.4}", v.px),
                 format!("{:.4}", v.mm),
-                format!("{:.1}", v.strain),
+                format!("{:.1}", v.surprise.sqrt()),
                 fate.into(),
             ]
         })
         .collect();
-    page.table("Fit", &["picture", "peaks", "px", "mm", "strain of the board", ""], &fits);
+    page.table("Fit", &["picture", "peaks", "px", "mm", "sigmas from the others' prediction", ""], &fits);
     page.figure(
         "Residual of each picture in the fit, px",
         &bars(&fit.views.iter().map(|v| (v.name.clone(), v.px)).collect::<Vec<_>>(), "px", None),

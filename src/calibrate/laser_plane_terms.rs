@@ -7,25 +7,26 @@ use super::measured_pose::{changed, moved, step_between};
 use crate::camera::Intrinsics;
 use crate::geometry::{Board, Camera, Plane, Rigid, Vec2, Vec3};
 use crate::solve::{LmOptions, Loss, Problem, Residuals, Solution, lm};
-use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix};
+use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix6, SMatrix};
 
 /// A peak as seen by the solver.
 #[derive(Clone, Copy)]
 pub(super) struct Seen {
     pub(super) view: usize,
     pub(super) index: usize,
+    pub(super) pixel: Vec2,
     /// Viewing ray (x, y, 1).
     pub(super) ray: Vec3,
     /// d(ray x, y)/d(pixel).
-    pub(super) ray_by_pixel: nalgebra::Matrix2<f64>,
+    pub(super) ray_by_pixel: Matrix2<f64>,
     pub(super) sigma_px: f64,
 }
 
 pub(super) fn look(camera: &Intrinsics, view: usize, index: usize, peak: &StripePeak) -> Option<Seen> {
     let n = camera.normalised_from_pixel(&peak.pixel)?;
-    let k = nalgebra::Matrix2::new(camera.fx, camera.skew, 0.0, camera.fy);
+    let k = Matrix2::new(camera.fx, camera.skew, 0.0, camera.fy);
     let ray_by_pixel = (k * camera.distort_jacobian(&n)).try_inverse()?;
-    Some(Seen { view, index, ray: Vec3::new(n.x, n.y, 1.0), ray_by_pixel, sigma_px: peak.sigma_px })
+    Some(Seen { view, index, pixel: peak.pixel, ray: Vec3::new(n.x, n.y, 1.0), ray_by_pixel, sigma_px: peak.sigma_px })
 }
 
 /// Where a ray (x, y, 1) meets a board.
@@ -148,10 +149,6 @@ pub(super) fn ratio(p: &Seen, s: &State, factor: f64) -> f64 {
     s.plane.distance(&x) / (mm_per_px(&s.plane, &s.poses[p.view], p) * p.sigma_px * factor)
 }
 
-pub(super) fn strain(data: &Data, s: &State, view: usize) -> f64 {
-    (data.roots[view] * step_between(&data.measured[view], &s.poses[view])).norm_squared()
-}
-
 /// d(nx ny nz offset)/d(two tilts, offset).
 pub(super) fn basis(plane: &Plane<Camera>) -> DMatrix<f64> {
     let [a, b] = tangents(&plane.normal);
@@ -163,70 +160,112 @@ pub(super) fn basis(plane: &Plane<Camera>) -> DMatrix<f64> {
     j
 }
 
-/// What one picture says about the plane at a linearisation: information and gradient of its three
-/// numbers, the board's pose eliminated (docs/math.md, Laser plane (5)).
-pub(super) fn share(data: &Data, state: &State, view: usize, factor: f64) -> Option<(Matrix3<f64>, Vec3)> {
-    let (mut h, mut g) = (SMatrix::<f64, 9, 9>::zeros(), SMatrix::<f64, 9, 1>::zeros());
-    let pose = &state.poses[view];
-    for p in data.peaks.iter().filter(|p| p.view == view) {
-        let (r, j) = row(&state.plane, pose, p, p.sigma_px * factor * mm_per_px(&state.plane, pose, p))?;
-        let j = SMatrix::<f64, 9, 1>::from(j);
+/// What one picture says of the plane, its board's pose eliminated (docs/math.md, Laser plane (5)): a stripe on a flat board
+/// is a straight line and tells the plane's distance at its two ends.
+pub(super) struct Says {
+    /// d(distances at the stripe's ends)/d(two tilts, offset).
+    pub(super) by_plane: SMatrix<f64, 2, 3>,
+    /// On the two distances, 1/mm² and 1/mm.
+    pub(super) information: Matrix2<f64>,
+    pub(super) gradient: Vec2,
+}
+
+impl Says {
+    /// The same on the plane's three numbers.
+    pub(super) fn of_plane(&self) -> (Matrix3<f64>, Vec3) {
+        let j = self.by_plane.transpose();
+        (j * self.information * self.by_plane, j * self.gradient)
+    }
+}
+
+/// `None` where fewer than two places of the board are lit.
+pub(super) fn says(data: &Data, state: &State, view: usize, factor: f64) -> Option<Says> {
+    let (plane, pose) = (&state.plane, &state.poses[view]);
+    let board: Vec3 = pose.rotation.column(2).into();
+    let along = plane.normal.cross(&board).try_normalize(1e-9)?;
+    let seen: Vec<(&Seen, Vec3)> =
+        data.peaks.iter().filter(|p| p.view == view).filter_map(|p| Some((p, on_board(pose, &p.ray)?))).collect();
+    let order = |a: &&(&Seen, Vec3), b: &&(&Seen, Vec3)| along.dot(&a.1).total_cmp(&along.dot(&b.1));
+    let ends = [seen.iter().min_by(order)?.1, seen.iter().max_by(order)?.1];
+    let length = along.dot(&(ends[1] - ends[0]));
+    if !(length > 0.0) {
+        return None;
+    }
+    let (mut h, mut g) = (SMatrix::<f64, 8, 8>::zeros(), SMatrix::<f64, 8, 1>::zeros());
+    for (p, at) in &seen {
+        let sigma_mm = p.sigma_px * factor * mm_per_px(plane, pose, p);
+        let (r, j) = row(plane, pose, p, sigma_mm)?;
+        let t = along.dot(&(at - ends[0])) / length;
+        let j = SMatrix::<f64, 8, 1>::from([(1.0 - t) / sigma_mm, t / sigma_mm, j[3], j[4], j[5], j[6], j[7], j[8]]);
         h += j * j.transpose();
         g += j * r;
     }
     let root = &data.roots[view];
     let prior = root.transpose() * root;
-    let local = h.fixed_view::<6, 6>(3, 3) + prior;
-    let rest = g.fixed_view::<6, 1>(3, 0) + prior * step_between(&data.measured[view], pose);
-    let mixed = h.fixed_view::<3, 6>(0, 3) * local.try_inverse()?;
-    let information = h.fixed_view::<3, 3>(0, 0) - mixed * h.fixed_view::<6, 3>(3, 0);
-    Some((information, g.fixed_view::<3, 1>(0, 0) - mixed * rest))
+    let local = h.fixed_view::<6, 6>(2, 2) + prior;
+    let rest = g.fixed_view::<6, 1>(2, 0) + prior * step_between(&data.measured[view], pose);
+    let mixed = h.fixed_view::<2, 6>(0, 2) * local.try_inverse()?;
+    let [a, b] = tangents(&plane.normal);
+    let row = |p: &Vec3| [a.dot(p), b.dot(p), -1.0];
+    let [first, last] = ends.map(|p| row(&p));
+    Some(Says {
+        by_plane: SMatrix::from_fn(|i, k| if i == 0 { first[k] } else { last[k] }),
+        information: h.fixed_view::<2, 2>(0, 0) - mixed * h.fixed_view::<6, 2>(2, 0),
+        gradient: g.fixed_view::<2, 1>(0, 0) - mixed * rest,
+    })
 }
 
-/// d(nx ny nz offset)/d(camera): the gradient's change with the camera through the peaks' rays and
-/// the boards' poses, by the implicit function theorem.
+/// The plane after a step of its two tilts and its offset.
+pub(super) fn stepped(plane: &Plane<Camera>, step: &Vec3) -> Option<Plane<Camera>> {
+    let [a, b] = tangents(&plane.normal);
+    Plane::new((plane.normal + a * step.x + b * step.y).normalize(), plane.offset + step.z)
+}
+
+/// How a fit follows the camera's nine parameters.
+pub(super) struct ByCamera {
+    /// Of the plane's two tilts and its offset.
+    pub(super) plane: SMatrix<f64, 3, 9>,
+    /// Of each picture's gradient ([`Says::gradient`]) at the fitted plane; none for a picture without light.
+    pub(super) gradients: Vec<Option<SMatrix<f64, 2, 9>>>,
+}
+
+/// Through the peaks' rays and the boards' poses, by the implicit function theorem.
 pub(super) fn by_camera(
     data: &Data,
     state: &State,
     views: &[StripeView],
     camera: &Intrinsics,
     factor: f64,
-) -> Option<DMatrix<f64>> {
-    let mut information = Matrix3::zeros();
-    for v in 0..views.len() {
-        information += share(data, state, v, factor)?.0;
-    }
+) -> Option<ByCamera> {
+    let said: Vec<Option<Says>> = (0..views.len()).map(|v| says(data, state, v, factor)).collect();
+    let information: Matrix3<f64> = said.iter().flatten().map(|s| s.of_plane().0).sum();
     let inverse = information.try_inverse()?;
-    let mut local = DMatrix::zeros(3, 9);
+    let mut gradients: Vec<_> = said.iter().map(|s| s.as_ref().map(|_| SMatrix::<f64, 2, 9>::zeros())).collect();
+    let mut plane = SMatrix::<f64, 3, 9>::zeros();
     for k in 0..9 {
         let h = if k < 4 { 0.05 } else { 1e-4 };
-        let gradient = |sign: f64| -> Option<Vec3> {
+        for sign in [1.0, -1.0] {
             let mut d = nalgebra::SVector::<f64, 9>::zeros();
             d[k] = sign * h;
             let other = changed(camera, &d);
             let peaks = data.peaks.iter().map(|p| look(&other, p.view, p.index, &views[p.view].peaks[p.index]));
             let follow = |(v, p): (&StripeView, _)| moved(p, (v.pose.by_intrinsics * d).as_slice());
-            let data = Data {
+            let changed = Data {
                 peaks: peaks.collect::<Option<_>>()?,
                 measured: views.iter().zip(&data.measured).map(follow).collect(),
                 roots: data.roots.clone(),
             };
-            (0..views.len()).map(|v| share(&data, state, v, factor).map(|s| s.1)).sum()
-        };
-        local.set_column(k, &(-inverse * (gradient(1.0)? - gradient(-1.0)?) / (2.0 * h)));
+            for (v, by) in gradients.iter_mut().enumerate() {
+                let Some(by) = by else { continue };
+                let slope = sign / (2.0 * h);
+                let there = says(&changed, state, v, factor)?;
+                let mut column = by.column_mut(k);
+                column += there.gradient * slope;
+                let step = -(inverse * there.of_plane().1) * slope;
+                let mut column = plane.column_mut(k);
+                column += step;
+            }
+        }
     }
-    Some(basis(&state.plane) * local)
-}
-
-/// The plane without one picture: one Gauss-Newton step from the whole solution.
-pub(super) fn without(data: &Data, state: &State, left_out: usize, factor: f64) -> Option<Plane<Camera>> {
-    let (mut h, mut g) = (Matrix3::zeros(), Vec3::zeros());
-    for v in (0..data.measured.len()).filter(|v| *v != left_out) {
-        let (a, b) = share(data, state, v, factor)?;
-        h += a;
-        g += b;
-    }
-    let step = -(h.try_inverse()? * g);
-    let [a, b] = tangents(&state.plane.normal);
-    Plane::new((state.plane.normal + a * step.x + b * step.y).normalize(), state.plane.offset + step.z)
+    Some(ByCamera { plane, gradients })
 }

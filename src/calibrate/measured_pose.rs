@@ -36,6 +36,9 @@ impl AboutCamera {
     }
 }
 
+/// The features of a picture may fit their board this many times worse than those of the others.
+pub const MISFIT: f64 = 3.0;
+
 /// A small motion in the camera frame: translation (mm) then rotation vector (rad);
 /// a point P goes to exp(w) P + v.
 pub type Step = Vector6<f64>;
@@ -78,7 +81,7 @@ pub struct MeasuredPose {
     pub by_intrinsics: ByIntrinsics,
     /// What the same pixels say about the camera.
     pub about_camera: AboutCamera,
-    /// rms of the feature residuals per coordinate, px.
+    /// rms of the feature residuals per coordinate, px; NaN for a pose that was given without pixels.
     pub rms_px: f64,
     /// What the residuals say about the stated sigmas: the factor that makes them true.
     pub sigma_factor: f64,
@@ -89,6 +92,40 @@ pub struct MeasuredPose {
 }
 
 impl MeasuredPose {
+    /// A pose that another program measured, with its sigmas per axis at the board's origin (mm, rad) where they are
+    /// stated; else what is left open is a turn about that origin, in rad, and `freedom` is 0. It says nothing of the
+    /// camera. `side`: of the square about the origin at whose corners poses are compared, mm.
+    pub fn given(
+        name: String,
+        camera_from_board: Rigid<Camera, Board>,
+        sigma: Option<[f64; 2]>,
+        side: f64,
+    ) -> MeasuredPose {
+        // The place's scatter cannot be told from the robot's: 1 mm per rad of the turn's keeps the sums finite.
+        let [place, turn] = sigma.unwrap_or([1.0, 1.0]);
+        // A turn about the board's origin o is the step v = o × w, w.
+        let lever = skew(&camera_from_board.translation);
+        let mut covariance = Matrix6::<f64>::zeros();
+        let own = Mat3::identity() * (place * place) + lever * lever.transpose() * (turn * turn);
+        covariance.fixed_view_mut::<3, 3>(0, 0).copy_from(&own);
+        covariance.fixed_view_mut::<3, 3>(0, 3).copy_from(&(lever * (turn * turn)));
+        covariance.fixed_view_mut::<3, 3>(3, 0).copy_from(&(lever.transpose() * (turn * turn)));
+        covariance.fixed_view_mut::<3, 3>(3, 3).copy_from(&(Mat3::identity() * (turn * turn)));
+        let half = side / 2.0;
+        let corner = |x: f64, y: f64| Vec3::new(x * half, y * half, 0.0);
+        MeasuredPose {
+            name,
+            camera_from_board,
+            information: covariance.try_inverse().unwrap_or_else(Matrix6::zeros),
+            by_intrinsics: ByIntrinsics::zeros(),
+            about_camera: AboutCamera::silent(),
+            rms_px: f64::NAN,
+            // Stated sigmas are taken as they are: no residuals could correct them.
+            sigma_factor: 1.0,
+            freedom: if sigma.is_some() { 1.0 } else { 0.0 },
+            landmarks: [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0), Vec3::zeros()],
+        }
+    }
     /// The distance (mm, rms over the landmarks) between this pose and another of the same board.
     pub fn displacement(&self, other: &Rigid<Camera, Board>) -> f64 {
         let sum: f64 =
@@ -108,6 +145,10 @@ impl MeasuredPose {
     /// Centre of the features, camera frame, mm.
     pub fn centre(&self) -> Vec3 {
         self.camera_from_board.point(&self.landmarks[4])
+    }
+    /// Its own factor where it fits far worse than usual, of a blurred picture or of another camera, else the usual one.
+    pub fn factor_among(&self, usual: f64) -> f64 {
+        if self.sigma_factor > MISFIT * usual { self.sigma_factor } else { usual }
     }
     /// Covariance of a step, the features' sigmas being this factor times the stated ones.
     pub fn covariance(&self, sigma_factor: f64) -> Matrix6<f64> {
@@ -239,11 +280,18 @@ pub fn measure_view(name: &str, camera: &Intrinsics, board: &BoardSpec, view: &B
     measure(&SeenBoard::from_view(name, board, view), camera, &start.camera_from_board)
 }
 
-/// One factor for all pictures: their residuals pooled by degrees of freedom.
-pub fn pooled_factor(poses: &[MeasuredPose]) -> f64 {
-    let (sum, freedom) =
-        poses.iter().fold((0.0, 0.0), |(s, f), p| (s + p.sigma_factor * p.sigma_factor * p.freedom, f + p.freedom));
-    if freedom > 0.0 { (sum / freedom).sqrt() } else { f64::NAN }
+/// One factor for all pictures: their residuals pooled by degrees of freedom; `None` where nothing tells it. A picture that fits
+/// more than three times as badly as the middle one, blurred or of another camera, does not speak for the others.
+pub fn pooled_factor<'a>(poses: impl Iterator<Item = &'a MeasuredPose>) -> Option<f64> {
+    let poses: Vec<&MeasuredPose> = poses.filter(|p| p.freedom > 0.0).collect();
+    let mut factors: Vec<f64> = poses.iter().map(|p| p.sigma_factor).collect();
+    factors.sort_by(f64::total_cmp);
+    let limit = MISFIT * factors.get((factors.len().max(1) - 1) / 2).copied()?;
+    let (sum, freedom) = poses
+        .iter()
+        .filter(|p| p.sigma_factor <= limit)
+        .fold((0.0, 0.0), |(s, f), p| (s + p.sigma_factor * p.sigma_factor * p.freedom, f + p.freedom));
+    (freedom > 0.0).then(|| f64::sqrt(sum / freedom))
 }
 
 /// The camera's covariance as 9x9 in the order of [`INTRINSIC_NAMES`]; parameters the file does not

@@ -3,6 +3,7 @@
 //! Frame and unit: camera frame, mm; spots in px (docs/math.md, Pointer (3) to (5)).
 
 use super::measured_pose::{MeasuredPose, changed, moved, step_between};
+use super::scatter::{beside, inflation};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Board, Camera, Plane, Ray, Rigid, Vec2, Vec3};
@@ -21,8 +22,11 @@ pub struct SpotView {
 /// Settings of [`solve`].
 #[derive(Clone, Debug)]
 pub struct PointerOptions {
-    /// A spot is wrong where its squared Mahalanobis distance (2 degrees of freedom) exceeds this; 9..=1000.
+    /// A spot is wrong where its squared Mahalanobis distance (2 degrees of freedom), over what is usual among the others,
+    /// exceeds this; 9..=1000.
     pub gate: f64,
+    /// Spots nearer than this to the first line, in what a pixel covers there, are never left out of it; 0.5..=50.
+    pub gate_px: f64,
     /// Fewest spots; 3..=1000.
     pub min_spots: usize,
     /// Spots must be spread along the beam at least this share of their distance; 0.01..=1.
@@ -31,7 +35,7 @@ pub struct PointerOptions {
 
 impl Default for PointerOptions {
     fn default() -> Self {
-        PointerOptions { gate: 20.0, min_spots: 4, min_spread: 0.1 }
+        PointerOptions { gate: 20.0, gate_px: 2.0, min_spots: 4, min_spread: 0.05 }
     }
 }
 
@@ -39,6 +43,7 @@ impl PointerOptions {
     pub fn check(&self) -> Result<()> {
         let ranges = [
             ("gate", self.gate, 9.0, 1000.0),
+            ("gate_px", self.gate_px, 0.5, 50.0),
             ("min_spots", self.min_spots as f64, 3.0, 1000.0),
             ("min_spread", self.min_spread, 0.01, 1.0),
         ];
@@ -64,6 +69,8 @@ pub struct SpotResidual {
     pub holdout_px: f64,
     pub holdout_mm: f64,
     pub distance2: f64,
+    /// The same over what is usual among these spots, where that is more than chance.
+    pub beside: f64,
 }
 
 /// What [`solve`] found.
@@ -190,7 +197,7 @@ fn fit(
 ) -> Option<Solved> {
     let roots = views
         .iter()
-        .map(|v| Some((v.pose.information / (factor * factor)).cholesky()?.l().transpose()))
+        .map(|v| Some((v.pose.information / v.pose.factor_among(factor).powi(2)).cholesky()?.l().transpose()))
         .collect::<Option<Vec<_>>>()?;
     let whiteners = views.iter().map(|v| v.covariance.cholesky()?.l().try_inverse()).collect::<Option<Vec<_>>>()?;
     let measured: Vec<_> =
@@ -227,34 +234,42 @@ pub fn solve(
         })
         .collect::<Option<Vec<Vec3>>>()
         .ok_or_else(|| refused("a spot's viewing ray does not meet its board".into()))?;
-    let start = robust_line(&points).ok_or_else(|| refused("the spots are all in one place".into()))?;
+    // What a pixel covers at each spot, mm.
+    let pixel_mm: Vec<f64> = points.iter().map(|p| o.gate_px * p.z / camera.fx.min(camera.fy)).collect();
+    let start = robust_line(&points, &pixel_mm).ok_or_else(|| refused("the spots are all in one place".into()))?;
     // Total least squares in space weighs far spots wrongly; the fit in pixels starts from it.
     let none = SVector::<f64, 9>::zeros();
-    let mut used: Vec<usize> = near_line(&points, &start);
-    let mut solved = None;
-    for _ in 0..views.len() {
-        if used.len() < o.min_spots {
-            return Err(refused(format!("only {} of {} spots lie on one line", used.len(), views.len())));
-        }
+    let mut used: Vec<usize> = near_line(&points, &pixel_mm, &start);
+    let fit_to = |used: &[usize]| -> Result<(Solved, Vec<f64>, Vec<f64>)> {
         let chosen: Vec<&SpotView> = used.iter().map(|&i| &views[i]).collect();
         let s = fit(&chosen, camera, &none, &start, feature_factor)
             .ok_or_else(|| refused("the beam is not determined by these spots".into()))?;
-        let distances: Vec<f64> =
-            (0..views.len()).map(|i| distance2(&views[i], camera, &s, used.contains(&i), feature_factor)).collect();
-        solved = Some((s, distances.clone()));
-        let next: Vec<usize> = (0..views.len()).filter(|&i| distances[i] <= o.gate).collect();
-        if next == used || next.len() < o.min_spots {
+        let distance = |i| distance2(&views[i], camera, &s, used.contains(&i), feature_factor);
+        let distances: Vec<f64> = (0..views.len()).map(distance).collect();
+        let beside = beside(&distances, |i| used.contains(&i));
+        Ok((s, distances, beside))
+    };
+    for _ in 0..2 * views.len() {
+        if used.len() < o.min_spots {
+            return Err(refused(format!("only {} of {} spots lie on one line", used.len(), views.len())));
+        }
+        let (_, distances, beside) = fit_to(&used)?;
+        // One at a time, judged by the beam of the others: a wrong spot pulls its neighbours out with it.
+        let worst = used.iter().copied().max_by(|a, b| distances[*a].total_cmp(&distances[*b])).expect("not empty");
+        if distances[worst] > o.gate && used.len() > o.min_spots {
+            let rest: Vec<usize> = used.iter().copied().filter(|&i| i != worst).collect();
+            if fit_to(&rest)?.2[worst] > o.gate {
+                used = rest;
+                continue;
+            }
+        }
+        let next: Vec<usize> = (0..views.len()).filter(|i| used.contains(i) || beside[*i] <= o.gate).collect();
+        if next == used {
             break;
         }
-        // One at a time: a wrong spot pulls its neighbours out with it.
-        let worst = used.iter().copied().max_by(|a, b| distances[*a].total_cmp(&distances[*b])).expect("not empty");
-        if distances[worst] > o.gate {
-            used.retain(|&i| i != worst);
-        } else {
-            used = next;
-        }
+        used = next;
     }
-    let (whole, distances) = solved.expect("at least one round");
+    let (whole, distances, beside) = fit_to(&used)?;
     let chosen: Vec<&SpotView> = used.iter().map(|&i| &views[i]).collect();
     let along: Vec<f64> = used.iter().map(|&i| points[i].z).collect();
     let reach = [along.iter().copied().fold(f64::INFINITY, f64::min), along.iter().copied().fold(0.0, f64::max)];
@@ -272,8 +287,7 @@ pub fn solve(
     let sigma_ratio = (cost / freedom.max(1.0)).sqrt();
     let exact = {
         let j = basis(&state.beam);
-        // A fit that is worse than its sigmas promise is believed; a better one is luck.
-        &j * local.view((0, 0), (4, 4)) * j.transpose() * sigma_ratio.max(1.0).powi(2)
+        &j * local.view((0, 0), (4, 4)) * j.transpose() * inflation(sigma_ratio * sigma_ratio, freedom)
     };
     let by_camera = by_camera(&chosen, camera, state, feature_factor)
         .ok_or_else(|| refused("the beam is not determined by these spots".into()))?;
@@ -304,6 +318,7 @@ pub fn solve(
                 holdout_px,
                 holdout_mm,
                 distance2: distances[i],
+                beside: beside[i],
             }
         })
         .collect();
@@ -311,11 +326,11 @@ pub fn solve(
 }
 
 /// The line through two of the points that most others are near to, refined on those.
-fn robust_line(points: &[Vec3]) -> Option<Ray<Camera>> {
+fn robust_line(points: &[Vec3], gates: &[f64]) -> Option<Ray<Camera>> {
     let mut best: Option<(f64, Ray<Camera>)> = None;
     for (i, a) in points.iter().enumerate() {
         for b in &points[..i] {
-            let Some(ray) = Ray::<Camera>::new(*a, b - a).filter(|_| (b - a).norm() > 1.0) else { continue };
+            let Some(ray) = Ray::<Camera>::new(*a, b - a).filter(|_| (b - a).norm() > 2.0 * gates[i]) else { continue };
             let mut d: Vec<f64> = points.iter().map(|p| off(&ray, p)).collect();
             let middle = (points.len() / 2 + 1).min(points.len() - 1);
             let (_, &mut median, _) = d.select_nth_unstable_by(middle, f64::total_cmp);
@@ -325,20 +340,19 @@ fn robust_line(points: &[Vec3]) -> Option<Ray<Camera>> {
         }
     }
     let ray = best?.1;
-    line(&near_line(points, &ray).iter().map(|&i| points[i]).collect::<Vec<_>>())
+    line(&near_line(points, gates, &ray).iter().map(|&i| points[i]).collect::<Vec<_>>())
 }
 
 fn off(ray: &Ray<Camera>, p: &Vec3) -> f64 {
     (p - ray.origin).cross(&ray.direction).norm()
 }
 
-fn near_line(points: &[Vec3], ray: &Ray<Camera>) -> Vec<usize> {
+fn near_line(points: &[Vec3], gates: &[f64], ray: &Ray<Camera>) -> Vec<usize> {
     let d: Vec<f64> = points.iter().map(|p| off(ray, p)).collect();
     let mut sorted = d.clone();
     sorted.sort_by(f64::total_cmp);
-    // Half a millimetre is more than any board pose of ours is wrong by.
-    let limit = (6.0 * sorted[points.len() / 2]).max(0.5);
-    (0..points.len()).filter(|&i| d[i] <= limit).collect()
+    let limit = 6.0 * sorted[points.len() / 2];
+    (0..points.len()).filter(|&i| d[i] <= limit.max(gates[i])).collect()
 }
 
 fn distance2(view: &SpotView, camera: &Intrinsics, s: &Solved, used: bool, factor: f64) -> f64 {
@@ -359,7 +373,7 @@ fn distance2(view: &SpotView, camera: &Intrinsics, s: &Solved, used: bool, facto
     let by_pose = j.fixed_columns::<6>(4);
     let by_beam = j.fixed_columns::<4>(0);
     let beam: SMatrix<f64, 4, 4> = local.fixed_view::<4, 4>(0, 0).into();
-    let own = view.covariance + by_pose * view.pose.covariance(factor) * by_pose.transpose();
+    let own = view.covariance + by_pose * view.pose.covariance(view.pose.factor_among(factor)) * by_pose.transpose();
     let fitted = by_beam * beam * by_beam.transpose();
     let total = if used { own - fitted } else { own + fitted };
     let e = q - view.pixel;

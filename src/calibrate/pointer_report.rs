@@ -4,9 +4,10 @@
 
 use super::limits::{Limits, rms};
 use super::measured_pose::INTRINSIC_NAMES;
-use super::pointer::PointerFit;
+use super::pointer::{PointerFit, PointerOptions};
 use super::pointer_range::range;
 use super::report::{Page, bars};
+use super::scatter::overrule;
 use crate::camera::Intrinsics;
 use crate::rig::{Covariance, Quality, Verdict};
 use nalgebra::{Matrix2, SMatrix};
@@ -61,6 +62,19 @@ pub fn judge(fit: &PointerFit, camera: &Intrinsics, spot_px: f64, limits: &Limit
     for s in fit.spots.iter().filter(|s| !s.used) {
         j.at_best(Verdict::Usable, true, || {
             format!("{} was left out: its spot is {:.2} px from the beam of the others", s.name, s.px)
+        });
+    }
+    overrule(used.len(), fit.spots.len() - used.len(), &mut j);
+    let gate = PointerOptions::default().gate;
+    for s in used.iter().filter(|s| s.beside > gate) {
+        j.at_best(Verdict::BadlyDetermined, true, || {
+            format!(
+                "{}: its spot lies {:.1} sigmas from the beam of the others, {:.1} are allowed, and too few pictures are \
+                 left to do without it",
+                s.name,
+                s.beside.sqrt(),
+                gate.sqrt()
+            )
         });
     }
     j.at_best(Verdict::Usable, fit.sigma_ratio > 3.0, || {

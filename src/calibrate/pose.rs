@@ -186,7 +186,7 @@ mod tests {
                 BoardPoint { feature_id, pixel: pixel + Vec2::from_fn(|_, _| noise.sample(&mut rng)), sigma_px }
             })
             .collect();
-        BoardView { points, ambiguous: false }
+        BoardView { points, ambiguous: false, dot_diameter: None }
     }
 
     #[test]

@@ -1,6 +1,7 @@
-//! In: files of line profiles (CSV, OpenCV YAML). Out: lists of x, z points.
+//! In: files of line profiles (CSV, matrices and plain sequences in YAML and JSON). Out: lists of x, z points.
 //! Frame and unit: the sensor's own plane, mm.
 
+use super::profile_sequences::{by_turns, from_brackets, value};
 use crate::fault::{Fault, Result};
 use crate::files::natural;
 use std::path::Path;
@@ -23,12 +24,13 @@ pub fn load(path: &Path) -> Result<Vec<Profile>> {
     let mut files: Vec<_> = entries
         .filter_map(|e| Some(e.ok()?.path()))
         .filter(|p| {
-            p.extension().is_some_and(|e| ["csv", "txt", "yml", "yaml"].iter().any(|k| e.eq_ignore_ascii_case(k)))
+            p.extension()
+                .is_some_and(|e| ["csv", "txt", "yml", "yaml", "json"].iter().any(|k| e.eq_ignore_ascii_case(k)))
         })
         .collect();
     files.sort_by_key(|p| natural(&p.file_name().unwrap_or_default().to_string_lossy()));
     if files.is_empty() {
-        return Err(Fault::input(format!("{}: holds no profiles (csv, txt, yml, yaml)", path.display()))
+        return Err(Fault::input(format!("{}: holds no profiles (csv, txt, yml, yaml, json)", path.display()))
             .cause("another folder")
             .next("give the folder with one profile a file, or one file with all"));
     }
@@ -40,10 +42,13 @@ pub fn load(path: &Path) -> Result<Vec<Profile>> {
 }
 
 fn load_file(path: &Path) -> Result<Vec<Profile>> {
-    let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+    let text = crate::files::read_text(path)?;
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let yaml = text.trim_start().starts_with("%YAML") || text.contains("opencv-matrix");
-    let read = if yaml { from_yaml(&text, &stem) } else { from_csv(&text, &stem) };
+    let read = match () {
+        () if text.contains("opencv-matrix") => from_yaml(&text, &stem),
+        () if text.contains('[') => from_brackets(&text, &stem),
+        () => from_csv(&text, &stem),
+    };
     read.map_err(|e| e.at(path.display()))
 }
 
@@ -88,10 +93,21 @@ pub fn from_csv(text: &str, stem: &str) -> Result<Vec<Profile>> {
             columns = Some(match cells.len() {
                 2 => [None, Some(0), Some(1)],
                 3 => [Some(0), Some(1), Some(2)],
-                n => return Err(bad(&format!("has {n} numbers: 2 (x, z) or 3 (profile, x, z) are read"))),
+                // A profile a line.
+                _ => [None, None, None],
             });
         }
         let [profile, x, z] = columns.expect("set above");
+        if x.is_none() {
+            let numbers = cells.iter().map(|c| c.parse()).collect::<std::result::Result<Vec<f64>, _>>();
+            let name = format!("{stem} line {}", number + 1);
+            let points = by_turns(&numbers.map_err(|_| bad("is no row of numbers"))?, &name)?;
+            out.push(Profile {
+                name,
+                points: points.into_iter().filter(|p| p.iter().all(|v| v.is_finite())).collect(),
+            });
+            continue;
+        }
         let cell = |i: usize| cells.get(i).copied().ok_or_else(|| bad("is too short"));
         let value = |i: usize| cell(i).and_then(|c| c.parse::<f64>().map_err(|_| bad("is no row of numbers")));
         let point = [value(x.expect("checked"))?, value(z.expect("checked"))?];
@@ -146,14 +162,11 @@ pub fn from_yaml(text: &str, stem: &str) -> Result<Vec<Profile>> {
         let numbers = data
             .split(|c: char| c == ',' || c.is_whitespace())
             .filter(|t| !t.is_empty())
-            .map(|t| match t.trim_start_matches('+').to_lowercase().as_str() {
-                ".nan" | "nan" => Ok(f64::NAN),
-                ".inf" | "-.inf" => Ok(f64::INFINITY),
-                other => other.trim_end_matches('.').parse::<f64>(),
-            })
-            .collect::<std::result::Result<Vec<f64>, _>>()
-            .map_err(|_| bad(&name, "holds something that is no number".into()))?;
-        if numbers.len() != rows * cols * channels {
+            .map(value)
+            .collect::<Option<Vec<f64>>>()
+            .ok_or_else(|| bad(&name, "holds something that is no number".into()))?;
+        let wanted = rows.checked_mul(cols).and_then(|n| n.checked_mul(channels));
+        if wanted != Some(numbers.len()) {
             return Err(bad(&name, format!("{} numbers for {rows}x{cols} of {channels} channels", numbers.len())));
         }
         let points: Vec<[f64; 2]> = match (rows, cols, channels) {
@@ -193,6 +206,8 @@ mod tests {
             assert_eq!((p[0].points.clone(), p[0].name.as_str()), (want.clone(), "a profile_0"));
         }
         assert!(from_yaml(&yaml("   rows: 2\n   cols: 2\n   dt: d\n   data: [ 1., 2., 3., 4. ]"), "a").is_err());
+        let lines = from_csv("1 10 2 11.5 3 12\n4 5 5 6 6 7\n", "a").unwrap();
+        assert_eq!((lines.len(), &lines[0].points, lines[1].points[2]), (2, &want, [6.0, 7.0]));
         assert!(from_csv("1,2,3,4\n", "a").is_err() && from_csv("a,b\n1,2\n", "a").is_err());
     }
 

@@ -247,8 +247,10 @@ pub fn find_spots(pictures: &[SpotPicture<'_>], hot: &[bool], o: &SpotOptions) -
             .cause("a glint or a second reflection of the beam")
             .next("cover the shiny place and take this picture again"));
         }
-        let covariance =
-            covariance.ok_or_else(|| Fault::refused(format!("{name}: the spot's centre is not determined")))?;
+        let covariance = covariance.ok_or_else(|| {
+            Fault::refused(format!("{name}: the spot's centre is not determined"))
+                .next("take the picture again with a smaller or darker spot")
+        })?;
         let mut saturated = 0;
         patch.each(|i, _, _| saturated += usize::from(patch.grey[i] >= patch.full));
         Ok(Spot {
@@ -300,7 +302,8 @@ fn collect_scatter(patch: &Patch, s: &Shape, out: &mut Vec<f64>) {
 fn locate(p: &SpotPicture<'_>, hot: &[bool], o: &SpotOptions) -> Result<(Patch, Shape, f64)> {
     let (w, h) = (p.laser.width as usize, p.laser.height as usize);
     if w < 16 || h < 16 {
-        return Err(Fault::input(format!("{}: {w}x{h} is too small for a spot, at least 16x16", p.name)));
+        return Err(Fault::input(format!("{}: {w}x{h} is too small for a spot, at least 16x16", p.name))
+            .next("give pictures of the whole sensor"));
     }
     let full = f64::from(p.laser.full_scale());
     let grey: Vec<f64> = p.laser.to_f32().iter().map(|&g| f64::from(g)).collect();

@@ -17,21 +17,30 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:
   sheetlight board charuco 14x10 --square-mm 15 --out boards/charuco
   sheetlight board chessboard 9x6 --square-mm 10 --out boards/chess
-  sheetlight board circles 7x5 --square-mm 20 --dot-mm 10 --asymmetric --out boards/dots")]
+  sheetlight board circles 7x5 --square-mm 20 --dot-mm 10 --asymmetric --out boards/dots
+  sheetlight board markers 6x4 --square-mm 20 --gap-mm 6 --dictionary DICT_4X4_50 --out tags
+  sheetlight board markers 1x1 --square-mm 60 --dictionary DICT_4X4_50 --first-id 7 --out tag")]
 pub struct Args {
-    /// chessboard, charuco or circles
-    #[arg(value_parser = ["chessboard", "charuco", "circles"])]
+    /// chessboard, charuco, circles or markers (ArUco, AprilTag)
+    #[arg(value_parser = ["chessboard", "charuco", "circles", "markers"])]
     kind: String,
-    /// COLUMNSxROWS: inner corners of a chessboard, squares of a ChArUco board, dots of a circle grid
+    /// COLUMNSxROWS: inner corners of a chessboard, squares of a ChArUco board, dots of a circle grid, markers
+    /// (1x1: a single one)
     #[arg(value_parser = super::parse::<Size>)]
     size: Size,
-    /// Side of a square, or pitch of the dots, mm
+    /// Side of a square or of a single marker, or pitch of the dots, mm
     #[arg(long)]
     square_mm: f64,
     /// ChArUco: side of a marker, mm [default: 0.7 of the square]
     #[arg(long)]
     marker_mm: Option<f64>,
-    /// ChArUco: OpenCV's name of the dictionary
+    /// Markers: white between two of them, mm [default: 0.3 of the marker]
+    #[arg(long)]
+    gap_mm: Option<f64>,
+    /// Markers: id of the first one
+    #[arg(long, default_value_t = 0)]
+    first_id: u32,
+    /// ChArUco, markers: OpenCV's name of the dictionary
     #[arg(long, default_value = "DICT_5X5_250")]
     dictionary: String,
     /// Circles: diameter of a dot, mm [default: half of the pitch]
@@ -75,10 +84,18 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
             dictionary: args.dictionary.clone(),
             border_mm,
         },
+        "markers" => BoardSpec::MarkerGrid {
+            markers: args.size.0,
+            marker_mm: args.square_mm,
+            gap_mm: args.gap_mm.unwrap_or(0.3 * args.square_mm),
+            dictionary: args.dictionary.clone(),
+            first_id: args.first_id,
+            border_mm,
+        },
         _ => BoardSpec::Circles {
             dots: args.size.0,
             pitch_mm: args.square_mm,
-            diameter_mm: args.dot_mm.unwrap_or(0.5 * args.square_mm),
+            diameter_mm: Some(args.dot_mm.unwrap_or(0.5 * args.square_mm)),
             asymmetric: args.asymmetric,
             border_mm,
         },

@@ -1,40 +1,85 @@
 //! In: results, warnings, progress. Out: data on stdout (text or JSON), talk and bars on stderr.
 //! Frame and unit: none.
 
-use crate::fault::Fault;
+use super::printable::{printable, printable_json};
+use crate::fault::{Fault, Result};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::io::IsTerminal;
+use std::cell::RefCell;
+use std::io::{ErrorKind, IsTerminal, Write};
 
-/// Where a command talks to. One a process.
+/// Where a command talks to. One a process; the one place that prints.
 pub struct Console {
     pub json: bool,
     quiet: bool,
+    /// The first thing that stdout did not take.
+    failed: RefCell<Option<std::io::Error>>,
 }
 
 impl Console {
     pub fn new(json: bool, quiet: bool) -> Console {
-        Console { json, quiet }
+        Console { json, quiet, failed: RefCell::default() }
     }
 
     /// The command's result: `value` as JSON with --json, else `text`.
     pub fn result(&self, value: &impl serde::Serialize, text: &str) {
         if self.json {
-            println!("{}", serde_json::to_string_pretty(value).expect("plain data"));
+            self.data(&printable_json(&serde_json::to_string_pretty(value).expect("plain data")));
         } else {
-            println!("{}", text.trim_end());
+            self.data(&printable(text.trim_end()));
         }
+    }
+
+    /// A piece of the result that is known before the rest; with --json it comes with the rest.
+    pub fn part(&self, text: &str) {
+        if !self.json {
+            self.data(&printable(text.trim_end()));
+        }
+    }
+
+    /// One of many results, as one line of JSON, at once. False where nobody reads them any more.
+    pub fn line(&self, value: &impl serde::Serialize) -> bool {
+        self.data(&printable_json(&serde_json::to_string(value).expect("plain data")));
+        self.failed.borrow().is_none()
+    }
+
+    fn data(&self, text: &str) {
+        let mut out = std::io::stdout().lock();
+        if let Err(e) = writeln!(out, "{text}").and_then(|()| out.flush()) {
+            self.failed.borrow_mut().get_or_insert(e);
+        }
+    }
+
+    /// `Err` where stdout took less than all of the data. A reader that has seen enough (`| head`) is no error: what the
+    /// command wrote into files is whole.
+    pub fn finish(&self) -> Result<()> {
+        match &*self.failed.borrow() {
+            Some(e) if e.kind() != ErrorKind::BrokenPipe => Err(Fault::output(format!("standard output: {e}"))
+                .cause("the disk that it is sent to is full, or it was closed")
+                .next("free some space, or send it elsewhere; what the command wrote into files is whole")),
+            _ => Ok(()),
+        }
+    }
+
+    /// Talk. Nothing is left to be said when even stderr is closed.
+    fn tell(&self, text: &str) {
+        let _ = write!(std::io::stderr().lock(), "{}", printable(text));
     }
 
     /// Something a person should know; never data.
     pub fn say(&self, text: impl AsRef<str>) {
         if !self.quiet {
-            eprintln!("{}", text.as_ref());
+            self.tell(&format!("{}\n", text.as_ref()));
         }
     }
 
     /// Something that may be wrong; said even when quiet.
     pub fn warn(&self, text: impl AsRef<str>) {
-        eprintln!("warning: {}", text.as_ref());
+        self.tell(&format!("warning: {}\n", text.as_ref()));
+    }
+
+    /// A question to a person, who answers on the same line; asked even when quiet.
+    pub fn ask(&self, question: &str) {
+        self.tell(question);
     }
 
     /// An error with its cause and next step; with --json also as one object on stdout.
@@ -42,9 +87,9 @@ impl Console {
         if self.json {
             let body =
                 serde_json::json!({"kind": fault.kind, "what": fault.what, "cause": fault.cause, "next": fault.next});
-            println!("{}", serde_json::json!({ "error": body }));
+            self.line(&serde_json::json!({ "error": body }));
         }
-        eprintln!("error: {fault}");
+        self.tell(&format!("error: {fault}\n"));
     }
 
     /// A bar with rate and time left; hidden when quiet or not on a terminal.

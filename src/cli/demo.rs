@@ -35,6 +35,9 @@ pub struct Args {
     on: Where,
 }
 
+/// What the scan is called; a demo replaces no other.
+const LABEL: &str = "a simulated board with parts";
+
 /// The tasks that the simulated board holds the parts of.
 const RECIPES: [&str; 3] = [
     include_str!("../../data/recipes/led.toml"),
@@ -51,6 +54,8 @@ struct Demo {
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
+    super::outputs::check_simulation(&args.out.join("simulated"))?;
+    super::outputs::check_scan(&args.out, LABEL)?;
     let options = SimulateOptions {
         seed: args.seed,
         shots: args.shots,
@@ -67,7 +72,9 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     bar.finish_and_clear();
     Settings { name: "demo".into(), ..Settings::default() }.store(&made.station)?;
     let folder = made.recordings.first().map(|(_, folder, _)| folder.clone());
-    let folder = folder.ok_or_else(|| Fault::output("nothing was simulated"))?;
+    let folder = folder.ok_or_else(|| {
+        Fault::output("nothing was simulated").next("choose an --out folder that you may write to, and run it again")
+    })?;
     let out = args.out.clone();
     let (settings, rig) = (Settings::load(&made.station)?, Rig::load(&made.station)?);
     let scan = ScanOptions {
@@ -80,14 +87,13 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         overlays: 4,
         skip_bad: false,
         resume: false,
+        stop: Default::default(),
     };
     console.say("scanning it through the whole chain");
     let bar = console.bar("scanning", options.shots as u64);
     let recording = Recording::open(&folder)?;
     let open = |first| Ok(Box::new(RecordingSource::open(&recording, None, first)?) as Box<_>);
-    let report = crate::station::scan("demo", "a simulated board with parts", open, &rig, &scan, |done, _| {
-        bar.set_position(done as u64)
-    })?;
+    let report = crate::station::scan("demo", LABEL, open, &rig, &scan, |done, _| bar.set_position(done as u64))?;
     bar.finish_and_clear();
     console.say("finding the parts, comparing every point with the truth");
     let truth = folder.join("truth.json");

@@ -3,12 +3,13 @@
 //! Frame and unit: base frame; mm, degrees.
 
 use super::Console;
+use super::outputs::{self, Inputs};
 use crate::fault::{Fault, Result};
 use crate::find::{Accelerator, LocateOptions, Recipe, Report};
 use crate::geometry::Vec3;
 use crate::robot::Convention;
 use crate::station::{Settings, find_part_in_all};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Find a part in a scan and say where the robot inserts
 ///
@@ -19,7 +20,7 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = "Example:
   sheetlight find scans/board7 --recipe data/recipes/led.toml --station cell3 --out led.json
-  sheetlight find scans/board7 scans/board7b --recipe data/recipes/led.toml --station cell3 --out led.json")]
+  sheetlight find scans/b7 scans/b7again --recipe led.toml --station cell3 --out led.json")]
 pub struct Args {
     /// Folders that sheetlight scan --out wrote: one, or several looks at the same part
     #[arg(required = true)]
@@ -43,6 +44,10 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let image = args.out.with_extension("png");
+    let scans: Vec<&Path> = args.scans.iter().map(PathBuf::as_path).collect();
+    let inputs = Inputs { files: &[&args.recipe], scans: &scans, station: args.station.as_deref() };
+    outputs::check(&[&args.out, &image], &inputs)?;
     let recipe = Recipe::load(&args.recipe)?;
     let of_station = args.station.as_deref().map(Settings::load).transpose()?.and_then(|s| s.robot);
     let up = args.up.map(Vec3::from);
@@ -54,7 +59,6 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let (report, picture) = find_part_in_all(&args.scans, &recipe, args.station.as_deref(), &options)?;
     let text = serde_json::to_string_pretty(&report).expect("plain data");
     crate::files::write(&args.out, text.as_bytes())?;
-    let image = args.out.with_extension("png");
     crate::files::write(&image, &picture.to_png())?;
     console.result(&report, &summary(&report));
     console.say(format!("see {} and {}", args.out.display(), image.display()));

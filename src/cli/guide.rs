@@ -47,9 +47,10 @@ pub struct Args {
     /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
     #[arg(long, default_value = "auto", value_parser = super::parse::<Where>)]
     on: Where,
-    /// Distance of the camera from the board when it looks at it squarely, mm
-    #[arg(long, default_value_t = 150.0)]
-    view_mm: f64,
+    /// Distance of the camera from the board when it looks at it squarely, mm [default: the middle of the working volume, else
+    /// where the sheet meets the camera's axis]
+    #[arg(long)]
+    view_mm: Option<f64>,
     /// Largest angle between the touched board and the found part, degrees
     #[arg(long, default_value_t = 3.0)]
     max_tilt_deg: f64,
@@ -80,7 +81,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         console.say(described(number, step));
         match &step.asks {
             Some(_) if args.yes => Ok(true),
-            Some(question) => ask(question),
+            Some(question) => ask(question, console),
             None => Ok(true),
         }
     })?;
@@ -101,13 +102,16 @@ fn described(number: usize, step: &Step) -> String {
 }
 
 /// A yes from the terminal; anything else is a no. Without a terminal nobody can answer.
-fn ask(question: &str) -> Result<bool> {
+fn ask(question: &str, console: &Console) -> Result<bool> {
     if !std::io::stdin().is_terminal() {
         return Err(Fault::usage(format!("nobody can answer '{question}': standard input is no terminal"))
             .next("run it in a terminal, or pass --yes for recordings and simulated stations"));
     }
-    eprint!("   {question} [y/N] ");
+    console.ask(&format!("   {question} [y/N] "));
     let mut line = String::new();
-    std::io::stdin().lock().read_line(&mut line).map_err(|e| Fault::input(format!("standard input: {e}")))?;
+    std::io::stdin()
+        .lock()
+        .read_line(&mut line)
+        .map_err(|e| Fault::input(format!("standard input: {e}")).next("run it in a terminal"))?;
     Ok(matches!(line.trim(), "y" | "Y" | "yes"))
 }

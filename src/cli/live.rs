@@ -2,12 +2,12 @@
 //! frames were passed over meanwhile. Frame and unit: camera frame, mm; milliseconds.
 
 use super::Console;
-use crate::fault::{Fault, Result};
+use crate::fault::Result;
+use crate::raster::Light;
 use crate::rig::Rig;
 use crate::scan::{Live, Newest, RawFormat, RawFrames, Where};
 use crate::stages::point::Point;
 use crate::station::Settings;
-use std::io::Write;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
@@ -71,11 +71,13 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         filled.close();
         end
     });
-    let mut out = std::io::stdout().lock();
-    let (mut waits, mut without_stripe) = (Vec::new(), 0);
+    let (mut waits, mut without_stripe, mut unlit) = (Vec::new(), 0, None);
     while let Some((frame, image, arrived)) = newest.take() {
+        // Looked at only while nothing was seen: it takes as long as a stage.
+        let light = waits.is_empty().then(|| Light::of(&image));
         let Some(measured) = live.measure(frame, image)? else {
             without_stripe += 1;
+            unlit = light.or(unlit);
             continue;
         };
         let latency_ms = 1e3 * arrived.elapsed().as_secs_f64();
@@ -89,10 +91,9 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
             passed_over: newest.passed_over(),
             xyz_sigma_mm: args.points.then(|| there.map(list).collect()),
         };
-        let text = serde_json::to_string(&line).expect("plain data");
-        writeln!(out, "{text}").and_then(|()| out.flush()).map_err(|e| {
-            Fault::output(format!("standard output was closed: {e}")).next("keep the reader of the lines running")
-        })?;
+        if !console.line(&line) {
+            return Ok(());
+        }
     }
     let frames = reader.join().expect("reading does not panic")?;
     waits.sort_by(f64::total_cmp);
@@ -106,5 +107,8 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         ms(0.99),
         live.ran_on()
     ));
+    if let Some(light) = unlit.filter(|_| waits.is_empty()) {
+        console.warn(format!("no frame showed a stripe; the last one: {light}"));
+    }
     Ok(())
 }

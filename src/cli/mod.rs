@@ -10,8 +10,11 @@ mod doctor;
 mod find;
 mod guide;
 mod insertion;
+mod interrupt;
 mod live;
 mod model;
+mod outputs;
+mod printable;
 mod range;
 mod scan;
 mod second_look;
@@ -19,6 +22,8 @@ mod shift_scan;
 mod simulate;
 mod station;
 mod teach;
+mod threads;
+mod trial;
 mod verify;
 
 pub use console::Console;
@@ -110,7 +115,8 @@ pub fn main() -> u8 {
         }
     };
     let console = Console::new(cli.json, cli.quiet);
-    match run(&cli.command, &console) {
+    let done = threads::start().and_then(|()| run(&cli.command, &console));
+    match done.and_then(|()| console.finish()) {
         Ok(()) => 0,
         Err(fault) => {
             console.fault(&fault);

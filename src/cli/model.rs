@@ -3,7 +3,8 @@
 
 use super::Console;
 use super::insertion::InsertionArgs;
-use crate::fault::{Fault, Result};
+use super::outputs::{self, Inputs};
+use crate::fault::Result;
 use crate::find::dxf::{self, DxfOptions, Unit};
 use crate::find::{TaskOptions, recipe_of};
 use std::path::PathBuf;
@@ -49,7 +50,8 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
-    let bytes = std::fs::read(&args.drawing).map_err(|e| Fault::read(&args.drawing, e))?;
+    outputs::check(&[&args.out], &Inputs { files: &[&args.drawing], ..Inputs::default() })?;
+    let bytes = crate::files::read(&args.drawing, dxf::LARGEST)?;
     let options = DxfOptions { unit: args.unit, layers: args.layers.clone(), origin: args.origin };
     let read = dxf::read(&bytes, &options).map_err(|e| e.at(args.drawing.display()))?;
     let [x0, y0, x1, y1] = read.drawing.bounds();

@@ -4,7 +4,7 @@
 
 use super::Console;
 use crate::fault::{Fault, Result};
-use crate::raster::{Channel, load};
+use crate::raster::{Channel, Image, Light, load_sized};
 use crate::recording::{Recording, load_poses};
 use crate::rig::{Rig, hash_file, hash_text};
 use crate::scan::{GridOptions, RawFormat, RawSource, RecordingSource, Where};
@@ -53,6 +53,12 @@ pub struct Args {
     /// Shots to draw with their peaks
     #[arg(long, default_value_t = 6)]
     overlays: usize,
+    /// With --raw: numbers of the frames that never came, from 0; frames and poses must then be as many
+    #[arg(long, value_name = "N,N,...", value_delimiter = ',', requires = "raw")]
+    missing: Vec<usize>,
+    /// Read pictures and poses that meta.json names outside the recording's folder
+    #[arg(long)]
+    pictures_outside: bool,
     /// Leave out shots that cannot be read, and list them
     #[arg(long)]
     skip_bad: bool,
@@ -76,6 +82,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         overlays: args.overlays,
         skip_bad: args.skip_bad,
         resume: args.resume,
+        stop: super::interrupt::asked_for(),
     };
     if let Some(truth) = &args.truth {
         // A wrong path shall not cost a scan.
@@ -90,12 +97,13 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         (Some(folder), None) => {
             let mut recording = Recording::open(folder)?;
             recording.channel = args.channel;
+            recording.outside = args.pictures_outside;
             recording.pose_file(args.poses.as_deref())?.warnings.iter().for_each(|w| console.warn(w));
             let mut id = identity(folder, &recording, args.poses.as_deref())?;
             if let Some(name) = &args.ambient {
                 let inside = folder.join(name);
                 let path = if inside.is_file() { inside } else { name.clone() };
-                options.ambient = Some(load(&path, args.channel, recording.meta.image.bits)?);
+                options.ambient = Some(recording.load(&path).map_err(no_ambient)?);
                 id += &hash_file(&path)?;
             }
             let open = |first| Ok(Box::new(RecordingSource::open(&recording, args.poses.as_deref(), first)?) as Box<_>);
@@ -110,9 +118,11 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
                 );
             }
             if let Some(path) = &args.ambient {
-                options.ambient = Some(load(path, args.channel, raw.format.bits)?);
+                let f = raw.format;
+                options.ambient = Some(ambient(path, args.channel, f.bits, [f.width, f.height])?);
             }
-            let open = |_| Ok(Box::new(RawSource::new(raw, std::io::stdin().lock(), file.poses)) as Box<_>);
+            let missing = args.missing.iter().copied().collect();
+            let open = |_| Ok(Box::new(RawSource::new(raw, std::io::stdin().lock(), file.poses, missing)?) as Box<_>);
             crate::station::scan("pipe", "standard input", open, &rig, &options, progress)?
         }
         _ => {
@@ -122,9 +132,12 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         }
     };
     bar.finish_and_clear();
-    let Some(truth) = &args.truth else {
+    if let (0, Some(folder)) = (report.points, &args.recording) {
+        console.warn(format!("the scan has 0 points{}", seen(folder, args.channel)));
+    }
+    let Some(truth) = args.truth.as_ref().filter(|_| report.points > 0) else {
         console.result(&report, &summary(&report, &args.out));
-        return Ok(());
+        return report.has_points();
     };
     let errors = judge(&args.out, truth, &[])?;
     let e = &errors.cloud;
@@ -137,6 +150,34 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     );
     console.result(&WithErrors { scan: report, errors }, &text);
     Ok(())
+}
+
+/// What the middle shot of a recording shows, and what is asked of it; nothing where it cannot be read.
+fn seen(folder: &Path, channel: Channel) -> String {
+    let read = || {
+        let mut recording = Recording::open(folder).ok()?;
+        recording.channel = channel;
+        let names: Vec<&String> = recording.meta.frames.iter().filter_map(|f| f.laser.as_ref()).collect();
+        let name = names.get(names.len() / 2)?;
+        Some(format!(
+            "; {name}: {}. Asked for is a stripe that stands out from its surroundings and crosses the working volume: \
+             compare exposure, laser and volume with docs/file-formats.md, station.toml",
+            Light::of(&recording.picture(name).ok()?)
+        ))
+    };
+    read().unwrap_or_default()
+}
+
+/// The picture with the laser off, of the shots' size.
+fn ambient(path: &Path, channel: Channel, bits: u8, size: [u32; 2]) -> Result<Image> {
+    load_sized(path, channel, bits, size).map_err(no_ambient)
+}
+
+fn no_ambient(fault: Fault) -> Fault {
+    fault
+        .at("the ambient picture")
+        .cause("a picture of another camera or another setting, or no picture")
+        .next("take one picture with the laser off and nothing else changed")
 }
 
 /// What `--json` prints with `--truth`.
@@ -160,7 +201,9 @@ fn summary(r: &ScanReport, out: &Path) -> String {
         "{} points from {} shots of {}x{} in {:.1} s ({:.1} shots/s, {})\n",
         r.points, r.shots, r.image.width, r.image.height, r.seconds, r.shots_per_second, r.ran_on
     );
-    s += &format!("each point good to {:.3} mm (median standard deviation)\n", r.median_sigma_mm);
+    if let Some(sigma) = r.median_sigma_mm {
+        s += &format!("each point good to {sigma:.3} mm (median standard deviation)\n");
+    }
     let all: u64 = r.peaks.values().sum();
     for (fate, n) in &r.peaks {
         s += &format!("  {:>9} peaks {fate} ({:.2} %)\n", n, 100.0 * *n as f64 / all.max(1) as f64);

@@ -3,6 +3,7 @@
 //! Frame and unit: base frame; mm, degrees.
 
 use super::Console;
+use super::outputs::{self, Inputs};
 use crate::fault::Result;
 use crate::find::{LookPlan, Recipe};
 use crate::recording::{Recording, save_poses};
@@ -17,10 +18,10 @@ use std::path::PathBuf;
 /// show an error along the approach. Check every pose for reach and collision before the robot goes there.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
-  sheetlight second-look scans/board7 --recording recordings/board7 --recipe data/recipes/led.toml --station cell3 \\
+  sheetlight second-look scans/b7 --recording recordings/b7 --recipe led.toml --station cell3 \\
       --out second.json
   (scan along the poses in second.json, then)
-  sheetlight find scans/board7 scans/board7b --recipe data/recipes/led.toml --station cell3 --out led.json")]
+  sheetlight find scans/b7 scans/b7again --recipe led.toml --station cell3 --out led.json")]
 pub struct Args {
     /// Folder that sheetlight scan --out wrote
     scan: PathBuf,
@@ -58,6 +59,8 @@ struct Planned<'a> {
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let inputs = Inputs { files: &[&args.recipe], scans: &[&args.scan], station: Some(&args.station) };
+    outputs::check(&[&args.out], &inputs)?;
     let recipe = Recipe::load(&args.recipe)?;
     let poses = Recording::open(&args.recording)?.poses(args.poses.as_deref())?;
     let look = second_look(&args.scan, &poses, &recipe, &args.station, args.turn, args.tilt)?;

@@ -18,9 +18,10 @@ use std::path::PathBuf;
 #[command(after_help = "Example:
   sheetlight shift-scan photos/cube --pixels-per-mm 10.6277 --camera-height-mm 80 \\
       --baseline-mm 37.3 --raises left --travel-mm 1 \\
-      --bed-rows 5..40,440..475 --channel red --out scans/cube")]
+      --bed-rows 5..40,440..475 --channel red --reference photos/empty \
+      --out scans/cube")]
 pub struct Args {
-    /// Folder with the pictures, taken in the order of their names
+    /// Folder with the pictures, taken in the order of their names (frame2 before frame10)
     pictures: PathBuf,
     /// Pixels per mm on the bed
     #[arg(long)]
@@ -43,6 +44,9 @@ pub struct Args {
     /// Part of a colour picture to use: red, green, blue or luma
     #[arg(long, default_value = "luma", value_parser = super::parse::<Channel>)]
     channel: Channel,
+    /// Folder with pictures of the empty bed, taken in the same way: how lens and laser bend the stripe is taken out
+    #[arg(long)]
+    reference: Option<PathBuf>,
     /// Points lower than this do not count for the level surface, mm
     #[arg(long, default_value_t = 1.0)]
     min_height_mm: f64,
@@ -61,11 +65,17 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         bed_rows: args.bed_rows.iter().map(|r| rows(r)).collect::<Result<_>>()?,
         channel: args.channel,
     };
+    if args.out.join("scan.json").exists() {
+        return Err(crate::fault::Fault::usage(format!("{}: holds a scan", args.out.display()))
+            .cause("a shift scan would replace its points")
+            .next("give another --out"));
+    }
     let bar = console.bar("measuring shifts", 0);
-    let (report, cloud) = shift_scan(&args.pictures, &rig, args.min_height_mm, &mut |done, of| {
-        bar.set_length(of as u64);
-        bar.set_position(done as u64);
-    })?;
+    let (report, cloud) =
+        shift_scan(&args.pictures, args.reference.as_deref(), &rig, args.min_height_mm, &mut |done, of| {
+            bar.set_length(of as u64);
+            bar.set_position(done as u64);
+        })?;
     bar.finish_and_clear();
     std::fs::create_dir_all(&args.out).map_err(|e| Fault::write(&args.out, e))?;
     write_cloud(&args.out.join("cloud.ply"), &cloud)?;
@@ -97,7 +107,7 @@ fn summary(r: &ShiftReport) -> String {
         s += &format!("{} pictures do not show the bed in the given rows\n", r.without_bed.len());
     }
     s + &match r.plateau {
-        None => "no level surface above the bed\n".into(),
+        None => "no level surface stands on the bed\n".into(),
         Some(p) => format!(
             "level surface {:.3} mm above the bed ({} points in {} pictures, noise {:.3} mm, between pictures {:.3} mm)\n",
             p.height_mm, p.points, p.shots, p.noise_mm, p.between_shots_mm

@@ -4,15 +4,19 @@
 use super::Console;
 use crate::fault::Result;
 use crate::recording::BoardSpec;
-use crate::simulate::{Sensor, Set, SimulateOptions, simulate};
-use crate::station::Settings;
+use crate::simulate::{RigSpec, Set, SimulateOptions, simulate};
+use crate::station::{Settings, WorkingVolume};
 use std::path::PathBuf;
 
 /// Makes recordings of a station whose every number is known: to try a command, to train people, to
 /// measure errors. The same options give the same files, byte for byte.
 ///
+/// With --rig the station, its boards and what it scans follow from a design; notched.toml in --out is the recipe of
+/// the part that lies there.
+///
 /// Example: sheetlight simulate --out try --set all --seed 3
 ///          sheetlight scan try/scan --station try/station --out try/result
+///          sheetlight simulate --rig data/rigs/webcam.toml --set all --out webcam
 #[derive(clap::Args)]
 pub struct Args {
     /// Folder for the recordings (one a set) and the station
@@ -22,7 +26,11 @@ pub struct Args {
     /// pointer_cal, pointer, surface, all
     #[arg(long = "set", value_delimiter = ',', default_value = "scan")]
     sets: Vec<String>,
-    /// Scene file (TOML, see docs/file-formats.md) [default: a circuit board with parts]
+    /// Design of the station (TOML, see docs/file-formats.md; data/rigs holds some) [default: the paper's]
+    #[arg(long)]
+    rig: Option<PathBuf>,
+    /// Scene file (TOML, see docs/file-formats.md) [default: a circuit board with parts; with --rig a stepped
+    /// block and a notched plate that fit into its field]
     #[arg(long)]
     scene: Option<PathBuf>,
     /// Description of the calibration board (JSON as sheetlight board writes it) for the sets
@@ -32,25 +40,25 @@ pub struct Args {
     /// Another specimen of the station, scene pose and noise for every seed; 0 is the design itself
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Sensor width, px
-    #[arg(long, default_value_t = 640)]
-    width: u32,
-    /// Sensor height, px [default: three quarters of the width]
+    /// Sensor width, px; the lens and what it sees stay [default: the rig's, 640]
+    #[arg(long)]
+    width: Option<u32>,
+    /// Sensor height, px [default: in proportion to the width]
     #[arg(long)]
     height: Option<u32>,
-    /// Bits per pixel, 8 to 16
-    #[arg(long, default_value_t = 8)]
-    bits: u8,
-    /// Shots of a scan
-    #[arg(long, default_value_t = 200)]
-    shots: usize,
+    /// Bits per pixel, 8 to 16 [default: the rig's, 8]
+    #[arg(long)]
+    bits: Option<u8>,
+    /// Shots of a scan [default: 200; with --rig one every one and a half pixel footprints]
+    #[arg(long)]
+    shots: Option<usize>,
     /// Scales shot noise, read noise, speckle and hot pixels; 0 is a noiseless sensor
     #[arg(long, default_value_t = 1.0)]
     noise: f64,
-    /// Speckle contrast per pixel, 0 to 0.6 [default: 0.12]
+    /// Speckle contrast per pixel, 0 to 0.6 [default: the rig's, 0.12]
     #[arg(long)]
     speckle: Option<f64>,
-    /// Peak of the stripe on white as share of full scale, 0.02 to 20 [default: 0.95]
+    /// Peak of the stripe on white as share of full scale, 0.02 to 20 [default: the rig's, 0.95]
     #[arg(long)]
     exposure: Option<f64>,
     /// Error of the reported robot poses, 1 sigma per axis, mm
@@ -62,6 +70,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
+    super::outputs::check_simulation(&args.out)?;
     let mut sets = Vec::new();
     for name in &args.sets {
         match name.as_str() {
@@ -69,21 +78,22 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
             name => sets.push(name.parse().map_err(|e: String| crate::fault::Fault::usage(e).next("name a set"))?),
         }
     }
-    let mut sensor = Sensor { bits: args.bits, ..Sensor::default() };
-    sensor.laser_white = args.exposure.unwrap_or(sensor.laser_white);
-    let mut options = SimulateOptions {
-        sets,
-        scene: args.scene.clone(),
-        board: args.board.as_deref().map(BoardSpec::load).transpose()?,
-        seed: args.seed,
-        width: args.width,
-        height: args.height.unwrap_or(args.width * 3 / 4),
-        sensor,
-        shots: args.shots,
-        pose_noise_mm: args.pose_noise_mm,
-        pose_noise_deg: args.pose_noise_deg,
-    }
-    .with_noise(args.noise);
+    let mut options = match &args.rig {
+        Some(path) => SimulateOptions::of(RigSpec::load(path)?),
+        None => SimulateOptions::default(),
+    };
+    let (w, h) = (options.width, options.height);
+    options.width = args.width.unwrap_or(w);
+    options.height = args.height.unwrap_or((u64::from(options.width) * u64::from(h) / u64::from(w)) as u32);
+    options.sets = sets;
+    options.scene = args.scene.clone();
+    options.board = args.board.as_deref().map(BoardSpec::load).transpose()?;
+    options.seed = args.seed;
+    options.shots = args.shots.unwrap_or(options.shots);
+    options.sensor.bits = args.bits.unwrap_or(options.sensor.bits);
+    options.sensor.laser_white = args.exposure.unwrap_or(options.sensor.laser_white);
+    (options.pose_noise_mm, options.pose_noise_deg) = (args.pose_noise_mm, args.pose_noise_deg);
+    options = options.with_noise(args.noise);
     options.sensor.speckle = args.speckle.unwrap_or(options.sensor.speckle);
     let bar = console.bar("simulating", 0);
     let done = simulate(&args.out, &options, &|n, of| {
@@ -91,7 +101,10 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         bar.set_position(n as u64);
     })?;
     bar.finish_and_clear();
-    Settings { name: format!("simulated {}", args.seed), ..Settings::default() }.store(&done.station)?;
+    let volume = |r: &RigSpec| WorkingVolume { near_mm: r.working.near_mm, far_mm: r.working.far_mm };
+    let working_volume = options.rig.as_ref().map(volume);
+    let name = format!("simulated {}", args.seed);
+    Settings { name, working_volume, ..Settings::default() }.store(&done.station)?;
     let mut text = format!("{}: station with the true calibration\n", done.station.display());
     for (set, folder, pictures) in &done.recordings {
         text += &format!("{}: {set}, {pictures} pictures\n", folder.display());

@@ -3,6 +3,7 @@
 
 use super::Console;
 use super::calibrate::stale;
+use super::outputs::{self, Inputs};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Camera, Plane, Ray};
@@ -27,7 +28,7 @@ pub enum Command {
     /// The file gets a new seal and your reason in it, and every report made with it shows that. What is no calibration at all
     /// (a direction that is not 1 long, a covariance that is none) is refused even so.
     #[command(after_help = "Example:
-  sheetlight station seal --station cell3 --kind laser-plane --because \"of version 1, checked on a gauge block\"")]
+  sheetlight station seal --station cell3 --kind laser-plane --because gauge-block-of-may")]
     Seal(Seal),
 }
 
@@ -121,6 +122,7 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
             stale(&a.station, console);
         }
         Command::Export(a) => {
+            outputs::check(&[&a.out], &Inputs { station: Some(&a.station), ..Inputs::default() })?;
             let values = Values::of(&Rig::load(&a.station)?);
             let text = serde_json::to_string_pretty(&values).expect("plain numbers");
             crate::files::write(&a.out, text.as_bytes())?;

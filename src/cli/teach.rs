@@ -4,6 +4,7 @@
 
 use super::Console;
 use super::insertion::InsertionArgs;
+use super::outputs::{self, Inputs};
 use crate::fault::Result;
 use crate::find::teach::TeachOptions;
 use crate::station::teach_part;
@@ -43,6 +44,8 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let image = args.out.with_extension("png");
+    outputs::check(&[&args.out, &image], &Inputs { scans: &[&args.scan], ..Inputs::default() })?;
     let options = TeachOptions {
         name: args.name.clone(),
         outline: args.outline,
@@ -54,7 +57,6 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let (recipe, proof, picture) = teach_part(&args.scan, &options)?;
     let text = toml::to_string(&recipe).expect("plain data");
     crate::files::write(&args.out, text.as_bytes())?;
-    let image = args.out.with_extension("png");
     crate::files::write(&image, &picture.to_png())?;
     if !proof.passed {
         console.warn(format!("the taught part misses a gate on its own scan: {}", proof.reasons.join("; ")));

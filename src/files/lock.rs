@@ -4,6 +4,7 @@
 use crate::fault::{Fault, Result};
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 /// A lock of the operating system on the file `NAME.lock`, which stays: a file that is taken away while another process
 /// waits for it would give two of them the lock.
@@ -11,11 +12,20 @@ pub struct Lock {
     _file: File,
 }
 
+/// How long a lock is asked for. A process that this one is just starting holds copies of its open files until it has begun.
+const PATIENCE: Duration = Duration::from_millis(400);
+
 impl Lock {
     /// Refuses where another process holds it; `who` says what that process does here.
     pub fn take(folder: &Path, name: &str, who: &str) -> Result<Lock> {
         let (path, file) = open(folder, name)?;
-        match file.try_lock() {
+        let mut tried = file.try_lock();
+        let begun = Instant::now();
+        while matches!(tried, Err(TryLockError::WouldBlock)) && begun.elapsed() < PATIENCE {
+            std::thread::sleep(PATIENCE / 20);
+            tried = file.try_lock();
+        }
+        match tried {
             Ok(()) => Ok(Lock { _file: file }),
             Err(TryLockError::Error(e)) => Err(Fault::write(&path, e)),
             Err(TryLockError::WouldBlock) => {

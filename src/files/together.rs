@@ -81,9 +81,10 @@ impl<'a> Together<'a> {
             rename(&whole, &moving)?;
         }
         if moving.exists() {
-            for entry in std::fs::read_dir(&moving)? {
-                let entry = entry?;
-                rename(&entry.path(), &self.folder.join(entry.file_name()))?;
+            // Listed first: the list must not change while it is read.
+            let names = std::fs::read_dir(&moving)?.map(|e| Ok(e?.file_name())).collect::<Io<Vec<_>>>()?;
+            for name in names {
+                rename(&moving.join(&name), &self.folder.join(&name))?;
             }
             sync_folder(self.folder)?;
             moment()?;

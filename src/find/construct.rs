@@ -3,6 +3,7 @@
 //! Frame and unit: the part frame of the measured pose; mm, rad.
 
 use super::drawing::Drawing;
+use super::measure::MeasureOptions;
 use super::surface_ends::Observation;
 use crate::fault::{Fault, Result};
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
@@ -78,7 +79,13 @@ const MIN_EDGES: usize = 2;
 
 /// Measures every element of every named closed shape that is seen well enough, by least squares on its
 /// own edges with the surface growth that the whole part showed.
-pub fn features(observations: &[Observation], growth: [f64; 2]) -> BTreeMap<(usize, usize), Feature> {
+pub fn features(
+    observations: &[Observation],
+    growth: [f64; 2],
+    options: &MeasureOptions,
+) -> BTreeMap<(usize, usize), Feature> {
+    // An end is not known better, whatever its few neighbours say.
+    let least = 0.03 * options.unit();
     let mut groups: BTreeMap<(usize, usize), Vec<&Observation>> = BTreeMap::new();
     for o in observations.iter().filter(|o| o.weight > 0.0) {
         groups.entry((o.shape, o.element)).or_default().push(o);
@@ -103,7 +110,7 @@ pub fn features(observations: &[Observation], growth: [f64; 2]) -> BTreeMap<(usi
         let Some(inverse) = a.try_inverse() else { continue };
         let t = inverse * b;
         let sum: f64 = list.iter().map(|o| (o.residual - growth[o.axis] - o.nx * t.x - o.ny * t.y).powi(2)).sum();
-        let s2 = (sum / (list.len() as f64 - 2.0).max(1.0)).max(0.03f64.powi(2));
+        let s2 = (sum / (list.len() as f64 - 2.0).max(1.0)).max(least * least);
         out.insert(key, Feature { offset: [t.x, t.y], sigma: (0.5 * inverse.trace() * s2).sqrt() });
     }
     out
@@ -112,7 +119,7 @@ pub fn features(observations: &[Observation], growth: [f64; 2]) -> BTreeMap<(usi
 /// Refuses constructions that refer to nothing, have too few inputs, or cannot be built.
 pub fn check(list: &[Construction], drawing: &Drawing) -> Result<()> {
     let measured = drawing.shape.iter().enumerate().flat_map(|(shape, s)| {
-        let n = s.grid.map_or(1, |g| g.count[0] * g.count[1]) as usize;
+        let n = s.elements();
         (0..n).map(move |element| ((shape, element), Feature { offset: [0.0, 0.0], sigma: 0.0 }))
     });
     for (i, c) in list.iter().enumerate() {
@@ -120,7 +127,7 @@ pub fn check(list: &[Construction], drawing: &Drawing) -> Result<()> {
             return Err(Fault::input(format!("the name '{}' is used twice", c.name)).next("rename one of them"));
         }
     }
-    build(list, drawing, &measured.collect()).map(|_| ())
+    build(list, drawing, &measured.collect(), &MeasureOptions::default()).map(|_| ())
 }
 
 /// Evaluates the constructions on measured shapes, in their order.
@@ -128,10 +135,11 @@ pub fn build(
     list: &[Construction],
     drawing: &Drawing,
     measured: &BTreeMap<(usize, usize), Feature>,
+    options: &MeasureOptions,
 ) -> Result<Vec<Built>> {
     let mut out: Vec<Built> = Vec::new();
     for c in list {
-        let built = one(c, drawing, measured, &out).map_err(|e| e.at(format!("construction '{}'", c.name)))?;
+        let built = one(c, drawing, measured, &out, options).map_err(|e| e.at(format!("construction '{}'", c.name)))?;
         out.push(built);
     }
     Ok(out)
@@ -144,6 +152,7 @@ fn one(
     drawing: &Drawing,
     measured: &BTreeMap<(usize, usize), Feature>,
     earlier: &[Built],
+    options: &MeasureOptions,
 ) -> Result<Built> {
     let needs = |least: usize, most: usize| {
         if (least..=most).contains(&c.of.len()) {
@@ -154,7 +163,8 @@ fn one(
             .next("correct 'of' in the recipe"))
     };
     if (c.by_mm.is_some() || c.along.is_some()) != (c.kind == Build::Offset) {
-        return Err(Fault::input("by_mm and along belong to an offset, and an offset needs both"));
+        return Err(Fault::input("by_mm and along belong to an offset, and an offset needs both")
+            .next("give both, or another kind of construction"));
     }
     let point = |name: &String| -> Result<Pair> {
         if let Some(b) = earlier.iter().find(|b| b.name == *name) {
@@ -196,7 +206,7 @@ fn one(
         }
         Build::Lattice => {
             needs(1, 1)?;
-            lattice(&c.of[0], drawing, measured)?
+            lattice(&c.of[0], drawing, measured, options)?
         }
     };
     let turn = m.direction.zip(n.direction).map(|(a, b)| {
@@ -235,7 +245,9 @@ fn line_through(points: &[Value]) -> Result<Value> {
         yy += dy * dy;
     }
     if xx + yy < 1e-9 {
-        return Err(Fault::input("a line through points that coincide").cause("an impossible construction"));
+        return Err(Fault::input("a line through points that coincide")
+            .cause("an impossible construction")
+            .next("name points that lie apart in 'of'"));
     }
     let mut angle = 0.5 * (2.0 * xy).atan2(xx - yy);
     let (first, last) = (points[0], points[points.len() - 1]);
@@ -246,8 +258,11 @@ fn line_through(points: &[Value]) -> Result<Value> {
 }
 
 fn direction(v: &Value) -> Result<f64> {
-    v.direction
-        .ok_or_else(|| Fault::input("a point where a line or a lattice is needed").cause("an impossible construction"))
+    v.direction.ok_or_else(|| {
+        Fault::input("a point where a line or a lattice is needed")
+            .cause("an impossible construction")
+            .next("name a line or a lattice there")
+    })
 }
 
 fn meet(a: &Value, b: &Value) -> Result<Value> {
@@ -255,7 +270,8 @@ fn meet(a: &Value, b: &Value) -> Result<Value> {
     let det = sa * cb - ca * sb;
     if det.abs() < 0.05 {
         return Err(Fault::input("two lines that are parallel to within 3 degrees do not meet")
-            .cause("an impossible construction"));
+            .cause("an impossible construction")
+            .next("name lines that cross at more than 3 degrees in 'of'"));
     }
     let (dx, dy) = (b.x - a.x, b.y - a.y);
     let s = (dy * cb - dx * sb) / det;
@@ -269,10 +285,19 @@ fn moved(p: &Value, d: &Value, by: [f64; 2]) -> Result<Value> {
 }
 
 /// Rigid fit of all measured elements of a grid to their nominal places.
-fn lattice(name: &str, drawing: &Drawing, measured: &BTreeMap<(usize, usize), Feature>) -> Result<Pair> {
+fn lattice(
+    name: &str,
+    drawing: &Drawing,
+    measured: &BTreeMap<(usize, usize), Feature>,
+    options: &MeasureOptions,
+) -> Result<Pair> {
     let shape = drawing.shape.iter().position(|s| s.name.as_deref() == Some(name));
-    let shape = shape.ok_or_else(|| Fault::input(format!("'{name}' names no shape")).cause("a misspelt name"))?;
-    let elements = drawing.shape[shape].grid.map_or(1, |g| g.count[0] * g.count[1]) as usize;
+    let shape = shape.ok_or_else(|| {
+        Fault::input(format!("'{name}' names no shape"))
+            .cause("a misspelt name")
+            .next("name a shape of the recipe that has a grid")
+    })?;
+    let elements = drawing.shape[shape].elements();
     if elements < 2 {
         return Err(Fault::input(format!("a lattice of '{name}', which has {elements} element, needs at least 2"))
             .cause("an impossible construction")
@@ -313,7 +338,7 @@ fn lattice(name: &str, drawing: &Drawing, measured: &BTreeMap<(usize, usize), Fe
         t = inverse * b;
         let mut size: Vec<f64> = seen.iter().map(|(p, f)| off(p, f, &t)).map(|r| r.0.hypot(r.1)).collect();
         size.sort_unstable_by(f64::total_cmp);
-        limit = (3.0 * size[size.len() / 2]).max(0.05);
+        limit = (3.0 * size[size.len() / 2]).max(0.05 * options.unit());
     }
     let s = limit / 3.0;
     let centre = drawing.shape[shape].centre.unwrap_or([0.0, 0.0]);

@@ -3,8 +3,8 @@
 //! Frame and unit: a correction in the part frame: z mm, turns about x and y rad.
 
 use super::drawing::Drawing;
-use super::drawn_edges::Face;
 use super::edge_index::EdgeIndex;
+use super::face::Face;
 use super::measure::{MeasureOptions, localise};
 use super::points::Ordered;
 use super::robust::robust;
@@ -32,10 +32,12 @@ pub(super) fn laid(
 ) -> Rigid<Base, Part> {
     // The gate grows along the part with each round's tilt.
     const ROUNDS: usize = 4;
-    let (faces, edges) = (drawing.faces(), EdgeIndex::new(drawing));
+    let (faces, edges) = (drawing.faces(), EdgeIndex::new(drawing, options.unit()));
     let mut pose = start;
     for _ in 0..ROUNDS {
-        let Ok(d) = fit_datum(points, &localise(points, drawing, &pose), &faces, &edges, options, 0) else { break };
+        let Ok(d) = fit_datum(points, &localise(points, drawing, &pose, options), &faces, &edges, options, 0) else {
+            break;
+        };
         pose = pose * moved(&d.step);
     }
     pose
@@ -68,13 +70,14 @@ pub(super) fn fit_datum(
     }
     if rows.len() < MIN_SURFACE {
         return Err(Fault::refused(format!(
-            "{} points lie on the part's level surfaces, at least {MIN_SURFACE} are needed",
-            rows.len()
+            "{} points lie on the part's level surfaces (to {} mm, from height_gate_mm), at least {MIN_SURFACE} are needed",
+            rows.len(),
+            gate
         ))
         .cause("the part is hidden, is another one, or the search was misled")
         .next("look at the picture of the match, then scan the part again"));
     }
-    robust(&rows, &[], 0.005)
+    robust(&rows, &[], 0.005 * options.unit())
         .map(|f| Datum { step: f.step, covariance: f.covariance, used: f.used, sigma: f.sigma })
         .ok_or_else(|| {
             Fault::refused("the seen surfaces do not determine height and tilt")

@@ -2,6 +2,7 @@
 //! Out: the same, checked, and where its named shapes stand; drawn_edges.rs makes faces and edges of it.
 //! Frame and unit: the part's frame (x along the long axis, z out of the part); mm.
 
+use super::outline::length;
 use crate::fault::{Fault, Result};
 
 /// The kinds of shape a drawing knows.
@@ -116,6 +117,16 @@ pub struct Drawing {
     pub shape: Vec<Shape>,
 }
 
+/// Limits of a drawing. They keep the memory of a search below 512 MB and its time to some seconds; a part of that size
+/// lies before no sensor of this kind. Corners count those by which circles and arcs are cut into lines.
+const MOST_CORNERS: f64 = 1.2e6;
+const MOST_EDGE_MM: f64 = 1e5;
+const MOST_HEIGHTS: f64 = 100.0;
+const MOST_LENGTH_MM: f64 = 1e4;
+const MOST_BOX_MM2: f64 = 4e6;
+/// Most elements of a grid.
+const MOST_ELEMENTS: u64 = 10_000;
+
 impl Drawing {
     pub fn parse(text: &str) -> Result<Drawing> {
         let drawing: Drawing = toml::from_str(text).map_err(|e| {
@@ -135,7 +146,38 @@ impl Drawing {
         for (i, s) in self.shape.iter().enumerate() {
             s.check().map_err(|e| e.at(format!("shape {}", i + 1)))?;
         }
-        Ok(())
+        self.check_size()
+    }
+
+    /// Refuses what no part is and no search ends with: a slipped decimal point, a whole assembly.
+    fn check_size(&self) -> Result<()> {
+        let corners: usize = self.shape.iter().map(|s| s.outline().0.len() * s.elements()).sum();
+        let mut heights: Vec<f64> = self.shape.iter().map(|s| s.z_mm).collect();
+        heights.sort_by(f64::total_cmp);
+        heights.dedup();
+        let limit = |what: &str, value: f64, most: f64| {
+            if value <= most {
+                return Ok(());
+            }
+            Err(Fault::input(format!("the drawing has {value:.0} {what}, limit {most:.0}"))
+                .cause("a slipped decimal point, another unit, or more than one part")
+                .next("correct the sizes, or draw only what the scan is to be compared with"))
+        };
+        limit("corners", corners as f64, MOST_CORNERS)?;
+        limit("mm of edges", self.edge_length(), MOST_EDGE_MM)?;
+        limit("heights", heights.len() as f64, MOST_HEIGHTS)?;
+        let [x0, y0, x1, y1] = self.bounds();
+        limit("mm from end to end", (x1 - x0).max(y1 - y0), MOST_LENGTH_MM)?;
+        limit("mm² in the box around it", (x1 - x0) * (y1 - y0), MOST_BOX_MM2)
+    }
+
+    /// Length of all edges, mm.
+    pub fn edge_length(&self) -> f64 {
+        let of = |s: &Shape| {
+            let (points, closed) = s.outline();
+            length(&points, closed) * s.elements() as f64
+        };
+        self.shape.iter().map(of).sum()
     }
 
     /// Nominal centre of `name` or `name[column,row]`, with the indices of its shape and element.
@@ -185,9 +227,18 @@ impl Drawing {
 }
 
 impl Shape {
+    /// How often its grid repeats it.
+    pub fn elements(&self) -> usize {
+        self.grid.map_or(1, |g| g.count[0] as usize * g.count[1] as usize)
+    }
+
     fn check(&self) -> Result<()> {
+        const NEXT: &str = "compare it with docs/file-formats.md, Drawing";
         let needs = |ok: bool, what: &str| {
-            if ok { Ok(()) } else { Err(Fault::input(format!("a {:?} needs {what}", self.kind).to_lowercase())) }
+            if ok {
+                return Ok(());
+            }
+            Err(Fault::input(format!("a {:?} needs {what}", self.kind).to_lowercase()).next(NEXT))
         };
         let has = [
             ("centre", self.centre.is_some(), [Form::Rectangle, Form::Circle, Form::Arc].contains(&self.kind)),
@@ -200,14 +251,19 @@ impl Shape {
             needs(there || !wanted, name)?;
             if there && !wanted {
                 return Err(Fault::input(format!("a {:?} has no {name}", self.kind).to_lowercase())
-                    .cause("a key of another kind of shape"));
+                    .cause("a key of another kind of shape")
+                    .next(NEXT));
             }
         }
         if self.angle_deg.is_some() && self.kind != Form::Rectangle {
-            return Err(Fault::input("angle_deg turns rectangles only"));
+            return Err(Fault::input("angle_deg turns rectangles only").next("take it out, or draw a polygon"));
         }
         let numbers = [self.centre, self.size, self.span_deg].into_iter().flatten().flatten().chain(self.radius);
-        let all: Vec<f64> = numbers.chain(self.points.iter().flatten().flatten().copied()).chain([self.z_mm]).collect();
+        let all: Vec<f64> = numbers
+            .chain(self.points.iter().flatten().flatten().copied())
+            .chain(self.angle_deg)
+            .chain([self.z_mm])
+            .collect();
         needs(all.iter().all(|v| v.is_finite() && v.abs() < 1e5), "numbers below 100000 mm")?;
         needs(self.size.is_none_or(|s| s[0] > 0.0 && s[1] > 0.0), "a size above 0")?;
         needs(self.radius.is_none_or(|r| r > 0.0), "a radius above 0")?;
@@ -216,8 +272,15 @@ impl Shape {
         let n = self.points.as_ref().map_or(want, Vec::len);
         needs(if self.kind == Form::Line { n == 2 } else { n >= 3 }, "2 points (line) or at least 3 (polygon)")?;
         if let Some(g) = self.grid {
-            needs(g.count[0] >= 1 && g.count[1] >= 1 && g.count[0] * g.count[1] <= 10_000, "a grid of 1 to 10000")?;
+            let elements = u64::from(g.count[0]) * u64::from(g.count[1]);
+            if !(1..=MOST_ELEMENTS).contains(&elements) {
+                return Err(Fault::input(format!("its grid has {elements} elements, limit 1 to {MOST_ELEMENTS}"))
+                    .cause("a slip in count")
+                    .next("correct count in the drawing"));
+            }
+            let reach = |i: usize| f64::from(g.count[i] - 1) * g.pitch[i];
             needs((0..2).all(|i| g.count[i] == 1 || g.pitch[i] > 0.0), "a pitch above 0")?;
+            needs((0..2).all(|i| g.pitch[i].is_finite() && reach(i) < 1e5), "a grid below 100000 mm")?;
         }
         Ok(())
     }

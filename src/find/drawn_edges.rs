@@ -3,7 +3,8 @@
 //! Frame and unit: the part's frame (x along the long axis, z out of the part); mm.
 
 use super::drawing::{Drawing, Form, Grid, Inside};
-use super::outline::contains;
+use super::face::Face;
+use super::outline::{bounds, diameter};
 
 /// A polyline with what it bounds.
 #[derive(Clone, Debug)]
@@ -44,35 +45,19 @@ pub struct EdgeSample {
     pub curvature: f64,
 }
 
-/// A level surface: union of the high shapes less the low ones at one height.
-#[derive(Clone, Debug)]
-pub struct Face {
-    pub z: f64,
-    high: Vec<Vec<[f64; 2]>>,
-    low: Vec<Vec<[f64; 2]>>,
-}
-
-impl Face {
-    /// True where the surface exists.
-    pub fn material(&self, x: f64, y: f64) -> bool {
-        self.high.iter().any(|l| contains(l, x, y)) && !self.low.iter().any(|l| contains(l, x, y))
-    }
-}
-
 impl Drawing {
     /// The level surfaces that measuring shapes bound, one a height, in the order of the drawing.
     pub fn faces(&self) -> Vec<Face> {
-        let contours = self.contours();
-        let mut faces: Vec<Face> = Vec::new();
-        for c in contours.iter().filter(|c| c.closed && c.inside != Inside::Either) {
-            let at = faces.iter().position(|f| f.z == c.z).unwrap_or_else(|| {
-                faces.push(Face { z: c.z, high: vec![], low: vec![] });
+        let mut faces: Vec<(f64, Vec<_>, Vec<_>)> = Vec::new();
+        for c in self.contours().into_iter().filter(|c| c.closed && c.inside != Inside::Either) {
+            let at = faces.iter().position(|f| f.0 == c.z).unwrap_or_else(|| {
+                faces.push((c.z, vec![], vec![]));
                 faces.len() - 1
             });
-            let list = if c.inside == Inside::High { &mut faces[at].high } else { &mut faces[at].low };
-            list.push(c.points.clone());
+            let list = if c.inside == Inside::High { &mut faces[at].1 } else { &mut faces[at].2 };
+            list.push(c.points);
         }
-        faces
+        faces.into_iter().map(|(z, high, low)| Face::new(z, high, low)).collect()
     }
 
     /// Places along all edges, about `spacing` apart. An edge of one shape that lies inside another of
@@ -84,6 +69,9 @@ impl Drawing {
             let face = faces.iter().find(|f| f.z == c.z);
             let n = c.points.len();
             let mut carry = 0.5 * spacing;
+            let s = &self.shape[c.shape];
+            let round = s.radius.filter(|_| matches!(s.kind, Form::Circle | Form::Arc));
+            let round = round.map(|r| (r, self.centre_of(c.shape, c.element)));
             for i in 0..if c.closed { n } else { n - 1 } {
                 let (a, b) = (c.points[i], c.points[(i + 1) % n]);
                 let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
@@ -108,12 +96,8 @@ impl Drawing {
                     };
                     let either = c.inside == Inside::Either;
                     let (extent, search, measure) = (c.extent, c.search, c.measure && c.closed && !either);
-                    let s = &self.shape[c.shape];
-                    let round = s.radius.filter(|_| matches!(s.kind, Form::Circle | Form::Arc));
-                    let curvature = round.map_or(0.0, |r| {
-                        let [cx, cy] = self.centre_of(c.shape, c.element);
-                        (sign * (rx * (x - cx) + ry * (y - cy))).signum() / r
-                    });
+                    let curvature =
+                        round.map_or(0.0, |(r, [cx, cy])| (sign * (rx * (x - cx) + ry * (y - cy))).signum() / r);
                     out.push(EdgeSample {
                         x,
                         y,
@@ -138,11 +122,7 @@ impl Drawing {
 
     /// Smallest box around all edges: x0, y0, x1, y1.
     pub fn bounds(&self) -> [f64; 4] {
-        let mut b = [f64::MAX, f64::MAX, f64::MIN, f64::MIN];
-        for p in self.contours().iter().flat_map(|c| &c.points) {
-            b = [b[0].min(p[0]), b[1].min(p[1]), b[2].max(p[0]), b[3].max(p[1])];
-        }
-        b
+        bounds(self.contours().iter().flat_map(|c| &c.points))
     }
 
     /// The polylines of the drawing, for pictures: points and whether closed.
@@ -155,10 +135,7 @@ impl Drawing {
         for (shape, s) in self.shape.iter().enumerate() {
             let (base, closed) = s.outline();
             let g = s.grid.unwrap_or(Grid { count: [1, 1], pitch: [0.0, 0.0] });
-            let extent = base
-                .iter()
-                .flat_map(|a| base.iter().map(move |b| (a[0] - b[0]).hypot(a[1] - b[1])))
-                .fold(0.0, f64::max);
+            let extent = diameter(&base);
             for iy in 0..g.count[1] {
                 for ix in 0..g.count[0] {
                     let dx = (f64::from(ix) - 0.5 * f64::from(g.count[0] - 1)) * g.pitch[0];

@@ -8,32 +8,38 @@ use std::collections::HashMap;
 /// Edge samples in buckets.
 pub struct EdgeIndex {
     samples: Vec<EdgeSample>,
+    /// The recipe's unit of length, mm (`MeasureOptions::unit`).
+    unit: f64,
     buckets: HashMap<(i32, i32), Vec<u32>>,
 }
 
-/// Edge length of a bucket, mm; no gate reaches farther than three of them.
-const BUCKET: f64 = 1.0;
+/// Distance between samples, in units.
 const SPACING: f64 = 0.05;
-/// Length of edge whose samples have what is not modelled in common, mm: about three widths of the sheet's light and a
+/// Length of edge whose samples have what is not modelled in common, in units: about three widths of the sheet's light and a
 /// few samples, over which walls, chamfers and pixels change.
 const PIECE: f64 = 4.0;
 
+/// The bucket of a place: one unit wide; no gate reaches farther than three of them.
+fn key(unit: f64, x: f64, y: f64) -> (i32, i32) {
+    ((x / unit).floor() as i32, (y / unit).floor() as i32)
+}
+
 impl EdgeIndex {
-    pub fn new(drawing: &Drawing) -> EdgeIndex {
-        let samples: Vec<EdgeSample> = drawing.samples(SPACING).into_iter().filter(|s| s.measure).collect();
+    pub fn new(drawing: &Drawing, unit: f64) -> EdgeIndex {
+        let samples: Vec<EdgeSample> = drawing.samples(SPACING * unit).into_iter().filter(|s| s.measure).collect();
         let mut buckets: HashMap<(i32, i32), Vec<u32>> = HashMap::new();
         for (i, s) in samples.iter().enumerate() {
-            buckets.entry(Self::key(s.x, s.y)).or_default().push(i as u32);
+            buckets.entry(key(unit, s.x, s.y)).or_default().push(i as u32);
         }
-        EdgeIndex { samples, buckets }
+        EdgeIndex { samples, unit, buckets }
     }
-    fn key(x: f64, y: f64) -> (i32, i32) {
-        ((x / BUCKET).floor() as i32, (y / BUCKET).floor() as i32)
+    pub fn unit(&self) -> f64 {
+        self.unit
     }
     /// The nearest sample within `gate` that passes `good`.
     pub fn nearest(&self, x: f64, y: f64, gate: f64, good: impl Fn(&EdgeSample) -> bool) -> Option<&EdgeSample> {
-        let (kx, ky) = Self::key(x, y);
-        let reach = (gate / BUCKET).ceil() as i32;
+        let (kx, ky) = key(self.unit, x, y);
+        let reach = (gate / self.unit).ceil() as i32;
         let mut best: Option<(f64, &EdgeSample)> = None;
         for dy in -reach..=reach {
             for dx in -reach..=reach {
@@ -55,7 +61,7 @@ impl EdgeIndex {
     /// Which piece of which edge a place beside it belongs to: shape, element, direction, place along it.
     pub fn piece(&self, s: &EdgeSample, x: f64, y: f64) -> (usize, usize, i32, i32) {
         let direction = (s.ny.atan2(s.nx) / std::f64::consts::FRAC_PI_4).round() as i32;
-        (s.shape, s.element, direction, ((s.nx * y - s.ny * x) / PIECE).floor() as i32)
+        (s.shape, s.element, direction, ((s.nx * y - s.ny * x) / (PIECE * self.unit)).floor() as i32)
     }
     pub fn is_empty(&self) -> bool {
         self.samples.is_empty()

@@ -40,8 +40,9 @@ struct Piece {
     rows: Vec<usize>,
 }
 
-/// Solves for the step from `x`. `bias`: prior size of a piece's offset, mm; `scatter`: of a shot's position, mm.
-pub(super) fn solve(rows: &[Row], x: &Unknowns, bias: f64, scatter: f64) -> Option<Solved> {
+/// Solves for the step from `x`. `bias`: prior size of a piece's offset, mm; `scatter`: of a shot's position, mm; `unit`: of the
+/// priors, mm.
+pub(super) fn solve(rows: &[Row], x: &Unknowns, bias: f64, scatter: f64, unit: f64) -> Option<Solved> {
     let mut sizes: Vec<f64> = rows.iter().map(|r| r.residual.abs()).collect();
     let middle = sizes.len() / 2;
     let sigma = (1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1).max(0.01);
@@ -50,7 +51,7 @@ pub(super) fn solve(rows: &[Row], x: &Unknowns, bias: f64, scatter: f64) -> Opti
         .map(|r| (1.0 - (r.residual / (TUKEY * sigma)).powi(2)).max(0.0).powi(2) / (sigma * sigma))
         .collect();
     let (mut a, mut b) = (Square::zeros(), Unknowns::zeros());
-    for &(k, mean, sd) in &PRIORS {
+    for (k, mean, sd) in PRIORS.map(|(k, mean, sd)| (k, mean * unit, sd * unit)) {
         a[(k, k)] += 1.0 / (sd * sd);
         b[k] += (mean - x[k]) / (sd * sd);
     }
@@ -70,7 +71,8 @@ pub(super) fn solve(rows: &[Row], x: &Unknowns, bias: f64, scatter: f64) -> Opti
         p.rows.push(i);
     }
     let pieces: Vec<Piece> = pieces.into_values().collect();
-    let mut size = bias.max(1e-4);
+    let least = 1e-4 * unit;
+    let mut size = bias.max(least);
     let (mut inverse, mut step) = (Square::zeros(), Unknowns::zeros());
     let mut reduced = a;
     for _ in 0..ROUNDS {
@@ -89,7 +91,7 @@ pub(super) fn solve(rows: &[Row], x: &Unknowns, bias: f64, scatter: f64) -> Opti
             sum +=
                 (k * (p.right - p.cross.dot(&step))).powi(2) + k + k * k * (p.cross.transpose() * inverse * p.cross)[0];
         }
-        size = (sum / (PRIOR_PIECES + pieces.len() as f64)).sqrt().max(1e-4);
+        size = (sum / (PRIOR_PIECES + pieces.len() as f64)).sqrt().max(least);
     }
     let covariance = spread(rows, &weights, &pieces, &reduced, &inverse, &step, size, scatter);
     Some(Solved { step, covariance, sigma })

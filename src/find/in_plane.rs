@@ -14,7 +14,7 @@ const MIN_EDGES: usize = 40;
 /// Standard deviation of where between two shots an edge is put, as a share of the step: the light of
 /// partly lit samples tells it to about half of what a uniform phase (0.29) would leave.
 const PHASE: f64 = 0.15;
-/// Prior standard deviation of the growth of surfaces, mm: half a laser line.
+/// Prior standard deviation of the growth of surfaces, in the recipe's unit of about 1 mm: half a laser line.
 const GROWTH_PRIOR: f64 = 0.05;
 
 pub(super) struct InPlane {
@@ -35,8 +35,9 @@ pub(super) fn fit_edges(
     let locating = axes[0] + axes[1];
     if locating < MIN_EDGES {
         return Err(Fault::refused(format!(
-            "{} ends of surfaces lie at the drawn edges ({} along the stripe, {} from shot to shot), at least {MIN_EDGES} are needed",
+            "{} ends of surfaces lie within edge_gate_mm = {} of the drawn edges ({} along the stripe, {} from shot to shot), at least {MIN_EDGES} are needed",
             locating,
+            options.edge_gate_mm,
             axes[0],
             axes[1]
         ))
@@ -55,7 +56,8 @@ pub(super) fn fit_edges(
             (j, o.residual, o.row)
         })
         .collect();
-    let fit = robust(&rows, &[(3, GROWTH_PRIOR), (4, GROWTH_PRIOR)], 0.03).ok_or_else(|| {
+    let growth = GROWTH_PRIOR * options.unit();
+    let fit = robust(&rows, &[(3, growth), (4, growth)], 0.03 * options.unit()).ok_or_else(|| {
         Fault::refused("the seen edges do not determine the part's place and turn")
             .cause("only edges of one direction are seen")
             .next("scan more of the part")
@@ -87,7 +89,7 @@ pub(super) fn fit_edges(
     covariance[(1, 1)] += bias * bias;
     let far = observations.iter().filter(|o| o.locates).map(|o| o.x * o.x + o.y * o.y);
     let span = far.sum::<f64>() / locating as f64;
-    covariance[(2, 2)] += bias * bias / span.max(1.0);
+    covariance[(2, 2)] += bias * bias / span.max(options.unit().powi(2));
     Ok(InPlane {
         step: fit.step.fixed_rows::<3>(0).into(),
         growth: [fit.step[3], fit.step[4]],

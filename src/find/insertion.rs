@@ -145,10 +145,9 @@ pub fn locate(cloud: &[CloudPoint], recipe: &Recipe, rig: Option<&Rig>, options:
             matches.iter().map(|m| format!("{:.3}", m.score)).collect::<Vec<_>>().join(" ")
         ));
     }
-    let gate = recipe.measure.height_gate_mm;
     let Judged { found: best, mut measured } =
         best_hypothesis(&points, &map, recipe, options.expected.as_ref(), &best, &matches)?;
-    let mut turns = vote(&points, &drawing, &measured.base_from_part, recipe.alike_turns, gate);
+    let mut turns = vote(&points, &drawing, &measured.base_from_part, recipe.alike_turns, &recipe.measure);
     if let Some(t) = turns.iter().find(|t| t.told() == Some(false)) {
         notes.push(format!(
             "turned by {:.0} degrees: {} of {} points where the turns differ say so",
@@ -159,17 +158,17 @@ pub fn locate(cloud: &[CloudPoint], recipe: &Recipe, rig: Option<&Rig>, options:
         let back: Rigid<Part, Part> =
             Rigid::from_vectors(&Vec3::new(0.0, 0.0, t.rival_deg.to_radians()), Vec3::zeros());
         measured = measure(&points, &drawing, measured.base_from_part * back, &recipe.measure)?;
-        turns = vote(&points, &drawing, &measured.base_from_part, recipe.alike_turns, gate);
+        turns = vote(&points, &drawing, &measured.base_from_part, recipe.alike_turns, &recipe.measure);
     }
-    let agreement = judge(&points, &drawing, &measured, gate);
-    let seen = features(&measured.observations, measured.growth);
+    let agreement = judge(&points, &drawing, &measured, &recipe.measure);
+    let seen = features(&measured.observations, measured.growth, &recipe.measure);
     let mut constructions = Vec::new();
     for c in &recipe.construction {
         // One construction that cannot be built does not hinder the others, unless it is the one used.
         let earlier: Vec<_> = recipe.construction.iter().take_while(|o| o.name != c.name).cloned().collect();
         let usable: Vec<_> =
             earlier.into_iter().filter(|e| constructions.iter().any(|b: &Built| b.name == e.name)).collect();
-        match build(&[usable, vec![c.clone()]].concat(), &drawing, &seen) {
+        match build(&[usable, vec![c.clone()]].concat(), &drawing, &seen, &recipe.measure) {
             Ok(mut all) => constructions.push(all.pop().expect("one was asked for")),
             Err(e) if recipe.insertion.construction == c.name => return Err(e),
             Err(e) => notes.push(e.what),
@@ -223,7 +222,7 @@ fn best_hypothesis(
                 continue;
             }
         };
-        let a = judge(points, &drawing, &measured, recipe.measure.height_gate_mm);
+        let a = judge(points, &drawing, &measured, &recipe.measure);
         let value = a.agreement * a.edges * found.score;
         let good = a.agreement >= recipe.gates.min_agreement && a.edges >= 0.5 && a.crossed <= recipe.gates.max_crossed;
         if kept.as_ref().is_none_or(|k| value > k.0) {
@@ -265,7 +264,7 @@ fn model_of(recipe: &Recipe, scene: &Scene) -> Result<ShapeModel> {
 /// A match in the map as a pose in the base frame: its height is the most frequent one of the points on
 /// the drawing's first face.
 fn lift(pose: &Pose, map: &HeightMap, points: &Ordered, recipe: &Recipe) -> Rigid<Base, Part> {
-    const BIN: f64 = 0.1;
+    let bin = 0.5 * recipe.measure.height_gate_mm;
     let flat: Rigid<Grid, Part> = Rigid::from_vectors(
         &Vec3::new(0.0, 0.0, pose.angle),
         Vec3::new((pose.x + 0.5) * map.cell, (pose.y + 0.5) * map.cell, 0.0),
@@ -275,15 +274,15 @@ fn lift(pose: &Pose, map: &HeightMap, points: &Ordered, recipe: &Recipe) -> Rigi
     let faces = drawing.faces();
     let face = &faces[0];
     let mut bins = std::collections::BTreeMap::<i64, usize>::new();
-    for q in localise(points, &drawing, &base_from_part).iter().flatten() {
+    for q in localise(points, &drawing, &base_from_part, &recipe.measure).iter().flatten() {
         if face.material(q.x, q.y) {
-            *bins.entry(((q.z - face.z) / BIN).floor() as i64).or_default() += 1;
+            *bins.entry(((q.z - face.z) / bin).floor() as i64).or_default() += 1;
         }
     }
     // Three neighbouring bins, so that a tilted face is not split.
     let weight = |k: i64| (k - 1..=k + 1).filter_map(|b| bins.get(&b)).sum::<usize>();
     let best = bins.keys().copied().max_by_key(|&k| weight(k)).unwrap_or(0);
-    base_from_part * Rigid::from_vectors(&Vec3::zeros(), Vec3::new(0.0, 0.0, (best as f64 + 0.5) * BIN))
+    base_from_part * Rigid::from_vectors(&Vec3::zeros(), Vec3::new(0.0, 0.0, (best as f64 + 0.5) * bin))
 }
 
 #[allow(clippy::too_many_arguments)]

@@ -2,9 +2,10 @@
 //! how much of the sheet's light each sample beside an edge still sends back (docs/math.md, Insertion (3) and (4)).
 //! Frame and unit: a correction in the part frame: x y mm, turn about z rad; light as a share of a fully lit sample's.
 
-use super::drawn_edges::{EdgeSample, Face};
+use super::drawn_edges::EdgeSample;
 use super::edge_index::EdgeIndex;
 use super::edge_pieces::{Row, solve};
+use super::face::Face;
 use super::measure::MeasureOptions;
 use super::points::Ordered;
 use crate::geometry::Vec3;
@@ -14,18 +15,18 @@ use nalgebra::{Matrix3, SVector, Vector2, Vector3};
 pub(super) const N: usize = 7;
 pub(super) type Unknowns = SVector<f64, N>;
 
-/// Prior mean and standard deviation of the last four, mm: optics blur a stripe's end by about a pixel, a line laser is
+/// Prior mean and standard deviation of the last four, in the recipe's unit of about 1 mm, as are the lengths below: optics blur a stripe's end by about a pixel, a line laser is
 /// about a tenth of a millimetre wide; both are measured where edges are sharp.
 pub(super) const PRIORS: [(usize, f64, f64); 4] = [(3, 0.0, 0.05), (4, 0.0, 0.05), (5, 0.25, 0.15), (6, 0.12, 0.08)];
-/// Least width of the fall, mm: a sharper one would make single samples decide.
+/// Least width of the fall: a sharper one would make single samples decide.
 const SHARPEST: f64 = 0.03;
-/// A sample this far inside an edge is fully lit, and so near to it at most may it be to measure the edge, mm.
+/// A sample this far inside an edge is fully lit, and so near to it at most may it be to measure the edge.
 const DEEP: f64 = 0.6;
 const NEAR: f64 = 0.8;
-/// Edges farther away than this take no light, mm.
+/// Edges farther away than this take no light.
 const BEYOND: f64 = 1.0;
-/// Fully lit samples around a partly lit one, within the first of these distances that holds enough, give its full light,
-/// mm: between a row of pins and an edge none are near.
+/// Fully lit samples around a partly lit one, within the first of these distances that holds enough, give its full light:
+/// between a row of pins and an edge none are near.
 const AROUND: [f64; 4] = [1.6, 3.2, 6.4, 12.8];
 const MIN_FULL: usize = 6;
 /// A second edge at least so many widths away dims a sample a little, which is predicted; a nearer one decides it.
@@ -65,22 +66,25 @@ pub(super) fn fit_light(
     options: &MeasureOptions,
 ) -> Option<Lit> {
     let on: Vec<Option<f64>> = local.iter().map(|q| face_of(q.as_ref()?, faces, options.height_gate_mm)).collect();
+    let unit = edges.unit();
     let [along, across] = sampling(points, local, &on)?;
-    let slant = slant(points, local);
+    let slant = slant(points, local, unit);
     let deep: Vec<bool> = (0..on.len())
         .map(|i| {
             let (Some(q), Some(z)) = (&local[i], on[i]) else { return false };
             faces.iter().any(|f| f.z == z && f.material(q.x, q.y))
-                && edges.nearest(q.x, q.y, DEEP, |s| s.z == z).is_none()
+                && edges.nearest(q.x, q.y, DEEP * unit, |s| s.z == z).is_none()
         })
         .collect();
     let mut samples = Vec::new();
     for i in (0..on.len()).filter(|&i| !deep[i]) {
         let (Some(q), Some(z)) = (&local[i], on[i]) else { continue };
-        if edges.nearest(q.x, q.y, NEAR, |s| s.z == z && s.locates).is_none() {
+        if edges.nearest(q.x, q.y, NEAR * unit, |s| s.z == z && s.locates).is_none() {
             continue;
         }
-        let Some(full) = full_light(points, local, &deep, &on, i, [along.norm(), across.norm()]) else { continue };
+        let Some(full) = full_light(points, local, &deep, &on, i, [along.norm(), across.norm()], unit) else {
+            continue;
+        };
         // Where the middle of the sheet meets the surface: the middle of a cut spot lies off the sheet's.
         let at = Vector2::new(q.x, q.y) + slant * (q.z - z);
         samples.push(Sample { at, light: f64::from(points.intensity[i]) / full, row: points.row[i], z });
@@ -89,16 +93,16 @@ pub(super) fn fit_light(
     let bias = options.edge_bias * along.norm().max(across.norm());
     let directions = [along.normalize(), across.normalize()];
     let mut x = Unknowns::zeros();
-    PRIORS.iter().for_each(|p| x[p.0] = p.1);
+    PRIORS.iter().for_each(|p| x[p.0] = p.1 * unit);
     let mut last = None;
     for _ in 0..ROUNDS {
         let rows: Vec<Row> = samples.iter().filter_map(|s| row(s, edges, &x, &directions)).collect();
         if rows.len() < MIN_SAMPLES {
             return None;
         }
-        let solved = solve(&rows, &x, bias, scatter)?;
+        let solved = solve(&rows, &x, bias, scatter, unit)?;
         x += solved.step;
-        (5..N).for_each(|k| x[k] = x[k].max(SHARPEST));
+        (5..N).for_each(|k| x[k] = x[k].max(SHARPEST * unit));
         last = Some((solved, rows.len()));
     }
     let (solved, samples) = last?;
@@ -125,14 +129,14 @@ fn sampling(points: &Ordered, local: &[Option<Vec3>], on: &[Option<f64>]) -> Opt
                 y.push(q.y - p.y);
             }
         }
-        (x.len() >= 20).then(|| Vector2::new(median(x), median(y))).filter(|s| s.norm() > 1e-3)
+        (x.len() >= 20).then(|| Vector2::new(median(x), median(y))).filter(|s| s.norm() > 0.0)
     };
     Some([step(0, 1)?, step(1, 0)?])
 }
 
 /// How far the sheet moves in the part's plane for a millimetre of height, from the points of the shots themselves, which
 /// lie in it; zero where they all lie on one line.
-fn slant(points: &Ordered, local: &[Option<Vec3>]) -> Vector2<f64> {
+fn slant(points: &Ordered, local: &[Option<Vec3>], unit: f64) -> Vector2<f64> {
     let mut rows = std::collections::BTreeMap::<u32, Vec<Vec3>>::new();
     for (q, row) in local.iter().zip(&points.row) {
         if let Some(q) = q {
@@ -150,8 +154,8 @@ fn slant(points: &Ordered, local: &[Option<Vec3>]) -> Vector2<f64> {
     order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
     let normal = eigen.eigenvectors.column(order[0]);
     let flat = Vector2::new(normal.x, normal.y);
-    // 0.3 mm of height differences, and a sheet that is not parallel to the surface.
-    let told = n > 0.0 && (eigen.eigenvalues[order[1]] / n).sqrt() > 0.3 && flat.norm() > 0.1;
+    // 0.3 units of height differences, and a sheet that is not parallel to the surface.
+    let told = n > 0.0 && (eigen.eigenvalues[order[1]] / n).sqrt() > 0.3 * unit && flat.norm() > 0.1;
     if told { flat * (normal.z / flat.norm_squared()) } else { Vector2::zeros() }
 }
 
@@ -163,9 +167,10 @@ fn full_light(
     on: &[Option<f64>],
     i: usize,
     step: [f64; 2],
+    unit: f64,
 ) -> Option<f64> {
     let q = local[i]?;
-    for around in AROUND {
+    for around in AROUND.map(|a| a * unit) {
         let reach = step.map(|s| (around / s).ceil().min(80.0) as i64);
         // A few hundred places are enough.
         let stride = reach.map(|r| (r / 8).max(1) as usize);
@@ -219,7 +224,7 @@ fn row(s: &Sample, edges: &EdgeIndex, x: &Unknowns, directions: &[Vector2<f64>; 
     let (sin, cos) = x[2].sin_cos();
     let (dx, dy) = (s.at.x - x[0], s.at.y - x[1]);
     let (px, py) = (cos * dx + sin * dy, cos * dy - sin * dx);
-    let edge = edges.nearest_locating(px, py, NEAR, s.z)?;
+    let edge = edges.nearest_locating(px, py, NEAR * edges.unit(), s.z)?;
     let EdgeSample { nx, ny, .. } = *edge;
     let (t, share, width) = widths_inside(edge, px, py, x, directions);
     if !(USED[0]..USED[1]).contains(&t) {
@@ -227,7 +232,7 @@ fn row(s: &Sample, edges: &EdgeIndex, x: &Unknowns, directions: &[Vector2<f64>; 
     }
     // A round edge turns away by itself.
     let same = |o: &EdgeSample| (o.shape, o.element) == (edge.shape, edge.element) && o.curvature != 0.0;
-    let other = edges.nearest(px, py, BEYOND, |o| o.z == s.z && o.nx * nx + o.ny * ny < 0.8 && !same(o));
+    let other = edges.nearest(px, py, BEYOND * edges.unit(), |o| o.z == s.z && o.nx * nx + o.ny * ny < 0.8 && !same(o));
     let spared = match other.map(|o| widths_inside(o, px, py, x, directions).0) {
         Some(t) if t < APART => return None,
         Some(t) => fall(t).0,

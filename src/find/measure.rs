@@ -18,11 +18,11 @@ use nalgebra::{Matrix6, Vector3};
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct MeasureOptions {
-    /// A point nearer than this to a face's height lies on that face, mm, 0.05 to 2.
+    /// A point nearer than this to a face's height lies on that face, mm, 0.0001 to 100.
     pub height_gate_mm: f64,
-    /// An end of a surface this far from the drawn edge is still taken for that edge, mm, 0.1 to 3.
+    /// An end of a surface this far from the drawn edge is still taken for that edge, mm, 0.0001 to 100.
     pub edge_gate_mm: f64,
-    /// Points nearer than this to an edge do not vote on height and tilt, mm, 0 to 3.
+    /// Points nearer than this to an edge do not vote on height and tilt, mm, 0.0001 to 100.
     pub margin_mm: f64,
     /// Standard deviation of what a piece of an edge has in common and the model of partly lit samples does not
     /// explain (a wall that shows, a chamfer, the pixels' raster), as a share of the sampling step, 0 to 0.5.
@@ -36,13 +36,23 @@ impl Default for MeasureOptions {
 }
 
 impl MeasureOptions {
+    /// Lengths of the measurement that nobody states are proportional to the margin, the reach of an edge's blur: they
+    /// were tried at 0.5 mm. One at that margin, two where everything is twice as large.
+    pub(super) fn unit(&self) -> f64 {
+        self.margin_mm / 0.5
+    }
+
     pub fn check(&self) -> Result<()> {
         let range = |name: &str, v: f64, a: f64, b: f64| {
-            if (a..=b).contains(&v) { Ok(()) } else { Err(Fault::usage(format!("{name} is {v}, wanted {a} to {b}"))) }
+            if (a..=b).contains(&v) {
+                Ok(())
+            } else {
+                Err(Fault::usage(format!("{name} is {v}, wanted {a} to {b}")).next("correct [measure] in the recipe"))
+            }
         };
-        range("height_gate_mm", self.height_gate_mm, 0.05, 2.0)?;
-        range("edge_gate_mm", self.edge_gate_mm, 0.1, 3.0)?;
-        range("margin_mm", self.margin_mm, 0.0, 3.0)?;
+        range("height_gate_mm", self.height_gate_mm, 1e-4, 100.0)?;
+        range("edge_gate_mm", self.edge_gate_mm, 1e-4, 100.0)?;
+        range("margin_mm", self.margin_mm, 1e-4, 100.0)?;
         range("edge_bias", self.edge_bias, 0.0, 0.5)
     }
 }
@@ -85,7 +95,7 @@ pub fn measure(
 ) -> Result<Measured> {
     options.check()?;
     let faces = drawing.faces();
-    let edges = EdgeIndex::new(drawing);
+    let edges = EdgeIndex::new(drawing, options.unit());
     if faces.is_empty() || edges.is_empty() {
         return Err(Fault::input("the drawing has no closed shape to measure on")
             .cause("only lines and arcs, or measure = false everywhere")
@@ -96,14 +106,14 @@ pub fn measure(
         Rigid::<Part, Part>::from_vectors(&Vec3::new(0.0, 0.0, step.z), Vec3::new(step.x, step.y, 0.0))
     };
     let level = |pose: &mut Rigid<Base, Part>, round: usize| -> Result<Datum> {
-        let datum = fit_datum(points, &localise(points, drawing, pose), &faces, &edges, options, round)?;
+        let datum = fit_datum(points, &localise(points, drawing, pose, options), &faces, &edges, options, round)?;
         *pose = *pose * datum::moved(&datum.step);
         Ok(datum)
     };
     // Ends of surfaces lead to within some hundredths of a millimetre, the light of the samples beside them from there.
     for round in 0..ROUNDS {
         level(&mut pose, round)?;
-        let local = localise(points, drawing, &pose);
+        let local = localise(points, drawing, &pose, options);
         let gate = if round < 2 { 2.0 * options.edge_gate_mm } else { options.edge_gate_mm };
         let (observations, step) = surface_ends(points, &local, &faces, &edges, options, gate);
         pose = pose * moved(&fit_edges(observations, &step, options)?.step);
@@ -111,12 +121,12 @@ pub fn measure(
     let mut lit = None;
     for _ in 0..LIT_ROUNDS {
         level(&mut pose, ROUNDS)?;
-        lit = fit_light(points, &localise(points, drawing, &pose), &faces, &edges, options);
+        lit = fit_light(points, &localise(points, drawing, &pose, options), &faces, &edges, options);
         let Some(lit) = &lit else { break };
         pose = pose * moved(&lit.step);
     }
     let datum = level(&mut pose, ROUNDS)?;
-    let local = localise(points, drawing, &pose);
+    let local = localise(points, drawing, &pose, options);
     let (observations, step) = surface_ends(points, &local, &faces, &edges, options, options.edge_gate_mm);
     let mut plane = fit_edges(observations, &step, options)?;
     // What the ends alone would still move is common to all of them: the light knows better.
@@ -152,16 +162,21 @@ pub fn measure(
     })
 }
 
-/// Points near the part in its own frame; `None` for the others.
-pub fn localise(points: &Ordered, drawing: &Drawing, pose: &Rigid<Base, Part>) -> Vec<Option<Vec3>> {
-    let b = drawing.bounds();
+/// Points at and around the part in its own frame; `None` for the others.
+pub fn localise(
+    points: &Ordered,
+    drawing: &Drawing,
+    pose: &Rigid<Base, Part>,
+    options: &MeasureOptions,
+) -> Vec<Option<Vec3>> {
+    let (b, r) = (drawing.bounds(), 3.0 * options.unit());
     let part_from_base = pose.inverse();
     points
         .points
         .iter()
         .map(|p| {
             let q = part_from_base.point(p);
-            let near = q.x > b[0] - 3.0 && q.x < b[2] + 3.0 && q.y > b[1] - 3.0 && q.y < b[3] + 3.0;
+            let near = q.x > b[0] - r && q.x < b[2] + r && q.y > b[1] - r && q.y < b[3] + r;
             near.then_some(q)
         })
         .collect()

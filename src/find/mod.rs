@@ -13,6 +13,7 @@ pub mod drawn_edges;
 pub mod dxf;
 pub mod edge_index;
 mod edge_pieces;
+mod face;
 mod from_drawing;
 pub mod gradient;
 mod in_plane;

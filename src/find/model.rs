@@ -55,13 +55,18 @@ impl Default for ModelOptions {
 impl ModelOptions {
     pub fn check(&self) -> Result<()> {
         if !(0.02..=1.0).contains(&self.contrast) {
-            return Err(Fault::usage(format!("contrast is {}, wanted 0.02 to 1", self.contrast)));
+            return Err(
+                Fault::usage(format!("contrast is {}, wanted 0.02 to 1", self.contrast)).next("correct contrast")
+            );
         }
         if !(30..=5000).contains(&self.max_points) {
-            return Err(Fault::usage(format!("max_points is {}, wanted 30 to 5000", self.max_points)));
+            return Err(Fault::usage(format!("max_points is {}, wanted 30 to 5000", self.max_points))
+                .next("correct max_points"));
         }
         if !(1..=8).contains(&self.max_levels) {
-            return Err(Fault::usage(format!("max_levels is {}, wanted 1 to 8", self.max_levels)));
+            return Err(
+                Fault::usage(format!("max_levels is {}, wanted 1 to 8", self.max_levels)).next("correct max_levels")
+            );
         }
         Ok(())
     }
@@ -121,9 +126,12 @@ impl ShapeModel {
         options.check()?;
         drawing.check()?;
         if !(mm_per_px > 0.0 && mm_per_px.is_finite()) {
-            return Err(Fault::usage(format!("mm_per_px is {mm_per_px}, wanted above 0")));
+            return Err(Fault::usage(format!("mm_per_px is {mm_per_px}, wanted above 0"))
+                .next("give the edge of the map's cells in mm"));
         }
-        let samples = drawing.samples(0.5 * mm_per_px);
+        // Of long edges no more places than the model can hold, many times over.
+        let spacing = drawing.edge_length() / (20 * options.max_points) as f64;
+        let samples = drawing.samples(spacing.max(0.5 * mm_per_px));
         let levels = (0..options.max_levels)
             .map(|level| {
                 let px = (1u64 << level) as f64;
@@ -264,9 +272,9 @@ pub fn ridge_offset(before: f64, middle: f64, after: f64) -> Option<f64> {
 }
 
 /// Keeps places at least `spacing` apart, the first in the list first; widens the spacing until at most
-/// `max` remain.
+/// `max` remain. A spacing that leaves more is given up at the first place too many.
 pub fn thin(points: &[ModelPoint], mut spacing: f64, max: usize) -> Vec<ModelPoint> {
-    loop {
+    'wider: loop {
         let mut taken = std::collections::HashMap::<(i64, i64), Vec<usize>>::new();
         let mut kept: Vec<ModelPoint> = Vec::new();
         for p in points {
@@ -284,13 +292,14 @@ pub fn thin(points: &[ModelPoint], mut spacing: f64, max: usize) -> Vec<ModelPoi
                 })
             });
             if !near {
+                if kept.len() == max {
+                    spacing *= 1.1;
+                    continue 'wider;
+                }
                 taken.entry((cx, cy)).or_default().push(kept.len());
                 kept.push(*p);
             }
         }
-        if kept.len() <= max {
-            return kept;
-        }
-        spacing *= 1.1;
+        return kept;
     }
 }

@@ -26,6 +26,8 @@ pub struct Ordered {
 
 /// Fewer points hold no part.
 pub const MIN_POINTS: usize = 500;
+/// No sensor is wider, px.
+const FARTHEST_PX: f32 = 131_072.0;
 
 impl Ordered {
     /// Sorts a cloud. The strongest of several points in one pixel column of a shot stays.
@@ -38,8 +40,16 @@ impl Ordered {
             .cause("an empty or tiny scan: no laser in the pictures, or a few shots only")
             .next("look at the scan's report, then scan the part again"));
         }
-        if let Some(p) = cloud.iter().find(|p| p.position.iter().any(|x| !x.is_finite())) {
-            return Err(Fault::input(format!("the cloud holds a point that is not finite, in shot {}", p.shot)));
+        let bad = |p: &&CloudPoint| p.position.iter().any(|x| !x.is_finite()) || !(p.u.abs() + p.v.abs() < FARTHEST_PX);
+        if let Some(p) = cloud.iter().find(bad) {
+            let ([x, y, z], u, v) = (p.position, p.u, p.v);
+            return Err(Fault::input(format!(
+                "the cloud holds the point ({x}, {y}, {z}) of pixel ({u}, {v}) in shot {}; wanted finite mm, and pixels \
+                 below {FARTHEST_PX}",
+                p.shot
+            ))
+            .cause("the cloud was damaged, or not written by sheetlight scan")
+            .next("scan again"));
         }
         // The stripe runs along the image axis in which the points of a shot are spread wider.
         let spread = |f: fn(&CloudPoint) -> f32| {
@@ -60,7 +70,8 @@ impl Ordered {
         let columns = (last - first) as usize + 1;
         if columns > 1 << 16 || columns.saturating_mul(shot.len()) > 1 << 28 {
             return Err(Fault::input(format!("the cloud spans {columns} pixel columns in {} shots", shot.len()))
-                .cause("the cloud was not written by sheetlight scan"));
+                .cause("the cloud was not written by sheetlight scan")
+                .next("scan again"));
         }
         let mut index = vec![NONE; columns * shot.len()];
         for (i, p) in cloud.iter().enumerate() {

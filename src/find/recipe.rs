@@ -20,7 +20,7 @@ pub struct Recipe {
     pub name: String,
     #[serde(default)]
     pub title: String,
-    /// Edge of a cell of the map that is searched, mm, 0.05 to 5. About two sampling steps.
+    /// Edge of a cell of the map that is searched, mm, 0.0001 to 500. About two sampling steps.
     pub cell_mm: f64,
     /// Layers that are searched. Default height alone.
     #[serde(default = "height")]
@@ -193,7 +193,7 @@ fn pose() -> String {
 
 impl Recipe {
     pub fn load(path: &Path) -> Result<Recipe> {
-        let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+        let text = crate::files::read_text(path)?;
         Recipe::parse(&text).map_err(|e| e.at(path.display()))
     }
 
@@ -221,7 +221,7 @@ impl Recipe {
             }
         };
         range("format", f64::from(self.format), 1.0, 1.0)?;
-        range("cell_mm", self.cell_mm, 0.05, 5.0)?;
+        range("cell_mm", self.cell_mm, 1e-4, 500.0)?;
         range("alike_turns", f64::from(self.alike_turns), 1.0, 8.0)?;
         if self.layers.is_empty() {
             return Err(Fault::input("layers is empty").next("name height, intensity or both"));
@@ -240,7 +240,7 @@ impl Recipe {
         let i = &self.insertion;
         range("approach_mm", i.approach_mm, 0.0, 1000.0)?;
         range("retract_mm", i.retract_mm, 0.0, 1000.0)?;
-        range("tolerance_mm", i.tolerance_mm, 1e-3, 10.0)?;
+        range("tolerance_mm", i.tolerance_mm, 1e-4, 100.0)?;
         range("tolerance_deg", i.tolerance_deg, 1e-3, 10.0)?;
         range("turn_deg", i.turn_deg, -360.0, 360.0)?;
         for o in i.offset_mm {
@@ -265,9 +265,9 @@ impl Recipe {
         ] {
             range(name, v, 0.0, 1.0)?;
         }
-        range("gates.max_sigma_mm", g.max_sigma_mm, 1e-4, 10.0)?;
+        range("gates.max_sigma_mm", g.max_sigma_mm, 1e-5, 100.0)?;
         range("gates.max_sigma_deg", g.max_sigma_deg, 1e-4, 10.0)?;
-        range("gates.max_disagreement_mm", g.max_disagreement_mm, 1e-4, 10.0)?;
+        range("gates.max_disagreement_mm", g.max_disagreement_mm, 1e-5, 100.0)?;
         range("gates.max_look_ratio", g.max_look_ratio, 1.0, 10.0)?;
         range("gates.min_look_turn_deg", g.min_look_turn_deg, 0.0, 180.0)?;
         range("gates.min_look_tilt_deg", g.min_look_tilt_deg, 0.0, 60.0)?;

@@ -127,7 +127,9 @@ impl Region {
 impl Scene {
     pub fn new(layers: Vec<Layer>, mm_per_px: Option<f64>) -> Result<Scene> {
         let Some(first) = layers.first() else {
-            return Err(Fault::input("a scene without layers").cause("neither height nor intensity was chosen"));
+            return Err(Fault::input("a scene without layers")
+                .cause("neither height nor intensity was chosen")
+                .next("name height, intensity or both"));
         };
         if layers.iter().any(|l| (l.width, l.height) != (first.width, first.height)) {
             return Err(Fault::input("the layers of a scene differ in size")

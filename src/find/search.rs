@@ -14,6 +14,10 @@ use crate::fault::{Fault, Result};
 use crate::stages::shape_frame::STRIDE;
 use rayon::prelude::*;
 
+/// A model that reaches farther than this many times the map is not searched: no place of it has half of its edges there, and
+/// turns and memory grow with its reach.
+const MOST_ACROSS: f64 = 4.0;
+
 /// A found instance.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Match {
@@ -57,6 +61,18 @@ pub fn find_on(
                 .cause("a model of heights is searched in a picture, or the other way round")
                 .next("teach the model from a map of the same kind"));
         }
+    }
+    let across = (scene.width() as f64).hypot(scene.height() as f64);
+    if model.radius > MOST_ACROSS * across {
+        let (of, to) = match scene.mm_per_px {
+            Some(mm) => (format!("{:.0} mm", model.radius * mm), format!("{:.0} mm", across * mm)),
+            None => (format!("{:.0} px", model.radius), format!("{across:.0} px")),
+        };
+        return Err(Fault::refused(format!(
+            "the model reaches {of} from its origin, the map is {to} across, limit {MOST_ACROSS} times that"
+        ))
+        .cause("a slipped decimal point in a size, another unit, or an origin far from the part")
+        .next("correct the drawing, or scan more of the part"));
     }
     // The strided grid needs a few columns and rows; a smaller map is searched on a finer level.
     let most = (0..model.levels.len()).rev().find(|l| scene.width().min(scene.height()) >> l >= 8).unwrap_or(0);

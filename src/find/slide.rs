@@ -11,10 +11,10 @@ use crate::geometry::{Base, Part, Rigid, Vec3};
 
 /// Length over width from which a part counts as long.
 const LONG: f64 = 4.0;
-/// Shifts that are tried: this share of the length to both sides, this far apart (mm).
+/// Shifts that are tried: this share of the length to both sides, this far apart (in the recipe's unit).
 const REACH: f64 = 0.3;
 const STEP: f64 = 0.5;
-/// A point this near to a face's height lies on it: the tilt is known only roughly, mm.
+/// A point this near to a face's height lies on it: the tilt is known only roughly; in the recipe's unit.
 const GATE: f64 = 1.0;
 /// Points that vote.
 const VOTERS: usize = 3000;
@@ -42,10 +42,12 @@ pub fn slide(
     let start = laid(points, drawing, start, options);
     let faces = drawing.faces();
     let b = drawing.bounds();
+    let unit = options.unit();
     let reach = REACH * (b[axis + 2] - b[axis]);
     let part_from_base = start.inverse();
     let grown = |k: usize, q: f64| {
-        q > b[k] - 2.0 - if k == axis { reach } else { 0.0 } && q < b[k + 2] + 2.0 + if k == axis { reach } else { 0.0 }
+        let around = 2.0 * unit + if k == axis { reach } else { 0.0 };
+        q > b[k] - around && q < b[k + 2] + around
     };
     let near: Vec<Vec3> =
         points.points.iter().map(|p| part_from_base.point(p)).filter(|q| grown(0, q.x) && grown(1, q.y)).collect();
@@ -56,7 +58,7 @@ pub fn slide(
             let mut p = *q;
             p[axis] -= shift;
             for f in &faces {
-                let on = (p.z - f.z).abs() < GATE;
+                let on = (p.z - f.z).abs() < GATE * unit;
                 match (f.material(p.x, p.y), on) {
                     (true, true) => votes += 1,
                     (true, false) | (false, true) => votes -= 1,
@@ -66,8 +68,9 @@ pub fn slide(
         }
         votes
     };
-    let n = (reach / STEP).round() as i64;
-    let best = (-n..=n).map(|k| k as f64 * STEP).max_by_key(|&s| (agreement(s), -(s.abs() * 10.0) as i64));
+    let step = STEP * unit;
+    let n = (reach / step).round() as i64;
+    let best = (-n..=n).map(|k| k as f64 * step).max_by_key(|&s| (agreement(s), -(s.abs() / unit * 10.0) as i64));
     let mut by = Vec3::zeros();
     by[axis] = best.unwrap_or(0.0);
     start * Rigid::<Part, Part>::from_vectors(&Vec3::zeros(), by)

@@ -2,8 +2,8 @@
 //! (docs/math.md, Insertion (2)).
 //! Frame and unit: part frame, mm; light as a share of a fully lit sample's.
 
-use super::drawn_edges::Face;
 use super::edge_index::EdgeIndex;
+use super::face::Face;
 use super::measure::MeasureOptions;
 use super::points::Ordered;
 use crate::geometry::Vec3;
@@ -64,7 +64,7 @@ pub(super) fn surface_ends(
                 let p = local[b].expect("on the face");
                 let (dx, dy) = (q.x - p.x, q.y - p.y);
                 let length = dx.hypot(dy);
-                if !(0.005..2.0).contains(&length) {
+                if !(0.005..2.0).contains(&(length / options.unit())) {
                     continue;
                 }
                 if n.is_some_and(on) {

@@ -40,6 +40,17 @@ pub fn teach(cloud: &[CloudPoint], map: &HeightMap, options: &TeachOptions) -> R
         .cause("corners swapped, or cells given for millimetres")
         .next("give x0 y0 x1 y1 in mm from the map's corner, smaller numbers first"));
     }
+    // A notch may reach over the outline.
+    let spare = 0.5 * (x1 - x0).max(y1 - y0);
+    let inside = |x: f64, y: f64| (x0 - spare..=x1 + spare).contains(&x) && (y0 - spare..=y1 + spare).contains(&y);
+    let windows = options.windows.iter().flat_map(|w| [[w[0], w[1], 0.0], [w[2], w[3], 0.0]]);
+    if let Some([x, y, _]) = options.holes.iter().copied().chain(windows).find(|p| !inside(p[0], p[1])) {
+        return Err(Fault::usage(format!(
+            "a hole or window lies at {x} {y}, more than {spare:.1} mm outside the outline {x0} {y0} {x1} {y1}"
+        ))
+        .cause("cells given for millimetres, or numbers from another corner than the map's")
+        .next("give places in mm from the map's corner, inside the outline"));
+    }
     let centre = [0.5 * (x0 + x1), 0.5 * (y0 + y1)];
     let place = Vec3::new(centre[0], centre[1], 0.0);
     let grid_from_part: Rigid<Grid, Part> =
@@ -76,7 +87,7 @@ pub fn teach(cloud: &[CloudPoint], map: &HeightMap, options: &TeachOptions) -> R
     for _ in 0..3 {
         let measured = measure(&points, &drawing, pose, &gates)?;
         pose = measured.base_from_part;
-        adjust(&mut drawing, &measured);
+        adjust(&mut drawing, &measured, &gates);
     }
     let recipe = recipe_of(options, drawing, map)?;
     let up = map.base_from_grid.direction(&Vec3::z());
@@ -109,8 +120,8 @@ fn datum_height(map: &HeightMap, grid_from_part: &Rigid<Grid, Part>, drawing: &D
 
 /// Moves sides and centres to where the points show them. A surface that reaches less far than it is
 /// long, as partly lit samples make it (about 0.05 mm a side), is taught as it is seen.
-fn adjust(drawing: &mut Drawing, measured: &Measured) {
-    let holes = features(&measured.observations, measured.growth);
+fn adjust(drawing: &mut Drawing, measured: &Measured, options: &MeasureOptions) {
+    let holes = features(&measured.observations, measured.growth, options);
     for (i, s) in drawing.shape.iter_mut().enumerate() {
         let centre = s.centre.expect("rectangles and circles have one");
         if s.kind == Form::Circle {
@@ -162,7 +173,7 @@ fn recipe_of(options: &TeachOptions, mut drawing: Drawing, map: &HeightMap) -> R
             along: None,
         });
     }
-    let cell_mm = (2.0 * map.cell).clamp(0.05, 5.0);
+    let cell_mm = (2.0 * map.cell).clamp(1e-4, 500.0);
     let plain = Recipe::new(&options.name, cell_mm, drawing.shape, options.insertion.clone());
     // A rectangle looks the same after half a turn: what was taught has no notch to tell it.
     let gates = Gates { turn_must_be_told: false, min_margin: 0.0, ..Gates::default() };

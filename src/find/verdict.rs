@@ -3,10 +3,10 @@
 //! Frame and unit: part frame, mm.
 
 use super::drawing::Drawing;
-use super::drawn_edges::Face;
 use super::edge_index::EdgeIndex;
+use super::face::Face;
 use super::insertion::Gate;
-use super::measure::{Measured, localise};
+use super::measure::{MeasureOptions, Measured, localise};
 use super::points::Ordered;
 use crate::geometry::{Base, Part, Rigid, Vec3};
 
@@ -21,34 +21,48 @@ pub struct Agreement {
     pub beside_points: usize,
     /// The smaller of the two.
     pub agreement: f64,
-    /// Share of the drawn surfaces (in squares of 0.6 mm) on which points were seen.
+    /// Share of the drawn surfaces (in squares of 1.2 margins) on which points were seen.
     pub coverage: f64,
-    /// Share of the drawn edges (in pieces of 0.5 mm) at which a surface was seen to end.
+    /// Share of the drawn edges (in pieces of a margin) at which a surface was seen to end.
     pub edges: f64,
     /// Share of the drawn edges beyond which the surface goes on: another, larger part.
     pub crossed: f64,
 }
 
-/// Points nearer than this to an edge say nothing about what is surface and what is not, mm.
-const MARGIN: f64 = 0.4;
-/// Ring around the part that is looked at, mm.
-const RING: f64 = 1.2;
-const SQUARE: f64 = 0.6;
-const PIECE: f64 = 0.5;
+/// Lengths of the judgement, in the recipe's unit.
+struct Lengths {
+    /// Points nearer than this to an edge say nothing about what is surface and what is not, mm.
+    margin: f64,
+    /// The same where turns are told apart, mm.
+    turn_margin: f64,
+    /// Ring around the part that is looked at, mm.
+    ring: f64,
+    square: f64,
+    piece: f64,
+}
+
+impl Lengths {
+    fn of(options: &MeasureOptions) -> Lengths {
+        let at = |mm: f64| mm * options.unit();
+        Lengths { margin: at(0.4), turn_margin: at(0.3), ring: at(1.2), square: at(0.6), piece: at(0.5) }
+    }
+}
 
 /// Judges a pose.
-pub fn judge(points: &Ordered, drawing: &Drawing, measured: &Measured, gate: f64) -> Agreement {
+pub fn judge(points: &Ordered, drawing: &Drawing, measured: &Measured, options: &MeasureOptions) -> Agreement {
+    let Lengths { margin, ring, square, piece: side, .. } = Lengths::of(options);
+    let gate = options.height_gate_mm;
     let faces = drawing.faces();
-    let edges = EdgeIndex::new(drawing);
-    let local = localise(points, drawing, &measured.base_from_part);
+    let edges = EdgeIndex::new(drawing, options.unit());
+    let local = localise(points, drawing, &measured.base_from_part, options);
     let b = drawing.bounds();
     let (mut on, mut inside, mut clear, mut beside) = (0usize, 0usize, 0usize, 0usize);
-    let cell = |x: f64, y: f64| ((x / SQUARE).floor() as i32, (y / SQUARE).floor() as i32);
+    let cell = |x: f64, y: f64| ((x / square).floor() as i32, (y / square).floor() as i32);
     let mut seen = std::collections::HashSet::new();
     let mut crossed = std::collections::HashSet::new();
-    let piece = |x: f64, y: f64, shape: usize| ((x / PIECE).floor() as i32, (y / PIECE).floor() as i32, shape);
+    let piece = |x: f64, y: f64, shape: usize| ((x / side).floor() as i32, (y / side).floor() as i32, shape);
     for q in local.iter().flatten() {
-        if q.x < b[0] - RING || q.x > b[2] + RING || q.y < b[1] - RING || q.y > b[3] + RING {
+        if q.x < b[0] - ring || q.x > b[2] + ring || q.y < b[1] - ring || q.y > b[3] + ring {
             continue;
         }
         let at = |f: &Face| (q.z - f.z).abs() <= gate;
@@ -56,14 +70,14 @@ pub fn judge(points: &Ordered, drawing: &Drawing, measured: &Measured, gate: f64
         if here.iter().any(|f| at(f)) {
             seen.insert(cell(q.x, q.y));
         }
-        if edges.nearest(q.x, q.y, MARGIN, |_| true).is_some() {
+        if edges.nearest(q.x, q.y, margin, |_| true).is_some() {
             continue;
         }
         if here.is_empty() {
             beside += 1;
             clear += usize::from(!faces.iter().any(at));
             for f in faces.iter().filter(|f| at(f)) {
-                if let Some(s) = edges.nearest(q.x, q.y, RING, |s| s.z == f.z && s.locates) {
+                if let Some(s) = edges.nearest(q.x, q.y, ring, |s| s.z == f.z && s.locates) {
                     crossed.insert(piece(s.x, s.y, s.shape));
                 }
             }
@@ -77,7 +91,7 @@ pub fn judge(points: &Ordered, drawing: &Drawing, measured: &Measured, gate: f64
     let (mut drawn, mut covered) = (0usize, 0usize);
     for cy in y0..=y1 {
         for cx in x0..=x1 {
-            let (x, y) = ((f64::from(cx) + 0.5) * SQUARE, (f64::from(cy) + 0.5) * SQUARE);
+            let (x, y) = ((f64::from(cx) + 0.5) * square, (f64::from(cy) + 0.5) * square);
             if faces.iter().any(|f| f.material(x, y)) {
                 drawn += 1;
                 covered += usize::from(seen.contains(&(cx, cy)));
@@ -92,7 +106,7 @@ pub fn judge(points: &Ordered, drawing: &Drawing, measured: &Measured, gate: f64
         // By the drawing's own sample: a coordinate of an edge may lie between two pieces, where rounding decides.
         .filter_map(|o| {
             let (x, y) = (o.x - o.residual * o.nx, o.y - o.residual * o.ny);
-            edges.nearest(x, y, PIECE, |s| (s.shape, s.element) == (o.shape, o.element))
+            edges.nearest(x, y, side, |s| (s.shape, s.element) == (o.shape, o.element))
         })
         .map(|s| piece(s.x, s.y, s.shape))
         .collect();
@@ -157,11 +171,17 @@ impl TurnVote {
 }
 
 /// Counts, where the part and the part turned differ, the points that fit the one or the other.
-pub fn vote(points: &Ordered, drawing: &Drawing, pose: &Rigid<Base, Part>, turns: u32, gate: f64) -> Vec<TurnVote> {
-    const MARGIN: f64 = 0.3;
+pub fn vote(
+    points: &Ordered,
+    drawing: &Drawing,
+    pose: &Rigid<Base, Part>,
+    turns: u32,
+    options: &MeasureOptions,
+) -> Vec<TurnVote> {
+    let (margin, gate) = (Lengths::of(options).turn_margin, options.height_gate_mm);
     let faces = drawing.faces();
-    let edges = EdgeIndex::new(drawing);
-    let local = localise(points, drawing, pose);
+    let edges = EdgeIndex::new(drawing, options.unit());
+    let local = localise(points, drawing, pose, options);
     (1..turns)
         .map(|k| {
             let angle = std::f64::consts::TAU * f64::from(k) / f64::from(turns);
@@ -171,7 +191,7 @@ pub fn vote(points: &Ordered, drawing: &Drawing, pose: &Rigid<Base, Part>, turns
                 let r = back.point(q);
                 for f in &faces {
                     let (mine, theirs) = (f.material(q.x, q.y), f.material(r.x, r.y));
-                    let near = |p: &Vec3| edges.nearest(p.x, p.y, MARGIN, |s| s.z == f.z).is_some();
+                    let near = |p: &Vec3| edges.nearest(p.x, p.y, margin, |s| s.z == f.z).is_some();
                     if mine == theirs || near(q) || near(&r) {
                         continue;
                     }

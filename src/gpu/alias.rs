@@ -17,13 +17,17 @@ struct Memory {
     raw: vk::DeviceMemory,
     host: *mut u8,
     bytes: u64,
+    /// Its place in the adapter's list of memory types.
+    kind: u32,
     /// Vulkan's device, and the driver that holds its code, must outlive the memory: scans with an ambient picture crashed
     /// at their end without it (tests/inputs.rs).
     _owner: wgpu::Device,
 }
 
-// The host's pointer is used under the rules of `Aliased::write` only; Vulkan's handles may be used by any thread.
+// SAFETY: the host's pointer is used under the rules of `Aliased::read` and `Aliased::write` only; Vulkan's handles may be
+// used by any thread.
 unsafe impl Send for Memory {}
+// SAFETY: as above; nothing of it changes after it was made.
 unsafe impl Sync for Memory {}
 
 impl Drop for Memory {
@@ -46,12 +50,17 @@ impl std::fmt::Debug for Aliased {
 }
 
 /// A buffer on memory of its own; `None` where the adapter is not Vulkan's or the memory cannot be had.
-pub(super) fn buffer(
+///
+/// # Safety
+/// The buffer's usages are among those of a storage buffer that nobody maps, and the adapter shares its memory with the host.
+pub(super) unsafe fn buffer(
     device: &wgpu::Device,
     descriptor: &wgpu::BufferDescriptor,
     zeroed: bool,
 ) -> Option<(wgpu::Buffer, Arc<Aliased>)> {
-    // SAFETY: nothing of the device is destroyed through this handle; all calls follow the order that Vulkan asks for.
+    // SAFETY: nothing of the device is destroyed through this handle; what is made here is destroyed where a later step
+    // fails, else by `destroy`, which wgpu calls when no work uses the buffer any more. The memory is bound once, to a type
+    // that the buffer's requirements allow, and mapped as a whole while it lives.
     unsafe {
         let hal = device.as_hal::<Vulkan>()?;
         let (raw, instance) = (hal.raw_device().clone(), hal.shared_instance().raw_instance());
@@ -72,9 +81,9 @@ pub(super) fn buffer(
         });
         let allocated = kind.and_then(|kind| {
             let info = vk::MemoryAllocateInfo::default().allocation_size(bytes).memory_type_index(kind);
-            raw.allocate_memory(&info, None).ok()
+            Some((kind, raw.allocate_memory(&info, None).ok()?))
         });
-        let Some(allocated) = allocated else {
+        let Some((kind, allocated)) = allocated else {
             raw.destroy_buffer(buffer, None);
             return None;
         };
@@ -88,7 +97,8 @@ pub(super) fn buffer(
         if zeroed {
             host.write_bytes(0, bytes as usize);
         }
-        let memory = Arc::new(Memory { device: raw.clone(), raw: allocated, host, bytes, _owner: device.clone() });
+        let memory =
+            Arc::new(Memory { device: raw.clone(), raw: allocated, host, bytes, kind, _owner: device.clone() });
         let held = memory.clone();
         let destroy = Box::new(move || {
             raw.destroy_buffer(buffer, None);
@@ -102,43 +112,66 @@ pub(super) fn buffer(
 }
 
 impl Aliased {
-    /// The same bytes as an image, rows of 2^ROW_LOG2 texels one after the other; `None` where the adapter would lay
-    /// it out in another way.
-    pub(super) fn texels(&self, device: &wgpu::Device, texel: Texel) -> Option<&wgpu::TextureView> {
+    /// The same bytes as an image of at most `most` rows, of 2^ROW_LOG2 texels each, one after the other; `None` where the
+    /// adapter has no such image, or would lay it out in another way.
+    ///
+    /// # Safety
+    /// `device` is the one that the buffer was made on; nobody submits to its queue meanwhile; its dispatches run one after
+    /// the other, so that no barrier is needed between a write of the buffer and a read of the image.
+    pub(super) unsafe fn texels(&self, device: &wgpu::Device, texel: Texel, most: u32) -> Option<&wgpu::TextureView> {
         let slot = &self.views[texel as usize];
         if slot.get().is_none() {
-            let _ = slot.set(self.image(device, texel)?);
+            // SAFETY: the caller's promises are those that are asked for here.
+            let _ = slot.set(unsafe { self.image(device, texel, most) }?);
         }
         slot.get()
     }
 
-    fn image(&self, device: &wgpu::Device, texel: Texel) -> Option<wgpu::TextureView> {
+    /// # Safety
+    /// As [`Aliased::texels`].
+    unsafe fn image(&self, device: &wgpu::Device, texel: Texel, most: u32) -> Option<wgpu::TextureView> {
         let row = texel.bytes() << ROW_LOG2;
-        let (width, height) = (1 << ROW_LOG2, (self.memory.bytes / row) as u32);
+        let (width, height) = (1 << ROW_LOG2, u32::try_from(self.memory.bytes / row).ok()?);
+        if width.max(height) > most {
+            return None;
+        }
         let format = match texel {
             Texel::One => vk::Format::R32_UINT,
             Texel::Four => vk::Format::R32G32B32A32_UINT,
         };
-        // SAFETY: as in `buffer`; the image lies within the memory, which it holds until it is destroyed.
+        // SAFETY: as in `buffer`; the adapter has such images, the memory's type is one that this image may lie on, the image
+        // lies within the memory, which it holds until it is destroyed, and it is in the layout that wgpu is told of.
         unsafe {
             let hal = device.as_hal::<Vulkan>()?;
-            let raw = hal.raw_device().clone();
+            let (raw, instance) = (hal.raw_device().clone(), hal.shared_instance().raw_instance());
+            let (kind, tiling) = (vk::ImageType::TYPE_2D, vk::ImageTiling::LINEAR);
+            let (usage, flags) = (vk::ImageUsageFlags::STORAGE, vk::ImageCreateFlags::ALIAS);
+            let card = hal.raw_physical_device();
+            let has = instance.get_physical_device_image_format_properties(card, format, kind, tiling, usage, flags);
+            let largest = has.ok()?.max_extent;
+            if width > largest.width || height > largest.height {
+                return None;
+            }
             let info = vk::ImageCreateInfo::default()
-                .flags(vk::ImageCreateFlags::ALIAS)
-                .image_type(vk::ImageType::TYPE_2D)
+                .flags(flags)
+                .image_type(kind)
                 .format(format)
                 .extent(vk::Extent3D { width, height, depth: 1 })
                 .mip_levels(1)
                 .array_layers(1)
                 .samples(vk::SampleCountFlags::TYPE_1)
-                .tiling(vk::ImageTiling::LINEAR)
-                .usage(vk::ImageUsageFlags::STORAGE);
+                .tiling(tiling)
+                .usage(usage)
+                // The bytes that lie there stay: from "undefined" they would be lost.
+                .initial_layout(vk::ImageLayout::PREINITIALIZED);
             let image = raw.create_image(&info, None).ok()?;
             let part = vk::ImageSubresource { aspect_mask: vk::ImageAspectFlags::COLOR, mip_level: 0, array_layer: 0 };
             let layout = raw.get_image_subresource_layout(image, part);
-            let fits = raw.get_image_memory_requirements(image).size <= self.memory.bytes;
+            let needs = raw.get_image_memory_requirements(image);
+            let fits = needs.size <= self.memory.bytes && needs.memory_type_bits & (1 << self.memory.kind) != 0;
             let plain = layout.offset == 0 && layout.row_pitch == row;
-            if !fits || !plain || raw.bind_image_memory(image, self.memory.raw, 0).is_err() {
+            let bound = fits && plain && raw.bind_image_memory(image, self.memory.raw, 0).is_ok();
+            if !bound || to_general(&hal, image).is_err() {
                 raw.destroy_image(image, None);
                 return None;
             }
@@ -177,18 +210,67 @@ impl Aliased {
         }
     }
 
-    /// Reads where the bytes lie. The caller sees to it that no submitted work writes the buffer.
-    pub(super) fn read(&self, range: std::ops::Range<usize>) -> &[u8] {
+    /// Reads where the bytes lie.
+    ///
+    /// # Safety
+    /// As long as the bytes are borrowed no submitted work writes the buffer, and nobody calls [`Aliased::write`] there.
+    pub(super) unsafe fn read(&self, range: std::ops::Range<usize>) -> &[u8] {
         assert!(range.start <= range.end && range.end as u64 <= self.memory.bytes, "{range:?} bytes");
-        // SAFETY: as in `write`.
+        // SAFETY: inside the mapped memory, just checked, which stays mapped as long as `self` lives.
         unsafe { std::slice::from_raw_parts(self.memory.host.add(range.start), range.len()) }
     }
 
-    /// Writes where the bytes lie. The caller sees to it that no submitted work uses the buffer.
-    pub(super) fn write(&self, offset: usize, bytes: &[u8]) {
-        assert!((offset + bytes.len()) as u64 <= self.memory.bytes, "{offset} + {} bytes", bytes.len());
+    /// Writes where the bytes lie.
+    ///
+    /// # Safety
+    /// No submitted work uses the buffer, nobody borrows these bytes, and no other thread writes them.
+    pub(super) unsafe fn write(&self, offset: usize, bytes: &[u8]) {
+        let end = offset.checked_add(bytes.len()).filter(|end| *end as u64 <= self.memory.bytes);
+        assert!(end.is_some(), "{offset} + {} bytes", bytes.len());
         // SAFETY: inside the mapped memory, just checked; it stays mapped as long as `self` lives.
         unsafe { self.memory.host.add(offset).copy_from_nonoverlapping(bytes.as_ptr(), bytes.len()) };
+    }
+}
+
+/// Takes a new image to the layout in which stages read it, and waits for that; its bytes stay.
+///
+/// # Safety
+/// Nobody submits to the device's queue meanwhile; the image is bound, and in the layout that it was made in.
+unsafe fn to_general(hal: &wgpu::hal::vulkan::Device, image: vk::Image) -> Result<(), vk::Result> {
+    let raw = hal.raw_device();
+    let whole =
+        vk::ImageSubresourceRange::default().aspect_mask(vk::ImageAspectFlags::COLOR).level_count(1).layer_count(1);
+    let barrier = vk::ImageMemoryBarrier::default()
+        .src_access_mask(vk::AccessFlags::HOST_WRITE | vk::AccessFlags::SHADER_WRITE)
+        .dst_access_mask(vk::AccessFlags::SHADER_READ)
+        .old_layout(vk::ImageLayout::PREINITIALIZED)
+        .new_layout(vk::ImageLayout::GENERAL)
+        .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+        .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+        .image(image)
+        .subresource_range(whole);
+    let (before, after) =
+        (vk::PipelineStageFlags::HOST | vk::PipelineStageFlags::COMPUTE_SHADER, vk::PipelineStageFlags::COMPUTE_SHADER);
+    // SAFETY: the commands are recorded, run once and waited for before their pool and the fence go.
+    unsafe {
+        let pool = vk::CommandPoolCreateInfo::default().queue_family_index(hal.queue_family_index());
+        let pool = raw.create_command_pool(&pool, None)?;
+        let run = || {
+            let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(1);
+            let commands = raw.allocate_command_buffers(&info)?;
+            raw.begin_command_buffer(commands[0], &vk::CommandBufferBeginInfo::default())?;
+            raw.cmd_pipeline_barrier(commands[0], before, after, Default::default(), &[], &[], &[barrier]);
+            raw.end_command_buffer(commands[0])?;
+            let fence = raw.create_fence(&vk::FenceCreateInfo::default(), None)?;
+            let done = raw
+                .queue_submit(hal.raw_queue(), &[vk::SubmitInfo::default().command_buffers(&commands)], fence)
+                .and_then(|()| raw.wait_for_fences(&[fence], true, u64::MAX));
+            raw.destroy_fence(fence, None);
+            done
+        };
+        let done = run();
+        raw.destroy_command_pool(pool, None);
+        done
     }
 }
 

@@ -7,7 +7,7 @@ use super::texels::{self, Texel};
 use crate::fault::{Fault, Result};
 use rayon::ThreadPool;
 use rayon::prelude::*;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 /// The longest a single submission may take before the device counts as lost.
@@ -55,6 +55,10 @@ pub struct Device {
     /// Bytes of all buffers made through this device.
     allocated: Arc<std::sync::atomic::AtomicU64>,
     pub(super) background: Arc<Background>,
+    /// One at a time: Vulkan asks for it where a queue is used beside wgpu.
+    submitting: Arc<Mutex<()>>,
+    /// Most rows of an image that an array is read as.
+    pub(super) image_rows: u32,
 }
 
 fn instance() -> wgpu::Instance {
@@ -181,6 +185,7 @@ impl Device {
                 note.lock().unwrap().get_or_insert(e.to_string());
             }
         }));
+        let image_rows = raw.limits().max_texture_dimension_2d;
         let tick_ns = info.timestamps.then(|| queue.get_timestamp_period());
         let mut device = Device {
             raw,
@@ -191,6 +196,8 @@ impl Device {
             lost,
             allocated: Default::default(),
             background: Default::default(),
+            submitting: Default::default(),
+            image_rows,
         };
         device.reads_texels = !device.has_own_processors() && device.info.unified_memory && texels::trial(&device)?;
         Ok(device)
@@ -256,7 +263,9 @@ impl Device {
         let descriptor = wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
         let maps = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::MAP_WRITE;
         if self.reads_texels && usage.contains(wgpu::BufferUsages::STORAGE) && !usage.intersects(maps) {
-            let (raw, aliased) = alias::buffer(&self.raw, &descriptor, zeroed).ok_or_else(|| {
+            // SAFETY: a storage buffer that is not mapped, on a software adapter, whose memory is the host's.
+            let made = unsafe { alias::buffer(&self.raw, &descriptor, zeroed) };
+            let (raw, aliased) = made.ok_or_else(|| {
                 Fault::device(format!("{}: {size} bytes for '{label}' cannot be had", self.info.name))
                     .cause("the memory ran out")
                     .next("close other programs; what has --on runs in less memory with --on cpu")
@@ -268,9 +277,18 @@ impl Device {
         Ok(Buffer { raw, bytes, aliased: None })
     }
 
-    /// A buffer as an image.
+    /// A buffer as an image; `None` where it is too large for one, or the adapter has none of that kind.
     pub(super) fn texels<'a>(&self, buffer: &'a Buffer, texel: Texel) -> Option<&'a wgpu::TextureView> {
-        buffer.aliased.as_ref()?.texels(&self.raw, texel)
+        let _alone = self.submitting.lock().unwrap_or_else(PoisonError::into_inner);
+        // SAFETY: only buffers of this device are aliased, and only on a software adapter, which runs dispatches one after the
+        // other; all submissions take the lock.
+        unsafe { buffer.aliased.as_ref()?.texels(&self.raw, texel, self.image_rows) }
+    }
+
+    /// Submits recorded commands.
+    pub(super) fn submit(&self, commands: wgpu::CommandBuffer) -> wgpu::SubmissionIndex {
+        let _alone = self.submitting.lock().unwrap_or_else(PoisonError::into_inner);
+        self.queue.submit([commands])
     }
 
     /// Bytes of all buffers made so far.
@@ -294,7 +312,7 @@ impl Device {
         let staging = self.readback_staging("read", buffer.bytes)?;
         let mut encoder = self.raw.create_command_encoder(&Default::default());
         encoder.copy_buffer_to_buffer(&buffer.raw, 0, &staging.raw, 0, buffer.raw.size());
-        let at = self.queue.submit([encoder.finish()]);
+        let at = self.submit(encoder.finish());
         let mapped = staging.map(wgpu::MapMode::Read, 0..buffer.raw.size());
         self.wait(Some(at))?;
         mapped.done()?;
@@ -305,9 +323,10 @@ impl Device {
 
     /// Waits for a submission, or for all of them.
     pub(super) fn wait(&self, at: Option<wgpu::SubmissionIndex>) -> Result<()> {
-        self.raw
-            .poll(wgpu::PollType::Wait { submission_index: at, timeout: Some(TIMEOUT) })
-            .map_err(|e| Fault::device(format!("{}: no answer within {} s: {e}", self.info.name, TIMEOUT.as_secs())))?;
+        self.raw.poll(wgpu::PollType::Wait { submission_index: at, timeout: Some(TIMEOUT) }).map_err(|e| {
+            Fault::device(format!("{}: no answer within {} s: {e}", self.info.name, TIMEOUT.as_secs()))
+                .next("run `sheetlight doctor`; what has --on runs without the GPU with --on cpu")
+        })?;
         self.alive()
     }
     /// Runs the callbacks of what has finished; does not wait.
@@ -380,7 +399,8 @@ impl Buffer {
             return parts.iter().enumerate().try_for_each(|(i, bytes)| {
                 let first = begin;
                 begin += bytes;
-                fill(i, &mut |offset, bytes| host.write(first + offset, bytes))
+                // SAFETY: the ring hands out a place whose batch is done, to this thread alone.
+                fill(i, &mut |offset, bytes| unsafe { host.write(first + offset, bytes) })
             });
         }
         let mut view = self.view_mut(0..self.bytes)?;
@@ -409,11 +429,15 @@ impl Buffer {
         Mapping(slot)
     }
     pub(super) fn view(&self, range: std::ops::Range<u64>) -> Result<wgpu::BufferView> {
-        self.raw.get_mapped_range(range).map_err(|e| Fault::device(format!("a mapped buffer cannot be read: {e}")))
+        self.raw.get_mapped_range(range).map_err(|e| {
+            Fault::device(format!("a mapped buffer cannot be read: {e}"))
+                .next("run the same command again; finished shots are kept")
+        })
     }
     fn view_mut(&self, range: std::ops::Range<u64>) -> Result<wgpu::BufferViewMut> {
-        self.raw
-            .get_mapped_range_mut(range)
-            .map_err(|e| Fault::device(format!("a mapped buffer cannot be written: {e}")))
+        self.raw.get_mapped_range_mut(range).map_err(|e| {
+            Fault::device(format!("a mapped buffer cannot be written: {e}"))
+                .next("run the same command again; finished shots are kept")
+        })
     }
 }

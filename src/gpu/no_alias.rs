@@ -6,18 +6,26 @@ use std::sync::Arc;
 #[derive(Debug)]
 pub(super) enum Aliased {}
 
-pub(super) fn buffer(_: &wgpu::Device, _: &wgpu::BufferDescriptor, _: bool) -> Option<(wgpu::Buffer, Arc<Aliased>)> {
+/// # Safety
+/// None is asked for.
+pub(super) unsafe fn buffer(
+    _: &wgpu::Device,
+    _: &wgpu::BufferDescriptor,
+    _: bool,
+) -> Option<(wgpu::Buffer, Arc<Aliased>)> {
     None
 }
 
 impl Aliased {
-    pub(super) fn texels(&self, _: &wgpu::Device, _: Texel) -> Option<&wgpu::TextureView> {
+    /// # Safety
+    /// None is asked for, here and below.
+    pub(super) unsafe fn texels(&self, _: &wgpu::Device, _: Texel, _: u32) -> Option<&wgpu::TextureView> {
         match *self {}
     }
-    pub(super) fn read(&self, _: std::ops::Range<usize>) -> &[u8] {
+    pub(super) unsafe fn read(&self, _: std::ops::Range<usize>) -> &[u8] {
         match *self {}
     }
-    pub(super) fn write(&self, _: usize, _: &[u8]) {
+    pub(super) unsafe fn write(&self, _: usize, _: &[u8]) {
         match *self {}
     }
 }

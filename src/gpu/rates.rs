@@ -8,7 +8,7 @@ use crate::fault::Result;
 use std::time::Instant;
 
 /// Transfer rates between host and device, 1e9 bytes a second.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Rates {
     /// Pictures in the host's memory, one after the other through the ring, without any stage.
     pub upload_gb_s: f64,
@@ -113,7 +113,7 @@ impl Device {
             let start = Instant::now();
             let mut encoder = self.raw.create_command_encoder(&Default::default());
             encoder.copy_buffer_to_buffer(&from.raw, 0, &to.raw, 0, bytes);
-            self.queue.submit([encoder.finish()]);
+            self.submit(encoder.finish());
             let mapped = to.map(wgpu::MapMode::Read, 0..bytes);
             self.wait(None)?;
             mapped.done()?;

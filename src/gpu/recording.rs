@@ -63,12 +63,8 @@ impl Recording {
         self.push(device, pipeline, parts, Size::Indirect(args.0.raw.clone(), args.1));
     }
     fn push(&mut self, device: &Device, pipeline: &Pipeline, parts: &[(&Buffer, u64, u64)], size: Size) {
-        self.steps.push(Dispatch {
-            label: pipeline.stage.name,
-            pipeline: pipeline.compiled.clone(),
-            bind: pipeline.bind(device, parts),
-            size,
-        });
+        let (pipeline, label) = (pipeline.bind(device, parts), pipeline.stage.name);
+        self.steps.push(Dispatch { label, pipeline: pipeline.0, bind: pipeline.1, size });
     }
     pub fn append(&mut self, other: &Recording) {
         self.steps.extend(other.steps.iter().cloned());
@@ -164,7 +160,7 @@ impl Replay {
         for (from, at, to, to_at, bytes) in after {
             encoder.copy_buffer_to_buffer(&from.raw, *at, &to.raw, *to_at, *bytes);
         }
-        let at = self.device.queue.submit([encoder.finish()]);
+        let at = self.device.submit(encoder.finish());
         self.device.alive()?;
         Ok(at)
     }

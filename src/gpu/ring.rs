@@ -89,7 +89,10 @@ fn copiers(device: &Device) -> Result<Option<ThreadPool>> {
         return Ok(None);
     }
     let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.map(Some).map_err(|e| Fault::device(format!("{threads} threads to copy pictures cannot be started: {e}")))
+    pool.map(Some).map_err(|e| {
+        Fault::device(format!("{threads} threads to copy pictures cannot be started: {e}"))
+            .next("close other programs, or raise the limits (ulimit -v, ulimit -u)")
+    })
 }
 
 impl Ring {
@@ -227,7 +230,7 @@ impl Ring {
                     }
                     let mut encoder = device.raw.create_command_encoder(&Default::default());
                     encoder.copy_buffer_to_buffer(&output.buffer.raw, 0, &staging.raw, 0, room);
-                    device.queue.submit([encoder.finish()]);
+                    device.submit(encoder.finish());
                 }
                 // The next one brings as much with it; less and less where that was noise in one batch.
                 output.sent = room.max(output.sent / 2).max(FIRST).min(staging.raw.size());
@@ -238,8 +241,8 @@ impl Ring {
             }
             let source = output.staging.as_ref().unwrap_or(&output.buffer);
             if let Some(host) = &source.aliased {
-                // The batch is done: its header has come.
-                read(i, host.read(0..bytes as usize));
+                // SAFETY: the batch is done: its header has come. The next one runs there after this has returned.
+                read(i, unsafe { host.read(0..bytes as usize) });
                 continue;
             }
             let size = bytes.next_multiple_of(8);

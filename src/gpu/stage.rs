@@ -5,7 +5,7 @@ use super::specialise::specialised;
 use super::texels::{rewrite, texel_of};
 use super::{Buffer, Device};
 use crate::fault::Result;
-use std::sync::{Arc, LazyLock};
+use std::sync::{Arc, LazyLock, OnceLock};
 
 /// How a stage uses a binding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,6 +66,14 @@ impl Stage {
     /// The stage with its override constants, compiled on another thread: who uses it first waits for it, or compiles it where
     /// no thread was free.
     pub fn pipeline(&self, device: &Device, overrides: &[(&str, f64)]) -> Result<Pipeline> {
+        let overrides = overrides.iter().map(|&(name, value)| (name.into(), value)).collect();
+        let pipeline = self.begun(device, device.reads_texels, overrides);
+        device.alive()?;
+        Ok(pipeline)
+    }
+
+    /// Compiled so that it reads arrays as texels, or not.
+    fn begun(&self, device: &Device, texels: bool, overrides: Vec<(String, f64)>) -> Pipeline {
         let entries: Vec<_> = self
             .bindings
             .iter()
@@ -74,7 +82,7 @@ impl Stage {
                 binding: i as u32,
                 visibility: wgpu::ShaderStages::COMPUTE,
                 ty: match b.access {
-                    Access::Texels if device.reads_texels => wgpu::BindingType::StorageTexture {
+                    Access::Texels if texels => wgpu::BindingType::StorageTexture {
                         access: wgpu::StorageTextureAccess::ReadOnly,
                         format: texel_of(self, b.name).format(),
                         view_dimension: wgpu::TextureViewDimension::D2,
@@ -95,17 +103,15 @@ impl Stage {
         let layout = device
             .raw
             .create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(self.name), entries: &entries });
-        device.alive()?;
-        let (stage, raw, texels, bound) = (*self, device.raw.clone(), device.reads_texels, layout.clone());
-        let overrides: Vec<(String, f64)> = overrides.iter().map(|&(name, value)| (name.into(), value)).collect();
-        let compile = move || stage.compile(&raw, texels, &bound, &overrides);
+        let (stage, raw, bound, values) = (*self, device.raw.clone(), layout.clone(), overrides.clone());
+        let compile = move || stage.compile(&raw, texels, &bound, &values);
         let compiled: Arc<Compiled> = Arc::new(LazyLock::new(Box::new(compile)));
         let ahead = compiled.clone();
         // A panic poisons it: who uses it panics as well.
         device.background.begin(move || {
             LazyLock::force(&ahead);
         });
-        Ok(Pipeline { stage: *self, compiled, layout })
+        Pipeline { stage: *self, compiled, layout, texels, overrides, plain: Default::default() }
     }
 
     fn compile(
@@ -149,40 +155,58 @@ pub(super) type Compiled = LazyLock<wgpu::ComputePipeline, Box<dyn FnOnce() -> w
 pub struct Pipeline {
     pub stage: Stage,
     pub(super) compiled: Arc<Compiled>,
-    pub(super) layout: wgpu::BindGroupLayout,
+    layout: wgpu::BindGroupLayout,
+    texels: bool,
+    overrides: Vec<(String, f64)>,
+    /// The same without texels, for arrays that cannot be had as images.
+    plain: Arc<OnceLock<Pipeline>>,
 }
 
 impl Pipeline {
-    /// Binds buffers, or `(offset, size)` parts of them, in the order of the stage's list.
-    pub(super) fn bind(&self, device: &Device, buffers: &[(&Buffer, u64, u64)]) -> wgpu::BindGroup {
+    /// Binds buffers, or `(offset, size)` parts of them, in the order of the stage's list; gives what they are bound for:
+    /// the stage without texels where one of them cannot be had as an image.
+    pub(super) fn bind(&self, device: &Device, buffers: &[(&Buffer, u64, u64)]) -> (Arc<Compiled>, wgpu::BindGroup) {
         assert_eq!(buffers.len(), self.stage.bindings.len(), "{}: bindings", self.stage.name);
-        let entries: Vec<_> = buffers
-            .iter()
-            .enumerate()
-            .map(|(i, (b, offset, size))| wgpu::BindGroupEntry {
-                binding: i as u32,
-                resource: match self.stage.bindings[i].access {
-                    Access::Texels if device.reads_texels => {
-                        let name = self.stage.bindings[i].name;
-                        assert_eq!(*offset, 0, "{}: texels '{name}' are bound whole", self.stage.name);
-                        let view = device.texels(b, texel_of(&self.stage, name));
-                        // The trial at the opening of the device made one of each kind.
-                        wgpu::BindingResource::TextureView(view.expect("every storage buffer can be read as texels"))
-                    }
-                    _ => wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-                        buffer: &b.raw,
+        let resource = |(i, (b, offset, size)): (usize, &(&'_ Buffer, u64, u64))| {
+            let binding = &self.stage.bindings[i];
+            if binding.access == Access::Texels && self.texels {
+                assert_eq!(*offset, 0, "{}: texels '{}' are bound whole", self.stage.name, binding.name);
+                let view = device.texels(b, texel_of(&self.stage, binding.name));
+                return view.cloned().map(Bound::Texels);
+            }
+            Some(Bound::Buffer(b.raw.clone(), *offset, *size))
+        };
+        let Some(bound) = buffers.iter().enumerate().map(resource).collect::<Option<Vec<_>>>() else {
+            let plain = self.plain.get_or_init(|| self.stage.begun(device, false, self.overrides.clone()));
+            return plain.bind(device, buffers);
+        };
+        let entries: Vec<_> = (0u32..)
+            .zip(&bound)
+            .map(|(binding, bound)| wgpu::BindGroupEntry {
+                binding,
+                resource: match bound {
+                    Bound::Texels(view) => wgpu::BindingResource::TextureView(view),
+                    Bound::Buffer(buffer, offset, size) => wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                        buffer,
                         offset: *offset,
                         size: std::num::NonZero::new(*size),
                     }),
                 },
             })
             .collect();
-        device.raw.create_bind_group(&wgpu::BindGroupDescriptor {
+        let group = device.raw.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some(self.stage.name),
             layout: &self.layout,
             entries: &entries,
-        })
+        });
+        (self.compiled.clone(), group)
     }
+}
+
+/// What a binding is bound to: a part of a buffer, or an image of all of it.
+enum Bound {
+    Buffer(wgpu::Buffer, u64, u64),
+    Texels(wgpu::TextureView),
 }
 
 /// What one run of one stage needs: bytes per binding (the uniform's too) and the workgroups.
@@ -204,15 +228,15 @@ pub fn run_once(device: &Device, pipeline: &Pipeline, load: &Workload) -> Result
         })
         .collect::<Result<Vec<_>>>()?;
     let parts: Vec<_> = buffers.iter().map(|b| (b, 0, b.raw.size())).collect();
-    let group = pipeline.bind(device, &parts);
+    let (compiled, group) = pipeline.bind(device, &parts);
     let mut encoder = device.raw.create_command_encoder(&Default::default());
     {
         let mut pass = encoder.begin_compute_pass(&Default::default());
-        pass.set_pipeline(&pipeline.compiled);
+        pass.set_pipeline(&compiled);
         pass.set_bind_group(0, &group, &[]);
         pass.dispatch_workgroups(load.groups[0], load.groups[1], load.groups[2]);
     }
-    let at = device.queue.submit([encoder.finish()]);
+    let at = device.submit(encoder.finish());
     device.wait(Some(at))?;
     buffers.iter().map(|b| device.read(b)).collect()
 }

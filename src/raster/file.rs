@@ -1,8 +1,11 @@
-//! In: PNG, JPEG, TIFF and PGM files, grey or colour. Out: grey images with the depth the sensor had.
+//! In: PNG, JPEG, TIFF, BMP and PGM files, grey or colour. Out: grey images with the depth the sensor had.
 //! Frame and unit: pixels, grey levels. The only place that names the `image` crate with `image8`.
 
+use super::budget::Budget;
 use super::{Image, Pixels};
 use crate::fault::{Fault, Result};
+use image::{DynamicImage, ImageDecoder, ImageReader};
+use std::io::Cursor;
 use std::path::Path;
 
 /// Which part of a colour picture is taken as grey. A grey picture ignores it.
@@ -30,23 +33,72 @@ impl std::str::FromStr for Channel {
     }
 }
 
-/// Reads a picture. `bits` is the depth the recording declares: 8, or 9..=16 for 16-bit files.
+/// Longest side of a picture, px: stages pack a place into two numbers of 16 bits.
+pub const MOST_SIDE: u32 = 65_535;
+/// Most pixels of a picture; the largest sensors have 250 million.
+pub const MOST_PIXELS: u64 = 1 << 28;
+/// Memory for pictures while they are decoded, by all threads together, bytes.
+static DECODING: Budget = Budget::new(1 << 30);
+
+/// Reads a picture of any size. `bits` is the depth the recording declares: 8, or 9..=16 for 16-bit files.
 pub fn load(path: &Path, channel: Channel, bits: u8) -> Result<Image> {
-    let bytes = std::fs::read(path).map_err(|e| Fault::read(path, e))?;
-    decode(&bytes, channel, bits).map_err(|e| e.at(path.display()))
+    read(path, channel, bits, None)
+}
+
+/// Reads a picture whose width and height are known; of another size none is decoded.
+pub fn load_sized(path: &Path, channel: Channel, bits: u8, size: [u32; 2]) -> Result<Image> {
+    read(path, channel, bits, Some(size))
+}
+
+fn read(path: &Path, channel: Channel, bits: u8, size: Option<[u32; 2]>) -> Result<Image> {
+    // Four channels of 16 bits, uncompressed, and what cameras write before them.
+    let pixels = size.map_or(MOST_PIXELS, |[w, h]| u64::from(w) * u64::from(h));
+    let bytes = crate::files::read(path, 8 * pixels + (16 << 20))?;
+    decode_sized(&bytes, channel, bits, size).map_err(|e| e.at(path.display()))
+}
+
+/// Refuses another size than the known one, before anything is decoded.
+pub(super) fn fits(width: u32, height: u32, size: Option<[u32; 2]>) -> Result<()> {
+    match size {
+        Some([w, h]) if [w, h] != [width, height] => {
+            Err(Fault::input(format!("is {width}x{height}, it should be {w}x{h} as meta.json says"))
+                .cause("pictures of two cameras or two resolutions in one folder")
+                .next("correct meta.json, or take the odd pictures out"))
+        }
+        None if width.max(height) > MOST_SIDE || u64::from(width) * u64::from(height) > MOST_PIXELS => {
+            Err(Fault::input(format!(
+                "is {width}x{height}, at most {MOST_SIDE} a side and {MOST_PIXELS} pixels in all are read"
+            ))
+            .cause("several pictures in one, or a damaged file")
+            .next("cut it into pictures of the sensor's size"))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Decodes a picture held in memory.
 pub fn decode(bytes: &[u8], channel: Channel, bits: u8) -> Result<Image> {
+    decode_sized(bytes, channel, bits, None)
+}
+
+fn decode_sized(bytes: &[u8], channel: Channel, bits: u8, size: Option<[u32; 2]>) -> Result<Image> {
     if bytes.starts_with(b"P5") {
-        return within_depth(super::pgm::decode(bytes, bits)?);
+        return within_depth(super::pgm::decode(bytes, bits, size)?);
     }
-    let picture = image::load_from_memory(bytes).map_err(|e| {
+    let unreadable = |e: &dyn std::fmt::Display| {
         Fault::input(format!("is not a readable picture ({} bytes): {e}", bytes.len()))
-            .cause("the file is truncated, empty, or of a format other than PNG, JPEG, TIFF and PGM")
+            .cause("the file is truncated, empty, or of a format other than PNG, JPEG, TIFF, BMP and PGM")
             .next("record the shot again, or pass --skip-bad to leave it out")
-    })?;
-    let (width, height) = (picture.width(), picture.height());
+    };
+    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| unreadable(&e))?;
+    // The size is judged here, by its own numbers.
+    reader.no_limits();
+    let decoder = reader.into_decoder().map_err(|e| unreadable(&e))?;
+    let (width, height) = decoder.dimensions();
+    fits(width, height, size)?;
+    // The picture, a copy of it in grey or RGB of the same depth, and the result.
+    let _memory = DECODING.hold(3 * decoder.total_bytes());
+    let picture = DynamicImage::from_decoder(decoder).map_err(|e| unreadable(&e))?;
     let deep = matches!(picture.color().bytes_per_pixel() / picture.color().channel_count(), 2..);
     if deep != (bits > 8) {
         return Err(Fault::input(format!(
@@ -126,10 +178,12 @@ mod tests {
         let path = dir.path().join("a.png");
         let deep = Image::from_u16(3, 2, 12, vec![0, 1, 4095, 7, 300, 2048]);
         save_png(&deep, &path).unwrap();
-        assert_eq!(load(&path, Channel::Luma, 12).unwrap(), deep);
-        assert!(load(&path, Channel::Luma, 10).unwrap_err().what.contains("4095"));
-        assert!(load(&path, Channel::Luma, 8).unwrap_err().what.contains("16 bits"));
+        let load = |bits| load_sized(&path, Channel::Luma, bits, [3, 2]);
+        assert_eq!(load(12).unwrap(), deep);
+        assert!(load(10).unwrap_err().what.contains("4095"));
+        assert!(load(8).unwrap_err().what.contains("16 bits"));
+        assert!(load_sized(&path, Channel::Luma, 12, [2, 3]).unwrap_err().what.contains("is 3x2"));
         std::fs::write(&path, &std::fs::read(&path).unwrap()[..40]).unwrap();
-        assert!(load(&path, Channel::Luma, 12).is_err());
+        assert!(load(12).is_err());
     }
 }

@@ -21,6 +21,9 @@ pub fn float_tiff(width: u32, height: u32, values: &[f32], description: &str) ->
     out.into_inner()
 }
 
+/// Most cells that a map may have.
+const MOST_CELLS: u64 = 1 << 26;
+
 /// Width, height and values of a single-channel float TIFF.
 pub fn read_float_tiff(bytes: &[u8]) -> Result<(u32, u32, Vec<f32>)> {
     let strange = |e: &dyn std::fmt::Display| {
@@ -28,8 +31,13 @@ pub fn read_float_tiff(bytes: &[u8]) -> Result<(u32, u32, Vec<f32>)> {
             .cause("another kind of picture, or a truncated file")
             .next("give the height.tif of a scan, or a single-channel 32-bit float TIFF")
     };
-    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(|e| strange(&e))?.with_limits(Limits::unlimited());
+    let decoder = Decoder::new(Cursor::new(bytes)).map_err(|e| strange(&e))?;
+    let mut decoder = decoder.with_limits(Limits::unlimited());
     let (width, height) = decoder.dimensions().map_err(|e| strange(&e))?;
+    let cells = u64::from(width) * u64::from(height);
+    if cells > MOST_CELLS {
+        return Err(strange(&format!("{width}x{height} are {cells} cells, limit {MOST_CELLS}")));
+    }
     match decoder.read_image().map_err(|e| strange(&e))? {
         DecodingResult::F32(values) if values.len() == width as usize * height as usize => Ok((width, height, values)),
         _ => Err(strange(&"its pixels are not one 32-bit float each")),

@@ -1,18 +1,23 @@
 //! In: picture files and raw sensor bytes. Out: grey images of 8 to 16 bits, rows without padding.
 //! Frame and unit: pixels, x to the right, y down, (0, 0) is the centre of the top left pixel; grey levels.
 
+mod budget;
 pub mod colour;
 mod file;
 mod float;
 mod image8;
+mod light;
 mod mask;
 mod pgm;
+mod response;
 mod text;
 
-pub use file::{Channel, decode, load, png, save_png};
+pub use file::{Channel, MOST_PIXELS, MOST_SIDE, decode, load, load_sized, png, save_png};
 pub use float::{float_tiff, read_float_tiff};
 pub use image8::{Rgb, RgbImage};
+pub use light::Light;
 pub use mask::Mask;
+pub use response::Response;
 pub use text::text_width;
 
 /// Grey levels, row-major.

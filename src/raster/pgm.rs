@@ -34,7 +34,7 @@ fn header(bytes: &[u8]) -> Option<Header> {
 }
 
 /// `bits` is the depth that the recording declares. Levels above it are left for the caller to find.
-pub fn decode(bytes: &[u8], bits: u8) -> Result<Image> {
+pub fn decode(bytes: &[u8], bits: u8, size: Option<[u32; 2]>) -> Result<Image> {
     let broken = |what: String| {
         Err(Fault::input(what)
             .cause("the file is truncated, or its header is of another program")
@@ -43,6 +43,7 @@ pub fn decode(bytes: &[u8], bits: u8) -> Result<Image> {
     let Some(Header { width, height, most, start }) = header(bytes) else {
         return broken(format!("is not a readable picture ({} bytes): a PGM without a whole header", bytes.len()));
     };
+    super::file::fits(width, height, size)?;
     let deep = most > 255;
     if deep != (bits > 8) {
         return Err(Fault::input(format!(
@@ -71,6 +72,7 @@ mod tests {
 
     #[test]
     fn levels_are_read_as_they_are_written() {
+        let decode = |bytes: &[u8], bits| super::decode(bytes, bits, None);
         let mut bytes = b"P5\n# a comment\n3 1\n4095\n".to_vec();
         bytes.extend([0, 7, 15, 255, 1, 0]);
         assert_eq!(decode(&bytes, 12).unwrap(), Image::from_u16(3, 1, 12, vec![7, 4095, 256]));

@@ -30,11 +30,29 @@ pub enum BoardSpec {
         #[serde(default)]
         border_mm: f64,
     },
+    /// ArUco or AprilTag markers in rows, one or more, white between them.
+    MarkerGrid {
+        /// Markers [columns, rows]; [1, 1] for a single one.
+        markers: [u32; 2],
+        marker_mm: f64,
+        /// White between two markers; not needed for a single one.
+        #[serde(default)]
+        gap_mm: f64,
+        /// OpenCV's name, e.g. DICT_APRILTAG_36h11.
+        dictionary: String,
+        /// Id of the first marker; the others follow row by row.
+        #[serde(default)]
+        first_id: u32,
+        #[serde(default)]
+        border_mm: f64,
+    },
     /// Dots on a square grid [columns, rows]; asymmetric grids shift every other row by half a pitch.
     Circles {
         dots: [u32; 2],
         pitch_mm: f64,
-        diameter_mm: f64,
+        /// Unstated: it is measured in each picture.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        diameter_mm: Option<f64>,
         #[serde(default)]
         asymmetric: bool,
         #[serde(default)]
@@ -49,7 +67,7 @@ fn black() -> String {
 impl BoardSpec {
     /// Reads a board's description file, as `sheetlight board` writes it.
     pub fn load(path: &Path) -> Result<BoardSpec> {
-        let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+        let text = crate::files::read_text(path)?;
         let board: BoardSpec = serde_json::from_str(&text).map_err(|e| {
             Fault::input(format!("{}: is no board description: {e}", path.display()))
                 .cause("a misspelt key or a missing size")
@@ -64,6 +82,7 @@ impl BoardSpec {
         let (count, what, least, border) = match self {
             BoardSpec::Chessboard { inner_corners, border_mm, .. } => (inner_corners, "inner corners", 2, border_mm),
             BoardSpec::Charuco { squares, border_mm, .. } => (squares, "squares", 3, border_mm),
+            BoardSpec::MarkerGrid { markers, border_mm, .. } => (markers, "markers", 1, border_mm),
             BoardSpec::Circles { dots, border_mm, .. } => (dots, "dots", 2, border_mm),
         };
         let refuse = |what: String| {
@@ -76,15 +95,13 @@ impl BoardSpec {
         }
         let in_range = |v: f64| v > 0.0 && v <= 10_000.0;
         // What is drawn in the cells must fit into them.
-        let (cell, name, drawn) = match self {
-            BoardSpec::Chessboard { square_mm, .. } => (*square_mm, "square_mm", None),
-            BoardSpec::Charuco { square_mm, marker_mm, .. } => {
-                (*square_mm, "square_mm", Some(("marker_mm", *marker_mm)))
-            }
-            BoardSpec::Circles { pitch_mm, diameter_mm, .. } => {
-                (*pitch_mm, "pitch_mm", Some(("diameter_mm", *diameter_mm)))
-            }
+        let (cell, drawn) = match self {
+            BoardSpec::Chessboard { square_mm, .. } => (*square_mm, None),
+            BoardSpec::Charuco { square_mm, marker_mm, .. } => (*square_mm, Some(("marker_mm", *marker_mm))),
+            BoardSpec::MarkerGrid { marker_mm, .. } => (*marker_mm, None),
+            BoardSpec::Circles { pitch_mm, diameter_mm, .. } => (*pitch_mm, diameter_mm.map(|d| ("diameter_mm", d))),
         };
+        let name = self.length_key();
         if !in_range(cell) {
             return refuse(format!("the board's {name} is {cell}, above 0 and up to 10000 mm is allowed"));
         }
@@ -95,10 +112,34 @@ impl BoardSpec {
             return refuse(format!("the board's border_mm is {border}, 0 to 10000 mm is allowed"));
         }
         match self {
+            // Without white between them two markers are one patch.
+            BoardSpec::MarkerGrid { markers, marker_mm, gap_mm, .. }
+                if !(0.0..=10_000.0).contains(gap_mm) || (markers != &[1, 1] && *gap_mm < 0.1 * marker_mm) =>
+            {
+                let least = 0.1 * marker_mm;
+                refuse(format!("the board's gap_mm is {gap_mm}, {least} (a tenth of marker_mm) to 10000 mm is allowed"))
+            }
             BoardSpec::Chessboard { first_square, .. } if first_square != "black" && first_square != "white" => {
                 refuse(format!("the board's first_square is '{first_square}', 'black' or 'white' is allowed"))
             }
             _ => Ok(()),
+        }
+    }
+
+    /// Diameter of a circle grid's dots as they are drawn: half of the pitch unless stated, mm.
+    pub fn drawn_diameter(&self) -> Option<f64> {
+        match self {
+            BoardSpec::Circles { pitch_mm, diameter_mm, .. } => Some(diameter_mm.unwrap_or(0.5 * pitch_mm)),
+            _ => None,
+        }
+    }
+
+    /// The key that states its cells' side, mm: every length on the board is in proportion to it.
+    pub fn length_key(&self) -> &'static str {
+        match self {
+            BoardSpec::Chessboard { .. } | BoardSpec::Charuco { .. } => "square_mm",
+            BoardSpec::MarkerGrid { .. } => "marker_mm",
+            BoardSpec::Circles { .. } => "pitch_mm",
         }
     }
 
@@ -115,6 +156,15 @@ impl BoardSpec {
                 lattice(nx.saturating_sub(1), ny.saturating_sub(1), |i, j| {
                     [f64::from(i + 1) * square_mm, f64::from(j + 1) * square_mm]
                 })
+            }
+            BoardSpec::MarkerGrid { markers: [nx, ny], marker_mm, gap_mm, .. } => {
+                let pitch = marker_mm + gap_mm;
+                let corners = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+                let first = lattice(*nx, *ny, |i, j| [f64::from(i) * pitch, f64::from(j) * pitch]);
+                first
+                    .iter()
+                    .flat_map(|f| corners.map(|[x, y]| f + Vec3::new(x * marker_mm, y * marker_mm, 0.0)))
+                    .collect()
             }
             BoardSpec::Circles { dots: [nx, ny], pitch_mm, asymmetric, .. } => lattice(*nx, *ny, |i, j| {
                 if *asymmetric {
@@ -134,9 +184,14 @@ impl BoardSpec {
             BoardSpec::Charuco { squares: [nx, ny], square_mm: s, border_mm: b, .. } => {
                 [-b, -b, f64::from(*nx) * s + b, f64::from(*ny) * s + b]
             }
+            BoardSpec::MarkerGrid { markers: [nx, ny], marker_mm: m, gap_mm: g, border_mm: b, .. } => {
+                let side = |n: u32| f64::from(n) * (m + g) - g + b;
+                [-b, -b, side(*nx), side(*ny)]
+            }
             BoardSpec::Circles { dots: [nx, ny], pitch_mm: p, diameter_mm: d, asymmetric, border_mm: b } => {
                 let columns = if *asymmetric { f64::from(2 * nx - 1) } else { f64::from(nx - 1) };
-                let r = d / 2.0 + b;
+                // What is not known to be there is not counted as board.
+                let r = d.unwrap_or(0.0) / 2.0 + b;
                 [-r, -r, columns * p + r, f64::from(ny - 1) * p + r]
             }
         }

@@ -3,6 +3,7 @@
 
 use super::BoardSpec;
 use crate::fault::{Fault, Result};
+use crate::raster::{MOST_PIXELS, MOST_SIDE, Response};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -48,7 +49,8 @@ pub struct ImageSpec {
     pub height: u32,
     pub bits: u8,
     pub channels: u8,
-    pub response: String,
+    /// How the levels follow the light: "linear", "srgb", or a gamma.
+    pub response: Response,
     pub pixel_centre: String,
 }
 
@@ -86,13 +88,14 @@ pub struct AmbientRef {
 
 impl Meta {
     pub fn load(path: &Path) -> Result<Meta> {
-        let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+        let text = crate::files::read_text(path)?;
         Meta::parse(&text).map_err(|e| e.at(path.display()))
     }
 
     /// Parses and checks; refuses unknown keys, units, formats and pixel conventions.
     pub fn parse(text: &str) -> Result<Meta> {
-        let meta: Meta = serde_json::from_str(text).map_err(|e| {
+        // A mark of the byte order says nothing in UTF-8.
+        let meta: Meta = serde_json::from_str(text.trim_start_matches('\u{feff}')).map_err(|e| {
             Fault::input(format!("is not a recording's meta.json: {e}"))
                 .cause("a misspelt key, a missing entry, or a file of another program")
                 .next("compare it with docs/file-formats.md")
@@ -123,12 +126,6 @@ impl Meta {
                 "say where the pixel centres are",
             );
         }
-        if self.image.response != "linear" {
-            return refuse(
-                format!("response is '{}', only 'linear' is read", self.image.response),
-                "switch the camera's gamma off",
-            );
-        }
         if !(8..=16).contains(&self.image.bits) || self.image.width == 0 || self.image.height == 0 {
             return refuse(
                 format!(
@@ -138,11 +135,31 @@ impl Meta {
                 "bits must be 8 to 16 and the size at least 1x1",
             );
         }
+        let [w, h] = [self.image.width, self.image.height];
+        if w.max(h) > MOST_SIDE || u64::from(w) * u64::from(h) > MOST_PIXELS {
+            return refuse(
+                format!("image {w}x{h} is too large: limit {MOST_SIDE} a side, {MOST_PIXELS} pixels in all"),
+                "give the size of the sensor's pictures",
+            );
+        }
         if self.frames.is_empty() {
             return refuse("the recording has no frames".into(), "record at least one shot");
         }
         for board in self.boards.iter().chain(&self.board) {
             board.check()?;
+        }
+        let mut taken: BTreeMap<&str, (usize, Option<usize>)> = BTreeMap::new();
+        for (i, f) in self.frames.iter().enumerate() {
+            let Some(name) = &f.laser else { continue };
+            match taken.insert(name, (i, f.pose)) {
+                Some((first, pose)) if pose != f.pose => {
+                    return refuse(
+                        format!("frames {first} and {i} name the same picture {name} at two poses"),
+                        "give each frame its own picture",
+                    );
+                }
+                _ => {}
+            }
         }
         let boards = self.boards.len() + usize::from(self.board.is_some());
         for (i, f) in self.frames.iter().enumerate() {

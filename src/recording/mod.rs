@@ -2,11 +2,14 @@
 //! Frame and unit: poses are base_from_flange in mm; boards in mm; see docs/file-formats.md.
 
 mod board;
+mod board_poses;
 mod markers;
 mod meta;
+mod pose_csv;
 mod poses;
 
 pub use board::BoardSpec;
+pub use board_poses::load_board_poses;
 pub use markers::Markers;
 pub use meta::{AmbientRef, Beam, FrameRef, ImageSpec, Meta};
 pub use poses::{PoseFile, load_poses, save_poses};
@@ -14,7 +17,7 @@ pub use poses::{PoseFile, load_poses, save_poses};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid};
 use crate::raster::{Channel, Image};
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 
 /// A recording on disk. Pictures are read one at a time, never all at once.
 #[derive(Clone, Debug)]
@@ -23,6 +26,8 @@ pub struct Recording {
     pub meta: Meta,
     /// Which part of colour pictures is used.
     pub channel: Channel,
+    /// Whether files outside the folder may be read: meta.json comes from elsewhere, and a person has to say so.
+    pub outside: bool,
 }
 
 impl Recording {
@@ -51,7 +56,7 @@ impl Recording {
                 .next("write meta.json as docs/file-formats.md shows: the picture's size, the board, the frames"));
         }
         let meta = Meta::load(&path)?;
-        Ok(Recording { folder: folder.to_owned(), meta, channel: Channel::default() })
+        Ok(Recording { folder: folder.to_owned(), meta, channel: Channel::default(), outside: false })
     }
 
     /// Refuses a recording of the other beam, where meta.json says which one it shows.
@@ -70,22 +75,60 @@ impl Recording {
         }
     }
 
+    /// Depth of the pictures as [`Recording::picture`] gives them.
+    pub fn bits(&self) -> u8 {
+        self.meta.image.response.depth(self.meta.image.bits)
+    }
+
+    /// Where one of the recording's own files lies; refuses what leads out of the folder.
+    pub fn inside(&self, name: &str) -> Result<PathBuf> {
+        let path = self.folder.join(name);
+        let plain = Path::new(name).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
+        let within = || match (path.canonicalize(), self.folder.canonicalize()) {
+            (Ok(file), Ok(folder)) => file.starts_with(folder),
+            // What is not there is said where it is read.
+            _ => true,
+        };
+        if self.outside || (plain && within()) {
+            return Ok(path);
+        }
+        Err(Fault::input(format!("{}: '{name}' lies outside the recording", self.folder.display()))
+            .cause("meta.json was written by somebody else, or the pictures are links to another place")
+            .next("copy the pictures into the recording, or scan with --pictures-outside where that is meant"))
+    }
+
+    /// Reads a picture of the recording's camera from anywhere, its levels made linear; of another size than meta.json says
+    /// none is decoded.
+    pub fn load(&self, path: &Path) -> Result<Image> {
+        let spec = &self.meta.image;
+        let image = crate::raster::load_sized(path, self.channel, spec.bits, [spec.width, spec.height])?;
+        Ok(spec.response.linear(image))
+    }
+
     /// Reads one of the recording's pictures and checks its size against `meta.json`.
     pub fn picture(&self, name: &str) -> Result<Image> {
-        let path = self.folder.join(name);
-        let image = crate::raster::load(&path, self.channel, self.meta.image.bits)?;
-        let (w, h) = (self.meta.image.width, self.meta.image.height);
-        if (image.width, image.height) != (w, h) {
+        self.load(&self.inside(name)?)
+    }
+
+    /// Which of `poses` the robot stood at in frame `index`. Frames that do not say are paired in order, and then there must
+    /// be as many poses as frames.
+    pub fn pose_of<'a, T>(&self, index: usize, poses: &'a [T]) -> Result<&'a T> {
+        let frame = &self.meta.frames[index];
+        let frames = self.meta.frames.len();
+        if frame.pose.is_none() && poses.len() != frames {
             return Err(Fault::input(format!(
-                "{}: is {}x{}, meta.json says {w}x{h}",
-                path.display(),
-                image.width,
-                image.height
+                "frame {index} names no pose; there are {frames} frames and {} poses",
+                poses.len()
             ))
-            .cause("pictures of two cameras or two resolutions in one folder")
-            .next("correct meta.json, or take the odd pictures out"));
+            .cause("a picture or a pose was lost on the way, so nobody knows which belong together")
+            .next("write \"pose\" into every frame of meta.json"));
         }
-        Ok(image)
+        let k = frame.pose.unwrap_or(index);
+        poses.get(k).ok_or_else(|| {
+            Fault::input(format!("frame {index} asks for pose {k}, the pose file has {}", poses.len()))
+                .cause("the pose file belongs to another recording, or ends early")
+                .next("export the poses of all pictures again")
+        })
     }
 
     /// The poses of [`Recording::pose_file`].
@@ -97,7 +140,7 @@ impl Recording {
     pub fn pose_file(&self, name: Option<&str>) -> Result<PoseFile> {
         let name = match (name, &self.meta.pose_file) {
             (Some(n), _) => n,
-            (None, Some(n)) => n.as_str(),
+            (None, Some(n)) => self.inside(n).map(|_| n.as_str())?,
             (None, None) => {
                 let known: Vec<&str> = self.meta.pose_files.keys().map(String::as_str).collect();
                 return Err(Fault::usage(format!("{}: meta.json names no single pose file", self.folder.display()))

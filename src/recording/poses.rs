@@ -1,10 +1,11 @@
 //! In: pose files (JSON matrices, CSV matrices, CSV in a named robot convention). Out: base_from_flange.
 //! Frame and unit: base and flange; the file states or names its units, the result is mm.
 
+use super::pose_csv::Row;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, ORTHONORMAL_WARN, Rigid};
 use crate::robot::Convention;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The poses of a file, and what a person should know about them.
 #[derive(Clone, Debug)]
@@ -30,22 +31,49 @@ struct JsonPose {
     matrix: [f64; 16],
 }
 
-/// `NAME.json` before `NAME.csv` in a folder.
+/// Two files that say the same, one of them with few digits, mm and rad.
+const SAME: [f64; 2] = [0.01, 2e-4];
+
+/// `NAME`, or `NAME.json` or `NAME.csv` in a folder; where both are there they must agree.
 pub(super) fn find_and_load(folder: &Path, name: &str) -> Result<PoseFile> {
     let candidates = [folder.join(name), folder.join(format!("{name}.json")), folder.join(format!("{name}.csv"))];
-    match candidates.iter().find(|p| p.is_file()) {
-        Some(path) => load_poses(path),
-        None => Err(Fault::input(format!("{}: no pose file {name}.json or {name}.csv", folder.display()))
+    let there: Vec<&PathBuf> = candidates.iter().filter(|p| p.is_file()).collect();
+    match there[..] {
+        [path] => load_poses(path),
+        [path, other] if path != &candidates[0] => {
+            let (read, again) = (load_poses(path)?, load_poses(other)?);
+            agree(&read.poses, &again.poses).map_err(|what| {
+                Fault::input(format!("{} and {} differ: {what}", path.display(), other.display()))
+                    .cause("poses of two recordings, or of two conventions")
+                    .next("take away the one that is wrong")
+            })?;
+            Ok(read)
+        }
+        [path, ..] => load_poses(path),
+        [] => Err(Fault::input(format!("{}: no pose file {name}.json or {name}.csv", folder.display()))
             .cause("the name is misspelt or the poses were not recorded")
-            .next(match there(folder) {
+            .next(match names_in(folder) {
                 names if names.is_empty() => "record the robot's pose at every picture".into(),
                 names => format!("name one of these with --poses: {}", names.join(", ")),
             })),
     }
 }
 
+fn agree(a: &[Rigid<Base, Flange>], b: &[Rigid<Base, Flange>]) -> std::result::Result<(), String> {
+    if a.len() != b.len() {
+        return Err(format!("{} and {} poses", a.len(), b.len()));
+    }
+    for (i, (a, b)) in a.iter().zip(b).enumerate() {
+        let (angle, mm) = a.difference(b);
+        if !(mm <= SAME[0] && angle <= SAME[1]) {
+            return Err(format!("pose {i} by {mm:.3} mm and {:.3} degrees", angle.to_degrees()));
+        }
+    }
+    Ok(())
+}
+
 /// The files of a folder that can be poses by their name.
-fn there(folder: &Path) -> Vec<String> {
+fn names_in(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).map_or(Vec::new(), |all| all.flatten().map(|e| e.file_name()).collect());
     let mut names: Vec<String> = entries
         .iter()
@@ -64,15 +92,15 @@ const METRES: f64 = 8.0;
 
 /// Loads a pose file by its extension: `.json`, or `.csv`/`.txt`.
 pub fn load_poses(path: &Path) -> Result<PoseFile> {
-    let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+    let text = crate::files::read_text(path)?;
     let json = path.extension().is_some_and(|e| e == "json");
-    let parsed = if json { from_json(&text) } else { from_csv(&text) };
+    let parsed = if json { from_json(text.trim_start_matches('\u{feff}')) } else { from_csv(&text) };
     parsed.map_err(|e| e.at(path.display()))
 }
 
-fn collect(rows: impl Iterator<Item = (usize, Convention, Vec<f64>)>) -> Result<PoseFile> {
+fn collect(rows: Vec<Row>) -> Result<PoseFile> {
     let mut out = PoseFile { poses: Vec::new(), warnings: Vec::new() };
-    for (expected, (index, convention, numbers)) in rows.enumerate() {
+    for (expected, (index, convention, numbers)) in rows.into_iter().enumerate() {
         if index != expected {
             return Err(Fault::input(format!("pose {expected} is numbered {index}"))
                 .cause("a pose is missing, or the file was sorted")
@@ -98,17 +126,70 @@ fn collect(rows: impl Iterator<Item = (usize, Convention, Vec<f64>)>) -> Result<
         }
         out.poses.push(pose);
     }
-    let reach = out.poses.iter().map(|p| p.translation.norm()).fold(0.0, f64::max);
-    if out.poses.len() > 2 && reach < METRES {
-        out.warnings.push(format!(
-            "all {} poses lie within {reach:.2} mm of the base's origin: they look like metres, and are read as millimetres",
-            out.poses.len()
-        ));
-    }
+    let metres = out.metres();
+    out.warnings.extend(metres);
     Ok(out)
 }
 
+impl PoseFile {
+    /// What is odd about poses that all lie in the robot's own foot.
+    fn metres(&self) -> Option<String> {
+        let reach = self.poses.iter().map(|p| p.translation.norm()).fold(0.0, f64::max);
+        (self.poses.len() > 2 && reach < METRES).then(|| {
+            format!(
+                "all {} poses lie within {reach:.2} mm of the base's origin: they look like metres, and are read as millimetres",
+                self.poses.len()
+            )
+        })
+    }
+}
+
+fn from_csv(text: &str) -> Result<PoseFile> {
+    let read = super::pose_csv::read(text)?;
+    let convention = read.rows.first().map_or(Convention::Matrix, |r| r.1);
+    if !read.angle_stated {
+        looks_like_another_unit(convention, &read.rows)?;
+    }
+    let file = collect(read.rows)?;
+    match file.metres() {
+        Some(what) if !read.length_stated => Err(Fault::refused(what)
+            .cause("positions in metres under a convention in millimetres")
+            .next("convert them, or write the unit into the header where they are right: X_mm,Y_mm,Z_mm")),
+        _ => Ok(file),
+    }
+}
+
+/// Asks about angles that look like the other unit; a unit in the header is the answer.
+fn looks_like_another_unit(convention: Convention, rows: &[Row]) -> Result<()> {
+    let Some((angles, degrees)) = convention.angles() else { return Ok(()) };
+    let of = |row: &Row| row.2.get(angles.clone()).unwrap_or_default().iter().fold(0.0, |m: f64, a| m.max(a.abs()));
+    let largest = rows.iter().map(of).fold(0.0, f64::max);
+    const TURN: f64 = std::f64::consts::TAU;
+    let (name, column) = (convention.name(), convention.labels()[angles.start].replace(' ', "_"));
+    let asked = |is: &str, want: &str| {
+        Err(Fault::refused(format!("no angle is above {largest:.3} in {} poses: {is}, {name} has {want}", rows.len()))
+            .cause(format!("the file is in {is} or of another convention"))
+            .next(format!(
+                "name the right convention, or write the unit into the header where it is right: {column},..."
+            )))
+    };
+    if degrees && largest > 0.0 && largest < 7.0 {
+        return asked("radians", "degrees");
+    }
+    if !degrees && largest > TURN + 0.01 {
+        return Err(Fault::refused(format!("an angle is {largest:.3}, above a turn in radians, which {name} has"))
+            .cause("the file is in degrees")
+            .next(format!("convert it, or write the unit into the header where it is right: {column},...")));
+    }
+    Ok(())
+}
+
 fn from_json(text: &str) -> Result<PoseFile> {
+    collect(json_rows(text, "base_T_flange")?)
+}
+
+/// Poses written as matrices of the transform that is named.
+pub(super) fn json_rows(text: &str, transform: &str) -> Result<Vec<Row>> {
     let file: JsonPoses = serde_json::from_str(text).map_err(|e| {
         Fault::input(format!("is not a pose file: {e}"))
             .cause("a misspelt key, NaN, or a truncated file")
@@ -117,7 +198,7 @@ fn from_json(text: &str) -> Result<PoseFile> {
     for (key, value, want) in [
         ("units", &file.units, "mm"),
         ("layout", &file.layout, "row-major 4x4"),
-        ("transform", &file.transform, "base_T_flange"),
+        ("transform", &file.transform, transform),
     ] {
         if value != want {
             return Err(Fault::input(format!("{key} is '{value}', only '{want}' is read"))
@@ -125,49 +206,7 @@ fn from_json(text: &str) -> Result<PoseFile> {
                 .next("convert the poses first"));
         }
     }
-    collect(file.poses.into_iter().map(|p| (p.frame, Convention::Matrix, p.matrix.to_vec())))
-}
-
-/// A CSV has a header; `frame,m00,...,m33` is a matrix in mm, every other layout is preceded by a
-/// line `# convention: NAME`.
-fn from_csv(text: &str) -> Result<PoseFile> {
-    let mut convention = None;
-    let mut header = false;
-    let mut rows = Vec::new();
-    for (number, line) in text.lines().enumerate() {
-        let line = line.trim();
-        if let Some(comment) = line.strip_prefix('#') {
-            if let Some(name) = comment.trim().strip_prefix("convention:") {
-                convention = Some(
-                    name.trim()
-                        .parse::<Convention>()
-                        .map_err(|e| Fault::input(e).next("name a convention of docs/conventions.md"))?,
-                );
-            }
-        } else if !line.is_empty() && !header {
-            header = true;
-            let matrix = line.split(',').map(str::trim).skip(1).eq(Convention::Matrix.labels().iter().copied());
-            convention = convention.or(matrix.then_some(Convention::Matrix));
-            if convention.is_none() {
-                return Err(Fault::input(format!("line {}: poses without a convention", number + 1))
-                    .cause("six or seven numbers can be read in nine ways, and this program does not guess")
-                    .next(
-                        "put a line '# convention: denso' (or ur, kuka, fanuc, abb, yaskawa, ros, quaternion) first",
-                    ));
-            }
-        } else if !line.is_empty() {
-            let mut cells = line.split(',').map(|c| c.trim().parse::<f64>());
-            let bad = || {
-                Fault::input(format!("line {}: '{line}' is not a row of numbers", number + 1))
-                    .cause("a truncated or edited file")
-                    .next("export the poses again")
-            };
-            let index = cells.next().and_then(|c| c.ok()).filter(|c| c.fract() == 0.0 && *c >= 0.0).ok_or_else(bad)?;
-            rows.push((index as usize, cells.collect::<std::result::Result<Vec<f64>, _>>().map_err(|_| bad())?));
-        }
-    }
-    let convention = convention.unwrap_or(Convention::Matrix);
-    collect(rows.into_iter().map(|(i, numbers)| (i, convention, numbers)))
+    Ok(file.poses.into_iter().map(|p| (p.frame, Convention::Matrix, p.matrix.to_vec())).collect())
 }
 
 /// Writes poses as JSON matrices.
@@ -189,7 +228,7 @@ mod tests {
     #[test]
     fn conventions_are_never_guessed() {
         assert!(from_csv("frame,x,y,z,rx,ry,rz\n0,1,2,3,4,5,6\n").unwrap_err().next.contains("convention"));
-        let poses = from_csv("# convention: denso\nframe,x,y,z,rx,ry,rz\n0,1,2,3,4,5,6\n").unwrap().poses;
+        let poses = from_csv("# convention: denso\nframe,x,y,z,rx_deg,ry_deg,rz_deg\n0,1,2,3,4,5,6\n").unwrap().poses;
         assert_eq!(poses[0].translation, crate::geometry::Vec3::new(1.0, 2.0, 3.0));
     }
 
@@ -210,8 +249,56 @@ mod tests {
             from_csv(&format!("# convention: denso\nframe,x,y,z,rx,ry,rz\n{}", rows.concat()))
         };
         assert!(file(1.0).unwrap().warnings.is_empty());
-        assert!(file(1e-3).unwrap().warnings[0].contains("metres"));
+        assert!(file(1e-3).unwrap_err().what.contains("metres"));
+        let meant = "# convention: denso\nframe,X_mm,Y_mm,Z_mm,RX,RY,RZ\n0,1,0,0,0,0,0\n1,2,0,0,0,0,0\n2,3,0,0,0,0,0\n";
+        assert!(from_csv(meant).unwrap().warnings[0].contains("metres"));
         assert!(file(1e3).unwrap_err().what.contains("400000 mm"));
+    }
+
+    #[test]
+    fn angles_of_the_other_unit_are_asked_about() {
+        let file = |convention: &str, header: &str, angle: f64| {
+            let rows: String = (0..4).map(|k| format!("{k},0.5,0.4,{k},0,0,{angle}\n")).collect();
+            from_csv(&format!("# convention: {convention}\nframe,{header}\n{rows}"))
+                .map(|_| ())
+                .map_err(|e| e.to_string())
+        };
+        let bare = "X,Y,Z,RX,RY,RZ";
+        assert!(file("denso", bare, 3.1).unwrap_err().contains("radians"));
+        assert!(file("denso", "X_mm,Y_mm,Z_mm,RX_deg,RY_deg,RZ_deg", 3.1).is_ok());
+        assert!(file("ur", bare, 90.0).unwrap_err().contains("degrees"));
+        assert!(file("ur", "X,Y,Z,RX_rad,RY_rad,RZ_rad", 9.0).is_ok());
+        assert!(file("ur", bare, 3.1).is_ok());
+        for impossible in [1e10, 1e160, 1e308] {
+            for convention in ["denso", "ur"] {
+                let unit = if convention == "ur" { "rad" } else { "deg" };
+                let header = format!("X,Y,Z,RX_{unit},RY_{unit},RZ_{unit}");
+                let said = file(convention, &header, impossible).unwrap_err();
+                assert!(said.contains("angle"), "{said}");
+            }
+        }
+    }
+
+    #[test]
+    fn two_files_of_one_name_must_agree() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |k: f64| {
+            Rigid::from_vectors(&crate::geometry::Vec3::new(0.1, 0.2, 0.3), crate::geometry::Vec3::new(400.0, k, 6.0))
+        };
+        save_poses(&dir.path().join("poses.json"), &[at(1.0), at(2.0)]).unwrap();
+        let csv = |b: f64, n: usize| {
+            let row = |(i, p): (usize, Rigid<Base, Flange>)| {
+                let numbers: Vec<String> = Convention::Denso.write(&p).iter().map(|v| format!("{v:.3}")).collect();
+                format!("{i},{}\n", numbers.join(","))
+            };
+            let rows: String = [at(1.0), at(b)].into_iter().take(n).enumerate().map(row).collect();
+            let text = format!("# convention: denso\nframe,X,Y,Z,RX,RY,RZ\n{rows}");
+            std::fs::write(dir.path().join("poses.csv"), text).unwrap();
+            find_and_load(dir.path(), "poses").map(|f| f.poses.len()).map_err(|e| e.what)
+        };
+        assert_eq!(csv(2.0, 2), Ok(2));
+        assert!(csv(2.5, 2).unwrap_err().contains("pose 1 by 0.500 mm"));
+        assert!(csv(2.0, 1).unwrap_err().contains("2 and 1 poses"));
     }
 
     #[test]

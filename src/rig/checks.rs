@@ -26,8 +26,11 @@ pub trait Measured {
     }
 }
 
+/// For values of which the caller says no more.
+const AGAIN: &str = "calibrate again, or import right values with sheetlight station import";
+
 fn bad(what: String, cause: &str) -> Fault {
-    Fault::input(what).cause(cause.to_owned())
+    Fault::input(what).cause(cause).next(AGAIN)
 }
 
 fn unit(v: &Vec3, what: &str) -> Result<()> {
@@ -70,6 +73,12 @@ impl Measured for Intrinsics {
             return Err(bad(
                 format!("fx {}, fy {} and skew {} px make no pixel", self.fx, self.fy, self.skew),
                 "numbers in another order",
+            ));
+        }
+        if self.normalised_from_pixel(&Vec2::new(w / 2.0, h / 2.0)).is_none() {
+            return Err(bad(
+                format!("the lens k1 k2 p1 p2 k3 = {:?} cannot be undone in the picture's middle", self.distortion),
+                "coefficients of another lens model, or in another order",
             ));
         }
         Ok(())
@@ -197,6 +206,7 @@ mod tests {
             check(|c| c.cx = 5000.0),
             check(|c| c.fx = 100.0),
             check(|c| c.fy = f64::NAN),
+            check(|c| (c.cx, c.distortion[0]) = (100.0, 1e300)),
         ] {
             assert!(!wrong.unwrap_err().cause.is_empty());
         }

@@ -40,7 +40,9 @@ impl Covariance {
     /// are not finite, a matrix that is not symmetric or not positive semidefinite.
     pub fn check(&self, kind: Kind) -> Result<()> {
         let bad = |what: String| {
-            Err(Fault::input(format!("the covariance {what}")).cause("edited by hand, or written by another program"))
+            Err(Fault::input(format!("the covariance {what}"))
+                .cause("edited by hand, or written by another program")
+                .next("calibrate again"))
         };
         let (names, counts) = kind.parameters();
         let n = self.parameters.len();

@@ -225,11 +225,7 @@ fn file(station: &Path, kind: Kind) -> PathBuf {
 fn load<T: DeserializeOwned + Measured>(station: &Path, kind: Kind) -> Result<Option<Calibration<T>>> {
     together(&station.join("calibration")).settle()?;
     let path = file(station, kind);
-    let text = match std::fs::read_to_string(&path) {
-        Ok(text) => text,
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        Err(e) => return Err(Fault::read(&path, e)),
-    };
+    let Some(text) = crate::files::read_text_if_there(&path)? else { return Ok(None) };
     let found: Calibration<T> = unsealed(&text, &path.display().to_string()).map_err(|e| e.next(again(kind)))?;
     found.check(kind).map_err(|e| e.at(path.display()).next(again(kind)))?;
     Ok(Some(found))

@@ -19,19 +19,24 @@ fn seal_of(value: &Value) -> String {
     super::hash_text(value.to_string().as_bytes())
 }
 
+/// For files of which the caller says no more.
+const AGAIN: &str = "make it again, or put the former one back";
+
 /// The record of a file whose seal is whole. `what` says what the file should be.
 pub fn unsealed<T: DeserializeOwned>(text: &str, what: &str) -> Result<T> {
     let (value, seal) = apart(text, what)?;
     let Some(seal) = seal else {
         return Err(Fault::input(format!("{what}: has no seal"))
-            .cause("written by a former version, by another program, or by hand"));
+            .cause("written by a former version, by another program, or by hand")
+            .next(AGAIN));
     };
     let is = seal_of(&value);
     if seal != is {
         return Err(Fault::input(format!(
             "{what}: was changed after it was made: sealed as {seal:.12}, it holds {is:.12}"
         ))
-        .cause("edited by hand, put together from two files, or damaged"));
+        .cause("edited by hand, put together from two files, or damaged")
+        .next(AGAIN));
     }
     shaped(value, what)
 }
@@ -40,7 +45,7 @@ pub fn unsealed<T: DeserializeOwned>(text: &str, what: &str) -> Result<T> {
 pub(super) fn apart(text: &str, what: &str) -> Result<(Value, Option<String>)> {
     let mut value: Value = serde_json::from_str(text).map_err(|e| strange(what, &e))?;
     let Some(object) = value.as_object_mut() else {
-        return Err(Fault::input(format!("{what}: is no JSON object")).cause("another kind of file"));
+        return Err(Fault::input(format!("{what}: is no JSON object")).cause("another kind of file").next(AGAIN));
     };
     let seal = object.remove("seal").map(|s| s.as_str().unwrap_or_default().to_owned());
     Ok((value, seal))
@@ -51,7 +56,9 @@ pub(super) fn shaped<T: DeserializeOwned>(value: Value, what: &str) -> Result<T>
 }
 
 fn strange(what: &str, e: &serde_json::Error) -> Fault {
-    Fault::input(format!("{what}: cannot be understood: {e}")).cause("edited by hand, truncated, or of another version")
+    Fault::input(format!("{what}: cannot be understood: {e}"))
+        .cause("edited by hand, truncated, or of another version")
+        .next(AGAIN)
 }
 
 #[cfg(test)]

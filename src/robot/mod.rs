@@ -76,8 +76,17 @@ impl Convention {
         }
     }
 
+    /// Where the angles stand among the numbers, and whether they are degrees; none for quaternions and matrices.
+    pub fn angles(self) -> Option<(std::ops::Range<usize>, bool)> {
+        match self {
+            Convention::Denso | Convention::Kuka | Convention::Fanuc | Convention::Yaskawa => Some((3..6, true)),
+            Convention::Ur => Some((3..6, false)),
+            Convention::Abb | Convention::Ros | Convention::Quaternion | Convention::Matrix => None,
+        }
+    }
+
     /// Reads a pose. Wrong counts, numbers that are not finite and quaternions whose length is
-    /// off by more than 1e-2 are refused.
+    /// off by more than 1e-2 are refused, and angles of more than ten turns.
     pub fn read<To: Frame, From: Frame>(self, numbers: &[f64]) -> Result<Rigid<To, From>> {
         let want = self.labels().len();
         if numbers.len() != want {
@@ -94,6 +103,21 @@ impl Convention {
             return Err(Fault::input("a pose holds a number that is not finite")
                 .cause("NaN in the pose file")
                 .next("export the pose again"));
+        }
+        if let Some((place, degrees)) = self.angles() {
+            // No wrist turns more often, whatever it counts.
+            let (limit, unit) = if degrees { (3600.0, "degrees") } else { (63.0, "radians") };
+            if let Some(angle) = numbers[place].iter().find(|a| a.abs() > limit) {
+                return Err(Fault::input(format!("an angle of {angle} {unit}, at most {limit} are believed"))
+                    .cause("a spoilt file, or numbers in another order or unit")
+                    .next("export the pose again"));
+            }
+        }
+        let limits = self.labels().iter().zip(numbers).filter_map(|(label, x)| Some((label, x, most(label)?)));
+        if let Some((label, x, most)) = limits.into_iter().find(|(_, x, most)| x.abs() > *most) {
+            return Err(Fault::input(format!("a pose holds {label} = {x:e}, limit {most:e}"))
+                .cause("a slipped decimal point, another unit, or a damaged file")
+                .next("export the pose again, or name the convention that the robot really writes"));
         }
         if self == Convention::Matrix {
             let rows: [f64; 16] = numbers.try_into().expect("counted above");
@@ -136,6 +160,15 @@ impl Convention {
             Convention::Matrix => unreachable!("returned above"),
         });
         out
+    }
+}
+
+/// Largest size of a length with this label: a kilometre; `None` for what is no length.
+fn most(label: &str) -> Option<f64> {
+    match label.split_once(' ')?.1 {
+        "mm" => Some(1e6),
+        "m" => Some(1e3),
+        _ => None,
     }
 }
 

@@ -3,6 +3,7 @@
 //! Frame and unit: robot base, mm; (u, v) in pixels of the shot; byte layout in docs/file-formats.md.
 
 use crate::fault::{Fault, Result};
+use crate::files::{moment, remove};
 use std::fs::File;
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -83,7 +84,9 @@ impl CloudWriter {
     /// Starts a cloud; an unfinished one of the same name is discarded.
     pub fn create(path: &Path) -> Result<CloudWriter> {
         let part = part_of(path);
-        let file = File::create(&part).map_err(|e| Fault::write(&part, e))?;
+        // Anew, so that a link of that name leads nowhere.
+        let file = remove(&part).and_then(|()| File::options().write(true).create_new(true).open(&part));
+        let file = file.map_err(|e| Fault::write(&part, e))?;
         let mut writer = CloudWriter { path: path.to_owned(), out: BufWriter::with_capacity(1 << 20, file), count: 0 };
         writer.put(header(0).as_bytes())?;
         Ok(writer)
@@ -93,10 +96,15 @@ impl CloudWriter {
     /// returned them; what came after is cut off.
     pub fn resume(path: &Path, keep: u64) -> Result<CloudWriter> {
         let part = part_of(path);
+        // Stopped between its name and the files that are made from it.
+        if path.exists() && !part.exists() {
+            moment().and_then(|()| std::fs::rename(path, &part)).map_err(|e| Fault::write(&part, e))?;
+        }
         let mut file = File::options().read(true).write(true).open(&part).map_err(|e| Fault::read(&part, e))?;
         let head = header(0);
         let mut found = vec![0; head.len()];
-        let good = file.read_exact(&mut found).is_ok() && found == head.as_bytes();
+        // Its count may be in it already.
+        let good = file.read_exact(&mut found).is_ok() && count_in(&found).is_some();
         let length = file.metadata().map_err(|e| Fault::read(&part, e))?.len();
         let wanted = head.len() as u64 + keep * RECORD;
         if !good || length < wanted {
@@ -125,7 +133,7 @@ impl CloudWriter {
 
     /// Puts everything on the disk; the returned count is what [`CloudWriter::resume`] can keep.
     pub fn checkpoint(&mut self) -> Result<u64> {
-        let done = self.out.flush().and_then(|()| self.out.get_ref().sync_data());
+        let done = moment().and_then(|()| self.out.flush()).and_then(|()| self.out.get_ref().sync_data());
         done.map_err(|e| Fault::write(&part_of(&self.path), e))?;
         Ok(self.count)
     }
@@ -133,16 +141,24 @@ impl CloudWriter {
     /// Writes the count into the header, syncs, and gives the file its name.
     pub fn finish(mut self) -> Result<u64> {
         let part = part_of(&self.path);
-        let done = self
-            .out
-            .seek(SeekFrom::Start(0))
+        let done = moment()
+            .and_then(|()| self.out.seek(SeekFrom::Start(0)))
             .and_then(|_| self.out.write_all(header(self.count).as_bytes()))
             .and_then(|()| self.out.flush())
+            .and_then(|()| moment())
             .and_then(|()| self.out.get_ref().sync_all())
+            .and_then(|()| moment())
             .and_then(|()| std::fs::rename(&part, &self.path));
         done.map_err(|e| Fault::write(&self.path, e))?;
         Ok(self.count)
     }
+}
+
+/// The count in a header of this program's; none in any other.
+fn count_in(head: &[u8]) -> Option<u64> {
+    let text = std::str::from_utf8(head).ok()?;
+    let count = text.lines().find_map(|l| l.strip_prefix("element vertex "))?.parse().ok()?;
+    (header(count).as_bytes() == head).then_some(count)
 }
 
 fn part_of(path: &Path) -> PathBuf {
@@ -169,6 +185,7 @@ pub struct CloudFile {
 impl CloudFile {
     /// Opens a PLY that this program wrote; other layouts are refused.
     pub fn open(path: &Path) -> Result<CloudFile> {
+        let length = crate::files::length(path)?;
         let mut file = File::open(path).map_err(|e| Fault::read(path, e))?;
         let mut bytes = vec![0; header(0).len()];
         let strange = |what: &str| {
@@ -177,17 +194,11 @@ impl CloudFile {
                 .next("give the cloud.ply of a sheetlight scan")
         };
         file.read_exact(&mut bytes).map_err(|_| strange("is too short for a cloud"))?;
-        let text = String::from_utf8_lossy(&bytes);
-        let count = text
-            .lines()
-            .find_map(|l| l.strip_prefix("element vertex "))
-            .and_then(|n| n.parse::<u64>().ok())
-            .filter(|&n| header(n).as_bytes() == bytes)
-            .ok_or_else(|| strange("has another header than a sheetlight cloud"))?;
+        let count = count_in(&bytes).ok_or_else(|| strange("has another header than a sheetlight cloud"))?;
         let start = bytes.len() as u64;
-        let length = file.metadata().map_err(|e| Fault::read(path, e))?.len();
-        if length != start + count * RECORD {
-            return Err(strange(&format!("is {length} bytes long, {count} points need {}", start + count * RECORD)));
+        let needed = count.saturating_mul(RECORD).saturating_add(start);
+        if length != needed {
+            return Err(strange(&format!("is {length} bytes long, {count} points need {needed}")));
         }
         Ok(CloudFile { path: path.to_owned(), count, start })
     }
@@ -283,7 +294,13 @@ mod tests {
         writer.append(&points[30..]).unwrap();
         assert_eq!(writer.finish().unwrap(), 50);
         assert_eq!(read_cloud(&path).unwrap(), points);
-        assert!(CloudWriter::resume(&path, 1).is_err());
+        // Stopped after it had its name, it goes on as the unfinished one that it was.
+        drop(CloudWriter::resume(&path, 20).unwrap());
+        assert!(!path.exists());
+        let mut writer = CloudWriter::resume(&path, 20).unwrap();
+        writer.append(&points[20..]).unwrap();
+        writer.finish().unwrap();
+        assert_eq!(read_cloud(&path).unwrap(), points);
     }
 
     #[test]

@@ -112,6 +112,11 @@ impl Engine {
         self
     }
 
+    /// Width of the pictures, px.
+    pub fn width(&self) -> u32 {
+        self.format.width
+    }
+
     /// Skeleton pixels that found no room in the GPU's list: more than a twentieth of the pictures.
     pub fn cut(&self) -> u64 {
         self.cut

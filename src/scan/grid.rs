@@ -14,16 +14,17 @@ use rand::{Rng, SeedableRng};
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct GridOptions {
-    /// Edge of a cell, mm, 0.005..=50; by default about 1.5 points a cell, rounded to 0.05 mm.
+    /// Edge of a cell, mm, 0.0001..=500; by default about 1.5 points a cell, to half a unit of its first digit.
     #[serde(rename = "cell_mm")]
     pub cell: Option<f64>,
     /// Where the grid lies; by default the scan's best plane, x along the base's x.
     pub base_from_grid: Option<Rigid<Base, Grid>>,
     /// Cells [x, y]; by default what the points need.
     pub cells: Option<[u32; 2]>,
-    /// Points farther apart than this in one cell belong to two surfaces, mm, 0.01..=10.
+    /// Points farther apart than this in one cell belong to two surfaces, mm, 0.0001..=100; by default the rise of a slope
+    /// of 31 degrees over a cell, and not less than six of the points' own standard deviations.
     #[serde(rename = "layer_mm")]
-    pub layer: f64,
+    pub layer: Option<f64>,
     /// Points of less quality are left out, 0..=1.
     pub min_quality: f32,
     /// A direction in the base frame that "up" shall agree with: towards the camera.
@@ -32,7 +33,7 @@ pub struct GridOptions {
 
 impl Default for GridOptions {
     fn default() -> Self {
-        GridOptions { cell: None, base_from_grid: None, cells: None, layer: 0.3, min_quality: 0.0, up: Vec3::z() }
+        GridOptions { cell: None, base_from_grid: None, cells: None, layer: None, min_quality: 0.0, up: Vec3::z() }
     }
 }
 
@@ -40,6 +41,8 @@ impl Default for GridOptions {
 const MOST_CELLS: u64 = 1 << 26;
 /// Most cells of a map whose cell nobody chose, however long the scan: 240 MB while they are filled.
 const FEW_CELLS: u64 = 1 << 22;
+/// Steeper than this is a step between two surfaces, mm per mm.
+const SLOPE: f64 = 0.6;
 
 impl GridOptions {
     pub fn check(&self) -> Result<()> {
@@ -47,11 +50,12 @@ impl GridOptions {
             Err(Fault::usage(format!("{name} is {value}, allowed {range}")).next("correct the grid options"))
         };
         match self.cell {
-            Some(c) if !(0.005..=50.0).contains(&c) => return bad("cell_mm", c, "0.005..=50"),
+            Some(c) if !(1e-4..=500.0).contains(&c) => return bad("cell_mm", c, "0.0001..=500"),
             _ => {}
         }
-        if !(0.01..=10.0).contains(&self.layer) {
-            return bad("layer_mm", self.layer, "0.01..=10");
+        match self.layer {
+            Some(l) if !(1e-4..=100.0).contains(&l) => return bad("layer_mm", l, "0.0001..=100"),
+            _ => {}
         }
         if !(0.0..=1.0).contains(&self.min_quality) {
             return bad("min_quality", f64::from(self.min_quality), "0..=1");
@@ -117,20 +121,22 @@ pub fn choose(source: &(impl PointSource + ?Sized), options: &GridOptions) -> Re
     }
     let base_from_grid = match options.base_from_grid {
         Some(frame) => frame,
-        None => best_frame(&sample.points, &options.up)?,
+        None => best_frame(&sample, &options.up)?,
     };
     let grid_from_base = base_from_grid.inverse();
     let local: Vec<Vec3> = sample.points.iter().map(|p| grid_from_base.point(p)).collect();
     // All points lie within the sample's extent but for the thin margin that a sample can miss.
-    let (x0, x1) = extent(&local, 0);
-    let (y0, y1) = extent(&local, 1);
-    let (z0, z1) = extent(&local, 2);
-    let area = ((x1 - x0) * (y1 - y0)).max(1e-6);
+    let [(x0, x1), (y0, y1), (z0, z1)] = extents(&local);
+    let area = ((x1 - x0) * (y1 - y0)).max(1e-12);
     let cell = options.cell.unwrap_or_else(|| {
         let wished = (1.5 * area / sample.total as f64).sqrt();
-        let least = 0.05 * ((area / FEW_CELLS as f64).sqrt() / 0.05).ceil();
-        ((wished / 0.05).round() * 0.05).clamp(least.clamp(0.05, 50.0), 50.0)
+        let least = (area / FEW_CELLS as f64).sqrt();
+        let unit = |x: f64| 0.5 * 10f64.powi(x.log10().floor() as i32);
+        let round = |x: f64| (x / unit(x)).round() * unit(x);
+        let up = |x: f64| (x / unit(x)).ceil() * unit(x);
+        round(wished).max(up(least)).clamp(1e-4, 500.0)
     });
+    let layer = options.layer.unwrap_or_else(|| (SLOPE * cell).max(6.0 * sample.sigma));
     let shift = if options.base_from_grid.is_some() { Vec3::zeros() } else { Vec3::new(x0, y0, 0.0) };
     let base_from_grid = Rigid::new(base_from_grid.rotation, base_from_grid.point(&shift));
     let [width, height] = options.cells.map_or_else(
@@ -144,9 +150,9 @@ pub fn choose(source: &(impl PointSource + ?Sized), options: &GridOptions) -> Re
         .cause("the cell is small against the scan, or a few stray points widen it")
         .next("choose a larger cell_mm, or give base_from_grid and cells"));
     }
-    let reach = z0.abs().max(z1.abs()) * 1.05 + 1.0;
+    let reach = z0.abs().max(z1.abs()) * 1.05 + 0.01 * (x1 - x0).max(y1 - y0);
     let z_step = (reach / f64::from(Z_MOST)) as f32;
-    let layer_steps = (options.layer / f64::from(z_step)).round() as i32;
+    let layer_steps = (layer / f64::from(z_step)).round().max(1.0) as i32;
     Ok(GridSpec {
         base_from_grid,
         width: width as u32,
@@ -160,6 +166,8 @@ pub fn choose(source: &(impl PointSource + ?Sized), options: &GridOptions) -> Re
 
 struct Sample {
     points: Vec<Vec3>,
+    /// Median of the points' own standard deviations, mm.
+    sigma: f64,
     total: u64,
     most_intensity: f32,
 }
@@ -168,7 +176,8 @@ struct Sample {
 /// so that the extent is that of the whole cloud.
 fn sample(source: &(impl PointSource + ?Sized), min_quality: f32) -> Result<Sample> {
     const MOST: usize = 200_000;
-    let mut out = Sample { points: Vec::new(), total: 0, most_intensity: 0.0 };
+    let mut sigmas = Vec::new();
+    let mut out = Sample { points: Vec::new(), sigma: 0.0, total: 0, most_intensity: 0.0 };
     let mut extremes: [[Option<(f32, Vec3)>; 2]; 3] = Default::default();
     let mut stride = 1u64;
     source.for_each_chunk(&mut |chunk| {
@@ -185,6 +194,9 @@ fn sample(source: &(impl PointSource + ?Sized), min_quality: f32) -> Result<Samp
                 }
             }
             if out.total % stride == 0 {
+                if sigmas.len() < MOST {
+                    sigmas.push(p.sigma_mm);
+                }
                 out.points.push(point);
                 if out.points.len() >= MOST {
                     let mut i = 0;
@@ -199,23 +211,37 @@ fn sample(source: &(impl PointSource + ?Sized), min_quality: f32) -> Result<Samp
         }
     })?;
     out.points.extend(extremes.iter().flatten().flatten().map(|(_, p)| *p));
+    if !sigmas.is_empty() {
+        let middle = sigmas.len() / 2;
+        out.sigma = f64::from(*sigmas.select_nth_unstable_by(middle, f32::total_cmp).1);
+    }
     Ok(out)
 }
 
-/// 0.02 % of the points on either side may be strays and do not widen the grid.
-fn extent(points: &[Vec3], axis: usize) -> (f64, f64) {
-    let mut values: Vec<f64> = points.iter().map(|p| p[axis]).collect();
-    let mut at = |i: usize| *values.select_nth_unstable_by(i, f64::total_cmp).1;
-    let (last, cut) = (points.len() - 1, points.len() / 5_000);
-    let [least, low, high, most] = [0, cut, last - cut, last].map(&mut at);
+/// Extents along x, y, z. 0.02 % of the points on either side may be strays and do not widen the grid.
+fn extents(points: &[Vec3]) -> [(f64, f64); 3] {
+    let of = |axis: usize| {
+        let mut values: Vec<f64> = points.iter().map(|p| p[axis]).collect();
+        let mut at = |i: usize| *values.select_nth_unstable_by(i, f64::total_cmp).1;
+        let (last, cut) = (points.len() - 1, points.len() / 5_000);
+        [0, cut, last - cut, last].map(&mut at)
+    };
+    let all = [of(0), of(1), of(2)];
+    let largest = all.iter().map(|[_, low, high, _]| high - low).fold(0.0, f64::max);
     // Strays are those that leave a gap; a dense edge is kept whole.
-    let margin = 0.01 * (high - low) + 0.5;
-    (least.max(low - margin), most.min(high + margin))
+    all.map(|[least, low, high, most]| {
+        let margin = 0.01 * (high - low) + 0.005 * largest;
+        (least.max(low - margin), most.min(high + margin))
+    })
 }
 
-/// The scan's best plane: the one with most points within 0.2 mm (seeded consensus over 400 triples),
-/// then least squares over its points. x is the base's x laid into the plane, z points `up`.
-fn best_frame(points: &[Vec3], up: &Vec3) -> Result<Rigid<Base, Grid>> {
+/// The scan's best plane: the one with most points near it (seeded consensus over 400 triples), then least squares over
+/// its points. x is the base's x laid into the plane, z points `up`. Near is six of the points' own standard deviations,
+/// and where those are small a five-hundredth of the scan's size: boards and tables are flat to that.
+fn best_frame(sample: &Sample, up: &Vec3) -> Result<Rigid<Base, Grid>> {
+    let points = &sample.points;
+    let size = extents(points).iter().map(|(a, b)| b - a).fold(0.0, f64::max);
+    let near = (6.0 * sample.sigma).max(size / 500.0);
     let flat = || {
         Fault::refused("the cloud's points lie on a line, a height map needs a surface")
             .cause("only one shot, or a robot that did not move")
@@ -233,15 +259,15 @@ fn best_frame(points: &[Vec3], up: &Vec3) -> Result<Rigid<Base, Grid>> {
             continue;
         }
         let Some(plane) = Plane::<Base>::new(normal, normal.dot(&a)) else { continue };
-        let count = probe.iter().filter(|p| plane.distance(p).abs() < 0.2).count();
+        let count = probe.iter().filter(|p| plane.distance(p).abs() < near).count();
         if best.is_none_or(|(n, _)| count > n) {
             best = Some((count, plane));
         }
     }
     let (_, mut plane) = best.ok_or_else(flat)?;
     for _ in 0..3 {
-        let near: Vec<Vec3> = points.iter().filter(|p| plane.distance(p).abs() < 0.2).copied().collect();
-        plane = fit_plane(&near).ok_or_else(flat)?.0;
+        let on: Vec<Vec3> = points.iter().filter(|p| plane.distance(p).abs() < near).copied().collect();
+        plane = fit_plane(&on).ok_or_else(flat)?.0;
     }
     if plane.normal.dot(up) < 0.0 {
         plane = plane.flipped();

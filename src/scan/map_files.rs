@@ -31,6 +31,8 @@ pub struct MapScale {
     pub pixel_centre: String,
 }
 
+/// Most bytes of one of a map's files: 64 million cells of 4 bytes, and what stands before them.
+const MOST_BYTES: u64 = (4 << 26) + (1 << 20);
 const CENTRE: &str = "((i + 0.5) cell_mm, (j + 0.5) cell_mm), row 0 first";
 
 impl HeightMap {
@@ -91,7 +93,7 @@ impl HeightMap {
     pub fn load(folder: &Path) -> Result<HeightMap> {
         let read = |name: &str| {
             let path = folder.join(name);
-            std::fs::read(&path).map_err(|e| Fault::read(&path, e))
+            crate::files::read(&path, MOST_BYTES)
         };
         let other = |what: String| {
             Fault::input(format!("{}: {what}", folder.display()))
@@ -112,7 +114,8 @@ impl HeightMap {
         };
         let mut map = HeightMap::empty(scale.width, scale.height, scale.cell_mm, scale.base_from_grid);
         (map.z, map.intensity, map.sigma) = (plane("height.tif")?, plane("intensity.tif")?, plane("sigma.tif")?);
-        let counts = crate::raster::load(&folder.join("count.png"), Default::default(), 16)?;
+        let size = [scale.width, scale.height];
+        let counts = crate::raster::load_sized(&folder.join("count.png"), Default::default(), 16, size)?;
         if (counts.width, counts.height) != (map.width, map.height) {
             return Err(other(format!("count.png is {}x{}", counts.width, counts.height)));
         }

@@ -3,6 +3,7 @@
 
 mod ambient;
 mod cloud;
+mod crossing;
 mod engine;
 mod extraction;
 mod filling;
@@ -13,6 +14,7 @@ mod map_files;
 mod map_picture;
 pub mod overlay;
 mod pcd;
+mod plateau;
 mod processor;
 mod scanner;
 mod shift;
@@ -28,7 +30,8 @@ pub use live::{Live, Newest};
 pub use map_files::MapScale;
 pub use map_picture::{MapPlace, Shown};
 pub use pcd::write_pcd;
+pub use plateau::Plateau;
 pub use processor::{Processor, Where, Why};
 pub use scanner::{Profile, Scanner, camera_for};
-pub use shift::{Plateau, ShiftReport, ShiftRig, Side, shift_scan};
+pub use shift::{ShiftReport, ShiftRig, Side, shift_scan};
 pub use source::{BadShot, Format, RawFormat, RawFrames, RawSource, RecordingSource, Shot, Source};

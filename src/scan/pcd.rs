@@ -1,70 +1,65 @@
 //! In: a cloud, in memory or on disk. Out: a binary PCD (Point Cloud Library), streamed.
 //! Frame and unit: base frame, mm; the PLY's fields under the names that PCL viewers know.
 
-use super::PointSource;
+use super::{CloudPoint, PointSource};
 use crate::fault::{Fault, Result};
-use pcd_rs::{DataKind, PcdSerialize, Writer, WriterInit};
-use std::io::BufWriter;
+use std::io::{BufWriter, Write};
 use std::path::Path;
 
-#[derive(PcdSerialize)]
-struct Record {
-    x: f32,
-    y: f32,
-    z: f32,
-    intensity: f32,
-    sigma_mm: f32,
-    quality: f32,
-    shot: u32,
-    u: f32,
-    v: f32,
+/// Fields of a record with their types (F: float, U: unsigned), 4 bytes each; `record` writes them in this order.
+const FIELDS: [(&str, &str); 9] = [
+    ("x", "F"),
+    ("y", "F"),
+    ("z", "F"),
+    ("intensity", "F"),
+    ("sigma_mm", "F"),
+    ("quality", "F"),
+    ("shot", "U"),
+    ("u", "F"),
+    ("v", "F"),
+];
+
+/// [PCD file format, pointclouds.org, version 0.7]
+fn header(count: u64) -> String {
+    let of = |what: fn(&(&'static str, &'static str)) -> &'static str| FIELDS.each_ref().map(what).join(" ");
+    format!(
+        "# .PCD v.7 - Point Cloud Data file format\nVERSION .7\nFIELDS {}\nSIZE {}\nTYPE {}\nCOUNT {}\n\
+         WIDTH {count}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS {count}\nDATA binary\n",
+        of(|f| f.0),
+        of(|_| "4"),
+        of(|f| f.1),
+        of(|_| "1")
+    )
+}
+
+fn record(p: &CloudPoint) -> [u8; 36] {
+    let [x, y, z] = p.position;
+    let floats = [x, y, z, p.intensity, p.sigma_mm, p.quality].map(f32::to_bits);
+    let words = floats.into_iter().chain([p.shot, p.u.to_bits(), p.v.to_bits()]);
+    let mut bytes = [0; 36];
+    bytes.chunks_exact_mut(4).zip(words).for_each(|(b, w)| b.copy_from_slice(&w.to_le_bytes()));
+    bytes
 }
 
 /// Writes `path` under a temporary name and renames it when it is complete.
 pub fn write_pcd(path: &Path, source: &(impl PointSource + ?Sized), count: u64) -> Result<()> {
     let file = crate::files::Aside::create(path)?;
-    let failed = |e: pcd_rs::Error| Fault::write(path, std::io::Error::other(e.to_string()));
-    let init = WriterInit {
-        width: count,
-        height: 1,
-        viewpoint: Default::default(),
-        data_kind: DataKind::Binary,
-        schema: None,
-        version: None,
-    };
-    let handle = file.file().try_clone().map_err(|e| Fault::write(path, e))?;
-    let mut writer: Writer<Record, _> =
-        init.build_from_writer(BufWriter::with_capacity(1 << 20, handle)).map_err(failed)?;
-    let mut wrong = None;
+    let mut out = BufWriter::with_capacity(1 << 20, file.file());
+    let mut written = out.write_all(header(count).as_bytes());
     source.for_each_chunk(&mut |chunk| {
         for p in chunk {
-            let [x, y, z] = p.position;
-            let record = Record {
-                x,
-                y,
-                z,
-                intensity: p.intensity,
-                sigma_mm: p.sigma_mm,
-                quality: p.quality,
-                shot: p.shot,
-                u: p.u,
-                v: p.v,
-            };
-            if wrong.is_none() {
-                wrong = writer.push(&record).err();
+            if written.is_ok() {
+                written = out.write_all(&record(p));
             }
         }
     })?;
-    if let Some(e) = wrong {
-        return Err(failed(e));
-    }
-    writer.finish().map_err(failed)?;
+    written.and_then(|()| out.flush()).map_err(|e| Fault::write(path, e))?;
+    drop(out);
     file.keep()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::CloudPoint;
     use super::*;
 
     #[test]
@@ -75,6 +70,8 @@ mod tests {
             .map(|i| CloudPoint { position: [i as f32, 2.5, -1.0], shot: 7, v: 3.25, ..Default::default() })
             .collect();
         write_pcd(&path, &points, 5).unwrap();
+        let reader = pcd_rs::DynReader::open(&path).unwrap();
+        assert_eq!(reader.map(|r| r.unwrap().0.len()).collect::<Vec<_>>(), [9; 5]);
         let bytes = std::fs::read(&path).unwrap();
         let end = bytes.windows(12).position(|w| w == b"DATA binary\n").unwrap() + 12;
         let header = String::from_utf8_lossy(&bytes[..end]);
@@ -82,6 +79,7 @@ mod tests {
             header.contains("POINTS 5") && header.contains("FIELDS x y z intensity sigma_mm quality shot u v"),
             "{header}"
         );
+        assert!(header.contains("SIZE 4 4 4 4 4 4 4 4 4\nTYPE F F F F F F U F F\n"), "{header}");
         assert_eq!(bytes.len() - end, 5 * 36);
         let third = &bytes[end + 2 * 36..];
         let float = |i: usize| f32::from_le_bytes(third[4 * i..4 * i + 4].try_into().unwrap());

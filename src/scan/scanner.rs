@@ -45,6 +45,8 @@ pub struct Scanner {
     /// Poses of shots that the engine works on, oldest first.
     poses: std::collections::VecDeque<(u32, Rigid<Base, Camera>)>,
     up: Vec3,
+    /// Where the scan's first shot was taken, if this is not its first part.
+    first: Option<Rigid<Base, Flange>>,
 }
 
 impl Scanner {
@@ -80,7 +82,13 @@ impl Scanner {
             support: None,
             poses: Default::default(),
             up: Vec3::z(),
+            first: None,
         })
+    }
+
+    /// Where the first shot of a resumed scan was taken: what follows from it stays what it was.
+    pub fn began_at(&mut self, first: Option<Rigid<Base, Flange>>) {
+        self.first = first;
     }
 
     /// Takes the next shot. Profiles become ready some shots later.
@@ -148,13 +156,15 @@ impl Scanner {
             };
             self.stripe = Some(stripe);
             self.engine.set_stripe(&stripe)?;
-            let base_from_camera = self.waiting[0].base_from_flange * self.camera_from_flange.inverse();
+            let first = self.first.unwrap_or(self.waiting[0].base_from_flange);
+            let base_from_camera = first * self.camera_from_flange.inverse();
             self.up = -base_from_camera.direction(&Vec3::z());
             let [nx, ny, _] = self.optics.normal.map(f64::from);
             let along = Vec3::new(ny, -nx, 0.0).try_normalize(1e-9).unwrap_or(Vec3::x());
             let axis = base_from_camera.direction(&along);
             let device = self.device();
-            self.support = Some(Support::new(self.extraction.support, stripe.width_px, &axis, device)?);
+            let field = self.pitch() * self.engine.width() as f32;
+            self.support = Some(Support::new(self.extraction.support, stripe.width_px, field, &axis, device)?);
         }
         for shot in std::mem::take(&mut self.waiting) {
             let base_from_camera = shot.base_from_flange * self.camera_from_flange.inverse();
@@ -164,8 +174,13 @@ impl Scanner {
         Ok(())
     }
 
+    /// What a pixel sees where the sheet meets the optical axis, mm.
+    fn pitch(&self) -> f32 {
+        (self.anchor.z / f64::from(self.optics.pinhole[0])) as f32
+    }
+
     fn collect(&mut self, all: bool) -> Result<Vec<Profile>> {
-        let pitch = (self.anchor.z / f64::from(self.optics.pinhole[0])) as f32;
+        let pitch = self.pitch();
         let mut measured = Vec::new();
         for Measured { shot, peaks, points } in self.engine.collect(all)? {
             let (index, base_from_camera) = self.poses.pop_front().expect("one pose a shot submitted");
@@ -227,7 +242,7 @@ pub fn camera_for(camera: &Intrinsics, format: Format) -> Result<Intrinsics> {
 fn anchor(camera: &Intrinsics, laser: &Plane<Camera>, depth_mm: [f64; 2]) -> Vec3 {
     let [near, far] = depth_mm;
     let z = laser.offset / laser.normal.z;
-    if z.is_finite() && z > 0.5 * near && z < 2.0 * far {
+    if z.is_finite() && (near..=far).contains(&z) {
         return Vec3::new(0.0, 0.0, z);
     }
     let (w, h) = (f64::from(camera.width), f64::from(camera.height));

@@ -3,9 +3,10 @@
 //! Frame and unit: x along the stripe, y along the travel, z up from the bed; mm (docs/math.md, Shift (1)).
 
 use super::CloudPoint;
+use super::crossing::{Crossing, stripe_by_row};
+use super::plateau::{Plateau, plateau, spread};
 use crate::fault::{Fault, Result};
-use crate::raster::{Channel, Image};
-use crate::stages::{Thinning, ThresholdParams, skeleton, thin, threshold};
+use crate::raster::Channel;
 use std::path::{Path, PathBuf};
 
 /// To which side of the picture a raised surface moves the stripe.
@@ -64,6 +65,11 @@ impl ShiftRig {
         Ok(())
     }
 
+    /// True of a row that always shows the bare bed.
+    fn is_bed(&self, row: f64) -> bool {
+        self.bed_rows.iter().any(|[a, b]| (f64::from(*a)..=f64::from(*b)).contains(&row))
+    }
+
     /// Height of a stripe that is shifted by `px`, and d(height)/d(px); docs/math.md, Shift (1).
     pub fn height(&self, px: f64) -> (f64, f64) {
         let (s, d) = (px / self.pixels_per_mm, self.baseline_mm);
@@ -71,87 +77,54 @@ impl ShiftRig {
     }
 }
 
-/// The stripe in one row.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Crossing {
-    /// Middle between the flanks, px.
-    pub u: f64,
-    /// Its standard deviation, px.
-    pub sigma_px: f64,
-    /// Grey levels above the row's background.
-    pub amplitude: f64,
-    pub saturated: bool,
+/// Where the stripe would lie on the bed: a line through the bed rows, and how far the stripe of the empty bed lies beside
+/// such a line.
+#[derive(Clone, Debug, Default)]
+struct Zero {
+    beside: Vec<f64>,
 }
 
-/// Grey levels that a stripe must rise above its row's background: ten times a webcam's noise.
-const FAINTEST: f64 = 30.0;
-/// Noise of a grey level on a flank, for the sigma: photographs are compressed and speckled.
-const NOISE: f64 = 5.0;
-
-/// The stripe of each row: of the skeleton's places the one with most light, refined to the middle
-/// between the places where its flanks cross half of its height. On glaring metal the top is cut off
-/// by saturation and says nothing, and the width changes tenfold within a picture; the flanks hold.
-pub fn stripe_by_row(image: &Image) -> Vec<Option<Crossing>> {
-    let window = ThresholdParams { size: 101, ..ThresholdParams::default() };
-    let skeleton = skeleton::twin(&thin::twin(&threshold::twin(image, &window), Thinning::default()));
-    let (width, grey, full) = (image.width as usize, image.to_f32(), f64::from(image.full_scale()));
-    let mut best: Vec<Option<(f64, Crossing)>> = vec![None; image.height as usize];
-    let backgrounds: Vec<f64> = grey.chunks_exact(width).map(middle_level).collect();
-    for pixel in skeleton {
-        let (x, y) = ((pixel & 0xffff) as usize, (pixel >> 16) as usize);
-        let row = &grey[y * width..(y + 1) * width];
-        let Some((crossing, run)) = flanks(row, x, backgrounds[y], full) else { continue };
-        let light = run * crossing.amplitude;
-        if best[y].is_none_or(|(most, _)| light > most) {
-            best[y] = Some((light, crossing));
-        }
+impl Zero {
+    /// From pictures of the empty bed, which show how the lens and the laser bend the stripe: the median of each row. A row
+    /// that fewer than half of them show lies as its neighbours do.
+    fn of(pictures: &[Vec<Option<Crossing>>], rig: &ShiftRig) -> Option<Zero> {
+        let lines: Vec<_> = pictures.iter().filter_map(|p| Some((p, bed_line(p, rig)?))).collect();
+        let rows = lines.first()?.0.len();
+        let seen: Vec<(usize, f64)> = (0..rows)
+            .filter_map(|v| {
+                let beside = |(p, (u0, slope)): &(&Vec<Option<Crossing>>, (f64, f64))| {
+                    p.get(v)?.map(|k| k.u - u0 - slope * v as f64)
+                };
+                let all: Vec<f64> = lines.iter().filter_map(beside).collect();
+                (2 * all.len() >= lines.len()).then(|| (v, spread(&all).0))
+            })
+            .collect();
+        let at = |v: usize| {
+            let next = seen.partition_point(|(row, _)| *row < v);
+            match (next.checked_sub(1).map(|i| seen[i]), seen.get(next)) {
+                (Some((a, x)), Some(&(b, y))) => x + (y - x) * (v - a) as f64 / (b - a) as f64,
+                (Some((_, x)), None) | (None, Some(&(_, x))) => x,
+                (None, None) => 0.0,
+            }
+        };
+        (!seen.is_empty()).then(|| Zero { beside: (0..rows).map(at).collect() })
     }
-    best.into_iter().map(|b| b.map(|(_, crossing)| crossing)).collect()
 }
 
-fn middle_level(row: &[f32]) -> f64 {
-    let mut sorted = row.to_vec();
-    let middle = sorted.len() / 2;
-    f64::from(*sorted.select_nth_unstable_by(middle, f32::total_cmp).1)
-}
-
-/// The middle between the half-height crossings about pixel `x`, and the distance between them.
-fn flanks(row: &[f32], x: usize, background: f64, full: f64) -> Option<(Crossing, f64)> {
-    let at = |i: usize| f64::from(row[i]);
-    let top = (x.saturating_sub(2)..(x + 3).min(row.len())).map(at).fold(0.0, f64::max);
-    let amplitude = top - background;
-    let half = background + amplitude / 2.0;
-    if amplitude < FAINTEST || at(x) < half {
-        return None;
-    }
-    let (mut a, mut b) = (x, x);
-    while a > 0 && at(a) >= half {
-        a -= 1;
-    }
-    while b + 1 < row.len() && at(b) >= half {
-        b += 1;
-    }
-    // A stripe that leaves the picture has one flank only.
-    if at(a) >= half || at(b) >= half {
-        return None;
-    }
-    let (rise, fall) = (at(a + 1) - at(a), at(b - 1) - at(b));
-    let left = a as f64 + (half - at(a)) / rise;
-    let right = b as f64 - (half - at(b)) / fall;
-    let sigma_px = 0.5 * NOISE * (1.0 / rise).hypot(1.0 / fall);
-    let crossing = Crossing { u: (left + right) / 2.0, sigma_px, amplitude, saturated: top >= full };
-    Some((crossing, right - left))
+/// The line of the bed rows; `None` where they do not show the bed.
+fn bed_line(rows: &[Option<Crossing>], rig: &ShiftRig) -> Option<(f64, f64)> {
+    let on_bed = |(v, k): (usize, &Option<Crossing>)| k.filter(|_| rig.is_bed(v as f64)).map(|k| (v as f64, k.u));
+    robust_line(&rows.iter().enumerate().filter_map(on_bed).collect::<Vec<_>>())
 }
 
 /// Points of one picture; empty where the bed rows do not show the bed.
-fn points(rows: &[Option<Crossing>], shot: u32, rig: &ShiftRig) -> Vec<CloudPoint> {
-    let bed = |v: usize| rig.bed_rows.iter().any(|[a, b]| (*a as usize..=*b as usize).contains(&v));
+fn points(rows: &[Option<Crossing>], shot: u32, rig: &ShiftRig, zero: &Zero) -> Vec<CloudPoint> {
     let found = || rows.iter().enumerate().filter_map(|(v, k)| k.map(|k| (v, k)));
-    let zero: Vec<(f64, f64)> = found().filter(|(v, _)| bed(*v)).map(|(v, k)| (v as f64, k.u)).collect();
-    let Some((u0, slope)) = robust_line(&zero) else { return Vec::new() };
+    let Some((u0, slope)) = bed_line(rows, rig) else { return Vec::new() };
+    let bed = |v: usize| u0 + slope * v as f64 + zero.beside.get(v).copied().unwrap_or(0.0);
     let sign = if rig.raises == Side::Left { -1.0 } else { 1.0 };
     let point = |(v, k): (usize, Crossing)| {
-        let (z, mm_per_px) = rig.height(sign * (k.u - u0 - slope * v as f64));
+        let (z, mm_per_px) = rig.height(sign * (k.u - bed(v)));
         CloudPoint {
             position: [(v as f64 / rig.pixels_per_mm) as f32, (f64::from(shot) * rig.travel_mm) as f32, z as f32],
             sigma_mm: (k.sigma_px * mm_per_px) as f32,
@@ -180,19 +153,6 @@ fn robust_line(points: &[(f64, f64)]) -> Option<(f64, f64)> {
     Some((median(points.iter().map(|(v, u)| u - slope * v).collect()), slope))
 }
 
-/// A level surface in a scan: the most frequent height above the bed.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Plateau {
-    /// Median of the points within 0.5 mm of the most frequent height, mm.
-    pub height_mm: f64,
-    /// Their robust standard deviation (1.4826 MAD), mm.
-    pub noise_mm: f64,
-    /// Standard deviation of the medians of single pictures, mm: what travels with the picture and does not average.
-    pub between_shots_mm: f64,
-    pub points: usize,
-    pub shots: usize,
-}
-
 /// What a shift scan came to.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct ShiftReport {
@@ -201,45 +161,67 @@ pub struct ShiftReport {
     pub points: usize,
     /// Pictures whose bed rows did not show the bed.
     pub without_bed: Vec<String>,
+    /// Pictures of the empty bed that gave the zero of each row; 0 without a reference.
+    pub reference: usize,
     /// The bed itself: noise of the zero.
     pub bed_noise_mm: f64,
     pub plateau: Option<Plateau>,
 }
 
-/// Scans a folder of pictures, in the order of their names.
+/// Scans a folder of pictures, in the order of their names; `reference` holds pictures of the empty bed.
 pub fn shift_scan(
     folder: &Path,
+    reference: Option<&Path>,
     rig: &ShiftRig,
     min_height_mm: f64,
     progress: &mut dyn FnMut(usize, usize),
 ) -> Result<(ShiftReport, Vec<CloudPoint>)> {
     rig.check()?;
-    let names = pictures(folder)?;
+    let (names, empty) = (pictures(folder)?, reference.map_or(Ok(vec![]), pictures)?);
+    let all = names.len() + empty.len();
+    let mut done = 0;
+    let mut rows = |path: &PathBuf| {
+        let found = stripe_by_row(&crate::raster::load(path, rig.channel, 8)?);
+        done += 1;
+        progress(done, all);
+        Ok(found)
+    };
+    let bare = empty.iter().map(&mut rows).collect::<Result<Vec<_>>>()?;
+    let zero = match reference {
+        None => Zero::default(),
+        Some(folder) => Zero::of(&bare, rig).ok_or_else(|| {
+            Fault::refused(format!(
+                "{}: 0 of {} pictures show the bed in the given rows",
+                folder.display(),
+                empty.len()
+            ))
+            .cause("no stripe there, or pictures of another set-up")
+            .next("give pictures of the empty bed, taken as the others, or leave --reference out")
+        })?,
+    };
     let mut report = ShiftReport {
         rig: rig.clone(),
         pictures: names.len(),
         points: 0,
         without_bed: vec![],
+        reference: empty.len(),
         bed_noise_mm: f64::NAN,
         plateau: None,
     };
     let mut cloud = Vec::new();
     for (i, path) in names.iter().enumerate() {
-        let image = crate::raster::load(path, rig.channel, 8)?;
-        let found = points(&stripe_by_row(&image), i as u32, rig);
+        let found = points(&rows(path)?, i as u32, rig, &zero);
         if found.is_empty() {
             report.without_bed.push(path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()));
         }
         cloud.extend(found);
-        progress(i + 1, names.len());
     }
     report.points = cloud.len();
-    let in_bed = |p: &CloudPoint| rig.bed_rows.iter().any(|[a, b]| (*a as f32..=*b as f32).contains(&p.v));
-    let bed: Vec<f64> = cloud.iter().filter(|p| in_bed(p)).map(|p| f64::from(p.position[2])).collect();
+    let on_bed = |p: &CloudPoint| rig.is_bed(f64::from(p.v));
+    let bed: Vec<f64> = cloud.iter().filter(|p| on_bed(p)).map(|p| f64::from(p.position[2])).collect();
     report.bed_noise_mm = spread(&bed).1;
-    let raised: Vec<CloudPoint> =
-        cloud.iter().filter(|p| !in_bed(p) && f64::from(p.position[2]) > min_height_mm).copied().collect();
-    report.plateau = plateau(&raised);
+    let high = |p: &&CloudPoint| !on_bed(p) && f64::from(p.position[2]) > min_height_mm;
+    report.plateau = plateau(&cloud.iter().filter(high).copied().collect::<Vec<_>>());
     Ok((report, cloud))
 }
 
@@ -247,52 +229,22 @@ fn pictures(folder: &Path) -> Result<Vec<PathBuf>> {
     let entries = std::fs::read_dir(folder).map_err(|e| Fault::read(folder, e))?;
     let known = |p: &PathBuf| {
         let extension = p.extension().map(|e| e.to_string_lossy().to_lowercase());
-        extension.is_some_and(|e| ["jpg", "jpeg", "png", "tif", "tiff", "pgm"].contains(&e.as_str()))
+        extension.is_some_and(|e| ["jpg", "jpeg", "png", "tif", "tiff", "bmp", "pgm"].contains(&e.as_str()))
     };
     let mut names: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(known).collect();
     names.sort_by_key(|p| crate::files::natural(&p.to_string_lossy()));
     if names.is_empty() {
         return Err(Fault::input(format!("{}: holds no pictures", folder.display()))
-            .cause("another folder, or pictures of another format than JPEG, PNG, TIFF, PGM")
+            .cause("another folder, or pictures of another format than JPEG, PNG, TIFF, BMP, PGM")
             .next("give the folder with the pictures"));
     }
     Ok(names)
 }
 
-/// Median and 1.4826 times the median absolute deviation.
-fn spread(values: &[f64]) -> (f64, f64) {
-    if values.is_empty() {
-        return (f64::NAN, f64::NAN);
-    }
-    let median = |mut x: Vec<f64>| {
-        x.sort_unstable_by(f64::total_cmp);
-        x[x.len() / 2]
-    };
-    let middle = median(values.to_vec());
-    (middle, 1.4826 * median(values.iter().map(|x| (x - middle).abs()).collect()))
-}
-
-fn plateau(raised: &[CloudPoint]) -> Option<Plateau> {
-    if raised.len() < 100 {
-        return None;
-    }
-    let bin = |p: &CloudPoint| (f64::from(p.position[2]) / 0.1).floor() as i64;
-    let mut counts = std::collections::BTreeMap::new();
-    raised.iter().for_each(|p| *counts.entry(bin(p)).or_insert(0usize) += 1);
-    let mode = counts.iter().max_by_key(|(_, n)| **n).map(|(b, _)| (*b as f64 + 0.5) * 0.1)?;
-    let on: Vec<&CloudPoint> = raised.iter().filter(|p| (f64::from(p.position[2]) - mode).abs() < 0.5).collect();
-    let (height_mm, noise_mm) = spread(&on.iter().map(|p| f64::from(p.position[2])).collect::<Vec<_>>());
-    let mut shots = std::collections::BTreeMap::<u32, Vec<f64>>::new();
-    on.iter().for_each(|p| shots.entry(p.shot).or_default().push(f64::from(p.position[2])));
-    let medians: Vec<f64> = shots.values().filter(|z| z.len() >= 10).map(|z| spread(z).0).collect();
-    let mean = medians.iter().sum::<f64>() / medians.len().max(1) as f64;
-    let variance = medians.iter().map(|m| (m - mean).powi(2)).sum::<f64>() / (medians.len().max(2) - 1) as f64;
-    Some(Plateau { height_mm, noise_mm, between_shots_mm: variance.sqrt(), points: on.len(), shots: medians.len() })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::raster::Image;
 
     fn rig() -> ShiftRig {
         ShiftRig {
@@ -323,7 +275,7 @@ mod tests {
     #[test]
     fn the_height_follows_the_shift_of_a_stripe_of_any_width() {
         for shift in [20.0, 61.5] {
-            let found = points(&stripe_by_row(&picture(shift)), 3, &rig());
+            let found = points(&stripe_by_row(&picture(shift)), 3, &rig(), &Zero::default());
             let top: Vec<f64> =
                 found.iter().filter(|p| (110.0..190.0).contains(&p.v)).map(|p| f64::from(p.position[2])).collect();
             assert!(top.len() > 75, "{}", top.len());
@@ -335,11 +287,34 @@ mod tests {
         }
     }
 
+    /// A bent stripe: without a reference the bend is height.
+    #[test]
+    fn a_reference_takes_out_how_the_stripe_is_bent() {
+        let bent = |shift: f64| -> Vec<Option<Crossing>> {
+            let at = |v: usize| {
+                let bend = 3.0 * ((v as f64 - 150.0) / 150.0).powi(2);
+                let u = 260.0 + bend - if (100..200).contains(&v) { shift } else { 0.0 };
+                // Some rows are never seen.
+                (v % 10 != 3).then_some(Crossing { u, sigma_px: 0.1, amplitude: 100.0, saturated: false })
+            };
+            (0..300).map(at).collect()
+        };
+        let zero = Zero::of(&[bent(0.0), bent(0.0), bent(0.0)], &rig()).unwrap();
+        let (want, _) = rig().height(20.0);
+        let off = |zero: &Zero| {
+            let found = points(&bent(20.0), 0, &rig(), zero);
+            let on = found.iter().filter(|p| (100.0..200.0).contains(&p.v));
+            on.map(|p| (f64::from(p.position[2]) - want).abs()).fold(0.0, f64::max)
+        };
+        assert!(off(&zero) < 0.01 && off(&Zero::default()) > 0.2, "{} {}", off(&zero), off(&Zero::default()));
+        assert!(Zero::of(&[vec![None; 300]], &rig()).is_none());
+    }
+
     #[test]
     fn senseless_rigs_are_refused() {
         assert!(ShiftRig { pixels_per_mm: 0.0, ..rig() }.check().is_err());
         assert!(ShiftRig { bed_rows: vec![[40, 5]], ..rig() }.check().is_err());
         let dir = tempfile::tempdir().unwrap();
-        assert!(shift_scan(dir.path(), &rig(), 1.0, &mut |_, _| {}).unwrap_err().what.contains("no pictures"));
+        assert!(shift_scan(dir.path(), None, &rig(), 1.0, &mut |_, _| {}).unwrap_err().what.contains("no pictures"));
     }
 }

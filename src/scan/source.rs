@@ -7,6 +7,7 @@ use crate::geometry::{Base, Flange, Rigid};
 use crate::raster::Image;
 use crate::recording::Recording;
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::io::Read;
 use std::sync::mpsc::{Receiver, sync_channel};
 
@@ -26,6 +27,8 @@ pub struct BadShot {
     pub index: u32,
     pub name: String,
     pub fault: Fault,
+    /// The source has ended with it: there is no next shot, and leaving this one out mends nothing.
+    pub last: bool,
 }
 
 /// Size and depth of every shot of a source.
@@ -43,6 +46,14 @@ pub trait Source {
     fn remaining(&self) -> Option<usize>;
     /// The next shot, in order; `None` at the end.
     fn next(&mut self) -> Option<std::result::Result<Shot, BadShot>>;
+    /// Whether it can be opened again where it was left.
+    fn resumable(&self) -> bool {
+        true
+    }
+    /// What the scan's report must say of it.
+    fn remarks(&self) -> Vec<String> {
+        Vec::new()
+    }
 }
 
 /// Memory for shots that are decoded ahead: at 640x480 two batches of the GPU's chain, eight shots at 12 MP and 8 bits. Half as
@@ -52,6 +63,7 @@ const AHEAD_BYTES: usize = 100 << 20;
 /// A recording folder as a source.
 pub struct RecordingSource {
     format: Format,
+    remarks: Vec<String>,
     remaining: usize,
     shots: Receiver<std::result::Result<Shot, BadShot>>,
 }
@@ -65,6 +77,7 @@ impl RecordingSource {
         let mut jobs = Vec::new();
         for (i, frame) in meta.frames.iter().enumerate() {
             let Some(name) = &frame.laser else { continue };
+            recording.inside(name)?;
             let pose = frame.pose.ok_or_else(|| {
                 Fault::input(format!("frame {i} ({name}) has no pose"))
                     .cause("the recording was made without a robot")
@@ -86,7 +99,7 @@ impl RecordingSource {
                 .next("give a recording whose frames name 'laser' pictures"));
         }
         let jobs = jobs.split_off(first.min(jobs.len()));
-        let format = Format { width: meta.image.width, height: meta.image.height, bits: meta.image.bits };
+        let format = Format { width: meta.image.width, height: meta.image.height, bits: recording.bits() };
         let bytes = format.width as usize * format.height as usize * if format.bits > 8 { 2 } else { 1 };
         let ahead = (AHEAD_BYTES / bytes.max(1)).clamp(8, 64);
         let (send, shots) = sync_channel(ahead);
@@ -97,7 +110,7 @@ impl RecordingSource {
                     .par_iter()
                     .map(|(index, name, pose)| match recording.picture(name) {
                         Ok(image) => Ok(Shot { index: *index, name: name.clone(), image, base_from_flange: *pose }),
-                        Err(fault) => Err(BadShot { index: *index, name: name.clone(), fault }),
+                        Err(fault) => Err(BadShot { index: *index, name: name.clone(), fault, last: false }),
                     })
                     .collect();
                 for shot in decoded {
@@ -108,7 +121,8 @@ impl RecordingSource {
                 }
             }
         });
-        Ok(RecordingSource { format, remaining, shots })
+        let remarks = meta.image.response.remark(meta.image.bits).into_iter().collect();
+        Ok(RecordingSource { format, remarks, remaining, shots })
     }
 }
 
@@ -123,6 +137,9 @@ impl Source for RecordingSource {
         let shot = self.shots.recv().ok()?;
         self.remaining -= 1;
         Some(shot)
+    }
+    fn remarks(&self) -> Vec<String> {
+        self.remarks.clone()
     }
 }
 
@@ -201,17 +218,42 @@ impl<R: Read> RawFrames<R> {
     }
 }
 
-/// Raw frames from a reader, one pose each.
+/// Raw frames from a reader, each with its pose: as many frames as poses, those that are `missing` counted.
 pub struct RawSource<R: Read> {
     frames: RawFrames<R>,
     poses: Vec<Rigid<Base, Flange>>,
+    /// Numbers of the poses whose frame never came.
+    missing: BTreeSet<usize>,
+    /// Pose of the next frame.
     next: usize,
     ended: bool,
 }
 
 impl<R: Read> RawSource<R> {
-    pub fn new(raw: RawFormat, reader: R, poses: Vec<Rigid<Base, Flange>>) -> RawSource<R> {
-        RawSource { frames: RawFrames::new(raw, reader), poses, next: 0, ended: false }
+    /// Refused: a missing frame that has no pose.
+    pub fn new(
+        raw: RawFormat,
+        reader: R,
+        poses: Vec<Rigid<Base, Flange>>,
+        missing: BTreeSet<usize>,
+    ) -> Result<RawSource<R>> {
+        if let Some(beyond) = missing.iter().find(|&&m| m >= poses.len()) {
+            return Err(Fault::usage(format!("frame {beyond} is called missing, the pose file has {}", poses.len()))
+                .cause("frames are numbered from 0")
+                .next("name the missing frames by the numbers of their poses"));
+        }
+        Ok(RawSource { frames: RawFrames::new(raw, reader), poses, missing, next: 0, ended: false })
+    }
+
+    /// Frames and poses do not go together: nobody knows which pose belongs to which frame.
+    fn uneven(&self, frames: String) -> Fault {
+        let missing = match self.missing.len() {
+            0 => String::new(),
+            n => format!(" and {n} missing frames are named"),
+        };
+        Fault::input(format!("the pipe gave {frames}, the pose file has {} poses{missing}", self.poses.len()))
+            .cause("frames were lost or doubled on the way, so later ones stand at poses of others")
+            .next("record again, or name the frames that never came: --missing 17,80")
     }
 }
 
@@ -220,31 +262,41 @@ impl<R: Read> Source for RawSource<R> {
         self.frames.format
     }
     fn remaining(&self) -> Option<usize> {
-        Some(self.poses.len() - self.next)
+        Some((self.next..self.poses.len()).filter(|i| !self.missing.contains(i)).count())
+    }
+    fn resumable(&self) -> bool {
+        false
+    }
+    fn remarks(&self) -> Vec<String> {
+        let names: Vec<String> = self.missing.iter().map(usize::to_string).collect();
+        if names.is_empty() { Vec::new() } else { vec![format!("frames said to be missing: {}", names.join(", "))] }
     }
     fn next(&mut self) -> Option<std::result::Result<Shot, BadShot>> {
         if self.ended {
             return None;
         }
+        while self.missing.contains(&self.next) {
+            self.next += 1;
+        }
         let index = self.next as u32;
         let name = format!("frame {index}");
-        let bad = |fault| Some(Err(BadShot { index, name: name.clone(), fault }));
+        let bad = |fault| Some(Err(BadShot { index, name: name.clone(), fault, last: true }));
         let image = match self.frames.read() {
             Ok(Some(image)) => image,
             Ok(None) => {
                 self.ended = true;
-                return None;
+                let came = self.next - self.missing.iter().filter(|m| **m < self.next).count();
+                return if self.next == self.poses.len() { None } else { bad(self.uneven(format!("{came} frames"))) };
             }
             Err(fault) => {
                 self.ended = true;
-                return bad(fault);
+                return bad(fault.at(&name));
             }
         };
         let Some(&base_from_flange) = self.poses.get(self.next) else {
             self.ended = true;
-            return bad(Fault::input(format!("frame {index} has no pose, the pose file has {}", self.poses.len()))
-                .cause("more frames than poses")
-                .next("record one pose a frame"));
+            let came = self.poses.len() - self.missing.len();
+            return bad(self.uneven(format!("more than {came} frames")));
         };
         self.next += 1;
         Some(Ok(Shot { index, name, image, base_from_flange }))
@@ -270,18 +322,43 @@ mod tests {
         }
     }
 
+    fn raw<'a>(format: &str, bytes: &'a [u8], n: usize, missing: &[usize]) -> RawSource<&'a [u8]> {
+        RawSource::new(format.parse().unwrap(), bytes, poses(n), missing.iter().copied().collect()).unwrap()
+    }
+
     #[test]
     fn a_pipe_gives_its_frames_and_says_where_it_broke() {
-        let raw: RawFormat = "2x2:gray10le".parse().unwrap();
         let bytes: Vec<u8> = [1u16, 2, 3, 1023, 5, 6, 7, 8, 9].iter().flat_map(|v| v.to_le_bytes()).collect();
-        let mut source = RawSource::new(raw, bytes.as_slice(), poses(3));
+        let mut source = raw("2x2:gray10le", &bytes, 3, &[]);
         assert_eq!(source.next().unwrap().unwrap().image, Image::from_u16(2, 2, 10, vec![1, 2, 3, 1023]));
         assert_eq!(source.next().unwrap().unwrap().index, 1);
         assert!(source.next().unwrap().unwrap_err().fault.what.contains("2 of 8 bytes"));
         assert!(source.next().is_none());
         let too_bright: Vec<u8> = [1024u16; 4].iter().flat_map(|v| v.to_le_bytes()).collect();
-        assert!(RawSource::new(raw, too_bright.as_slice(), poses(1)).next().unwrap().is_err());
-        let mut short = RawSource::new("2x2:gray8".parse().unwrap(), [0u8; 8].as_slice(), poses(1));
-        assert!(short.next().unwrap().is_ok() && short.next().unwrap().unwrap_err().fault.what.contains("no pose"));
+        assert!(raw("2x2:gray10le", &too_bright, 1, &[]).next().unwrap().is_err());
+    }
+
+    #[test]
+    fn frames_and_poses_are_counted_against_each_other() {
+        let all = |frames: usize, poses: usize, missing: &[usize]| {
+            let bytes = vec![0u8; 4 * frames];
+            let mut source = raw("2x2:gray8", &bytes, poses, missing);
+            let shots: Vec<_> = std::iter::from_fn(|| source.next()).collect();
+            shots
+                .into_iter()
+                .map(|s| s.map(|s| s.index).map_err(|b| (b.last, b.fault.what)))
+                .collect::<std::result::Result<Vec<_>, _>>()
+        };
+        assert_eq!(all(3, 3, &[]), Ok(vec![0, 1, 2]));
+        let (last, what) = all(2, 3, &[]).unwrap_err();
+        assert!(last && what.contains("gave 2 frames, the pose file has 3"), "{what}");
+        let (last, what) = all(4, 3, &[]).unwrap_err();
+        assert!(last && what.contains("more than 3 frames"), "{what}");
+        assert_eq!(all(2, 4, &[0, 2]), Ok(vec![1, 3]));
+        assert_eq!(all(2, 4, &[1, 3]), Ok(vec![0, 2]));
+        let (_, what) = all(3, 5, &[1]).unwrap_err();
+        assert!(what.contains("3 frames, the pose file has 5 poses and 1 missing"), "{what}");
+        let beyond = RawSource::new("2x2:gray8".parse().unwrap(), [].as_slice(), poses(2), [2].into());
+        assert!(beyond.err().unwrap().what.contains("frame 2"));
     }
 }

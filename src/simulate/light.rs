@@ -78,10 +78,12 @@ pub struct View<'a> {
     pub scene_from_camera: Rigid<InScene, Camera>,
 }
 
-/// Beyond this nothing is lit or seen, mm.
-const FAR: f64 = 2000.0;
-
 impl View<'_> {
+    /// Beyond this nothing is lit or seen, mm.
+    pub(super) fn far(&self) -> f64 {
+        13.0 * self.station.working_distance
+    }
+
     fn sigma_px(&self) -> f64 {
         (self.station.blur_px().powi(2) + 1.0 / 12.0).sqrt()
     }
@@ -95,9 +97,8 @@ impl View<'_> {
         let reach = laser.half_fan_deg.to_radians().tan();
         let pixel = s.working_distance / s.camera.fx;
         let source_distance = (laser.source - Vec3::new(0.0, 0.0, s.working_distance)).norm();
-        // A third of a pixel between beams, along and across: the blur hides the raster.
+        // A third of a pixel between beams, along and across (below): the blur hides the raster.
         let along = (2.0 * reach * source_distance / pixel * 3.0).ceil() as usize;
-        let across = (4.0 * laser.waist_radius / pixel * 3.0).ceil() as usize | 1;
         let gain = self.sheet_gain();
         let mut middle = Vec::new();
         for i in 0..along {
@@ -106,8 +107,9 @@ impl View<'_> {
             // Equal steps of tan φ; the power per angle falls off towards the edges of the fan.
             let dphi = 2.0 * reach / along as f64 / (1.0 + slope * slope);
             let power = gain * dphi * (1.0 - 0.35 * (slope / reach).powi(2));
-            let Some(centre) = self.scene.hit(&source, &direction, FAR) else { continue };
+            let Some(centre) = self.scene.hit(&source, &direction, self.far()) else { continue };
             let radius = laser.radius(centre.t);
+            let across = (4.0 * radius / pixel * 3.0).ceil() as usize | 1;
             let mut total = 0.0;
             let weight = |k: usize| {
                 let x = 2.0 * (2.0 * (k as f64 + 0.5) / across as f64 - 1.0);
@@ -117,7 +119,7 @@ impl View<'_> {
             for k in 0..across {
                 let (x, w) = weight(k);
                 let start = source + normal * (x * radius);
-                let hit = if x == 0.0 { Some(centre) } else { self.scene.hit(&start, &direction, FAR) };
+                let hit = if x == 0.0 { Some(centre) } else { self.scene.hit(&start, &direction, self.far()) };
                 let Some(hit) = hit else { continue };
                 let seen = self.deposit(canvas, &hit, &direction, power * w / total);
                 if let (true, Some((u, v))) = (x.abs() < 1e-12, seen) {
@@ -133,7 +135,7 @@ impl View<'_> {
         let (s, pointer) = (self.station, &self.station.pointer);
         let source = self.scene_from_camera.point(&pointer.source);
         let axis = self.scene_from_camera.direction(&pointer.axis);
-        let centre = self.scene.hit(&source, &axis, FAR)?;
+        let centre = self.scene.hit(&source, &axis, self.far())?;
         let radius = pointer.radius(centre.t);
         let side = axis.cross(&Vec3::new(0.3, 0.5, 0.8)).normalize();
         let up = axis.cross(&side);
@@ -147,7 +149,7 @@ impl View<'_> {
             for j in 0..n {
                 let (x, y) = (place(i), place(j));
                 let start = source + (side * x + up * y) * radius;
-                let Some(hit) = self.scene.hit(&start, &axis, FAR) else { continue };
+                let Some(hit) = self.scene.hit(&start, &axis, self.far()) else { continue };
                 let weight = (-2.0 * (x * x + y * y)).exp() / total;
                 let seen = self.deposit(canvas, &hit, &axis, gain * weight);
                 if let (true, Some((u, v))) = (x.abs() < 1e-12 && y.abs() < 1e-12, seen) {
@@ -165,7 +167,7 @@ impl View<'_> {
         if mirror > 0.0 {
             let onward = direction - hit.normal * (2.0 * direction.dot(&hit.normal));
             let start = hit.point + hit.normal * 1e-4;
-            if let Some(second) = self.scene.hit(&start, &onward, FAR) {
+            if let Some(second) = self.scene.hit(&start, &onward, self.far()) {
                 self.glow(canvas, &second, &onward, power * mirror);
             }
         }
@@ -186,7 +188,8 @@ impl View<'_> {
         let in_camera = self.scene_from_camera.inverse().point(&hit.point);
         let px = self.station.camera.pixel_from_point(&in_camera)?;
         let (w, h) = (f64::from(self.station.camera.width), f64::from(self.station.camera.height));
-        if !(px.x > -20.0 && px.y > -20.0 && px.x < w + 20.0 && px.y < h + 20.0) {
+        let reach = 4.0 * self.sigma_px() + 1.0;
+        if !(px.x > -reach && px.y > -reach && px.x < w + reach && px.y < h + reach) {
             return None;
         }
         if !self.scene.clear(&(hit.point + hit.normal * 1e-4), &eye) {

@@ -36,8 +36,9 @@ impl Pattern {
                 let on = i >= 0.0 && j >= 0.0 && i < f64::from(*nx) && j < f64::from(*ny);
                 on && ((i + j) % 2.0 == 0.0 || self.markers.as_ref().is_some_and(|m| m.black_at(x, y)))
             }
-            BoardSpec::Circles { diameter_mm, .. } => {
-                let r = diameter_mm / 2.0;
+            BoardSpec::MarkerGrid { .. } => self.markers.as_ref().is_some_and(|m| m.black_at(x, y)),
+            BoardSpec::Circles { .. } => {
+                let r = self.board.drawn_diameter().unwrap_or(0.0) / 2.0;
                 self.dots.iter().any(|c| (x - c[0]).hypot(y - c[1]) <= r)
             }
         }

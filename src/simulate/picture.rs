@@ -17,7 +17,7 @@ impl View<'_> {
         let along = Vec3::new(n.x, n.y, 1.0).normalize();
         let eye = self.scene_from_camera.translation;
         let direction = self.scene_from_camera.direction(&along);
-        let Some(hit) = self.scene.hit(&eye, &direction, 2000.0) else { return 0.02 };
+        let Some(hit) = self.scene.hit(&eye, &direction, self.far()) else { return 0.02 };
         let lamp = self.scene_from_camera.direction(&Vec3::new(-0.35, -0.25, -0.9)).normalize();
         let shade = 0.55 + 0.45 * hit.normal.dot(&lamp).max(0.0);
         // cos⁴ of the angle to the axis: natural vignetting of a lens.
@@ -114,6 +114,9 @@ pub fn hot_pixels(sensor: &Sensor, pixels: usize, rng: &mut Pcg64) -> Vec<(usize
     (0..count).map(|_| (rng.random_range(0..pixels), rng.random_range(0.02f32..0.5))).collect()
 }
 
+/// A speckle contrast below this changes no level of 16 bits, and the Gamma distribution's shape leaves what f32 holds.
+const FAINTEST_SPECKLE: f64 = 1e-6;
+
 /// Turns light (share of full scale) into grey levels. `laser` has speckle, `room` has none.
 pub fn expose(
     sensor: &Sensor,
@@ -123,7 +126,7 @@ pub fn expose(
     hot: &[(usize, f32)],
     rng: &mut Pcg64,
 ) -> Image {
-    let speckle = (sensor.speckle > 0.0).then(|| {
+    let speckle = (sensor.speckle > FAINTEST_SPECKLE).then(|| {
         let grains = 1.0 / (sensor.speckle * sensor.speckle);
         Gamma::new(grains as f32, (1.0 / grains) as f32).expect("positive")
     });

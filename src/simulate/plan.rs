@@ -26,14 +26,28 @@ pub fn above(x: f64, y: f64, z: f64) -> Rigid<InScene, Camera> {
     Rigid::new(Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0)), Vec3::new(x, y, z))
 }
 
-/// A straight pass over the scene's region along y in equal steps. The sheet meets the optical axis
-/// at the scene's focus height; the pass is longer than the region by what the heights shift it.
+/// A straight pass over the scene's region along y in equal steps, from the side that the laser stands on. The sheet
+/// meets the scene's focus height at the working distance; the pass is longer than the region by what the heights shift it.
 pub fn scan(station: &Station, scene: &Scene, shots: usize) -> Vec<Rigid<InScene, Camera>> {
     let [x0, y0, x1, y1] = scene.spec.region_mm;
-    let height = scene.spec.focus_height_mm + station.working_distance;
-    let (from, to) = (y0 - 1.0, y1 + 1.0);
+    let (rig, laser) = (&station.rig, &station.laser);
+    let side = rig.laser.side_deg.to_radians();
+    let turn = exp(&(Vec3::z() * (90f64.to_radians() - side)));
+    let lean = exp(&(Vec3::x() * -rig.working.lean_deg.to_radians()));
+    let rotation = lean * Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0)) * turn;
+    // Where the fan's middle is at the working distance, towards the laser; on the axis unless the rig says otherwise.
+    let z = station.working_distance;
+    let along = (laser.source + laser.axis * ((z - laser.source.z) / laser.axis.z))
+        .xy()
+        .dot(&Vec2::new(side.cos(), side.sin()));
+    let met = rotation * Vec3::new(along * side.cos(), along * side.sin(), z);
+    let over = rig.scale();
+    let (from, to) = (y0 - over, y1 + over);
     (0..shots)
-        .map(|i| above((x0 + x1) / 2.0, from + (to - from) * i as f64 / (shots.max(2) - 1) as f64, height))
+        .map(|i| {
+            let y = from + (to - from) * i as f64 / (shots.max(2) - 1) as f64;
+            Rigid::new(rotation, Vec3::new((x0 + x1) / 2.0, y, scene.spec.focus_height_mm) - met)
+        })
         .collect()
 }
 
@@ -68,7 +82,7 @@ pub struct Views {
     pub seen: f64,
 }
 
-/// Whether a beam falls on a board where it can be measured: the sheet's middle well inside the
+/// Whether a beam falls on a board where it can be measured: inside the picture, the sheet's middle well inside the
 /// plate, the pointer on an even patch, because print under the spot moves its centroid.
 fn useful(station: &Station, board: &Pattern, pose: &Rigid<Camera, Board>, beam: Beam) -> bool {
     let plane = pose.plane(&Plane::<Board>::new(Vec3::z(), 0.0).expect("unit normal"));
@@ -77,11 +91,17 @@ fn useful(station: &Station, board: &Pattern, pose: &Rigid<Camera, Board>, beam:
         Beam::Pointer => Some(station.pointer.ray()),
     };
     let Some(p) = ray.and_then(|r| r.meet(&plane)) else { return false };
+    let (w, h) = (f64::from(station.camera.width), f64::from(station.camera.height));
+    let seen = station.camera.pixel_from_point(&p);
+    if !seen.is_some_and(|q| q.x > 0.0 && q.y > 0.0 && q.x < w && q.y < h) {
+        return false;
+    }
     let p = pose.inverse().point(&p);
     let [x0, y0, x1, y1] = board.board.outline();
-    let margin = if beam == Beam::Line { 0.2 * (y1 - y0) } else { 2.0 };
+    let spot = station.pointer.waist_radius;
+    let margin = if beam == Beam::Line { 0.2 * (y1 - y0) } else { 4.0 * spot };
     let inside = p.x > x0 + margin && p.x < x1 - margin && p.y > y0 + margin && p.y < y1 - margin;
-    let around = |i: u32| Vec2::new(p.x, p.y) + 1.6 * Vec2::new(f64::from(i).cos(), f64::from(i).sin());
+    let around = |i: u32| Vec2::new(p.x, p.y) + 3.2 * spot * Vec2::new(f64::from(i).cos(), f64::from(i).sin());
     inside && (beam == Beam::Line || (0..12).map(around).all(|q| !board.is_black(q.x, q.y)))
 }
 
@@ -102,6 +122,8 @@ pub fn board_views(
     let camera = &station.camera;
     let (w, h) = (f64::from(camera.width), f64::from(camera.height));
     let edge = 0.02 * w;
+    // A board's long side lies along the picture's.
+    let upright = if h > w { 90f64.to_radians() } else { 0.0 };
     let inside = |p: Vec3| {
         camera.pixel_from_point(&p).is_some_and(|q| q.x > edge && q.y > edge && q.x < w - edge && q.y < h - edge)
     };
@@ -115,7 +137,7 @@ pub fn board_views(
             let px = Vec2::new(w / 2.0 + within(0.45 * w) * spread, h / 2.0 + within(0.45 * h) * spread);
             let azimuth = within(std::f64::consts::PI);
             let tilt = within(views.tilt_deg).to_radians();
-            let turn = within(views.turn_deg).to_radians();
+            let turn = upright + within(views.turn_deg).to_radians();
             let z = rng.random_range(views.near..=views.far);
             let ray = camera.ray_from_pixel(&px)?;
             let rotation = exp(&(Vec3::new(azimuth.cos(), azimuth.sin(), 0.0) * tilt)) * exp(&(Vec3::z() * turn));

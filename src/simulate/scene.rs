@@ -158,6 +158,12 @@ impl ShapeSpec {
     }
 }
 
+/// Most copies of one solid, or cuts in it; most of both in a scene.
+const MOST_COPIES: u64 = 10_000;
+const MOST_BODIES: u64 = 100_000;
+/// Largest coordinate, mm, and turn, degrees.
+const FARTHEST: f64 = 1e5;
+
 /// Places of the copies, centred on the origin.
 fn copies(repeat: [u32; 2], pitch: [f64; 2]) -> impl Iterator<Item = Vec3> {
     let offset = move |i: u32, axis: usize| (f64::from(i) - f64::from(repeat[axis] - 1) / 2.0) * pitch[axis];
@@ -208,7 +214,7 @@ pub struct Scene {
 
 impl SceneSpec {
     pub fn load(path: &Path) -> Result<SceneSpec> {
-        let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+        let text = crate::files::read_text(path)?;
         SceneSpec::parse(&text).map_err(|e| e.at(path.display()))
     }
     pub fn parse(text: &str) -> Result<SceneSpec> {
@@ -218,9 +224,13 @@ impl SceneSpec {
                 .next("compare it with docs/file-formats.md, Scene file")
         })?;
         let [x0, y0, x1, y1] = spec.region_mm;
-        if !(x1 - x0 > 0.1 && y1 - y0 > 0.1) {
-            return Err(Fault::input(format!("region_mm {:?} spans less than 0.1 mm", spec.region_mm))
-                .next("give x0, y0, x1, y1 with x0 < x1 and y0 < y1"));
+        let span = |low: f64, high: f64| (0.1..=FARTHEST).contains(&(high - low));
+        if !(span(x0, x1) && span(y0, y1)) {
+            return Err(Fault::input(format!(
+                "region_mm {:?} spans less than 0.1 or more than {FARTHEST} mm",
+                spec.region_mm
+            ))
+            .next("give x0, y0, x1, y1 with x0 < x1 and y0 < y1"));
         }
         Ok(spec)
     }
@@ -329,8 +339,29 @@ fn place(
     if let Some((value, most)) = ranges.iter().find(|(v, most)| !(0.0..=*most).contains(v)) {
         return Err(Fault::input(format!("a material holds {value}, allowed 0..={most}")).next("correct the material"));
     }
-    if solid.repeat.contains(&0) || solid.cut.iter().any(|c| c.repeat.contains(&0)) {
-        return Err(Fault::input("repeat holds 0, at least 1 needed").next("leave repeat out for a single one"));
+    let of = |r: [u32; 2]| u64::from(r[0]) * u64::from(r[1]);
+    let cuts = solid.cut.iter().map(|c| of(c.repeat)).fold(0, u64::saturating_add);
+    for (what, n, least) in [("copies", of(solid.repeat), 1), ("cuts", cuts, solid.cut.len() as u64)] {
+        if !(least..=MOST_COPIES).contains(&n) || solid.cut.iter().any(|c| of(c.repeat) == 0) {
+            return Err(Fault::input(format!("a solid has {n} {what}, limit 1 to {MOST_COPIES}"))
+                .cause("a slip in repeat")
+                .next("correct repeat; leave it out for a single one"));
+        }
+    }
+    // What is there already counts too: rays are tried on everything.
+    let held =
+        out.iter().map(|b| 1 + b.body.cuts.len() as u64).sum::<u64>() + of(solid.repeat).saturating_mul(1 + cuts);
+    if held > MOST_BODIES {
+        return Err(Fault::input(format!("the scene holds {held} solids and cuts, limit {MOST_BODIES}"))
+            .cause("a slip in repeat")
+            .next("draw less of the scene"));
+    }
+    let places = solid.cut.iter().flat_map(|c| c.at_mm.into_iter().chain(c.pitch_mm).chain([c.turn_deg]));
+    let mut places = places.chain(solid.at_mm).chain(solid.pitch_mm).chain([solid.turn_deg]);
+    if let Some(bad) = places.find(|v| !(v.abs() <= FARTHEST)) {
+        return Err(Fault::input(format!("a place, pitch or turn is {bad}, allowed -{FARTHEST}..={FARTHEST}"))
+            .cause("a slip in the scene file")
+            .next("correct the solid"));
     }
     let shape = solid.shape.build()?;
     let mut cuts = Vec::new();

@@ -2,6 +2,7 @@
 //! hand-eye — whose every number is known.
 //! Frame and unit: camera and flange frames, mm, rad; pixels; grey levels as shares of full scale.
 
+use super::rig::RigSpec;
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Camera, Flange, Plane, Ray, Rigid, Vec3, exp};
@@ -66,7 +67,7 @@ impl Pointer {
 pub struct Sensor {
     /// Grey depth, 8..=16.
     pub bits: u8,
-    /// Optical blur, 1 sigma, px of a 640-px-wide picture, 0.2..=5; scales with the width.
+    /// Optical blur, 1 sigma, px of a picture as wide as the rig's own, 0.2..=9; scales with the width.
     pub blur_px: f64,
     /// Electrons at full scale, 500..=1e6: sets the shot noise.
     pub full_well_e: f64,
@@ -104,7 +105,7 @@ impl Sensor {
     pub fn check(&self) -> Result<()> {
         let limits = [
             ("bits", f64::from(self.bits), 8.0, 16.0),
-            ("blur_px", self.blur_px, 0.2, 5.0),
+            ("blur_px", self.blur_px, 0.2, 9.0),
             ("full_well_e", self.full_well_e, 500.0, 1e6),
             ("read_noise_e", self.read_noise_e, 0.0, 1000.0),
             ("speckle", self.speckle, 0.0, 0.6),
@@ -125,73 +126,102 @@ impl Sensor {
 /// One specimen of the station.
 #[derive(Clone, Debug)]
 pub struct Station {
+    /// The design that it was built after.
+    pub rig: RigSpec,
     pub camera: Intrinsics,
     pub sensor: Sensor,
     pub flange_from_camera: HandEye,
     pub laser: LineLaser,
     pub pointer: Pointer,
-    /// Distance that scans are taken at: where the sheet crosses the optical axis, mm.
+    /// Depths that the pointer measures between, mm.
+    pub pointer_range: [f64; 2],
+    /// Camera depth that scans are taken at, mm.
     pub working_distance: f64,
     pub seed: u64,
 }
 
+/// What a simulated calibration says of itself.
+pub const TRUE_VALUES: &str = "true values of a simulated station";
+
 impl Station {
-    /// The design: a 5.08 mm lens on 8.3 µm pixels, the laser 77 mm below the camera at 28 degrees,
+    /// The default design: a 5.08 mm lens on 8.3 µm pixels, the laser 77 mm below the camera at 28 degrees,
     /// the pointer 40 mm beside it; the flange 94 mm behind the camera.
     pub fn design() -> Station {
-        Station::built(&mut |x, _| x, 0)
+        Station::of(&RigSpec::paper(), 0)
     }
 
-    /// A specimen as it comes from the workshop: every design value off by up to a few per cent,
-    /// another specimen for every seed.
+    /// A specimen of the default design.
     pub fn random(seed: u64) -> Station {
-        let mut rng = Pcg64::seed_from_u64(seed ^ 0x57a7_1011);
-        Station::built(&mut |x, by| x + by * rng.random_range(-1.0..1.0), seed)
+        Station::of(&RigSpec::paper(), seed)
     }
 
-    fn built(off: &mut impl FnMut(f64, f64) -> f64, seed: u64) -> Station {
-        let f = off(611.6, 30.0);
+    /// A specimen of a design as it comes from the workshop: every value off by up to a few per cent,
+    /// another specimen for every seed; 0 is the design itself.
+    pub fn of(rig: &RigSpec, seed: u64) -> Station {
+        let mut rng = Pcg64::seed_from_u64(seed ^ 0x57a7_1011);
+        let mut off = |x: f64, by: f64| if seed == 0 { x } else { x + by * rng.random_range(-1.0..1.0) };
+        let (c, l, m) = (&rig.camera, &rig.laser, &rig.mount);
+        let (width, height) = (f64::from(c.width_px), f64::from(c.height_px));
+        let f = off(rig.focal_px(), 30.0 / 611.6 * rig.focal_px());
+        let [k1, k2, p1, p2, k3] = c.distortion;
         let camera = Intrinsics {
             fx: f,
             fy: f * off(1.0, 0.002),
-            cx: off(319.5, 8.0),
-            cy: off(239.5, 8.0),
+            cx: off((width - 1.0) / 2.0, width / 80.0),
+            cy: off((height - 1.0) / 2.0, height / 60.0),
             skew: 0.0,
-            distortion: [off(-0.11, 0.03), off(0.08, 0.03), off(0.0, 8e-4), off(0.0, 8e-4), off(-0.015, 0.01)],
-            width: 640,
-            height: 480,
+            distortion: [
+                off(k1, 3.0 / 11.0 * k1.abs()),
+                off(k2, 3.0 / 8.0 * k2.abs()),
+                off(p1, 8e-4),
+                off(p2, 8e-4),
+                off(k3, 2.0 / 3.0 * k3.abs()),
+            ],
+            width: c.width_px,
+            height: c.height_px,
         };
-        // The sheet crosses the optical axis at the working distance; the source lies below the image.
-        let (baseline, angle, roll) = (off(77.0, 4.0), off(28.0, 2.0).to_radians(), off(0.0, 1.5).to_radians());
-        let working_distance = off(155.0, 4.0);
-        let source = Vec3::new(off(0.0, 3.0), baseline, working_distance - baseline / angle.tan());
-        let axis = Vec3::new(0.0, -angle.sin(), angle.cos());
-        let normal = exp(&(axis * roll)) * Vec3::new(0.0, angle.cos(), angle.sin());
+        // The sheet crosses the optical axis at the design's distance for it; the source lies on the laser's side.
+        let (baseline, angle) =
+            (off(l.baseline_mm, 4.0 / 77.0 * l.baseline_mm), off(l.angle_deg, (l.angle_deg / 14.0).min(2.0)));
+        let (angle, roll) = (angle.to_radians(), off(0.0, 1.5).to_radians());
+        let crossing = rig.crossing();
+        let crossing = off(crossing, 4.0 / 155.0 * crossing);
+        let working_distance = crossing * rig.working.distance_mm / rig.crossing();
+        let side = exp(&(Vec3::z() * (l.side_deg - 90.0).to_radians()));
+        let source =
+            side * Vec3::new(off(0.0, 3.0 / 77.0 * l.baseline_mm), baseline, crossing - baseline / angle.tan());
+        let axis = side * Vec3::new(0.0, -angle.sin(), angle.cos());
+        let normal = exp(&(axis * roll)) * (side * Vec3::new(0.0, angle.cos(), angle.sin()));
         let laser = LineLaser {
             source,
             axis,
             normal,
-            half_fan_deg: 33.0,
-            waist_radius: off(0.21, 0.02),
-            waist_distance: off(170.0, 8.0),
-            wavelength_nm: 650.0,
+            half_fan_deg: l.fan_deg / 2.0,
+            waist_radius: off(l.waist_radius_mm, 2.0 / 21.0 * l.waist_radius_mm),
+            waist_distance: off(l.waist_at_mm, 8.0 / 170.0 * l.waist_at_mm),
+            wavelength_nm: l.wavelength_nm,
         };
-        let spot = Vec3::new(off(41.0, 2.0), off(9.0, 3.0), off(12.0, 2.0));
-        let aim = Vec3::new(off(0.0, 3.0), off(3.0, 2.0), off(190.0, 8.0));
+        let p = rig.pointer_spec();
+        let (wide, far) = (rig.board_scale(), rig.working.distance_mm / 155.0);
+        let scales = [wide, wide, far];
+        let mut near =
+            |at: [f64; 3], by: [f64; 3]| Vec3::from(std::array::from_fn::<_, 3, _>(|i| off(at[i], by[i] * scales[i])));
+        let (spot, aim) = (near(p.source_mm, [2.0, 3.0, 2.0]), near(p.aim_mm, [3.0, 2.0, 8.0]));
         let pointer = Pointer {
             source: spot,
             axis: (aim - spot).normalize(),
-            waist_radius: 0.5,
-            waist_distance: 150.0,
-            wavelength_nm: 650.0,
+            waist_radius: p.waist_radius_mm,
+            waist_distance: p.waist_at_mm,
+            wavelength_nm: p.wavelength_nm,
         };
-        let quarter = off(-91.0, 4.0).to_radians();
+        let quarter = off(m.turn_deg, 4.0).to_radians();
         let tilt = Vec3::new(off(0.0, 0.02), off(0.0, 0.02), 0.0);
-        let flange_from_camera: Rigid<Flange, Camera> = Rigid::new(
-            exp(&tilt) * exp(&(Vec3::z() * quarter)),
-            Vec3::new(off(-46.0, 6.0), off(1.0, 5.0), off(94.0, 6.0)),
-        );
-        Station { camera, sensor: Sensor::default(), flange_from_camera, laser, pointer, working_distance, seed }
+        let [x, y, z] = m.at_mm;
+        let flange_from_camera: Rigid<Flange, Camera> =
+            Rigid::new(exp(&tilt) * exp(&(Vec3::z() * quarter)), Vec3::new(off(x, 6.0), off(y, 5.0), off(z, 6.0)));
+        let (sensor, pointer_range) = (rig.sensor, [p.near_mm, p.far_mm]);
+        let rig = rig.clone();
+        Station { rig, camera, sensor, flange_from_camera, laser, pointer, pointer_range, working_distance, seed }
     }
 
     /// The same lens on a sensor with other pixels: the width spans the same angle, rows are added or
@@ -210,7 +240,7 @@ impl Station {
 
     /// Optical blur on this sensor, 1 sigma, px.
     pub fn blur_px(&self) -> f64 {
-        self.sensor.blur_px * f64::from(self.camera.width) / 640.0
+        self.sensor.blur_px * f64::from(self.camera.width) / f64::from(self.rig.camera.width_px)
     }
 
     /// Writes the true values as the calibration of a station folder; an independent random stream
@@ -218,7 +248,7 @@ impl Station {
     pub fn store(&self, folder: &Path) -> Result<()> {
         let quality = Quality {
             verdict: Verdict::Good,
-            reasons: vec!["true values of a simulated station".into()],
+            reasons: vec![TRUE_VALUES.into()],
             advice: vec![],
             figures: Default::default(),
             per_picture: vec![],

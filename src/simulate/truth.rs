@@ -120,7 +120,7 @@ pub struct CloudErrors {
 
 impl Truth {
     pub fn load(path: &Path) -> Result<Truth> {
-        let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+        let text = crate::files::read_text(path)?;
         let strange = |what: String| {
             Fault::input(format!("{}: {what}", path.display()))
                 .cause("not the truth.json of a simulated scan")

@@ -5,6 +5,7 @@
 use super::light::{Canvas, InScene, View};
 use super::picture::{expose, hot_pixels};
 use super::plan::{self, Views};
+use super::rig::{RigSpec, three_digits};
 use super::scene::{Scene, SceneSpec};
 use super::station::{Sensor, Station};
 use super::truth::TruthFile;
@@ -29,7 +30,7 @@ pub enum Set {
     Laserplane,
     /// The pointer's spot on a chessboard in many poses.
     PointerCal,
-    /// The pointer's spot on a plate across the optical axis, 70 to 290 mm away.
+    /// The pointer's spot on a plate across the optical axis, through its range.
     Pointer,
     /// The pointer's spot on the scene from several robot poses, for the surface normal.
     Surface,
@@ -68,7 +69,9 @@ pub const DEFAULT_SCENE: &str = include_str!("../../data/scenes/board.toml");
 #[derive(Clone, Debug)]
 pub struct SimulateOptions {
     pub sets: Vec<Set>,
-    /// A scene file; the built-in board with parts when not given.
+    /// The design that stations are built after; the paper's when not given.
+    pub rig: Option<RigSpec>,
+    /// A scene file; when not given the built-in board with parts, or for a named rig what fits into its field.
     pub scene: Option<PathBuf>,
     /// The calibration board of all sets that show one; chessboards of our own choice when not given.
     pub board: Option<BoardSpec>,
@@ -87,22 +90,28 @@ pub struct SimulateOptions {
 
 impl Default for SimulateOptions {
     fn default() -> Self {
+        SimulateOptions { rig: None, shots: 200, ..SimulateOptions::of(RigSpec::paper()) }
+    }
+}
+
+impl SimulateOptions {
+    /// A scan by a rig as it was designed.
+    pub fn of(rig: RigSpec) -> SimulateOptions {
         SimulateOptions {
             sets: vec![Set::Scan],
             scene: None,
             board: None,
             seed: 1,
-            width: 640,
-            height: 480,
-            sensor: Sensor::default(),
-            shots: 200,
+            width: rig.camera.width_px,
+            height: rig.camera.height_px,
+            sensor: rig.sensor,
+            shots: rig.shots(),
+            rig: Some(rig),
             pose_noise_mm: 0.0,
             pose_noise_deg: 0.0,
         }
     }
-}
 
-impl SimulateOptions {
     pub fn check(&self) -> Result<()> {
         self.sensor.check()?;
         let limits = [
@@ -121,9 +130,14 @@ impl SimulateOptions {
         }
     }
 
+    /// The design: the named rig, or the paper's.
+    pub fn design(&self) -> RigSpec {
+        self.rig.clone().unwrap_or_else(RigSpec::paper)
+    }
+
     /// The specimen that these options describe.
     pub fn station(&self) -> Station {
-        let mut station = if self.seed == 0 { Station::design() } else { Station::random(self.seed) };
+        let mut station = Station::of(&self.design(), self.seed);
         station.sensor = self.sensor;
         station.with_size(self.width, self.height)
     }
@@ -151,14 +165,18 @@ pub struct Simulated {
 pub fn simulate(out: &Path, options: &SimulateOptions, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<Simulated> {
     options.check()?;
     let station = options.station();
-    let spec = match &options.scene {
-        Some(path) => SceneSpec::load(path)?,
-        None => SceneSpec::parse(DEFAULT_SCENE)?,
+    let spec = match (&options.scene, &options.rig) {
+        (Some(path), _) => SceneSpec::load(path)?,
+        (None, None) => SceneSpec::parse(DEFAULT_SCENE)?,
+        (None, Some(rig)) => rig.scene(),
     };
     let scene = Scene::new(spec)?;
     let folder = out.join("station");
     std::fs::create_dir_all(&folder).map_err(|e| Fault::write(&folder, e))?;
     station.store(&folder)?;
+    if let (None, Some(rig)) = (&options.scene, &options.rig) {
+        crate::files::write(&out.join("notched.toml"), rig.recipe(options.shots).as_bytes())?;
+    }
     let plans: Vec<Plan> =
         options.sets.iter().map(|set| Plan::new(*set, &station, &scene, options)).collect::<Result<_>>()?;
     let total = plans.iter().map(|p| p.shots.iter().map(Shot::pictures).sum::<usize>()).sum();
@@ -199,7 +217,9 @@ struct Plan {
     truth: TruthFile,
 }
 
-fn chessboard(columns: u32, rows: u32, square_mm: f64, border_mm: f64) -> BoardSpec {
+/// A board of our choice, `scale` times as large, to three digits.
+fn chessboard(columns: u32, rows: u32, square_mm: f64, border_mm: f64, scale: f64) -> BoardSpec {
+    let [square_mm, border_mm] = [square_mm, border_mm].map(|mm| three_digits(mm * scale));
     BoardSpec::Chessboard { inner_corners: [columns, rows], square_mm, border_mm, first_square: "black".into() }
 }
 
@@ -212,7 +232,13 @@ impl Plan {
     fn new(set: Set, station: &Station, scene: &Scene, options: &SimulateOptions) -> Result<Plan> {
         let truth = TruthFile::of(station, set.name());
         let mut plan = Plan { set, scenes: vec![], boards: vec![], shots: vec![], poses: vec![], truth };
-        let z = station.working_distance;
+        // Poses of boards whose middle is so many working distances away, and how large boards are beside those that the
+        // default rig sees there: they come into the picture whole, and nobody holds one outside the working volume.
+        let (rig, z) = (&station.rig, station.working_distance);
+        let views = |count, wanted: [f64; 2], tilt_deg, turn_deg| {
+            let [near, far] = rig.board_distances(wanted, z);
+            (Views { count, near, far, tilt_deg, turn_deg, seen: 1.0 }, rig.board_scale() * near / (wanted[0] * z))
+        };
         match set {
             Set::Scan | Set::Surface => {
                 let base_from_scene = plan::base_from_scene(station);
@@ -230,12 +256,12 @@ impl Plan {
                 }
             }
             Set::Intrinsics => {
-                let views = Views { count: 20, near: 1.1 * z, far: 2.0 * z, tilt_deg: 40.0, turn_deg: 25.0, seen: 1.0 };
-                plan.show_boards(station, vec![chessboard(9, 6, 15.0, 9.0)], &views, None, options)?;
+                let (views, k) = views(20, [1.1, 2.0], 40.0, 25.0);
+                plan.show_boards(station, vec![chessboard(9, 6, 15.0, 9.0, k)], &views, None, options)?;
             }
             Set::Handeye => {
-                let views = Views { count: 16, near: 1.2 * z, far: 2.0 * z, tilt_deg: 35.0, turn_deg: 80.0, seen: 1.0 };
-                plan.show_boards(station, vec![chessboard(9, 6, 15.0, 9.0)], &views, None, options)?;
+                let (views, k) = views(16, [1.2, 2.0], 35.0, 80.0);
+                plan.show_boards(station, vec![chessboard(9, 6, 15.0, 9.0, k)], &views, None, options)?;
                 let base_from_board: Rigid<Base, Board> =
                     Rigid::from_vectors(&Vec3::new(3.1, 0.02, 0.03), Vec3::new(470.0, -80.0, 60.0));
                 plan.truth.base_from_board = Some(base_from_board);
@@ -243,22 +269,24 @@ impl Plan {
                 plan.poses = plan.truth.camera_from_board.iter().map(robot).collect();
             }
             Set::Laserplane => {
-                let views =
-                    Views { count: 14, near: 0.75 * z, far: 1.35 * z, tilt_deg: 30.0, turn_deg: 15.0, seen: 1.0 };
-                let boards = vec![chessboard(9, 6, 8.0, 6.0), chessboard(8, 5, 10.0, 6.0)];
+                let (views, k) = views(14, [0.75, 1.35], 30.0, 15.0);
+                let boards = vec![chessboard(9, 6, 8.0, 6.0, k), chessboard(8, 5, 10.0, 6.0, k)];
                 plan.show_boards(station, boards, &views, Some(Beam::Line), options)?;
             }
             Set::PointerCal => {
-                let views =
-                    Views { count: 12, near: 0.7 * z, far: 1.85 * z, tilt_deg: 20.0, turn_deg: 10.0, seen: 1.0 };
-                plan.show_boards(station, vec![chessboard(9, 6, 8.0, 6.0)], &views, Some(Beam::Pointer), options)?;
+                let (views, k) = views(12, [0.7, 1.85], 20.0, 10.0);
+                plan.show_boards(station, vec![chessboard(9, 6, 8.0, 6.0, k)], &views, Some(Beam::Pointer), options)?;
             }
             Set::Pointer => {
-                let plate = SceneSpec::parse(
-                    "name = 'plate'\nregion_mm = [-400, -400, 400, 400]\n[[solid]]\nshape = { block = { size_mm = [900, 900, 5] } }\nat_mm = [0, 0, 0]",
-                );
+                let [near, far] = station.pointer_range;
+                let half = 1.4 * far;
+                let plate = SceneSpec::parse(&format!(
+                    "name = 'plate'\nregion_mm = [{a}, {a}, {half}, {half}]\n[[solid]]\nshape = {{ block = {{ size_mm = [{s}, {s}, 5] }} }}\nat_mm = [0, 0, 0]",
+                    a = -half,
+                    s = 3.1 * far,
+                ));
                 plan.scenes = vec![Scene::new(plate.expect("well formed")).expect("one solid")];
-                plan.truth.distances_mm = (0..23).map(|i| 70.0 + 10.0 * f64::from(i)).collect();
+                plan.truth.distances_mm = (0..23).map(|i| near + (far - near) / 22.0 * f64::from(i)).collect();
                 let shot = |distance: &f64| Shot {
                     scene_from_camera: plan::above(0.0, 0.0, *distance),
                     scene: 0,
@@ -316,7 +344,7 @@ impl Plan {
                 height: station.camera.height,
                 bits: station.sensor.bits,
                 channels: 1,
-                response: "linear".into(),
+                response: crate::raster::Response::Linear,
                 pixel_centre: "integer coordinates".into(),
             },
             beam,

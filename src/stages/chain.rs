@@ -156,7 +156,8 @@ impl Chain {
             return Err(Fault::usage(format!(
                 "{} shots a batch and {} batches in flight; 1 to 64 and 1 to 8 are possible",
                 config.shots, config.slots
-            )));
+            ))
+            .next("correct the number of shots and batches"));
         }
         let mut frame = Frame::new(config.width, config.height, config.bits, config.shots, &config.threshold)?;
         frame.flags |= if config.prune { 0 } else { ALL_TILES };

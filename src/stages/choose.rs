@@ -76,7 +76,8 @@ impl ChooseParams {
             ("echo_reach", self.echo_reach, 0.0, 100.0),
         ] {
             if !(low..=high).contains(&value) {
-                return Err(Fault::usage(format!("choose {name} is {value}, it must be in {low}..={high}")));
+                return Err(Fault::usage(format!("choose {name} is {value}, it must be in {low}..={high}"))
+                    .next("correct [extraction] in station.toml"));
             }
         }
         Ok(())

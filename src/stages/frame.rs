@@ -68,13 +68,16 @@ impl Frame {
         if !(1..=32 * 1023).contains(&width) || !(1..=8 * 4095).contains(&height) {
             return Err(Fault::input(format!(
                 "a picture of {width} x {height} pixels, 1 x 1 to 32736 x 32760 are possible"
-            )));
+            ))
+            .next("cut the pictures, or measure at less resolution"));
         }
         if !(8..=16).contains(&bits) {
-            return Err(Fault::input(format!("pictures of {bits} bits, 8 to 16 are possible")));
+            return Err(Fault::input(format!("pictures of {bits} bits, 8 to 16 are possible"))
+                .next("give the depth that the pictures really have"));
         }
         if !(1..=1023).contains(&shots) {
-            return Err(Fault::usage(format!("{shots} shots in one batch, 1 to 1023 are possible")));
+            return Err(Fault::usage(format!("{shots} shots in one batch, 1 to 1023 are possible"))
+                .next("take fewer shots a batch"));
         }
         let (tiles_x, tiles_y) = (width.div_ceil(32), height.div_ceil(8));
         let pitch = tiles_x * 32 >> px_log2(bits);

@@ -61,7 +61,8 @@ impl HoughParams {
             ("near_px", self.near_px, 0.5, 20.0),
         ] {
             if !(low..=high).contains(&value) {
-                return Err(Fault::usage(format!("hough {name} is {value}, it must be in {low}..={high}")));
+                return Err(Fault::usage(format!("hough {name} is {value}, it must be in {low}..={high}"))
+                    .next("correct [extraction] in station.toml"));
             }
         }
         Ok(())

@@ -31,7 +31,8 @@ impl LengthenParams {
             return Err(Fault::usage(format!(
                 "lengthen reach is {} and share is {}; they must be in 0..=6 widths and 0.2..=1",
                 self.reach, self.share
-            )));
+            ))
+            .next("correct [extraction] in station.toml"));
         }
         Ok(())
     }

@@ -112,7 +112,8 @@ impl ThresholdParams {
             return Err(Fault::usage(format!(
                 "threshold offset is {}, it must be in -65535..=65535 grey levels",
                 self.offset
-            )));
+            ))
+            .next("correct [extraction.threshold] in station.toml"));
         }
         Ok(())
     }

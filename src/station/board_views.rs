@@ -53,7 +53,7 @@ pub fn boards(recording: &Recording, camera: &Intrinsics, progress: &(dyn Fn(usi
     let done = std::sync::atomic::AtomicUsize::new(0);
     // A picture that is missing or of another size is the recording's fault and ends it; a board that is not
     // found is that picture's.
-    let each: Vec<(String, Result<FrameBoard>)> = frames
+    let each: Vec<(String, Result<(FrameBoard, Option<f64>)>)> = frames
         .par_iter()
         .map(|(index, frame, name)| {
             let board = meta.board_of(frame).ok_or_else(|| {
@@ -64,7 +64,8 @@ pub fn boards(recording: &Recording, camera: &Intrinsics, progress: &(dyn Fn(usi
             let one = || {
                 let view = find(&picture, board, &FindOptions::default())?;
                 let pose = measure_view(name, camera, board, &view)?;
-                Ok(FrameBoard { frame: *index, board: board.clone(), pose, ambiguous: view.ambiguous })
+                let found = FrameBoard { frame: *index, board: board.clone(), pose, ambiguous: view.ambiguous };
+                Ok((found, view.dot_diameter))
             };
             let result = one();
             progress(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1, frames.len());
@@ -72,9 +73,13 @@ pub fn boards(recording: &Recording, camera: &Intrinsics, progress: &(dyn Fn(usi
         })
         .collect::<Result<_>>()?;
     let mut out = Boards::default();
+    let mut diameters = Vec::new();
     for (name, result) in each {
         match result {
-            Ok(found) => out.found.push(found),
+            Ok((found, diameter)) => {
+                diameters.extend(diameter);
+                out.found.push(found);
+            }
             Err(fault) => out.missing.push((name, fault.to_string())),
         }
     }
@@ -87,5 +92,17 @@ pub fn boards(recording: &Recording, camera: &Intrinsics, progress: &(dyn Fn(usi
             .cause("a wrong board size in meta.json, too little contrast, or the board cut off")
             .next("compare meta.json's board with the real one and look at the pictures"));
     }
+    know_diameter(&mut out.found, diameters);
     Ok(out)
+}
+
+/// Dots of unstated diameter get the one that the pictures show, in the median.
+fn know_diameter(found: &mut [FrameBoard], mut diameters: Vec<f64>) {
+    diameters.sort_by(f64::total_cmp);
+    let Some(median) = diameters.get(diameters.len() / 2) else { return };
+    for b in found {
+        if let BoardSpec::Circles { diameter_mm: unstated @ None, .. } = &mut b.board {
+            *unstated = Some(*median);
+        }
+    }
 }

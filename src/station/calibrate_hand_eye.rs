@@ -1,5 +1,5 @@
-//! In: a recording of a fixed board with robot poses, a station with a camera. Out: the hand-eye
-//! calibration, its report, and the files it came from.
+//! In: a recording of a fixed board with robot poses and a station with a camera, or poses of both alone. Out: the
+//! hand-eye calibration, its report, and the files it came from.
 //! Frame and unit: flange_from_camera (eye in hand) or base_from_camera (eye to hand); mm, rad.
 
 use super::board_views::{FrameBoard, boards};
@@ -9,13 +9,16 @@ use crate::calibrate::hand_eye_closed::Pair;
 use crate::calibrate::hand_eye_report::{covariance, judge, page};
 use crate::calibrate::hand_eye_turns::{read_with, resolve};
 use crate::calibrate::limits::Asked;
-use crate::calibrate::measured_pose::{AboutCamera, intrinsic_covariance};
+use crate::calibrate::measured_pose::{AboutCamera, MeasuredPose, intrinsic_covariance};
 use crate::calibrate::report::Page;
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
-use crate::geometry::{Base, Camera, Flange, Rigid};
-use crate::recording::Recording;
-use crate::rig::{Calibration, HandEye, Kind, Rig, Volume, hash_text};
+use crate::geometry::{Base, Board, Camera, Flange, Rigid};
+use crate::recording::{Recording, load_board_poses, load_poses};
+use crate::rig::{Calibration, HandEye, Kind, Rig, Volume, hash_file, hash_text};
+use nalgebra::SMatrix;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 /// How [`calibrate_hand_eye`] is run.
 #[derive(Clone, Debug)]
@@ -26,6 +29,15 @@ pub struct HandEyeRun {
     pub solver: HandEyeOptions,
     /// Judged where the laser plane is used, unless stated; without a laser plane where the boards stood.
     pub asked: Asked,
+}
+
+/// Files of pose pairs.
+#[derive(Clone, Debug)]
+pub struct PosePairs {
+    pub robot: PathBuf,
+    pub boards: PathBuf,
+    /// Sigmas of the board poses per axis, mm and rad, where they are known.
+    pub board_sigma: Option<[f64; 2]>,
 }
 
 /// What a calibration command leaves: the record to be stored, the page to be read.
@@ -42,6 +54,22 @@ pub enum HandEyeResult {
     InBase(Calibrated<Rigid<Base, Camera>>),
 }
 
+/// Width of the view at a distance of 1, where no camera is known: a usual lens sees 20 to 25 degrees.
+const USUAL_VIEW: f64 = 0.4;
+
+/// What the pairs came from, and what is to be said of it.
+struct Gathered<'a> {
+    pairs: Vec<Pair>,
+    /// The camera that the boards were measured with, where they were seen in pictures.
+    camera: Option<&'a Calibration<Intrinsics>>,
+    /// What went in: name to hash.
+    inputs: BTreeMap<String, String>,
+    missing: Vec<(String, String)>,
+    notes: Vec<String>,
+    /// What states the board's lengths.
+    board_length: String,
+}
+
 /// Calibrates the hand-eye transform from a recording of one board that stands still (eye in hand)
 /// or is carried by the flange (eye to hand). `progress` is told (pictures done, pictures in all).
 pub fn calibrate_hand_eye(
@@ -50,66 +78,120 @@ pub fn calibrate_hand_eye(
     run: &HandEyeRun,
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<HandEyeResult> {
-    run.asked.check()?;
-    run.solver.check()?;
     let camera = rig.need_camera()?;
     let poses = recording.poses(run.poses.as_deref())?;
     let seen = boards(recording, &camera.value, progress)?;
     let mut pairs = Vec::new();
     for b in &seen.found {
-        let index = recording.meta.frames[b.frame].pose.unwrap_or(b.frame);
-        let pose: &Rigid<Base, Flange> = poses.get(index).ok_or_else(|| {
-            Fault::input(format!("{}: asks for pose {index}, the pose file has {}", b.pose.name, poses.len()))
-                .cause("the pose file belongs to another recording, or ends early")
-                .next("export the poses of all pictures again")
-        })?;
-        let (r, t) = match run.mount {
-            Mount::EyeInHand => (pose.inverse().rotation, pose.inverse().translation),
-            Mount::EyeToHand => (pose.rotation, pose.translation),
-        };
-        pairs.push(Pair { near_from_far: Rigid::new(r, t), seen: b.pose.clone() });
+        let pose = recording.pose_of(b.frame, &poses).map_err(|e| e.at(&b.pose.name))?;
+        pairs.push(paired(run.mount, pose, b.pose.clone()));
     }
+    let mut notes: Vec<String> =
+        seen.missing.iter().map(|(name, why)| format!("{name} was not used: {}", first_line(why))).collect();
     let again = said_already(recording, camera, &mut pairs)?;
-    let turned = one_origin(&mut pairs, &seen.found, run.solver.seed)?;
-    let fit = solve(&pairs, run.mount, &intrinsic_covariance(&camera.covariance), &camera.value, &run.solver)?;
-    let depths = pairs.iter().map(|p| p.seen.centre().z);
-    let work = super::volume::calibrated(rig).or_else(|| Volume::spanned(depths, "where the boards stood"));
-    let limits = run.asked.limits(&work.expect("pairs with boards"), |z| camera.value.view_mm(z));
-    let mut quality = judge(&fit, &pairs, &limits);
-    quality.reasons.extend(seen.missing.iter().map(|(name, why)| format!("{name} was not used: {}", first_line(why))));
-    quality.reasons.extend(turned);
+    notes.extend(one_origin(&mut pairs, &seen.found, run.solver.seed)?);
     if again > 0 {
-        quality.reasons.push(format!(
+        notes.push(format!(
             "{again} of these pictures are among those that the camera was calibrated with: what they say of it counts once"
         ));
     }
-    let x = fit.chain.near_from_camera;
     let pose_name = run.poses.clone().or(recording.meta.pose_file.clone()).unwrap_or_default();
-    let sources = |c: &mut std::collections::BTreeMap<String, String>| -> Result<()> {
-        c.insert("meta.json".into(), crate::rig::hash_file(&recording.folder.join("meta.json"))?);
-        let rows: Vec<[f64; 16]> = poses.iter().map(|p| p.to_rows()).collect();
-        c.insert(format!("poses {pose_name}"), hash_text(serde_json::to_string(&rows).expect("numbers").as_bytes()));
-        for b in &seen.found {
-            c.insert(b.pose.name.clone(), crate::rig::hash_file(&recording.folder.join(&b.pose.name))?);
-        }
-        Ok(())
+    let rows: Vec<[f64; 16]> = poses.iter().map(|p| p.to_rows()).collect();
+    let mut inputs = BTreeMap::from([
+        ("meta.json".to_string(), hash_file(&recording.folder.join("meta.json"))?),
+        (format!("poses {pose_name}"), hash_text(serde_json::to_string(&rows).expect("numbers").as_bytes())),
+    ]);
+    for b in &seen.found {
+        inputs.insert(b.pose.name.clone(), hash_file(&recording.folder.join(&b.pose.name))?);
+    }
+    let board_length = format!("{} in meta.json", seen.found[0].board.length_key());
+    let gathered = Gathered { pairs, camera: Some(camera), inputs, missing: seen.missing, notes, board_length };
+    let view = |z: f64| camera.value.view_mm(z);
+    concluded(gathered, &intrinsic_covariance(&camera.covariance), &camera.value, rig, view, run)
+}
+
+/// The same from robot poses and board poses that another program measured, without pictures: no camera is needed.
+pub fn calibrate_hand_eye_from_poses(files: &PosePairs, rig: &Rig, run: &HandEyeRun) -> Result<HandEyeResult> {
+    let poses = load_poses(&files.robot)?.poses;
+    let boards = load_board_poses(&files.boards)?;
+    // Boards are compared at the corners of a square that a usual lens sees nearly whole at their distance.
+    let depths = Volume::spanned(boards.iter().map(|(_, b)| b.translation.z), "where the boards stood");
+    let side = USUAL_VIEW * depths.map_or(0.0, |d| d.middle());
+    let pair = |(index, board): &(usize, Rigid<Camera, Board>)| {
+        let pose = poses.get(*index).ok_or_else(|| {
+            Fault::input(format!("a board was seen at pose {index}, the pose file has {}", poses.len()))
+                .cause("the pose file belongs to another recording, or ends early")
+                .next("export the poses of all pictures again")
+        })?;
+        let seen = MeasuredPose::given(format!("pose {index}"), *board, files.board_sigma, side);
+        Ok(paired(run.mount, pose, seen))
     };
+    let gathered = Gathered {
+        pairs: boards.iter().map(pair).collect::<Result<_>>()?,
+        // The result is used with the station's camera, whoever measured the boards.
+        camera: rig.camera.as_ref(),
+        inputs: BTreeMap::from([
+            (file_name(&files.robot), hash_file(&files.robot)?),
+            (file_name(&files.boards), hash_file(&files.boards)?),
+        ]),
+        missing: Vec::new(),
+        notes: Vec::new(),
+        board_length: "the size that the board's poses were computed with".into(),
+    };
+    // Nothing is known in px: a pinhole of focal length 1 makes them tangents, which the report leaves out.
+    let tangents =
+        Intrinsics { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0, skew: 0.0, distortion: [0.0; 5], width: 1, height: 1 };
+    let view = |z: f64| rig.camera.as_ref().map_or(USUAL_VIEW * z, |c| c.value.view_mm(z));
+    concluded(gathered, &SMatrix::zeros(), &tangents, rig, view, run)
+}
+
+/// The pair of a board and a robot pose.
+fn paired(mount: Mount, pose: &Rigid<Base, Flange>, seen: MeasuredPose) -> Pair {
+    let (r, t) = match mount {
+        Mount::EyeInHand => (pose.inverse().rotation, pose.inverse().translation),
+        Mount::EyeToHand => (pose.rotation, pose.translation),
+    };
+    Pair { near_from_far: Rigid::new(r, t), seen }
+}
+
+/// `view` is how wide the camera sees at a depth, mm.
+fn concluded(
+    g: Gathered<'_>,
+    covariance_of_camera: &SMatrix<f64, 9, 9>,
+    camera: &Intrinsics,
+    rig: &Rig,
+    view: impl Fn(f64) -> f64,
+    run: &HandEyeRun,
+) -> Result<HandEyeResult> {
+    run.asked.check()?;
+    let solver = HandEyeOptions { board_length: g.board_length, ..run.solver.clone() };
+    let fit = solve(&g.pairs, run.mount, covariance_of_camera, camera, &solver)?;
+    let depths = g.pairs.iter().map(|p| p.seen.centre().z);
+    let work = super::volume::calibrated(rig).or_else(|| Volume::spanned(depths, "where the boards stood"));
+    let limits = run.asked.limits(&work.expect("pairs with boards"), view);
+    let mut quality = judge(&fit, &g.pairs, &limits);
+    quality.reasons.extend(g.notes);
+    let x = fit.chain.near_from_camera;
     Ok(match run.mount {
         Mount::EyeInHand => {
-            let page = page(&fit, &pairs, &quality, "flange");
+            let page = page(&fit, &g.pairs, &quality, "flange");
             let value = HandEye::new(x.rotation, x.translation);
-            let mut calibration = Calibration::new(Kind::HandEye, value, Some(camera), covariance(&fit), quality);
-            sources(&mut calibration.inputs)?;
-            HandEyeResult::OnFlange(Calibrated { calibration, page, missing: seen.missing })
+            let mut calibration = Calibration::new(Kind::HandEye, value, g.camera, covariance(&fit), quality);
+            calibration.inputs = g.inputs;
+            HandEyeResult::OnFlange(Calibrated { calibration, page, missing: g.missing })
         }
         Mount::EyeToHand => {
-            let page = page(&fit, &pairs, &quality, "base");
+            let page = page(&fit, &g.pairs, &quality, "base");
             let value = Rigid::<Base, Camera>::new(x.rotation, x.translation);
-            let mut calibration = Calibration::new(Kind::BaseCamera, value, Some(camera), covariance(&fit), quality);
-            sources(&mut calibration.inputs)?;
-            HandEyeResult::InBase(Calibrated { calibration, page, missing: seen.missing })
+            let mut calibration = Calibration::new(Kind::BaseCamera, value, g.camera, covariance(&fit), quality);
+            calibration.inputs = g.inputs;
+            HandEyeResult::InBase(Calibrated { calibration, page, missing: g.missing })
         }
     })
+}
+
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// Pictures that went into the camera's calibration have said what they know of the camera: here they speak of the
@@ -118,7 +200,7 @@ fn said_already(recording: &Recording, camera: &Calibration<Intrinsics>, pairs: 
     let known: std::collections::BTreeSet<&String> = camera.inputs.values().collect();
     let mut count = 0;
     for pair in pairs {
-        if known.contains(&crate::rig::hash_file(&recording.folder.join(&pair.seen.name))?) {
+        if known.contains(&hash_file(&recording.folder.join(&pair.seen.name))?) {
             pair.seen.about_camera = AboutCamera::silent();
             count += 1;
         }

@@ -4,6 +4,7 @@
 
 use super::board_views::{Boards, FrameBoard, boards};
 use super::calibrate_hand_eye::{Calibrated, first_line};
+use super::room_light;
 use super::straight::keep_straight;
 use crate::calibrate::laser_plane::{LaserPlaneFit, LaserPlaneOptions, StripePeak, StripeView, solve};
 use crate::calibrate::laser_plane_report::{covariance, judge, page};
@@ -46,7 +47,9 @@ pub fn calibrate_laser_plane(
     for b in found {
         match &recording.meta.frames[b.frame].laser {
             Some(name) => {
-                images.push(recording.picture(name)?);
+                let (laser, ambient) = (recording.picture(name)?, recording.picture(&b.pose.name)?);
+                let share = room_light::share(&laser, &ambient, &b.board, &b.pose.camera_from_board, &camera.value);
+                images.push(if share > 0.0 { room_light::without(&laser, &ambient, share) } else { laser });
                 names.push(name.clone());
                 seen.push(b);
             }
@@ -59,7 +62,7 @@ pub fn calibrate_laser_plane(
             .next("record an ambient and a laser picture of each board pose"));
     }
     let c = intrinsic_covariance(&camera.covariance);
-    let factor = pooled_factor(&seen.iter().map(|s| s.pose.clone()).collect::<Vec<_>>());
+    let factor = pooled_factor(seen.iter().map(|s| &s.pose)).unwrap_or(f64::NAN);
     let processor = run.place.open()?;
     let device = match &processor {
         Processor::Gpu(device) => Some(device),
@@ -89,7 +92,7 @@ pub fn calibrate_laser_plane(
     let (views, fit) = fit_with(&guess, everywhere)?;
     let lit = Volume::new(fit.reach[0], fit.reach[1], "where the boards were lit");
     let limits = run.asked.limits(&lit, |z| camera.value.view_mm(z));
-    let mut quality = judge(&fit, &limits);
+    let mut quality = judge(&fit, &views, &camera.value, &limits);
     quality.reasons.extend(missing.iter().map(|(name, why)| format!("{name} was not used: {}", first_line(why))));
     let page = page(&fit, &views, &quality, (camera.value.width, camera.value.height));
     let mut calibration = Calibration::new(Kind::LaserPlane, fit.plane, Some(camera), covariance(&fit), quality);

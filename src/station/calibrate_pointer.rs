@@ -4,6 +4,7 @@
 
 use super::board_views::{Boards, boards};
 use super::calibrate_hand_eye::{Calibrated, first_line};
+use super::room_light;
 use crate::calibrate::limits::Asked;
 use crate::calibrate::measured_pose::{intrinsic_covariance, pooled_factor};
 use crate::calibrate::pointer::{PointerOptions, SpotView, solve};
@@ -39,8 +40,10 @@ pub fn calibrate_pointer(
     for b in found {
         match &recording.meta.frames[b.frame].laser {
             Some(name) => {
-                let ambient = recording.picture(&b.pose.name)?;
-                pictures.push((b, name.clone(), recording.picture(name)?, ambient));
+                let (laser, ambient) = (recording.picture(name)?, recording.picture(&b.pose.name)?);
+                let share = room_light::share(&laser, &ambient, &b.board, &b.pose.camera_from_board, &camera.value);
+                let laser = if share > 0.0 { room_light::without(&laser, &ambient, share) } else { laser };
+                pictures.push((b, name.clone(), laser, ambient));
             }
             None => missing.push((b.pose.name.clone(), "its frame has no laser picture".into())),
         }
@@ -60,7 +63,7 @@ pub fn calibrate_pointer(
             Err(fault) => missing.push((name.clone(), fault.to_string())),
         }
     }
-    let factor = pooled_factor(&views.iter().map(|v| v.pose.clone()).collect::<Vec<_>>());
+    let factor = pooled_factor(views.iter().map(|v| &v.pose)).unwrap_or(f64::NAN);
     let c = intrinsic_covariance(&camera.covariance);
     let fit = solve(&views, &camera.value, &c, factor, &run.solver).map_err(|mut fault| {
         if let Some((name, why)) = missing.first() {

@@ -5,6 +5,7 @@
 use super::calibrate_hand_eye::Calibrated;
 use crate::calibrate::hand_eye_report::HAND_EYE_NAMES;
 use crate::calibrate::limits::{Asked, Limits, rms};
+use crate::calibrate::profile_evaluate::{Evaluation, evaluate};
 use crate::calibrate::profile_files::load;
 use crate::calibrate::profile_hand_eye::{BallFit, BallOptions, solve};
 use crate::calibrate::report::{Page, bars};
@@ -54,12 +55,45 @@ pub fn calibrate_profile_hand_eye(
     Ok((Calibrated { calibration, page, missing: Vec::new() }, warnings))
 }
 
+/// How well profiles and poses agree with a transform that came from elsewhere. Also gives warnings in words.
+pub fn evaluate_profile_hand_eye(
+    profiles: &Path,
+    poses: &Path,
+    transform: &Path,
+    options: &BallOptions,
+) -> Result<(Evaluation, Vec<String>)> {
+    let sensor = sensor_of(transform)?;
+    let (read, warnings) = poses_of(poses)?;
+    Ok((evaluate(&load(profiles)?, &read, &sensor, options)?, warnings))
+}
+
+/// `flange_T_sensor` of a JSON file: a calibration's record, or an object with that key.
+fn sensor_of(path: &Path) -> Result<Rigid<Flange, Sensor>> {
+    let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+    let refuse = |what: String| {
+        Fault::input(format!("{}: {what}", path.display()))
+            .cause("another file, or another transform")
+            .next("give calibration/profile_hand_eye.json, or {\"flange_T_sensor\": [16 numbers, row by row, mm]}")
+    };
+    let file: serde_json::Value = serde_json::from_str(&text).map_err(|e| refuse(format!("is no JSON: {e}")))?;
+    let frame = file.get("frame").and_then(|f| f.as_str());
+    let rows = match (file.get("flange_T_sensor"), frame) {
+        (Some(rows), _) => rows,
+        (None, Some("flange_T_sensor")) => file.get("value").unwrap_or(&serde_json::Value::Null),
+        (None, Some(other)) => return Err(refuse(format!("holds {other}, flange_T_sensor is wanted"))),
+        (None, None) => return Err(refuse("holds no flange_T_sensor".into())),
+    };
+    let rows: [f64; 16] = serde_json::from_value(rows.clone())
+        .map_err(|e| refuse(format!("flange_T_sensor is no list of 16 numbers: {e}")))?;
+    Rigid::from_rows(&rows).map(|(pose, _)| pose).map_err(|e| e.at(path.display()))
+}
+
 fn poses_of(path: &Path) -> Result<(Vec<Rigid<Base, Flange>>, Vec<String>)> {
     let listing = path.extension().is_some_and(|e| ["ls", "tp"].iter().any(|k| e.eq_ignore_ascii_case(k)));
     if !listing {
         return load_poses(path).map(|f| (f.poses, f.warnings));
     }
-    let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+    let text = crate::files::read_text(path)?;
     let read = fanuc_tp::read::<Base, Flange>(&text).map_err(|e| e.at(path.display()))?;
     let mut warnings = Vec::new();
     let (uf, ut) = (read[0].user_frame, read[0].tool_frame);
@@ -110,6 +144,8 @@ fn judge(fit: &BallFit, limits: &Limits) -> Quality {
     let figures = BTreeMap::from([
         ("expected_error_at_working_distance_mm".to_string(), expected),
         ("working_distance_mm".into(), limits.middle()),
+        ("translation_sigma_mm".into(), (0..3).map(|i| fit.covariance[(i, i)]).sum::<f64>().max(0.0).sqrt()),
+        ("rotation_sigma_deg".into(), (3..6).map(|i| fit.covariance[(i, i)]).sum::<f64>().max(0.0).sqrt().to_degrees()),
         ("rms_mm".into(), rms(used.iter().map(|p| p.mm))),
         ("holdout_rms_mm".into(), rms(used.iter().map(|p| p.holdout_mm))),
         ("point_sigma_mm".into(), fit.point_sigma),

@@ -2,7 +2,7 @@
 //! a scan taken with another calibration than the station's is refused.
 //! Frame and unit: base frame, mm.
 
-use super::run::{cloud_of, load_report};
+use super::report::{cloud_of, load_report};
 use crate::fault::{Fault, Result};
 use crate::find::teach::{TeachOptions, teach};
 use crate::find::{LocateOptions, LookPlan, Recipe, Report, agree, locate, picture, plan_look};
@@ -89,7 +89,6 @@ pub fn find_part(
 
 /// Teaches a part from a finished scan: the recipe, its proof on that scan, and a picture of it.
 pub fn teach_part(scan: &Path, options: &TeachOptions) -> Result<(Recipe, Report, RgbImage)> {
-    load_report(scan)?;
     let cloud = cloud_of(scan)?;
     let map = grid(&cloud, &GridOptions::default())?;
     let (recipe, proof) = teach(&cloud, &map, options).map_err(|e| e.at(scan.display()))?;

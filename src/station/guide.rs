@@ -6,11 +6,12 @@
 use super::range::{RangeReport, RangeRun, measure_range};
 use super::run::{ScanOptions, scan};
 use super::settings::Settings;
+use super::volume;
 use crate::fault::{Fault, Result};
 use crate::find::{Accelerator, LocateOptions, Recipe, Report, locate, picture};
 use crate::geometry::{Base, Camera, Flange, Mat3, Rigid, Vec3};
 use crate::recording::Recording;
-use crate::rig::{Rig, hash_file};
+use crate::rig::{Rig, Volume, hash_file};
 use crate::robot::Convention;
 use crate::scan::{GridOptions, RecordingSource, Where};
 use std::path::PathBuf;
@@ -31,8 +32,8 @@ pub struct GuideOptions {
     /// Notation of the poses.
     pub robot: Convention,
     pub place: Where,
-    /// Distance of the camera from the board when it looks at it squarely, mm, 20 to 2000.
-    pub view_mm: f64,
+    /// Distance of the camera from the board when it looks at it squarely, mm; `None`: where the rig works.
+    pub view_mm: Option<f64>,
     /// Largest angle between the touched board and the found part, degrees, 0.1 to 20: parts sit a little
     /// askew, but not by more.
     pub max_tilt_deg: f64,
@@ -64,11 +65,14 @@ pub struct Guided {
 
 impl GuideOptions {
     pub fn check(&self) -> Result<()> {
-        for (name, v, a, b) in [("view_mm", self.view_mm, 20.0, 2000.0), ("max_tilt_deg", self.max_tilt_deg, 0.1, 20.0)]
-        {
-            if !(a..=b).contains(&v) {
-                return Err(Fault::usage(format!("{name} is {v}, wanted {a} to {b}")));
-            }
+        let (tilt, view) = (self.max_tilt_deg, self.view_mm.unwrap_or(1.0));
+        if !(0.1..=20.0).contains(&tilt) {
+            return Err(Fault::usage(format!("max_tilt_deg is {tilt}, wanted 0.1 to 20")).next("correct the option"));
+        }
+        if !(view > 0.0 && view.is_finite()) {
+            return Err(
+                Fault::usage(format!("view_mm is {view}, a distance above 0 is wanted")).next("correct the option")
+            );
         }
         Ok(())
     }
@@ -102,11 +106,18 @@ pub fn guide(options: &GuideOptions, confirm: &mut dyn FnMut(&Step) -> Result<bo
     let normal = Vec3::from(surface.normal);
     pass(Step { name: "touch", says: touched_words(&touched), asks: None, pose: None })?;
 
-    let view =
-        square_view(&surface.base_from_tool.rotation, &Vec3::from(surface.centre_mm), options.view_mm, &hand_eye);
+    let far = match options.view_mm {
+        Some(mm) => Volume::new(mm, mm, "stated"),
+        None => volume::view(&settings, &rig)?,
+    };
+    let view = square_view(&surface.base_from_tool.rotation, &Vec3::from(surface.centre_mm), far.middle(), &hand_eye);
     pass(Step {
         name: "look squarely",
-        says: vec![format!("the camera {:.0} mm above the board, its axis along the normal", options.view_mm)],
+        says: vec![format!(
+            "the camera {} mm above the board ({}), its axis along the normal",
+            far.depth(far.middle()),
+            far.from
+        )],
         asks: Some("move the flange to this pose?".into()),
         pose: Some(options.robot.write(&view)),
     })?;
@@ -125,17 +136,18 @@ pub fn guide(options: &GuideOptions, confirm: &mut dyn FnMut(&Step) -> Result<bo
         place: options.place,
         extraction: settings.extraction.clone(),
         grid: GridOptions::default(),
-        volume: super::volume::believed(&settings, &rig),
+        volume: volume::believed(&settings, &rig),
         ambient: None,
         overlays: 0,
         skip_bad: false,
         resume: false,
+        stop: Default::default(),
     };
     let open = |first| Ok(Box::new(RecordingSource::open(&recording, poses, first)?) as Box<_>);
     let id = hash_file(&options.scan.join("meta.json"))?;
     let scanned = scan(&id, &options.scan.display().to_string(), open, &rig, &run, |_, _| {})?;
 
-    let cloud = super::run::cloud_of(&scan_folder)?;
+    let cloud = super::report::cloud_of(&scan_folder)?;
     let accelerator = (options.place != Where::Cpu).then(Accelerator::open).flatten();
     let locate_options = LocateOptions { up: Some(normal), robot: options.robot, accelerator, expected: None };
     let report = locate(&cloud, &recipe, Some(&rig), &locate_options)?;

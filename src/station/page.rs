@@ -4,7 +4,7 @@
 
 use super::judge::{HISTOGRAM_STEP, Judged};
 use super::judge_parts::FoundPart;
-use super::run::{ScanReport, load_report};
+use super::report::{ScanReport, load_report};
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec3;
 use crate::scan::{CloudFile, HeightMap, PointSource};
@@ -75,7 +75,9 @@ fn head(body: &mut String, r: &ScanReport, judged: Option<&Judged>) {
     };
     card(thousands(r.points), "points");
     card(r.shots.to_string(), &format!("shots of {}×{}, full resolution", r.image.width, r.image.height));
-    card(format!("{:.3} mm", r.median_sigma_mm), "standard deviation of a point (median, as stated by the scan)");
+    if let Some(sigma) = r.median_sigma_mm {
+        card(format!("{sigma:.3} mm"), "standard deviation of a point (median, as stated by the scan)");
+    }
     if let Some(j) = judged {
         card(format!("{:.3} mm", j.cloud.median_mm), "true distance from the surface (median)");
         card(format!("{:.2} %", 100.0 * j.cloud.outliers_share), "points beyond 1 mm");
@@ -203,6 +205,7 @@ fn peaks(body: &mut String, r: &ScanReport) {
             write!(body, "<tr><td>{}</td><td>{}</td><td>{:.3} %</td></tr>", escape(fate), thousands(*n), 100.0 * share);
     }
     body.push_str("</table>");
+    let _ = write!(body, "<p>{}.</p>", escape(&r.seen.words()));
     if !r.dark_shots.is_empty() {
         let _ = write!(body, "<p>{} shots without a stripe.</p>", r.dark_shots.len());
     }

@@ -2,14 +2,17 @@
 //! companions, pictures, PCD.
 //! Frame and unit: cloud in the base frame, height map in its grid frame; mm.
 
-use super::run::HeightMapFigures;
+use super::report::HeightMapFigures;
 use crate::fault::Result;
 use crate::geometry::Vec3;
 use crate::gpu::Device;
+use crate::rig::hash_file;
 use crate::scan::{CloudFile, GridOptions, grid_on, write_pcd};
+use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Writes everything that is derived from the cloud; `None` where there are too few points for a map.
+/// Writes everything that is derived from the cloud; no figures where there are too few points for a map. With them come
+/// the SHA-256 of cloud and map by file name.
 pub fn write(
     out: &Path,
     cloud: &Path,
@@ -17,9 +20,10 @@ pub fn write(
     options: &GridOptions,
     up: Vec3,
     device: Option<&Device>,
-) -> Result<Option<HeightMapFigures>> {
+) -> Result<(Option<HeightMapFigures>, BTreeMap<String, String>)> {
+    let hash = |name: &str| Ok((name.to_owned(), hash_file(&out.join(name))?));
     if points < 100 {
-        return Ok(None);
+        return Ok((None, BTreeMap::from([hash("cloud.ply")?])));
     }
     let source = CloudFile::open(cloud)?;
     let heights = || {
@@ -27,15 +31,20 @@ pub fn write(
         map.save(out)?;
         Ok(map)
     };
-    let (map, pcd) = rayon::join(heights, || write_pcd(&out.join("cloud.pcd"), &source, points));
+    let ((map, pcd), of_cloud) = rayon::join(
+        || rayon::join(heights, || write_pcd(&out.join("cloud.pcd"), &source, points)),
+        || hash("cloud.ply"),
+    );
     let map = pcd.and(map)?;
-    let (low, high) = map.quantiles(0.01, 0.99).unwrap_or((f32::NAN, f32::NAN));
-    Ok(Some(HeightMapFigures {
+    let files = BTreeMap::from([of_cloud?, hash("height.tif")?, hash("height.json")?]);
+    let (low, high) = map.quantiles(0.01, 0.99).unwrap_or((0.0, 0.0));
+    let figures = HeightMapFigures {
         width: map.width,
         height: map.height,
         cell_mm: map.cell,
         coverage: map.coverage(),
         z_low_mm: f64::from(low),
         z_high_mm: f64::from(high),
-    }))
+    };
+    Ok((Some(figures), files))
 }

@@ -1,18 +1,22 @@
-//! In: finished profiles of a running scan. Out: a checkpoint file to resume from, and running figures
+//! In: finished profiles of a running scan. Out: a sealed checkpoint file to resume from, and running figures
 //! in memory that does not grow with the scan.
-//! Frame and unit: counts; sigma in mm.
+//! Frame and unit: counts; sigma in mm; poses base_from_flange.
 
+use super::scan_folder::PROGRESS;
 use crate::fault::{Fault, Result};
+use crate::geometry::{Base, Flange, Rigid, Vec3};
+use crate::raster::{Image, Pixels};
+use crate::rig::{sealed, unsealed};
 use crate::scan::{CloudWriter, Profile};
 use crate::stages::peak::{Reject, Stripe};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Where an interrupted scan stands. Everything in it belongs to points that are on the disk.
-#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Checkpoint {
-    /// Hash of recording, rig and settings.
+    /// Hash of recording, rig, working volume and settings.
     pub identity: String,
     /// Shots done, the skipped ones included.
     pub shots: usize,
@@ -20,16 +24,26 @@ pub struct Checkpoint {
     pub peaks: BTreeMap<String, u64>,
     pub dark: Vec<u32>,
     pub skipped: Vec<(String, String)>,
+    /// Pixels that found no room in the stages' list.
+    pub cut: u64,
     /// What the first shots said of the stripe.
     pub stripe: Option<Stripe>,
+    /// Where the first shot was taken, as rows: from there the map's up and the stripe's axis follow.
+    first_pose: Option<[f64; 16]>,
+    /// [`fingerprint_of`] the last shot done, which a resumed scan reads again.
+    pub last_picture: Option<u32>,
     /// Histogram of log10(sigma / mm) from -5 to 1 in 240 steps of 0.025 (6 % a step).
     sigma: Vec<u64>,
 }
 
 const SIGMA_BINS: usize = 240;
 
-fn path_of(out: &Path) -> PathBuf {
-    out.join("scan.progress.json")
+/// CRC-32 of a picture's levels: tells one recording's picture from another's, whose noise differs.
+pub fn fingerprint_of(image: &Image) -> u32 {
+    match &image.pixels {
+        Pixels::U8(p) => crc32fast::hash(p),
+        Pixels::U16(p) => crc32fast::hash(bytemuck::cast_slice(p)),
+    }
 }
 
 impl Checkpoint {
@@ -41,38 +55,53 @@ impl Checkpoint {
             peaks: BTreeMap::new(),
             dark: Vec::new(),
             skipped: Vec::new(),
+            cut: 0,
             stripe: None,
+            first_pose: None,
+            last_picture: None,
             sigma: vec![0; SIGMA_BINS],
         }
     }
 
-    /// The checkpoint in a folder, if a scan was interrupted there.
-    pub fn load(out: &Path) -> Result<Option<Checkpoint>> {
-        let path = path_of(out);
-        match std::fs::read_to_string(&path) {
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
-            Err(e) => Err(Fault::read(&path, e)),
-            Ok(text) => serde_json::from_str(&text).map(Some).map_err(|e| {
-                Fault::input(format!("{}: is no checkpoint: {e}", path.display()))
-                    .cause("damaged, or of another version")
-                    .next("delete it and scan again")
-            }),
+    /// The checkpoint in a working folder, if a scan was interrupted there.
+    pub fn load(part: &Path) -> Result<Option<Checkpoint>> {
+        let path = part.join(PROGRESS);
+        let again = "scan again without --resume: the pictures are still there";
+        let text = match std::fs::read_to_string(&path) {
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            Err(e) => return Err(Fault::read(&path, e).next(again)),
+            Ok(text) => text,
+        };
+        let what = format!("{}: the checkpoint", path.display());
+        let found: Checkpoint = unsealed(&text, &what).map_err(|e| e.next(again))?;
+        if found.sigma.len() != SIGMA_BINS {
+            return Err(Fault::input(format!(
+                "{what} has {} steps of sigma, {SIGMA_BINS} are needed",
+                found.sigma.len()
+            ))
+            .cause("of another version")
+            .next(again));
         }
+        Ok(Some(found))
     }
 
     /// Puts the cloud on the disk, then says how far it got.
-    pub fn save(&mut self, out: &Path, cloud: &mut CloudWriter) -> Result<()> {
+    pub fn save(&mut self, part: &Path, cloud: &mut CloudWriter) -> Result<()> {
         self.points = cloud.checkpoint()?;
-        let text = serde_json::to_string(self).expect("plain data");
-        crate::files::write(&path_of(out), text.as_bytes())
+        crate::files::write(&part.join(PROGRESS), sealed(self).as_bytes())
     }
 
-    /// A finished scan needs none.
-    pub fn remove(out: &Path) -> Result<()> {
-        match std::fs::remove_file(path_of(out)) {
-            Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Fault::write(&path_of(out), e)),
-            _ => Ok(()),
-        }
+    /// Pose of the scan's first shot.
+    pub fn first_pose(&self) -> Option<Rigid<Base, Flange>> {
+        // Not repaired as poses from outside are: to the last bit what it was.
+        let m = self.first_pose?;
+        let rotation = crate::geometry::Mat3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
+        Some(Rigid::new(rotation, Vec3::new(m[3], m[7], m[11])))
+    }
+
+    /// Keeps the pose of the first shot of all.
+    pub fn begin_at(&mut self, pose: &Rigid<Base, Flange>) {
+        self.first_pose.get_or_insert(pose.to_rows());
     }
 
     /// Counts a finished profile.
@@ -93,42 +122,40 @@ impl Checkpoint {
         }
     }
 
-    /// Median standard deviation of the points, mm, to 3 %; NaN without points.
-    pub fn median_sigma(&self) -> f64 {
+    /// Median standard deviation of the points, mm, to 3 %; none without points.
+    pub fn median_sigma(&self) -> Option<f64> {
         let half = self.sigma.iter().sum::<u64>().div_ceil(2);
         let mut sum = 0;
         let bin = self.sigma.iter().position(|n| {
             sum += n;
             half > 0 && sum >= half
         });
-        bin.map_or(f64::NAN, |b| 10f64.powf((b as f64 + 0.5) / 40.0 - 5.0))
+        bin.map(|b| 10f64.powf((b as f64 + 0.5) / 40.0 - 5.0))
     }
 }
 
-/// One scan at a time may write into a folder. The lock is a file that goes with the value.
-pub struct Lock {
-    path: PathBuf,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-impl Lock {
-    pub fn take(out: &Path) -> Result<Lock> {
-        let path = out.join("scan.lock");
-        // A lock left by a process that is gone is taken over.
-        if let Some(pid) = std::fs::read_to_string(&path).ok().and_then(|t| t.trim().parse::<u32>().ok()) {
-            if pid != std::process::id() && Path::new("/proc").join(pid.to_string()).exists() {
-                return Err(Fault::output(format!("{}: another scan (process {pid}) writes here", out.display()))
-                    .cause("two scans were started into one folder")
-                    .next("wait for it, or choose another --out"));
-            }
+    #[test]
+    fn a_checkpoint_comes_back_and_a_damaged_one_is_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut cloud = CloudWriter::create(&dir.path().join("cloud.ply")).unwrap();
+        let mut state = Checkpoint::new("id".into());
+        state.begin_at(&Rigid::from_vectors(&Vec3::new(0.1, 0.2, 0.3), Vec3::new(1.0, 2.0, 3.0)));
+        state.last_picture = Some(7);
+        state.save(dir.path(), &mut cloud).unwrap();
+        assert_eq!(Checkpoint::load(dir.path()).unwrap(), Some(state));
+        let path = dir.path().join(PROGRESS);
+        let text = std::fs::read_to_string(&path).unwrap();
+        for (from, to) in [("\"shots\": 0", "\"shots\": 64"), ("\"points\": 0", "\"points\": 1"), ("0,\n    0,", "0,")]
+        {
+            assert!(text.contains(from), "{from}");
+            std::fs::write(&path, text.replacen(from, to, 1)).unwrap();
+            let said = Checkpoint::load(dir.path()).unwrap_err();
+            assert!(said.what.contains("was changed") && said.next.contains("without --resume"), "{said}");
         }
-        std::fs::write(&path, std::process::id().to_string()).map_err(|e| Fault::write(&path, e))?;
-        Ok(Lock { path })
-    }
-}
-
-impl Drop for Lock {
-    fn drop(&mut self) {
-        // Best effort: a stale lock is recognised by its process being gone.
-        let _ = std::fs::remove_file(&self.path);
+        assert_eq!(Checkpoint::new(String::new()).median_sigma(), None);
     }
 }

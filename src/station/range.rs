@@ -87,7 +87,8 @@ pub struct RangeReport {
 /// Measures a distance in every frame that has a `laser` picture.
 pub fn measure_range(recording: &Recording, rig: &Rig, run: &RangeRun) -> Result<RangeReport> {
     if !(3.0..=100.0).contains(&run.max_off_beam) {
-        return Err(Fault::usage(format!("max_off_beam is {}, 3 to 100 sigmas are allowed", run.max_off_beam)));
+        return Err(Fault::usage(format!("max_off_beam is {}, 3 to 100 sigmas are allowed", run.max_off_beam))
+            .next("correct max_off_beam"));
     }
     let (camera, pointer) = (rig.need_camera()?, rig.need_pointer()?);
     recording.shows(Beam::Pointer)?;
@@ -119,15 +120,15 @@ pub fn measure_range(recording: &Recording, rig: &Rig, run: &RangeRun) -> Result
         }
     }
     let frames: Vec<_> =
-        recording.meta.frames.iter().enumerate().filter_map(|(i, f)| Some((i, f, f.laser.as_deref()?))).collect();
-    let images = frames.iter().map(|f| recording.picture(f.2)).collect::<Result<Vec<_>>>()?;
+        recording.meta.frames.iter().enumerate().filter_map(|(i, f)| Some((i, f.laser.as_deref()?))).collect();
+    let images = frames.iter().map(|f| recording.picture(f.1)).collect::<Result<Vec<_>>>()?;
     let hot = hot_pixels(&images.iter().collect::<Vec<_>>());
     let asked: Vec<SpotPicture<'_>> =
-        frames.iter().zip(&images).map(|(f, laser)| SpotPicture { name: f.2, laser, ambient: None }).collect();
+        frames.iter().zip(&images).map(|(f, laser)| SpotPicture { name: f.1, laser, ambient: None }).collect();
     let mut out = RangeReport { distances: Vec::new(), surface: None, missing: Vec::new(), remarks };
     let mut points: Vec<BasePoint> = Vec::new();
     let mut first_x = None;
-    for ((index, frame, name), spot) in frames.iter().zip(find_spots(&asked, &hot, &run.spots)?) {
+    for ((index, name), spot) in frames.iter().zip(find_spots(&asked, &hot, &run.spots)?) {
         let found = spot.and_then(|s| {
             let r = range(&s.pixel, &s.covariance, &camera.value, &pointer.value, &joint)?;
             on_beam(&r, run.max_off_beam).map(|()| (s, r))
@@ -141,12 +142,7 @@ pub fn measure_range(recording: &Recording, rig: &Rig, run: &RangeRun) -> Result
         };
         let mut in_base = None;
         if let Some((poses, hand_eye)) = base {
-            let k = frame.pose.unwrap_or(*index);
-            let pose = poses.get(k).ok_or_else(|| {
-                Fault::input(format!("{name}: asks for pose {k}, the pose file has {}", poses.len()))
-                    .cause("the pose file belongs to another recording, or ends early")
-                    .next("export the poses of all pictures again")
-            })?;
+            let pose = recording.pose_of(*index, poses).map_err(|e| e.at(name))?;
             first_x.get_or_insert(Vec3::from(pose.rotation.column(0)));
             let p = to_base(&ranged, pose, &hand_eye.value, &shared, &robot);
             in_base = Some(p.clone());

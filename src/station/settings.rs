@@ -43,11 +43,11 @@ impl Settings {
     /// Reads `station/station.toml`; a station without one has the defaults.
     pub fn load(station: &Path) -> Result<Settings> {
         let path = station.join("station.toml");
-        let text = match std::fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound && station.is_dir() => return Ok(Settings::default()),
-            Err(e) => {
-                return Err(Fault::read(&path, e)
+        let text = match crate::files::read_text_if_there(&path)? {
+            Some(text) => text,
+            None if station.is_dir() => return Ok(Settings::default()),
+            None => {
+                return Err(Fault::read(&path, std::io::ErrorKind::NotFound.into())
                     .next("make a station with sheetlight station new, or give its folder as --station"));
             }
         };

@@ -1,5 +1,6 @@
 //! In: stripe peaks of pictures, boards of known pose in them. Out: of each picture the peaks along the strongest straight
-//! line on its board (stage `hough`): a flat board cuts the sheet in a line, dots, halos and reflections do not lie on it.
+//! line on its board (stage `hough`) and along a second one nearly as strong: a flat board cuts the sheet in a line, dots and
+//! halos do not lie on it; which of two lines is the sheet only all pictures together can tell.
 //! Frame and unit: pixels of a camera without lens distortion, in which the line is straight.
 
 use crate::calibrate::board_print::inside;
@@ -12,6 +13,8 @@ use crate::stages::hough::{HoughFrame, HoughParams, lines, vote};
 
 /// Half width of the line's surroundings in stripe sigmas, and at least 2 px: a centre that is farther off is another's.
 const NEAR_WIDTHS: f64 = 3.0;
+/// Share of the strongest line's pixels from which on a second one is kept, too.
+const RIVAL: f64 = 0.4;
 /// Fewest peaks of a line; with fewer on the board nothing is left out, the solver judges them.
 const LEAST: u32 = 10;
 
@@ -20,7 +23,7 @@ pub fn keep_straight(views: &mut [StripeView], camera: &Intrinsics, device: Opti
     // Undistorted, the picture's corners leave it by less than a quarter of its size.
     let margin = Vec2::new(f64::from(camera.width / 4), f64::from(camera.height / 4));
     let (width, height) = (camera.width + 2 * (camera.width / 4), camera.height + 2 * (camera.height / 4));
-    let params = HoughParams { most: 1, least_pixels: LEAST, ..HoughParams::default() };
+    let params = HoughParams { most: 2, least_pixels: LEAST, ..HoughParams::default() };
     let frame = HoughFrame::new(width, height, &params);
     let place = |pixel: &Vec2| {
         let n = camera.normalised_from_pixel(pixel)?;
@@ -49,12 +52,15 @@ pub fn keep_straight(views: &mut [StripeView], camera: &Intrinsics, device: Opti
     for (((view, places), pixels), votes) in
         views.iter_mut().zip(&places).zip(&pixels).zip(vote(device, &frame, &pixels)?)
     {
-        let Some(line) = lines(&frame, votes, pixels, &params).first().copied() else { continue };
-        let (s, c) = line.angle.sin_cos();
+        let mut kept = lines(&frame, votes, pixels, &params);
+        let Some(strongest) = kept.iter().map(|l| l.pixels).max() else { continue };
+        kept.retain(|l| f64::from(l.pixels) >= RIVAL * f64::from(strongest));
         let mut at = places.iter();
         view.peaks.retain(|k| {
             let near = f64::max(2.0, NEAR_WIDTHS * k.width_px);
-            at.next().expect("one a peak").is_some_and(|p| (p.x * c + p.y * s - line.distance_px).abs() < near)
+            at.next().expect("one a peak").is_some_and(|p| {
+                kept.iter().any(|l| (p.x * l.angle.cos() + p.y * l.angle.sin() - l.distance_px).abs() < near)
+            })
         });
     }
     Ok(())

@@ -37,7 +37,7 @@ pub struct PointerValue {
 
 impl Values {
     pub fn load(path: &Path) -> Result<Values> {
-        let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+        let text = crate::files::read_text(path)?;
         serde_json::from_str(&text).map_err(|e| {
             Fault::input(format!("{}: holds no rig values: {e}", path.display()))
                 .cause("not JSON, or an entry of another shape")

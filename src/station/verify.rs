@@ -83,7 +83,7 @@ pub fn verify(rig: &Rig, run: &VerifyRun) -> Result<VerifyReport> {
     let touch = match &run.touches {
         None => None,
         Some(path) => {
-            let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+            let text = crate::files::read_text(path)?;
             Some(touch(&read_touches(&text).map_err(|e| e.at(path.display()))?)?)
         }
     };

@@ -4,6 +4,7 @@
 
 use super::Settings;
 use crate::calibrate::limits::Asked;
+use crate::fault::{Fault, Result};
 use crate::rig::{Rig, Volume};
 
 /// Where the laser plane was held by boards; `None` for an imported one.
@@ -18,6 +19,21 @@ pub fn calibrated(rig: &Rig) -> Option<Volume> {
 /// as far again. `None`: nobody knows, every depth is believed.
 pub fn believed(settings: &Settings, rig: &Rig) -> Option<Volume> {
     settings.volume().or_else(|| calibrated(rig).map(|v| v.extended()))
+}
+
+/// Where the camera looks at a surface squarely: the middle of the working volume, else where the sheet meets its axis.
+pub fn view(settings: &Settings, rig: &Rig) -> Result<Volume> {
+    if let Some(v) = settings.volume().or_else(|| calibrated(rig)) {
+        return Ok(v);
+    }
+    let plane = rig.need_laser_plane()?.value;
+    let z = plane.offset / plane.normal.z;
+    if !(z > 0.0 && z.is_finite()) {
+        return Err(Fault::usage("how far the camera is to look at the surface from is not known")
+            .cause("the sheet does not meet the camera's axis in front of it, and no working volume is stated")
+            .next("state the distance with --view-mm, or [working_volume] in station.toml"));
+    }
+    Ok(Volume::new(z, z, "where the sheet meets the camera's axis"))
 }
 
 /// What is stated about judging a calibration: on the command line, else in station.toml.
@@ -50,6 +66,7 @@ mod tests {
         };
         rig.laser_plane = plane(quality(&[]));
         assert_eq!(believed(&settings, &rig), None, "an imported plane says nothing of depths");
+        assert!((view(&settings, &rig).unwrap().middle() - 200.0 / 0.4).abs() < 1e-9);
         rig.laser_plane = plane(quality(&[("nearest_board_mm", 411.0), ("farthest_board_mm", 504.0)]));
         let v = believed(&settings, &rig).unwrap();
         assert_eq!((v.near_mm, v.far_mm), (318.0, 597.0));

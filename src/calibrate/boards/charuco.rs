@@ -3,7 +3,8 @@
 //! Frame and unit: pixels; ids row by row from the inner corner nearest to the board's origin.
 
 use super::grid::{FrontEnd, Grid, Prepared};
-use super::refine::{Corner, Grey, Window};
+use super::growth::grown;
+use super::refine::{Grey, Window};
 use super::{BoardPoint, BoardView, FindOptions};
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec2;
@@ -84,72 +85,17 @@ fn detector(layout: &Layout<'_>) -> Result<CharucoDetector> {
     })
 }
 
-/// Refines what was found, then lets the lattice grow into corners that the detector missed, as long
-/// as the picture shows a crossing of the same contrast, polarity and blur there.
+/// Refines what was found and lets the lattice grow over the board.
 fn refine(grid: &mut Grid, layout: &Layout<'_>, grey: &Grey, options: &FindOptions) -> BoardView {
     // The white margin round a marker, less a quarter for blur.
     let margin = 0.75 * 0.5 * (1.0 - layout.marker_mm / layout.square_mm);
     let window = Window { reach: options.reach, longest_px: options.longest_px, margin };
-    let mut corners = grid.refined(grey, &window, options.band_px);
-    // A round grows by one row or column on each side.
-    for _ in 0..grid.columns + grid.rows {
-        let Some(typical) = Typical::of(&corners, grid.columns) else { break };
-        for (k, c) in corners.iter_mut().enumerate() {
-            if c.is_some_and(|c| !typical.resembles(&c, k % grid.columns + k / grid.columns)) {
-                *c = None;
-            }
-        }
-        corners.iter().zip(&mut grid.corners).for_each(|(c, g)| *g = c.map(|c| c.pixel));
-        let known = grid.count();
-        let missing = grid.predicted();
-        let mut grown = grid.clone();
-        missing.iter().for_each(|(k, p)| grown.corners[*k] = Some(*p));
-        let all = grown.refined(grey, &window, options.band_px);
-        for (k, _) in missing {
-            let new = all[k].filter(|c| typical.resembles(c, k % grid.columns + k / grid.columns));
-            corners[k] = new;
-            grid.corners[k] = new.map(|c| c.pixel);
-        }
-        if grid.count() == known {
-            break;
-        }
-    }
-    let points = corners
+    let points = grown(grid, grey, &window, options.band_px)
         .iter()
         .enumerate()
         .filter_map(|(feature_id, c)| c.map(|c| BoardPoint { feature_id, pixel: c.pixel, sigma_px: c.sigma_px }))
         .collect();
-    BoardView { points, ambiguous: false }
-}
-
-/// What this picture's corners look like, in the median.
-struct Typical {
-    contrast: f64,
-    blur: f64,
-    sigma: f64,
-}
-
-impl Typical {
-    fn of(corners: &[Option<Corner>], columns: usize) -> Option<Typical> {
-        let median = |f: &dyn Fn(usize, &Corner) -> f64| {
-            let mut v: Vec<f64> = corners.iter().enumerate().filter_map(|(k, c)| c.as_ref().map(|c| f(k, c))).collect();
-            v.sort_by(f64::total_cmp);
-            v.get(v.len() / 2).copied()
-        };
-        Some(Typical {
-            contrast: median(&|k, c| c.contrast * sign(k % columns + k / columns))?,
-            blur: median(&|_, c| c.blur_px)?,
-            sigma: median(&|_, c| c.sigma_px)?,
-        })
-    }
-    fn resembles(&self, c: &Corner, parity: usize) -> bool {
-        let contrast = c.contrast * sign(parity) / self.contrast;
-        (0.3..3.0).contains(&contrast) && c.blur_px < 2.5 * self.blur + 0.5 && c.sigma_px < 5.0 * self.sigma + 0.02
-    }
-}
-
-fn sign(parity: usize) -> f64 {
-    if parity % 2 == 0 { 1.0 } else { -1.0 }
+    BoardView { points, ambiguous: false, dot_diameter: None }
 }
 
 fn why_not(layout: &Layout<'_>, span: f64, reason: &str) -> Fault {

@@ -2,6 +2,7 @@
 //! Frame and unit: pixels; ids row by row from the board's first inner corner.
 
 use super::grid::{FrontEnd, Grid, Prepared, lattices};
+use super::growth::grown;
 use super::refine::{Corner, Grey, Window};
 use super::{BoardPoint, BoardView, FindOptions};
 use crate::fault::{Fault, Result};
@@ -38,7 +39,8 @@ pub fn find(image: &Image, corners: [u32; 2], black_first: bool, options: &FindO
     Err(why_not(best.as_ref(), columns, rows, best_span, &grey))
 }
 
-/// The view, where the lattice has the extent asked for and every corner stands the refinement.
+/// The view, where the lattice has the extent asked for and every corner stands the refinement. Second try: corners
+/// of the background dropped, corners that were missed found where their neighbours put them.
 fn accept(
     grid: &Grid,
     columns: usize,
@@ -48,35 +50,103 @@ fn accept(
     window: &Window,
     options: &FindOptions,
 ) -> Result<Option<BoardView>> {
+    let whole = whole(grid, columns, rows, grey, window, options);
+    let Some(mut found) = whole.or_else(|| mended(grid, columns, rows, grey, window, options)) else { return Ok(None) };
+    // Contrast of corner (i, j) has the sign of its lower right square, which is alternately coloured;
+    // a lattice that slipped by one somewhere would show it here.
+    let bright = |k: usize, c: &Corner| (c.contrast > 0.0) != ((k % columns + k / columns) % 2 == 1);
+    let mut all = found.corners.iter().enumerate().filter_map(|(k, c)| Some(bright(k, c.as_ref()?)));
+    let Some(first_bright) = all.next() else { return Ok(None) };
+    if !all.all(|b| b == first_bright) || !found.grid.fill_gaps(1.0) {
+        return Ok(None);
+    }
+    // A corner may be hidden, not out of view: of a board that goes on beyond the picture nobody knows the rest.
+    let inside = |p: &Vec2| p.x > 0.0 && p.y > 0.0 && p.x < grey.width as f64 - 1.0 && p.y < grey.height as f64 - 1.0;
+    let hidden = found.grid.corners.iter().zip(&found.corners).filter(|(_, c)| c.is_none());
+    if !hidden.filter_map(|(place, _)| place.as_ref()).all(|p| inside(p)) {
+        return Ok(None);
+    }
+    orient(&found, first_bright, black_first).map(Some)
+}
+
+/// A lattice of the extent asked for with what was refined of it.
+struct Found {
+    grid: Grid,
+    corners: Vec<Option<Corner>>,
+}
+
+fn whole(
+    grid: &Grid,
+    columns: usize,
+    rows: usize,
+    grey: &Grey,
+    window: &Window,
+    options: &FindOptions,
+) -> Option<Found> {
     let mut turned = grid.clone();
     if (grid.columns, grid.rows) != (columns, rows) {
         turned = grid.quarter_turn();
     }
     if (turned.columns, turned.rows) != (columns, rows) || !turned.fill_gaps(options.gaps) {
-        return Ok(None);
+        return None;
     }
     let corners = turned.refined(grey, window, options.band_px);
-    let Some(corners) = corners.into_iter().collect::<Option<Vec<Corner>>>() else { return Ok(None) };
-    // Contrast of corner (i, j) has the sign of its lower right square, which is alternately coloured;
-    // a lattice that slipped by one somewhere would show it here.
-    let bright = |c: &Corner, k: usize| (c.contrast > 0.0) != ((k % columns + k / columns) % 2 == 1);
-    let first_bright = bright(&corners[0], 0);
-    if !corners.iter().enumerate().all(|(k, c)| bright(c, k) == first_bright) {
-        return Ok(None);
+    corners.iter().all(Option::is_some).then_some(Found { grid: turned, corners })
+}
+
+/// Grows the lattice as far as the picture shows the board, one line beyond what was asked for at most: a larger board is
+/// not this one. A few corners may stay unseen (glare).
+fn mended(
+    grid: &Grid,
+    columns: usize,
+    rows: usize,
+    grey: &Grey,
+    window: &Window,
+    options: &FindOptions,
+) -> Option<Found> {
+    let least = columns.min(rows);
+    if 2 * grid.count() < columns * rows || grid.columns.min(grid.rows) + 3 < least {
+        return None;
     }
-    orient(&corners, columns, rows, first_bright, black_first).map(Some)
+    let mut large = grid.padded(columns.max(rows).saturating_sub(grid.columns.min(grid.rows)).clamp(1, 4));
+    let corners = grown(&mut large, grey, window, options.band_px);
+    let [across, down] = large.extent();
+    let cut = |k: usize| (down.start + k / across.len()) * large.columns + across.start + k % across.len();
+    let count = across.len() * down.len();
+    let mut found = Found {
+        grid: Grid {
+            columns: across.len(),
+            rows: down.len(),
+            corners: (0..count).map(|k| large.corners[cut(k)]).collect(),
+        },
+        corners: (0..count).map(|k| corners[cut(k)]).collect(),
+    };
+    if (found.grid.columns, found.grid.rows) != (columns, rows) {
+        let places = Grid { corners: (0..count).map(|k| Some(Vec2::new(k as f64, 0.0))).collect(), ..found.grid };
+        let order = places.quarter_turn();
+        found.corners = order.corners.iter().flatten().map(|k| found.corners[k.x as usize]).collect();
+        found.grid = Grid {
+            corners: found.corners.iter().map(|c| c.map(|c| c.pixel)).collect(),
+            columns: order.columns,
+            rows: order.rows,
+        };
+    }
+    let fits = (found.grid.columns, found.grid.rows) == (columns, rows);
+    let missing = found.corners.iter().filter(|c| c.is_none()).count() as f64;
+    (fits && missing <= options.gaps * count as f64).then_some(found)
 }
 
 /// Chooses the turn at which the square outside the first corner has its colour.
-fn orient(corners: &[Corner], columns: usize, rows: usize, first_bright: bool, black_first: bool) -> Result<BoardView> {
+fn orient(found: &Found, first_bright: bool, black_first: bool) -> Result<BoardView> {
+    let (columns, rows) = (found.grid.columns, found.grid.rows);
     // The square outside the first corner and the one inside it (diagonally) have the same colour.
     let as_found = first_bright != black_first;
     let grid = Grid { columns, rows, corners: (0..columns * rows).map(|k| Some(Vec2::new(k as f64, 0.0))).collect() };
     let half = grid.quarter_turn().quarter_turn();
     let half_keeps_colour = (columns + rows) % 2 == 0;
     let square = columns == rows;
-    // A quarter turn of an even square lattice moves a black first square onto a white one.
-    let quarter_keeps_colour = square && columns % 2 == 1;
+    // n inner corners are n + 1 squares: a quarter turn moves a black corner square onto a white one where n is odd.
+    let quarter_keeps_colour = square && columns.is_multiple_of(2);
     let chosen = match (as_found, half_keeps_colour, square) {
         (true, _, _) => grid,
         (false, false, _) => half,
@@ -86,33 +156,37 @@ fn orient(corners: &[Corner], columns: usize, rows: usize, first_bright: bool, b
                 "a board of {columns}x{rows} inner corners was found, but the square outside its first corner is {}",
                 if black_first { "white" } else { "black" }
             ))
-            .cause("first_square in the board's description is the other colour")
-            .next(format!("set first_square to \"{}\"", if black_first { "white" } else { "black" })));
+            .cause("first_square in the board's description is the other colour, or the picture is mirrored")
+            .next(format!(
+                "set first_square to \"{}\", or switch the camera's mirroring off",
+                if black_first { "white" } else { "black" }
+            )));
         }
     };
     // Where a turn changes nothing, the picture's upper left decides for now; the view says so.
     let ambiguous = half_keeps_colour;
-    let chosen = if ambiguous { nearest_to_top_left(chosen, corners, quarter_keeps_colour) } else { chosen };
+    let chosen = if ambiguous { nearest_to_top_left(chosen, &found.grid, quarter_keeps_colour) } else { chosen };
     let points = chosen
         .corners
         .iter()
         .flatten()
         .enumerate()
-        .map(|(feature_id, old)| {
-            let c = &corners[old.x as usize];
-            BoardPoint { feature_id, pixel: c.pixel, sigma_px: c.sigma_px }
+        .filter_map(|(feature_id, old)| {
+            let c = found.corners[old.x as usize]?;
+            Some(BoardPoint { feature_id, pixel: c.pixel, sigma_px: c.sigma_px })
         })
         .collect();
-    Ok(BoardView { points, ambiguous })
+    Ok(BoardView { points, ambiguous, dot_diameter: None })
 }
 
-fn nearest_to_top_left(grid: Grid, corners: &[Corner], quarters: bool) -> Grid {
+/// `order` holds indices into `places`, whose corners are all known.
+fn nearest_to_top_left(order: Grid, places: &Grid, quarters: bool) -> Grid {
     let first = |g: &Grid| {
-        let p = corners[g.corners[0].expect("full").x as usize].pixel;
+        let p = places.corners[g.corners[0].expect("full").x as usize].expect("full");
         p.x + p.y
     };
-    let mut best = grid.clone();
-    let mut turned = grid;
+    let mut best = order.clone();
+    let mut turned = order;
     for k in 1..4 {
         turned = turned.quarter_turn();
         if (k == 2 || quarters) && first(&turned) < first(&best) {

@@ -46,8 +46,9 @@ pub fn find(image: &Image, board: &BoardSpec, _options: &FindOptions) -> Result<
         let Some((chosen, ambiguous)) = labelled(&blobs, &nodes) else { continue };
         let dots: Option<Vec<Dot>> = chosen.iter().map(|&b| dot(&grey, &blobs[b].centre, &blobs[b].shape)).collect();
         let Some(dots) = dots else { continue };
-        let points = centred(&dots, &features, diameter_mm / 2.0)?;
-        return Ok(BoardView { points, ambiguous });
+        let (points, radius) = centred(&dots, &features, diameter_mm.map(|d| d / 2.0))?;
+        let dot_diameter = diameter_mm.is_none().then_some(2.0 * radius);
+        return Ok(BoardView { points, ambiguous, dot_diameter });
     }
     Err(Fault::refused(format!("no grid of {nx}x{ny} dots was found; {most} round spots are in the picture"))
         .cause(if most < features.len() {
@@ -106,7 +107,7 @@ fn blobs(grey: &Grey, dark: bool) -> Vec<Blob> {
 }
 
 /// Pixels that differ from the mean of their surroundings (an eighth of the picture) by a fifth of it.
-fn mask(grey: &Grey, dark: bool) -> Vec<bool> {
+pub(super) fn mask(grey: &Grey, dark: bool) -> Vec<bool> {
     let (w, h) = (grey.width, grey.height);
     let mut sums = vec![0.0f64; (w + 1) * (h + 1)];
     for y in 0..h {
@@ -207,20 +208,44 @@ fn matching(lattice: &HashMap<Node, usize>, nodes: &[Node], blobs: &[Blob]) -> O
 }
 
 /// The image of a circle's centre is not the centre of its image: with the board's homography H the
-/// circle's conic C becomes H⁻ᵀCH⁻¹, whose centre tells the difference (docs/math.md, Corners (5)).
-fn centred(dots: &[Dot], features: &[Vec3], radius: f64) -> Result<Vec<BoardPoint>> {
+/// circle's conic C becomes H⁻ᵀCH⁻¹, whose centre tells the difference (docs/math.md, Corners (5)). A radius that is
+/// not stated is measured; second: the radius.
+fn centred(dots: &[Dot], features: &[Vec3], stated: Option<f64>) -> Result<(Vec<BoardPoint>, f64)> {
     let plane: Vec<Vec2> = features.iter().map(|f| f.xy()).collect();
     let mut pixels: Vec<Vec2> = dots.iter().map(|d| d.pixel).collect();
-    for _ in 0..2 {
+    let mut radius = stated.unwrap_or(0.0);
+    for _ in 0..3 {
         let h = homography(&plane, &pixels).ok_or_else(|| {
             Fault::refused("no board was found: the dots lie on a line").cause("an edge-on board").next("tilt it less")
         })?;
+        if stated.is_none() {
+            radius = measured_radius(&h, dots, &plane);
+        }
         for ((p, d), x) in pixels.iter_mut().zip(dots).zip(&plane) {
             *p = d.pixel - eccentricity(&h, x, radius);
         }
     }
     let points = dots.iter().zip(pixels).enumerate();
-    Ok(points.map(|(feature_id, (d, pixel))| BoardPoint { feature_id, pixel, sigma_px: d.sigma_px }).collect())
+    Ok((
+        points.map(|(feature_id, (d, pixel))| BoardPoint { feature_id, pixel, sigma_px: d.sigma_px }).collect(),
+        radius,
+    ))
+}
+
+/// The radius that makes the circles' images as large as the ellipses, in the median over the dots: areas change by
+/// the homography's determinant at a dot, for small dots, and the circle's image tells the rest.
+fn measured_radius(h: &Mat3, dots: &[Dot], plane: &[Vec2]) -> f64 {
+    let mut all: Vec<f64> = dots
+        .iter()
+        .zip(plane)
+        .map(|(dot, x)| {
+            let seen = 1.0 / dot.shape.determinant().max(1e-12).sqrt();
+            let w = (h * Vec3::new(x.x, x.y, 1.0)).z;
+            (seen * w.abs().powi(3) / h.determinant().abs().max(1e-300)).sqrt()
+        })
+        .collect();
+    all.sort_by(f64::total_cmp);
+    all[all.len() / 2]
 }
 
 /// Centre of the circle's image minus image of its centre, px.

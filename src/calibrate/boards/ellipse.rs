@@ -13,6 +13,8 @@ pub struct Dot {
     pub pixel: Vec2,
     /// Standard deviation per axis, px.
     pub sigma_px: f64,
+    /// A of the ellipse qᵀAq = 1 that its edge is, 1/px².
+    pub shape: Matrix2<f64>,
 }
 
 const PARAMETERS: usize = 10;
@@ -124,7 +126,8 @@ fn fit(pixels: &[[f64; 3]], shape: &Matrix2<f64>, smallest: f64) -> Option<Dot> 
             (q[2] - model(&p, q[0], q[1], &mut j), j)
         })
     };
-    good.then(|| Dot { pixel: Vec2::new(p[0], p[1]), sigma_px: scatter().sqrt() })
+    let shape = Matrix2::new(p[2], p[3], p[3], p[4]);
+    good.then(|| Dot { pixel: Vec2::new(p[0], p[1]), sigma_px: scatter().sqrt(), shape })
 }
 
 type Normal = (SMatrix<f64, PARAMETERS, PARAMETERS>, SVector<f64, PARAMETERS>, f64);

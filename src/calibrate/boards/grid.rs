@@ -58,6 +58,39 @@ impl Grid {
             .collect();
         Grid { columns, rows, corners }
     }
+    /// The lattice with `margin` unknown rows and columns on each side.
+    pub fn padded(&self, margin: usize) -> Grid {
+        let (columns, rows) = (self.columns + 2 * margin, self.rows + 2 * margin);
+        let mut corners = vec![None; columns * rows];
+        for (k, c) in self.corners.iter().enumerate() {
+            corners[(k / self.columns + margin) * columns + k % self.columns + margin] = *c;
+        }
+        Grid { columns, rows, corners }
+    }
+    /// Columns and rows (first, one past the last) of the lattice without outer lines that hold fewer than half of their
+    /// corners.
+    pub fn extent(&self) -> [std::ops::Range<usize>; 2] {
+        let known = |i: usize, j: usize| usize::from(self.corners[j * self.columns + i].is_some());
+        let span = |n: usize, any: &dyn Fn(usize) -> bool| {
+            let first = (0..n).find(|k| any(*k)).unwrap_or(0);
+            first..(first..n).rev().find(|k| any(*k)).map_or(first, |k| k + 1)
+        };
+        let mut across = span(self.columns, &|i| (0..self.rows).any(|j| known(i, j) > 0));
+        let mut down = span(self.rows, &|j| (0..self.columns).any(|i| known(i, j) > 0));
+        while !across.is_empty() && !down.is_empty() {
+            let column = |i: usize| 2 * down.clone().map(|j| known(i, j)).sum::<usize>() < down.len();
+            let row = |j: usize| 2 * across.clone().map(|i| known(i, j)).sum::<usize>() < across.len();
+            let weak = [column(across.start), column(across.end - 1), row(down.start), row(down.end - 1)];
+            match weak.iter().position(|w| *w) {
+                Some(0) => across.start += 1,
+                Some(1) => across.end -= 1,
+                Some(2) => down.start += 1,
+                Some(_) => down.end -= 1,
+                None => break,
+            }
+        }
+        [across, down]
+    }
     /// Mirrored along i.
     pub fn mirrored(&self) -> Grid {
         let corners = (0..self.rows)
@@ -192,18 +225,7 @@ pub struct Prepared {
 impl Prepared {
     /// Averages `shrink` x `shrink` pixels and stretches the contrast where it uses less than half of the range.
     pub fn new(image: &crate::raster::Image, grey: &Grey, shrink: usize) -> Prepared {
-        let (width, height) = (grey.width / shrink, grey.height / shrink);
-        let mut small = Vec::with_capacity(width * height);
-        for y in 0..height {
-            for x in 0..width {
-                let mut sum = 0.0;
-                for dy in 0..shrink {
-                    let row = (y * shrink + dy) * grey.width + x * shrink;
-                    sum += grey.levels[row..row + shrink].iter().sum::<f32>();
-                }
-                small.push(sum / (shrink * shrink) as f32);
-            }
-        }
+        let Grey { width, height, levels: small } = grey.shrunk(shrink);
         let full = f32::from(image.full_scale());
         let mut histogram = [0usize; 256];
         small.iter().for_each(|&v| histogram[(v / full * 255.0) as usize] += 1);
@@ -233,6 +255,21 @@ impl Prepared {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn lines_with_few_corners_are_no_part_of_a_board() {
+        let at = |k: i32| Some(Vec2::new(f64::from(k % 4) * 10.0, f64::from(k / 4) * 9.0));
+        let grid = Grid { columns: 4, rows: 3, corners: (0..12).map(at).collect() };
+        let mut padded = grid.padded(2);
+        assert_eq!((padded.columns, padded.rows, padded.count()), (8, 7, 12));
+        assert_eq!(padded.extent(), [2..6, 2..5]);
+        // A speck of the background beside the board, and a corner that glare hides.
+        padded.corners[8 * 3 + 6] = Some(Vec2::new(40.0, 9.0));
+        padded.corners[8 * 2 + 2] = None;
+        assert_eq!(padded.extent(), [2..6, 2..5]);
+        padded.corners.fill(None);
+        assert!(padded.extent().iter().any(|r| r.is_empty()));
+    }
 
     #[test]
     fn turns_keep_handedness_and_four_of_them_are_none() {

@@ -7,7 +7,12 @@ mod chessboard;
 mod circles;
 mod ellipse;
 mod grid;
+mod growth;
+mod marker_grid;
+#[cfg(test)]
+mod parity;
 pub mod print;
+mod quads;
 pub mod refine;
 mod sandwich;
 #[cfg(test)]
@@ -38,6 +43,8 @@ pub struct BoardView {
     /// The board looks the same after a half (or quarter) turn: which of [`turns`] holds is unknown
     /// here and must come from the whole set.
     pub ambiguous: bool,
+    /// Diameter of a circle grid's dots as this picture shows it, mm, where the description leaves it open.
+    pub dot_diameter: Option<f64>,
 }
 
 /// Settings of [`find`].
@@ -93,6 +100,7 @@ pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<B
                 charuco::Layout { squares: *squares, square_mm: *square_mm, marker_mm: *marker_mm, dictionary };
             charuco::find(image, &layout, options)
         }
+        BoardSpec::MarkerGrid { .. } => marker_grid::find(image, board, options),
         BoardSpec::Circles { .. } => circles::find(image, board, options),
     }
 }

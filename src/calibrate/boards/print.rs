@@ -39,8 +39,13 @@ pub fn sheet(board: &BoardSpec) -> Result<Sheet> {
             let all = Markers::of(board)?.expect("a ChArUco board has markers");
             markers(&mut sheet, &all, [-x0, -y0]);
         }
-        BoardSpec::Circles { diameter_mm, .. } => {
-            let discs = board.features().into_iter().map(|c| [c.x - x0, c.y - y0, diameter_mm / 2.0]);
+        BoardSpec::MarkerGrid { .. } => {
+            let all = Markers::of(board)?.expect("a marker grid has markers");
+            markers(&mut sheet, &all, [-x0, -y0]);
+        }
+        BoardSpec::Circles { .. } => {
+            let r = board.drawn_diameter().expect("a circle grid has dots") / 2.0;
+            let discs = board.features().into_iter().map(|c| [c.x - x0, c.y - y0, r]);
             sheet.discs.extend(discs);
         }
     }
@@ -63,11 +68,15 @@ fn check(board: &BoardSpec) -> Result<()> {
         BoardSpec::Charuco { squares, square_mm, border_mm, .. } => {
             (*squares, "squares", *square_mm, "squares", *border_mm)
         }
+        BoardSpec::MarkerGrid { markers, marker_mm, border_mm, .. } => {
+            (*markers, "markers", *marker_mm, "markers", *border_mm)
+        }
         BoardSpec::Circles { dots, pitch_mm, border_mm, .. } => (*dots, "dots", *pitch_mm, "a pitch", *border_mm),
     };
-    if n.iter().any(|n| !(3..=100).contains(n)) {
+    let least = if matches!(board, BoardSpec::MarkerGrid { .. }) { 1 } else { 3 };
+    if n.iter().any(|n| !(least..=100).contains(n)) {
         return bad(
-            format!("a board of {}x{} {of} cannot be drawn, only 3 to 100 each way", n[0], n[1]),
+            format!("a board of {}x{} {of} cannot be drawn, only {least} to 100 each way", n[0], n[1]),
             "give COLUMNSxROWS within that, e.g. 9x6",
         );
     }
@@ -91,10 +100,24 @@ fn check(board: &BoardSpec) -> Result<()> {
             ),
             "choose markers of 0.5 to 0.8 of the square",
         ),
-        BoardSpec::Circles { diameter_mm, pitch_mm, .. } if !(*diameter_mm > 0.0 && *diameter_mm < 0.9 * pitch_mm) => {
-            let most = 0.9 * pitch_mm;
+        // A white margin of a cell, or its edges are not seen.
+        BoardSpec::MarkerGrid { markers, marker_mm, gap_mm, border_mm, .. }
+            if (markers != &[1, 1] && *gap_mm < 0.15 * marker_mm) || *border_mm < 0.15 * marker_mm =>
+        {
+            let least = 0.15 * marker_mm;
             bad(
-                format!("dots of {diameter_mm} mm do not fit a pitch of {pitch_mm} mm: above 0 and below {most} mm"),
+                format!(
+                    "gaps of {gap_mm} mm and a border of {border_mm} mm leave too little white round markers of {marker_mm} mm: at least {least} mm"
+                ),
+                "choose gaps and a border of a fifth to half of the marker",
+            )
+        }
+        BoardSpec::Circles { pitch_mm, .. }
+            if !board.drawn_diameter().is_some_and(|d| d > 0.0 && d < 0.9 * pitch_mm) =>
+        {
+            let (most, drawn) = (0.9 * pitch_mm, board.drawn_diameter().unwrap_or(0.0));
+            bad(
+                format!("dots of {drawn} mm do not fit a pitch of {pitch_mm} mm: above 0 and below {most} mm"),
                 "choose dots of half the pitch",
             )
         }
@@ -137,7 +160,11 @@ fn label(board: &BoardSpec) -> String {
         BoardSpec::Charuco { squares: [a, b], square_mm, marker_mm, dictionary, .. } => {
             format!("ChArUco, {a}x{b} squares of {square_mm} mm, markers {marker_mm} mm, {dictionary}")
         }
-        BoardSpec::Circles { dots: [a, b], pitch_mm, diameter_mm, asymmetric, .. } => {
+        BoardSpec::MarkerGrid { markers: [a, b], marker_mm, gap_mm, dictionary, first_id, .. } => {
+            format!("{a}x{b} markers of {marker_mm} mm, gaps {gap_mm} mm, {dictionary} from {first_id}")
+        }
+        BoardSpec::Circles { dots: [a, b], pitch_mm, asymmetric, .. } => {
+            let diameter_mm = board.drawn_diameter().unwrap_or(0.0);
             let kind = if *asymmetric { "asymmetric" } else { "symmetric" };
             format!("{kind} circles, {a}x{b}, pitch {pitch_mm} mm, diameter {diameter_mm} mm")
         }
@@ -247,8 +274,13 @@ mod tests {
             border_mm,
             first_square: "black".into(),
         };
-        let dots =
-            BoardSpec::Circles { dots: [7, 5], pitch_mm: 10.0, diameter_mm: 9.5, asymmetric: false, border_mm: 6.0 };
+        let dots = BoardSpec::Circles {
+            dots: [7, 5],
+            pitch_mm: 10.0,
+            diameter_mm: Some(9.5),
+            asymmetric: false,
+            border_mm: 6.0,
+        };
         for (board, words) in [
             (squares([1, 6], 10.0, 6.0), ["board of 1x6 inner corners", "3 to 100"]),
             (squares([9, 101], 10.0, 6.0), ["board of 9x101 inner corners", "3 to 100"]),

@@ -17,6 +17,16 @@ impl Grey {
     pub fn new(image: &crate::raster::Image) -> Grey {
         Grey { width: image.width as usize, height: image.height as usize, levels: image.to_f32() }
     }
+    /// Means of `shrink` x `shrink` pixels.
+    pub fn shrunk(&self, shrink: usize) -> Grey {
+        let (width, height) = (self.width / shrink, self.height / shrink);
+        let mean = |k: usize| {
+            let (x, y) = (k % width * shrink, k / width * shrink);
+            let rows = (y..y + shrink).map(|y| &self.levels[y * self.width + x..y * self.width + x + shrink]);
+            rows.map(|row| row.iter().sum::<f32>()).sum::<f32>() / (shrink * shrink) as f32
+        };
+        Grey { width, height, levels: (0..width * height).map(mean).collect() }
+    }
     /// Bilinear; `None` outside.
     pub fn at(&self, p: &Vec2) -> Option<f64> {
         let (x, y) = (p.x.floor(), p.y.floor());

@@ -25,7 +25,7 @@ fn camera() -> Intrinsics {
     }
 }
 
-fn facing(board: &BoardSpec, rotation: Vec3, distance: f64) -> Rigid<Camera, Board> {
+pub(super) fn facing(board: &BoardSpec, rotation: Vec3, distance: f64) -> Rigid<Camera, Board> {
     let features = board.features();
     let centre = features.iter().sum::<Vec3>() / features.len() as f64;
     let r = crate::geometry::exp(&rotation);
@@ -72,15 +72,18 @@ impl Print {
     }
 }
 
-/// 36 rays a pixel.
 fn picture(board: &BoardSpec, pose: &Rigid<Camera, Board>) -> Image {
+    picture_by(&camera(), board, pose)
+}
+
+/// 36 rays a pixel.
+pub(super) fn picture_by(k: &Intrinsics, board: &BoardSpec, pose: &Rigid<Camera, Board>) -> Image {
     let print = Print::new(board, &sheet(board).unwrap());
     let back = pose.inverse();
     let eye = back.translation;
-    let k = camera();
     let mut pixels = Vec::new();
-    for v in 0..HEIGHT {
-        for u in 0..WIDTH {
+    for v in 0..k.height {
+        for u in 0..k.width {
             let mut sum = 0.0;
             for s in 0..36 {
                 // A rank-1 lattice: 36 different columns and rows, so that aligned edges are not quantised.
@@ -93,7 +96,7 @@ fn picture(board: &BoardSpec, pose: &Rigid<Camera, Board>) -> Image {
             pixels.push((sum / 36.0).round() as u8);
         }
     }
-    Image::from_u8(WIDTH, HEIGHT, pixels)
+    Image::from_u8(k.width, k.height, pixels)
 }
 
 /// Largest distance of the features from where they are, with the best of the board's turns.
@@ -124,7 +127,7 @@ fn charuco() -> BoardSpec {
 }
 
 fn circles(nx: u32, ny: u32, asymmetric: bool) -> BoardSpec {
-    BoardSpec::Circles { dots: [nx, ny], pitch_mm: 10.0, diameter_mm: 8.0, asymmetric, border_mm: 10.0 }
+    BoardSpec::Circles { dots: [nx, ny], pitch_mm: 10.0, diameter_mm: Some(8.0), asymmetric, border_mm: 10.0 }
 }
 
 #[test]
@@ -143,6 +146,97 @@ fn every_kind_is_found_where_it_is_from_every_side() {
     }
 }
 
+/// Markers whose cells are a whole number of the print's cells.
+fn markers(count: [u32; 2], dictionary: &str, first_id: u32) -> BoardSpec {
+    let bits = calib_targets_aruco::resolve_dictionary(dictionary).unwrap().marker_size();
+    let marker_mm = 2.0 * (bits + 2) as f64;
+    BoardSpec::MarkerGrid {
+        markers: count,
+        marker_mm,
+        gap_mm: 5.0,
+        dictionary: dictionary.into(),
+        first_id,
+        border_mm: 6.0,
+    }
+}
+
+#[test]
+fn markers_of_every_dictionary_are_read_where_they_are_from_every_side() {
+    let mut worst_of_all = 0.0f64;
+    for (k, dictionary) in
+        ["DICT_4X4_50", "DICT_5X5_100", "DICT_6X6_250", "DICT_7X7_1000", "DICT_APRILTAG_36h11"].iter().enumerate()
+    {
+        for (count, distance) in [([4, 3], 260.0), ([1, 1], 90.0)] {
+            let board = markers(count, dictionary, 7 + k as u32);
+            assert_eq!(turns(&board).len(), 1);
+            let rotation = [Vec3::new(0.5, -0.3, 0.2), Vec3::new(-0.4, 0.2, 1.7), Vec3::new(0.1, 0.6, -2.9)][k % 3];
+            let pose = facing(&board, rotation, distance);
+            let image = picture(&board, &pose);
+            let view = find(&image, &board, &FindOptions::default()).unwrap_or_else(|e| panic!("{board:?}: {e}"));
+            assert_eq!(view.points.len(), board.features().len(), "{board:?}");
+            let off = worst(&board, &pose, &view);
+            worst_of_all = worst_of_all.max(off);
+            assert!(off < 0.1, "{board:?}: {off} px");
+            // Other ids of the same dictionary, and the same ids of another, are not this board.
+            let other = find(&image, &markers(count, dictionary, 30), &FindOptions::default()).unwrap_err();
+            assert!(other.cause.contains("other ids"), "{other}");
+            let levels = image.to_f32();
+            let mirrored = levels.chunks(WIDTH as usize).flat_map(|row| row.iter().rev().map(|v| *v as u8)).collect();
+            assert!(find(&Image::from_u8(WIDTH, HEIGHT, mirrored), &board, &FindOptions::default()).is_err());
+        }
+    }
+    println!("corners of markers off by {worst_of_all:.3} px at most");
+}
+
+#[test]
+fn markers_that_are_covered_are_left_out() {
+    use rand::SeedableRng;
+    use rand_distr::{Distribution, Normal};
+    let board = markers([5, 4], "DICT_APRILTAG_36h11", 0);
+    let pose = facing(&board, Vec3::new(0.35, -0.3, 0.15), 290.0);
+    let drawn = picture(&board, &pose).to_f32();
+    let features = board.features();
+    let noise = Normal::new(0.0f32, 3.0).unwrap();
+    let mut worst_of_all = 0.0f64;
+    for seed in 0..4 {
+        let rng = &mut rand_pcg::Pcg64::seed_from_u64(seed);
+        let mut levels: Vec<u8> =
+            drawn.iter().map(|v| (v + noise.sample(rng)).round().clamp(0.0, 255.0) as u8).collect();
+        // A grey card over the middle: it touches six of the twenty.
+        for y in 210..260 {
+            levels[y * WIDTH as usize + 290..y * WIDTH as usize + 340].fill(120);
+        }
+        let view = find(&Image::from_u8(WIDTH, HEIGHT, levels), &board, &FindOptions::default()).unwrap();
+        assert!((52..=64).contains(&view.points.len()), "{}", view.points.len());
+        for p in &view.points {
+            let truth = camera().pixel_from_point(&pose.point(&features[p.feature_id])).unwrap();
+            worst_of_all = worst_of_all.max((truth - p.pixel).norm());
+        }
+    }
+    println!("corners of noisy markers off by {worst_of_all:.3} px at most");
+    assert!(worst_of_all < 1.0, "{worst_of_all}");
+}
+
+#[test]
+fn dots_of_unstated_diameter_are_measured() {
+    let with = |diameter_mm: Option<f64>| BoardSpec::Circles {
+        dots: [4, 3],
+        pitch_mm: 30.0,
+        diameter_mm,
+        asymmetric: false,
+        border_mm: 9.0,
+    };
+    for (diameter, rotation) in [(22.0, Vec3::new(0.0, 0.6, 0.1)), (12.0, Vec3::new(-0.5, 0.2, 1.0))] {
+        let pose = facing(&with(Some(diameter)), rotation, 190.0);
+        let image = picture(&with(Some(diameter)), &pose);
+        let view = find(&image, &with(None), &FindOptions::default()).unwrap();
+        let measured = view.dot_diameter.unwrap();
+        let off = worst(&with(None), &pose, &view);
+        println!("{diameter} mm: measured {measured:.3}, centres off by {off:.4} px");
+        assert!((measured / diameter - 1.0).abs() < 0.01 && off < 0.03, "{measured} mm, {off} px");
+    }
+}
+
 #[test]
 fn boards_that_look_alike_when_turned_say_so() {
     for board in [chessboard(8, 6), chessboard(7, 7), circles(7, 5, false)] {
@@ -157,7 +251,7 @@ fn boards_that_look_alike_when_turned_say_so() {
 fn a_circles_centre_is_not_the_centre_of_its_ellipse() {
     // Large dots near a tilted camera: uncorrected, the centres would be 0.1 px and more off.
     let board =
-        BoardSpec::Circles { dots: [4, 3], pitch_mm: 30.0, diameter_mm: 22.0, asymmetric: false, border_mm: 9.0 };
+        BoardSpec::Circles { dots: [4, 3], pitch_mm: 30.0, diameter_mm: Some(22.0), asymmetric: false, border_mm: 9.0 };
     let pose = facing(&board, Vec3::new(0.0, 0.6, 0.1), 190.0);
     let view = find(&picture(&board, &pose), &board, &FindOptions::default()).unwrap();
     let off = worst(&board, &pose, &view);

@@ -37,9 +37,10 @@ pub fn turns(board: &BoardSpec) -> Vec<Turn> {
 fn colours_agree(board: &BoardSpec, quarter: u32) -> bool {
     match board {
         BoardSpec::Chessboard { inner_corners: [nx, ny], .. } => {
-            (nx + ny) % 2 == 0 && (quarter == 2 || (nx == ny && nx % 2 == 1))
+            // An odd number of inner corners is an even number of squares: a quarter turn swaps their colours.
+            (nx + ny) % 2 == 0 && (quarter == 2 || (nx == ny && nx % 2 == 0))
         }
-        BoardSpec::Charuco { .. } => false,
+        BoardSpec::Charuco { .. } | BoardSpec::MarkerGrid { .. } => false,
         BoardSpec::Circles { .. } => true,
     }
 }
@@ -50,7 +51,7 @@ impl BoardView {
         let mut points = self.points.clone();
         points.iter_mut().for_each(|p| p.feature_id = turn.ids[p.feature_id]);
         points.sort_by_key(|p| p.feature_id);
-        BoardView { points, ambiguous: self.ambiguous }
+        BoardView { points, ambiguous: self.ambiguous, dot_diameter: self.dot_diameter }
     }
 }
 
@@ -62,7 +63,7 @@ mod tests {
         BoardSpec::Chessboard { inner_corners: [nx, ny], square_mm: 10.0, border_mm: 0.0, first_square: "black".into() }
     }
     fn circles(nx: u32, ny: u32, asymmetric: bool) -> BoardSpec {
-        BoardSpec::Circles { dots: [nx, ny], pitch_mm: 10.0, diameter_mm: 5.0, asymmetric, border_mm: 0.0 }
+        BoardSpec::Circles { dots: [nx, ny], pitch_mm: 10.0, diameter_mm: Some(5.0), asymmetric, border_mm: 0.0 }
     }
 
     #[test]
@@ -70,7 +71,7 @@ mod tests {
         let count = |b: &BoardSpec| turns(b).len();
         assert_eq!(count(&chessboard(9, 6)), 1);
         assert_eq!((count(&chessboard(8, 6)), count(&chessboard(9, 7))), (2, 2));
-        assert_eq!((count(&chessboard(7, 7)), count(&chessboard(8, 8))), (4, 2));
+        assert_eq!((count(&chessboard(7, 7)), count(&chessboard(8, 8))), (2, 4));
         assert_eq!((count(&circles(7, 5, false)), count(&circles(6, 6, false))), (2, 4));
         assert_eq!((count(&circles(4, 11, true)), count(&circles(4, 10, true))), (1, 2));
     }

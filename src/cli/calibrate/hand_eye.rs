@@ -4,32 +4,47 @@
 use super::super::Console;
 use super::{Keep, finish};
 use crate::calibrate::hand_eye::{HandEyeOptions, Mount};
-use crate::fault::Result;
+use crate::fault::{Fault, Result};
 use crate::geometry::{Frame, Rigid};
-use crate::recording::Recording;
+use crate::recording::{Recording, load_poses};
 use crate::rig::Rig;
 use crate::robot::Convention;
 use crate::station::volume::asked;
-use crate::station::{HandEyeResult, HandEyeRun, Settings, calibrate_hand_eye};
-use std::path::PathBuf;
+use crate::station::{
+    HandEyeResult, HandEyeRun, PosePairs, Settings, calibrate_hand_eye, calibrate_hand_eye_from_poses,
+};
+use std::path::{Path, PathBuf};
 
 /// Find the camera's pose on the flange from pictures of a fixed board and the robot's poses
 ///
 /// Pictures and poses are adjusted together: pixels weigh by their noise, poses by the robot's, which
 /// is estimated. Pairs that do not belong together are found and named. The result says how far a
 /// point at the working distance is to be trusted, and each pose is predicted by the others.
+/// With --board-poses no pictures are read: the file holds the board's poses as another program measured them.
 #[derive(clap::Args)]
-#[command(after_help = "Example:
-  sheetlight calibrate hand-eye recordings/handeye --poses poses_noisy --station cell3")]
+#[command(after_help = "Examples:
+  sheetlight calibrate hand-eye recordings/handeye --poses poses_noisy --station cell3
+  sheetlight calibrate hand-eye --board-poses boards.csv --poses robot.csv --station cell3")]
 pub struct Args {
     /// Recording folder: one board that stands still, a picture and a pose per frame
-    recording: PathBuf,
-    /// Station folder with the camera's calibration
+    #[arg(required_unless_present = "board_poses", conflicts_with = "board_poses")]
+    recording: Option<PathBuf>,
+    /// Station folder; with pictures it holds the camera's calibration
     #[arg(long)]
     station: PathBuf,
-    /// Pose file of the recording, without extension [default: the one meta.json names]
+    /// Pose file of the recording, without extension [default: the one meta.json names]; beside --board-poses a path
     #[arg(long)]
     poses: Option<String>,
+    /// Board poses in the camera frame (camera_T_board, docs/file-formats.md) in place of pictures
+    #[arg(long, requires = "poses")]
+    board_poses: Option<PathBuf>,
+    /// Sigma of the board poses' position per axis, mm [default: their places' scatter counts as the
+    /// robot's, their turns' is estimated]
+    #[arg(long, requires = "board_poses", requires = "board_sigma_deg")]
+    board_sigma_mm: Option<f64>,
+    /// Sigma of the board poses' orientation per axis, degrees
+    #[arg(long, requires = "board_poses", requires = "board_sigma_mm")]
+    board_sigma_deg: Option<f64>,
     /// The camera stands still and the flange carries the board
     #[arg(long)]
     eye_to_hand: bool,
@@ -48,8 +63,6 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
-    let recording = Recording::open(&args.recording)?;
-    recording.pose_file(args.poses.as_deref())?.warnings.iter().for_each(|w| console.warn(w));
     let (settings, rig) = (Settings::load(&args.station)?, Rig::load_to_calibrate(&args.station)?);
     let run = HandEyeRun {
         poses: args.poses.clone(),
@@ -61,13 +74,21 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         },
         asked: asked(&settings, args.working_mm.map(|mm| [mm, mm])),
     };
-    let bar = console.bar("boards", 0);
-    let progress = |done: usize, all: usize| {
-        bar.set_length(all as u64);
-        bar.set_position(done as u64);
+    let result = match (&args.recording, &args.board_poses) {
+        (Some(recording), _) => from_pictures(args, recording, &rig, &run, console)?,
+        (None, Some(boards)) => {
+            let robot = PathBuf::from(args.poses.as_deref().expect("clap: required beside --board-poses"));
+            load_poses(&robot)?.warnings.iter().for_each(|w| console.warn(w));
+            let board_sigma = args.board_sigma_mm.zip(args.board_sigma_deg).map(|(mm, deg)| [mm, deg.to_radians()]);
+            if let Some([mm, rad]) = board_sigma.filter(|s| !s.iter().all(|s| *s > 0.0 && s.is_finite())) {
+                let deg = rad.to_degrees();
+                return Err(Fault::usage(format!("board sigmas of {mm} mm and {deg} degrees, above 0 is allowed"))
+                    .next("state what the other program's poses scatter by, or leave both out"));
+            }
+            calibrate_hand_eye_from_poses(&PosePairs { robot, boards: boards.clone(), board_sigma }, &rig, &run)?
+        }
+        (None, None) => unreachable!("clap: one of them is required"),
     };
-    let result = calibrate_hand_eye(&recording, &rig, &run, &progress)?;
-    bar.finish_and_clear();
     match result {
         HandEyeResult::OnFlange(c) => {
             let text = described("camera on the flange", &c.calibration.value);
@@ -78,6 +99,25 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
             finish(&args.station, &c.calibration, &c.page, &text, &args.keep, console)
         }
     }
+}
+
+fn from_pictures(
+    args: &Args,
+    recording: &Path,
+    rig: &Rig,
+    run: &HandEyeRun,
+    console: &Console,
+) -> Result<HandEyeResult> {
+    let recording = Recording::open(recording)?;
+    recording.pose_file(args.poses.as_deref())?.warnings.iter().for_each(|w| console.warn(w));
+    let bar = console.bar("boards", 0);
+    let progress = |done: usize, all: usize| {
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+    };
+    let result = calibrate_hand_eye(&recording, rig, run, &progress)?;
+    bar.finish_and_clear();
+    Ok(result)
 }
 
 fn described<A: Frame, B: Frame>(what: &str, pose: &Rigid<A, B>) -> String {

@@ -5,6 +5,7 @@ use super::super::Console;
 use super::{Keep, finish};
 use crate::calibrate::laser_plane::LaserPlaneOptions;
 use crate::fault::Result;
+use crate::raster::Channel;
 use crate::recording::Recording;
 use crate::rig::Rig;
 use crate::scan::Where;
@@ -15,8 +16,8 @@ use std::path::PathBuf;
 /// Find the laser plane from pictures of the stripe on boards
 ///
 /// Each frame has an ambient picture, which gives the board's pose, and a laser picture of the same
-/// pose. The stripe is found as in a scan; only what lies on the board and away from the print's edges
-/// counts. The camera's calibration is held; its uncertainty is carried over.
+/// pose. Room light that the laser picture holds too is taken out. The stripe is found as in a scan; only
+/// what lies on the board and away from the print's edges counts. The camera's calibration is held; its uncertainty is carried over.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
   sheetlight calibrate laser-plane recordings/laserplane --station cell3")]
@@ -36,12 +37,16 @@ pub struct Args {
     /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
     #[arg(long, default_value = "auto", value_parser = super::super::parse::<Where>)]
     on: Where,
+    /// Part of a colour picture to use: red, green, blue or luma
+    #[arg(long, default_value = "luma", value_parser = crate::cli::parse::<Channel>)]
+    channel: Channel,
     #[command(flatten)]
     keep: Keep,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
-    let recording = Recording::open(&args.recording)?;
+    let mut recording = Recording::open(&args.recording)?;
+    recording.channel = args.channel;
     let (settings, rig) = (Settings::load(&args.station)?, Rig::load_to_calibrate(&args.station)?);
     let run = LaserPlaneRun {
         solver: LaserPlaneOptions::default(),

@@ -10,7 +10,7 @@ mod profile_hand_eye;
 use super::Console;
 use crate::calibrate::report::Page;
 use crate::fault::{Fault, Result};
-use crate::rig::{Calibration, Kind, Measured, Rig, Verdict};
+use crate::rig::{Calibration, Kind, Measured, Quality, Rig, Verdict};
 use serde::Serialize;
 use std::path::Path;
 
@@ -57,7 +57,7 @@ fn finish<T: Serialize + Measured>(
         std::fs::create_dir_all(&folder).map_err(|e| Fault::write(&folder, e))?;
         let html = folder.join(format!("{}.refused.html", calibration.kind.name()));
         page.save(&html)?;
-        console.say(format!("{}: what was found", html.display()));
+        console.say(format!("{value}\n{}not stored; {}: what was found", figures(q), html.display()));
         let what = format!("the {} is {}: {}", calibration.kind.words(), q.verdict.words(), q.reasons.join("; "));
         return Err(Fault::refused(what)
             .cause("too few, too similar or contradicting pictures; the station keeps its former calibration")
@@ -73,14 +73,7 @@ fn finish<T: Serialize + Measured>(
     for a in &q.advice {
         text += &format!("  next: {a}\n");
     }
-    let show = |text: &mut String, head: &str, keys: &[&str]| {
-        let found: Vec<String> = keys.iter().filter_map(|k| q.figures.get(*k).map(|v| format!("{k} {v:.4}"))).collect();
-        if !found.is_empty() {
-            *text += &format!("{head:13} {}\n", found.join(", "));
-        }
-    };
-    show(&mut text, "fit:", &["rms_px", "rms_mm"]);
-    show(&mut text, "verification:", &["holdout_rms_px", "holdout_rms_mm"]);
+    text += &figures(q);
     text += &format!("stored {}\nreport {}", path.display(), html.display());
     console.result(calibration, &text);
     if q.verdict >= Verdict::BadlyDetermined {
@@ -98,4 +91,21 @@ pub(in crate::cli) fn stale(station: &Path, console: &Console) {
         Ok(()) => {}
         Err(fault) => console.warn(fault.to_string()),
     }
+}
+
+/// How well a result fits, how it predicts what it did not see, and how well it is known: a line each.
+fn figures(q: &Quality) -> String {
+    let mut text = String::new();
+    for (head, keys) in [
+        ("boards:", &["board_rms_px"][..]),
+        ("fit:", &["rms_px", "rms_mm"]),
+        ("verification:", &["holdout_rms_px", "holdout_rms_mm"]),
+        ("sigma:", &["translation_sigma_mm", "rotation_sigma_deg"]),
+    ] {
+        let found: Vec<String> = keys.iter().filter_map(|k| q.figures.get(*k).map(|v| format!("{k} {v:.4}"))).collect();
+        if !found.is_empty() {
+            text += &format!("{head:13} {}\n", found.join(", "));
+        }
+    }
+    text
 }

@@ -6,6 +6,7 @@ use super::{Keep, finish};
 use crate::calibrate::pointer::PointerOptions;
 use crate::calibrate::spot::SpotOptions;
 use crate::fault::Result;
+use crate::raster::Channel;
 use crate::recording::Recording;
 use crate::rig::Rig;
 use crate::station::volume::asked;
@@ -15,7 +16,7 @@ use std::path::PathBuf;
 /// Find the laser pointer's beam from pictures of its spot on boards
 ///
 /// Each frame has an ambient picture, which gives the board's pose, and a laser picture of the same
-/// pose. The camera's calibration is held; its uncertainty is carried over.
+/// pose. Room light that the laser picture holds too is taken out. The camera's calibration is held; its uncertainty is carried over.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
   sheetlight calibrate pointer recordings/pointer_cal --station cell3")]
@@ -32,12 +33,16 @@ pub struct Args {
     /// Farthest depth at which the result is judged, mm
     #[arg(long, requires = "near_mm")]
     far_mm: Option<f64>,
+    /// Part of a colour picture to use: red, green, blue or luma
+    #[arg(long, default_value = "luma", value_parser = crate::cli::parse::<Channel>)]
+    channel: Channel,
     #[command(flatten)]
     keep: Keep,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
-    let recording = Recording::open(&args.recording)?;
+    let mut recording = Recording::open(&args.recording)?;
+    recording.channel = args.channel;
     let (settings, rig) = (Settings::load(&args.station)?, Rig::load_to_calibrate(&args.station)?);
     let run = PointerRun {
         spots: SpotOptions::default(),

@@ -8,19 +8,22 @@ use crate::calibrate::profile_hand_eye::{BallOptions, Side};
 use crate::fault::Result;
 use crate::rig::Volume;
 use crate::robot::Convention;
-use crate::station::{Settings, calibrate_profile_hand_eye};
-use std::path::PathBuf;
+use crate::station::{Settings, calibrate_profile_hand_eye, evaluate_profile_hand_eye};
+use std::path::{Path, PathBuf};
 
 /// Find a line-profile sensor's pose on the flange from profiles of a ball and the robot's poses
 ///
 /// The sensor measures x along its line and z away from it, both mm; y = z × x. The ball stands still.
 /// On which side of the profile plane its centre lies must be told by the data, or be stated.
+/// With --evaluate nothing is calibrated: a transform from elsewhere is put to the test.
 #[derive(clap::Args)]
-#[command(after_help = "Example:
+#[command(after_help = "Examples:
   sheetlight calibrate profile-hand-eye profiles/ --poses BALL.LS \\
-      --ball-diameter-mm 30 --station cell3")]
+      --ball-diameter-mm 30 --station cell3
+  sheetlight calibrate profile-hand-eye profiles/ --poses BALL.LS \\
+      --ball-diameter-mm 30 --evaluate theirs.json")]
 pub struct Args {
-    /// A folder with a profile a file, or one file with all: CSV (x, z) or OpenCV YAML matrices
+    /// A folder with a profile a file, or one file with all: CSV (x, z), OpenCV YAML, or plain sequences of numbers
     profiles: PathBuf,
     /// Poses in the profiles' order: CSV or JSON as in a recording, or a FANUC listing (.LS)
     #[arg(long)]
@@ -32,20 +35,27 @@ pub struct Args {
     #[arg(long, value_parser = super::super::parse::<Side>)]
     side: Option<Side>,
     /// Station folder that the result is stored in
-    #[arg(long)]
-    station: PathBuf,
+    #[arg(long, required_unless_present = "evaluate")]
+    station: Option<PathBuf>,
     /// Depth of the sensor (its z) at which the expected error is stated, mm [default: the middle of where the profiles'
     /// points lie]
     #[arg(long, allow_negative_numbers = true)]
     working_mm: Option<f64>,
+    /// JSON with flange_T_sensor (a profile_hand_eye.json, or 16 numbers under that key): say how well it fits
+    #[arg(long, conflicts_with_all = ["station", "side"])]
+    evaluate: Option<PathBuf>,
     #[command(flatten)]
     keep: Keep,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
-    // The result may be the first that the station gets.
-    let settings = if args.station.exists() { Settings::load(&args.station)? } else { Settings::default() };
     let options = BallOptions { side: args.side, ..BallOptions::new(args.ball_diameter_mm) };
+    if let Some(transform) = &args.evaluate {
+        return put_to_the_test(args, transform, &options, console);
+    }
+    let station = args.station.as_deref().expect("clap: required without --evaluate");
+    // The result may be the first that the station gets.
+    let settings = if station.exists() { Settings::load(station)? } else { Settings::default() };
     let working = args.working_mm.map(|mm| Volume::new(mm, mm, "stated"));
     let asked = Asked { working, tolerance_mm: settings.tolerance_mm };
     let (c, warnings) = calibrate_profile_hand_eye(&args.profiles, &args.poses, &options, &asked)?;
@@ -55,5 +65,20 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         "sensor on the flange: {:.4} {:.4} {:.4} mm, RX {:.4} RY {:.4} RZ {:.4} degrees (R = Rz·Ry·Rx)",
         n[0], n[1], n[2], n[3], n[4], n[5]
     );
-    finish(&args.station, &c.calibration, &c.page, &text, &args.keep, console)
+    finish(station, &c.calibration, &c.page, &text, &args.keep, console)
+}
+
+fn put_to_the_test(args: &Args, transform: &Path, options: &BallOptions, console: &Console) -> Result<()> {
+    let (found, warnings) = evaluate_profile_hand_eye(&args.profiles, &args.poses, transform, options)?;
+    warnings.iter().for_each(|w| console.warn(w));
+    let mut text = format!(
+        "the profiles' points lie on one ball of {:.3} mm to {:.4} mm rms; with the diameter left free on one of {:.3} mm to {:.4} mm\n",
+        options.diameter, found.rms, found.free_diameter, found.free_rms
+    );
+    text += &format!("ball in the base: {:.3} {:.3} {:.3} mm\n", found.ball.x, found.ball.y, found.ball.z);
+    for (name, points, rms) in &found.profiles {
+        text += &format!("  {name}: {points} points on the ball, {rms:.4} mm rms\n");
+    }
+    console.result(&found, text.trim_end());
+    Ok(())
 }

@@ -9,7 +9,7 @@ mod spline;
 mod tags;
 
 use super::drawing::{Drawing, Form, Inside};
-use super::outline::area;
+use super::outline::{area, bounds};
 use crate::fault::{Fault, Result};
 use curves::{Curve, Form as Drawn};
 
@@ -40,6 +40,8 @@ impl std::str::FromStr for Unit {
     }
 }
 
+/// More is no drawing of a part but an assembly, bytes.
+pub const LARGEST: u64 = 64 << 20;
 /// How far a polyline may lie from the curve it stands for, mm: well below what a scan can tell.
 const FLAT: f64 = 0.002;
 
@@ -86,10 +88,10 @@ pub fn read(bytes: &[u8], options: &DxfOptions) -> Result<Imported> {
     };
     let origin = options.origin.unwrap_or_else(|| match largest.circle {
         Some((centre, _)) => centre.map(|c| c / unit.mm),
-        None => [0, 1].map(|k| {
-            let (low, high) = largest.points.iter().fold((f64::MAX, f64::MIN), |m, p| (m.0.min(p[k]), m.1.max(p[k])));
-            0.5 * (low + high) / unit.mm
-        }),
+        None => {
+            let [x0, y0, x1, y1] = bounds(&largest.points);
+            [0.5 * (x0 + x1) / unit.mm, 0.5 * (y0 + y1) / unit.mm]
+        }
     });
     let placed: Vec<Curve> = read.curves.iter().map(|c| moved(c, origin, unit.mm)).collect();
     let joined = loops::join(&placed);

@@ -4,7 +4,7 @@
 use super::curves::{Curve, Form as Drawn};
 use super::loops::Loop;
 use crate::find::drawing::{Form, Grid, Inside, Shape};
-use crate::find::outline::{area, contains};
+use crate::find::outline::{area, bounds, contains};
 
 /// Lengths are rounded to a micrometre, so that a drawing in inches stays readable.
 fn micrometre(v: f64) -> f64 {
@@ -15,13 +15,16 @@ fn micrometre(v: f64) -> f64 {
 pub fn shapes(mut loops: Vec<Loop>, open: &[Curve]) -> Vec<Shape> {
     loops.sort_by(|a, b| area(&b.points).abs().total_cmp(&area(&a.points).abs()));
     let datum = loops.first().map_or(0.0, |l| l.z);
+    let boxes: Vec<[f64; 4]> = loops.iter().map(|l| bounds(&l.points)).collect();
     // The smallest larger loop around each, on the same surface.
     let parents: Vec<Option<usize>> = (0..loops.len())
         .map(|i| {
             let inner = inside_of(&loops[i].points);
-            (0..i)
-                .rev()
-                .find(|&k| (loops[k].z - loops[i].z).abs() < 1e-6 && contains(&loops[k].points, inner[0], inner[1]))
+            (0..i).rev().find(|&k| {
+                let [x0, y0, x1, y1] = boxes[k];
+                let near = (x0..=x1).contains(&inner[0]) && (y0..=y1).contains(&inner[1]);
+                near && (loops[k].z - loops[i].z).abs() < 1e-6 && contains(&loops[k].points, inner[0], inner[1])
+            })
         })
         .collect();
     let mut depth = vec![0usize; loops.len()];
@@ -69,9 +72,12 @@ pub fn shapes(mut loops: Vec<Loop>, open: &[Curve]) -> Vec<Shape> {
     out
 }
 
+/// Sides at which a point just inside an outline is looked for: of those without a turn at one of them any will do.
+const TRIED: usize = 64;
+
 /// A point just inside an outline.
 fn inside_of(p: &[[f64; 2]]) -> [f64; 2] {
-    for i in 0..p.len() {
+    for i in (0..p.len()).step_by(p.len().div_ceil(TRIED).max(1)) {
         let (a, b) = (p[i], p[(i + 1) % p.len()]);
         let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
         for side in [1e-4, -1e-4] {

@@ -4,8 +4,8 @@
 use crate::fault::{Fault, Result};
 use std::collections::BTreeMap;
 
-/// More is no drawing of a part, bytes.
-const LARGEST: usize = 64 << 20;
+const DAMAGED: &str = "a damaged file";
+const EXPORT: &str = "export the drawing again as ASCII DXF";
 
 /// One group: a code and its value.
 #[derive(Clone, Debug)]
@@ -74,7 +74,8 @@ impl Entity {
 
     pub fn needed(&self, code: i32) -> Result<f64> {
         let found = self.tags.iter().find(|t| t.code == code);
-        found.ok_or_else(|| damaged(self.fault(format!("it has no group {code}"))))?.number()
+        let missing = || self.fault(format!("it has no group {code}")).cause(DAMAGED).next(EXPORT);
+        found.ok_or_else(missing)?.number()
     }
 
     pub fn whole(&self, code: i32, missing: i64) -> Result<i64> {
@@ -90,13 +91,20 @@ impl Tag {
     /// A length or an angle: finite, and below what a drawing can hold.
     pub fn number(&self) -> Result<f64> {
         let value = self.value.trim().parse::<f64>().ok().filter(|v| v.is_finite() && v.abs() < 1e12);
-        value
-            .ok_or_else(|| damaged(Fault::input(format!("line {}: '{}' is no usable number", self.line, self.short()))))
+        value.ok_or_else(|| {
+            Fault::input(format!("line {}: '{}' is no usable number (finite, below 1e12)", self.line, self.short()))
+                .cause(DAMAGED)
+                .next(EXPORT)
+        })
     }
 
     pub fn whole(&self) -> Result<i64> {
         let value = self.value.trim().parse();
-        value.map_err(|_| damaged(Fault::input(format!("line {}: '{}' is no whole number", self.line, self.short()))))
+        value.map_err(|_| {
+            Fault::input(format!("line {}: '{}' is no whole number", self.line, self.short()))
+                .cause(DAMAGED)
+                .next(EXPORT)
+        })
     }
 
     fn short(&self) -> String {
@@ -104,18 +112,9 @@ impl Tag {
     }
 }
 
-fn damaged(fault: Fault) -> Fault {
-    fault.cause("a damaged file").next("export the drawing again as ASCII DXF")
-}
-
 /// Reads a file's groups; what is not needed is passed over unread.
 pub fn read(bytes: &[u8]) -> Result<File> {
     const NEXT: &str = "save the drawing as ASCII DXF";
-    if bytes.len() > LARGEST {
-        return Err(Fault::input(format!("is {} MiB large, at most {} are read", bytes.len() >> 20, LARGEST >> 20))
-            .cause("a whole assembly instead of one part")
-            .next("export the part alone"));
-    }
     if bytes.starts_with(b"AutoCAD Binary DXF") {
         return Err(Fault::input("is a binary DXF, which is not read").next(NEXT));
     }

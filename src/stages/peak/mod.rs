@@ -92,7 +92,8 @@ impl PeakParams {
             ("steps", self.steps as f32, 1.0, 20.0),
         ] {
             if !(low..=high).contains(&value) {
-                return Err(Fault::usage(format!("peak {name} is {value}, it must be in {low}..={high}")));
+                return Err(Fault::usage(format!("peak {name} is {value}, it must be in {low}..={high}"))
+                    .next("correct [extraction] in station.toml"));
             }
         }
         Ok(())

@@ -22,9 +22,11 @@ use stage::{Neighbourhood, Site, SupportFrame, whole};
 pub struct SupportParams {
     /// Whether points are judged by their neighbours at all.
     pub on: bool,
-    /// Half of the chord on a neighbouring shot's line, 0.01..=10 mm: what a point may be wrong by and still be
-    /// useful; smaller removes more at corners.
-    pub radius_mm: f32,
+    /// Half of the chord on a neighbouring shot's line, 0.0001..=1000 mm: what a point may be wrong by and still be
+    /// useful; smaller removes more at corners. Unless given a 540th of the picture's width where the sheet meets the
+    /// optical axis.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub radius_mm: Option<f32>,
     /// How much farther than the distance of the shots a neighbour may lie, 1..=3; 1.2 is a slope of 33 degrees.
     pub slope: f32,
     /// Support that a peak of the right width needs, 0..=1.
@@ -46,7 +48,7 @@ impl Default for SupportParams {
     fn default() -> Self {
         SupportParams {
             on: true,
-            radius_mm: 0.3,
+            radius_mm: None,
             slope: 1.2,
             clean: 0.1,
             doubtful: 0.3,
@@ -61,7 +63,7 @@ impl Default for SupportParams {
 impl SupportParams {
     pub fn check(&self) -> Result<()> {
         for (name, value, low, high) in [
-            ("radius_mm", self.radius_mm, 0.01, 10.0),
+            ("radius_mm", self.radius_mm.unwrap_or(1.0), 1e-4, 1e3),
             ("slope", self.slope, 1.0, 3.0),
             ("clean", self.clean, 0.0, 1.0),
             ("doubtful", self.doubtful, 0.0, 1.0),
@@ -72,7 +74,8 @@ impl SupportParams {
             ("right_width[1]", self.right_width[1], 1.0, 3.0),
         ] {
             if !(low..=high).contains(&value) {
-                return Err(Fault::usage(format!("support {name} is {value}, it must be in {low}..={high}")));
+                return Err(Fault::usage(format!("support {name} is {value}, it must be in {low}..={high}"))
+                    .next("correct [extraction] in station.toml"));
             }
         }
         Ok(())
@@ -103,6 +106,8 @@ struct Held {
 /// Holds three shots at a time, whatever the length of the scan.
 pub struct Support {
     params: SupportParams,
+    /// Half of the chord, mm.
+    radius: f32,
     frame: SupportFrame,
     /// Direction along the laser line, base frame; only orders the points, so the first shot's serves the scan.
     axis: Vec3,
@@ -113,11 +118,26 @@ pub struct Support {
 }
 
 impl Support {
-    /// `axis`: unit vector along the laser line, base frame; `width_px`: the stripe's Gaussian sigma. Without a device
-    /// the twin judges, with the same result.
-    pub fn new(params: SupportParams, width_px: f32, axis: &Vec3, device: Option<&Device>) -> Result<Support> {
+    /// `axis`: unit vector along the laser line, base frame; `width_px`: the stripe's Gaussian sigma; `field_mm`: width of the
+    /// picture where the sheet meets the optical axis. Without a device the twin judges, with the same result.
+    pub fn new(
+        params: SupportParams,
+        width_px: f32,
+        field_mm: f32,
+        axis: &Vec3,
+        device: Option<&Device>,
+    ) -> Result<Support> {
         let gpu = device.map(OnGpu::new).transpose()?;
-        Ok(Support { params, frame: SupportFrame::new(&params, width_px), axis: *axis, before: None, now: None, gpu })
+        let radius = params.radius_mm.unwrap_or(field_mm / 540.0);
+        Ok(Support {
+            params,
+            radius,
+            frame: SupportFrame::new(&params, width_px),
+            axis: *axis,
+            before: None,
+            now: None,
+            gpu,
+        })
     }
 
     /// Takes shots in order and gives those that are judged: all but the last, which waits for its neighbour, or with
@@ -196,7 +216,7 @@ impl Support {
         let mut expected = 0.0;
         for (side, (anchor, first, end)) in beside.into_iter().enumerate().filter_map(|(i, b)| Some((i, b?))) {
             let step = (anchor - profile.anchor).norm() as f32;
-            let reach2 = p.radius_mm * p.radius_mm + p.slope * p.slope * step * step;
+            let reach2 = self.radius * self.radius + p.slope * p.slope * step * step;
             expected += 2.0 * (reach2 - step * step).sqrt() / profile.pitch;
             (out.first[side], out.end[side]) = (*first, *end);
             (out.reach[side], out.drop[side]) = stage::reach(f64::from(reach2.sqrt()));
@@ -234,7 +254,7 @@ mod tests {
         Profile { shot: index, peaks, points, anchor: Vec3::new(0.0, 0.35 * f64::from(index), 0.0), pitch: 0.25 }
     }
     fn scan(width_px: f32, strays: &[u32]) -> Vec<Profile> {
-        let mut support = Support::new(SupportParams::default(), 1.0, &Vec3::x(), None).unwrap();
+        let mut support = Support::new(SupportParams::default(), 1.0, 162.0, &Vec3::x(), None).unwrap();
         let mut out = Vec::new();
         for i in 0..6 {
             out.extend(support.take(vec![shot(i, width_px, strays.contains(&i))], false).unwrap());
@@ -266,7 +286,7 @@ mod tests {
 
     #[test]
     fn one_shot_alone_is_not_judged() {
-        let mut support = Support::new(SupportParams::default(), 1.0, &Vec3::x(), None).unwrap();
+        let mut support = Support::new(SupportParams::default(), 1.0, 162.0, &Vec3::x(), None).unwrap();
         assert!(support.take(vec![shot(0, 1.0, true)], false).unwrap().is_empty());
         assert!(support.take(Vec::new(), true).unwrap()[0].peaks.iter().all(Peak::kept));
     }
@@ -277,7 +297,7 @@ mod tests {
         let odd = |i| i == 2 || i == 3;
         let shots = || (0..6).map(|i| shot(i, if odd(i) { 1.5 } else { 1.0 }, odd(i))).collect::<Vec<_>>();
         let fates = |device: Option<&Device>, run: usize| {
-            let mut support = Support::new(SupportParams::default(), 1.0, &Vec3::x(), device).unwrap();
+            let mut support = Support::new(SupportParams::default(), 1.0, 162.0, &Vec3::x(), device).unwrap();
             let mut out = Vec::new();
             for part in shots().chunks(run) {
                 out.extend(support.take(part.to_vec(), false).unwrap());

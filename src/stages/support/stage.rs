@@ -142,7 +142,7 @@ pub fn cases() -> Vec<Case> {
     .into_iter()
     .map(|(name, step, radius, rough)| {
         let mut noise = Noise(17);
-        let p = SupportParams { radius_mm: radius, ..Default::default() };
+        let p = SupportParams { radius_mm: Some(radius), ..Default::default() };
         let mut f = SupportFrame::new(&p, 1.0);
         let (mut shots, mut sites, mut places, mut peaks) = (vec![], vec![], vec![], vec![]);
         for shot in 0..5u32 {

@@ -1,0 +1,178 @@
+//! In: a picture and the description of ArUco or AprilTag markers, one or a grid of them. Out: the corners of those
+//! that are in view with their ids, or why there are none.
+//! Frame and unit: pixels; ids four a marker, clockwise from its upper left corner, markers row by row.
+
+use super::circles::mask;
+use super::quads::{QuadCorner, quads, refined};
+use super::refine::Grey;
+use super::{BoardPoint, BoardView, FindOptions};
+use crate::calibrate::homography::{apply, homography};
+use crate::fault::{Fault, Result};
+use crate::geometry::{Mat3, Vec2};
+use crate::raster::Image;
+use crate::recording::{BoardSpec, Markers};
+use calib_targets_aruco::Matcher;
+
+/// Cells of a marker's black ring that must be read as black.
+const RING: f64 = 0.9;
+
+/// A marker that was read: its place in the board's order, and its corners from its own upper left on.
+struct Seen {
+    place: usize,
+    corners: [QuadCorner; 4],
+}
+
+/// Finds the markers of a board, of which any number may be in view.
+pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<BoardView> {
+    let markers = Markers::of(board)?
+        .ok_or_else(|| Fault::usage("the board has no markers").next("describe it as type marker_grid"))?;
+    let grey = Grey::new(image);
+    let matcher = Matcher::new(markers.dictionary(), markers.dictionary().max_correction_bits().min(1));
+    let shrink = (grey.width.max(grey.height) / options.detector_px).max(1);
+    let mut seen: Vec<Seen> = Vec::new();
+    let mut patches = 0;
+    for shrink in if shrink > 1 { vec![shrink, 1] } else { vec![1] } {
+        let small = grey.shrunk(shrink);
+        let found = quads(&mask(&small, true), small.width, small.height);
+        patches += found.len();
+        let full = |p: &Vec2| p.map(|c| (c + 0.5) * shrink as f64 - 0.5);
+        for quad in found {
+            let quad = quad.each_ref().map(full);
+            seen.extend(read(&grey, &quad, &markers, &matcher));
+        }
+        if !seen.is_empty() {
+            break;
+        }
+    }
+    let features = board.features();
+    keep_agreeing(&mut seen, &features.iter().map(|f| f.xy()).collect::<Vec<_>>());
+    if seen.is_empty() {
+        return Err(why_not(&markers, patches));
+    }
+    let mut points: Vec<BoardPoint> = seen
+        .iter()
+        .flat_map(|s| {
+            s.corners.iter().enumerate().map(|(k, c)| BoardPoint {
+                feature_id: 4 * s.place + k,
+                pixel: c.pixel,
+                sigma_px: c.sigma_px,
+            })
+        })
+        .collect();
+    points.sort_by_key(|p| p.feature_id);
+    Ok(BoardView { points, ambiguous: false, dot_diameter: None })
+}
+
+/// The marker in a quadrilateral, if it is one of the board's.
+fn read(grey: &Grey, quad: &[Vec2; 4], markers: &Markers, matcher: &Matcher) -> Option<Seen> {
+    let cells = markers.cells();
+    let n = cells as f64;
+    // The black ring is one cell wide, the white ground round it as wide at least; the start is a pixel off.
+    let corners = refined(grey, quad, 0.55 / n)?;
+    let square = [[0.0, 0.0], [n, 0.0], [n, n], [0.0, n]].map(Vec2::from);
+    let h = homography(&square, &corners.map(|c| c.pixel))?;
+    let levels = cell_levels(grey, &h, cells)?;
+    let low = levels.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = levels.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let black = |k: usize| levels[k] < 0.5 * (low + high);
+    let ring = |k: usize| k % cells == 0 || k / cells == 0 || k % cells == cells - 1 || k / cells == cells - 1;
+    let of_ring = (0..levels.len()).filter(|k| ring(*k));
+    let dark = of_ring.clone().filter(|k| black(*k)).count() as f64;
+    if dark < RING * of_ring.count() as f64 {
+        return None;
+    }
+    let bits = (0..levels.len()).filter(|k| !ring(*k));
+    let code = bits.enumerate().fold(0u64, |code, (bit, k)| code | u64::from(black(k)) << bit);
+    let found = matcher.match_code(code)?;
+    let place = markers.places().position(|(_, _, id)| id == found.id as usize)?;
+    // The marker appears turned clockwise by `rotation` quarters: its upper left is that many corners on.
+    let turn = found.rotation as usize;
+    Some(Seen { place, corners: std::array::from_fn(|k| corners[(k + turn) % 4]) })
+}
+
+/// Mean light of the middle of each cell.
+fn cell_levels(grey: &Grey, h: &Mat3, cells: usize) -> Option<Vec<f64>> {
+    let spots = [-0.2, 0.0, 0.2];
+    (0..cells * cells)
+        .map(|k| {
+            let (x, y) = ((k % cells) as f64 + 0.5, (k / cells) as f64 + 0.5);
+            let at = spots.iter().flat_map(|dy| spots.iter().map(move |dx| Vec2::new(x + dx, y + dy)));
+            let light = at.map(|p| grey.at(&apply(h, &p))).collect::<Option<Vec<f64>>>()?;
+            Some(light.iter().sum::<f64>() / light.len() as f64)
+        })
+        .collect()
+}
+
+/// Drops markers that were read twice, worse ones first, and those that are not where the others put them.
+fn keep_agreeing(seen: &mut Vec<Seen>, features: &[Vec2]) {
+    seen.sort_by(|a, b| {
+        let sigma = |s: &Seen| s.corners.iter().map(|c| c.sigma_px).sum::<f64>();
+        a.place.cmp(&b.place).then(sigma(a).total_cmp(&sigma(b)))
+    });
+    seen.dedup_by_key(|s| s.place);
+    if seen.len() < 3 {
+        return;
+    }
+    let off = |i: usize| -> f64 {
+        let s = &seen[i];
+        off_px(seen, features, i) / (s.corners[0].pixel - s.corners[2].pixel).norm()
+    };
+    let good: Vec<bool> = (0..seen.len()).map(|i| off(i) < 0.4).collect();
+    // A wrong neighbour spoils good ones: where most disagree nothing is dropped.
+    if good.iter().filter(|g| **g).count() * 2 > seen.len() {
+        let mut good = good.iter();
+        seen.retain(|_| *good.next().expect("one each"));
+    }
+    drop_covered(seen, features);
+}
+
+/// How far a marker's worst corner is from where the three markers nearest on the board put it, px: a lens bends less over so
+/// short a way.
+fn off_px(seen: &[Seen], features: &[Vec2], i: usize) -> f64 {
+    let middle = |s: &Seen| features[4 * s.place] + features[4 * s.place + 2];
+    let mut others: Vec<usize> = (0..seen.len()).filter(|k| *k != i).collect();
+    let far = |k: &usize| (middle(&seen[*k]) - middle(&seen[i])).norm();
+    others.sort_by(|a, b| far(a).total_cmp(&far(b)));
+    others.truncate(3);
+    let (mut from, mut to) = (Vec::new(), Vec::new());
+    for s in others.iter().map(|k| &seen[*k]) {
+        from.extend((0..4).map(|k| features[4 * s.place + k]));
+        to.extend(s.corners.iter().map(|c| c.pixel));
+    }
+    let Some(h) = homography(&from, &to) else { return 0.0 };
+    let s = &seen[i];
+    let worst = (0..4).map(|k| (apply(&h, &features[4 * s.place + k]) - s.corners[k].pixel).norm());
+    worst.fold(0.0, f64::max)
+}
+
+/// Drops, worst first, markers of which a corner stands out against what their neighbours say: something covers it. What
+/// stands out is measured by the middle marker, whose neighbours' lens and noise are the same.
+fn drop_covered(seen: &mut Vec<Seen>, features: &[Vec2]) {
+    while seen.len() > 4 {
+        let off: Vec<f64> = (0..seen.len()).map(|i| off_px(seen, features, i)).collect();
+        let mut sorted = off.clone();
+        sorted.sort_by(f64::total_cmp);
+        let worst = (0..off.len()).max_by(|a, b| off[*a].total_cmp(&off[*b])).expect("more than four");
+        if off[worst] <= STANDS_OUT * sorted[sorted.len() / 2].max(LEAST_OFF_PX) {
+            return;
+        }
+        seen.remove(worst);
+    }
+}
+
+/// Times the middle marker's distance from where its neighbours put it; and the least such distance that is believed, px.
+const STANDS_OUT: f64 = 4.0;
+const LEAST_OFF_PX: f64 = 0.1;
+
+fn why_not(markers: &Markers, patches: usize) -> Fault {
+    let count = markers.places().count();
+    Fault::refused(format!(
+        "none of the board's {count} markers was found; {patches} dark quadrilaterals are in the picture"
+    ))
+    .cause(if patches == 0 {
+        "out of view, out of focus, smaller than 10 px, or without a white margin of a cell round each marker"
+    } else {
+        "another dictionary or other ids than described, too small or out of focus to be read, or a mirrored picture"
+    })
+    .next("look at the picture and compare the printed markers with their description")
+}

@@ -1,0 +1,228 @@
+//! In: a picture. Out: dark quadrilaterals on bright ground, and their corners to a few hundredths of a pixel with
+//! sigma, from straight lines through the edges near each corner.
+//! Frame and unit: pixels (centres at integers); corners run clockwise in the picture.
+
+use super::refine::Grey;
+use crate::geometry::Vec2;
+use nalgebra::Matrix2;
+
+/// A corner as the crossing of two fitted lines.
+#[derive(Clone, Copy, Debug)]
+pub struct QuadCorner {
+    pub pixel: Vec2,
+    /// Standard deviation per axis, px.
+    pub sigma_px: f64,
+}
+
+/// Share of a quadrilateral that the convex hull of its patch fills at least.
+const FILLED: f64 = 0.88;
+/// Shortest side, px: a marker of six cells has cells of 1.5 px then.
+const SHORTEST: f64 = 9.0;
+/// Farthest that a corner's lines follow the edges, px: beyond it the lens bends them measurably.
+const LONGEST: f64 = 40.0;
+
+/// Quadrilaterals whose inside is dark at the rim, the surroundings brighter; to a pixel or two.
+pub fn quads(mask: &[bool], width: usize, height: usize) -> Vec<[Vec2; 4]> {
+    let mut seen = vec![false; mask.len()];
+    let (mut found, mut stack) = (Vec::new(), Vec::new());
+    for first in 0..mask.len() {
+        if seen[first] || !mask[first] {
+            continue;
+        }
+        stack.push(first);
+        seen[first] = true;
+        // Leftmost and rightmost pixel of each row are all that the hull needs.
+        let mut rows: std::collections::BTreeMap<usize, [usize; 2]> = std::collections::BTreeMap::new();
+        let mut border = false;
+        while let Some(k) = stack.pop() {
+            let (x, y) = (k % width, k / width);
+            let row = rows.entry(y).or_insert([x, x]);
+            *row = [row[0].min(x), row[1].max(x)];
+            border |= x == 0 || y == 0 || x + 1 == width || y + 1 == height;
+            let neighbours = [
+                (x > 0, k.wrapping_sub(1)),
+                (x + 1 < width, k + 1),
+                (y > 0, k.wrapping_sub(width)),
+                (y + 1 < height, k + width),
+            ];
+            for (inside, m) in neighbours {
+                if inside && mask[m] && !seen[m] {
+                    seen[m] = true;
+                    stack.push(m);
+                }
+            }
+        }
+        if border || (rows.len() as f64) < 0.7 * SHORTEST {
+            continue;
+        }
+        let points: Vec<Vec2> = rows.iter().flat_map(|(y, xs)| xs.map(|x| Vec2::new(x as f64, *y as f64))).collect();
+        found.extend(quadrilateral(&hull(points)));
+    }
+    found
+}
+
+/// Convex hull, clockwise in the picture (y down) [andrew79].
+fn hull(mut points: Vec<Vec2>) -> Vec<Vec2> {
+    points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    let turn = |a: &Vec2, b: &Vec2, c: &Vec2| (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
+    let half = |points: &mut dyn Iterator<Item = Vec2>| {
+        let mut out: Vec<Vec2> = Vec::new();
+        for p in points {
+            while out.len() > 1 && turn(&out[out.len() - 2], &out[out.len() - 1], &p) <= 0.0 {
+                out.pop();
+            }
+            out.push(p);
+        }
+        out.pop();
+        out
+    };
+    let mut all = half(&mut points.iter().copied());
+    all.extend(half(&mut points.iter().rev().copied()));
+    all
+}
+
+fn area(p: &[Vec2]) -> f64 {
+    let n = p.len();
+    (0..n).map(|i| p[i].x * p[(i + 1) % n].y - p[i].y * p[(i + 1) % n].x).sum::<f64>() / 2.0
+}
+
+/// The four corners of a hull that is one: corners that hardly matter for the area go first [visvalingam93].
+fn quadrilateral(hull: &[Vec2]) -> Option<[Vec2; 4]> {
+    let whole = area(hull).abs();
+    let mut p = hull.to_vec();
+    while p.len() > 4 {
+        let n = p.len();
+        let lost = |i: usize| area(&[p[(i + n - 1) % n], p[i], p[(i + 1) % n]]).abs();
+        let least = (0..n).min_by(|&a, &b| lost(a).total_cmp(&lost(b)))?;
+        p.remove(least);
+    }
+    let four: [Vec2; 4] = p.try_into().ok()?;
+    let sides = (0..4).map(|i| (four[(i + 1) % 4] - four[i]).norm());
+    let good = sides.fold(f64::INFINITY, f64::min) >= SHORTEST && area(&four).abs() >= FILLED * whole;
+    // The hull runs through the pixels' centres: half a pixel is missing on each side.
+    let middle = four.iter().sum::<Vec2>() / 4.0;
+    good.then(|| four.map(|p| p + (p - middle).normalize() * std::f64::consts::FRAC_1_SQRT_2))
+}
+
+/// The corners of a quadrilateral by lines through its edges. `clear`: how far from the edge, on both sides, the
+/// picture shows nothing else, as a share of the side that the edge is seen across.
+pub fn refined(grey: &Grey, quad: &[Vec2; 4], clear: f64) -> Option<[QuadCorner; 4]> {
+    let mut now = *quad;
+    let mut out = None;
+    // The second round looks across the edges where the first has found them.
+    for _ in 0..2 {
+        let mut corners = Vec::new();
+        for k in 0..4 {
+            let (before, here, after) = (now[(k + 3) % 4], now[k], now[(k + 1) % 4]);
+            // Across the side to `after` one looks along the side to `before`, and the other way round.
+            let first = line(grey, &here, &after, clear * (before - here).norm())?;
+            let second = line(grey, &here, &before, clear * (after - here).norm())?;
+            corners.push(crossing(&first, &second)?);
+        }
+        for k in 0..4 {
+            if (corners[k].pixel - quad[k]).norm() > 0.25 * (quad[k] - quad[(k + 1) % 4]).norm() + 2.0 {
+                return None;
+            }
+            now[k] = corners[k].pixel;
+        }
+        out = <[QuadCorner; 4]>::try_from(corners).ok();
+    }
+    out
+}
+
+/// A line near a corner: distance from it along `normal` is a + b s, s along `along` from `origin`.
+struct Line {
+    origin: Vec2,
+    along: Vec2,
+    normal: Vec2,
+    a: f64,
+    b: f64,
+    /// Variance of a.
+    variance: f64,
+}
+
+/// Fits the edge from `corner` towards `end`.
+fn line(grey: &Grey, corner: &Vec2, end: &Vec2, clear_px: f64) -> Option<Line> {
+    let length = (end - corner).norm();
+    let along = (end - corner) / length;
+    let normal = Vec2::new(-along.y, along.x);
+    let reach = clear_px.clamp(1.5, 5.0);
+    // The tip is rounded by blur, and the other edge reaches into it.
+    let (from, to) = ((0.12 * length).clamp(1.5, 6.0), (0.6 * length).min(LONGEST));
+    let places: Vec<(f64, f64)> = (0..)
+        .map(|i| from + f64::from(i))
+        .take_while(|s| *s <= to)
+        .filter_map(|s| Some((s, edge(grey, &(corner + along * s), &normal, reach)?)))
+        .collect();
+    if places.len() < 4 {
+        return None;
+    }
+    let n = places.len() as f64;
+    let fit = |w: &[f64]| {
+        let sum = |f: &dyn Fn(&(f64, f64)) -> f64| places.iter().zip(w).map(|(p, w)| w * f(p)).sum::<f64>();
+        let (s0, s1, s2) = (sum(&|_| 1.0), sum(&|p| p.0), sum(&|p| p.0 * p.0));
+        let (d0, d1) = (sum(&|p| p.1), sum(&|p| p.0 * p.1));
+        let det = s0 * s2 - s1 * s1;
+        (det > 1e-9).then(|| ((s2 * d0 - s1 * d1) / det, (s0 * d1 - s1 * d0) / det, s2 / det))
+    };
+    let mut weights = vec![1.0; places.len()];
+    let (mut a, mut b, mut gain) = fit(&weights)?;
+    for _ in 0..3 {
+        let residuals: Vec<f64> = places.iter().map(|p| p.1 - a - b * p.0).collect();
+        let mut sorted: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
+        sorted.sort_by(f64::total_cmp);
+        let sigma = (1.4826 * sorted[sorted.len() / 2]).max(0.01);
+        weights = residuals.iter().map(|r| (2.0 * sigma / r.abs().max(1e-9)).min(1.0)).collect();
+        (a, b, gain) = fit(&weights)?;
+    }
+    let residuals: Vec<f64> = places.iter().map(|p| p.1 - a - b * p.0).collect();
+    let square = residuals.iter().map(|r| r * r).sum::<f64>();
+    // Places one pixel apart share pixels: their errors hang together.
+    let shared = residuals.windows(2).map(|w| w[0] * w[1]).sum::<f64>() / square.max(1e-12);
+    let variance = square / (n - 2.0) * (1.0 + 2.0 * shared.clamp(0.0, 1.0)) * gain;
+    Some(Line { origin: *corner, along, normal, a, b, variance })
+}
+
+/// Signed distance along `normal` from `at` to the edge: where the light crosses half way between both sides.
+fn edge(grey: &Grey, at: &Vec2, normal: &Vec2, reach: f64) -> Option<f64> {
+    const STEP: f64 = 0.5;
+    let half = (reach / STEP).round() as i32;
+    let light =
+        (-half..=half).map(|k| grey.at(&(at + normal * (f64::from(k) * STEP)))).collect::<Option<Vec<f64>>>()?;
+    // The edge's place is the mean of the slope, which a symmetric blur leaves where it is.
+    let slopes: Vec<f64> = light.windows(2).map(|w| w[1] - w[0]).collect();
+    let total: f64 = slopes.iter().sum();
+    let place = |i: usize| (i as f64 + 0.5 - f64::from(half)) * STEP;
+    let mean = slopes.iter().enumerate().map(|(i, s)| s * place(i)).sum::<f64>() / total;
+    let rough: f64 = slopes.iter().map(|s| s.abs()).sum();
+    // Where light goes up and down again, or hardly changes, there is no edge.
+    (total.abs() > 0.5 * rough && total.abs() > 4.0 && mean.abs() < reach).then_some(mean)
+}
+
+/// Where two lines cross, with the sigma that their own sigmas make.
+fn crossing(p: &Line, q: &Line) -> Option<QuadCorner> {
+    // A point x is on a line where n·(x − origin) = a + b (along·(x − origin)).
+    let row = |l: &Line| l.normal - l.along * l.b;
+    let (r1, r2) = (row(p), row(q));
+    let m = Matrix2::new(r1.x, r1.y, r2.x, r2.y).try_inverse()?;
+    let pixel = m * Vec2::new(r1.dot(&p.origin) + p.a, r2.dot(&q.origin) + q.a);
+    let variance = m.column(0).norm_squared() * p.variance + m.column(1).norm_squared() * q.variance;
+    pixel.iter().all(|v| v.is_finite()).then(|| QuadCorner { pixel, sigma_px: (variance / 2.0).sqrt().max(1e-3) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_hull_of_a_square_is_its_corners_and_a_disc_is_no_quadrilateral() {
+        let square: Vec<Vec2> = (0..400).map(|k| Vec2::new(f64::from(k % 20), f64::from(k / 20))).collect();
+        let four = quadrilateral(&hull(square)).unwrap();
+        assert!(area(&four) > 0.0, "clockwise in a picture whose y points down");
+        assert!((area(&four) - 400.0).abs() < 1e-9, "the pixels themselves, not their centres");
+        let disc: Vec<Vec2> = (0..60)
+            .map(|k| Vec2::new(20.0 * (f64::from(k) * 0.105).cos(), 20.0 * (f64::from(k) * 0.105).sin()))
+            .collect();
+        assert!(quadrilateral(&hull(disc)).is_none());
+    }
+}

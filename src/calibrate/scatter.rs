@@ -1,0 +1,68 @@
+//! In: how much more the pictures of a set scatter than their own sigmas say, and from how many degrees of freedom that is
+//! known. Out: by how much a stated variance is to grow; which pictures stand out; when the others may overrule them.
+//! Frame and unit: none; squared distances in sigmas.
+
+use super::limits::Judgement;
+use crate::rig::Verdict;
+
+/// Share of the pictures that may contradict the others: with more it is not known who is right.
+const CONTRADICTING: f64 = 1.0 / 3.0;
+/// Pictures that must agree where others contradict them, and to be good.
+pub const ENOUGH: usize = 5;
+/// Median of a chi-square with 2 degrees of freedom.
+const MEDIAN_OF_TWO: f64 = 2.0 * std::f64::consts::LN_2;
+
+/// The factor on the variance. The scatter itself is known from few pictures: three sigmas are to hold what three sigmas of
+/// Student's distribution do (its expansion at 3 [abramowitz72, 26.7.5]), coming in as the scatter leaves what chance
+/// explains. Three and four pictures hardly show whether they scatter: for them it is in full.
+pub fn inflation(scatter2: f64, freedom: f64) -> f64 {
+    let n = freedom.max(1.0);
+    let student = 1.0 + 2.5 / n + 5.75 / (n * n) + 10.1 / (n * n * n);
+    let more = (scatter2 - 1.0).clamp(0.0, 1.0);
+    let few = ((9.0 - n) / 4.0).clamp(0.0, 1.0);
+    scatter2.max(1.0) * (1.0 + (student - 1.0) * more.max(few)).powi(2)
+}
+
+/// Squared distances (2 degrees of freedom each) over what is usual among those that count, where that is more than chance:
+/// pictures that all scatter alike leave none out.
+pub fn beside(distances: &[f64], counts: impl Fn(usize) -> bool) -> Vec<f64> {
+    let mut sorted: Vec<f64> = (0..distances.len()).filter(|i| counts(*i)).map(|i| distances[i]).collect();
+    sorted.sort_by(f64::total_cmp);
+    let middle = sorted.get(sorted.len() / 2).map_or(1.0, |m| m / MEDIAN_OF_TWO);
+    let scale = if middle.is_finite() { middle.max(1.0) } else { 1.0 };
+    distances.iter().map(|d| d / scale).collect()
+}
+
+/// Whether those that agree may overrule those that contradict them.
+pub fn overrule(agree: usize, against: usize, j: &mut Judgement) {
+    let all = agree + against;
+    j.at_best(Verdict::BadlyDetermined, against as f64 > CONTRADICTING * all as f64, || {
+        format!("{against} of {all} pictures contradict the others, up to a third may: it is not known who is right")
+    });
+    j.at_best(Verdict::BadlyDetermined, against > 0 && agree < ENOUGH, || {
+        format!("{agree} pictures agree, {ENOUGH} are needed to overrule the others")
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_factor_is_one_for_many_quiet_pictures_and_students_for_few() {
+        assert_eq!(inflation(0.7, 17.0), 1.0);
+        // Three sigmas of Student's distribution with 3, 5 and 17 degrees of freedom: 9.22, 5.51, 3.51.
+        for (n, t, within) in [(3.0, 9.22, 0.08), (5.0, 5.51, 0.02), (17.0, 3.51, 0.01)] {
+            let found = 3.0 * (inflation(2.0, n) / 2.0).sqrt();
+            assert!((found / t - 1.0).abs() < within, "{n}: {found} for {t}");
+        }
+    }
+
+    #[test]
+    fn one_that_stands_out_does_so_beside_loud_ones_too() {
+        let quiet = beside(&[1.0, 2.0, 1.5, 90.0], |_| true);
+        assert!(quiet[3] > 60.0 && quiet[0] < 1.01);
+        let loud = beside(&[60.0, 50.0, 70.0, 90.0], |_| true);
+        assert!(loud.iter().all(|d| *d < 3.0), "{loud:?}");
+    }
+}

@@ -1,0 +1,47 @@
+//! In: this machine's processors and what the process may use of them. Out: the pool of threads that all parallel work runs on.
+//! Frame and unit: none.
+
+use crate::fault::{Fault, Result};
+use rayon::{ThreadBuilder, ThreadPoolBuilder};
+use std::sync::mpsc::{Sender, channel};
+
+/// Starts as many threads as there are processors, or as many of them as the process gets. rayon's own way is all or a
+/// panic in whatever needs the first of them, and cannot be tried twice.
+pub fn start() -> Result<()> {
+    let wanted = std::thread::available_parallelism().map_or(1, |n| n.get());
+    pool(wanted, std::env::var("RAYON_NUM_THREADS").ok().and_then(|n| n.parse().ok()))
+}
+
+fn pool(processors: usize, asked: Option<usize>) -> Result<()> {
+    let wanted = asked.filter(|n| *n > 0).unwrap_or(processors);
+    let mut failed = None;
+    // Each waits for what it is to be in the pool.
+    let mut waiting: Vec<Sender<ThreadBuilder>> = Vec::new();
+    while waiting.len() < wanted && failed.is_none() {
+        let (give, take) = channel::<ThreadBuilder>();
+        let body = move || {
+            if let Ok(thread) = take.recv() {
+                thread.run();
+            }
+        };
+        match std::thread::Builder::new().name(format!("pool {}", waiting.len())).spawn(body) {
+            Ok(_) => waiting.push(give),
+            Err(e) => failed = Some(e),
+        }
+    }
+    if failed.is_some() {
+        // What the last of them took is needed for the work itself.
+        waiting.truncate(waiting.len().div_ceil(2));
+    }
+    if let (true, Some(e)) = (waiting.is_empty(), failed) {
+        return Err(Fault::device(format!("0 of {wanted} threads could be started, at least 1 is needed: {e}"))
+            .cause("the memory ran out, or the number of processes is limited")
+            .next("close other programs, or raise the limits (ulimit -v, ulimit -u)"));
+    }
+    let give = |thread: ThreadBuilder| {
+        let place = thread.index();
+        waiting[place].send(thread).map_err(|_| std::io::Error::other("a thread of the pool ended"))
+    };
+    let built = ThreadPoolBuilder::new().num_threads(waiting.len()).spawn_handler(give).build_global();
+    built.map_err(|e| Fault::device(format!("the threads cannot be used: {e}")).next("run the same command again"))
+}

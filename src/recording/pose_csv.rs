@@ -1,0 +1,183 @@
+//! In: a pose file in CSV. Out: numbered rows of numbers in the convention that the file names; columns, units and order must
+//! be that convention's.
+//! Frame and unit: as the convention says (docs/conventions.md).
+
+use crate::fault::{Fault, Result};
+use crate::robot::Convention;
+
+/// One pose: its number, the convention, its numbers.
+pub(super) type Row = (usize, Convention, Vec<f64>);
+
+/// The rows of a file, and whether its header says the units of lengths and of angles.
+pub(super) struct Read {
+    pub rows: Vec<Row>,
+    pub length_stated: bool,
+    pub angle_stated: bool,
+}
+
+/// `frame,m00,...,m33` is a matrix in mm; every other layout is preceded by a line `# convention: NAME`.
+pub(super) fn read(text: &str) -> Result<Read> {
+    let mut convention = None;
+    let mut header: Option<Header> = None;
+    let mut rows = Vec::new();
+    // A mark of the byte order says nothing in UTF-8.
+    for (number, line) in (1..).zip(text.trim_start_matches('\u{feff}').lines()) {
+        let line = line.trim();
+        if line.is_empty() {
+            continue;
+        }
+        if let Some(comment) = line.strip_prefix('#') {
+            if let Some(name) = comment.trim().strip_prefix("convention:") {
+                let named = name.trim().parse::<Convention>();
+                convention = Some(named.map_err(|e| Fault::input(e).next("name a convention of docs/conventions.md"))?);
+            }
+            continue;
+        }
+        let Some(h) = &header else {
+            header = Some(Header::read(line, convention).map_err(|e| e.at(format!("line {number}")))?);
+            continue;
+        };
+        rows.push(row(line, h).map_err(|e| e.at(format!("line {number}")))?);
+    }
+    let stated = |k: fn(&Header) -> bool| header.as_ref().is_some_and(k);
+    Ok(Read { length_stated: stated(|h| h.length_stated), angle_stated: stated(|h| h.angle_stated), rows })
+}
+
+struct Header {
+    convention: Convention,
+    length_stated: bool,
+    angle_stated: bool,
+}
+
+/// A unit in any of its spellings, as the conventions' labels have it.
+fn unit(word: &str) -> Option<&'static str> {
+    match word {
+        "mm" | "millimetre" | "millimetres" | "millimeter" | "millimeters" => Some("mm"),
+        "m" | "metre" | "metres" | "meter" | "meters" => Some("m"),
+        "deg" | "degree" | "degrees" | "°" => Some("deg"),
+        "rad" | "radian" | "radians" => Some("rad"),
+        _ => None,
+    }
+}
+
+/// A column's name and unit: `RX_deg`, `rx [deg]`, `RX deg` are `rx` in `deg`.
+fn column(cell: &str) -> (String, Option<String>) {
+    let lower = cell.trim().trim_matches('"').to_lowercase();
+    let mut words = lower.split(|c: char| !c.is_alphanumeric() && c != '°').filter(|w| !w.is_empty());
+    let name = words.next().unwrap_or_default().to_owned();
+    (name, words.next().map(str::to_owned))
+}
+
+impl Header {
+    fn read(line: &str, convention: Option<Convention>) -> Result<Header> {
+        let cells: Vec<&str> = line.split(',').collect();
+        if cells.len() < 2 && line.contains([';', '\t']) {
+            return Err(Fault::input("columns are parted by semicolons or tabs, only commas are read")
+                .cause("exported by a spreadsheet whose numbers have decimal commas")
+                .next("export with commas between columns and points in numbers"));
+        }
+        if cells.iter().all(|c| c.trim().parse::<f64>().is_ok()) {
+            return Err(Fault::input(format!("'{line}' is numbers where the columns should be named"))
+                .cause("the header line is missing")
+                .next("put a header first, e.g. frame,X_mm,Y_mm,Z_mm,RX_deg,RY_deg,RZ_deg"));
+        }
+        let columns: Vec<_> = cells.iter().map(|c| column(c)).collect();
+        let names = columns[1..].iter().map(|(name, _)| name.as_str());
+        let matrix = names.clone().eq(Convention::Matrix.labels().iter().copied());
+        let Some(convention) = convention.or(matrix.then_some(Convention::Matrix)) else {
+            return Err(Fault::input("poses without a convention")
+                .cause("six or seven numbers can be read in nine ways, and this program does not guess")
+                .next("put a line '# convention: denso' (or ur, kuka, fanuc, abb, yaskawa, ros, quaternion) first"));
+        };
+        let wanted: Vec<_> = convention.labels().iter().map(|l| column(l)).collect();
+        let layout = format!("frame,{}", convention.labels().join(",").replace(' ', "_"));
+        let other = |what: String, cause: &str| {
+            Err(Fault::input(what).cause(cause.to_owned()).next(format!(
+                "name the convention that the file is in, or put the columns as {} has them: {layout}",
+                convention.name()
+            )))
+        };
+        if columns[0].0 != "frame" || !names.clone().eq(wanted.iter().map(|(name, _)| name.as_str())) {
+            return other(
+                format!("the columns are '{line}', a {} file has '{layout}'", convention.name()),
+                "another convention than the one named, or columns in another order",
+            );
+        }
+        for (k, ((_, is), (_, want))) in columns[1..].iter().zip(&wanted).enumerate() {
+            if is.is_some() && is.as_deref().and_then(unit) != want.as_deref() {
+                let want = want.as_deref().unwrap_or("no unit");
+                let what =
+                    format!("column {} is '{}', {} has it in {want}", k + 2, cells[k + 1].trim(), convention.name());
+                return other(what, "the numbers are in another unit than the convention's");
+            }
+        }
+        let stated = |units: [&str; 2]| {
+            let mut of =
+                columns[1..].iter().zip(&wanted).filter(|(_, (_, w))| w.as_deref().is_some_and(|w| units.contains(&w)));
+            of.clone().next().is_none() || of.all(|((_, is), _)| is.is_some())
+        };
+        Ok(Header { convention, length_stated: stated(["mm", "m"]), angle_stated: stated(["deg", "rad"]) })
+    }
+}
+
+fn row(line: &str, header: &Header) -> Result<Row> {
+    let cells: Vec<&str> = line.split(',').collect();
+    let wanted = header.convention.labels().len() + 1;
+    if cells.len() != wanted {
+        let decimal = cells.len() > wanted && cells.iter().all(|c| c.trim().parse::<i64>().is_ok());
+        return Err(Fault::input(format!("'{line}' has {} columns, the header has {wanted}", cells.len()))
+            .cause(if decimal { "numbers with decimal commas" } else { "a truncated or edited file" })
+            .next("export the poses again, with points in numbers"));
+    }
+    let numbers: std::result::Result<Vec<f64>, _> = cells.iter().map(|c| c.trim().parse::<f64>()).collect();
+    let bad = || {
+        Fault::input(format!("'{line}' is not a row of numbers"))
+            .cause("a truncated or edited file")
+            .next("export the poses again")
+    };
+    let numbers = numbers.map_err(|_| bad())?;
+    let index = Some(numbers[0]).filter(|c| c.fract() == 0.0 && (0.0..1e9).contains(c)).ok_or_else(bad)?;
+    Ok((index as usize, header.convention, numbers[1..].to_vec()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn said(text: &str) -> String {
+        read(text).err().map(|e| e.to_string()).unwrap_or_default()
+    }
+
+    #[test]
+    fn columns_and_units_must_be_the_conventions() {
+        let with = |convention: &str, header: &str| format!("# convention: {convention}\n{header}\n0,1,2,3,4,5,6\n");
+        for good in [
+            "frame,X,Y,Z,RX,RY,RZ",
+            "frame,x_mm,y_mm,z_mm,rx_deg,ry_deg,rz_deg",
+            "frame, X [mm],Y (mm),Z mm,RX °,RY deg,RZ degrees",
+        ] {
+            assert_eq!(said(&with("denso", good)), "", "{good}");
+        }
+        for (convention, header, want) in [
+            ("denso", "frame,rx,ry,rz,x,y,z", "another order"),
+            ("denso", "frame,X_m,Y_m,Z_m,RX,RY,RZ", "column 2 is 'X_m', denso has it in mm"),
+            ("kuka", "frame,X,Y,Z,A_rad,B_rad,C_rad", "column 5 is 'A_rad', kuka has it in deg"),
+            ("kuka", "frame,X,Y,Z,C,B,A", "another order"),
+            ("ur", "frame,X,Y,Z,RX_deg,RY_deg,RZ_deg", "ur has it in rad"),
+            ("ur", "frame,X_mm,Y_mm,Z_mm,RX,RY,RZ", "ur has it in m"),
+            ("fanuc", "frame,X,Y,Z,RX,RY,RZ", "a fanuc file has 'frame,X_mm,Y_mm,Z_mm,W_deg"),
+            ("denso", "X,Y,Z,RX,RY,RZ", "a denso file has"),
+            ("denso", "frame;X;Y;Z;RX;RY;RZ", "semicolons"),
+            ("denso", "0,1,2,3,4,5,6", "header line is missing"),
+            ("quaternion", "frame,x,y,z,qx,qy,qz,qw", "another order"),
+        ] {
+            let is = said(&with(convention, header));
+            assert!(is.contains(want) && is.contains("next step"), "{convention} {header}: {is}");
+        }
+        assert!(
+            said("# convention: denso\nframe,x,y,z,rx,ry,rz\n0,1,5,2,5,3,5,4,5,5,5,6,5\n").contains("decimal commas")
+        );
+        assert!(said("\u{feff}# convention: denso\nframe,x,y,z,rx,ry,rz\n0,1,2,3,4,5,6\n").is_empty());
+        assert!(said("frame,x,y,z,rx,ry,rz\n0,1,2,3,4,5,6\n").contains("without a convention"));
+    }
+}

@@ -1,0 +1,168 @@
+//! In: a few shots of a scan. Out: what they look like: levels, saturation, where the light lies, beside where it was
+//! looked for.
+//! Frame and unit: pixels; grey levels of the recording's depth.
+
+use crate::camera::Intrinsics;
+use crate::geometry::{Camera, Plane, Vec2};
+use crate::raster::{Image, Pixels};
+
+/// Levels of a scan's pictures, from the shots 0, 1, 2, 4, 8, ...
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Seen {
+    pub pictures: u32,
+    /// Median of the pictures' medians, the brightest pixel of all, and the level of a saturated one.
+    pub median_level: u16,
+    pub brightest_level: u16,
+    pub full_scale: u16,
+    /// Largest share of saturated pixels in a picture.
+    pub saturated: f64,
+    /// x0, y0, x1, y1 around all pixels nearer to their picture's brightest level than to its median.
+    pub light_px: Option<[u32; 4]>,
+    /// x0, y0, x1, y1 around the pixels in which the laser plane lies within the working volume.
+    pub looked_for_px: Option<[u32; 4]>,
+    #[serde(skip)]
+    medians: Vec<u16>,
+}
+
+/// A picture whose brightest pixel is below this share of full scale is dark.
+const DARK: f64 = 0.06;
+/// A picture with more than this share of its pixels saturated is white.
+const WHITE: f64 = 0.2;
+
+impl Seen {
+    /// Nothing yet; the laser plane is looked for in the camera's picture at these depths, mm.
+    pub fn new(camera: &Intrinsics, plane: &Plane<Camera>, depth_mm: [f64; 2]) -> Seen {
+        const STEPS: u32 = 64;
+        let at = |i: u32, side: u32| u32::min(i * side / STEPS, side - 1);
+        let mut seen = Seen::default();
+        for (i, j) in (0..=STEPS).flat_map(|i| (0..=STEPS).map(move |j| (i, j))) {
+            let (x, y) = (at(i, camera.width), at(j, camera.height));
+            let ray = camera.ray_from_pixel(&Vec2::new(f64::from(x), f64::from(y)));
+            if ray.and_then(|r| r.meet(plane)).is_some_and(|p| (depth_mm[0]..=depth_mm[1]).contains(&p.z)) {
+                widen(&mut seen.looked_for_px, x, y);
+            }
+        }
+        seen
+    }
+
+    /// Looks at a shot, if it is one of those that are looked at.
+    pub fn look(&mut self, index: u32, image: &Image) {
+        if index != 0 && !index.is_power_of_two() {
+            return;
+        }
+        match &image.pixels {
+            Pixels::U8(p) => self.levels(image, p),
+            Pixels::U16(p) => self.levels(image, p),
+        }
+    }
+
+    fn levels<T: Copy + Into<u16> + PartialOrd>(&mut self, image: &Image, pixels: &[T]) {
+        let mut counts = vec![0u32; usize::from(image.full_scale()) + 1];
+        pixels.iter().for_each(|&p| counts[usize::from(p.into())] += 1);
+        let mut below = 0;
+        let median = counts.iter().position(|&n| {
+            below += n as usize;
+            below * 2 >= pixels.len()
+        });
+        let median = median.unwrap_or(0) as u16;
+        let brightest = counts.iter().rposition(|&n| n > 0).unwrap_or(0) as u16;
+        self.medians.push(median);
+        let middle = self.medians.len() / 2;
+        self.median_level = *self.medians.select_nth_unstable(middle).1;
+        self.pictures += 1;
+        self.full_scale = image.full_scale();
+        self.brightest_level = self.brightest_level.max(brightest);
+        let saturated = f64::from(counts[usize::from(image.full_scale())]) / pixels.len().max(1) as f64;
+        self.saturated = self.saturated.max(saturated);
+        if brightest > median {
+            let half = median + (brightest - median).div_ceil(2);
+            for (y, row) in (0..).zip(pixels.chunks(image.width as usize)) {
+                let lit = |p: &T| (*p).into() >= half;
+                if let (Some(a), Some(b)) = (row.iter().position(lit), row.iter().rposition(lit)) {
+                    widen(&mut self.light_px, a as u32, y);
+                    widen(&mut self.light_px, b as u32, y);
+                }
+            }
+        }
+    }
+
+    /// One sentence for people.
+    pub fn words(&self) -> String {
+        let place = |b: Option<[u32; 4]>| {
+            b.map_or("nowhere".into(), |[x0, y0, x1, y1]| format!("in columns {x0} to {x1}, rows {y0} to {y1}"))
+        };
+        format!(
+            "in {} pictures the median level is {}, the brightest {} of {}, up to {:.1} % of the pixels are saturated; the \
+             light lies {}, the laser plane is looked for {}",
+            self.pictures,
+            self.median_level,
+            self.brightest_level,
+            self.full_scale,
+            100.0 * self.saturated,
+            place(self.light_px),
+            place(self.looked_for_px)
+        )
+    }
+
+    /// Likely cause and next step where nothing was measured.
+    pub fn why(&self) -> (&'static str, &'static str) {
+        let full = f64::from(self.full_scale);
+        let apart = match (self.light_px, self.looked_for_px) {
+            (Some(a), Some(b)) => a[0] > b[2] || b[0] > a[2] || a[1] > b[3] || b[1] > a[3],
+            _ => false,
+        };
+        if f64::from(self.brightest_level) < DARK * full {
+            (
+                "the pictures are dark: the laser was off, or the exposure is far too short",
+                "expose longer, or switch the laser on",
+            )
+        } else if self.saturated > WHITE {
+            (
+                "the pictures are white: room light or exposure is far too strong for a stripe to stand out",
+                "expose shorter, or use a filter of the laser's colour",
+            )
+        } else if apart {
+            (
+                "the light lies where the laser plane is not within the working volume",
+                "compare working_volume in station.toml and the laser plane with the station; is the picture mirrored or turned?",
+            )
+        } else {
+            (
+                "what light there is makes no stripe as the settings ask for: too wide, too faint, or broken into specks",
+                "look at the overlays, then at [extraction] in station.toml",
+            )
+        }
+    }
+}
+
+fn widen(range: &mut Option<[u32; 4]>, x: u32, y: u32) {
+    let [x0, y0, x1, y1] = range.unwrap_or([x, y, x, y]);
+    *range = Some([x0.min(x), y0.min(y), x1.max(x), y1.max(y)]);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn levels_and_light_are_found_where_they_are() {
+        let mut seen = Seen::default();
+        let mut pixels = vec![10u16; 64 * 48];
+        for x in 5..=50 {
+            pixels[30 * 64 + x] = 900;
+        }
+        seen.look(3, &Image::from_u16(64, 48, 10, pixels.clone()));
+        assert_eq!(seen.pictures, 0);
+        seen.look(4, &Image::from_u16(64, 48, 10, pixels));
+        assert_eq!((seen.median_level, seen.brightest_level, seen.full_scale), (10, 900, 1023));
+        assert_eq!(seen.light_px, Some([5, 30, 50, 30]));
+        let white = |level| {
+            let mut seen = Seen::default();
+            seen.look(0, &Image::from_u8(8, 8, vec![level; 64]));
+            seen
+        };
+        assert!(white(255).why().0.contains("white") && white(3).why().0.contains("dark"));
+        assert_eq!(white(255).light_px, None);
+    }
+}

@@ -1,0 +1,77 @@
+//! In: the sources. Out: a failure for every fault that is made without a next step.
+//! Frame and unit: none.
+
+use std::path::{Path, PathBuf};
+
+fn sources(folder: &Path, out: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()) {
+        if entry.is_dir() {
+            sources(&entry, out);
+        } else if entry.extension().is_some_and(|e| e == "rs") {
+            out.push(entry);
+        }
+    }
+}
+
+/// Where the bracket that stands first in `text` is closed; what stands in quotes does not count.
+fn closed(text: &str) -> usize {
+    let (mut depth, mut quoted, mut escaped) = (0, false, false);
+    for (at, c) in text.char_indices() {
+        match c {
+            _ if escaped => escaped = false,
+            '\\' if quoted => escaped = true,
+            '"' => quoted = !quoted,
+            _ if quoted => {}
+            '(' | '[' | '{' => depth += 1,
+            ')' | ']' | '}' => {
+                depth -= 1;
+                if depth == 0 {
+                    return at + 1;
+                }
+            }
+            _ => {}
+        }
+    }
+    text.len()
+}
+
+/// The first line of each fault in a source whose chain of calls has no `next`.
+fn without_next(text: &str) -> Vec<String> {
+    let code = text.find("#[cfg(test)]\nmod").map_or(text, |at| &text[..at]);
+    let mut out = Vec::new();
+    for made in ["Fault::input(", "Fault::usage(", "Fault::refused(", "Fault::output(", "Fault::device(", "Fault::new("]
+    {
+        for (at, _) in code.match_indices(made) {
+            let mut rest = &code[at + made.len() - 1..];
+            let mut found = false;
+            loop {
+                rest = &rest[closed(rest)..];
+                let Some(call) = rest.trim_start().strip_prefix('.') else { break };
+                let Some(open) = call.find('(') else { break };
+                found |= &call[..open] == "next";
+                rest = &call[open..];
+            }
+            if !found {
+                let line = code[..at].matches('\n').count() + 1;
+                out.push(format!("{line}: {}", code[at..].lines().next().unwrap_or_default()));
+            }
+        }
+    }
+    out
+}
+
+#[test]
+fn every_fault_has_a_next_step() {
+    assert_eq!(without_next("Fault::input(format!(\"a) {x}\")).cause(\"b\")").len(), 1);
+    assert_eq!(without_next("Fault::input(format!(\"a) {x}\"))\n    .cause(\"b\")\n    .next(\"c\")").len(), 0);
+    let mut files = Vec::new();
+    sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut files);
+    let (mut wrong, mut seen) = (Vec::new(), 0);
+    for file in files.iter().filter(|f| !f.ends_with("fault/mod.rs")) {
+        let text = std::fs::read_to_string(file).unwrap();
+        seen += text.matches("Fault::").count();
+        wrong.extend(without_next(&text).into_iter().map(|line| format!("{}:{line}", file.display())));
+    }
+    assert!(seen > 300, "{seen} faults were found");
+    assert!(wrong.is_empty(), "{} faults do not say what to do next:\n{}", wrong.len(), wrong.join("\n"));
+}

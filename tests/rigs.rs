@@ -1,0 +1,393 @@
+//! In: the designs in data/rigs. Out: each simulated, calibrated, scanned on GPU and twins and searched through the command
+//! line, judged by what its own pixels, light and geometry predict; with UPDATE_RIGS=1 the table docs/rigs.md.
+//! Frame and unit: scene frame of the simulated scan, mm; errors also in pixel footprints of the rig.
+
+mod common;
+
+use common::sheetlight;
+use serde_json::Value;
+use sheetlight::camera::Intrinsics;
+use sheetlight::geometry::{Base, Camera, Plane, Rigid, Vec2, Vec3, fit_plane};
+use sheetlight::recording::load_poses;
+use sheetlight::scan::{CloudPoint, read_cloud};
+use sheetlight::simulate::rig_scene::{STEPS_MM, TREAD_MM};
+use sheetlight::simulate::{RigSpec, Truth};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn designs() -> Vec<(String, PathBuf)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("data/rigs");
+    let mut all: Vec<_> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|e| e.unwrap().path())
+        .map(|p| (p.file_stem().unwrap().to_str().unwrap().to_owned(), p))
+        .collect();
+    all.sort();
+    all
+}
+
+/// One calibration command: its verdict, or the first line of its refusal.
+fn calibrate(what: &str, recording: &str, station: &str, more: &[&str]) -> String {
+    let mut args = vec!["calibrate", what, recording, "--station", station, "--json", "--quiet"];
+    args.extend(more);
+    let done = Command::new(env!("CARGO_BIN_EXE_sheetlight")).args(&args).output().expect("the program starts");
+    if !done.status.success() {
+        return String::from_utf8_lossy(&done.stderr).lines().next().unwrap_or("").to_owned();
+    }
+    let found: Value = serde_json::from_slice(&done.stdout).unwrap();
+    found["quality"]["verdict"].as_str().unwrap().to_owned()
+}
+
+/// What is known of the rig that took a scan.
+struct Known {
+    camera: Intrinsics,
+    plane: Plane<Camera>,
+    scene_from_camera: Vec<Rigid<sheetlight::simulate::InScene, Camera>>,
+    full_well: f64,
+    read: f64,
+    speckle: f64,
+    full: f64,
+}
+
+impl Known {
+    fn load(scan: &Path, rig: &RigSpec) -> (Known, Truth) {
+        let truth = Truth::load(&scan.join("truth.json")).unwrap();
+        let f = &truth.file;
+        let poses = load_poses(&scan.join("poses_true.json")).unwrap().poses;
+        let scene_from_base = f.base_from_scene.unwrap().inverse();
+        let s = &rig.sensor;
+        let known = Known {
+            camera: f.intrinsics,
+            plane: f.laser_plane_camera,
+            scene_from_camera: poses.iter().map(|p| scene_from_base * (*p * f.flange_from_camera)).collect(),
+            full_well: s.full_well_e,
+            read: s.read_noise_e,
+            speckle: s.speckle,
+            full: f64::from((1u32 << s.bits) - 1),
+        };
+        (known, truth)
+    }
+
+    /// Least standard deviation of a centre across a stripe of `sigma` px whose peak is `grey` of full scale, averaged along
+    /// the stripe as the fit does (docs/math.md, Stripe peak): sqrt(sum(w² F)) / sum(w F), F a pixel's Fisher information.
+    fn bound_px(&self, sigma: f64, grey: f64) -> f64 {
+        let peak = grey / self.full * self.full_well;
+        let quantum = self.full_well / self.full;
+        let radius = 2.4 * sigma;
+        let reach = (4.0 * sigma).ceil() as i32;
+        let (mut top, mut bottom) = (0.0, 0.0);
+        for i in -reach..=reach {
+            let w = (1.0 - (f64::from(i) / radius).powi(2)).max(0.0).powi(2);
+            for j in -reach..=reach {
+                let d = f64::from(j) - 0.3;
+                let light = peak * (-0.5 * (d / sigma).powi(2)).exp();
+                let variance = light + self.read.powi(2) + quantum.powi(2) / 12.0 + (self.speckle * light).powi(2);
+                let fisher = (light * d / (sigma * sigma)).powi(2) / variance;
+                top += w * w * fisher;
+                bottom += w * fisher;
+            }
+        }
+        top.sqrt() / bottom
+    }
+
+    /// How far a point of a level surface moves up for one pixel across the stripe's picture, mm: the viewing ray of the
+    /// moved pixel meets the sheet elsewhere.
+    fn rise_per_px(&self, p: &CloudPoint) -> f64 {
+        let pose = &self.scene_from_camera[p.shot as usize];
+        let at = |px: Vec2| self.camera.ray_from_pixel(&px).and_then(|r| r.meet(&self.plane)).unwrap();
+        let px = Vec2::new(f64::from(p.u), f64::from(p.v));
+        let here = at(px);
+        let level = pose.inverse().direction(&Vec3::z());
+        let along = self.plane.normal.cross(&level).normalize();
+        let step = self.camera.pixel_from_point(&(here + along * (1e-3 * here.z))).unwrap() - px;
+        let across = Vec2::new(-step.y, step.x).normalize() * 0.1;
+        (at(px + across) - here).dot(&level).abs() / 0.1
+    }
+}
+
+/// What came of one rig.
+struct Row {
+    name: String,
+    footprint: f64,
+    verdicts: [String; 3],
+    points: usize,
+    completeness: f64,
+    /// Own-plane rms of the treads, and what was predicted, mm.
+    plane: f64,
+    predicted: f64,
+    /// Errors of the four rises, mm, and in predicted standard deviations.
+    steps: [f64; 4],
+    step_sigmas: [f64; 4],
+    /// Place (mm, in the plane), height (mm) and turn (degrees) of the part against the truth; or why not found.
+    part: Result<[f64; 3], String>,
+    /// Largest difference of GPU and twins at the same pixel, mm, and points that only one has.
+    gpu: Option<(f64, usize)>,
+}
+
+fn median(mut v: Vec<f64>) -> f64 {
+    let middle = v.len() / 2;
+    *v.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// Everything with one rig; pictures `width` wide, a scan in `shots`, in the folder `at`.
+fn run(name: &str, file: &Path, at: &Path, width: Option<u32>, shots: Option<usize>) -> Row {
+    let rig = RigSpec::load(file).unwrap();
+    let text = |p: PathBuf| p.to_str().unwrap().to_owned();
+    let of = |n: &str| text(at.join(n));
+    let mut args: Vec<String> = ["simulate", "--rig", file.to_str().unwrap(), "--out", at.to_str().unwrap(), "--quiet"]
+        .map(String::from)
+        .into();
+    args.extend(["--set", "intrinsics,laserplane,handeye,scan"].map(String::from));
+    width.iter().for_each(|w| args.extend(["--width".into(), w.to_string()]));
+    shots.iter().for_each(|n| args.extend(["--shots".into(), n.to_string()]));
+    sheetlight(&args.iter().map(String::as_str).collect::<Vec<_>>());
+
+    std::fs::create_dir_all(at.join("cell")).unwrap();
+    std::fs::copy(at.join("station/station.toml"), at.join("cell/station.toml")).unwrap();
+    let verdicts = [
+        calibrate("camera", &of("intrinsics"), &of("cell"), &[]),
+        calibrate("laser-plane", &of("laserplane"), &of("cell"), &["--on", "cpu"]),
+        calibrate("hand-eye", &of("handeye"), &of("cell"), &["--poses", "poses_exact"]),
+    ];
+    let calibrated =
+        at.join("cell/calibration/hand_eye.json").is_file() && at.join("cell/calibration/laser_plane.json").is_file();
+    let scan = |on: &str, station: &str, out: &str| {
+        sheetlight(&[
+            "scan",
+            &of("scan"),
+            "--station",
+            station,
+            "--out",
+            out,
+            "--on",
+            on,
+            "--overlays",
+            "0",
+            "--quiet",
+        ]);
+        read_cloud(&Path::new(out).join("cloud.ply")).unwrap()
+    };
+    let (known, truth) = Known::load(&at.join("scan"), &rig);
+    // The true calibration: what is left is the scan's own error.
+    let cloud = scan("cpu", &of("station"), &of("twins"));
+    let long = std::env::var_os("SHEETLIGHT_LONG").is_some();
+    let device = if long { common::device() } else { None };
+    let gpu = device.map(|_| compared(&cloud, &scan("gpu", &of("station"), &of("gpu"))));
+    let report: Value = serde_json::from_slice(&std::fs::read(at.join("twins/scan.json")).unwrap()).unwrap();
+    let sigma = report["stripe"]["width_px"].as_f64().unwrap();
+
+    let u = rig.scale();
+    let steps_part = truth.file.parts.iter().find(|p| p.name == "steps").unwrap().base_from_part;
+    let part_from_base = steps_part.inverse();
+    let base = |p: &CloudPoint| Vec3::from(p.position.map(f64::from));
+    let margin = [0.2 * TREAD_MM[0] * u, 0.15 * TREAD_MM[1] * u];
+    let (mut square, mut predicted, mut counted) = (0.0, 0.0, 0usize);
+    let mut tops = Vec::new();
+    let mut top = 0.0;
+    for (i, rise) in [0.0].iter().chain(&STEPS_MM).enumerate() {
+        top += rise * u;
+        let x = TREAD_MM[0] * (i as f64 - 2.0) * u;
+        let on: Vec<(&CloudPoint, Vec3)> = cloud
+            .iter()
+            .map(|p| (p, part_from_base.point(&base(p))))
+            .filter(|(_, q)| {
+                (q.x - x).abs() < 0.5 * TREAD_MM[0] * u - margin[0]
+                    && q.y.abs() < 0.5 * TREAD_MM[1] * u - margin[1]
+                    && (q.z - top).abs() < 0.4 * u
+            })
+            .collect();
+        assert!(on.len() > 100, "{name}: tread {i} has {} points", on.len());
+        let places: Vec<Vec3> = on.iter().map(|(_, q)| *q).collect();
+        let (_, rms) = fit_plane::<Base>(&places).unwrap();
+        let variance = on
+            .iter()
+            .map(|(p, _)| (known.bound_px(sigma, f64::from(p.intensity)) * known.rise_per_px(p)).powi(2))
+            .sum::<f64>()
+            / on.len() as f64;
+        (square, predicted, counted) =
+            (square + rms * rms * on.len() as f64, predicted + variance * on.len() as f64, counted + on.len());
+        let mean = places.iter().map(|q| q.z).sum::<f64>() / places.len() as f64 - top;
+        // Averaging along the stripe leaves one independent centre for every sum(w)² / sum(w²) = 2.2 sigma.
+        tops.push((mean, variance / (on.len() as f64 / (2.2 * sigma).max(1.0))));
+    }
+    let steps = std::array::from_fn(|i| tops[i + 1].0 - tops[i].0);
+    let step_sigmas = std::array::from_fn(|i| steps[i] / (tops[i + 1].1 + tops[i].1).sqrt());
+    let visible = std::fs::read(at.join("scan/visible.ply")).unwrap();
+    let header = visible.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
+    let lit = (visible.len() - header) / 12;
+    let lines = 3.0;
+    let completeness = (cloud.len() as f64 / (lit as f64 / lines)).min(1.0);
+
+    if calibrated {
+        scan("cpu", &of("cell"), &of("result"));
+    }
+    let part = if calibrated { find(at, &truth) } else { Err("not calibrated".into()) };
+    let footprint = median(
+        cloud
+            .iter()
+            .step_by(97)
+            .map(|p| {
+                let q = known.scene_from_camera[p.shot as usize].inverse();
+                let scene = truth.file.base_from_scene.unwrap().inverse().point(&base(p));
+                q.point(&scene).z / known.camera.fx
+            })
+            .collect(),
+    );
+    Row {
+        name: name.into(),
+        footprint,
+        verdicts,
+        points: cloud.len(),
+        completeness,
+        plane: (square / counted as f64).sqrt(),
+        predicted: (predicted / counted as f64).sqrt(),
+        steps,
+        step_sigmas,
+        part,
+        gpu,
+    }
+}
+
+/// The part's pose by the calibrated station against the truth, or the refusal.
+fn find(at: &Path, truth: &Truth) -> Result<[f64; 3], String> {
+    let of = |n: &str| at.join(n).to_str().unwrap().to_owned();
+    let (scan, recipe, out, cell) = (of("result"), of("notched.toml"), of("found.json"), of("cell"));
+    let args = ["find", &scan, "--recipe", &recipe, "--station", &cell, "--out", &out, "--quiet"];
+    let done = Command::new(env!("CARGO_BIN_EXE_sheetlight")).args(args).output().expect("the program starts");
+    if !done.status.success() {
+        return Err(String::from_utf8_lossy(&done.stderr).lines().next().unwrap_or("").to_owned());
+    }
+    let report: Value = serde_json::from_slice(&std::fs::read(&out).unwrap()).unwrap();
+    let found: Rigid<Base, sheetlight::geometry::Part> =
+        serde_json::from_value(report["base_from_part"].clone()).unwrap();
+    let want = truth.file.parts.iter().find(|p| p.name == "notched").unwrap().base_from_part;
+    let off = want.inverse() * found;
+    let t = off.translation;
+    Ok([t.x.hypot(t.y), t.z.abs(), off.rotation_vector().norm().to_degrees()])
+}
+
+/// Largest distance of two clouds' points of the same pixel, and points that only one of them has.
+fn compared(a: &[CloudPoint], b: &[CloudPoint]) -> (f64, usize) {
+    let key = |p: &CloudPoint| (p.shot, (8.0 * p.u).round() as i32, (8.0 * p.v).round() as i32);
+    let mut places: HashMap<_, &CloudPoint> = b.iter().map(|p| (key(p), p)).collect();
+    let (mut worst, mut alone) = (0.0f64, 0);
+    for p in a {
+        let (shot, u, v) = key(p);
+        // A centre that lies between two eighths of a pixel may be rounded either way.
+        let near = (-1..=1).flat_map(|i| (-1..=1).map(move |j| (shot, u + i, v + j)));
+        let other = near.filter_map(|k| places.get(&k).map(|q| (k, *q))).min_by(|x, y| {
+            let d = |q: &CloudPoint| (q.u - p.u).hypot(q.v - p.v);
+            d(x.1).total_cmp(&d(y.1))
+        });
+        match other {
+            Some((k, q)) => {
+                let d = (0..3).map(|i| f64::from(p.position[i] - q.position[i]).powi(2)).sum::<f64>().sqrt();
+                worst = worst.max(d);
+                places.remove(&k);
+            }
+            None => alone += 1,
+        }
+    }
+    (worst, alone + places.len())
+}
+
+fn judged(row: &Row) -> Vec<String> {
+    let mut faults = Vec::new();
+    let mut want = |ok: bool, what: String| {
+        if !ok {
+            faults.push(format!("{}: {what}", row.name));
+        }
+    };
+    let p = row.footprint;
+    for (what, v) in ["camera", "laser plane", "hand-eye"].iter().zip(&row.verdicts) {
+        want(v == "good" || v == "usable", format!("{what} is {v}"));
+    }
+    want(row.plane <= 1.15 * row.predicted, format!("own-plane rms {:.5} of {:.5} mm", row.plane, row.predicted));
+    match &row.part {
+        Ok([place, height, turn]) => {
+            want(*place < 0.5 * p && *height < 0.5 * p && *turn < 0.3, format!("part off by {:?}", row.part));
+        }
+        Err(why) => want(false, format!("part not found: {why}")),
+    }
+    if let Some((worst, alone)) = row.gpu {
+        // 0.001 mm at the reference rigs' pixel of 0.25 mm.
+        want(worst <= 0.004 * p, format!("GPU and twins differ by {worst:.6} mm, footprint {p:.4}"));
+        want(alone * 2000 <= row.points, format!("{alone} points on GPU or twins alone"));
+    }
+    faults
+}
+
+fn table(rows: &[Row]) -> String {
+    let mut out = String::from(
+        "| rig | footprint mm | camera, plane, hand-eye | points | plane rms px | over prediction | steps of 0.1, 0.5, 1, 5 units: errors px | part: place, height px, turn ° | GPU - twins px |\n|---|---|---|---|---|---|---|---|---|\n",
+    );
+    for r in rows {
+        let p = r.footprint;
+        let steps: Vec<String> = r.steps.iter().map(|s| format!("{:+.4}", s / p)).collect();
+        let part = match &r.part {
+            Ok([a, b, c]) => format!("{:.3}, {:.3}, {c:.3}", a / p, b / p),
+            Err(why) => why.clone(),
+        };
+        let gpu = r.gpu.map_or("-".into(), |(d, n)| format!("{:.5} ({n} alone)", d / p));
+        out += &format!(
+            "| {} | {p:.4} | {} | {} | {:.4} | {:.2} | {} | {part} | {gpu} |\n",
+            r.name,
+            r.verdicts.join(", "),
+            r.points,
+            r.plane / p,
+            r.plane / r.predicted,
+            steps.join(" "),
+        );
+    }
+    out
+}
+
+/// One rig with small pictures and few shots on the twins; all of them, as they are and on the GPU too, with SHEETLIGHT_LONG.
+#[test]
+fn rigs_are_calibrated_scanned_and_searched() {
+    let long = std::env::var_os("SHEETLIGHT_LONG").is_some();
+    let short = ["behind"];
+    // Names, separated by commas, and the width of their pictures: a part of the table on a slow machine.
+    let only = std::env::var("SHEETLIGHT_RIGS").ok();
+    let narrow: Option<u32> = std::env::var("SHEETLIGHT_RIGS_WIDTH").ok().map(|w| w.parse().expect("px"));
+    let wanted = |name: &str| match &only {
+        Some(list) => list.split(',').any(|n| n == name),
+        None => long || short.contains(&name),
+    };
+    let mut rows = Vec::new();
+    let mut faults = Vec::new();
+    for (name, file) in designs().iter().filter(|(n, _)| wanted(n)) {
+        let dir = tempfile::tempdir().unwrap();
+        let (width, shots) = if long { (narrow, Some(80)) } else { (Some(narrow.unwrap_or(400)), Some(36)) };
+        let row = run(name, file, dir.path(), width, shots);
+        println!("{}", table(std::slice::from_ref(&row)).lines().last().unwrap());
+        println!("   steps in predicted sigmas {:.2?}, completeness {:.3}", row.step_sigmas, row.completeness);
+        faults.extend(judged(&row));
+        rows.push(row);
+    }
+    if std::env::var_os("UPDATE_RIGS").is_some() {
+        let head = "# Errors by rig\n\nEvery design in data/rigs, simulated, calibrated, scanned in 80 shots and searched through the command line; lengths\nin pixel footprints of the rig (what a pixel sees of the parts, mm). Regenerated by\n`SHEETLIGHT_LONG=1 UPDATE_RIGS=1 cargo test --test rigs rigs_are -- --nocapture`.\n\n";
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/rigs.md");
+        std::fs::write(path, format!("{head}{}", table(&rows))).unwrap();
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
+}
+
+/// The designs span what rigs differ in.
+#[test]
+fn the_shipped_designs_are_many_and_sound() {
+    let all = designs();
+    assert!(all.len() >= 12, "{}", all.len());
+    let rigs: Vec<RigSpec> = all.iter().map(|(_, f)| RigSpec::load(f).unwrap()).collect();
+    let some = |what: &str, test: &dyn Fn(&RigSpec) -> bool| assert!(rigs.iter().any(test), "no rig with {what}");
+    for side in [0.0, 90.0, 180.0, 270.0, 45.0, 120.0, 150.0] {
+        some(&format!("side {side}"), &|r| r.laser.side_deg == side);
+    }
+    some("a steep sheet", &|r| r.laser.angle_deg > 45.0);
+    some("a flat sheet", &|r| r.laser.angle_deg < 15.0);
+    some("a portrait picture", &|r| r.camera.height_px > r.camera.width_px);
+    some("a plane behind the volume", &|r| r.crossing() > r.working.far_mm);
+    some("1.5 m", &|r| r.working.distance_mm >= 1500.0);
+    some("a field of 10 mm", &|r| r.field_mm()[0] <= 10.1);
+}
