@@ -179,7 +179,7 @@ fn bad_recipes_and_empty_scans_are_refused_with_numbers() {
         std::fs::read_to_string(PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("data/recipes/osc.toml")).unwrap();
     for (from, to, word) in [
         ("cell_mm = 0.5", "cell_mm = 0.5\ncolour = 3", "colour"),
-        ("cell_mm = 0.5", "cell_mm = 50", "0.05 to 5"),
+        ("cell_mm = 0.5", "cell_mm = 50", "0 to 2.55"),
         ("of = [\"pin\"]", "of = [\"pen\"]", "pen"),
         ("grid = { count = [2, 2], pitch = [15.24, 7.62] }", "", "pin"),
         (

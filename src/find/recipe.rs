@@ -231,6 +231,9 @@ impl Recipe {
         self.measure.check()?;
         let drawing = self.drawing();
         drawing.check()?;
+        // Coarser cells show nothing of the part.
+        let b = drawing.bounds();
+        range("cell_mm", self.cell_mm, 0.0, (b[2] - b[0]).max(b[3] - b[1]) / 8.0)?;
         if drawing.faces().is_empty() {
             return Err(Fault::input("the recipe draws no surface: nothing gives height and tilt")
                 .cause("only lines, arcs or shapes with inside = \"either\"")
