@@ -110,7 +110,7 @@ fn keep_agreeing(seen: &mut Vec<Seen>, features: &[Vec2]) {
         a.place.cmp(&b.place).then(sigma(a).total_cmp(&sigma(b)))
     });
     seen.dedup_by_key(|s| s.place);
-    if seen.len() < 3 {
+    if seen.len() < 2 {
         return;
     }
     let off = |i: usize| -> f64 {
@@ -118,11 +118,14 @@ fn keep_agreeing(seen: &mut Vec<Seen>, features: &[Vec2]) {
         off_px(seen, features, i) / (s.corners[0].pixel - s.corners[2].pixel).norm()
     };
     let good: Vec<bool> = (0..seen.len()).map(|i| off(i) < 0.4).collect();
-    // A wrong neighbour spoils good ones: where most disagree nothing is dropped.
-    if good.iter().filter(|g| **g).count() * 2 > seen.len() {
-        let mut good = good.iter();
-        seen.retain(|_| *good.next().expect("one each"));
+    // A wrong neighbour spoils good ones, so that one marker's word is not enough; but where most disagree none is believed. Some
+    // markers are their own mirror image (DICT_4X4_50: 8, 9, 17) and are read in a mirrored picture, each the wrong way round.
+    if good.iter().filter(|g| **g).count() * 2 <= seen.len() {
+        seen.clear();
+        return;
     }
+    let mut good = good.iter();
+    seen.retain(|_| *good.next().expect("one each"));
     drop_covered(seen, features);
 }
 
