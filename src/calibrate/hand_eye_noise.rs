@@ -7,7 +7,8 @@ use super::hand_eye::{HandEyeOptions, Mount, Noise};
 use super::hand_eye_camera::{CameraBelief, Sharpened};
 use super::hand_eye_closed::{Chain, Pair};
 use super::hand_eye_terms::{Refined, refine, robot_parts, with_camera};
-use nalgebra::{DMatrix, DVector, SVector};
+use crate::camera::{PARAMETERS, Parameters};
+use nalgebra::{DMatrix, DVector};
 
 /// One round of variance components at a fitted chain.
 ///
@@ -29,13 +30,13 @@ fn components(
         parts: Vec::new(),
     };
     let mut parts = [DMatrix::zeros(n, n), DMatrix::zeros(n, n)];
-    let mut by_camera = DMatrix::zeros(n, 9);
+    let mut by_camera = DMatrix::zeros(n, PARAMETERS);
     for (i, pair) in pairs.iter().enumerate() {
-        let (e, j) = with_camera(chain, &SVector::zeros(), pair, camera);
+        let (e, j) = with_camera(chain, &Parameters::zeros(), pair, camera);
         let at = 6 * i;
         model.residual.rows_mut(at, 6).copy_from(&e);
         model.jacobian.view_mut((at, 0), (6, 12)).copy_from(&j.fixed_columns::<12>(0));
-        by_camera.view_mut((at, 0), (6, 9)).copy_from(&j.fixed_columns::<9>(12));
+        by_camera.view_mut((at, 0), (6, PARAMETERS)).copy_from(&j.fixed_columns::<PARAMETERS>(12));
         let mut known = pair.seen.covariance(noise.feature_factor);
         let [t, r] = robot_parts(&mount.flange(chain, &pair.near_from_far));
         for (k, (part, given)) in

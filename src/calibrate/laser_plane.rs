@@ -7,12 +7,12 @@ use super::laser_plane_terms::{
     Data, Seen, State, basis, by_camera, look, mm_per_px, on_board, ratio, strain, tangents, without,
 };
 use super::measured_pose::MeasuredPose;
-use crate::camera::Intrinsics;
+use crate::camera::{Intrinsics, PARAMETERS, ParameterCovariance, named};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Board, Camera, Plane, Rigid, Vec2, Vec3, fit_plane};
 use crate::recording::BoardSpec;
 use crate::solve::{ConsensusOptions, Loss, consensus};
-use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix};
+use nalgebra::{DMatrix, Matrix3, Matrix6};
 
 /// One place where the stripe was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -152,7 +152,7 @@ fn refused(what: String) -> Fault {
 pub fn solve(
     views: &[StripeView],
     camera: &Intrinsics,
-    camera_covariance: &SMatrix<f64, 9, 9>,
+    camera_covariance: &ParameterCovariance,
     feature_factor: f64,
     o: &LaserPlaneOptions,
 ) -> Result<LaserPlaneFit> {
@@ -228,9 +228,9 @@ pub fn solve(
     for p in &data.peaks {
         uses[p.view][p.index] = PeakUse::Used;
     }
-    let by_camera = by_camera(&data, &state, views, camera, factor)
+    let by_camera = by_camera(&data, &state, views, camera, &named(camera_covariance), factor)
         .ok_or_else(|| refused("the laser plane is not determined by these stripes".into()))?;
-    let c = DMatrix::from_column_slice(9, 9, camera_covariance.as_slice());
+    let c = DMatrix::from_column_slice(PARAMETERS, PARAMETERS, camera_covariance.as_slice());
     let basis = basis(&state.plane);
     let exact = &basis * &local * basis.transpose();
     let covariance = &exact + &by_camera * c * by_camera.transpose();

@@ -3,8 +3,8 @@
 //! Frame and unit: camera frame, mm; peaks in px (docs/math.md, Laser plane (1) to (5)).
 
 use super::laser_plane::{StripePeak, StripeView};
-use super::measured_pose::{changed, moved, step_between};
-use crate::camera::Intrinsics;
+use super::measured_pose::{moved, step_between};
+use crate::camera::{Intrinsics, PARAMETERS, Parameters, difference_step};
 use crate::geometry::{Board, Camera, Plane, Rigid, Vec2, Vec3};
 use crate::solve::{LmOptions, Loss, Problem, Residuals, Solution, lm};
 use nalgebra::{DMatrix, Matrix3, Matrix6, SMatrix};
@@ -184,12 +184,13 @@ pub(super) fn share(data: &Data, state: &State, view: usize, factor: f64) -> Opt
 }
 
 /// d(nx ny nz offset)/d(camera): the gradient's change with the camera through the peaks' rays and
-/// the boards' poses, by the implicit function theorem.
+/// the boards' poses, by the implicit function theorem; for the parameters that are uncertain.
 pub(super) fn by_camera(
     data: &Data,
     state: &State,
     views: &[StripeView],
     camera: &Intrinsics,
+    uncertain: &[usize],
     factor: f64,
 ) -> Option<DMatrix<f64>> {
     let mut information = Matrix3::zeros();
@@ -197,13 +198,13 @@ pub(super) fn by_camera(
         information += share(data, state, v, factor)?.0;
     }
     let inverse = information.try_inverse()?;
-    let mut local = DMatrix::zeros(3, 9);
-    for k in 0..9 {
-        let h = if k < 4 { 0.05 } else { 1e-4 };
+    let mut local = DMatrix::zeros(3, PARAMETERS);
+    for &k in uncertain {
+        let h = difference_step(k);
         let gradient = |sign: f64| -> Option<Vec3> {
-            let mut d = nalgebra::SVector::<f64, 9>::zeros();
+            let mut d = Parameters::zeros();
             d[k] = sign * h;
-            let other = changed(camera, &d);
+            let other = camera.changed(&d);
             let peaks = data.peaks.iter().map(|p| look(&other, p.view, p.index, &views[p.view].peaks[p.index]));
             let follow = |(v, p): (&StripeView, _)| moved(p, (v.pose.by_intrinsics * d).as_slice());
             let data = Data {

@@ -22,6 +22,7 @@ pub mod intrinsics_quality;
 pub mod laser_plane;
 pub mod laser_plane_report;
 mod laser_plane_terms;
+pub mod lens;
 pub mod limits;
 pub mod measured_pose;
 pub mod pointer;
