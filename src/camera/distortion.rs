@@ -151,7 +151,7 @@ impl Distortion {
 
     /// True where the map is one to one between the axis and n.
     pub fn connected(&self, n: &Vec2) -> bool {
-        [0.25, 0.5, 0.75, 1.0].iter().all(|t| self.bent_jacobian(&(n * *t)).determinant() > 0.0)
+        [0.25, 0.5, 0.75, 1.0].iter().all(|t| upright(&self.bent_jacobian(&(n * *t))))
     }
 
     fn newton(&self, flat: &Vec2, start: Vec2) -> Option<Vec2> {
@@ -166,7 +166,7 @@ impl Distortion {
                 break;
             }
         }
-        ((self.bent(&n) - flat).norm() < 1e-12 && self.bent_jacobian(&n).determinant() > 0.0).then_some(n)
+        ((self.bent(&n) - flat).norm() < 1e-12 && upright(&self.bent_jacobian(&n))).then_some(n)
     }
 
     /// From the axis outwards in steps: Newton's method from the distorted place jumps over a fold of a strong lens.
@@ -182,6 +182,11 @@ impl Distortion {
         }
         self.connected(&n).then_some(n)
     }
+}
+
+/// True where nothing is folded over: beyond two folds the determinant is positive again, the picture turned by half a turn.
+fn upright(j: &Matrix2<f64>) -> bool {
+    j.determinant() > 0.0 && j.trace() > 0.0
 }
 
 fn projected(t: &Mat3, p: &Vec2) -> Vec2 {
