@@ -12,6 +12,22 @@ struct PointFrame {
     p1: f32,
     p2: f32,
     k3: f32,
+    k4: f32,
+    k5: f32,
+    k6: f32,
+    s1: f32,
+    s2: f32,
+    s3: f32,
+    s4: f32,
+    t0: f32,
+    t1: f32,
+    t2: f32,
+    t3: f32,
+    t4: f32,
+    t5: f32,
+    t6: f32,
+    t7: f32,
+    t8: f32,
     normal_x: f32,
     normal_y: f32,
     normal_z: f32,
@@ -34,6 +50,9 @@ struct PointFrame {
 @group(0) @binding(3) var<storage, read> strongest: array<u32>;
 @group(0) @binding(4) var<storage, read_write> peaks: array<Peak>;
 @group(0) @binding(5) var<storage, read_write> spots: array<vec4<f32>>;
+
+// 1: the lens has terms beside Brown-Conrady's five, or its sensor is tilted.
+override full_lens: u32 = 0u;
 
 const NARROW = 3u;
 const ECHO = 7u;
@@ -62,34 +81,69 @@ fn row(r: vec4<f32>, p: vec3<f32>) -> f32 {
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     if id.x < header[3] {
         let k = peaks[id.x];
-        let yd = (k.v - frame.cy) / frame.fy;
-        let xd = (k.u - frame.cx - frame.skew * yd) / frame.fx;
+        let yv = (k.v - frame.cy) / frame.fy;
+        let xv = (k.u - frame.cx - frame.skew * yv) / frame.fx;
+        // One pixel along the peak's normal.
+        let dv = k.normal_v / frame.fy;
+        let du = (k.normal_u - frame.skew * dv) / frame.fx;
+        var xd = xv;
+        var yd = yv;
+        var dxd = du;
+        var dyd = dv;
+        if full_lens == 1u {
+            // Off the tilted sensor.
+            let w = frame.t6 * xv + (frame.t7 * yv + frame.t8);
+            xd = (frame.t0 * xv + (frame.t1 * yv + frame.t2)) / w;
+            yd = (frame.t3 * xv + (frame.t4 * yv + frame.t5)) / w;
+            dxd = ((frame.t0 - xd * frame.t6) * du + (frame.t1 - xd * frame.t7) * dv) / w;
+            dyd = ((frame.t3 - yd * frame.t6) * du + (frame.t4 - yd * frame.t7) * dv) / w;
+        }
         var x = xd;
         var y = yd;
+        var a = 1.0;
+        var b = 0.0;
+        var c = 0.0;
+        var d = 1.0;
         var det = 1.0;
         for (var i = 0u; i < NEWTON; i++) {
             let r2 = x * x + y * y;
-            let radial = 1.0 + r2 * (frame.k1 + r2 * (frame.k2 + r2 * frame.k3));
-            let bend = frame.k1 + r2 * (2.0 * frame.k2 + 3.0 * frame.k3 * r2);
-            let ex = (x * radial - xd) + (2.0 * frame.p1 * (x * y) + frame.p2 * (r2 + 2.0 * (x * x)));
-            let ey = (y * radial - yd) + (frame.p1 * (r2 + 2.0 * (y * y)) + 2.0 * frame.p2 * (x * y));
-            let a = (radial + 2.0 * (x * x) * bend) + (2.0 * frame.p1 * y + 6.0 * frame.p2 * x);
-            let b = 2.0 * (x * y) * bend + (2.0 * frame.p1 * x + 2.0 * frame.p2 * y);
-            let d = (radial + 2.0 * (y * y) * bend) + (6.0 * frame.p1 * y + 2.0 * frame.p2 * x);
-            det = a * d - b * b;
+            var radial = 1.0 + r2 * (frame.k1 + r2 * (frame.k2 + r2 * frame.k3));
+            var bend = frame.k1 + r2 * (2.0 * frame.k2 + 3.0 * frame.k3 * r2);
+            if full_lens == 1u {
+                let below = 1.0 + r2 * (frame.k4 + r2 * (frame.k5 + r2 * frame.k6));
+                radial /= below;
+                bend = (bend - radial * (frame.k4 + r2 * (2.0 * frame.k5 + 3.0 * frame.k6 * r2))) / below;
+            }
+            var ex = (x * radial - xd) + (2.0 * frame.p1 * (x * y) + frame.p2 * (r2 + 2.0 * (x * x)));
+            var ey = (y * radial - yd) + (frame.p1 * (r2 + 2.0 * (y * y)) + 2.0 * frame.p2 * (x * y));
+            a = (radial + 2.0 * (x * x) * bend) + (2.0 * frame.p1 * y + 6.0 * frame.p2 * x);
+            b = 2.0 * (x * y) * bend + (2.0 * frame.p1 * x + 2.0 * frame.p2 * y);
+            c = b;
+            d = (radial + 2.0 * (y * y) * bend) + (6.0 * frame.p1 * y + 2.0 * frame.p2 * x);
+            if full_lens == 1u {
+                let px = 2.0 * (frame.s1 + 2.0 * frame.s2 * r2);
+                let py = 2.0 * (frame.s3 + 2.0 * frame.s4 * r2);
+                ex += r2 * (frame.s1 + frame.s2 * r2);
+                ey += r2 * (frame.s3 + frame.s4 * r2);
+                a += px * x;
+                b += px * y;
+                c += py * x;
+                d += py * y;
+            }
+            det = a * d - b * c;
             x -= (d * ex - b * ey) / det;
-            y -= (a * ey - b * ex) / det;
+            y -= (a * ey - c * ex) / det;
         }
+        let dx = (d * dxd - b * dyd) / det;
+        let dy = (a * dyd - c * dxd) / det;
         let slope = frame.normal_x * x + (frame.normal_y * y + frame.normal_z);
         let z = frame.offset / slope;
         let there = det > 0.0 && abs(x) < 1e9 && abs(y) < 1e9 && slope > 1e-6 && z < 1e6;
-        // One pixel along the peak's normal: dx, dy of the ray, dz from the plane.
-        let dx = k.normal_u / frame.fx;
-        let dy = k.normal_v / frame.fy;
+        // dx, dy of the ray, dz from the plane.
         let dz = -z * (frame.normal_x * dx + frame.normal_y * dy) / slope;
-        let ex = dz * x + z * dx;
-        let ey = dz * y + z * dy;
-        let sigma = sqrt(ex * ex + (ey * ey + dz * dz)) * k.sigma_px;
+        let mx = dz * x + z * dx;
+        let my = dz * y + z * dy;
+        let sigma = sqrt(mx * mx + (my * my + dz * dz)) * k.sigma_px;
         let p = vec3(x * z, y * z, z);
         let spot = vec4(row(poses[3u * k.shot], p), row(poses[3u * k.shot + 1u], p), row(poses[3u * k.shot + 2u], p), sigma);
         // The first reason stays.

@@ -130,7 +130,7 @@ fn a_wrong_board_is_told_by_its_size() {
     // Squares 3 % smaller than stated show against the robot's lengths.
     let c = Case::new("handeye");
     c.meta(|m| m["board"]["square_mm"] = json!(15.0 / 0.97));
-    c.fails("hand-eye", &NOISY, &["lengths", "square_mm"]);
+    c.fails("hand-eye", &NOISY, &["the board's lengths are 97.0 %", "square_mm"]);
     let c = Case::new("laserplane");
     c.meta(|m| m["boards"] = json!([{"type": "chessboard", "inner_corners": [7, 3], "square_mm": 8.0}]));
     c.fails("laser-plane", &["--on", "cpu"], &["board"]);

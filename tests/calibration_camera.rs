@@ -3,7 +3,8 @@
 
 use sheetlight::calibrate::boards::{BoardPoint, BoardView, FindOptions, find};
 use sheetlight::calibrate::camera::{CameraOptions, calibrate};
-use sheetlight::calibrate::intrinsics::{Lens, Observation, SolveOptions, solve};
+use sheetlight::calibrate::intrinsics::{Observation, SolveOptions, solve};
+use sheetlight::calibrate::lens::Lens;
 use sheetlight::camera::Intrinsics;
 use sheetlight::geometry::{Board, Camera, Mat3, Rigid, Vec2, orthonormalise};
 use sheetlight::raster::Channel;
@@ -33,7 +34,7 @@ fn truth(reference: &std::path::Path, set: &str) -> (Intrinsics, Vec<Rigid<Camer
         cx: f("cx"),
         cy: f("cy"),
         skew: 0.0,
-        distortion: d.try_into().unwrap(),
+        distortion: sheetlight::camera::Distortion::from_opencv(&d).unwrap(),
         width: 640,
         height: 480,
     };
@@ -127,7 +128,7 @@ fn on_the_same_corners_the_solve_equals_opencv() {
         for (ours, name) in [(k.fx, "fx"), (k.fy, "fy"), (k.cx, "cx"), (k.cy, "cy")] {
             assert!((ours - want(name)).abs() < 1e-3, "{side} {name}: {ours} {}", want(name));
         }
-        for (i, ours) in k.distortion.iter().enumerate() {
+        for (i, ours) in k.distortion.to_opencv().iter().enumerate() {
             assert!((ours - set["k1_k2_p1_p2_k3"][i].as_f64().unwrap()).abs() < 1e-4, "{side} distortion {i}");
         }
         let sigma = solved.covariance.unwrap()[(0, 0)].sqrt();

@@ -95,7 +95,7 @@ fn without_a_fit_every_skeleton_pixel_gives_the_point_of_its_middle() {
         config.threshold.minimum <<= bits - 8;
         let pose: Rigid<Base, Camera> = Rigid::from_vectors(&Vec3::new(0.2, -0.4, 1.1), Vec3::new(40.0, -60.0, 30.0));
         let [fx, fy, cx, cy, skew] = optics.pinhole.map(f64::from);
-        let distortion = optics.distortion.map(f64::from);
+        let distortion = sheetlight::camera::Distortion::from_opencv(&optics.distortion.map(f64::from)).unwrap();
         let camera = Intrinsics { fx, fy, cx, cy, skew, distortion, width, height };
         let plane = Plane::new(Vec3::from(optics.normal.map(f64::from)), f64::from(optics.offset)).unwrap();
         let mut chain = Chain::new(&device, &config).unwrap();

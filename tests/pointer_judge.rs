@@ -6,16 +6,16 @@ mod common;
 
 use common::judge::{Trial, between, gauss, gauss2, gauss3, judge};
 use common::sheets::{Sheet, log_between};
-use nalgebra::{DMatrix, DVector, Matrix2, SMatrix, SVector};
+use nalgebra::{DMatrix, DVector, Matrix2, SMatrix};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use sheetlight::calibrate::limits::Asked;
-use sheetlight::calibrate::measured_pose::{SeenBoard, changed, measure, pooled_factor};
+use sheetlight::calibrate::measured_pose::{SeenBoard, measure, pooled_factor};
 use sheetlight::calibrate::pointer::{PointerOptions, SpotView, solve};
-use sheetlight::calibrate::pointer_range::{RobotNoise, range, surface, to_base};
+use sheetlight::calibrate::pointer_range::{RIG, RigCovariance, RobotNoise, SharedCovariance, range, surface, to_base};
 use sheetlight::calibrate::pointer_report::judge as judge_pointer;
-use sheetlight::camera::Intrinsics;
+use sheetlight::camera::{Intrinsics, ParameterCovariance, Parameters};
 use sheetlight::geometry::{Base, Board, Camera, Flange, Plane, Ray, Rigid, Vec2, Vec3, exp};
 use sheetlight::rig::{Verdict, Volume};
 
@@ -34,7 +34,7 @@ fn station(rng: &mut Pcg64, count: usize) -> Station {
         cx: between(rng, 310.0, 330.0),
         cy: between(rng, 230.0, 250.0),
         skew: 0.0,
-        distortion: [between(rng, -0.12, 0.0), between(rng, 0.0, 0.08), 0.0, 0.0, 0.0],
+        distortion: [between(rng, -0.12, 0.0), between(rng, 0.0, 0.08), 0.0, 0.0, 0.0].into(),
         width: 640,
         height: 480,
     };
@@ -154,7 +154,7 @@ fn errors_are_what_the_report_says_and_near_the_bound() {
     let names = ["x_at_120_mm", "y_at_120_mm", "x_at_280_mm", "y_at_280_mm"];
     judge("pointer", &names, levels.len(), make, |(s, bound, (corner, px)), rng| {
         let v = views(rng, s, &s.camera, *corner, *px);
-        let found = solve(&v, &s.camera, &SMatrix::zeros(), 1.0, &PointerOptions::default()).unwrap();
+        let found = solve(&v, &s.camera, &ParameterCovariance::zeros(), 1.0, &PointerOptions::default()).unwrap();
         let j = four_by_beam(&found.beam);
         let c = &j * found.covariance.view((0, 0), (6, 6)) * j.transpose();
         Trial::new(four(&found.beam) - four(&s.beam), &c, bound)
@@ -164,17 +164,20 @@ fn errors_are_what_the_report_says_and_near_the_bound() {
 /// Distances from a beam that was calibrated with the same wrong camera: the two errors belong together.
 #[test]
 fn distances_come_with_their_true_sigmas() {
-    let sigma = [0.3, 0.3, 0.2, 0.2, 1e-3, 1e-3, 1e-4, 1e-4, 1e-3];
-    let covariance = SMatrix::<f64, 9, 9>::from_diagonal(&SVector::from(sigma).map(|s: f64| s * s));
+    // Brown-Conrady's parameters, and of the others k4, s1 and the sensor's tilt.
+    let sigma = Parameters::from([
+        0.3, 0.3, 0.2, 0.2, 1e-3, 1e-3, 1e-4, 1e-4, 1e-3, 5e-4, 0.0, 0.0, 1e-4, 0.0, 0.0, 0.0, 1e-3, 1e-3, 0.0,
+    ]);
+    let covariance = ParameterCovariance::from_diagonal(&sigma.map(|s| s * s));
     let depths = [80.0, 120.0, 180.0, 240.0, 290.0];
     let mut over = [0.0; 5];
     for k in 0..200 {
         let rng = &mut Pcg64::seed_from_u64(4000 + k);
         let s = station(rng, 9);
-        let believed = changed(&s.camera, &SVector::from_fn(|i, _| gauss(rng, sigma[i])));
+        let believed = s.camera.changed(&Parameters::from_fn(|i, _| gauss(rng, sigma[i])));
         let v = views(rng, &s, &believed, 0.03, 0.03);
         let found = solve(&v, &believed, &covariance, 1.0, &PointerOptions::default()).unwrap();
-        let joint = SMatrix::<f64, 15, 15>::from_fn(|i, j| found.covariance[(i, j)]);
+        let joint = RigCovariance::from_fn(|i, j| found.covariance[(i, j)]);
         for (i, z) in depths.iter().enumerate() {
             let p = s.beam.at((z - s.beam.origin.z) / s.beam.direction.z);
             let pixel = s.camera.pixel_from_point(&p).unwrap() + gauss2(rng, 0.03);
@@ -195,7 +198,7 @@ fn a_wrong_spot_is_named() {
         let mut v = views(rng, &s, &s.camera, 0.03, 0.03);
         let bad = k as usize % 9;
         v[bad].pixel += if k % 2 == 0 { Vec2::new(25.0, -8.0) } else { Vec2::new(0.5, 0.5) };
-        let found = solve(&v, &s.camera, &SMatrix::zeros(), 1.0, &PointerOptions::default()).unwrap();
+        let found = solve(&v, &s.camera, &ParameterCovariance::zeros(), 1.0, &PointerOptions::default()).unwrap();
         let out: Vec<usize> = (0..9).filter(|&i| !found.spots[i].used).collect();
         assert_eq!(out, [bad], "seed {k}: {:?}", found.spots.iter().map(|s| s.distance2).collect::<Vec<_>>());
     }
@@ -209,7 +212,7 @@ fn spots_in_one_place_are_refused() {
         b.translation.z += 200.0 - b.point(&Vec3::new(40.0, 25.0, 0.0)).z;
     }
     let v = views(rng, &s, &s.camera, 0.03, 0.03);
-    let e = solve(&v, &s.camera, &SMatrix::zeros(), 1.0, &PointerOptions::default()).unwrap_err();
+    let e = solve(&v, &s.camera, &ParameterCovariance::zeros(), 1.0, &PointerOptions::default()).unwrap_err();
     assert!(e.what.contains("are needed"), "{e}");
 }
 
@@ -220,13 +223,13 @@ fn a_surfaces_normal_comes_with_its_true_sigma() {
         let rng = &mut Pcg64::seed_from_u64(9000 + k);
         let s = station(rng, 9);
         let v = views(rng, &s, &s.camera, 0.03, 0.03);
-        let found = solve(&v, &s.camera, &SMatrix::zeros(), 1.0, &PointerOptions::default()).unwrap();
-        let joint = SMatrix::<f64, 15, 15>::from_fn(|i, j| found.covariance[(i, j)]);
+        let found = solve(&v, &s.camera, &ParameterCovariance::zeros(), 1.0, &PointerOptions::default()).unwrap();
+        let joint = RigCovariance::from_fn(|i, j| found.covariance[(i, j)]);
         let hand_eye: Rigid<Flange, Camera> = Rigid::from_vectors(&gauss3(rng, 1.0), gauss3(rng, 60.0));
-        let mut shared = SMatrix::<f64, 21, 21>::zeros();
-        shared.fixed_view_mut::<15, 15>(0, 0).copy_from(&joint);
+        let mut shared = SharedCovariance::zeros();
+        shared.fixed_view_mut::<RIG, RIG>(0, 0).copy_from(&joint);
         let noise = [0.02, 0.02, 0.02, 1e-4, 1e-4, 1e-4];
-        (0..6).for_each(|i| shared[(15 + i, 15 + i)] = noise[i] * noise[i]);
+        (0..6).for_each(|i| shared[(RIG + i, RIG + i)] = noise[i] * noise[i]);
         let d: [f64; 6] = std::array::from_fn(|i| gauss(rng, noise[i]));
         let believed = Rigid::<Flange, Camera>::new(
             exp(&Vec3::new(d[3], d[4], d[5])) * hand_eye.rotation,
@@ -368,7 +371,7 @@ fn judged(seed: u64, wrong: Wrong, count: usize) -> Judged {
         }
     }
     let factor = pooled_factor(v.iter().map(|v| &v.pose)).unwrap_or(f64::NAN);
-    let Ok(fit) = solve(&v, &s.camera, &SMatrix::zeros(), factor, &PointerOptions::default()) else {
+    let Ok(fit) = solve(&v, &s.camera, &ParameterCovariance::zeros(), factor, &PointerOptions::default()) else {
         return (None, 0.0, 0.0, vec![]);
     };
     let lay = Volume::new(fit.reach[0], fit.reach[1], "where the spots lay");
@@ -399,7 +402,7 @@ fn judged(seed: u64, wrong: Wrong, count: usize) -> Judged {
         ]);
         variance += (j * SMatrix::<f64, 6, 6>::from_fn(|i, k| c[(i, k)]) * j.transpose()).trace() / count as f64;
     }
-    let joint = SMatrix::<f64, 15, 15>::from_fn(|i, j| fit.covariance[(i, j)]);
+    let joint = RigCovariance::from_fn(|i, j| fit.covariance[(i, j)]);
     let ranged = (0..3)
         .map(|i| {
             let z = fit.reach[0] + (fit.reach[1] - fit.reach[0]) * f64::from(i) / 2.0;

@@ -285,7 +285,7 @@ const EDITS: &[Edit] = &[
     }),
     ("principal point 5 px off in v", |b, _| b.station.camera.cy += 5.0),
     ("principal point 5 px off in u", |b, _| b.station.camera.cx += 5.0),
-    ("lens forgotten", |b, _| b.station.camera.distortion = [0.0; 5]),
+    ("lens forgotten", |b, _| b.station.camera.distortion = Default::default()),
     ("poses early by three shots", |_, l| delayed(l, 3)),
     ("poses late by one shot", |_, l| delayed(l, -1)),
     ("one picture lost", |_, l| lost(l, 1)),

@@ -13,7 +13,7 @@ use crate::stages::host::Host;
 use crate::stages::lengthen::LengthenParams;
 use crate::stages::measured::Measure;
 use crate::stages::peak::{Method, PeakParams, Stripe, noise};
-use crate::stages::point::Optics;
+use crate::stages::point::{FLAT, Optics};
 use crate::stages::{ThresholdParams, Window};
 use rayon::prelude::*;
 use std::io::{BufRead, Write};
@@ -79,8 +79,13 @@ pub fn serve(device: &Device, mut input: impl BufRead, mut output: impl Write) -
         input.read_exact(&mut pixels).map_err(lost)?;
         images.push(Image::from_u8(setup.width, setup.height, pixels));
     }
-    let optics =
-        Optics { pinhole: setup.pinhole, distortion: setup.distortion, normal: setup.normal, offset: setup.offset_mm };
+    let optics = Optics {
+        pinhole: setup.pinhole,
+        distortion: std::array::from_fn(|i| setup.distortion.get(i).copied().unwrap_or(0.0)),
+        untilt: FLAT,
+        normal: setup.normal,
+        offset: setup.offset_mm,
+    };
     let peak = PeakParams { width_px: setup.width_px, ..PeakParams::default() };
     // The other side refuses nothing either.
     let pixels =

@@ -4,10 +4,10 @@
 
 use super::boards::FindOptions;
 use super::camera_pictures::{Pictures, one_size, pictures};
-use super::intrinsics::{Observation, SolveOptions, Solved, held_names, solve};
+use super::intrinsics::{Observation, SolveOptions, Solved, solve};
 use super::intrinsics_quality::{self as quality, expected_ray_error};
-use super::projection::{INTRINSICS, NAMES};
-use crate::camera::Intrinsics;
+use super::lens::{Lens, held_names};
+use crate::camera::{ALWAYS_NAMED, Intrinsics, NAMES};
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec2;
 use crate::recording::Recording;
@@ -106,9 +106,11 @@ pub fn from_observations(
     };
     let worst = worst_corners(&pictures, &solved);
     let judged = judge(&pictures, &solved, &left_out, contradiction, &hold_out_px, &worst, options);
-    let count = if options.solve.skew { INTRINSICS } else { INTRINSICS - 1 };
+    let stated = |i: &usize| *i < ALWAYS_NAMED || !solved.held.contains(i);
+    let stated: Vec<usize> = (0..NAMES.len()).filter(stated).collect();
     let covariance = solved.covariance.as_ref().map_or_else(Covariance::default, |c| {
-        Covariance::new(&NAMES[..count], &c.view((0, 0), (count, count)).into_owned())
+        let names: Vec<&str> = stated.iter().map(|&i| NAMES[i]).collect();
+        Covariance::new(&names, &c.select_rows(&stated).select_columns(&stated))
     });
     let calibration = Calibration::new(Kind::Camera, solved.intrinsics, None, covariance, judged);
     Ok(CameraResult { calibration, used: pictures, solved, left_out, hold_out_px, worst })
@@ -236,7 +238,7 @@ fn judge(
         );
     }
     let names = held_names(&solved.held);
-    let chosen = options.solve.lens == super::intrinsics::Lens::Evidence;
+    let chosen = options.solve.lens == Lens::Evidence;
     if chosen && !names.is_empty() {
         reasons.push(format!(
             "{} held at 0: the pictures do not tell {} from 0",

@@ -3,8 +3,8 @@
 
 use super::camera::CameraResult;
 use super::intrinsics_quality::{feature_bias, tilt_deg};
-use super::projection::NAMES;
 use super::report::{Page, axis_sphere, bars, coverage_map, residual_arrows, scatter};
+use crate::camera::NAMES;
 use crate::geometry::Vec3;
 
 /// The report of a camera calibration.
@@ -14,7 +14,7 @@ pub fn page(result: &CameraResult, title: &str) -> Page {
     let mut page = Page::new(title);
     page.verdict(&c.quality);
 
-    let value = |name: &str| super::projection::to_vector(k)[NAMES.iter().position(|n| *n == name).unwrap_or(0)];
+    let value = |name: &str| k.parameters()[NAMES.iter().position(|n| *n == name).unwrap_or(0)];
     let parameters: Vec<Vec<String>> = c
         .covariance
         .parameters

@@ -7,8 +7,8 @@ use super::hand_eye_checks as checks;
 use super::hand_eye_closed::{Agreement, Chain, Far, Near, Pair, agree, canonical_order};
 use super::hand_eye_noise::{Fitted, fit};
 use super::hand_eye_terms::{Refined, UNKNOWNS, refine, step_covariance, with_camera};
-use super::measured_pose::{changed, moved, pooled_factor};
-use crate::camera::Intrinsics;
+use super::measured_pose::{moved, pooled_factor};
+use crate::camera::{Intrinsics, PARAMETERS, ParameterCovariance};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Rigid, Vec3};
 use nalgebra::{DMatrix, Matrix6, SMatrix};
@@ -120,13 +120,13 @@ pub struct HandEyeFit {
     /// Covariance of 12 numbers: translation (mm) and left rotation (rad) of near_from_camera in
     /// the near frame, then of far_from_board in the far frame. Camera uncertainty included.
     pub covariance: DMatrix<f64>,
-    /// The 12 numbers by the nine of the given camera's z: how the result follows the camera it was given.
-    pub by_camera: SMatrix<f64, 12, 9>,
+    /// The 12 numbers by the given camera's z: how the result follows the camera it was given.
+    pub by_camera: SMatrix<f64, 12, PARAMETERS>,
     /// The camera that was given, as a belief about itself.
     pub camera: Intrinsics,
     pub given: CameraBelief,
     /// The camera that all pixels and poses together speak for, and the covariance of the 12 numbers and of its
-    /// nine parameters.
+    /// parameters.
     pub joint_camera: Intrinsics,
     pub joint_covariance: DMatrix<f64>,
     /// Squared Mahalanobis distance between the given camera and what these pictures say of it, and its freedom.
@@ -162,7 +162,7 @@ fn distance2(fit: &Fitted, mount: Mount, pair: &Pair, used: bool) -> f64 {
 pub fn solve(
     pairs: &[Pair],
     mount: Mount,
-    camera: &SMatrix<f64, 9, 9>,
+    camera: &ParameterCovariance,
     model: &Intrinsics,
     o: &HandEyeOptions,
 ) -> Result<HandEyeFit> {
@@ -208,17 +208,17 @@ pub fn solve(
     let freedom = (used.len() * 6) as f64 - 12.0;
     let Fitted { refined, noise, camera } = found;
     let c = refined.covariance;
-    // From the camera's z to its nine parameters.
+    // From the camera's z to its parameters.
     let mut to_parameters = SMatrix::<f64, UNKNOWNS, UNKNOWNS>::identity();
-    to_parameters.fixed_view_mut::<9, 9>(12, 12).copy_from(&camera.belief.root);
+    to_parameters.fixed_view_mut::<PARAMETERS, PARAMETERS>(12, 12).copy_from(&camera.belief.root);
     let joint = to_parameters * c * to_parameters.transpose();
     let fit = HandEyeFit {
         chain: refined.chain,
         covariance: DMatrix::from_fn(12, 12, |i, j| c[(i, j)]),
-        by_camera: c.fixed_view::<12, 9>(0, 12) * camera.by_given,
+        by_camera: c.fixed_view::<12, PARAMETERS>(0, 12) * camera.by_given,
         camera: *model,
         given,
-        joint_camera: changed(model, &(camera.belief.mean + camera.belief.root * refined.z)),
+        joint_camera: model.changed(&(camera.belief.mean + camera.belief.root * refined.z)),
         joint_covariance: DMatrix::from_column_slice(UNKNOWNS, UNKNOWNS, joint.as_slice()),
         camera_surprise: (camera.surprise, camera.freedom),
         noise,
@@ -248,7 +248,7 @@ fn residual(
         let mut seen = pair.seen.clone();
         seen.camera_from_board = moved(&seen.camera_from_board, (seen.by_intrinsics * change).as_slice());
         let expected = r.chain.expected(&pair.near_from_far);
-        (seen.displacement_px(&expected, &changed(model, &change)), seen.displacement(&expected))
+        (seen.displacement_px(&expected, &model.changed(&change)), seen.displacement(&expected))
     };
     let (px, mm) = off(&fit.refined, &fit.camera.belief);
     let (holdout_px, holdout_mm) = held_out.map_or((f64::INFINITY, f64::INFINITY), |(r, b)| off(&r, &b));

@@ -4,23 +4,21 @@
 
 use super::hand_eye_closed::Pair;
 use super::intrinsics_quality::expected_ray_error;
-use super::projection::INTRINSICS;
-use crate::camera::Intrinsics;
-use nalgebra::{DMatrix, SMatrix, SVector};
+use crate::camera::{Intrinsics, ParameterCovariance, Parameters};
 
-/// Change of the nine camera parameters from those that the boards were measured with: mean + root z, z ~ N(0, I).
+/// Change of the camera's parameters from those that the boards were measured with: mean + root z, z ~ N(0, I).
 /// The root has no inverse where a parameter counts as known.
 #[derive(Clone, Copy, Debug)]
 pub struct CameraBelief {
-    pub mean: SVector<f64, 9>,
-    pub root: SMatrix<f64, 9, 9>,
+    pub mean: Parameters,
+    pub root: ParameterCovariance,
 }
 
 /// A belief after pictures were seen.
 pub struct Sharpened {
     pub belief: CameraBelief,
     /// New z by the old one: how the belief follows the camera that was given.
-    pub by_given: SMatrix<f64, 9, 9>,
+    pub by_given: ParameterCovariance,
     /// Squared Mahalanobis distance of what the pictures say from what was given, and its degrees of freedom.
     pub surprise: f64,
     pub freedom: f64,
@@ -28,24 +26,30 @@ pub struct Sharpened {
 
 impl CameraBelief {
     /// A camera that is right on average.
-    pub fn given(covariance: &SMatrix<f64, 9, 9>) -> CameraBelief {
+    pub fn given(covariance: &ParameterCovariance) -> CameraBelief {
         // Correlations: the parameters' units differ by orders of magnitude.
-        let sigma = SVector::<f64, 9>::from_fn(|i, _| covariance[(i, i)].max(0.0).sqrt());
+        let sigma = Parameters::from_fn(|i, _| covariance[(i, i)].max(0.0).sqrt());
         let inverse = sigma.map(|s| if s > 0.0 { 1.0 / s } else { 0.0 });
-        let correlation = SMatrix::<f64, 9, 9>::from_fn(|i, j| covariance[(i, j)] * inverse[i] * inverse[j]);
+        let correlation = ParameterCovariance::from_fn(|i, j| covariance[(i, j)] * inverse[i] * inverse[j]);
         let e = correlation.symmetric_eigen();
         let length = e.eigenvalues.map(|l| l.max(0.0).sqrt());
-        let root = SMatrix::from_diagonal(&sigma) * e.eigenvectors * SMatrix::from_diagonal(&length);
-        CameraBelief { mean: SVector::zeros(), root }
+        let root =
+            ParameterCovariance::from_diagonal(&sigma) * e.eigenvectors * ParameterCovariance::from_diagonal(&length);
+        CameraBelief { mean: Parameters::zeros(), root }
     }
 
-    pub fn covariance(&self) -> SMatrix<f64, 9, 9> {
+    /// The directions of z that lead anywhere.
+    pub fn directions(&self) -> Vec<usize> {
+        (0..self.root.ncols()).filter(|&i| self.root.column(i).amax() > 0.0).collect()
+    }
+
+    pub fn covariance(&self) -> ParameterCovariance {
         self.root * self.root.transpose()
     }
 
     /// With what these pictures say, the features' sigmas being `factor` times the stated ones.
     pub fn after(&self, pairs: &[&Pair], factor: f64) -> Option<Sharpened> {
-        let (mut information, mut gradient) = (SMatrix::<f64, 9, 9>::zeros(), SVector::<f64, 9>::zeros());
+        let (mut information, mut gradient) = (ParameterCovariance::zeros(), Parameters::zeros());
         for pair in pairs {
             let said = &pair.seen.about_camera;
             information += said.information / (factor * factor);
@@ -53,7 +57,7 @@ impl CameraBelief {
         }
         gradient += information * self.mean;
         let learnt = self.root.transpose() * information * self.root;
-        let cholesky = (SMatrix::<f64, 9, 9>::identity() + learnt).cholesky()?;
+        let cholesky = (ParameterCovariance::identity() + learnt).cholesky()?;
         let z = -cholesky.solve(&(self.root.transpose() * gradient));
         let by_given = cholesky.l().try_inverse()?;
         // The pictures alone place z with information `learnt`; given and said differ by (1 + 1/learnt) in each
@@ -70,12 +74,10 @@ impl CameraBelief {
     }
 }
 
-/// What a covariance of the nine parameters, or the square of one change of them, means for the viewing rays: px rms over
+/// What a covariance of the parameters, or the square of one change of them, means for the viewing rays: px rms over
 /// the image, after the rotation that a hand-eye transform makes up for.
-pub fn ray_error_px(camera: &Intrinsics, covariance: &SMatrix<f64, 9, 9>) -> f64 {
-    let mut whole = DMatrix::zeros(INTRINSICS, INTRINSICS);
-    whole.view_mut((0, 0), (9, 9)).copy_from(covariance);
-    expected_ray_error(camera, &whole)
+pub fn ray_error_px(camera: &Intrinsics, covariance: &ParameterCovariance) -> f64 {
+    expected_ray_error(camera, covariance)
 }
 
 #[cfg(test)]
@@ -84,7 +86,7 @@ mod tests {
 
     #[test]
     fn a_root_is_a_root_also_where_parameters_are_known() {
-        let mut c = SMatrix::<f64, 9, 9>::zeros();
+        let mut c = ParameterCovariance::zeros();
         for i in 0..8 {
             for j in 0..8 {
                 let scale = |k: usize| if k < 4 { 0.5 } else { 1e-3 };

@@ -2,7 +2,9 @@
 //! Frame and unit: the camera's carrier, mm (docs/math.md, Hand-eye (12)).
 
 use super::hand_eye::HandEyeFit;
+use super::hand_eye_terms::UNKNOWNS;
 use super::projection::project;
+use crate::camera::PARAMETERS;
 use crate::geometry::{Mat3, Vec3, skew};
 use nalgebra::{DMatrix, SMatrix};
 
@@ -29,9 +31,9 @@ pub fn expected_error(fit: &HandEyeFit, distance: f64) -> ExpectedError {
     let rest = by_chain * (fixed(&fit.covariance) - follows) * by_chain.transpose();
     let by_given = by_chain * fit.by_camera + by_ray * fit.given.root;
     let from_camera = (by_given * by_given.transpose()).trace();
-    let mut by_all = DMatrix::<f64>::zeros(3, 21);
+    let mut by_all = DMatrix::<f64>::zeros(3, UNKNOWNS);
     by_all.view_mut((0, 0), (3, 12)).copy_from(&by_chain);
-    by_all.view_mut((0, 12), (3, 9)).copy_from(&by_ray);
+    by_all.view_mut((0, 12), (3, PARAMETERS)).copy_from(&by_ray);
     let joint = (&by_all * &fit.joint_covariance * by_all.transpose()).trace();
     let root = |x: f64| x.max(0.0).sqrt();
     ExpectedError {
@@ -42,11 +44,11 @@ pub fn expected_error(fit: &HandEyeFit, distance: f64) -> ExpectedError {
 }
 
 /// How the point that a pixel and a depth stand for moves with the camera's parameters.
-fn seen_by_camera(fit: &HandEyeFit, point: &Vec3) -> SMatrix<f64, 3, 9> {
-    let mut out = SMatrix::<f64, 3, 9>::zeros();
+fn seen_by_camera(fit: &HandEyeFit, point: &Vec3) -> SMatrix<f64, 3, PARAMETERS> {
+    let mut out = SMatrix::<f64, 3, PARAMETERS>::zeros();
     let Some(at) = project(&fit.camera, point) else { return out };
     let Some(back) = at.by_point.fixed_columns::<2>(0).try_inverse() else { return out };
-    out.fixed_rows_mut::<2>(0).copy_from(&-(back * at.by_intrinsics.fixed_columns::<9>(0)));
+    out.fixed_rows_mut::<2>(0).copy_from(&-(back * at.by_intrinsics));
     out
 }
 

@@ -8,7 +8,8 @@ use super::hand_eye_camera::{CameraBelief, Sharpened};
 use super::hand_eye_closed::{Chain, Pair};
 use super::hand_eye_terms::{Refined, refine, robot_parts, with_camera};
 use super::measured_pose::pooled_factor;
-use nalgebra::{DMatrix, DVector, SVector};
+use crate::camera::{PARAMETERS, Parameters};
+use nalgebra::{DMatrix, DVector};
 
 /// One round of variance components at a fitted chain.
 ///
@@ -31,13 +32,13 @@ fn components(
     };
     let mut parts = [DMatrix::zeros(n, n), DMatrix::zeros(n, n), DMatrix::zeros(n, n)];
     let boards_open = open(pairs);
-    let mut by_camera = DMatrix::zeros(n, 9);
+    let mut by_camera = DMatrix::zeros(n, PARAMETERS);
     for (i, pair) in pairs.iter().enumerate() {
-        let (e, j) = with_camera(chain, &SVector::zeros(), pair, camera);
+        let (e, j) = with_camera(chain, &Parameters::zeros(), pair, camera);
         let at = 6 * i;
         model.residual.rows_mut(at, 6).copy_from(&e);
         model.jacobian.view_mut((at, 0), (6, 12)).copy_from(&j.fixed_columns::<12>(0));
-        by_camera.view_mut((at, 0), (6, 9)).copy_from(&j.fixed_columns::<9>(12));
+        by_camera.view_mut((at, 0), (6, PARAMETERS)).copy_from(&j.fixed_columns::<PARAMETERS>(12));
         let mut known = nalgebra::Matrix6::zeros();
         if boards_open {
             parts[2].view_mut((at, at), (6, 6)).copy_from(&pair.seen.covariance(1.0));

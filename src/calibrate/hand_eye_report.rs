@@ -8,8 +8,8 @@ use super::hand_eye_checks::belongs_to;
 use super::hand_eye_closed::{Pair, axis_spread};
 use super::hand_eye_expected::{ExpectedError, expected_error};
 use super::limits::{Limits, rms};
-use super::measured_pose::change_between;
 use super::report::{Page, axis_sphere, bars};
+use crate::camera::PARAMETERS;
 use crate::geometry::{Vec3, log};
 use crate::rig::{Covariance, Quality, Verdict};
 use std::collections::BTreeMap;
@@ -71,10 +71,10 @@ pub fn judge(fit: &HandEyeFit, pairs: &[Pair], limits: &Limits) -> Quality {
     if pixels {
         j.reasons.push(format!("each board fits its own picture to {boards:.3} px rms, whatever the robot says"));
     }
-    let change = change_between(&fit.camera, &fit.joint_camera);
+    let change = fit.joint_camera.parameters() - fit.camera.parameters();
     let moved = ray_error_px(&fit.camera, &(change * change.transpose()));
     let before = ray_error_px(&fit.camera, &fit.given.covariance());
-    let after = ray_error_px(&fit.camera, &fit.joint_covariance.fixed_view::<9, 9>(12, 12).into());
+    let after = ray_error_px(&fit.camera, &fit.joint_covariance.fixed_view::<PARAMETERS, PARAMETERS>(12, 12).into());
     let (surprise, freedom) = fit.camera_surprise;
     if before > 0.0 {
         j.reasons.push(format!(

@@ -6,9 +6,10 @@ use super::hand_eye::{Mount, Noise};
 use super::hand_eye_camera::CameraBelief;
 use super::hand_eye_closed::{Chain, Pair};
 use super::measured_pose::step_between;
+use crate::camera::{PARAMETERS, Parameters};
 use crate::geometry::{Mat3, Rigid, Vec3, exp, skew};
 use crate::solve::{LmOptions, Problem, Residuals, Stop, lm};
-use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
+use nalgebra::{Matrix6, SMatrix, Vector6};
 
 /// Steps of one pair by the 12 unknowns, at the present chain.
 pub(super) fn jacobian(chain: &Chain, pair: &Pair) -> (SMatrix<f64, 6, 1>, SMatrix<f64, 6, 12>) {
@@ -49,22 +50,24 @@ pub(super) fn step_covariance(chain: &Chain, pair: &Pair, noise: &Noise, mount: 
 }
 
 /// The refinement: the robot's true poses are eliminated in closed form, which leaves whitened
-/// steps of six numbers a pair, and nine numbers of the camera (docs/math.md, Hand-eye (6), (7), (9)).
+/// steps of six numbers a pair, and the numbers of the camera (docs/math.md, Hand-eye (6), (7), (9)).
 struct Refinement<'a> {
     pairs: &'a [&'a Pair],
     /// Inverse Cholesky factors of the steps' covariances.
     whiteners: Vec<Matrix6<f64>>,
     camera: &'a CameraBelief,
+    /// The unknowns that are not held: directions of the camera that lead nowhere are.
+    free: Vec<usize>,
 }
 
-/// Unknowns: twelve of the chain, nine of the camera.
-pub(super) const UNKNOWNS: usize = 21;
+/// Unknowns: twelve of the chain, and the camera's.
+pub(super) const UNKNOWNS: usize = 12 + PARAMETERS;
 
 /// A refined chain with the camera that goes with it.
 pub(super) struct Refined {
     pub chain: Chain,
     /// The camera's z in its belief.
-    pub z: SVector<f64, 9>,
+    pub z: Parameters,
     /// Of the chain's twelve numbers and the camera's z.
     pub covariance: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
     pub cost: f64,
@@ -74,7 +77,7 @@ pub(super) struct Refined {
 /// derivatives by all unknowns.
 pub(super) fn with_camera(
     chain: &Chain,
-    z: &SVector<f64, 9>,
+    z: &Parameters,
     pair: &Pair,
     camera: &CameraBelief,
 ) -> (Vector6<f64>, SMatrix<f64, 6, UNKNOWNS>) {
@@ -82,12 +85,12 @@ pub(super) fn with_camera(
     let follow = pair.seen.by_intrinsics;
     let mut all = SMatrix::<f64, 6, UNKNOWNS>::zeros();
     all.fixed_columns_mut::<12>(0).copy_from(&j);
-    all.fixed_columns_mut::<9>(12).copy_from(&-(follow * camera.root));
+    all.fixed_columns_mut::<PARAMETERS>(12).copy_from(&-(follow * camera.root));
     (e - follow * (camera.mean + camera.root * z), all)
 }
 
 impl Problem for Refinement<'_> {
-    type State = (Chain, SVector<f64, 9>);
+    type State = (Chain, Parameters);
     fn width(&self) -> usize {
         UNKNOWNS
     }
@@ -100,25 +103,18 @@ impl Problem for Refinement<'_> {
             ),
             far_from_board: Rigid::new(exp(&v(9)) * c.far_from_board.rotation, c.far_from_board.translation + v(6)),
         };
-        (chain, z + SVector::from_column_slice(&s[12..]))
+        (chain, z + Parameters::from_column_slice(&s[12..]))
     }
     fn residuals(&self, (chain, z): &Self::State, out: &mut Residuals) -> Option<()> {
-        const ALL: [usize; UNKNOWNS] = {
-            let mut all = [0; UNKNOWNS];
-            let mut i = 0;
-            while i < UNKNOWNS {
-                all[i] = i;
-                i += 1;
-            }
-            all
-        };
         for (pair, w) in self.pairs.iter().zip(&self.whiteners) {
             let (e, j) = with_camera(chain, z, pair, self.camera);
             let r = w * e;
-            out.group(r.as_slice(), &ALL, (w * j).transpose().as_slice());
+            let j = (w * j).transpose();
+            let rows: Vec<f64> = j.column_iter().flat_map(|row| self.free.iter().map(move |&i| row[i])).collect();
+            out.group(r.as_slice(), &self.free, &rows);
         }
-        for i in 0..9 {
-            out.prior(&[z[i]], &[12 + i], &[1.0]);
+        for &i in &self.free[12..] {
+            out.prior(&[z[i - 12]], &[i], &[1.0]);
         }
         Some(())
     }
@@ -135,7 +131,10 @@ pub(super) fn refine(
         .iter()
         .map(|p| step_covariance(start, p, noise, mount).cholesky()?.l().try_inverse())
         .collect::<Option<Vec<_>>>()?;
-    let found = lm(&Refinement { pairs, whiteners, camera }, (*start, SVector::zeros()), &LmOptions::default());
+    let free: Vec<usize> = (0..12).chain(camera.directions().into_iter().map(|i| 12 + i)).collect();
+    let hold = (0..UNKNOWNS).filter(|i| !free.contains(i)).collect();
+    let options = LmOptions { hold, ..LmOptions::default() };
+    let found = lm(&Refinement { pairs, whiteners, camera, free }, (*start, Parameters::zeros()), &options);
     if found.stop == Stop::BadStart {
         return None;
     }

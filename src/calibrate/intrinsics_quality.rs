@@ -5,8 +5,8 @@
 use super::boards::BoardView;
 use super::intrinsics::{Observation, SolveOptions, Solved, solve};
 use super::pose::point_by_step;
-use super::projection::{INTRINSICS, project};
-use crate::camera::Intrinsics;
+use super::projection::project;
+use crate::camera::{Intrinsics, PARAMETERS, ParameterCovariance};
 use crate::geometry::{Board, Camera, Rigid, Vec2, Vec3, exp, skew};
 use nalgebra::{DMatrix, Matrix2, Matrix6, SMatrix};
 
@@ -30,15 +30,15 @@ fn ray_jacobian(k: &Intrinsics) -> DMatrix<f64> {
         }
     }
     let rows = 2 * a.len();
-    let a = DMatrix::from_fn(rows, INTRINSICS, |r, c| a[r / 2][(r % 2, c)]);
+    let a = DMatrix::from_fn(rows, PARAMETERS, |r, c| a[r / 2][(r % 2, c)]);
     let b = DMatrix::from_fn(rows, 3, |r, c| b[r / 2][(r % 2, c)]);
     let turn = (b.transpose() * &b).try_inverse().map(|inv| inv * b.transpose() * &a);
     turn.map_or(a.clone(), |t| a - b * t)
 }
 
 /// Expected rms displacement of the viewing rays over the image, px, after the best rotation, from
-/// the covariance of the ten intrinsic parameters.
-pub fn expected_ray_error(k: &Intrinsics, covariance: &DMatrix<f64>) -> f64 {
+/// the covariance of the camera's parameters.
+pub fn expected_ray_error(k: &Intrinsics, covariance: &ParameterCovariance) -> f64 {
     let j = ray_jacobian(k);
     let sum: f64 = (&j * covariance).component_mul(&j).sum();
     (sum / (j.nrows() as f64 / 2.0)).max(0.0).sqrt()
@@ -106,7 +106,7 @@ pub struct NextPicture {
 pub fn next_picture(solved: &Solved, features: &[Vec3], typical_distance: f64, sigma_px: f64) -> Option<NextPicture> {
     let covariance = solved.covariance.as_ref()?;
     let k = &solved.intrinsics;
-    let free: Vec<usize> = (0..INTRINSICS).filter(|i| !solved.held.contains(i)).collect();
+    let free: Vec<usize> = (0..PARAMETERS).filter(|i| !solved.held.contains(i)).collect();
     let reduced = DMatrix::from_fn(free.len(), free.len(), |a, b| covariance[(free[a], free[b])]);
     let information = reduced.try_inverse()?;
     let centre = features.iter().sum::<Vec3>() / features.len() as f64;
@@ -125,7 +125,7 @@ pub fn next_picture(solved: &Solved, features: &[Vec3], typical_distance: f64, s
                 let Some(gain) = picture_information(k, features, &pose, sigma_px) else { continue };
                 let with = &information + DMatrix::from_fn(free.len(), free.len(), |a, b| gain[(free[a], free[b])]);
                 let Some(c) = with.try_inverse() else { continue };
-                let mut whole = DMatrix::zeros(INTRINSICS, INTRINSICS);
+                let mut whole = ParameterCovariance::zeros();
                 for (a, &i) in free.iter().enumerate() {
                     for (b, &j) in free.iter().enumerate() {
                         whole[(i, j)] = c[(a, b)];
@@ -168,9 +168,9 @@ fn picture_information(
     features: &[Vec3],
     pose: &Rigid<Camera, Board>,
     sigma_px: f64,
-) -> Option<SMatrix<f64, INTRINSICS, INTRINSICS>> {
-    let mut kk = SMatrix::<f64, INTRINSICS, INTRINSICS>::zeros();
-    let mut kp = SMatrix::<f64, INTRINSICS, 6>::zeros();
+) -> Option<ParameterCovariance> {
+    let mut kk = ParameterCovariance::zeros();
+    let mut kp = SMatrix::<f64, PARAMETERS, 6>::zeros();
     let mut pp = Matrix6::<f64>::zeros();
     let mut inside = 0;
     for x in features {

@@ -9,12 +9,12 @@ use super::laser_plane_checks::{Consistency, board_spread, consistency, depth_sp
 use super::laser_plane_terms::{Data, Seen, State, basis, by_camera, look, mm_per_px, on_board, ratio};
 use super::measured_pose::MeasuredPose;
 use super::scatter::inflation;
-use crate::camera::Intrinsics;
+use crate::camera::{Intrinsics, ParameterCovariance, named};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Board, Camera, Plane, Rigid, Vec2};
 use crate::recording::BoardSpec;
 use crate::solve::Loss;
-use nalgebra::{DMatrix, Matrix6, SMatrix};
+use nalgebra::{DMatrix, Matrix6};
 
 /// One place where the stripe was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -167,7 +167,7 @@ pub(super) fn refused(what: String) -> Fault {
 pub fn solve(
     views: &[StripeView],
     camera: &Intrinsics,
-    camera_covariance: &SMatrix<f64, 9, 9>,
+    camera_covariance: &ParameterCovariance,
     feature_factor: f64,
     o: &LaserPlaneOptions,
 ) -> Result<LaserPlaneFit> {
@@ -241,7 +241,7 @@ pub fn solve(
         uses[p.view][p.index] = PeakUse::Used;
     }
     let basis = basis(&state.plane);
-    let by_camera = by_camera(&data, &state, views, camera, factor)
+    let by_camera = by_camera(&data, &state, views, camera, &named(camera_covariance), factor)
         .ok_or_else(|| refused("the laser plane is not determined by these stripes".into()))?;
     let mut checks = consistency(&data, &state, factor);
     if checks.freedom > 0.0 {

@@ -4,7 +4,7 @@
 
 use super::laser_plane_terms::{ByCamera, Data, Says, State, on_board, says, stepped, tangents};
 use super::scatter;
-use crate::camera::Intrinsics;
+use crate::camera::{Intrinsics, PARAMETERS, ParameterCovariance};
 use crate::geometry::{Camera, Plane, Vec3};
 use crate::rig::Volume;
 use nalgebra::{DMatrix, Matrix3, SMatrix};
@@ -33,9 +33,9 @@ pub(super) fn from_camera(
     state: &State,
     factor: f64,
     by: &ByCamera,
-    camera_covariance: &SMatrix<f64, 9, 9>,
+    camera_covariance: &ParameterCovariance,
 ) -> f64 {
-    let one = |(v, gradient): (usize, &Option<SMatrix<f64, 2, 9>>)| {
+    let one = |(v, gradient): (usize, &Option<SMatrix<f64, 2, PARAMETERS>>)| {
         let s = says(data, state, v, factor)?;
         let off = s.information.try_inverse()? * (*gradient)? + s.by_plane * by.plane;
         Some((camera_covariance * off.transpose() * s.information * off).trace())

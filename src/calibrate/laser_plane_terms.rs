@@ -3,8 +3,8 @@
 //! Frame and unit: camera frame, mm; peaks in px (docs/math.md, Laser plane (1) to (5)).
 
 use super::laser_plane::{StripePeak, StripeView};
-use super::measured_pose::{changed, moved, step_between};
-use crate::camera::Intrinsics;
+use super::measured_pose::{moved, step_between};
+use crate::camera::{Intrinsics, PARAMETERS, Parameters, difference_step};
 use crate::geometry::{Board, Camera, Plane, Rigid, Vec2, Vec3};
 use crate::solve::{LmOptions, Loss, Problem, Residuals, Solution, lm};
 use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix6, SMatrix};
@@ -221,33 +221,35 @@ pub(super) fn stepped(plane: &Plane<Camera>, step: &Vec3) -> Option<Plane<Camera
     Plane::new((plane.normal + a * step.x + b * step.y).normalize(), plane.offset + step.z)
 }
 
-/// How a fit follows the camera's nine parameters.
+/// How a fit follows the camera's parameters ([`crate::camera::NAMES`]); none of those that are certain.
 pub(super) struct ByCamera {
     /// Of the plane's two tilts and its offset.
-    pub(super) plane: SMatrix<f64, 3, 9>,
+    pub(super) plane: SMatrix<f64, 3, PARAMETERS>,
     /// Of each picture's gradient ([`Says::gradient`]) at the fitted plane; none for a picture without light.
-    pub(super) gradients: Vec<Option<SMatrix<f64, 2, 9>>>,
+    pub(super) gradients: Vec<Option<SMatrix<f64, 2, PARAMETERS>>>,
 }
 
-/// Through the peaks' rays and the boards' poses, by the implicit function theorem.
+/// Through the peaks' rays and the boards' poses, by the implicit function theorem; for the parameters that are uncertain.
 pub(super) fn by_camera(
     data: &Data,
     state: &State,
     views: &[StripeView],
     camera: &Intrinsics,
+    uncertain: &[usize],
     factor: f64,
 ) -> Option<ByCamera> {
     let said: Vec<Option<Says>> = (0..views.len()).map(|v| says(data, state, v, factor)).collect();
     let information: Matrix3<f64> = said.iter().flatten().map(|s| s.of_plane().0).sum();
     let inverse = information.try_inverse()?;
-    let mut gradients: Vec<_> = said.iter().map(|s| s.as_ref().map(|_| SMatrix::<f64, 2, 9>::zeros())).collect();
-    let mut plane = SMatrix::<f64, 3, 9>::zeros();
-    for k in 0..9 {
-        let h = if k < 4 { 0.05 } else { 1e-4 };
+    let mut gradients: Vec<_> =
+        said.iter().map(|s| s.as_ref().map(|_| SMatrix::<f64, 2, PARAMETERS>::zeros())).collect();
+    let mut plane = SMatrix::<f64, 3, PARAMETERS>::zeros();
+    for &k in uncertain {
+        let h = difference_step(k);
         for sign in [1.0, -1.0] {
-            let mut d = nalgebra::SVector::<f64, 9>::zeros();
+            let mut d = Parameters::zeros();
             d[k] = sign * h;
-            let other = changed(camera, &d);
+            let other = camera.changed(&d);
             let peaks = data.peaks.iter().map(|p| look(&other, p.view, p.index, &views[p.view].peaks[p.index]));
             let follow = |(v, p): (&StripeView, _)| moved(p, (v.pose.by_intrinsics * d).as_slice());
             let changed = Data {

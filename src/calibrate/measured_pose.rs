@@ -5,34 +5,30 @@
 use super::boards::BoardView;
 use super::pose::board_pose;
 use super::projection::project;
-use crate::camera::Intrinsics;
+use crate::camera::{Intrinsics, NAMES, PARAMETERS, ParameterCovariance, Parameters};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Board, Camera, Mat3, Rigid, Vec2, Vec3, exp, log, skew};
 use crate::recording::BoardSpec;
 use crate::solve::{LmOptions, Loss, Problem, Residuals, Stop, lm};
-use nalgebra::{Matrix6, SMatrix, SVector, Vector6};
+use nalgebra::{Matrix6, SMatrix, Vector6};
 
-/// Names of the camera's parameters in the order used for sensitivities and covariances: those of
-/// [`super::projection::NAMES`] without the skew, which no station of ours has.
-pub const INTRINSIC_NAMES: [&str; 9] = ["fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"];
-
-/// Change of six pose numbers by the nine camera parameters.
-pub type ByIntrinsics = SMatrix<f64, 6, 9>;
+/// Change of six pose numbers by the camera's parameters, in the order of [`crate::camera::NAMES`].
+pub type ByIntrinsics = SMatrix<f64, 6, PARAMETERS>;
 
 /// What a picture's pixels say about the camera, its own pose left to them: a change d of the camera's parameters
 /// changes the sum of squared residuals, in units of the features' stated sigmas, by 2 gᵀd + dᵀAd.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AboutCamera {
     /// A.
-    pub information: SMatrix<f64, 9, 9>,
+    pub information: ParameterCovariance,
     /// g.
-    pub gradient: SVector<f64, 9>,
+    pub gradient: Parameters,
 }
 
 impl AboutCamera {
     /// Says nothing.
     pub fn silent() -> AboutCamera {
-        AboutCamera { information: SMatrix::zeros(), gradient: SVector::zeros() }
+        AboutCamera { information: ParameterCovariance::zeros(), gradient: Parameters::zeros() }
     }
 }
 
@@ -232,7 +228,7 @@ pub fn measure(seen: &SeenBoard, camera: &Intrinsics, start: &Rigid<Camera, Boar
         let p = pose.point(&seen.points[i]);
         let at = project(camera, &p).expect("in front of the camera at the solution");
         let j = at.by_point * point_by_step(&p);
-        let by_camera = at.by_intrinsics.fixed_columns::<9>(0);
+        let by_camera = at.by_intrinsics;
         let w = weight / (seen.sigmas_px[i] * seen.sigmas_px[i]);
         let r = at.pixel - seen.pixels[i];
         information += j.transpose() * j * w;
@@ -294,34 +290,7 @@ pub fn pooled_factor<'a>(poses: impl Iterator<Item = &'a MeasuredPose>) -> Optio
     (freedom > 0.0).then(|| f64::sqrt(sum / freedom))
 }
 
-/// The camera's covariance as 9x9 in the order of [`INTRINSIC_NAMES`]; parameters the file does not
-/// name count as known.
-pub fn intrinsic_covariance(covariance: &crate::rig::Covariance) -> SMatrix<f64, 9, 9> {
-    let at = INTRINSIC_NAMES.map(|n| covariance.parameters.iter().position(|p| p == n));
-    SMatrix::from_fn(|i, j| match (at[i], at[j]) {
-        (Some(a), Some(b)) => covariance.matrix[a][b],
-        _ => 0.0,
-    })
-}
-
-/// Adds a change of the camera's parameters.
-pub fn changed(camera: &Intrinsics, d: &SVector<f64, 9>) -> Intrinsics {
-    let k = camera.distortion;
-    Intrinsics {
-        fx: camera.fx + d[0],
-        fy: camera.fy + d[1],
-        cx: camera.cx + d[2],
-        cy: camera.cy + d[3],
-        distortion: std::array::from_fn(|i| k[i] + d[4 + i]),
-        ..*camera
-    }
-}
-
-/// What leads from one camera's parameters to another's: the inverse of [`changed`].
-pub fn change_between(from: &Intrinsics, to: &Intrinsics) -> SVector<f64, 9> {
-    let vector = |c: &Intrinsics| {
-        let k = c.distortion;
-        SVector::<f64, 9>::from([c.fx, c.fy, c.cx, c.cy, k[0], k[1], k[2], k[3], k[4]])
-    };
-    vector(to) - vector(from)
+/// The camera's covariance in the order of [`NAMES`]; parameters that the file does not name count as known.
+pub fn intrinsic_covariance(covariance: &crate::rig::Covariance) -> ParameterCovariance {
+    covariance.of(NAMES)
 }

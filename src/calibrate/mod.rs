@@ -24,6 +24,7 @@ mod laser_plane_agree;
 mod laser_plane_checks;
 pub mod laser_plane_report;
 mod laser_plane_terms;
+pub mod lens;
 pub mod limits;
 pub mod measured_pose;
 pub mod pointer;

@@ -2,13 +2,13 @@
 //! by maximum likelihood, the boards' poses free within their own uncertainty.
 //! Frame and unit: camera frame, mm; spots in px (docs/math.md, Pointer (3) to (5)).
 
-use super::measured_pose::{MeasuredPose, changed, moved, step_between};
+use super::measured_pose::{MeasuredPose, moved, step_between};
 use super::scatter::{beside, inflation};
-use crate::camera::Intrinsics;
+use crate::camera::{Intrinsics, PARAMETERS, ParameterCovariance, Parameters, difference_step, named};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Board, Camera, Plane, Ray, Rigid, Vec2, Vec3};
 use crate::solve::{LmOptions, Problem, Residuals, Stop, lm};
-use nalgebra::{DMatrix, Matrix2, Matrix6, SMatrix, SVector};
+use nalgebra::{DMatrix, Matrix2, Matrix6, SMatrix};
 
 /// One board with the pointer's spot on it.
 #[derive(Clone, Debug)]
@@ -77,7 +77,7 @@ pub struct SpotResidual {
 #[derive(Clone, Debug)]
 pub struct PointerFit {
     pub beam: Ray<Camera>,
-    /// ox oy oz (mm) dx dy dz, then fx fy cx cy k1 k2 p1 p2 k3: 15x15. The beam was found with this
+    /// ox oy oz (mm) dx dy dz, then the camera's ([`crate::camera::NAMES`]). The beam was found with this
     /// camera, so their errors belong together.
     pub covariance: DMatrix<f64>,
     /// The beam's 6x6 with the camera taken as exact.
@@ -191,7 +191,7 @@ type Solved = (State, DMatrix<f64>, f64);
 fn fit(
     views: &[&SpotView],
     camera: &Intrinsics,
-    shift: &SVector<f64, 9>,
+    shift: &Parameters,
     start: &Ray<Camera>,
     factor: f64,
 ) -> Option<Solved> {
@@ -217,7 +217,7 @@ fn fit(
 pub fn solve(
     views: &[SpotView],
     camera: &Intrinsics,
-    camera_covariance: &SMatrix<f64, 9, 9>,
+    camera_covariance: &ParameterCovariance,
     feature_factor: f64,
     o: &PointerOptions,
 ) -> Result<PointerFit> {
@@ -238,7 +238,7 @@ pub fn solve(
     let pixel_mm: Vec<f64> = points.iter().map(|p| o.gate_px * p.z / camera.fx.min(camera.fy)).collect();
     let start = robust_line(&points, &pixel_mm).ok_or_else(|| refused("the spots are all in one place".into()))?;
     // Total least squares in space weighs far spots wrongly; the fit in pixels starts from it.
-    let none = SVector::<f64, 9>::zeros();
+    let none = Parameters::zeros();
     let mut used: Vec<usize> = near_line(&points, &pixel_mm, &start);
     let fit_to = |used: &[usize]| -> Result<(Solved, Vec<f64>, Vec<f64>)> {
         let chosen: Vec<&SpotView> = used.iter().map(|&i| &views[i]).collect();
@@ -289,14 +289,14 @@ pub fn solve(
         let j = basis(&state.beam);
         &j * local.view((0, 0), (4, 4)) * j.transpose() * inflation(sigma_ratio * sigma_ratio, freedom)
     };
-    let by_camera = by_camera(&chosen, camera, state, feature_factor)
+    let by_camera = by_camera(&chosen, camera, state, &named(camera_covariance), feature_factor)
         .ok_or_else(|| refused("the beam is not determined by these spots".into()))?;
-    let c = DMatrix::from_column_slice(9, 9, camera_covariance.as_slice());
-    let mut covariance = DMatrix::zeros(15, 15);
+    let c = DMatrix::from_column_slice(PARAMETERS, PARAMETERS, camera_covariance.as_slice());
+    let mut covariance = DMatrix::zeros(6 + PARAMETERS, 6 + PARAMETERS);
     covariance.view_mut((0, 0), (6, 6)).copy_from(&(&exact + &by_camera * &c * by_camera.transpose()));
-    covariance.view_mut((0, 6), (6, 9)).copy_from(&(&by_camera * &c));
-    covariance.view_mut((6, 0), (9, 6)).copy_from(&(&c * by_camera.transpose()));
-    covariance.view_mut((6, 6), (9, 9)).copy_from(&c);
+    covariance.view_mut((0, 6), (6, PARAMETERS)).copy_from(&(&by_camera * &c));
+    covariance.view_mut((6, 0), (PARAMETERS, 6)).copy_from(&(&c * by_camera.transpose()));
+    covariance.view_mut((6, 6), (PARAMETERS, PARAMETERS)).copy_from(&c);
     let spots = (0..views.len())
         .map(|i| {
             let gap = |beam: &Ray<Camera>| {
@@ -392,15 +392,21 @@ fn basis(beam: &Ray<Camera>) -> DMatrix<f64> {
 }
 
 /// d(ox oy oz dx dy dz)/d(camera), by solving again with the camera a little different: the boards'
-/// poses follow the camera, too.
-fn by_camera(views: &[&SpotView], camera: &Intrinsics, state: &State, factor: f64) -> Option<DMatrix<f64>> {
-    let mut out = DMatrix::zeros(6, 9);
-    for k in 0..9 {
-        let h = if k < 4 { 0.05 } else { 1e-4 };
+/// poses follow the camera, too. For the parameters that are uncertain.
+fn by_camera(
+    views: &[&SpotView],
+    camera: &Intrinsics,
+    state: &State,
+    uncertain: &[usize],
+    factor: f64,
+) -> Option<DMatrix<f64>> {
+    let mut out = DMatrix::zeros(6, PARAMETERS);
+    for &k in uncertain {
+        let h = difference_step(k);
         let at = |sign: f64| {
-            let mut d = SVector::<f64, 9>::zeros();
+            let mut d = Parameters::zeros();
             d[k] = sign * h;
-            let beam = fit(views, &changed(camera, &d), &d, &state.beam, factor)?.0.beam;
+            let beam = fit(views, &camera.changed(&d), &d, &state.beam, factor)?.0.beam;
             // All beams are compared where they cross one plane, square to the first.
             let s = (state.beam.origin - beam.origin).dot(&state.beam.direction)
                 / beam.direction.dot(&state.beam.direction);

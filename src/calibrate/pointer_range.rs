@@ -2,14 +2,20 @@
 //! their sigmas; from three or more points the surface's normal and a tool pose square to it.
 //! Frame and unit: camera and base frame, mm, rad (docs/math.md, Pointer (6) to (9); the paper's eq. 3, 4).
 
-use super::measured_pose::changed;
-use crate::camera::Intrinsics;
+use super::pointer_report::BEAM_NAMES;
+use crate::camera::{Intrinsics, NAMES, PARAMETERS, difference_step};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Camera, Flange, Mat3, Ray, Rigid, Tool, Vec2, Vec3, fit_plane, skew};
-use nalgebra::{DMatrix, Matrix2, SMatrix, SVector};
+use nalgebra::{Matrix2, SMatrix, SVector};
 
-/// Derivatives of a point by what it was computed from: beam (6), camera (9).
-pub type ByRig = SMatrix<f64, 3, 15>;
+/// What a point is computed from: the beam's six numbers and the camera's.
+pub const RIG: usize = 6 + PARAMETERS;
+/// The same and the six of the hand-eye transform.
+pub const SHARED: usize = RIG + 6;
+/// Derivatives of a point by what it was computed from.
+pub type ByRig = SMatrix<f64, 3, RIG>;
+pub type RigCovariance = SMatrix<f64, RIG, RIG>;
+pub type SharedCovariance = SMatrix<f64, SHARED, SHARED>;
 
 /// A point that the pointer touched.
 #[derive(Clone, Debug)]
@@ -34,13 +40,13 @@ pub struct Ranged {
 }
 
 /// The beam's point whose pixel is nearest to the spot's, in units of the spot's sigma: the viewing
-/// ray and the beam meet only up to noise. `joint` is the pointer's 15x15 covariance.
+/// ray and the beam meet only up to noise. `joint` is that of [`joint_covariance`].
 pub fn range(
     pixel: &Vec2,
     covariance: &Matrix2<f64>,
     camera: &Intrinsics,
     beam: &Ray<Camera>,
-    joint: &SMatrix<f64, 15, 15>,
+    joint: &RigCovariance,
 ) -> Result<Ranged> {
     let lost = || {
         Fault::refused(format!("the spot at {:.1} {:.1} px has no point on the beam", pixel.x, pixel.y))
@@ -52,13 +58,13 @@ pub fn range(
     })?;
     let s = nearest(pixel, &whitener, camera, beam).ok_or_else(lost)?;
     // Derivatives of the solution by everything it depends on, by differences of the solution itself.
-    let at = |p: &Vec2, d: &SVector<f64, 15>| -> Option<(f64, Vec3)> {
-        let camera = changed(camera, &d.fixed_rows::<9>(6).into_owned());
+    let at = |p: &Vec2, d: &SVector<f64, RIG>| -> Option<(f64, Vec3)> {
+        let camera = camera.changed(&d.fixed_rows::<PARAMETERS>(6).into_owned());
         let beam = Ray::new(beam.origin + Vec3::new(d[0], d[1], d[2]), beam.direction + Vec3::new(d[3], d[4], d[5]))?;
         let s = nearest(p, &whitener, &camera, &beam)?;
         Some((s, beam.at(s)))
     };
-    let zero = SVector::<f64, 15>::zeros();
+    let zero = SVector::<f64, RIG>::zeros();
     let mut by_spot = SMatrix::<f64, 4, 2>::zeros();
     for c in 0..2 {
         let mut e = Vec2::zeros();
@@ -66,13 +72,12 @@ pub fn range(
         let (a, b) = (at(&(pixel + e), &zero).ok_or_else(lost)?, at(&(pixel - e), &zero).ok_or_else(lost)?);
         by_spot.set_column(c, &(stack(&a) - stack(&b)).scale(1.0 / 2e-3));
     }
-    let mut by_rig = SMatrix::<f64, 4, 15>::zeros();
-    for c in 0..15 {
+    let mut by_rig = SMatrix::<f64, 4, RIG>::zeros();
+    for c in (0..RIG).filter(|&c| joint[(c, c)] != 0.0) {
         let h = match c {
             0..=2 => 1e-3,
             3..=5 => 1e-6,
-            6..=9 => 1e-2,
-            _ => 1e-5,
+            _ => 0.2 * difference_step(c - 6),
         };
         let mut d = zero;
         d[c] = h;
@@ -91,7 +96,7 @@ pub fn range(
         point,
         covariance: all.fixed_view::<3, 3>(1, 1).into(),
         covariance_spot: own.fixed_view::<3, 3>(1, 1).into(),
-        by_rig: by_rig.fixed_view::<3, 15>(1, 0).into(),
+        by_rig: by_rig.fixed_view::<3, RIG>(1, 0).into(),
         off_beam_px: off.norm(),
         off_beam_sigmas: (whitener * off).norm(),
     })
@@ -133,8 +138,8 @@ pub struct BasePoint {
     pub covariance: Mat3,
     /// The part of this shot alone: spot and robot.
     pub own: Mat3,
-    /// How it follows beam, camera (15) and hand-eye (6), which all points share.
-    pub shared: SMatrix<f64, 3, 21>,
+    /// How it follows beam, camera and hand-eye, which all points share.
+    pub shared: SMatrix<f64, 3, SHARED>,
     /// Where the camera was: the side of the surface that is outside.
     pub camera: Vec3,
 }
@@ -147,22 +152,22 @@ pub struct RobotNoise {
 }
 
 /// The paper's eq. 4: the point in the base frame, with the hand-eye's and the robot's uncertainty.
-/// `shared` is the covariance of beam and camera (15) and hand-eye (6).
+/// `shared` is the covariance of beam, camera and hand-eye.
 pub fn to_base(
     ranged: &Ranged,
     base_from_flange: &Rigid<Base, Flange>,
     flange_from_camera: &Rigid<Flange, Camera>,
-    shared: &SMatrix<f64, 21, 21>,
+    shared: &SharedCovariance,
     robot: &RobotNoise,
 ) -> BasePoint {
     let turned = flange_from_camera.rotation * ranged.point;
     let in_flange = turned + flange_from_camera.translation;
     let base_from_camera = *base_from_flange * *flange_from_camera;
     let r = base_from_camera.rotation;
-    let mut j = SMatrix::<f64, 3, 21>::zeros();
-    j.fixed_view_mut::<3, 15>(0, 0).copy_from(&(r * ranged.by_rig));
-    j.fixed_view_mut::<3, 3>(0, 15).copy_from(&base_from_flange.rotation);
-    j.fixed_view_mut::<3, 3>(0, 18).copy_from(&(-base_from_flange.rotation * skew(&turned)));
+    let mut j = SMatrix::<f64, 3, SHARED>::zeros();
+    j.fixed_view_mut::<3, RIG>(0, 0).copy_from(&(r * ranged.by_rig));
+    j.fixed_view_mut::<3, 3>(0, RIG).copy_from(&base_from_flange.rotation);
+    j.fixed_view_mut::<3, 3>(0, RIG + 3).copy_from(&(-base_from_flange.rotation * skew(&turned)));
     let arm = skew(&(base_from_flange.rotation * in_flange));
     let own = r * ranged.covariance_spot * r.transpose()
         + Mat3::identity() * robot.mm.powi(2)
@@ -200,7 +205,7 @@ pub struct Surface {
 
 /// The plane through three or more points, weighted by their own noise, with the uncertainty that
 /// they share propagated on top. `x` is the direction wanted for the tool's x axis (base frame).
-pub fn surface(points: &[BasePoint], shared: &SMatrix<f64, 21, 21>, x: &Vec3) -> Result<Surface> {
+pub fn surface(points: &[BasePoint], shared: &SharedCovariance, x: &Vec3) -> Result<Surface> {
     let whole = plane_of(points, shared, x)?;
     let freedom = points.len() as f64 - 3.0;
     if points.len() < 5 || whole.misfit * freedom < GROSS {
@@ -227,7 +232,7 @@ fn even(freedom: f64) -> f64 {
     1.0 + 3.0 * (2.0 / freedom).sqrt()
 }
 
-fn plane_of(points: &[BasePoint], shared: &SMatrix<f64, 21, 21>, x: &Vec3) -> Result<Surface> {
+fn plane_of(points: &[BasePoint], shared: &SharedCovariance, x: &Vec3) -> Result<Surface> {
     let weak = |what: String| {
         Fault::refused(what)
             .cause("a surface's tilt needs three spots that do not lie on a line")
@@ -267,7 +272,7 @@ fn plane_of(points: &[BasePoint], shared: &SMatrix<f64, 21, 21>, x: &Vec3) -> Re
             residuals[i] = (at[i] - centre).dot(&normal) - rows[i].dot(&s);
         }
         // Of the three numbers with respect to the shared parameters.
-        let mut j = SMatrix::<f64, 3, 21>::zeros();
+        let mut j = SMatrix::<f64, 3, SHARED>::zeros();
         for i in 0..n {
             j += rows[i] * weights[i] * (normal.transpose() * points[i].shared);
         }
@@ -300,7 +305,6 @@ fn plane_of(points: &[BasePoint], shared: &SMatrix<f64, 21, 21>, x: &Vec3) -> Re
 
 /// The joint covariance of beam and camera from a pointer's calibration file. A file that knows only
 /// the beam (imported values) counts the camera's part as nothing.
-pub fn joint_covariance(covariance: &crate::rig::Covariance) -> SMatrix<f64, 15, 15> {
-    let m: DMatrix<f64> = covariance.to_matrix();
-    SMatrix::from_fn(|i, j| if i < m.nrows() && j < m.ncols() { m[(i, j)] } else { 0.0 })
+pub fn joint_covariance(covariance: &crate::rig::Covariance) -> RigCovariance {
+    covariance.of::<RIG>(std::array::from_fn(|i| if i < 6 { BEAM_NAMES[i] } else { NAMES[i - 6] }))
 }

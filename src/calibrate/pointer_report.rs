@@ -3,29 +3,30 @@
 //! Frame and unit: camera frame; mm, degrees, px.
 
 use super::limits::{Limits, rms};
-use super::measured_pose::INTRINSIC_NAMES;
 use super::pointer::{PointerFit, PointerOptions};
-use super::pointer_range::range;
+use super::pointer_range::{RigCovariance, range};
 use super::report::{Page, bars};
 use super::scatter::overrule;
-use crate::camera::Intrinsics;
+use crate::camera::{Intrinsics, NAMES, PARAMETERS, ParameterCovariance, named};
 use crate::rig::{Covariance, Quality, Verdict};
-use nalgebra::{Matrix2, SMatrix};
+use nalgebra::Matrix2;
 use std::collections::BTreeMap;
 
-/// Names of the beam's own six parameters; the camera's nine follow in the file.
+/// Names of the beam's own six parameters; the camera's follow in the file.
 pub const BEAM_NAMES: [&str; 6] = ["ox_mm", "oy_mm", "oz_mm", "dx", "dy", "dz"];
 
 pub fn covariance(fit: &PointerFit) -> Covariance {
-    let names: Vec<&str> = BEAM_NAMES.into_iter().chain(INTRINSIC_NAMES).collect();
-    Covariance::new(&names, &fit.covariance)
+    let camera: ParameterCovariance = fit.covariance.fixed_view::<PARAMETERS, PARAMETERS>(6, 6).into();
+    let kept: Vec<usize> = (0..6).chain(named(&camera).into_iter().map(|i| 6 + i)).collect();
+    let names: Vec<&str> = kept.iter().map(|&i| if i < 6 { BEAM_NAMES[i] } else { NAMES[i - 6] }).collect();
+    Covariance::new(&names, &fit.covariance.select_rows(&kept).select_columns(&kept))
 }
 
 /// Expected error of a distance along the optical axis for a spot with this sigma, mm.
 pub fn expected_error(fit: &PointerFit, camera: &Intrinsics, depth: f64, spot_px: f64) -> Option<f64> {
     let s = (depth - fit.beam.origin.z) / fit.beam.direction.z;
     let pixel = camera.pixel_from_point(&fit.beam.at(s))?;
-    let joint = SMatrix::<f64, 15, 15>::from_fn(|i, j| fit.covariance[(i, j)]);
+    let joint = RigCovariance::from_fn(|i, j| fit.covariance[(i, j)]);
     let spot = Matrix2::identity() * (spot_px * spot_px);
     Some(range(&pixel, &spot, camera, &fit.beam, &joint).ok()?.along_axis_sigma)
 }

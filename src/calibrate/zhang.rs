@@ -3,7 +3,7 @@
 //! Frame and unit: pixels; the plane's unit.
 
 use super::pose::pose_from_homography;
-use crate::camera::Intrinsics;
+use crate::camera::{Distortion, Intrinsics};
 use crate::geometry::{Mat3, Vec2};
 use nalgebra::{DMatrix, Matrix5, Vector5};
 
@@ -24,7 +24,7 @@ pub fn first_camera(seen: &[Seen], width: u32, height: u32) -> Option<Intrinsics
         cx,
         cy,
         skew: 0.0,
-        distortion: [0.0; 5],
+        distortion: Distortion::default(),
         width,
         height,
     };

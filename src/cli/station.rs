@@ -4,7 +4,7 @@
 use super::Console;
 use super::calibrate::stale;
 use super::outputs::{self, Inputs};
-use crate::camera::Intrinsics;
+use crate::camera::{Intrinsics, LENS, NAMES};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Camera, Plane, Ray};
 use crate::rig::{Calibration, HandEye, Kind, Rig};
@@ -154,10 +154,17 @@ fn named(folder: &Path) -> String {
 
 fn summary(settings: &Settings, rig: &Rig) -> String {
     let camera = line("camera", &rig.camera, |c| {
-        let d = c.distortion;
+        let terms = c.distortion.to_opencv();
+        let lens: Vec<String> = NAMES[LENS..].iter().zip(terms).map(|(name, t)| format!("{name} {t:.6}")).collect();
         format!(
-            "fx {:.3} fy {:.3} cx {:.3} cy {:.3} px, k1 k2 p1 p2 k3 {:.5} {:.5} {:.6} {:.6} {:.5}, {}x{}",
-            c.fx, c.fy, c.cx, c.cy, d[0], d[1], d[2], d[3], d[4], c.width, c.height
+            "fx {:.3} fy {:.3} cx {:.3} cy {:.3} px, {}, {}x{}",
+            c.fx,
+            c.fy,
+            c.cx,
+            c.cy,
+            lens.join(" "),
+            c.width,
+            c.height
         )
     });
     let plane = line("laser plane", &rig.laser_plane, |p| {

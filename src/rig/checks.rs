@@ -184,7 +184,7 @@ mod tests {
             cx: 315.0,
             cy: 232.0,
             skew: 0.0,
-            distortion: [0.0; 5],
+            distortion: Default::default(),
             width: 640,
             height: 480,
         }
@@ -206,7 +206,7 @@ mod tests {
             check(|c| c.cx = 5000.0),
             check(|c| c.fx = 100.0),
             check(|c| c.fy = f64::NAN),
-            check(|c| (c.cx, c.distortion[0]) = (100.0, 1e300)),
+            check(|c| (c.cx, c.distortion.0[0]) = (100.0, 1e300)),
         ] {
             assert!(!wrong.unwrap_err().cause.is_empty());
         }

@@ -3,7 +3,7 @@
 
 use super::Kind;
 use crate::fault::{Fault, Result};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, SMatrix};
 
 /// Covariance of named parameters; `matrix[i][j]` belongs to `parameters[i]`, `parameters[j]`.
 /// Each name ends with its unit: `fx_px`, `tx_mm`, `rx_rad`. Without parameters it is not known.
@@ -30,6 +30,14 @@ impl Covariance {
         let i = self.parameters.iter().position(|p| p == name)?;
         Some(self.matrix.get(i)?.get(i)?.max(0.0).sqrt())
     }
+    /// The covariance of these parameters in this order; those that it does not name count as known.
+    pub fn of<const N: usize>(&self, names: [&str; N]) -> SMatrix<f64, N, N> {
+        let at = names.map(|n| self.parameters.iter().position(|p| p == n));
+        SMatrix::from_fn(|i, j| match (at[i], at[j]) {
+            (Some(a), Some(b)) => self.matrix[a][b],
+            _ => 0.0,
+        })
+    }
     /// As a matrix; [`Covariance::check`] has seen to its shape.
     pub fn to_matrix(&self) -> DMatrix<f64> {
         let n = self.parameters.len();
@@ -46,7 +54,14 @@ impl Covariance {
         };
         let (names, counts) = kind.parameters();
         let n = self.parameters.len();
-        if n > 0 && !(counts.contains(&n) && self.parameters.iter().eq(names[..n].iter())) {
+        // A camera's further terms are named where they were free, in their order.
+        let given = |from: usize, name: &String| names[from..].iter().position(|n| n == name).map(|i| from + i + 1);
+        let in_order =
+            |from: usize| self.parameters[from..].iter().try_fold(from, |at, name| given(at, name)).is_some();
+        let begins = |&c: &usize| c <= n && self.parameters[..c].iter().eq(names[..c].iter());
+        let longest = counts.iter().copied().max().unwrap_or(0);
+        let known = counts.iter().any(|c| *c == n && begins(c)) || (begins(&longest) && in_order(longest));
+        if n > 0 && !known {
             let wanted: Vec<String> = counts.iter().map(|&n| names[..n].join(" ")).collect();
             return bad(format!(
                 "is of {}; a {} has {}",
@@ -129,5 +144,23 @@ mod tests {
             let said = c.check(Kind::LaserPlane).unwrap_err().what;
             assert!(said.contains(want), "{want}: {said}");
         }
+    }
+
+    #[test]
+    fn a_camera_names_nine_and_those_of_the_others_that_were_free() {
+        let check =
+            |kind: Kind, names: &[&str]| Covariance::new(names, &DMatrix::zeros(names.len(), names.len())).check(kind);
+        let nine = &crate::camera::NAMES[..9];
+        let beam = &Kind::Pointer.parameters().0[..6];
+        for more in [&[][..], &["skew_px"], &["k4", "k5", "k6"], &["s1", "tau_x_rad", "tau_y_rad"]] {
+            check(Kind::Camera, &[nine, more].concat()).unwrap();
+            check(Kind::Pointer, &[beam, nine, more].concat()).unwrap();
+        }
+        check(Kind::Pointer, beam).unwrap();
+        for wrong in [&["k5", "k4"][..], &["k3"], &["k7"], &["s1", "s1"]] {
+            assert!(check(Kind::Camera, &[nine, wrong].concat()).is_err());
+            assert!(check(Kind::Pointer, &[beam, wrong].concat()).is_err());
+        }
+        assert!(check(Kind::Camera, &nine[..8]).is_err() && check(Kind::LaserPlane, &[beam, nine].concat()).is_err());
     }
 }

@@ -249,7 +249,7 @@ mod tests {
     }
 
     fn camera(fx: f64) -> Calibration<Intrinsics> {
-        let (cx, cy, skew, distortion) = (315.0, 232.0, 0.0, [0.0; 5]);
+        let (cx, cy, skew, distortion) = (315.0, 232.0, 0.0, Default::default());
         let value = Intrinsics { fx, fy: 611.6, cx, cy, skew, distortion, width: 640, height: 480 };
         Calibration::new(Kind::Camera, value, None, Covariance::default(), quality())
     }

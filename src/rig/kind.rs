@@ -1,6 +1,7 @@
 //! In: what was calibrated. Out: its names in files and for people, its frame, and the parameters that its covariance has.
 //! Frame and unit: `A_T_b` maps coordinates in frame b to frame A; the unit is part of a parameter's name.
 
+use crate::camera::{ALWAYS_NAMED, NAMES, PARAMETERS};
 use std::collections::BTreeMap;
 
 /// What a calibration is of.
@@ -37,11 +38,18 @@ pub enum Units {
     MmRadPx,
 }
 
-const CAMERA: [&str; 10] = ["fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3", "skew_px"];
 const PLANE: [&str; 4] = ["nx", "ny", "nz", "offset_mm"];
 /// The beam's own, then the camera's: it was found with that camera, and a range needs both.
-const POINTER: [&str; 15] =
-    ["ox_mm", "oy_mm", "oz_mm", "dx", "dy", "dz", "fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"];
+const POINTER: [&str; 6 + PARAMETERS] = {
+    let mut all = ["ox_mm"; 6 + PARAMETERS];
+    let beam = ["ox_mm", "oy_mm", "oz_mm", "dx", "dy", "dz"];
+    let mut i = 0;
+    while i < all.len() {
+        all[i] = if i < 6 { beam[i] } else { NAMES[i - 6] };
+        i += 1;
+    }
+    all
+};
 const POSE: [&str; 6] = ["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"];
 
 impl Kind {
@@ -71,13 +79,13 @@ impl Kind {
             Kind::ProfileHandEye => Place::FlangeFromSensor,
         }
     }
-    /// The covariance's parameters in their order, and how many of the first of them a file may have: a camera may be without
-    /// skew, a pointer (imported, simulated) without its camera.
+    /// The covariance's parameters in their order, and how many of the first of them a file may have: a pointer (imported,
+    /// simulated) may be without its camera. Beyond the longest a camera's others may follow, where they were estimated.
     pub fn parameters(self) -> (&'static [&'static str], &'static [usize]) {
         match self {
-            Kind::Camera => (&CAMERA, &[9, 10]),
+            Kind::Camera => (&NAMES, &[ALWAYS_NAMED]),
             Kind::LaserPlane => (&PLANE, &[4]),
-            Kind::Pointer => (&POINTER, &[6, 15]),
+            Kind::Pointer => (&POINTER, &[6, 6 + ALWAYS_NAMED]),
             Kind::HandEye | Kind::BaseCamera | Kind::ProfileHandEye => (&POSE, &[6]),
         }
     }

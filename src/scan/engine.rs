@@ -316,7 +316,7 @@ mod tests {
                 cx: 314.9,
                 cy: 232.3,
                 skew: 0.0,
-                distortion: [k, 0.086, 0.00062, -0.00041, -0.017],
+                distortion: [k, 0.086, 0.00062, -0.00041, -0.017].into(),
                 width: 641,
                 height: 479,
             };

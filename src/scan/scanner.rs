@@ -271,7 +271,7 @@ mod tests {
             cx: 320.0,
             cy: 240.0,
             skew: 0.0,
-            distortion: [0.0; 5],
+            distortion: Default::default(),
             width: 640,
             height: 480,
         };

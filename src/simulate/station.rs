@@ -3,7 +3,7 @@
 //! Frame and unit: camera and flange frames, mm, rad; pixels; grey levels as shares of full scale.
 
 use super::rig::RigSpec;
-use crate::camera::Intrinsics;
+use crate::camera::{ALWAYS_NAMED, Intrinsics, NAMES};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Camera, Flange, Plane, Ray, Rigid, Vec3, exp};
 use crate::rig::{Calibration, Covariance, HandEye, Kind, Quality, Rig, Verdict};
@@ -176,7 +176,8 @@ impl Station {
                 off(p1, 8e-4),
                 off(p2, 8e-4),
                 off(k3, 2.0 / 3.0 * k3.abs()),
-            ],
+            ]
+            .into(),
             width: c.width_px,
             height: c.height_px,
         };
@@ -228,13 +229,8 @@ impl Station {
     /// cut off evenly above and below.
     pub fn with_size(mut self, width: u32, height: u32) -> Station {
         let scaled_height = f64::from(self.camera.height) * f64::from(width) / f64::from(self.camera.width);
-        let scale = f64::from(width) / f64::from(self.camera.width);
-        self.camera.fx *= scale;
-        self.camera.fy *= scale;
-        self.camera.skew *= scale;
-        self.camera.cx = (self.camera.cx + 0.5) * scale - 0.5;
-        self.camera.cy = (self.camera.cy + 0.5) * scale - 0.5 + (f64::from(height) - scaled_height) / 2.0;
-        (self.camera.width, self.camera.height) = (width, height);
+        let square = Intrinsics { height: self.camera.width, ..self.camera }.scaled_to(width, width);
+        self.camera = square.region(0.0, (scaled_height - f64::from(height)) / 2.0, width, height);
         self
     }
 
@@ -254,7 +250,7 @@ impl Station {
             per_picture: vec![],
         };
         let none = |names: &[&str]| Covariance::new(names, &nalgebra::DMatrix::zeros(names.len(), names.len()));
-        let camera = none(&["fx_px", "fy_px", "cx_px", "cy_px", "k1", "k2", "p1", "p2", "k3"]);
+        let camera = none(&NAMES[..ALWAYS_NAMED]);
         let plane = none(&["nx", "ny", "nz", "offset_mm"]);
         let pointer = none(&["ox_mm", "oy_mm", "oz_mm", "dx", "dy", "dz"]);
         let hand_eye = none(&["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"]);

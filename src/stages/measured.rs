@@ -47,7 +47,7 @@ impl Measuring {
             strongest: device.storage("strongest", 4 * u64::from(frame.entries))?,
             peak: peak::STAGE.pipeline(device, &depth)?,
             lines: choose::LINES.pipeline(device, &[])?,
-            point: point::STAGE.pipeline(device, &[])?,
+            point: point::STAGE.pipeline(device, &[(point::FULL_LENS, m.optics.full_lens())])?,
             frame,
             uniform,
             rig,

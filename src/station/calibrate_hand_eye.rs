@@ -11,12 +11,11 @@ use crate::calibrate::hand_eye_turns::{read_with, resolve};
 use crate::calibrate::limits::Asked;
 use crate::calibrate::measured_pose::{AboutCamera, MeasuredPose, intrinsic_covariance};
 use crate::calibrate::report::Page;
-use crate::camera::Intrinsics;
+use crate::camera::{Distortion, Intrinsics, ParameterCovariance};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Board, Camera, Flange, Rigid};
 use crate::recording::{Recording, load_board_poses, load_poses};
 use crate::rig::{Calibration, HandEye, Kind, Rig, Volume, hash_file, hash_text};
-use nalgebra::SMatrix;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -139,10 +138,18 @@ pub fn calibrate_hand_eye_from_poses(files: &PosePairs, rig: &Rig, run: &HandEye
         board_length: "the size that the board's poses were computed with".into(),
     };
     // Nothing is known in px: a pinhole of focal length 1 makes them tangents, which the report leaves out.
-    let tangents =
-        Intrinsics { fx: 1.0, fy: 1.0, cx: 0.0, cy: 0.0, skew: 0.0, distortion: [0.0; 5], width: 1, height: 1 };
+    let tangents = Intrinsics {
+        fx: 1.0,
+        fy: 1.0,
+        cx: 0.0,
+        cy: 0.0,
+        skew: 0.0,
+        distortion: Distortion::default(),
+        width: 1,
+        height: 1,
+    };
     let view = |z: f64| rig.camera.as_ref().map_or(USUAL_VIEW * z, |c| c.value.view_mm(z));
-    concluded(gathered, &SMatrix::zeros(), &tangents, rig, view, run)
+    concluded(gathered, &ParameterCovariance::zeros(), &tangents, rig, view, run)
 }
 
 /// The pair of a board and a robot pose.
@@ -157,7 +164,7 @@ fn paired(mount: Mount, pose: &Rigid<Base, Flange>, seen: MeasuredPose) -> Pair 
 /// `view` is how wide the camera sees at a depth, mm.
 fn concluded(
     g: Gathered<'_>,
-    covariance_of_camera: &SMatrix<f64, 9, 9>,
+    covariance_of_camera: &ParameterCovariance,
     camera: &Intrinsics,
     rig: &Rig,
     view: impl Fn(f64) -> f64,

@@ -3,15 +3,15 @@
 //! Frame and unit: camera and base frame; mm, rad.
 
 use super::calibrate_hand_eye::first_line;
+use crate::calibrate::hand_eye_report::HAND_EYE_NAMES;
 use crate::calibrate::pointer_range::{
-    BasePoint, Ranged, RobotNoise, Surface, joint_covariance, range, surface, to_base,
+    BasePoint, RIG, Ranged, RobotNoise, SharedCovariance, Surface, joint_covariance, range, surface, to_base,
 };
 use crate::calibrate::spot::{Spot, SpotOptions, SpotPicture, find_spots, hot_pixels};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Mat3, Rigid, Tool, Vec3};
 use crate::recording::{Beam, Recording};
 use crate::rig::Rig;
-use nalgebra::SMatrix;
 
 /// How [`measure_range`] is run.
 #[derive(Clone, Debug)]
@@ -107,13 +107,11 @@ pub fn measure_range(recording: &Recording, rig: &Rig, run: &RangeRun) -> Result
         (None, _) => None,
     };
     let mut remarks = rig.remarks();
-    let mut shared = SMatrix::<f64, 21, 21>::zeros();
-    shared.fixed_view_mut::<15, 15>(0, 0).copy_from(&joint);
+    let mut shared = SharedCovariance::zeros();
+    shared.fixed_view_mut::<RIG, RIG>(0, 0).copy_from(&joint);
     let mut robot = RobotNoise::default();
     if let Some((_, h)) = base {
-        if h.covariance.parameters.len() == 6 {
-            shared.fixed_view_mut::<6, 6>(15, 15).copy_from(&h.covariance.to_matrix());
-        }
+        shared.fixed_view_mut::<6, 6>(RIG, RIG).copy_from(&h.covariance.of(HAND_EYE_NAMES));
         match h.robot_sigma()? {
             Some([mm, deg]) => robot = RobotNoise { mm, rad: deg.to_radians() },
             None => remarks.push("nothing is known of the robot's noise: the points' sigmas are without it".into()),

@@ -104,7 +104,7 @@ mod tests {
             cx: 0.0,
             cy: 0.0,
             skew: 0.0,
-            distortion: [0.0; 5],
+            distortion: crate::camera::Distortion::default(),
             width: 100,
             height: 80,
         };

@@ -28,7 +28,7 @@ pub fn station(rng: &mut Pcg64, mount: Mount, count: usize) -> Station {
         cx: between(rng, 300.0, 340.0),
         cy: between(rng, 220.0, 260.0),
         skew: 0.0,
-        distortion: [between(rng, -0.15, 0.0), between(rng, 0.0, 0.1), gauss(rng, 5e-4), gauss(rng, 5e-4), 0.0],
+        distortion: [between(rng, -0.15, 0.0), between(rng, 0.0, 0.1), gauss(rng, 5e-4), gauss(rng, 5e-4), 0.0].into(),
         width: 640,
         height: 480,
     };

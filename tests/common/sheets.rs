@@ -48,7 +48,7 @@ impl Sheet {
             cx: f64::from(width) * between(rng, 0.46, 0.54),
             cy: f64::from(height) * between(rng, 0.46, 0.54),
             skew: 0.0,
-            distortion: [between(rng, -0.15, 0.05) * bend, between(rng, 0.0, 0.05) * bend, 0.0, 0.0, 0.0],
+            distortion: [between(rng, -0.15, 0.05) * bend, between(rng, 0.0, 0.05) * bend, 0.0, 0.0, 0.0].into(),
             width,
             height,
         };

@@ -4,7 +4,7 @@
 
 use super::trials::{facing, picture_by};
 use super::{FindOptions, find, turns};
-use crate::camera::Intrinsics;
+use crate::camera::{Distortion, Intrinsics};
 use crate::geometry::{Vec2, Vec3};
 use crate::raster::Image;
 use crate::recording::BoardSpec;
@@ -40,7 +40,7 @@ fn check(n: [u32; 2], drawn_first: &str) -> usize {
         cx: 149.5,
         cy: 149.5,
         skew: 0.0,
-        distortion: [0.0; 5],
+        distortion: Distortion::default(),
         width: SIDE,
         height: SIDE,
     };

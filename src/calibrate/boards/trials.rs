@@ -19,7 +19,7 @@ fn camera() -> Intrinsics {
         cx: 319.5,
         cy: 239.5,
         skew: 0.0,
-        distortion: [0.0; 5],
+        distortion: Default::default(),
         width: WIDTH,
         height: HEIGHT,
     }

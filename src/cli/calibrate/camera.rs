@@ -5,8 +5,9 @@ use super::super::Console;
 use super::{Keep, finish};
 use crate::calibrate::camera::{CameraOptions, CameraResult, calibrate};
 use crate::calibrate::camera_report::page;
-use crate::calibrate::intrinsics::{Lens, SolveOptions};
-use crate::calibrate::projection::{NAMES, to_vector};
+use crate::calibrate::intrinsics::SolveOptions;
+use crate::calibrate::lens::Lens;
+use crate::camera::NAMES;
 use crate::fault::Result;
 use crate::raster::Channel;
 use crate::recording::Recording;
@@ -29,7 +30,9 @@ pub struct Args {
     /// Station folder that gets the calibration
     #[arg(long)]
     station: PathBuf,
-    /// Lens terms: evidence (all that the pictures determine), five, four (no k3), one (k1), none
+    /// Lens: evidence (what the pictures determine), none, one (k1), four (k1 k2 p1 p2), five (k3 too),
+    /// rational (five and k4 k5 k6), prism (five and s1..s4), scheimpflug (k1 k2 k3 and the sensor's tilt),
+    /// all (OpenCV's 14 terms)
     #[arg(long, default_value = "evidence", value_parser = crate::cli::parse::<Lens>)]
     lens: Lens,
     /// Estimate the skew too (sensors with square rows have none)
@@ -65,10 +68,11 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
 
 /// The parameters with their standard deviations, and the expected error.
 fn parameters(result: &CameraResult) -> String {
-    let (c, k) = (&result.calibration, to_vector(&result.calibration.value));
+    let (c, k) = (&result.calibration, result.calibration.value.parameters());
     let mut text = String::from("camera");
-    for (name, value) in NAMES.iter().zip(k).take(c.covariance.parameters.len()) {
-        text += &format!("\n  {name:8} {value:12.6} +- {:.6}", c.covariance.sigma(name).unwrap_or(f64::NAN));
+    let stated = |name: &str| c.covariance.parameters.iter().any(|p| p == name);
+    for (name, value) in NAMES.iter().zip(k.iter()).filter(|(name, _)| stated(name)) {
+        text += &format!("\n  {name:9} {value:12.6} +- {:.6}", c.covariance.sigma(name).unwrap_or(f64::NAN));
     }
     let figure = |name: &str| c.quality.figures.get(name).copied().unwrap_or(f64::NAN);
     text += &format!(

@@ -8,6 +8,8 @@ pub use peaks::{Space, peaks, ruled};
 use super::entry::Case;
 use super::frame::{self, Frame, px_log2};
 use super::*;
+use crate::camera::{Distortion, Intrinsics};
+use crate::geometry::{Plane, Vec3};
 use crate::raster::Image;
 use std::collections::BTreeMap;
 
@@ -194,10 +196,26 @@ pub fn optics(width: u32, height: u32) -> point::Optics {
     let f = 0.96 * width as f32;
     point::Optics {
         pinhole: [f, f, 0.49 * width as f32, 0.51 * height as f32, 0.0],
-        distortion: [-0.118, 0.086, 0.00062, -0.00041, -0.017],
+        distortion: [-0.118, 0.086, 0.00062, -0.00041, -0.017, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+        untilt: point::FLAT,
         normal: [-0.0192, 0.8828, 0.4694],
         offset: 72.15,
     }
+}
+
+/// The same with all of a lens's terms on a sensor that is tilted by 11 and 7 degrees.
+fn tilted(width: u32, height: u32) -> point::Optics {
+    let k = Intrinsics {
+        fx: 0.96 * f64::from(width),
+        fy: 0.97 * f64::from(width),
+        cx: 0.49 * f64::from(width),
+        cy: 0.51 * f64::from(height),
+        skew: 0.4,
+        distortion: Distortion([0.3, -0.1, 6e-4, -4e-4, 0.01, 0.5, 0.04, 0.02, 2e-3, -1e-3, -2e-3, 1e-3, 0.19, -0.12]),
+        width,
+        height,
+    };
+    point::Optics::new(&k, &Plane::new(Vec3::new(-0.0192, 0.8828, 0.4694), 72.15).expect("a normal"))
 }
 
 /// A turned pose some way off the base, another one a shot.

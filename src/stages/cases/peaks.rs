@@ -1,7 +1,7 @@
 //! In: the scenes with a stripe; straight stripes of every width, direction and depth. Out: the cases of the stages after the
 //! skeleton. Frame and unit: pixels, words.
 
-use super::{Case, Noise, Scene, Walk, drawn, optics, pose};
+use super::{Case, Noise, Scene, Walk, drawn, optics, pose, tilted};
 use crate::stages::frame::{self, px_log2};
 use crate::stages::peak::{Method, PeakParams};
 use crate::stages::point::Optics;
@@ -18,8 +18,13 @@ struct Told {
 pub fn peaks(stage: &str) -> Vec<Case> {
     let scenes = super::scenes();
     let striped = scenes.iter().filter(|s| s.name.contains("stripe"));
-    let told = |s: &Scene| Told { width_px: 3.0, optics: optics(s.shots[0].width, s.shots[0].height) };
-    striped.flat_map(|s| cases(s.name, s, &told(s), &Method::ALL, stage)).collect()
+    // Only points know of the lens.
+    let rigs: &[fn(u32, u32) -> Optics] = if stage == point::STAGE.name { &[optics, tilted] } else { &[optics] };
+    let told = |s: &Scene, rig: &fn(u32, u32) -> Optics| Told {
+        width_px: 3.0,
+        optics: rig(s.shots[0].width, s.shots[0].height),
+    };
+    striped.flat_map(|s| rigs.iter().flat_map(move |r| cases(s.name, s, &told(s, r), &Method::ALL, stage))).collect()
 }
 
 /// Profile sigmas, px: every number of quads and of rows a sample.
@@ -109,8 +114,12 @@ fn cases(name: &str, scene: &Scene, told: &Told, methods: &[Method], wanted: &st
                         twin: fn(&mut [Vec<u32>], &[(&'static str, f64)]),
                         bindings: &mut Vec<Vec<u32>>,
                         groups: [u32; 3]| {
-            let all =
-                [(frame::PX_LOG2, f64::from(px_log2(bits))), (peak::METHOD, method.number()), (peak::QUADS, quads)];
+            let all = [
+                (frame::PX_LOG2, f64::from(px_log2(bits))),
+                (peak::METHOD, method.number()),
+                (peak::QUADS, quads),
+                (point::FULL_LENS, told.optics.full_lens()),
+            ];
             let overrides: Vec<_> = all.into_iter().filter(|o| stage.overrides.contains(&o.0)).collect();
             if stage.name == wanted {
                 let name = format!("{name}, {method:?}");
