@@ -115,7 +115,7 @@ fn keep_agreeing(seen: &mut Vec<Seen>, features: &[Vec2]) {
     }
     let off = |i: usize| -> f64 {
         let s = &seen[i];
-        off_px(seen, features, i) / (s.corners[0].pixel - s.corners[2].pixel).norm()
+        off_px(seen, features, i)[3] / (s.corners[0].pixel - s.corners[2].pixel).norm()
     };
     let good: Vec<bool> = (0..seen.len()).map(|i| off(i) < 0.4).collect();
     // A wrong neighbour spoils good ones, so that one marker's word is not enough; but where most disagree none is believed. Some
@@ -129,9 +129,9 @@ fn keep_agreeing(seen: &mut Vec<Seen>, features: &[Vec2]) {
     drop_covered(seen, features);
 }
 
-/// How far a marker's worst corner is from where the three markers nearest on the board put it, px: a lens bends less over so
-/// short a way.
-fn off_px(seen: &[Seen], features: &[Vec2], i: usize) -> f64 {
+/// How far a marker's corners are from where the three markers nearest on the board put them, px, ascending: a lens bends less
+/// over so short a way.
+fn off_px(seen: &[Seen], features: &[Vec2], i: usize) -> [f64; 4] {
     let middle = |s: &Seen| features[4 * s.place] + features[4 * s.place + 2];
     let mut others: Vec<usize> = (0..seen.len()).filter(|k| *k != i).collect();
     let far = |k: &usize| (middle(&seen[*k]) - middle(&seen[i])).norm();
@@ -142,30 +142,35 @@ fn off_px(seen: &[Seen], features: &[Vec2], i: usize) -> f64 {
         from.extend((0..4).map(|k| features[4 * s.place + k]));
         to.extend(s.corners.iter().map(|c| c.pixel));
     }
-    let Some(h) = homography(&from, &to) else { return 0.0 };
+    let Some(h) = homography(&from, &to) else { return [0.0; 4] };
     let s = &seen[i];
-    let worst = (0..4).map(|k| (apply(&h, &features[4 * s.place + k]) - s.corners[k].pixel).norm());
-    worst.fold(0.0, f64::max)
+    let mut off: [f64; 4] =
+        std::array::from_fn(|k| (apply(&h, &features[4 * s.place + k]) - s.corners[k].pixel).norm());
+    off.sort_by(f64::total_cmp);
+    off
 }
 
-/// Drops, worst first, markers of which a corner stands out against what their neighbours say: something covers it. What
-/// stands out is measured by the middle marker, whose neighbours' lens and noise are the same.
+/// Drops, worst first, markers of which a corner stands out against what their neighbours say, and against their own other
+/// corners: something covers it. A lens, or a neighbour that is wrong itself, puts all four off.
 fn drop_covered(seen: &mut Vec<Seen>, features: &[Vec2]) {
     while seen.len() > 4 {
-        let off: Vec<f64> = (0..seen.len()).map(|i| off_px(seen, features, i)).collect();
-        let mut sorted = off.clone();
-        sorted.sort_by(f64::total_cmp);
-        let worst = (0..off.len()).max_by(|a, b| off[*a].total_cmp(&off[*b])).expect("more than four");
-        if off[worst] <= STANDS_OUT * sorted[sorted.len() / 2].max(LEAST_OFF_PX) {
-            return;
-        }
-        seen.remove(worst);
+        let off: Vec<[f64; 4]> = (0..seen.len()).map(|i| off_px(seen, features, i)).collect();
+        let mut worst: Vec<f64> = off.iter().map(|o| o[3]).collect();
+        worst.sort_by(f64::total_cmp);
+        let usual = worst[worst.len() / 2].max(LEAST_OFF_PX);
+        let covered = |i: &usize| off[*i][3] > STANDS_OUT * usual && off[*i][3] > AGAINST_OWN * off[*i][1];
+        match (0..off.len()).filter(covered).max_by(|a, b| off[*a][3].total_cmp(&off[*b][3])) {
+            Some(i) => seen.remove(i),
+            None => return,
+        };
     }
 }
 
-/// Times the middle marker's distance from where its neighbours put it; and the least such distance that is believed, px.
+/// Times the middle marker's distance from where its neighbours put it, with the least such distance that is believed, px; and
+/// times the marker's own second best corner's: two of the four may be covered.
 const STANDS_OUT: f64 = 4.0;
 const LEAST_OFF_PX: f64 = 0.1;
+const AGAINST_OWN: f64 = 6.0;
 
 fn why_not(markers: &Markers, patches: usize) -> Fault {
     let count = markers.places().count();
