@@ -27,7 +27,7 @@ pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<B
     let markers = Markers::of(board)?
         .ok_or_else(|| Fault::usage("the board has no markers").next("describe it as type marker_grid"))?;
     let grey = Grey::new(image);
-    let matcher = Matcher::new(markers.dictionary(), markers.dictionary().max_correction_bits().min(1));
+    let matcher = Matcher::new(markers.dictionary(), markers.dictionary().max_correction_bits().min(2));
     let shrink = (grey.width.max(grey.height) / options.detector_px).max(1);
     let mut seen: Vec<Seen> = Vec::new();
     let mut patches = 0;
@@ -169,7 +169,7 @@ fn drop_covered(seen: &mut Vec<Seen>, features: &[Vec2]) {
 /// Times the middle marker's distance from where its neighbours put it, with the least such distance that is believed, px; and
 /// times the marker's own second best corner's: two of the four may be covered.
 const STANDS_OUT: f64 = 4.0;
-const LEAST_OFF_PX: f64 = 0.1;
+const LEAST_OFF_PX: f64 = 0.25;
 const AGAINST_OWN: f64 = 6.0;
 
 fn why_not(markers: &Markers, patches: usize) -> Fault {
