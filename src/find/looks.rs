@@ -424,6 +424,21 @@ mod tests {
         assert!(agreed(&turned, &found(&turned, &wrong, &mut rng)).disagreement.ratio > 3.0);
     }
 
+    /// Two looks cannot show a hand-eye's error along the axis of the turn between them; a third one about another axis can.
+    #[test]
+    fn a_third_look_shows_what_two_leave_open() {
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(9);
+        let right = vec![DVector::zeros(4), DVector::zeros(6)];
+        let mut hides = |sides: &[(f64, f64)]| {
+            let s = setup(sides);
+            let looks = agreed(&s, &found(&s, &right, &mut rng)).disagreement;
+            let by_hand_eye = looks.explained_by.iter().find(|e| e.name == "hand-eye").unwrap();
+            by_hand_eye.unseen_mm.into_iter().fold(0.0, f64::max)
+        };
+        let (two, three) = (hides(&[(0.0, 0.0), (180.0, 20.0)]), hides(&[(0.0, 0.0), (180.0, 20.0), (90.0, -25.0)]));
+        assert!(two > 10.0 && three < 1.0, "{two} and {three} mm");
+    }
+
     #[test]
     fn one_look_cannot_be_compared() {
         let s = setup(&[(0.0, 0.0)]);
