@@ -2,6 +2,10 @@
 //! parser answers with a value or an error that names something and says what to do next; none panics, hangs or eats memory.
 //! Frame and unit: none. As many mutations of each as SHEETLIGHT_LONG says, 300 without it.
 
+#[path = "common/process.rs"]
+mod process;
+
+use process::{most_held_mb, processor_seconds};
 use proptest::prelude::*;
 use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
@@ -153,18 +157,6 @@ fn survives(name: &'static str, seeds: Vec<Vec<u8>>, read: impl Fn(&[u8]) -> Res
             }
         }
     }
-}
-
-/// Time that this thread has had a processor; 0 where the system does not tell.
-fn processor_seconds() -> f64 {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-    text.split(' ').next().and_then(|ns| ns.parse::<f64>().ok()).unwrap_or(0.0) * 1e-9
-}
-
-fn most_held_mb() -> u64 {
-    let text = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = text.lines().find_map(|l| l.strip_prefix("VmHWM:"));
-    line.and_then(|l| l.trim().trim_end_matches(" kB").parse::<u64>().ok()).unwrap_or(0) / 1024
 }
 
 /// For parsers that want a file: the same file again and again.

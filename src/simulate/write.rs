@@ -246,7 +246,7 @@ impl Plan {
                 plan.scenes = vec![scene.clone()];
                 let cameras = match set {
                     Set::Scan => plan::scan(station, scene, options.shots),
-                    _ => surface_views(station, scene),
+                    _ => plan::surface_views(station, scene),
                 };
                 for (i, camera) in cameras.iter().enumerate() {
                     let laser = Some(if set == Set::Scan { Beam::Line } else { Beam::Pointer });
@@ -476,24 +476,6 @@ impl Plan {
         };
         Ok(middle.iter().filter(|p| bright(p.u, p.v)).map(|p| p.point).collect())
     }
-}
-
-/// Five places of the scene's region, seen by the pointer from the working distance with a slight tilt.
-fn surface_views(station: &Station, scene: &Scene) -> Vec<Rigid<InScene, Camera>> {
-    let [x0, y0, x1, y1] = scene.spec.region_mm;
-    let at = |fx: f64, fy: f64| (x0 + fx * (x1 - x0), y0 + fy * (y1 - y0));
-    let beam = station.pointer.ray();
-    [(0.06, 0.06), (0.94, 0.08), (0.92, 0.94), (0.07, 0.93), (0.5, 0.03)]
-        .iter()
-        .enumerate()
-        .map(|(i, &(fx, fy))| {
-            let (x, y) = at(fx, fy);
-            let z = station.working_distance * (0.95 + 0.03 * i as f64);
-            // Where the beam is at that depth, so that the spot and not the axis meets the place.
-            let spot = beam.at((z - beam.origin.z) / beam.direction.z);
-            plan::above(x - spot.x, y + spot.y, z)
-        })
-        .collect()
 }
 
 /// A point list as binary PLY (x y z, float32).

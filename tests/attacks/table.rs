@@ -1,6 +1,7 @@
 //! In: cases with what is expected of them. Out: the table of what was got, and a failure where they differ.
 //! Frame and unit: seconds, MB.
 
+use crate::common::process::{most_held_mb, processor_seconds};
 use sheetlight::fault::Fault;
 use std::fmt::Write;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -67,16 +68,4 @@ pub fn check(cases: Vec<Case>) {
     println!("{text}most memory held so far: {held} MB");
     assert!(held < MOST_MB, "{held} MB of memory, limit {MOST_MB}");
     assert!(wrong == 0, "{wrong} cases are not answered as expected\n{text}");
-}
-
-/// Time that this thread has had a processor; 0 where the system does not tell.
-fn processor_seconds() -> f64 {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-    text.split(' ').next().and_then(|ns| ns.parse::<f64>().ok()).unwrap_or(0.0) * 1e-9
-}
-
-fn most_held_mb() -> u64 {
-    let text = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = text.lines().find_map(|l| l.strip_prefix("VmHWM:"));
-    line.and_then(|l| l.trim().trim_end_matches(" kB").parse::<u64>().ok()).unwrap_or(0) / 1024
 }

@@ -5,6 +5,7 @@
 pub mod hand_eye;
 pub mod judge;
 pub mod pose;
+pub mod process;
 pub mod sheets;
 pub mod turned;
 
