@@ -6,7 +6,7 @@ use super::judge::{between, gauss, gauss2};
 use nalgebra::Matrix3;
 use rand::Rng;
 use rand_pcg::Pcg64;
-use sheetlight::calibrate::laser_plane::{StripePeak, StripeView};
+use sheetlight::calibrate::laser_plane::solve::{StripePeak, StripeView};
 use sheetlight::calibrate::measured_pose::{SeenBoard, measure};
 use sheetlight::camera::Intrinsics;
 use sheetlight::geometry::{Board, Camera, Plane, Rigid, Vec2, Vec3, exp};

@@ -7,8 +7,8 @@ mod laser_plane;
 mod pointer;
 mod profile_hand_eye;
 
-use super::Console;
 use crate::calibrate::report::Page;
+use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
 use crate::rig::{Calibration, Kind, Measured, Quality, Rig, Verdict};
 use serde::Serialize;

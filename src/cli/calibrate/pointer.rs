@@ -1,16 +1,17 @@
 //! In: a recording of boards with the pointer's spot on them. Out: the beam.
 //! Frame and unit: camera frame, mm.
 
-use super::super::Console;
 use super::{Keep, finish};
-use crate::calibrate::pointer::PointerOptions;
-use crate::calibrate::spot::SpotOptions;
+use crate::calibrate::pointer::solve::PointerOptions;
+use crate::calibrate::pointer::spot::SpotOptions;
+use crate::cli::terminal::console::Console;
 use crate::fault::Result;
 use crate::raster::Channel;
 use crate::recording::Recording;
 use crate::rig::Rig;
+use crate::station::calibrate_pointer;
 use crate::station::volume::asked;
-use crate::station::{PointerRun, Settings, calibrate_pointer};
+use crate::station::{PointerRun, Settings};
 use std::path::PathBuf;
 
 /// Find the laser pointer's beam from pictures of its spot on boards
@@ -34,7 +35,7 @@ pub struct Args {
     #[arg(long, requires = "near_mm")]
     far_mm: Option<f64>,
     /// Part of a colour picture to use: red, green, blue or luma
-    #[arg(long, default_value = "luma", value_parser = crate::cli::parse::<Channel>)]
+    #[arg(long, default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
     channel: Channel,
     #[command(flatten)]
     keep: Keep,

@@ -4,7 +4,7 @@
 use super::FLAT;
 use super::curves::{Curve, Form};
 use super::flatten::arc;
-use crate::find::outline::area;
+use crate::find::model::outline::area;
 use std::collections::HashMap;
 
 /// A closed edge.

@@ -8,8 +8,8 @@ mod shapes;
 mod spline;
 mod tags;
 
-use super::drawing::{Drawing, Form, Inside};
-use super::outline::{area, bounds};
+use super::model::drawing::{Drawing, Form, Inside};
+use super::model::outline::{area, bounds};
 use crate::fault::{Fault, Result};
 use curves::{Curve, Form as Drawn};
 
