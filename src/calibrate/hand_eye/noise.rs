@@ -1,6 +1,6 @@
 //! In: pairs of robot poses and boards, a start. Out: the chain, the camera that goes with it and the robot's noise,
 //! each fitted to the others.
-//! Frame and unit: see `hand_eye_closed`; mm, rad (docs/math.md, Hand-eye (6) to (9)).
+//! Frame and unit: see `closed`; mm, rad (docs/math.md, Hand-eye (6) to (9)).
 
 use super::camera_belief::{CameraBelief, Sharpened};
 use super::closed::{Chain, Pair};

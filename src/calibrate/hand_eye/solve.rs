@@ -1,6 +1,6 @@
 //! In: board poses with their information and the robot's poses. Out: the hand-eye transform and the
 //! board's place by joint maximum likelihood, with the robot's noise, covariance and hold-out errors.
-//! Frame and unit: see `hand_eye_closed`; mm, rad (docs/math.md, Hand-eye (1) to (10)).
+//! Frame and unit: see `closed`; mm, rad (docs/math.md, Hand-eye (1) to (10)).
 
 use super::camera_belief::CameraBelief;
 use super::checks;

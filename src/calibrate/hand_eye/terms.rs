@@ -1,6 +1,6 @@
 //! In: a chain, pairs, noise. Out: the steps between seen and expected boards with their derivatives and
 //! covariance, and the chain that makes them least.
-//! Frame and unit: see `hand_eye_closed`; mm, rad (docs/math.md, Hand-eye (6), (7), (9)).
+//! Frame and unit: see `closed`; mm, rad (docs/math.md, Hand-eye (6), (7), (9)).
 
 use super::camera_belief::CameraBelief;
 use super::closed::{Chain, Pair};

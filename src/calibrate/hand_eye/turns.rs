@@ -1,6 +1,6 @@
 //! In: pairs of robot poses and pictures of a board that looks the same after a turn. Out: every picture read
 //! with the same origin, resolved over the whole set, or a refusal.
-//! Frame and unit: see `hand_eye_closed`; mm, rad (docs/math.md, Hand-eye (11)).
+//! Frame and unit: see `closed`; mm, rad (docs/math.md, Hand-eye (11)).
 
 use super::closed::{Chain, Pair, canonical_order, park_martin};
 use crate::calibrate::boards::Turn;
