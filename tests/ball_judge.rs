@@ -9,8 +9,10 @@ use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use sheetlight::calibrate::ball::evaluate::evaluate;
-use sheetlight::calibrate::ball::profiles::Profile;
-use sheetlight::calibrate::ball::solve::{BallFit, BallOptions, Side, solve};
+use sheetlight::calibrate::ball::options::BallOptions;
+use sheetlight::calibrate::ball::options::Side;
+use sheetlight::calibrate::ball::profile::Profile;
+use sheetlight::calibrate::ball::solve::{BallFit, solve};
 use sheetlight::geometry::{Base, Flange, Mat3, Rigid, Sensor, Vec3, exp, log};
 
 const RADIUS: f64 = 20.0;

@@ -8,7 +8,8 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use sheetlight::fault::Fault;
 use sheetlight::find::dxf::{DxfOptions, Imported, read};
-use sheetlight::find::model::drawing::{Form, Inside};
+use sheetlight::find::model::shape::Form;
+use sheetlight::find::model::shape::Inside;
 use sheetlight::find::{Drawing, Recipe};
 use std::fmt::Write;
 

@@ -10,10 +10,11 @@ use nalgebra::{DMatrix, DVector};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
+use sheetlight::calibrate::laser_plane::options::LaserPlaneOptions;
 use sheetlight::calibrate::laser_plane::report::judge as judge_plane;
-use sheetlight::calibrate::laser_plane::solve::{
-    LaserPlaneFit, LaserPlaneOptions, PeakUse, StripePeak, StripeView, solve,
-};
+use sheetlight::calibrate::laser_plane::solve::{LaserPlaneFit, PeakUse, solve};
+use sheetlight::calibrate::laser_plane::views::StripePeak;
+use sheetlight::calibrate::laser_plane::views::StripeView;
 use sheetlight::calibrate::limits::Asked;
 use sheetlight::calibrate::measured_pose::{SeenBoard, measure, pooled_factor};
 use sheetlight::camera::{Intrinsics, ParameterCovariance, Parameters};

@@ -1,11 +1,11 @@
 //! In: a station folder. Out: a new one, a summary of one, or values moved in and out of it.
 //! Frame and unit: camera and flange frames, mm.
 
-use super::calibrate::stale;
+use super::calibrate::store::stale;
+use super::terminal::console::Console;
 use super::terminal::outputs;
 use super::terminal::outputs::Inputs;
 use crate::camera::{Intrinsics, LENS, NAMES};
-use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Camera, Plane, Ray};
 use crate::rig::{Calibration, HandEye, Kind, Rig};

@@ -12,6 +12,7 @@ mod values;
 mod verify;
 pub mod volume;
 
+pub use crate::station::judge::figures::Judged;
 pub use calibrate::ball::{calibrate_profile_hand_eye, evaluate_profile_hand_eye};
 pub use calibrate::board_views::{Boards, FrameBoard, boards};
 pub use calibrate::hand_eye::{
@@ -22,7 +23,7 @@ pub use calibrate::pointer::{PointerRun, calibrate_pointer};
 pub use find::{SecondLook, find_part, find_part_in_all, second_look, teach_part};
 pub use guide::{GuideOptions, Guided, Step, guide};
 pub use judge::parts::{FoundPart, judge_parts};
-pub use judge::points::{Judged, judge};
+pub use judge::points::judge;
 pub use range::{Distance, RangeReport, RangeRun, SurfaceFound, measure_range};
 pub use scan::report::{HeightMapFigures, ScanReport, Spent, cloud_of, load_report};
 pub use scan::run::{ScanOptions, scan, scan_on};

@@ -1,8 +1,8 @@
 //! In: a profile of a ball. Out: the circle that its points lie on, with its information.
 //! Frame and unit: the sensor's plane y = 0, mm; docs/math.md, Ball (2).
 
-use super::profiles::Profile;
-use super::solve::BallOptions;
+use super::options::BallOptions;
+use super::profile::Profile;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Mat3, Vec3};
 use crate::solve::{ConsensusOptions, LmOptions, Loss, Problem, Residuals, consensus, lm};

@@ -3,8 +3,8 @@
 //! Frame and unit: flange_from_sensor, ball in the base frame; mm.
 
 use super::circle::circle;
-use super::profiles::Profile;
-use super::solve::BallOptions;
+use super::options::BallOptions;
+use super::profile::Profile;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Mat3, Rigid, Sensor, Vec3};
 use crate::solve::{LmOptions, Loss, Problem, Residuals, Stop, lm};

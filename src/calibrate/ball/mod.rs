@@ -3,6 +3,8 @@
 
 mod circle;
 pub mod evaluate;
+pub mod options;
+pub mod profile;
 pub mod profiles;
 mod sequences;
 pub mod solve;

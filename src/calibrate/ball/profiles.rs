@@ -1,18 +1,11 @@
 //! In: files of line profiles (CSV, matrices and plain sequences in YAML and JSON). Out: lists of x, z points.
 //! Frame and unit: the sensor's own plane, mm.
 
+use super::profile::Profile;
 use super::sequences::{by_turns, from_brackets, value};
 use crate::fault::{Fault, Result};
 use crate::files::natural;
 use std::path::Path;
-
-/// The points of one profile; places without a measurement (not finite) are left out.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Profile {
-    pub name: String,
-    /// x along the line, z away from the sensor, mm.
-    pub points: Vec<[f64; 2]>,
-}
 
 /// Reads profiles from a file with many, or from a folder with a file each, in the order of their
 /// names (numbers in names count as numbers).

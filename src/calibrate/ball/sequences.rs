@@ -2,7 +2,7 @@
 //! line. Out: profiles. Both readings of numbers that stand in one row are told apart, or it is refused.
 //! Frame and unit: the sensor's own plane, mm.
 
-use super::profiles::Profile;
+use super::profile::Profile;
 use crate::fault::{Fault, Result};
 
 /// A bracket without brackets in it: the key before it, the bracket it stands in, its numbers.

@@ -3,7 +3,8 @@
 //! Frame and unit: mm, rad.
 
 use super::closed::{Pair, agree, axis_spread, park_martin, robot_scale};
-use super::solve::{HandEyeFit, HandEyeOptions};
+use super::fit::HandEyeFit;
+use super::options::HandEyeOptions;
 use crate::fault::{Fault, Result};
 use crate::geometry::Rigid;
 use rand::{SeedableRng, seq::SliceRandom};

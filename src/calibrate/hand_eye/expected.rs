@@ -1,7 +1,7 @@
 //! In: a hand-eye fit. Out: how far off a measured point will be, the camera's own error with it.
 //! Frame and unit: the camera's carrier, mm (docs/math.md, Hand-eye (12)).
 
-use super::solve::HandEyeFit;
+use super::fit::HandEyeFit;
 use super::terms::UNKNOWNS;
 use crate::calibrate::projection::project;
 use crate::camera::PARAMETERS;

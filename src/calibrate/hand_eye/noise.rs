@@ -4,7 +4,7 @@
 
 use super::camera_belief::{CameraBelief, Sharpened};
 use super::closed::{Chain, Pair};
-use super::solve::{HandEyeOptions, Mount, Noise};
+use super::options::{HandEyeOptions, Mount, Noise};
 use super::terms::{Refined, refine, robot_parts, with_camera};
 use crate::calibrate::components::Components;
 use crate::calibrate::measured_pose::pooled_factor;

@@ -6,7 +6,7 @@ use super::camera_belief::ray_error_px;
 use super::checks::belongs_to;
 use super::closed::{Pair, axis_spread};
 use super::expected::{ExpectedError, expected_error};
-use super::solve::HandEyeFit;
+use super::fit::HandEyeFit;
 use crate::calibrate::limits::{Limits, rms};
 use crate::calibrate::report::{Page, axis_sphere, bars};
 use crate::camera::PARAMETERS;
@@ -209,7 +209,7 @@ pub fn page(fit: &HandEyeFit, pairs: &[Pair], quality: &Quality, carrier: &str) 
         .collect();
     page.paragraph("Fit: how the pictures agree with the chain that was fitted to them. A small residual does not prove a small error. The board's own px: how its corners fit a flat board in that picture, the robot aside.");
     page.table("Fit", &["picture", "the board's own px", "px", "mm", "distance² (6 expected)", ""], &fits);
-    let bar = |f: &dyn Fn(&crate::calibrate::hand_eye::solve::PairResidual) -> f64| -> Vec<(String, f64)> {
+    let bar = |f: &dyn Fn(&crate::calibrate::hand_eye::fit::PairResidual) -> f64| -> Vec<(String, f64)> {
         fit.pairs.iter().map(|p| (p.name.clone(), f(p))).filter(|(_, v)| v.is_finite()).collect()
     };
     page.figure("Residual of each pose in the fit, mm at the board's corners", &bars(&bar(&|p| p.mm), "mm", None));

@@ -4,141 +4,15 @@
 
 use super::camera_belief::CameraBelief;
 use super::checks;
-use super::closed::{Agreement, Chain, Far, Near, Pair, agree, canonical_order};
+use super::closed::{Agreement, Pair, agree, canonical_order};
+use super::fit::{HandEyeFit, PairResidual};
 use super::noise::{Fitted, fit};
+use super::options::{HandEyeOptions, Mount, Noise};
 use super::terms::{Refined, UNKNOWNS, refine, step_covariance, with_camera};
 use crate::calibrate::measured_pose::{moved, pooled_factor};
 use crate::camera::{Intrinsics, PARAMETERS, ParameterCovariance};
 use crate::fault::{Fault, Result};
-use crate::geometry::{Rigid, Vec3};
 use nalgebra::{DMatrix, Matrix6, SMatrix};
-
-/// Settings of [`solve`].
-#[derive(Clone, Debug)]
-pub struct HandEyeOptions {
-    /// Sigma of the robot's position per axis, mm; `None`: estimated. 1e-6..=10.
-    pub robot_sigma_mm: Option<f64>,
-    /// Sigma of the robot's orientation per axis, degrees; `None`: estimated. 1e-7..=5.
-    pub robot_sigma_deg: Option<f64>,
-    /// A pair is wrong where its squared Mahalanobis distance (6 degrees of freedom) exceeds this;
-    /// 26.1 leaves one good pair in 5,000 out. 12..=1000.
-    pub gate: f64,
-    /// Rotation about the second axis (rms over all motions) below which the result is refused, degrees; 0.1..=30.
-    pub min_second_axis_deg: f64,
-    /// Fewest agreeing pairs; 3..=1000.
-    pub min_pairs: usize,
-    /// What states the board's lengths, as a message names it.
-    pub board_length: String,
-    /// Seed of the draws among more than 25 pairs.
-    pub seed: u64,
-}
-
-impl Default for HandEyeOptions {
-    fn default() -> Self {
-        HandEyeOptions {
-            robot_sigma_mm: None,
-            robot_sigma_deg: None,
-            gate: 26.1,
-            min_second_axis_deg: 3.0,
-            min_pairs: 4,
-            board_length: "the board's description".into(),
-            seed: 1,
-        }
-    }
-}
-
-impl HandEyeOptions {
-    pub fn check(&self) -> Result<()> {
-        let bad = |name: &str, value: f64, range: &str| {
-            Err(Fault::usage(format!("{name} is {value}, {range} is allowed")).next("choose a value in that range"))
-        };
-        if let Some(s) = self.robot_sigma_mm.filter(|s| !(1e-6..=10.0).contains(s)) {
-            return bad("robot_sigma_mm", s, "1e-6 to 10");
-        }
-        if let Some(s) = self.robot_sigma_deg.filter(|s| !(1e-7..=5.0).contains(s)) {
-            return bad("robot_sigma_deg", s, "1e-7 to 5");
-        }
-        if !(12.0..=1000.0).contains(&self.gate) {
-            return bad("gate", self.gate, "12 to 1000");
-        }
-        if !(0.1..=30.0).contains(&self.min_second_axis_deg) {
-            return bad("min_second_axis_deg", self.min_second_axis_deg, "0.1 to 30");
-        }
-        if !(3..=1000).contains(&self.min_pairs) {
-            return bad("min_pairs", self.min_pairs as f64, "3 to 1000");
-        }
-        Ok(())
-    }
-}
-
-/// Standard deviations of the robot's reported poses per axis, and the factor of the features' sigmas; for board poses
-/// that were given without sigmas the factor is their turn's, rad.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Noise {
-    pub robot_mm: f64,
-    pub robot_rad: f64,
-    pub feature_factor: f64,
-}
-
-/// Where the flange is, as the noise of its pose moves the board in the picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mount {
-    EyeInHand,
-    EyeToHand,
-}
-
-impl Mount {
-    /// The flange's origin in the camera frame.
-    pub(in crate::calibrate) fn flange(self, chain: &Chain, near_from_far: &Rigid<Near, Far>) -> Vec3 {
-        match self {
-            Mount::EyeInHand => chain.near_from_camera.inverse().translation,
-            Mount::EyeToHand => (chain.near_from_camera.inverse() * *near_from_far).translation,
-        }
-    }
-}
-
-/// How one pair fits: its step from the expected to the seen board pose.
-#[derive(Clone, Debug)]
-pub struct PairResidual {
-    pub name: String,
-    /// In the fit; false: it disagreed and was left out.
-    pub used: bool,
-    /// Squared Mahalanobis distance, 6 degrees of freedom.
-    pub distance2: f64,
-    /// Board corners, rms: px in the picture and mm in space.
-    pub px: f64,
-    pub mm: f64,
-    /// The same with the pair left out of the fit.
-    pub holdout_px: f64,
-    pub holdout_mm: f64,
-}
-
-/// What [`solve`] found.
-#[derive(Clone, Debug)]
-pub struct HandEyeFit {
-    pub chain: Chain,
-    /// Covariance of 12 numbers: translation (mm) and left rotation (rad) of near_from_camera in
-    /// the near frame, then of far_from_board in the far frame. Camera uncertainty included.
-    pub covariance: DMatrix<f64>,
-    /// The 12 numbers by the given camera's z: how the result follows the camera it was given.
-    pub by_camera: SMatrix<f64, 12, PARAMETERS>,
-    /// The camera that was given, as a belief about itself.
-    pub camera: Intrinsics,
-    pub given: CameraBelief,
-    /// The camera that all pixels and poses together speak for, and the covariance of the 12 numbers and of its
-    /// parameters.
-    pub joint_camera: Intrinsics,
-    pub joint_covariance: DMatrix<f64>,
-    /// Squared Mahalanobis distance between the given camera and what these pictures say of it, and its freedom.
-    pub camera_surprise: (f64, f64),
-    pub noise: Noise,
-    /// One per pair, in the order given.
-    pub pairs: Vec<PairResidual>,
-    /// Squared Mahalanobis distances over their degrees of freedom; near 1.
-    pub chi2: f64,
-    /// The closed form that it started from.
-    pub start: Agreement,
-}
 
 fn undetermined() -> Fault {
     Fault::refused("the hand-eye transform is not determined by these poses")

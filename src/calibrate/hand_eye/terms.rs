@@ -4,7 +4,7 @@
 
 use super::camera_belief::CameraBelief;
 use super::closed::{Chain, Pair};
-use super::solve::{Mount, Noise};
+use super::options::{Mount, Noise};
 use crate::calibrate::measured_pose::step_between;
 use crate::camera::{PARAMETERS, Parameters};
 use crate::geometry::{Mat3, Rigid, Vec3, exp, skew};

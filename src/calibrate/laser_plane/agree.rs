@@ -2,8 +2,9 @@
 //! a second plane in what is left over.
 //! Frame and unit: camera frame, mm; distances from a stripe in px.
 
-use super::solve::{LaserPlaneOptions, StripeView, refused};
+use super::options::{LaserPlaneOptions, refused};
 use super::terms::{Data, Seen, State, mm_per_px, on_board};
+use super::views::StripeView;
 use crate::camera::Intrinsics;
 use crate::fault::Result;
 use crate::geometry::{Board, Camera, Plane, Rigid, Vec3, fit_plane};

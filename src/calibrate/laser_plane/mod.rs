@@ -3,6 +3,8 @@
 
 mod agree;
 mod checks;
+pub mod options;
 pub mod report;
 pub mod solve;
 mod terms;
+pub mod views;

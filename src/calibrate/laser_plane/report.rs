@@ -3,7 +3,9 @@
 //! Frame and unit: camera frame; mm, degrees, px.
 
 use super::checks::{expected_error, places_in_view};
-use super::solve::{LaserPlaneFit, LaserPlaneOptions, PeakUse, StripeView};
+use super::options::LaserPlaneOptions;
+use super::solve::{LaserPlaneFit, PeakUse};
+use super::views::StripeView;
 use crate::calibrate::limits::{Judgement, Limits, rms};
 use crate::calibrate::measured_pose::MISFIT;
 use crate::calibrate::report::{Page, axis_sphere, bars, coverage_map};

@@ -5,89 +5,17 @@
 pub use super::agree::SecondPlane;
 use super::agree::{agreeing, majority, near, second_plane};
 use super::checks::{Consistency, board_spread, consistency, depth_spread, from_camera, reach};
+use super::options::{LaserPlaneOptions, refused};
 use super::terms::{Data, Seen, State, basis, by_camera, look, mm_per_px, on_board, ratio};
+use super::views::StripeView;
 use crate::calibrate::boards::extent::{inside, to_print_edge};
 use crate::calibrate::measured_pose::MeasuredPose;
 use crate::calibrate::scatter::inflation;
 use crate::camera::{Intrinsics, ParameterCovariance, named};
-use crate::fault::{Fault, Result};
-use crate::geometry::{Board, Camera, Plane, Rigid, Vec2};
-use crate::recording::BoardSpec;
+use crate::fault::Result;
+use crate::geometry::{Board, Camera, Plane, Rigid};
 use crate::solve::Loss;
 use nalgebra::{DMatrix, Matrix6};
-
-/// One place where the stripe was found.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StripePeak {
-    /// px.
-    pub pixel: Vec2,
-    /// Standard deviation across the stripe, px.
-    pub sigma_px: f64,
-    /// Standard deviation of the stripe's own profile, px.
-    pub width_px: f64,
-}
-
-/// One board with the stripe on it.
-#[derive(Clone, Debug)]
-pub struct StripeView {
-    pub pose: MeasuredPose,
-    pub board: BoardSpec,
-    pub peaks: Vec<StripePeak>,
-}
-
-/// Settings of [`solve`].
-#[derive(Clone, Debug)]
-pub struct LaserPlaneOptions {
-    /// Peaks nearer to an edge of the print or the board than this many stripe widths are not used; 0..=20.
-    pub edge_widths: f64,
-    /// Peaks farther than this from the stripe of the plane that most agree with never enter, px; 0.5..=50.
-    pub gate_px: f64,
-    /// Peaks with a larger residual than this many sigmas are left out; 2.5..=10.
-    pub gate_sigmas: f64,
-    /// A picture is left out whose stripe lies farther than this from where the others predict it: squared, in sigmas of
-    /// both, two degrees of freedom; 9..=1000.
-    pub gate_surprise: f64,
-    /// Share of the length of a picture's stripe that must agree for it to count; 0.1..=0.95.
-    pub min_share: f64,
-    /// Fewest peaks a picture needs; 2..=10000.
-    pub min_peaks: usize,
-    /// Seed of the consensus.
-    pub seed: u64,
-}
-
-impl Default for LaserPlaneOptions {
-    fn default() -> Self {
-        LaserPlaneOptions {
-            edge_widths: 2.5,
-            gate_px: 2.0,
-            gate_sigmas: 4.0,
-            gate_surprise: 25.0,
-            min_share: 0.6,
-            min_peaks: 10,
-            seed: 1,
-        }
-    }
-}
-
-impl LaserPlaneOptions {
-    pub fn check(&self) -> Result<()> {
-        let ranges = [
-            ("edge_widths", self.edge_widths, 0.0, 20.0),
-            ("gate_px", self.gate_px, 0.5, 50.0),
-            ("gate_sigmas", self.gate_sigmas, 2.5, 10.0),
-            ("gate_surprise", self.gate_surprise, 9.0, 1000.0),
-            ("min_share", self.min_share, 0.1, 0.95),
-            ("min_peaks", self.min_peaks as f64, 2.0, 10000.0),
-        ];
-        match ranges.iter().find(|(_, v, low, high)| !(low..=high).contains(&v)) {
-            Some((name, v, low, high)) => {
-                Err(Fault::usage(format!("{name} is {v}, {low} to {high} is allowed"))
-                    .next("choose a value in that range"))
-            }
-            None => Ok(()),
-        }
-    }
-}
 
 /// Why a peak does not count.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -153,12 +81,6 @@ pub struct LaserPlaneFit {
     pub reach: [f64; 2],
     /// Spread of the stripes across their own direction, mm (rms): what holds the plane's tilt.
     pub depth_spread: f64,
-}
-
-pub(in crate::calibrate) fn refused(what: String) -> Fault {
-    Fault::refused(what)
-        .cause("the boards were too few, too alike, or hardly lit by the laser")
-        .next("show the board at five or more distances and tilts, the stripe right across it")
 }
 
 /// Fits the laser plane. `feature_factor` makes the stated sigmas of the boards' features true

@@ -2,7 +2,7 @@
 //! picture says about the plane with its board's pose eliminated.
 //! Frame and unit: camera frame, mm; peaks in px (docs/math.md, Laser plane (1) to (5)).
 
-use super::solve::{StripePeak, StripeView};
+use super::views::{StripePeak, StripeView};
 use crate::calibrate::measured_pose::{moved, step_between};
 use crate::camera::{Intrinsics, PARAMETERS, Parameters, difference_step};
 use crate::geometry::{Board, Camera, Plane, Rigid, Vec2, Vec3};

@@ -3,7 +3,7 @@
 //! Frame and unit: camera frame; mm, degrees, px.
 
 use super::range::{RigCovariance, range};
-use super::solve::{PointerFit, PointerOptions};
+use super::solve::{BEAM_NAMES, PointerFit, PointerOptions};
 use crate::calibrate::limits::{Limits, rms};
 use crate::calibrate::report::{Page, bars};
 use crate::calibrate::scatter::overrule;
@@ -11,9 +11,6 @@ use crate::camera::{Intrinsics, NAMES, PARAMETERS, ParameterCovariance, named};
 use crate::rig::{Covariance, Quality, Verdict};
 use nalgebra::Matrix2;
 use std::collections::BTreeMap;
-
-/// Names of the beam's own six parameters; the camera's follow in the file.
-pub const BEAM_NAMES: [&str; 6] = ["ox_mm", "oy_mm", "oz_mm", "dx", "dy", "dz"];
 
 pub fn covariance(fit: &PointerFit) -> Covariance {
     let camera: ParameterCovariance = fit.covariance.fixed_view::<PARAMETERS, PARAMETERS>(6, 6).into();

@@ -420,3 +420,6 @@ fn by_camera(
     }
     Some(out)
 }
+
+/// Names of the beam's own six parameters; the camera's follow in the file.
+pub const BEAM_NAMES: [&str; 6] = ["ox_mm", "oy_mm", "oz_mm", "dx", "dy", "dz"];

@@ -1,7 +1,7 @@
 //! In: a recording of a board and a station. Out: the station's camera calibration and a report page.
 //! Frame and unit: camera frame; pixels, mm.
 
-use super::{Keep, finish};
+use super::store::{Keep, finish};
 use crate::calibrate::camera::intrinsics::SolveOptions;
 use crate::calibrate::camera::lens::Lens;
 use crate::calibrate::camera::procedure::{CameraOptions, CameraResult, calibrate};

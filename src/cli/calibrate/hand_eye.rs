@@ -1,17 +1,18 @@
 //! In: a recording of a board with robot poses. Out: the camera on the flange (or in the base).
 //! Frame and unit: flange_T_camera or base_T_camera; mm, degrees.
 
-use super::{Keep, finish};
-use crate::calibrate::hand_eye::solve::{HandEyeOptions, Mount};
+use super::store::{Keep, finish};
+use crate::calibrate::hand_eye::options::{HandEyeOptions, Mount};
 use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Frame, Rigid};
 use crate::recording::{Recording, load_poses};
 use crate::rig::Rig;
 use crate::robot::Convention;
-use crate::station::calibrate_hand_eye;
 use crate::station::volume::asked;
-use crate::station::{HandEyeResult, HandEyeRun, PosePairs, Settings, calibrate_hand_eye_from_poses};
+use crate::station::{
+    HandEyeResult, HandEyeRun, PosePairs, Settings, calibrate_hand_eye, calibrate_hand_eye_from_poses,
+};
 use std::path::{Path, PathBuf};
 
 /// Find the camera's pose on the flange from pictures of a fixed board and the robot's poses

@@ -1,17 +1,16 @@
 //! In: a recording of boards with the stripe on them. Out: the laser plane.
 //! Frame and unit: camera frame, mm.
 
-use super::{Keep, finish};
-use crate::calibrate::laser_plane::solve::LaserPlaneOptions;
+use super::store::{Keep, finish};
+use crate::calibrate::laser_plane::options::LaserPlaneOptions;
 use crate::cli::terminal::console::Console;
 use crate::fault::Result;
 use crate::raster::Channel;
 use crate::recording::Recording;
 use crate::rig::Rig;
 use crate::scan::Where;
-use crate::station::calibrate_laser_plane;
 use crate::station::volume::asked;
-use crate::station::{LaserPlaneRun, Settings};
+use crate::station::{LaserPlaneRun, Settings, calibrate_laser_plane};
 use std::path::PathBuf;
 
 /// Find the laser plane from pictures of the stripe on boards

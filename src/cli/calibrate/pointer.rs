@@ -1,7 +1,7 @@
 //! In: a recording of boards with the pointer's spot on them. Out: the beam.
 //! Frame and unit: camera frame, mm.
 
-use super::{Keep, finish};
+use super::store::{Keep, finish};
 use crate::calibrate::pointer::solve::PointerOptions;
 use crate::calibrate::pointer::spot::SpotOptions;
 use crate::cli::terminal::console::Console;
@@ -9,9 +9,8 @@ use crate::fault::Result;
 use crate::raster::Channel;
 use crate::recording::Recording;
 use crate::rig::Rig;
-use crate::station::calibrate_pointer;
 use crate::station::volume::asked;
-use crate::station::{PointerRun, Settings};
+use crate::station::{PointerRun, Settings, calibrate_pointer};
 use std::path::PathBuf;
 
 /// Find the laser pointer's beam from pictures of its spot on boards

@@ -1,15 +1,14 @@
 //! In: profiles of a ball and robot poses. Out: a line-profile sensor's pose on the flange.
 //! Frame and unit: flange_T_sensor; mm, degrees.
 
-use super::{Keep, finish};
-use crate::calibrate::ball::solve::{BallOptions, Side};
+use super::store::{Keep, finish};
+use crate::calibrate::ball::options::{BallOptions, Side};
 use crate::calibrate::limits::Asked;
 use crate::cli::terminal::console::Console;
 use crate::fault::Result;
 use crate::rig::Volume;
 use crate::robot::Convention;
-use crate::station::calibrate_profile_hand_eye;
-use crate::station::{Settings, evaluate_profile_hand_eye};
+use crate::station::{Settings, calibrate_profile_hand_eye, evaluate_profile_hand_eye};
 use std::path::{Path, PathBuf};
 
 /// Find a line-profile sensor's pose on the flange from profiles of a ball and the robot's poses

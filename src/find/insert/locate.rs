@@ -3,14 +3,15 @@
 //! Frame and unit: base frame; mm, degrees; sigmas along the part's own axes.
 
 use super::budget::{Budget, budget, towards_camera};
+use super::gate::Gate;
 use super::looks;
 use super::looks::{Agreed, Disagreement, Look};
 use super::recipe::{Gates, Recipe};
 use super::verdict::{Agreement, TurnVote, judge, vote};
 use crate::fault::{Fault, Result};
 use crate::find::measure::construct::{Built, build, features};
-use crate::find::measure::points::Ordered;
-use crate::find::measure::pose::{Measured, localise, measure};
+use crate::find::measure::points::{Ordered, localise};
+use crate::find::measure::pose::{Measured, measure};
 use crate::find::measure::slide::{long_axis, slide};
 use crate::find::model::shape_model::ShapeModel;
 use crate::find::scene::{Kind, Layer, Scene};
@@ -20,8 +21,7 @@ use crate::find::search::refine::Pose;
 use crate::geometry::{Base, Grid, Part, Rigid, Tool, Vec3};
 use crate::rig::Rig;
 use crate::robot::Convention;
-use crate::scan::grid;
-use crate::scan::{CloudPoint, GridOptions, HeightMap};
+use crate::scan::{CloudPoint, GridOptions, HeightMap, grid};
 
 /// What else is known about a scan.
 #[derive(Clone, Debug)]
@@ -50,15 +50,6 @@ impl LocateOptions {
         let up = self.up.or_else(|| Some(first.base_from_part.direction(&Vec3::z())));
         LocateOptions { up, expected: Some(first.base_from_part), ..self }
     }
-}
-
-/// One gate: what was seen against the limit.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct Gate {
-    pub name: &'static str,
-    pub value: f64,
-    pub limit: f64,
-    pub passed: bool,
 }
 
 /// A pose for the robot.
@@ -414,19 +405,6 @@ const LOOKS: &str = "number of looks";
 /// The gates that a look missed by itself, in words.
 fn missed(gates: &[Gate]) -> impl Iterator<Item = String> {
     gates.iter().filter(|g| !g.passed && g.name != LOOKS).map(Gate::words)
-}
-
-impl Gate {
-    pub fn least(name: &'static str, value: f64, limit: f64) -> Gate {
-        Gate { name, value, limit, passed: value >= limit }
-    }
-    pub fn most(name: &'static str, value: f64, limit: f64) -> Gate {
-        Gate { name, value, limit, passed: value <= limit }
-    }
-    /// What was missed.
-    fn words(&self) -> String {
-        format!("{} is {:.3}, limit {:.3}", self.name, self.value, self.limit)
-    }
 }
 
 fn gates(

@@ -3,7 +3,7 @@
 //! explain it. Frame and unit: base frame; differences along the part's axes, mm and degrees. docs/math.md, Second look.
 
 use super::budget::Budget;
-use super::locate::Gate;
+use super::gate::Gate;
 use super::recipe::Gates;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Camera, Mat3, Part, Rigid, Vec3, exp, log};

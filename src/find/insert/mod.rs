@@ -3,6 +3,7 @@
 
 pub mod budget;
 mod from_drawing;
+pub mod gate;
 pub mod locate;
 mod look_plan;
 pub mod looks;

@@ -5,8 +5,9 @@
 use crate::fault::{Fault, Result};
 use crate::find::measure::construct;
 use crate::find::measure::construct::Construction;
-use crate::find::measure::pose::MeasureOptions;
-use crate::find::model::drawing::{Drawing, Shape};
+use crate::find::measure::options::MeasureOptions;
+use crate::find::model::drawing::Drawing;
+use crate::find::model::shape::Shape;
 use crate::find::model::shape_model::ModelOptions;
 use crate::find::scene::Kind;
 use crate::find::search::options::SearchOptions;

@@ -6,9 +6,11 @@ use super::locate::{LocateOptions, Report, locate};
 use super::recipe::{Gates, InsertionSpec, Recipe};
 use crate::fault::{Fault, Result};
 use crate::find::measure::construct::{Build, Construction, features};
+use crate::find::measure::options::MeasureOptions;
 use crate::find::measure::points::Ordered;
-use crate::find::measure::pose::{MeasureOptions, Measured, measure};
-use crate::find::model::drawing::{Drawing, Form, Inside, Shape};
+use crate::find::measure::pose::{Measured, measure};
+use crate::find::model::drawing::Drawing;
+use crate::find::model::shape::{Form, Inside, Shape};
 use crate::geometry::{Base, Grid, Part, Rigid, Vec3};
 use crate::scan::{CloudPoint, HeightMap};
 

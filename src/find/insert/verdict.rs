@@ -2,9 +2,10 @@
 //! how much of the part was seen, and which of its alike turns it is.
 //! Frame and unit: part frame, mm.
 
-use super::locate::Gate;
-use crate::find::measure::points::Ordered;
-use crate::find::measure::pose::{MeasureOptions, Measured, localise};
+use super::gate::Gate;
+use crate::find::measure::options::MeasureOptions;
+use crate::find::measure::points::{Ordered, localise};
+use crate::find::measure::pose::Measured;
 use crate::find::model::drawing::Drawing;
 use crate::find::model::edge_index::EdgeIndex;
 use crate::find::model::face::Face;

@@ -2,7 +2,7 @@
 //! built from them, each beside its nominal value.
 //! Frame and unit: the part frame of the measured pose; mm, rad.
 
-use super::pose::MeasureOptions;
+use super::options::MeasureOptions;
 use super::surface_ends::Observation;
 use crate::fault::{Fault, Result};
 use crate::find::model::drawing::Drawing;

@@ -2,8 +2,8 @@
 //! (docs/math.md, Insertion (1)).
 //! Frame and unit: a correction in the part frame: z mm, turns about x and y rad.
 
-use super::points::Ordered;
-use super::pose::{MeasureOptions, localise};
+use super::options::MeasureOptions;
+use super::points::{Ordered, localise};
 use super::robust::robust;
 use crate::fault::{Fault, Result};
 use crate::find::model::drawing::Drawing;

@@ -2,7 +2,7 @@
 //! covariance with what samples have in common: their shot's pose and their piece of edge (docs/math.md, Insertion (4)).
 //! Frame and unit: as `lit_edges`; light as a share, mm, rad.
 
-use super::lit_edges::{N, PRIORS, Unknowns};
+use nalgebra::SVector;
 use nalgebra::{Cholesky, SMatrix};
 use std::collections::BTreeMap;
 
@@ -159,3 +159,13 @@ fn spread(
     let grow = Unknowns::from_fn(|k, _| (seen[(k, k)] / known[(k, k)].max(1e-300)).max(1.0).sqrt());
     inverse * offsets * inverse + Square::from_fn(|i, k| known[(i, k)] * grow[i] * grow[k])
 }
+
+/// Unknowns: x, y, turn, growth along the stripe and from shot to shot, width of the light's fall there.
+pub(in crate::find) const N: usize = 7;
+
+pub(in crate::find) type Unknowns = SVector<f64, N>;
+
+/// Prior mean and standard deviation of the last four, in the recipe's unit of about 1 mm, as are the lengths below: optics blur a stripe's end by about a pixel, a line laser is
+/// about a tenth of a millimetre wide; both are measured where edges are sharp.
+pub(in crate::find) const PRIORS: [(usize, f64, f64); 4] =
+    [(3, 0.0, 0.05), (4, 0.0, 0.05), (5, 0.25, 0.15), (6, 0.12, 0.08)];

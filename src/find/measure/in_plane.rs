@@ -2,7 +2,7 @@
 //! (docs/math.md, Insertion (3) and (4)).
 //! Frame and unit: a correction in the part frame: x y mm, turn about z rad.
 
-use super::pose::MeasureOptions;
+use super::options::MeasureOptions;
 use super::robust::robust;
 use super::surface_ends::Observation;
 use crate::fault::{Fault, Result};

@@ -2,23 +2,15 @@
 //! how much of the sheet's light each sample beside an edge still sends back (docs/math.md, Insertion (3) and (4)).
 //! Frame and unit: a correction in the part frame: x y mm, turn about z rad; light as a share of a fully lit sample's.
 
-use super::edge_pieces::{Row, solve};
+use super::edge_pieces::{N, PRIORS, Row, Unknowns, solve};
+use super::options::MeasureOptions;
 use super::points::Ordered;
-use super::pose::MeasureOptions;
 use crate::find::model::drawn_edges::EdgeSample;
 use crate::find::model::edge_index::EdgeIndex;
 use crate::find::model::face::Face;
 use crate::geometry::Vec3;
-use nalgebra::{Matrix3, SVector, Vector2, Vector3};
+use nalgebra::{Matrix3, Vector2, Vector3};
 
-/// Unknowns: x, y, turn, growth along the stripe and from shot to shot, width of the light's fall there.
-pub(in crate::find) const N: usize = 7;
-pub(in crate::find) type Unknowns = SVector<f64, N>;
-
-/// Prior mean and standard deviation of the last four, in the recipe's unit of about 1 mm, as are the lengths below: optics blur a stripe's end by about a pixel, a line laser is
-/// about a tenth of a millimetre wide; both are measured where edges are sharp.
-pub(in crate::find) const PRIORS: [(usize, f64, f64); 4] =
-    [(3, 0.0, 0.05), (4, 0.0, 0.05), (5, 0.25, 0.15), (6, 0.12, 0.08)];
 /// Least width of the fall: a sharper one would make single samples decide.
 const SHARPEST: f64 = 0.03;
 /// A sample this far inside an edge is fully lit, and so near to it at most may it be to measure the edge.

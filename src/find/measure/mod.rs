@@ -6,6 +6,7 @@ mod datum;
 mod edge_pieces;
 mod in_plane;
 mod lit_edges;
+pub mod options;
 pub mod points;
 pub mod pose;
 mod robust;

@@ -2,8 +2,10 @@
 //! stripe, so that a point's neighbours along the stripe and in the next shot are known.
 //! Frame and unit: base frame, mm.
 
+use super::options::MeasureOptions;
 use crate::fault::{Fault, Result};
-use crate::geometry::Vec3;
+use crate::find::model::drawing::Drawing;
+use crate::geometry::{Base, Part, Rigid, Vec3};
 use crate::scan::CloudPoint;
 
 const NONE: u32 = u32::MAX;
@@ -122,4 +124,24 @@ impl Ordered {
     pub fn covers(&self, row: i64, column: i64) -> bool {
         row >= 0 && row < self.shot.len() as i64 && column >= 0 && column < self.columns as i64
     }
+}
+
+/// Points at and around the part in its own frame; `None` for the others.
+pub fn localise(
+    points: &Ordered,
+    drawing: &Drawing,
+    pose: &Rigid<Base, Part>,
+    options: &MeasureOptions,
+) -> Vec<Option<Vec3>> {
+    let (b, r) = (drawing.bounds(), 3.0 * options.unit());
+    let part_from_base = pose.inverse();
+    points
+        .points
+        .iter()
+        .map(|p| {
+            let q = part_from_base.point(p);
+            let near = q.x > b[0] - r && q.x < b[2] + r && q.y > b[1] - r && q.y < b[3] + r;
+            near.then_some(q)
+        })
+        .collect()
 }

@@ -7,56 +7,14 @@ use super::datum;
 use super::datum::{Datum, fit_datum};
 use super::in_plane::fit_edges;
 use super::lit_edges::fit_light;
-use super::points::Ordered;
+use super::options::MeasureOptions;
+use super::points::{Ordered, localise};
 use super::surface_ends::{Observation, surface_ends};
 use crate::fault::{Fault, Result};
 use crate::find::model::drawing::Drawing;
 use crate::find::model::edge_index::EdgeIndex;
 use crate::geometry::{Base, Part, Rigid, Vec3};
 use nalgebra::{Matrix6, Vector3};
-
-/// How the pose is measured.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct MeasureOptions {
-    /// A point nearer than this to a face's height lies on that face, mm, 0.0001 to 100.
-    pub height_gate_mm: f64,
-    /// An end of a surface this far from the drawn edge is still taken for that edge, mm, 0.0001 to 100.
-    pub edge_gate_mm: f64,
-    /// Points nearer than this to an edge do not vote on height and tilt, mm, 0.0001 to 100.
-    pub margin_mm: f64,
-    /// Standard deviation of what a piece of an edge has in common and the model of partly lit samples does not
-    /// explain (a wall that shows, a chamfer, the pixels' raster), as a share of the sampling step, 0 to 0.5.
-    pub edge_bias: f64,
-}
-
-impl Default for MeasureOptions {
-    fn default() -> Self {
-        MeasureOptions { height_gate_mm: 0.2, edge_gate_mm: 0.45, margin_mm: 0.5, edge_bias: 0.07 }
-    }
-}
-
-impl MeasureOptions {
-    /// Lengths of the measurement that nobody states are proportional to the margin, the reach of an edge's blur: they
-    /// were tried at 0.5 mm. One at that margin, two where everything is twice as large.
-    pub(in crate::find) fn unit(&self) -> f64 {
-        self.margin_mm / 0.5
-    }
-
-    pub fn check(&self) -> Result<()> {
-        let range = |name: &str, v: f64, a: f64, b: f64| {
-            if (a..=b).contains(&v) {
-                Ok(())
-            } else {
-                Err(Fault::usage(format!("{name} is {v}, wanted {a} to {b}")).next("correct [measure] in the recipe"))
-            }
-        };
-        range("height_gate_mm", self.height_gate_mm, 1e-4, 100.0)?;
-        range("edge_gate_mm", self.edge_gate_mm, 1e-4, 100.0)?;
-        range("margin_mm", self.margin_mm, 1e-4, 100.0)?;
-        range("edge_bias", self.edge_bias, 0.0, 0.5)
-    }
-}
 
 /// A measured pose.
 #[derive(Clone, Debug)]
@@ -161,24 +119,4 @@ pub fn measure(
         step,
         observations: plane.observations,
     })
-}
-
-/// Points at and around the part in its own frame; `None` for the others.
-pub fn localise(
-    points: &Ordered,
-    drawing: &Drawing,
-    pose: &Rigid<Base, Part>,
-    options: &MeasureOptions,
-) -> Vec<Option<Vec3>> {
-    let (b, r) = (drawing.bounds(), 3.0 * options.unit());
-    let part_from_base = pose.inverse();
-    points
-        .points
-        .iter()
-        .map(|p| {
-            let q = part_from_base.point(p);
-            let near = q.x > b[0] - r && q.x < b[2] + r && q.y > b[1] - r && q.y < b[3] + r;
-            near.then_some(q)
-        })
-        .collect()
 }

@@ -4,8 +4,8 @@
 //! search alone cannot tell; what lies at the part's ends can.
 
 use super::datum::laid;
+use super::options::MeasureOptions;
 use super::points::Ordered;
-use super::pose::MeasureOptions;
 use crate::find::model::drawing::Drawing;
 use crate::geometry::{Base, Part, Rigid, Vec3};
 

@@ -2,8 +2,8 @@
 //! (docs/math.md, Insertion (2)).
 //! Frame and unit: part frame, mm; light as a share of a fully lit sample's.
 
+use super::options::MeasureOptions;
 use super::points::Ordered;
-use super::pose::MeasureOptions;
 use crate::find::model::edge_index::EdgeIndex;
 use crate::find::model::face::Face;
 use crate::geometry::Vec3;

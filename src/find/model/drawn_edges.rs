@@ -2,9 +2,10 @@
 //! Out: faces (level surfaces with holes) and samples of their edges with outward normals.
 //! Frame and unit: the part's frame (x along the long axis, z out of the part); mm.
 
-use super::drawing::{Drawing, Form, Grid, Inside};
+use super::drawing::Drawing;
 use super::face::Face;
 use super::outline::{bounds, diameter};
+use super::shape::{Form, Grid, Inside};
 
 /// A polyline with what it bounds.
 #[derive(Clone, Debug)]

@@ -7,4 +7,5 @@ pub mod edge_index;
 pub mod face;
 pub mod gradient;
 pub mod outline;
+pub mod shape;
 pub mod shape_model;

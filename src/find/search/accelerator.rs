@@ -1,7 +1,7 @@
 //! In: a level and the places of a model's features at every turn. Out: the peaks of their sums, computed by WGSL stages;
 //! the same numbers as the CPU's. Frame and unit: strided places of the level; a perfect feature scores 4.
 
-use super::coarse::{Level, Placed};
+use super::level::{Level, Placed};
 use crate::fault::{Fault, Result};
 use crate::gpu::{Device, Pipeline, Recording, Replay};
 use crate::stages::shape_frame::ShapeFrame;

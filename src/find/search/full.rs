@@ -4,7 +4,8 @@
 
 use super::accelerator::Accelerator;
 use super::climb::{Candidate, Directions, climb, score};
-use super::coarse::{Level, Query, Turn, turn_between};
+use super::coarse::{Query, Turn, turn_between};
+use super::level::Level;
 use super::options::SearchOptions;
 use super::refine::{Pose, refine};
 use crate::fault::{Fault, Result};

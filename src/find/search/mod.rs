@@ -5,5 +5,6 @@ pub mod accelerator;
 mod climb;
 pub mod coarse;
 pub mod full;
+pub mod level;
 pub mod options;
 pub mod refine;

@@ -4,8 +4,9 @@
 
 use super::hand_eye::Calibrated;
 use crate::calibrate::ball::evaluate::{Evaluation, evaluate};
+use crate::calibrate::ball::options::BallOptions;
 use crate::calibrate::ball::profiles::load;
-use crate::calibrate::ball::solve::{BallFit, BallOptions, solve};
+use crate::calibrate::ball::solve::{BallFit, solve};
 use crate::calibrate::hand_eye::report::HAND_EYE_NAMES;
 use crate::calibrate::limits::{Asked, Limits, rms};
 use crate::calibrate::report::{Page, bars};
@@ -127,7 +128,7 @@ fn judge(fit: &BallFit, limits: &Limits) -> Quality {
     );
     j.reasons.push(format!(
         "the ball's centre lies on the {} side of the profile plane in most profiles; the other side fits worse by {:.0}",
-        if fit.side == crate::calibrate::ball::solve::Side::Plus { "plus" } else { "minus" },
+        if fit.side == crate::calibrate::ball::options::Side::Plus { "plus" } else { "minus" },
         fit.side_margin
     ));
     j.at_best(Verdict::Usable, used.len() < 12, || format!("{} profiles, 12 are needed to be good", used.len()));

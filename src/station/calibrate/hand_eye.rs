@@ -5,8 +5,9 @@
 use super::board_views::{FrameBoard, boards};
 use crate::calibrate::boards::turns;
 use crate::calibrate::hand_eye::closed::Pair;
+use crate::calibrate::hand_eye::options::{HandEyeOptions, Mount};
 use crate::calibrate::hand_eye::report::{covariance, judge, page};
-use crate::calibrate::hand_eye::solve::{HandEyeOptions, Mount, solve};
+use crate::calibrate::hand_eye::solve::solve;
 use crate::calibrate::hand_eye::turns::{read_with, resolve};
 use crate::calibrate::limits::Asked;
 use crate::calibrate::measured_pose::{AboutCamera, MeasuredPose, intrinsic_covariance};

@@ -4,7 +4,7 @@
 //! Frame and unit: pixels of a camera without lens distortion, in which the line is straight.
 
 use crate::calibrate::boards::extent::inside;
-use crate::calibrate::laser_plane::solve::StripeView;
+use crate::calibrate::laser_plane::views::StripeView;
 use crate::camera::Intrinsics;
 use crate::fault::Result;
 use crate::geometry::Vec2;
@@ -69,7 +69,7 @@ pub fn keep_straight(views: &mut [StripeView], camera: &Intrinsics, device: Opti
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibrate::laser_plane::solve::StripePeak;
+    use crate::calibrate::laser_plane::views::StripePeak;
     use crate::calibrate::measured_pose::{SeenBoard, measure};
     use crate::geometry::{Rigid, Vec3};
     use crate::recording::BoardSpec;

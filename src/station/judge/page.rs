@@ -2,8 +2,8 @@
 //! carries its pictures and points inside and loads nothing from anywhere.
 //! Frame and unit: points of the view in the grid frame, mm.
 
+use super::figures::{HISTOGRAM_STEP, Judged};
 use super::parts::FoundPart;
-use super::points::{HISTOGRAM_STEP, Judged};
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec3;
 use crate::scan::{CloudFile, HeightMap, PointSource};
