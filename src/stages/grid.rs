@@ -221,7 +221,7 @@ fn fixed(bits: u32, places: i32) -> i32 {
         0.. => (mantissa << s) as i32,
         _ => {
             let t = (-s).min(26);
-            (mantissa + (1 << (t - 1)) >> t) as i32
+            ((mantissa + (1 << (t - 1))) >> t) as i32
         }
     };
     if bits >> 31 == 1 { -size } else { size }
