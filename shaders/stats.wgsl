@@ -1,5 +1,5 @@
 // In: pictures. Out: per block of 16 x 8 pixels its sum, its largest and smallest pixel, and its smallest sums of a
-// row, of a column and of a quad (2 x 2 pixels): what `bands` and `tiles` need to prove that it holds no lit pixel.
+// row, of a column and of a quad (2 x 2 pixels): what `tiles` needs to prove that it holds no lit pixel.
 // The only pass that touches every pixel: 16 pixels a load, four pixels an addition. Deeper pictures are
 // given in 256ths of their full scale, rounded to the safe side: largest up, all else down.
 @group(0) @binding(0) var<uniform> frame: Frame;
