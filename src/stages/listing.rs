@@ -3,6 +3,8 @@
 
 use super::frame::{self, ACTIVITY, Frame, PX_LOG2, SHARED, frame_of, tile_unpack};
 use crate::gpu::{Access::*, Binding, Stage};
+use crate::stages::same::Same;
+use crate::stages::step::{Groups, Step};
 
 /// Words between the headers of two lists: 256 bytes, which every adapter can bind.
 pub const HEADER_WORDS: u32 = 64;
@@ -23,6 +25,15 @@ pub const RESET: Stage = Stage {
     overrides: &[PX_LOG2],
 };
 
+/// Empties the headers of all lists.
+pub const RESETTING: Step = Step {
+    stage: &RESET,
+    twin: reset_twin,
+    binds: &["frame", "single headers", "lit headers", "run headers", "active headers"],
+    groups: Groups::Of(|_| [1, 1, 1]),
+    same: Same::Words,
+};
+
 pub const CLEAR: Stage = Stage {
     name: "clear",
     wgsl: include_str!("../../shaders/clear.wgsl"),
@@ -37,6 +48,15 @@ pub const CLEAR: Stage = Stage {
         Binding { name: "counts", access: ReadWrite },
     ],
     ..RESET
+};
+
+/// Empties the tiles that the last batch listed.
+pub const CLEARING: Step = Step {
+    stage: &CLEAR,
+    twin: clear_twin,
+    binds: &["frame", "lit header", "lit list", "mask", "other mask", "lit", "stamps", "counts"],
+    groups: Groups::Listed("lit header"),
+    same: Same::Words,
 };
 
 pub const COMPACT: Stage = Stage {
@@ -54,6 +74,15 @@ pub const COMPACT: Stage = Stage {
     ..RESET
 };
 
+/// Shortens the list to the tiles that still change.
+pub const COMPACTING: Step = Step {
+    stage: &COMPACT,
+    twin: compact_twin,
+    binds: &["frame", "lit header", "lit list", "stamps", "header after 1", "active list"],
+    groups: Groups::Listed("lit header"),
+    same: Same::Lists(&[(5, 1)]),
+};
+
 pub const REBASE: Stage = Stage {
     name: "rebase",
     wgsl: include_str!("../../shaders/rebase.wgsl"),
@@ -64,6 +93,15 @@ pub const REBASE: Stage = Stage {
         Binding { name: "stamps", access: ReadWrite },
     ],
     ..RESET
+};
+
+/// Makes the stamps of a round those before a further one.
+pub const REBASING: Step = Step {
+    stage: &REBASE,
+    twin: rebase_twin,
+    binds: &["frame", "lit header", "lit list", "stamps"],
+    groups: Groups::Listed("lit header"),
+    same: Same::Words,
 };
 
 /// Adds an entry, a tile or a run of them: word 3 of the header counts, word 0 is the number of workgroups of 64 entries.

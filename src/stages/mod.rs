@@ -11,12 +11,15 @@ mod list;
 pub mod listing;
 pub mod noise;
 pub mod peak;
+mod same;
 pub mod shape;
+pub mod step;
 pub mod stripe;
 pub mod support;
 
-pub use entry::{Case, Entry, Verdict, differing_words, differing_words_beside_order};
+pub use entry::{Case, Entry, Verdict};
 pub use frame::Frame;
 pub use list::all;
+pub use same::{Same, differing_words, differing_words_beside_order};
 pub use stripe::thin::Thinning;
 pub use stripe::threshold_params::{ThresholdParams, Window};

@@ -3,7 +3,7 @@
 
 use super::config::ChainConfig;
 use super::measured::{Measuring, POSE_BYTES};
-use super::recorded::{Pipelines, Shared};
+use super::recorded::Recorded;
 use crate::fault::{Fault, Result};
 use crate::gpu::{Device, PART, Recording, Replay, Ring, RingSizes, StageTime};
 use crate::raster::{Image, Mask};
@@ -31,7 +31,7 @@ pub struct Chain {
     header: Vec<u32>,
     tags: VecDeque<u64>,
     shots_in: VecDeque<u32>,
-    shared: Shared,
+    recorded: Recorded,
     /// Where the poses begin in the input, if points are wanted.
     poses: Option<usize>,
     /// Rows of a picture that are written at a time, and the input's bytes in such parts.
@@ -104,7 +104,7 @@ impl Chain {
         frame.flags |= if config.prune { 0 } else { ALL_TILES };
         frame.lengthen = config.lengthen;
         frame.flags |= if config.region.is_some() { HAS_ROI } else { 0 };
-        let shared = Shared::new(device, &frame, config)?;
+        let recorded = Recorded::new(device, &frame, config)?;
         let measuring = match &config.measure {
             Some(m) => Some(Measuring::new(device, &frame, config.bits, m)?),
             None => None,
@@ -125,19 +125,19 @@ impl Chain {
             },
         )?;
         let (band, parts) = parts(&frame, input);
-        let pipelines = Pipelines::new(device, config)?;
         let mut runs = Runs {
             prepare: Vec::new(),
             front: Vec::new(),
-            thinning: shared.thinning(device, &pipelines),
-            restart: shared.restart(device, &pipelines),
+            thinning: recorded.thinning(device, &frame),
+            restart: recorded.restart(device, &frame),
             back: Vec::new(),
         };
         for slot in &ring.slots {
-            runs.prepare.push(shared.prepare(device, &frame, &pipelines, &slot.input));
-            runs.front.push(shared.front(device, &frame, &pipelines, &slot.input));
             let pixels = measuring.as_ref().map_or(&slot.outputs[0].buffer, |m| &m.pixels);
-            let mut back = shared.back(device, &frame, &pipelines, &slot.input, &slot.header, pixels);
+            let own = [("image", &slot.input), ("header", &slot.header), ("points", pixels)];
+            runs.prepare.push(recorded.prepare(device, &frame, &own));
+            runs.front.push(recorded.front(device, &frame, &own));
+            let mut back = recorded.back(device, &frame, &own);
             if let Some(m) = &measuring {
                 let poses = (&slot.input, poses, POSE_BYTES * u64::from(frame.shots));
                 let [peaks, points] = [0, 1].map(|i| &slot.outputs[i].buffer);
@@ -157,7 +157,7 @@ impl Chain {
             header: vec![0; skeleton::HEADER + frame.shots as usize + 1],
             tags: VecDeque::new(),
             shots_in: VecDeque::new(),
-            shared,
+            recorded,
             poses: measuring.is_some().then_some(poses as usize),
             band,
             parts,
@@ -288,12 +288,12 @@ impl Chain {
 
     /// The thinned mask of a shot of the batch that ran last; for tests and pictures, not for the shot path.
     pub fn mask(&self, shot: u32) -> Result<Mask> {
-        let words: Vec<u32> = bytemuck::pod_collect_to_vec(&self.device.read(&self.shared.mask)?);
+        let words: Vec<u32> = bytemuck::pod_collect_to_vec(&self.device.read(self.recorded.buffer("mask"))?);
         Ok(self.frame.unpack_mask(&words, shot))
     }
     /// As `mask`, before thinning.
     pub fn lit(&self, shot: u32) -> Result<Mask> {
-        let words: Vec<u32> = bytemuck::pod_collect_to_vec(&self.device.read(&self.shared.lit)?);
+        let words: Vec<u32> = bytemuck::pod_collect_to_vec(&self.device.read(self.recorded.buffer("lit"))?);
         Ok(self.frame.unpack_mask(&words, shot))
     }
 

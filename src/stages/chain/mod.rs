@@ -7,6 +7,7 @@ pub mod measure;
 pub mod measured;
 pub mod part;
 mod recorded;
+pub mod table;
 
 pub use batches::{Batch, Chain};
 pub use config::ChainConfig;

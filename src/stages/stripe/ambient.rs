@@ -6,6 +6,8 @@ use crate::gpu::{Binding, Stage};
 use crate::raster::{Image, Pixels};
 use crate::stages::frame;
 use crate::stages::frame::{Frame, PX_LOG2, SHARED, frame_of};
+use crate::stages::same::Same;
+use crate::stages::step::{Groups, Step};
 
 pub const STAGE: Stage = Stage {
     name: "ambient",
@@ -19,6 +21,15 @@ pub const STAGE: Stage = Stage {
     ],
     uniform: frame::UNIFORM,
     overrides: &[PX_LOG2],
+};
+
+/// Subtracts the ambient light from the pictures where they lie.
+pub const STEP: Step = Step {
+    stage: &STAGE,
+    twin: twin,
+    binds: &["frame", "image", "ambient"],
+    groups: Groups::Of(groups),
+    same: Same::Words,
 };
 
 /// One invocation for 4 words of one shot.

@@ -8,6 +8,8 @@ use crate::raster::{Image, Mask};
 use crate::stages::frame;
 use crate::stages::frame::{PIXELS, PX_LOG2, SHARED, frame_of, tile_unpack};
 use crate::stages::listing::mask_index;
+use crate::stages::same::Same;
+use crate::stages::step::{Groups, Step};
 
 /// Thinning eats a lit streak from its ends as it does from its sides, so a skeleton stops short of the edge by half
 /// of the streak's thickness. The edge itself is where a blurred step has half of its height: an end is carried on
@@ -143,6 +145,15 @@ pub const COPY: Stage = Stage {
     overrides: &[PX_LOG2],
 };
 
+/// A copy of the thinned mask, to be carried on.
+pub const COPYING: Step = Step {
+    stage: &COPY,
+    twin: copy_twin,
+    binds: &["frame", "lit header", "lit list", "mask", "long"],
+    groups: Groups::Listed("lit header"),
+    same: Same::Words,
+};
+
 /// Adds the ends. Only lit pixels are added, so they lie in listed tiles.
 pub const STAGE: Stage = Stage {
     name: "lengthen",
@@ -158,6 +169,15 @@ pub const STAGE: Stage = Stage {
         Binding { name: "long", access: ReadWrite },
     ],
     ..COPY
+};
+
+/// Carries the ends of lines on.
+pub const STEP: Step = Step {
+    stage: &STAGE,
+    twin: stage_twin,
+    binds: &["frame", "image", "lit header", "lit list", "mask", "lit", "long"],
+    groups: Groups::Listed("lit header"),
+    same: Same::Words,
 };
 
 pub fn copy_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {

@@ -7,6 +7,8 @@ use crate::raster::Mask;
 use crate::stages::frame;
 use crate::stages::frame::{Frame, PX_LOG2, SHARED, frame_of, tile_unpack};
 use crate::stages::listing::{HEADER_WORDS, mask_index, tile_index};
+use crate::stages::same::Same;
+use crate::stages::step::{Groups, Step};
 
 /// Width and height of the tiles that the stages work in, in pixels: one word wide.
 pub const TILE: (u32, u32) = (32, 8);
@@ -55,6 +57,15 @@ pub const COUNT: Stage = Stage {
     overrides: &[PX_LOG2],
 };
 
+/// Pixels of each tile.
+pub const COUNTING: Step = Step {
+    stage: &COUNT,
+    twin: count_twin,
+    binds: &["frame", "lit header", "lit list", "long", "counts"],
+    groups: Groups::Listed("lit header"),
+    same: Same::Words,
+};
+
 /// Counts before each tile in its row of tiles.
 pub const SCAN_ROWS: Stage = Stage {
     name: "scan_rows",
@@ -66,6 +77,15 @@ pub const SCAN_ROWS: Stage = Stage {
         Binding { name: "rows", access: ReadWrite },
     ],
     ..COUNT
+};
+
+/// Where each tile begins in its row.
+pub const SCANNING_ROWS: Step = Step {
+    stage: &SCAN_ROWS,
+    twin: scan_rows_twin,
+    binds: &["frame", "counts", "starts", "rows"],
+    groups: Groups::Of(rows_groups),
+    same: Same::Words,
 };
 
 /// Counts before each row of tiles in its shot, and each shot's.
@@ -81,6 +101,15 @@ pub const SCAN_SHOTS: Stage = Stage {
     ..COUNT
 };
 
+/// Where each row begins in its shot.
+pub const SCANNING_SHOTS: Step = Step {
+    stage: &SCAN_SHOTS,
+    twin: scan_shots_twin,
+    binds: &["frame", "rows", "row starts", "totals"],
+    groups: Groups::Of(shots_groups),
+    same: Same::Words,
+};
+
 /// The point list's header.
 pub const HEAD: Stage = Stage {
     name: "header",
@@ -93,6 +122,15 @@ pub const HEAD: Stage = Stage {
         Binding { name: "header", access: ReadWrite },
     ],
     ..COUNT
+};
+
+/// What the batch came to.
+pub const HEADING: Step = Step {
+    stage: &HEAD,
+    twin: head_twin,
+    binds: &["frame", "totals", "all header", "active headers", "header"],
+    groups: Groups::Of(shots_groups),
+    same: Same::Words,
 };
 
 /// The point list: (x | y << 16, shot).
@@ -110,6 +148,15 @@ pub const STAGE: Stage = Stage {
         Binding { name: "points", access: ReadWrite },
     ],
     ..COUNT
+};
+
+/// The list of pixels.
+pub const STEP: Step = Step {
+    stage: &STAGE,
+    twin: stage_twin,
+    binds: &["frame", "lit header", "lit list", "long", "starts", "row starts", "header", "points"],
+    groups: Groups::Listed("lit header"),
+    same: Same::Words,
 };
 
 /// Words of the point list's header before the shots' first points.

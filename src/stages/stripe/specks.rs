@@ -9,6 +9,8 @@ use crate::gpu::Access::*;
 use crate::gpu::{Binding, Stage};
 use crate::stages::frame::{Frame, HAS_ROI, frame_of, tile_unpack};
 use crate::stages::listing::{append, mask_index};
+use crate::stages::same::Same;
+use crate::stages::step::{Groups, Step};
 
 pub const STAGE: Stage = Stage {
     name: "specks",
@@ -27,6 +29,27 @@ pub const STAGE: Stage = Stage {
         Binding { name: "runs", access: ReadWrite },
     ],
     ..threshold::MEAN
+};
+
+/// Lit pixels of the tiles that stand alone.
+pub const STEP: Step = Step {
+    stage: &STAGE,
+    twin: twin,
+    binds: &[
+        "frame",
+        "image",
+        "single header",
+        "singles",
+        "roi",
+        "mask",
+        "lit",
+        "lit header",
+        "lit list",
+        "run header",
+        "runs",
+    ],
+    groups: Groups::Listed("single header"),
+    same: Same::Lists(&[(8, 1), (10, 2)]),
 };
 
 /// Least brightness that passes against a window of that sum.

@@ -5,6 +5,8 @@ use crate::gpu::Access::*;
 use crate::gpu::{Binding, Stage};
 use crate::stages::frame;
 use crate::stages::frame::{Frame, PX_LOG2, SHARED, frame_of};
+use crate::stages::same::Same;
+use crate::stages::step::{Groups, Step};
 
 pub const STAGE: Stage = Stage {
     name: "stats",
@@ -18,6 +20,15 @@ pub const STAGE: Stage = Stage {
     ],
     uniform: frame::UNIFORM,
     overrides: &[PX_LOG2],
+};
+
+/// Sums and extremes of every block.
+pub const STEP: Step = Step {
+    stage: &STAGE,
+    twin: twin,
+    binds: &["frame", "image", "stats"],
+    groups: Groups::Of(groups),
+    same: Same::Words,
 };
 
 /// One invocation a block, two blocks a tile.

@@ -7,6 +7,8 @@ use crate::raster::Mask;
 use crate::stages::frame;
 use crate::stages::frame::{PX_LOG2, SHARED, frame_of, tile_unpack};
 use crate::stages::listing::{mask_index, tile_index};
+use crate::stages::same::Same;
+use crate::stages::step::{Groups, Step};
 
 /// One sub-iteration over the listed tiles.
 pub const STAGE: Stage = Stage {
@@ -24,6 +26,15 @@ pub const STAGE: Stage = Stage {
     ],
     uniform: frame::UNIFORM,
     overrides: &[PX_LOG2, RULE],
+};
+
+/// One sub-iteration of thinning; a round binds other headers and turns the masks around.
+pub const STEP: Step = Step {
+    stage: &STAGE,
+    twin: stage_twin,
+    binds: &["frame", "lit header", "lit list", "mask", "other mask", "stamps"],
+    groups: Groups::Listed("lit header"),
+    same: Same::Words,
 };
 
 /// Selects the rule when the pipeline is built, [`Thinning::number`].

@@ -8,6 +8,8 @@ use crate::gpu::{Binding, Stage};
 use crate::raster::{Image, Mask};
 use crate::stages::frame;
 use crate::stages::frame::{COLUMNS, Frame, PIXELS, PX_LOG2, SHARED, frame_of, tile_unpack};
+use crate::stages::same::Same;
+use crate::stages::step::{Groups, Step};
 
 /// Half the window's edge, less a half: a constant of the mean window's pipeline.
 pub const RADIUS: &str = "radius";
@@ -33,6 +35,15 @@ pub const MEAN: Stage = Stage {
     overrides: &[PX_LOG2, RADIUS],
 };
 
+/// Lit pixels of runs of tiles, by the mean of a window.
+pub const BY_MEAN: Step = Step {
+    stage: &MEAN,
+    twin: mean_twin,
+    binds: &["frame", "image", "run header", "runs", "roi", "mask", "lit", "lit header", "lit list"],
+    groups: Groups::Listed("run header"),
+    same: Same::Lists(&[(8, 1)]),
+};
+
 /// Gaussian window.
 pub const GAUSSIAN: Stage = Stage {
     name: "threshold_gaussian",
@@ -48,6 +59,19 @@ pub const GAUSSIAN: Stage = Stage {
     ],
     overrides: &[PX_LOG2],
     ..MEAN
+};
+
+/// Lit pixels by a Gaussian window.
+pub const BY_GAUSSIAN: Step = Step {
+    stage: &GAUSSIAN,
+    twin: stage_twin,
+    binds: &["frame", "image", "single header", "singles", "weights", "quads"],
+    groups: Groups::Listed("single header"),
+    same: Same::Within(
+        pixels_apart,
+        1.0,
+        "f32 sums in another order; at most 1 pixel in 100,000 lies that near to its limit",
+    ),
 };
 
 /// Quads to words, cut to the picture and the region of interest.
@@ -67,6 +91,15 @@ pub const GATHER: Stage = Stage {
     ],
     shared: &[SHARED],
     ..GAUSSIAN
+};
+
+/// Their words of the mask.
+pub const GATHERING: Step = Step {
+    stage: &GATHER,
+    twin: gather_twin,
+    binds: &["frame", "single header", "singles", "quads", "roi", "mask", "lit", "lit header", "lit list"],
+    groups: Groups::Listed("single header"),
+    same: Same::Lists(&[(8, 1)]),
 };
 
 /// Lit exactly when `value - offset > round(sum / n^2)`. Because n is odd the mean is never half way

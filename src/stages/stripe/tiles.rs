@@ -10,6 +10,8 @@ use crate::gpu::{Binding, Stage};
 use crate::stages::frame;
 use crate::stages::frame::{ALL_TILES, Frame, GAUSSIAN, HAS_ROI, PX_LOG2, SHARED, frame_of, tile_pack};
 use crate::stages::listing::append;
+use crate::stages::same::Same;
+use crate::stages::step::{Groups, Step};
 
 pub const STAGE: Stage = Stage {
     name: "tiles",
@@ -28,6 +30,15 @@ pub const STAGE: Stage = Stage {
     ],
     uniform: frame::UNIFORM,
     overrides: &[PX_LOG2, RADIUS, WEIGHTED],
+};
+
+/// Lists the tiles that may hold a lit pixel.
+pub const STEP: Step = Step {
+    stage: &STAGE,
+    twin: twin,
+    binds: &["frame", "stats", "roi", "all header", "single header", "singles", "run header", "runs"],
+    groups: Groups::Of(groups),
+    same: Same::Lists(&[(5, 2), (7, 2)]),
 };
 
 /// 1 for a window with weights ([`GAUSSIAN`]): a constant of the pipeline.

@@ -1,0 +1,187 @@
+//! In: the layout of a batch. Out: the chain as one table: its buffers, and its steps in order. Recording, the walk on the
+//! twins and the tests read it; nothing else knows the order. Reasons: docs/math.md, Stripe stages.
+//! Frame and unit: words of 32 bits.
+
+use crate::stages::Thinning;
+use crate::stages::frame::{Frame, GAUSSIAN, HAS_ROI, PX_LOG2, px_log2};
+use crate::stages::listing::{self, HEADER_WORDS};
+use crate::stages::step::{Groups, Step};
+use crate::stages::stripe::{ambient, lengthen, skeleton, specks, stats, thin, threshold, tiles};
+
+/// The uniform block, another one each sub-iteration of thinning.
+pub const FRAME: &str = "frame";
+
+/// Sub-iterations in one round of thinning; a stripe 50 px wide takes 52. Wider ones go further rounds.
+pub const ROUND: u32 = 56;
+/// Sub-iterations before which the tile list is shortened: the ends of the sections of a round. The first time soon: most tiles of a noisy picture hold specks
+/// that never change. Then at most 8 apart: what a change can travel in them stays within the neighbouring tiles,
+/// which are 8 px high.
+const SHORTEN: [u32; 8] = [2, 8, 16, 24, 32, 40, 48, ROUND];
+
+/// Buffers that all batches use one after the other, and their words.
+pub const BUFFERS: &[(&str, fn(&Frame) -> u32)] = &[
+    ("ambient", |f| f.shot_words),
+    ("stats", |f| 4 * f.tiles()),
+    ("roi", |f| if f.flags & HAS_ROI != 0 { f.tiles_x * f.tiles_y * 8 } else { 4 }),
+    ("weights", |f| f.size),
+    ("single headers", |_| 2 * HEADER_WORDS),
+    ("singles", |f| 2 * f.tiles()),
+    ("run headers", |_| HEADER_WORDS),
+    ("runs", |f| 2 * f.tiles()),
+    ("lit headers", |_| HEADER_WORDS),
+    ("lit list", |f| f.tiles()),
+    ("active headers", |_| HEADER_WORDS * SHORTEN.len() as u32),
+    ("active list", |f| f.tiles()),
+    // The Gaussian window's lit pixels before they are gathered into words.
+    ("quads", |f| if f.flags & GAUSSIAN != 0 { 8 * f.tiles() } else { 4 }),
+    ("mask", Frame::mask_words),
+    ("other mask", Frame::mask_words),
+    ("lit", Frame::mask_words),
+    ("long", Frame::mask_words),
+    ("stamps", Frame::tiles),
+    ("counts", Frame::tiles),
+    ("starts", Frame::tiles),
+    ("rows", |f| f.tiles_y * f.shots),
+    ("row starts", |f| f.tiles_y * f.shots),
+    ("totals", |f| f.shots),
+];
+
+/// Headers of lists, by name: the buffer and the first of their four words.
+pub const HEADERS: &[(&str, &str, u32)] = &[
+    ("single header", "single headers", 0),
+    // The count of all tiles that are listed.
+    ("all header", "single headers", HEADER_WORDS),
+    ("run header", "run headers", 0),
+    ("lit header", "lit headers", 0),
+    (SHORTENED[1], "active headers", 0),
+    (SHORTENED[2], "active headers", HEADER_WORDS),
+    (SHORTENED[3], "active headers", 2 * HEADER_WORDS),
+    (SHORTENED[4], "active headers", 3 * HEADER_WORDS),
+    (SHORTENED[5], "active headers", 4 * HEADER_WORDS),
+    (SHORTENED[6], "active headers", 5 * HEADER_WORDS),
+    (SHORTENED[7], "active headers", 6 * HEADER_WORDS),
+    (SHORTENED[8], "active headers", 7 * HEADER_WORDS),
+];
+/// Words of a header.
+pub const HEADER: u32 = 4;
+
+/// The header of the list after so many shortenings.
+const SHORTENED: [&str; 9] = [
+    "lit header",
+    "header after 1",
+    "header after 2",
+    "header after 3",
+    "header after 4",
+    "header after 5",
+    "header after 6",
+    "header after 7",
+    "header after 8",
+];
+
+/// A step, what it binds in this place, and the sub-iteration that its uniform block holds.
+#[derive(Clone, Debug)]
+pub struct Placed {
+    pub step: Step,
+    pub binds: Vec<&'static str>,
+    pub groups: Groups,
+    pub iteration: u32,
+}
+
+impl From<Step> for Placed {
+    fn from(step: Step) -> Placed {
+        Placed { binds: step.binds.to_vec(), groups: step.groups, iteration: 0, step }
+    }
+}
+
+/// Every step of the chain, each once, in order; a new stage is one line here.
+pub const STEPS: &[Step] = &[
+    listing::CLEARING,
+    listing::RESETTING,
+    ambient::STEP,
+    stats::STEP,
+    tiles::STEP,
+    specks::STEP,
+    threshold::BY_MEAN,
+    threshold::BY_GAUSSIAN,
+    threshold::GATHERING,
+    thin::STEP,
+    listing::COMPACTING,
+    listing::REBASING,
+    lengthen::COPYING,
+    lengthen::STEP,
+    skeleton::COUNTING,
+    skeleton::SCANNING_ROWS,
+    skeleton::SCANNING_SHOTS,
+    skeleton::HEADING,
+    skeleton::STEP,
+];
+
+/// What is done to the pictures where they lie, once: a batch that starts over must not do it again.
+pub fn prepare(has_ambient: bool) -> Vec<Placed> {
+    has_ambient.then(|| ambient::STEP.into()).into_iter().collect()
+}
+
+/// From the pictures to the mask.
+pub fn front(f: &Frame) -> Vec<Placed> {
+    let threshold: &[Step] = if f.flags & GAUSSIAN != 0 {
+        &[threshold::BY_GAUSSIAN, threshold::GATHERING]
+    } else {
+        &[specks::STEP, threshold::BY_MEAN]
+    };
+    let first = [listing::CLEARING, listing::RESETTING, stats::STEP, tiles::STEP];
+    first.iter().chain(threshold).map(|&s| s.into()).collect()
+}
+
+/// One round of thinning, in sections that end with a shortened list.
+pub fn thinning() -> Vec<Vec<Placed>> {
+    let begins = std::iter::once(0).chain(SHORTEN);
+    let section = |(n, (begin, end)): (usize, (u32, u32))| {
+        let (header, list) = (SHORTENED[n], if n == 0 { "lit list" } else { "active list" });
+        let thinned = (begin..end).map(|iteration| {
+            let (from, to) = if iteration % 2 == 0 { ("mask", "other mask") } else { ("other mask", "mask") };
+            let binds = vec![FRAME, header, list, from, to, "stamps"];
+            Placed { binds, groups: Groups::Listed(header), iteration, step: thin::STEP }
+        });
+        let binds = vec![FRAME, "lit header", "lit list", "stamps", SHORTENED[n + 1], "active list"];
+        let shortened = Placed { binds, iteration: end, ..listing::COMPACTING.into() };
+        thinned.chain([shortened]).collect()
+    };
+    begins.zip(SHORTEN).enumerate().map(section).collect()
+}
+
+/// Between two rounds of thinning.
+pub fn restart() -> Vec<Placed> {
+    vec![
+        Placed { iteration: ROUND, ..listing::REBASING.into() },
+        // Later than the first sub-iteration, it leaves the lists that the front made.
+        Placed { iteration: 1, ..listing::RESETTING.into() },
+    ]
+}
+
+/// From the thinned mask to the list of points.
+pub fn back(f: &Frame) -> Vec<Placed> {
+    let mut steps: Vec<Placed> = Vec::new();
+    if f.lengthen != 0 {
+        steps.extend([lengthen::COPYING.into(), lengthen::STEP.into()]);
+    }
+    let rest =
+        [skeleton::COUNTING, skeleton::SCANNING_ROWS, skeleton::SCANNING_SHOTS, skeleton::HEADING, skeleton::STEP];
+    steps.extend(rest.map(Placed::from));
+    // The same stages read the mask whose lines were carried on, or the thinned one.
+    let mask = if f.lengthen != 0 { "long" } else { "mask" };
+    for s in steps.iter_mut().filter(|s| [skeleton::COUNT.name, skeleton::STAGE.name].contains(&s.step.stage.name)) {
+        s.binds.iter_mut().filter(|b| **b == "long").for_each(|b| *b = mask);
+    }
+    steps
+}
+
+/// The constants that a stage is built with.
+pub fn overrides(step: &Step, f: &Frame, bits: u8, thinning: Thinning) -> Vec<(&'static str, f64)> {
+    let all = [
+        (PX_LOG2, f64::from(px_log2(bits))),
+        (threshold::RADIUS, f64::from(f.size / 2)),
+        (tiles::WEIGHTED, f64::from(u8::from(f.flags & GAUSSIAN != 0))),
+        (thin::RULE, f64::from(thinning.number())),
+    ];
+    all.into_iter().filter(|o| step.stage.overrides.contains(&o.0)).collect()
+}
