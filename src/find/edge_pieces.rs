@@ -2,7 +2,7 @@
 //! covariance with what samples have in common: their shot's pose and their piece of edge (docs/math.md, Insertion (4)).
 //! Frame and unit: as `lit_edges`; light as a share, mm, rad.
 
-use super::lit_edges::{N, PRIORS, Unknowns};
+use super::lit_edges::{N, Prior, Unknowns};
 use nalgebra::{Cholesky, SMatrix};
 use std::collections::BTreeMap;
 
@@ -40,9 +40,15 @@ struct Piece {
     rows: Vec<usize>,
 }
 
-/// Solves for the step from `x`. `bias`: prior size of a piece's offset, mm; `scatter`: of a shot's position, mm; `unit`: of the
-/// priors, mm.
-pub(super) fn solve(rows: &[Row], x: &Unknowns, bias: f64, scatter: f64, unit: f64) -> Option<Solved> {
+/// Solves for the step from `x`. `bias`: expected size of a piece's offset, mm; `scatter`: of a shot's position, mm; `unit`: the
+/// recipe's unit of length, mm.
+pub(super) fn solve(
+    rows: &[Row],
+    x: &Unknowns,
+    priors: &[Prior],
+    [bias, scatter]: [f64; 2],
+    unit: f64,
+) -> Option<Solved> {
     let mut sizes: Vec<f64> = rows.iter().map(|r| r.residual.abs()).collect();
     let middle = sizes.len() / 2;
     let sigma = (1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1).max(0.01);
@@ -51,7 +57,7 @@ pub(super) fn solve(rows: &[Row], x: &Unknowns, bias: f64, scatter: f64, unit: f
         .map(|r| (1.0 - (r.residual / (TUKEY * sigma)).powi(2)).max(0.0).powi(2) / (sigma * sigma))
         .collect();
     let (mut a, mut b) = (Square::zeros(), Unknowns::zeros());
-    for (k, mean, sd) in PRIORS.map(|(k, mean, sd)| (k, mean * unit, sd * unit)) {
+    for &(k, mean, sd) in priors {
         a[(k, k)] += 1.0 / (sd * sd);
         b[k] += (mean - x[k]) / (sd * sd);
     }

@@ -3,16 +3,18 @@
 //! Frame and unit: base frame; mm, degrees; sigmas along the part's own axes.
 
 use super::accelerator::Accelerator;
-use super::budget::{Budget, budget, towards_camera};
+use super::budget::{Budget, budget};
 use super::construct::{Built, build, features};
-use super::looks::{self, Agreed, Disagreement, Look};
+use super::looks::{self, Agreed, Disagreement, Look, Witness};
 use super::measure::{Measured, localise, measure};
 use super::model::ShapeModel;
+use super::part_seen::towards_camera;
 use super::points::Ordered;
 use super::recipe::{Gates, Recipe};
 use super::refine::Pose;
 use super::scene::{Kind, Layer, Scene};
 use super::search::{Match, find_on};
+use super::size::SizeCheck;
 use super::slide::{long_axis, slide};
 use super::verdict::{Agreement, TurnVote, judge, vote};
 use crate::fault::{Fault, Result};
@@ -105,6 +107,9 @@ pub struct Report {
     pub surface_rms_mm: f64,
     pub growth_mm: [f64; 2],
     pub notes: Vec<String>,
+    /// What the part's own sizes say of scale, steps and shear; `None` where too few edges were seen or no station is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sizes: Option<SizeCheck>,
     /// What further looks at the part said; `None`: one look alone, not cross-checked.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub looks: Option<Disagreement>,
@@ -300,12 +305,16 @@ fn conclude(
     mut notes: Vec<String>,
 ) -> Report {
     let spec = &recipe.insertion;
-    let budget = budget(points, &measured, rig, &recipe.robot);
+    let budget = budget(points, &measured, rig, recipe);
+    let sizes = size_check(&budget, recipe);
     let named = |name: &Option<String>| constructions.iter().find(|b| Some(&b.name) == name.as_ref());
     let disagreement_mm = named(&spec.two_pin)
         .zip(named(&spec.lattice))
         .map(|(a, b)| (a.deviation_mm[0] - b.deviation_mm[0]).hypot(a.deviation_mm[1] - b.deviation_mm[1]));
-    let gates = gates(&recipe.gates, &found, recipe, &budget, &agreement, &turns, disagreement_mm);
+    let mut gates = gates(&recipe.gates, &found, recipe, &budget, &agreement, &turns, disagreement_mm);
+    // Where another look says where the part lies, no other place is in question: the looks have to agree.
+    gates.retain(|g| options.expected.is_none() || g.name != "margin");
+    gates.extend(sizes.as_ref().map(|s| s.gate(&recipe.gates)));
     let reasons: Vec<String> =
         missed(&gates).chain(gates.iter().filter(|g| g.name == LOOKS).map(Gate::words)).collect();
     // The construction's deviation moves the part pose in its plane.
@@ -320,6 +329,7 @@ fn conclude(
     });
     let base_from_constructed = measured.base_from_part * moved;
     notes.push(ONE_LOOK.into());
+    notes.extend(sizes.as_ref().and_then(SizeCheck::silent));
     let passed = reasons.is_empty();
     Report {
         recipe: recipe.name.clone(),
@@ -345,10 +355,17 @@ fn conclude(
         surface_rms_mm: measured.surface_rms,
         growth_mm: measured.growth,
         notes,
+        sizes,
         looks: None,
         base_from_constructed,
         map,
     }
+}
+
+/// The part's sizes against what the calibrations make expect; they are the robot's and the camera's as much as the part's.
+fn size_check(budget: &Budget, recipe: &Recipe) -> Option<SizeCheck> {
+    let (shape, seen) = (budget.shape.as_ref()?, budget.seen.as_ref()?);
+    Some(SizeCheck::new(shape, &budget.levers, &seen.scan_axes(), recipe.measure.size_sigma))
 }
 
 /// What is said of a pose that rests on one look.
@@ -383,18 +400,24 @@ fn within_tolerance(recipe: &Recipe, sigma_mm: [f64; 3], sigma_deg: [f64; 3]) ->
 
 /// One report from several looks at the same part: the agreed pose, what the looks disagree about, and the gates on it. Every
 /// look must have met its own gates. Errors: none of the looks, or a covariance that cannot be inverted.
-pub fn agree(reports: Vec<Report>, recipe: &Recipe, robot: Convention) -> Result<Report> {
+pub fn agree(reports: Vec<Report>, witness: Option<&Witness>, recipe: &Recipe, robot: Convention) -> Result<Report> {
     let looks: Vec<Look> =
         reports.iter().map(|r| Look { base_from_part: r.base_from_constructed, budget: &r.budget }).collect();
-    let Agreed { base_from_part, covariance, disagreement } = looks::agree(&looks)?;
+    let Agreed { base_from_part, covariance, disagreement } =
+        looks::agree(&looks, witness, recipe.measure.size_sigma, recipe.gates.max_look_ratio)?;
     let reasons: Vec<String> =
         (1..).zip(&reports).flat_map(|(k, r)| missed(&r.gates).map(move |why| format!("look {k}: {why}"))).collect();
     let mut report = reports.into_iter().next().expect("looks agree about one part at least");
-    report.notes.retain(|n| n != ONE_LOOK);
-    let second = disagreement.gates(&recipe.gates);
+    let alone = disagreement.looks < 2;
+    report.notes.retain(|n| alone || n != ONE_LOOK);
+    if alone {
+        report.notes.push("the height was cross-checked by the pointer, nothing else was".into());
+    }
+    let second = disagreement.gates(recipe);
     report.reasons = reasons;
     report.reasons.extend(second.iter().filter(|g| !g.passed).map(Gate::words));
-    report.gates.retain(|g| g.name != LOOKS);
+    report.gates.retain(|g| alone || g.name != LOOKS);
+    report.reasons.extend(report.gates.iter().filter(|g| g.name == LOOKS && !g.passed).map(Gate::words));
     report.gates.extend(second);
     report.passed = report.reasons.is_empty();
     [report.sigma_mm, report.sigma_deg] = super::budget::sigmas(&covariance);

@@ -1,36 +1,17 @@
-//! In: the same part found from several sides, each look with its own uncertainty and the levers of the calibrations that all
-//! looks share. Out: one pose from all, what the looks disagree about beside what they may, and which calibration would
-//! explain it. Frame and unit: base frame; differences along the part's axes, mm and degrees. docs/math.md, Second look.
+//! In: the same part found from several sides, each look with its own uncertainty and the levers of what all looks share.
+//! Out: one pose from all, what the looks disagree about beside what they may, and which calibration would explain it.
+//! Frame and unit: base frame; differences along the part's axes, mm and degrees. docs/math.md, Second look.
 
-use super::budget::Budget;
+use super::budget::both;
+use super::explain::{Explanation, explanations};
 use super::insertion::Gate;
-use super::recipe::Gates;
+use super::look_stack::{Stack, Vector6, motion, singular};
+use super::recipe::Recipe;
 use crate::fault::{Fault, Result};
-use crate::geometry::{Base, Camera, Mat3, Part, Rigid, Vec3, exp, log};
-use nalgebra::{DMatrix, DVector, Matrix6, SVector};
+use crate::geometry::{Base, Mat3, Part, Rigid, Vec3, exp};
+use nalgebra::{DMatrix, Matrix6};
 
-type Vector6 = SVector<f64, 6>;
-
-/// One look at the part.
-#[derive(Clone, Copy)]
-pub struct Look<'a> {
-    pub base_from_part: Rigid<Base, Part>,
-    pub budget: &'a Budget,
-}
-
-/// How much of the disagreement one calibration would explain, if it were free to be wrong, and what it could hide.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct Explanation {
-    pub name: &'static str,
-    /// Share of the squared disagreement that goes away, 0 to 1.
-    pub share: f64,
-    /// By how much it would have to be wrong, in its own sigmas (root mean square over its parameters).
-    pub off_by_sigmas: f64,
-    /// Three standard deviations of the agreed pose if this calibration is not believed at all and the others are: how far off
-    /// it can make the pose without the looks showing it. Along the part's axes.
-    pub unseen_mm: [f64; 3],
-    pub unseen_deg: [f64; 3],
-}
+pub use super::look_stack::{Look, Witness};
 
 /// What the looks disagree about.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -45,14 +26,34 @@ pub struct Disagreement {
     pub expected_deg: [f64; 3],
     /// The largest of the six differences over its expected value.
     pub ratio: f64,
+    /// All that should be zero together (differences, sizes, distances), as the standard deviations of one normal variate.
+    pub misfit_sigmas: f64,
     /// Largest turn about the part's normal and largest tilt against it between two looks, degrees; 0 where the stations are
     /// not known.
     pub turn_deg: f64,
     pub tilt_deg: f64,
     /// Which calibration explains it best comes first; empty where none has a covariance.
     pub explained_by: Vec<Explanation>,
-    /// A calibration without covariance takes part: more disagreement than expected may be its share.
+    /// The largest of what these could hide: in the part's plane, along its normal, as a turn.
+    pub unseen_in_plane_mm: f64,
+    pub unseen_height_mm: f64,
+    pub unseen_deg: f64,
+    /// A calibration without covariance takes part: more disagreement than expected may be its share, and what it could hide
+    /// is not known.
     pub complete: bool,
+    /// What a witness of the height says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub witness: Option<Witnessed>,
+}
+
+/// Heights that something else measured on the part, against the agreed pose.
+#[derive(Clone, Copy, Debug, serde::Serialize)]
+pub struct Witnessed {
+    pub places: usize,
+    /// Measured less agreed, weighted mean, and what all covariances make expect of it, mm.
+    pub height_mm: f64,
+    pub expected_mm: f64,
+    pub ratio: f64,
 }
 
 /// What several looks say together.
@@ -66,189 +67,115 @@ pub struct Agreed {
 
 impl Disagreement {
     /// The gates that several looks have to pass.
-    pub fn gates(&self, g: &Gates) -> Vec<Gate> {
-        vec![
+    pub fn gates(&self, recipe: &Recipe) -> Vec<Gate> {
+        let (g, bears) = (&recipe.gates, &recipe.insertion);
+        let of_witness = self.witness.map(|w| Gate::most("range's ratio", w.ratio, g.max_look_ratio));
+        if self.looks < 2 {
+            return of_witness.into_iter().collect();
+        }
+        let mut gates = vec![
             Gate::most("looks' ratio", self.ratio, g.max_look_ratio),
+            Gate::most("looks' misfit", self.misfit_sigmas, g.max_look_ratio),
             Gate::least("looks' turn_deg", self.turn_deg, g.min_look_turn_deg),
             Gate::least("looks' tilt_deg", self.tilt_deg, g.min_look_tilt_deg),
-        ]
+            Gate::most("unseen in plane, mm", self.unseen_in_plane_mm, bears.tolerance_mm),
+            Gate::most("unseen height, mm", self.unseen_height_mm, g.max_unseen_height_mm),
+            Gate::most("unseen turn, deg", self.unseen_deg, bears.tolerance_deg),
+        ];
+        gates.extend(of_witness);
+        gates
     }
-}
-
-/// What was measured, stacked look by look: motions against the first look (base axes), and their joint covariance.
-struct Stack {
-    motions: DVector<f64>,
-    covariance: DMatrix<f64>,
-}
-
-/// Motion from the first look's pose to another's: shift of the part's origin, then turn; base axes.
-fn motion(from: &Rigid<Base, Part>, to: &Rigid<Base, Part>) -> Vector6 {
-    let turn = log(&(to.rotation * from.rotation.transpose()));
-    let shift = to.translation - from.translation;
-    Vector6::new(shift.x, shift.y, shift.z, turn.x, turn.y, turn.z)
-}
-
-/// Both blocks of a covariance or motion turned: base axes from part axes.
-fn both(r: &Mat3) -> Matrix6<f64> {
-    let mut out = Matrix6::zeros();
-    out.fixed_view_mut::<3, 3>(0, 0).copy_from(r);
-    out.fixed_view_mut::<3, 3>(3, 3).copy_from(r);
-    out
-}
-
-/// One calibration's lever over all looks, 6 N x n; `None` where a look lacks it.
-fn stacked_lever(looks: &[Look], name: &str) -> Option<(DMatrix<f64>, Option<DMatrix<f64>>)> {
-    let all: Vec<_> =
-        looks.iter().map(|l| l.budget.levers.iter().find(|v| v.name == name)).collect::<Option<Vec<_>>>()?;
-    let n = all[0].jacobian.ncols();
-    let mut out = DMatrix::zeros(6 * looks.len(), n);
-    for (i, lever) in all.iter().enumerate() {
-        out.view_mut((6 * i, 0), (6, n)).copy_from(&lever.jacobian);
-    }
-    Some((out, all[0].covariance.clone()))
-}
-
-fn names(looks: &[Look]) -> Vec<&'static str> {
-    looks[0].budget.levers.iter().map(|l| l.name).collect()
-}
-
-impl Stack {
-    /// `free`: a calibration whose uncertainty is taken a thousand times as large, which lets it explain what it can.
-    fn new(looks: &[Look], free: Option<&str>) -> Stack {
-        let n = 6 * looks.len();
-        let mut motions = DVector::zeros(n);
-        let mut covariance = DMatrix::zeros(n, n);
-        for (i, look) in looks.iter().enumerate() {
-            motions.rows_mut(6 * i, 6).copy_from(&motion(&looks[0].base_from_part, &look.base_from_part));
-            let turn = both(&look.base_from_part.rotation);
-            covariance.view_mut((6 * i, 6 * i), (6, 6)).copy_from(&(turn * look.budget.own * turn.transpose()));
-        }
-        for name in names(looks) {
-            if let Some((lever, Some(c))) = stacked_lever(looks, name) {
-                let more = if free == Some(name) { 1e6 } else { 1.0 };
-                covariance += &lever * (c * more) * lever.transpose();
-            }
-        }
-        Stack { motions, covariance }
-    }
-
-    /// The motion of least variance that all looks share, and its covariance.
-    fn agreed(&self) -> Result<(Vector6, Matrix6<f64>)> {
-        let weights = self.covariance.clone().cholesky().ok_or_else(singular)?;
-        let mut each = DMatrix::zeros(self.motions.len(), 6);
-        for i in 0..self.motions.len() / 6 {
-            each.view_mut((6 * i, 0), (6, 6)).fill_with_identity();
-        }
-        let covariance = (each.transpose() * weights.solve(&each)).cholesky().ok_or_else(singular)?.inverse();
-        let step = &covariance * each.transpose() * weights.solve(&self.motions);
-        Ok((Vector6::from_iterator(step.iter().copied()), Matrix6::from_iterator(covariance.iter().copied())))
-    }
-
-    /// Motions and covariance of the looks' differences from the first look.
-    fn differences(&self) -> (DVector<f64>, DMatrix<f64>) {
-        let n = self.motions.len() - 6;
-        let mut d = DMatrix::zeros(n, n + 6);
-        d.view_mut((0, 6), (n, n)).fill_with_identity();
-        for i in 0..n / 6 {
-            d.view_mut((6 * i, 0), (6, 6)).copy_from(&-DMatrix::identity(6, 6));
-        }
-        (&d * &self.motions, &d * &self.covariance * d.transpose())
-    }
-}
-
-fn singular() -> Fault {
-    Fault::refused("the looks' covariances cannot be combined: a standard deviation is zero")
-        .cause("a calibration or recipe whose uncertainty is stated as nothing")
-        .next("calibrate with uncertainty, or give the recipe's robot its repeatability")
 }
 
 /// Brings two or more looks together. The pose is the one of least variance under the joint covariance, in which what the
 /// calibrations got wrong is one error seen from several sides (generalised least squares; docs/math.md, Second look).
-/// Errors: fewer than two looks, or covariances that cannot be inverted.
-pub fn agree(looks: &[Look]) -> Result<Agreed> {
-    if looks.len() < 2 {
+/// `size_sigma`: of the part's own sizes; `ratio`: up to which disagreement passes. Errors: fewer than two looks, or covariances
+/// that cannot be inverted.
+pub fn agree(looks: &[Look], witness: Option<&Witness>, size_sigma: f64, ratio: f64) -> Result<Agreed> {
+    if looks.is_empty() || (looks.len() < 2 && witness.is_none()) {
         return Err(Fault::usage(format!("{} look given, two or more can be compared", looks.len()))
             .next("name the second scan's folder behind the first"));
     }
-    let stack = Stack::new(looks, None);
-    let (step, covariance) = stack.agreed()?;
+    let stack = Stack::new(looks, witness, size_sigma);
+    let (follow, covariance) = stack.agreed()?;
+    let step = &follow * &stack.values;
     let first = looks[0].base_from_part;
     let base_from_part = Rigid::new(
         exp(&Vec3::new(step[3], step[4], step[5])) * first.rotation,
         first.translation + Vec3::new(step[0], step[1], step[2]),
     );
     let into_part = both(&base_from_part.rotation.transpose());
-    let covariance = into_part * covariance * into_part.transpose();
-    Ok(Agreed { base_from_part, covariance, disagreement: disagreement(looks, &stack, &into_part)? })
+    let gauges = stack.gauges(looks, &into_part, &follow)?;
+    let explained_by = explanations(&stack, &gauges, &follow, &into_part, ratio)?;
+    let most = |f: &dyn Fn(&Explanation) -> f64| explained_by.iter().map(f).fold(0.0, f64::max);
+    let (worst, (turn_deg, tilt_deg)) = (worst_pair(looks, &stack, &into_part), sides(looks));
+    let Pair { between, difference, expected, ratio } = worst;
+    let mm = |v: &Vector6| [v[0], v[1], v[2]];
+    let deg = |v: &Vector6| [v[3], v[4], v[5]].map(f64::to_degrees);
+    let disagreement = Disagreement {
+        looks: looks.len(),
+        between,
+        difference_mm: mm(&difference),
+        difference_deg: deg(&difference),
+        expected_mm: mm(&expected),
+        expected_deg: deg(&expected),
+        ratio,
+        misfit_sigmas: misfit(&stack)?,
+        turn_deg,
+        tilt_deg,
+        unseen_in_plane_mm: most(&|e| e.unseen_mm[0].max(e.unseen_mm[1])),
+        unseen_height_mm: most(&|e| e.unseen_mm[2]),
+        unseen_deg: most(&|e| e.unseen_deg.into_iter().fold(0.0, f64::max)),
+        explained_by,
+        complete: looks.iter().all(|l| l.budget.complete),
+        witness: witness.map(|_| witnessed(&stack, &follow)).transpose()?,
+    };
+    Ok(Agreed { base_from_part, covariance: into_part * covariance * into_part.transpose(), disagreement })
 }
 
-fn disagreement(looks: &[Look], stack: &Stack, into_part: &Matrix6<f64>) -> Result<Disagreement> {
-    let mut worst: Option<([usize; 2], Vector6, Vector6, f64)> = None;
+struct Pair {
+    between: [usize; 2],
+    difference: Vector6,
+    expected: Vector6,
+    ratio: f64,
+}
+
+fn worst_pair(looks: &[Look], stack: &Stack, into_part: &Matrix6<f64>) -> Pair {
+    // One look, which only a witness checks, disagrees with none.
+    let none = Pair { between: [1, 1], difference: Vector6::zeros(), expected: Vector6::zeros(), ratio: 0.0 };
+    let mut worst: Option<Pair> = None;
     for i in 0..looks.len() {
         for j in i + 1..looks.len() {
             let block = |a: usize, b: usize| stack.covariance.view((6 * a, 6 * b), (6, 6)).clone_owned();
             let c = block(j, j) + block(i, i) - block(i, j) - block(j, i);
             let c = into_part * Matrix6::from_iterator(c.iter().copied()) * into_part.transpose();
-            let d = into_part * motion(&looks[i].base_from_part, &looks[j].base_from_part);
+            let difference = into_part * motion(&looks[i].base_from_part, &looks[j].base_from_part);
             let expected = c.diagonal().map(|v| v.max(0.0).sqrt());
-            let ratio = (0..6).map(|k| d[k].abs() / expected[k].max(1e-12)).fold(0.0, f64::max);
-            if worst.as_ref().is_none_or(|w| ratio > w.3) {
-                worst = Some(([i + 1, j + 1], d, expected, ratio));
+            let ratio = (0..6).map(|k| difference[k].abs() / expected[k].max(1e-12)).fold(0.0, f64::max);
+            if worst.as_ref().is_none_or(|w| ratio > w.ratio) {
+                worst = Some(Pair { between: [i + 1, j + 1], difference, expected, ratio });
             }
         }
     }
-    let (between, d, expected, ratio) = worst.expect("two looks at least");
-    let mm = |v: &Vector6| [v[0], v[1], v[2]];
-    let deg = |v: &Vector6| [v[3], v[4], v[5]].map(f64::to_degrees);
-    let (turn_deg, tilt_deg) = sides(looks);
-    Ok(Disagreement {
-        looks: looks.len(),
-        between,
-        difference_mm: mm(&d),
-        difference_deg: deg(&d),
-        expected_mm: mm(&expected),
-        expected_deg: deg(&expected),
-        ratio,
-        turn_deg,
-        tilt_deg,
-        explained_by: explanations(looks, stack, into_part)?,
-        complete: looks.iter().all(|l| l.budget.complete),
-    })
+    worst.unwrap_or(none)
 }
 
-/// For each calibration: the disagreement that is left when it may be wrong by anything, against that of all as stated.
-fn explanations(looks: &[Look], stack: &Stack, into_part: &Matrix6<f64>) -> Result<Vec<Explanation>> {
-    let (d, c) = stack.differences();
-    let all = d.dot(&c.cholesky().ok_or_else(singular)?.solve(&d));
-    let mut out = Vec::new();
-    for name in names(looks) {
-        let Some((lever, Some(own))) = stacked_lever(looks, name) else { continue };
-        let freed = Stack::new(looks, Some(name));
-        let (d, c) = freed.differences();
-        let whitened = c.cholesky().ok_or_else(singular)?.solve(&d);
-        let left = d.dot(&whitened);
-        // The error that the freed calibration takes on: C Lᵀ S⁻¹ d, in units of its own sigmas.
-        let n = lever.nrows() - 6;
-        let mut shown = DMatrix::zeros(n, lever.ncols());
-        for i in 0..n / 6 {
-            let step = lever.rows(6 * (i + 1), 6) - lever.rows(0, 6);
-            shown.rows_mut(6 * i, 6).copy_from(&step);
-        }
-        let error = (&own * 1e6) * shown.transpose() * whitened;
-        let sigmas: f64 =
-            (0..error.len()).filter(|&k| own[(k, k)] > 0.0).map(|k| error[k].powi(2) / own[(k, k)]).sum::<f64>();
-        let unseen = into_part * freed.agreed()?.1 * into_part.transpose();
-        let unseen = unseen.diagonal().map(|v| 3.0 * v.max(0.0).sqrt());
-        out.push(Explanation {
-            name,
-            unseen_mm: [unseen[0], unseen[1], unseen[2]],
-            unseen_deg: [unseen[3], unseen[4], unseen[5]].map(f64::to_degrees),
-            share: if all > 0.0 { (1.0 - left / all).clamp(0.0, 1.0) } else { 0.0 },
-            off_by_sigmas: (sigmas / error.len() as f64).sqrt(),
-        });
-    }
-    out.sort_by(|a, b| b.share.total_cmp(&a.share));
-    Ok(out)
+/// chi² of all that should be zero, as a normal variate of the same probability [wilson31]; below 0 where it agrees better than
+/// the mean.
+fn misfit(stack: &Stack) -> Result<f64> {
+    let rows = stack.contrasts();
+    let (d, c) = (&rows * &stack.values, &rows * &stack.covariance * rows.transpose());
+    let sum = d.dot(&c.cholesky().ok_or_else(singular)?.solve(&d));
+    let n = d.len() as f64;
+    let spread = 2.0 / (9.0 * n);
+    Ok(((sum / n).cbrt() - (1.0 - spread)) / spread.sqrt())
+}
+
+fn witnessed(stack: &Stack, follow: &DMatrix<f64>) -> Result<Witnessed> {
+    let off = stack.witnessed(follow) * &stack.values;
+    let (weights, variance) = stack.witness_weights(follow)?;
+    let (height_mm, expected_mm) = (weights.dot(&off), variance.sqrt());
+    Ok(Witnessed { places: off.len(), height_mm, expected_mm, ratio: height_mm.abs() / expected_mm })
 }
 
 /// Largest turn about the part's normal and largest tilt against it between two looks, degrees.
@@ -282,166 +209,6 @@ pub fn other_side(base_from_part: &Rigid<Base, Part>, turn_deg: f64, tilt_deg: f
     *base_from_part * part * base_from_part.inverse()
 }
 
-/// A camera that looks from another side.
-pub(super) fn seen_from(
-    base_from_camera: &Rigid<Base, Camera>,
-    base_from_part: &Rigid<Base, Part>,
-    turn_deg: f64,
-    tilt_deg: f64,
-) -> Rigid<Base, Camera> {
-    other_side(base_from_part, turn_deg, tilt_deg) * *base_from_camera
-}
-
 #[cfg(test)]
-mod tests {
-    use super::super::budget::{Lever, hand_eye_lever, plane_lever};
-    use super::*;
-    use crate::geometry::{Flange, Plane};
-    use rand::{Rng, SeedableRng};
-    use rand_distr::StandardNormal;
-
-    const HAND_EYE_SIGMA: [f64; 6] = [0.05, 0.05, 0.05, 2e-4, 2e-4, 2e-4];
-
-    struct Setup {
-        part: Rigid<Base, Part>,
-        looks: Vec<Budget>,
-        hand_eye: Rigid<Flange, Camera>,
-    }
-
-    /// A part below the robot and cameras that look at it, each turned and tilted against the first.
-    fn setup(sides: &[(f64, f64)]) -> Setup {
-        let part = Rigid::from_vectors(&Vec3::new(0.1, -0.2, 0.7), Vec3::new(350.0, 40.0, 12.0));
-        let first: Rigid<Part, Camera> =
-            Rigid::from_vectors(&Vec3::new(std::f64::consts::PI, 0.0, 0.0), Vec3::new(5.0, -8.0, 150.0));
-        let hand_eye = Rigid::from_vectors(&Vec3::new(0.02, 0.01, -1.6), Vec3::new(-46.0, 1.4, 93.6));
-        let plane = Plane::<Camera>::new(Vec3::new(0.0, 0.8, 0.6), 90.0).unwrap();
-        let looks = sides
-            .iter()
-            .map(|&(turn, tilt)| {
-                let camera = seen_from(&(part * first), &part, turn, tilt);
-                let target = camera.inverse().point(&part.translation);
-                let diagonal =
-                    |s: &[f64]| DMatrix::from_diagonal(&DVector::from_iterator(s.len(), s.iter().map(|x| x * x)));
-                let levers = vec![
-                    Lever {
-                        covariance: Some(diagonal(&[1e-4, 1e-4, 1e-4, 0.01])),
-                        ..plane_lever(&camera, &target, &plane)
-                    },
-                    Lever {
-                        covariance: Some(diagonal(&HAND_EYE_SIGMA)),
-                        ..hand_eye_lever(&camera, &target, &hand_eye)
-                    },
-                ];
-                let own = Matrix6::from_diagonal(&Vector6::new(1e-4, 1e-4, 1e-4, 1e-8, 1e-8, 1e-8));
-                Budget {
-                    terms: Vec::new(),
-                    sigma_mm: [0.0; 3],
-                    sigma_deg: [0.0; 3],
-                    complete: true,
-                    covariance: own,
-                    own,
-                    levers,
-                    base_from_camera: Some(camera),
-                }
-            })
-            .collect();
-        Setup { part, looks, hand_eye }
-    }
-
-    /// Where a look finds the part: moved by errors of the calibrations and by its own.
-    fn found(s: &Setup, errors: &[DVector<f64>], rng: &mut rand_pcg::Pcg64) -> Vec<Rigid<Base, Part>> {
-        s.looks
-            .iter()
-            .map(|b| {
-                let mut m: Vector6 = Vector6::zeros();
-                for (lever, e) in b.levers.iter().zip(errors) {
-                    m += Vector6::from_iterator((&lever.jacobian * e).iter().copied());
-                }
-                let own = Vector6::from_fn(|k, _| b.own[(k, k)].sqrt() * rng.sample::<f64, _>(StandardNormal));
-                m += both(&s.part.rotation) * own;
-                Rigid::new(
-                    exp(&Vec3::new(m[3], m[4], m[5])) * s.part.rotation,
-                    s.part.translation + Vec3::new(m[0], m[1], m[2]),
-                )
-            })
-            .collect()
-    }
-
-    fn agreed(s: &Setup, poses: &[Rigid<Base, Part>]) -> Agreed {
-        let looks: Vec<Look> =
-            poses.iter().zip(&s.looks).map(|(&base_from_part, budget)| Look { base_from_part, budget }).collect();
-        agree(&looks).unwrap()
-    }
-
-    #[test]
-    fn errors_as_stated_pass_and_the_pose_is_as_good_as_it_says() {
-        let s = setup(&[(0.0, 0.0), (180.0, 20.0)]);
-        let mut rng = rand_pcg::Pcg64::seed_from_u64(5);
-        let (mut squares, mut passed) = ([0f64; 6], 0);
-        let trials = 600;
-        for _ in 0..trials {
-            let errors: Vec<DVector<f64>> = s.looks[0]
-                .levers
-                .iter()
-                .map(|l| {
-                    let c = l.covariance.as_ref().unwrap();
-                    DVector::from_fn(c.nrows(), |k, _| c[(k, k)].sqrt() * rng.sample::<f64, _>(StandardNormal))
-                })
-                .collect();
-            let a = agreed(&s, &found(&s, &errors, &mut rng));
-            let d = both(&s.part.rotation.transpose()) * motion(&s.part, &a.base_from_part);
-            for k in 0..6 {
-                squares[k] += d[k].powi(2) / a.covariance[(k, k)];
-            }
-            passed += usize::from(a.disagreement.ratio <= 3.0);
-        }
-        for (k, sum) in squares.iter().enumerate() {
-            let honest = (sum / f64::from(trials)).sqrt();
-            assert!((0.9..1.1).contains(&honest), "axis {k}: error over stated sigma {honest}");
-        }
-        assert!(passed >= trials as usize * 98 / 100, "{passed} of {trials} right ones pass");
-    }
-
-    #[test]
-    fn a_turn_and_a_tilt_show_an_error_that_looks_from_one_side_hide() {
-        let mut rng = rand_pcg::Pcg64::seed_from_u64(7);
-        let wrong = vec![DVector::zeros(4), DVector::from_vec(vec![1.5, 0.0, 0.0, 0.0, 0.0, 0.0])];
-        let same = setup(&[(0.0, 0.0), (0.0, 0.0)]);
-        let hidden = agreed(&same, &found(&same, &wrong, &mut rng)).disagreement;
-        assert!(hidden.ratio < 4.0 && hidden.turn_deg < 0.1 && hidden.tilt_deg < 0.1, "{hidden:?}");
-        assert!(hidden.gates(&Gates::default()).iter().any(|g| !g.passed));
-        let turned = setup(&[(0.0, 0.0), (180.0, 20.0)]);
-        let shown = agreed(&turned, &found(&turned, &wrong, &mut rng)).disagreement;
-        assert!(shown.ratio > 10.0, "{shown:?}");
-        assert_eq!(shown.explained_by[0].name, "hand-eye");
-        assert!((shown.turn_deg - 180.0).abs() < 0.1 && (shown.tilt_deg - 20.0).abs() < 0.1, "{shown:?}");
-        // Along the approach a turn alone shows nothing.
-        let along = turned.hand_eye.rotation * turned.looks[0].base_from_camera.unwrap().rotation.transpose();
-        let along = along * turned.part.rotation * Vec3::z();
-        let wrong = vec![DVector::zeros(4), DVector::from_vec(vec![along.x, along.y, along.z, 0.0, 0.0, 0.0])];
-        let only_turned = setup(&[(0.0, 0.0), (180.0, 0.0)]);
-        assert!(agreed(&only_turned, &found(&only_turned, &wrong, &mut rng)).disagreement.ratio < 4.0);
-        assert!(agreed(&turned, &found(&turned, &wrong, &mut rng)).disagreement.ratio > 3.0);
-    }
-
-    /// Two looks cannot show a hand-eye's error along the axis of the turn between them; a third one about another axis can.
-    #[test]
-    fn a_third_look_shows_what_two_leave_open() {
-        let mut rng = rand_pcg::Pcg64::seed_from_u64(9);
-        let right = vec![DVector::zeros(4), DVector::zeros(6)];
-        let mut hides = |sides: &[(f64, f64)]| {
-            let s = setup(sides);
-            let looks = agreed(&s, &found(&s, &right, &mut rng)).disagreement;
-            let by_hand_eye = looks.explained_by.iter().find(|e| e.name == "hand-eye").unwrap();
-            by_hand_eye.unseen_mm.into_iter().fold(0.0, f64::max)
-        };
-        let (two, three) = (hides(&[(0.0, 0.0), (180.0, 20.0)]), hides(&[(0.0, 0.0), (180.0, 20.0), (90.0, -25.0)]));
-        assert!(two > 10.0 && three < 1.0, "{two} and {three} mm");
-    }
-
-    #[test]
-    fn one_look_cannot_be_compared() {
-        let s = setup(&[(0.0, 0.0)]);
-        assert!(agree(&[Look { base_from_part: s.part, budget: &s.looks[0] }]).is_err());
-    }
-}
+#[path = "looks_tests.rs"]
+mod tests;

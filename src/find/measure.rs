@@ -9,6 +9,7 @@ use super::edge_index::EdgeIndex;
 use super::in_plane::fit_edges;
 use super::lit_edges::fit_light;
 use super::points::Ordered;
+use super::size::{Shape, measure_shape};
 use super::surface_ends::{Observation, surface_ends};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Part, Rigid, Vec3};
@@ -27,11 +28,14 @@ pub struct MeasureOptions {
     /// Standard deviation of what a piece of an edge has in common and the model of partly lit samples does not
     /// explain (a wall that shows, a chamfer, the pixels' raster), as a share of the sampling step, 0 to 0.5.
     pub edge_bias: f64,
+    /// Standard deviation of a part's sizes against the drawing, all of them together, as a share, 0 to 0.1; a third of it is
+    /// how far one direction differs from the other.
+    pub size_sigma: f64,
 }
 
 impl Default for MeasureOptions {
     fn default() -> Self {
-        MeasureOptions { height_gate_mm: 0.2, edge_gate_mm: 0.45, margin_mm: 0.5, edge_bias: 0.07 }
+        MeasureOptions { height_gate_mm: 0.2, edge_gate_mm: 0.45, margin_mm: 0.5, edge_bias: 0.07, size_sigma: 0.0015 }
     }
 }
 
@@ -53,7 +57,8 @@ impl MeasureOptions {
         range("height_gate_mm", self.height_gate_mm, 1e-4, 100.0)?;
         range("edge_gate_mm", self.edge_gate_mm, 1e-4, 100.0)?;
         range("margin_mm", self.margin_mm, 1e-4, 100.0)?;
-        range("edge_bias", self.edge_bias, 0.0, 0.5)
+        range("edge_bias", self.edge_bias, 0.0, 0.5)?;
+        range("size_sigma", self.size_sigma, 0.0, 0.1)
     }
 }
 
@@ -77,6 +82,8 @@ pub struct Measured {
     /// Largest distance between neighbouring samples along the stripe and from shot to shot, mm.
     pub step: [f64; 2],
     pub observations: Vec<Observation>,
+    /// The part's sizes against the drawing; `None` where too few edges were seen.
+    pub shape: Option<Shape>,
 }
 
 /// Rounds of datum and ends, then of datum and light; the pose moves by less than a micrometre in the last.
@@ -121,7 +128,7 @@ pub fn measure(
     let mut lit = None;
     for _ in 0..LIT_ROUNDS {
         level(&mut pose, ROUNDS)?;
-        lit = fit_light(points, &localise(points, drawing, &pose, options), &faces, &edges, options);
+        lit = fit_light(points, &localise(points, drawing, &pose, options), &faces, &edges, options, None);
         let Some(lit) = &lit else { break };
         pose = pose * moved(&lit.step);
     }
@@ -133,6 +140,8 @@ pub fn measure(
     for o in &mut plane.observations {
         o.residual -= o.nx * plane.step.x + o.ny * plane.step.y + (o.x * o.ny - o.y * o.nx) * plane.step.z;
     }
+    let shape =
+        measure_shape(&plane.observations, |start| fit_light(points, &local, &faces, &edges, options, Some(start)));
     let in_plane = lit.as_ref().map_or(plane.covariance, |l| l.covariance);
     let mut covariance = Matrix6::zeros();
     // Datum unknowns are z, rx, ry; edge unknowns x, y, rz.
@@ -159,6 +168,7 @@ pub fn measure(
         growth: plane.growth,
         step,
         observations: plane.observations,
+        shape,
     })
 }
 

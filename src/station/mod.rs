@@ -8,6 +8,7 @@ mod calibrate_pointer;
 mod calibrate_profile_hand_eye;
 mod find;
 mod guide;
+mod height_witness;
 mod judge;
 mod judge_parts;
 mod overlays;
@@ -33,7 +34,7 @@ pub use calibrate_hand_eye::{
 pub use calibrate_laser_plane::{LaserPlaneRun, calibrate_laser_plane};
 pub use calibrate_pointer::{PointerRun, calibrate_pointer};
 pub use calibrate_profile_hand_eye::{calibrate_profile_hand_eye, evaluate_profile_hand_eye};
-pub use find::{SecondLook, find_part, find_part_in_all, second_look, teach_part};
+pub use find::{Looked, SecondLook, find_part, find_part_in_all, second_look, teach_part};
 pub use guide::{GuideOptions, Guided, Step, guide};
 pub use judge::{Judged, judge};
 pub use judge_parts::{FoundPart, judge_parts};
