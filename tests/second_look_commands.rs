@@ -9,19 +9,25 @@ use common::{figure, sheetlight, sheetlight_fails};
 use nalgebra::{DMatrix, DVector};
 use serde_json::Value;
 use sheetlight::geometry::{Base, Part, Rigid, Vec3};
+use sheetlight::recording::save_poses;
 use sheetlight::rig::{Covariance, Rig};
+use sheetlight::simulate::{Station, above, base_from_scene};
 use std::path::{Path, PathBuf};
 
-/// The LED socket of data/scenes/board.toml alone on its board; {x} {y} in scene mm.
+/// The LED socket of data/scenes/board.toml on its board, balls at its ends; {x} {y} in scene mm.
 fn scene(x: f64, y: f64) -> String {
+    let balls: String = [(21.5, -7.0), (22.0, 4.0), (-21.5, -5.0), (-22.0, 6.0)]
+        .iter()
+        .map(|(x, y)| format!("[[solid]]\nshape = {{ ball = {{ diameter_mm = 9 }} }}\nat_mm = [{x}, {y}, 7]\nmaterial = {{ albedo = 0.6 }}\n"))
+        .collect();
     format!(
-        "name = 'led'\nregion_mm = [-20, -13, 20, 13]\nfocus_height_mm = 2.0\n\
+        "name = 'led'\nregion_mm = [-27, -13, 27, 13]\nfocus_height_mm = 2.0\n\
          [[solid]]\nshape = {{ block = {{ size_mm = [190, 104, 1.6] }} }}\nat_mm = [0, 0, 0]\nmaterial = {{ albedo = 0.45 }}\n\
          [[part]]\nname = 'led'\nat_mm = [{x}, {y}, 4.2]\nturn_deg = 3\n\
          [[part.solid]]\nshape = {{ block = {{ size_mm = [30.48, 17.78, 4.2] }} }}\nat_mm = [0, 0, 0]\nmaterial = {{ albedo = 0.5 }}\n\
          [[part.solid.cut]]\nshape = {{ cone = {{ top_mm = 1.44, bottom_mm = 0.84, depth_mm = 2.5 }} }}\nrepeat = [12, 2]\npitch_mm = [2.54, 15.24]\n\
          [[part.solid.cut]]\nshape = {{ block = {{ size_mm = [11.04, 12.4, 9] }} }}\nrepeat = [2, 1]\npitch_mm = [14.24, 0]\n\
-         [[part.solid.cut]]\nshape = {{ cylinder = {{ diameter_mm = 3, depth_mm = 9 }} }}\nat_mm = [-15.24, 0, 0]\n"
+         [[part.solid.cut]]\nshape = {{ cylinder = {{ diameter_mm = 3, depth_mm = 9 }} }}\nat_mm = [-15.24, 0, 0]\n{balls}"
     )
 }
 
@@ -86,7 +92,28 @@ fn state_uncertainty(station: &Path) {
     j.view_mut((3, 0), (1, 3)).copy_from(&(Vec3::new(0.0, 0.0, 155.0).transpose() * tangent));
     j[(3, 3)] = 0.015;
     plane.covariance = Covariance::new(&["nx", "ny", "nz", "offset_mm"], &(&j * j.transpose()));
+    let beam = DVector::from_vec(vec![0.02, 0.02, 0.02, 1.5e-4, 1.5e-4, 1.5e-4]);
+    let names = ["ox_mm", "oy_mm", "oz_mm", "dx", "dy", "dz"];
+    rig.pointer.as_mut().unwrap().covariance = Covariance::new(&names, &DMatrix::from_diagonal(&beam.map(|s| s * s)));
     rig.store_all(station).unwrap();
+}
+
+/// Where the robot stands for the pointer's spot on plain places of the part's top: between the windows and at the ends.
+fn spots(out: &Path) {
+    let station = Station::random(3);
+    let (ray, turn) = (station.pointer.ray(), 3f64.to_radians());
+    let places = [[0.0, 0.0], [13.9, 4.5], [13.9, -4.5], [-13.9, 4.5], [-13.9, -4.5], [-6.0, 8.9]];
+    let poses: Vec<_> = places
+        .iter()
+        .map(|[x, y]| {
+            let (x, y) = (turn.cos() * x - turn.sin() * y, turn.sin() * x + turn.cos() * y);
+            let far = station.working_distance;
+            let spot = ray.at((far - ray.origin.z) / ray.direction.z);
+            let camera = base_from_scene(&station) * above(x - spot.x, y + spot.y, 4.2 + far);
+            camera * station.flange_from_camera.inverse()
+        })
+        .collect();
+    save_poses(out, &poses).unwrap();
 }
 
 fn truth(recording: &Path) -> Rigid<Base, Part> {
@@ -146,6 +173,41 @@ fn a_second_look_is_planned_taken_and_brought_together() {
     assert!((0..3).all(|k| both.by[k].abs() < 3.0 * sigma[k]), "{both:?} {sigma:?}");
     assert!(both.in_plane() < 0.05 && both.in_height() < 0.05, "{both:?}");
 
+    // The pointer's distances agree; the spot at the part's edge is left out. One scan with them is checked in its height only.
+    spots(&b.at("spots.json"));
+    b.simulate("--out ./spots --scene here.toml --set surface --poses spots.json");
+    let ranged: Value = serde_json::from_str(&b.run(&format!("{find} --range spots/surface"))).unwrap();
+    let witness = |r: &Value, path: &str| figure(r, &["looks", "witness", path]);
+    println!("{}", ranged["looks"]["witness"]);
+    assert!(witness(&ranged, "places") == 5.0 && witness(&ranged, "ratio") < 3.0, "{}", ranged["looks"]["witness"]);
+    assert!(witness(&ranged, "height_mm").abs() < 0.05, "{}", ranged["looks"]["witness"]);
+    assert!(notes(&ranged).contains("laser_0005.png: the spot is nearer than 1 mm to an edge"), "{}", notes(&ranged));
+    let one_ranged = format!("find scans/a --range spots/surface --out r.json {at} --recipe");
+    let alone: Value = serde_json::from_str(&b.run(&format!("{one_ranged} led.toml"))).unwrap();
+    assert!(
+        notes(&alone).contains("not cross-checked") && notes(&alone).contains("height was cross-checked"),
+        "{alone}"
+    );
+    let (code, said) = b.fails(&format!("{one_ranged} strict.toml"));
+    assert!(code == 1 && said.contains("number of looks"), "{said}");
+    let (code, said) = b.fails(&format!("{find} --range first/scan"));
+    assert!(code == 1 && said.contains("pointer"), "{said}");
+    // The same scans as of an object that nobody drew.
+    let object = |look: &str| {
+        let args = format!("verify --station ./station --object scans/{look}a --object scans/{look}b --json");
+        serde_json::from_str::<Value>(&b.run(&args)).unwrap()
+    };
+    let seen = object("");
+    println!("{}", seen["object"]);
+    assert!(
+        figure(&seen, &["object", "looks", "ratio"]) < 3.0 && !seen["remarks"].to_string().contains("disagree"),
+        "{seen}"
+    );
+    let (code, said) = b.fails("verify --station ./station --object scans/a --object scans/a");
+    assert!(code == 2 && said.contains("one scan twice"), "{said}");
+    let (code, said) = b.fails("verify --station ./station --object scans/a");
+    assert!(code == 2 && said.contains("two or more"), "{said}");
+
     // What is no second look.
     let refused = |scans: &str, code: i32, words: &[&str]| {
         let (is, said) = b.fails(&format!("find {scans} --recipe led.toml --out no.json {at}"));
@@ -180,6 +242,22 @@ fn a_second_look_is_planned_taken_and_brought_together() {
     }
     refused("scans/wrong_a scans/wrong_b", 1, &["looks' ratio"]);
     assert_eq!(json(&b.at("no.json"))["looks"]["explained_by"][0]["name"], "hand-eye");
+    let seen = object("wrong_");
+    println!("{}\n{}", seen["object"], seen["remarks"]);
+    assert!(figure(&seen, &["object", "looks", "ratio"]) > 3.0, "{}", seen["object"]);
+    assert!(seen["remarks"].to_string().contains("the hand-eye explains"), "{}", seen["remarks"]);
     // A scan with another calibration beside one with the present one.
     refused("scans/wrong_a scans/b", 1, &["was scanned with calibration"]);
+
+    // The laser plane is 0.3 mm nearer: two looks hardly show it, the pointer does.
+    let mut rig = Rig::load(&b.at("station")).unwrap();
+    rig.hand_eye.as_mut().unwrap().value.translation.x -= 1.0;
+    rig.laser_plane.as_mut().unwrap().value.offset -= 0.3;
+    rig.store_all(&b.at("station")).unwrap();
+    b.scan("first/scan", "scans/low_a");
+    b.scan("again/scan", "scans/low_b");
+    refused("scans/low_a scans/low_b --range spots/surface", 1, &["range's ratio"]);
+    let low = json(&b.at("no.json"));
+    println!("{}", low["looks"]);
+    assert!(witness(&low, "height_mm") < -0.3, "{}", low["looks"]["witness"]);
 }

@@ -53,7 +53,7 @@ pub struct Args {
     /// Shots of a scan [default: 200; with --rig one every one and a half pixel footprints]
     #[arg(long)]
     shots: Option<usize>,
-    /// Flange poses to scan from instead of a straight pass, one a shot, as second-look writes them
+    /// Flange poses to take the set scan or surface from instead of our own, one a shot, as second-look writes them
     #[arg(long, value_name = "FILE", conflicts_with = "shots")]
     poses: Option<PathBuf>,
     /// Scales shot noise, read noise, speckle and hot pixels; 0 is a noiseless sensor

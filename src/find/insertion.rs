@@ -7,6 +7,7 @@ use super::budget::{Budget, budget};
 use super::construct::{Built, build, features};
 use super::looks::{self, Agreed, Disagreement, Look, Witness};
 use super::measure::{Measured, localise, measure};
+use super::mirror::own_mirror_image;
 use super::model::ShapeModel;
 use super::part_seen::towards_camera;
 use super::points::Ordered;
@@ -330,6 +331,9 @@ fn conclude(
     let base_from_constructed = measured.base_from_part * moved;
     notes.push(ONE_LOOK.into());
     notes.extend(sizes.as_ref().and_then(SizeCheck::silent));
+    if own_mirror_image(&recipe.drawing()) {
+        notes.push(SAME_IN_A_MIRROR.into());
+    }
     let passed = reasons.is_empty();
     Report {
         recipe: recipe.name.clone(),
@@ -372,6 +376,10 @@ fn size_check(budget: &Budget, recipe: &Recipe) -> Option<SizeCheck> {
 const ONE_LOOK: &str = "not cross-checked: one look cannot show what calibrations, delay, convention or robot got wrong; \
     plan a second one with sheetlight second-look";
 
+/// What is said of a part that cannot tell pictures from their mirror images.
+const SAME_IN_A_MIRROR: &str =
+    "the part is its own mirror image: one look cannot tell mirrored pictures (ReverseX, ReverseY)";
+
 /// The tool's poses for a part whose pose is known.
 fn poses_at(base_from_part: &Rigid<Base, Part>, recipe: &Recipe, robot: Convention) -> Poses {
     let spec = &recipe.insertion;
@@ -409,7 +417,7 @@ pub fn agree(reports: Vec<Report>, witness: Option<&Witness>, recipe: &Recipe, r
         (1..).zip(&reports).flat_map(|(k, r)| missed(&r.gates).map(move |why| format!("look {k}: {why}"))).collect();
     let mut report = reports.into_iter().next().expect("looks agree about one part at least");
     let alone = disagreement.looks < 2;
-    report.notes.retain(|n| alone || n != ONE_LOOK);
+    report.notes.retain(|n| alone || ![ONE_LOOK, SAME_IN_A_MIRROR].contains(&n.as_str()));
     if alone {
         report.notes.push("the height was cross-checked by the pointer, nothing else was".into());
     }

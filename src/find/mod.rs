@@ -25,6 +25,7 @@ mod look_plan;
 mod look_stack;
 pub mod looks;
 pub mod measure;
+pub mod mirror;
 pub mod model;
 mod outline;
 pub mod part_seen;

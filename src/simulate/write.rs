@@ -83,7 +83,7 @@ pub struct SimulateOptions {
     pub sensor: Sensor,
     /// Shots of a scan, 2..=100000.
     pub shots: usize,
-    /// Where the robot stands for each shot of a scan, instead of a straight pass over the scene: a second look.
+    /// Where the robot stands for each shot of a scan or of the pointer on the scene, instead of places of our choice.
     pub poses: Option<Vec<Rigid<Base, Flange>>>,
     /// Errors of the reported robot poses, 1 sigma per axis, mm 0..=10 and degrees 0..=5.
     pub pose_noise_mm: f64,
@@ -125,9 +125,9 @@ impl SimulateOptions {
             ("pose noise in degrees", self.pose_noise_deg, 0.0, 5.0),
             ("the number of sets", self.sets.len() as f64, 1.0, 100.0),
         ];
-        if self.poses.is_some() && !self.sets.contains(&Set::Scan) {
-            return Err(Fault::usage("poses were given, and no scan is simulated")
-                .next("add the set scan, or leave the poses out"));
+        if self.poses.is_some() && !matches!(self.sets[..], [Set::Scan] | [Set::Surface]) {
+            return Err(Fault::usage("poses were given for something else than one scan or one set surface")
+                .next("simulate scan or surface alone, or leave the poses out"));
         }
         match limits.iter().find(|(_, v, low, high)| !(*low..=*high).contains(v)) {
             Some((name, v, low, high)) => {
@@ -253,7 +253,7 @@ impl Plan {
                 plan.scenes = vec![scene.clone()];
                 let cameras = match (set, &options.poses) {
                     (Set::Scan, None) => plan::scan(station, scene, options.shots),
-                    (Set::Scan, Some(poses)) => {
+                    (_, Some(poses)) => {
                         let scene_from_base = base_from_scene.inverse();
                         poses.iter().map(|p| scene_from_base * *p * station.flange_from_camera).collect()
                     }
