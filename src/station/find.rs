@@ -3,15 +3,17 @@
 //! Frame and unit: base frame, mm.
 
 use super::height_witness::height_witness;
-use super::report::{ScanReport, cloud_of, load_report};
+use super::scan::report::{ScanReport, cloud_of, load_report};
 use crate::fault::{Fault, Result};
-use crate::find::teach::{TeachOptions, teach};
-use crate::find::{LocateOptions, LookPlan, Recipe, Report, agree, locate, picture, plan_look};
+use crate::find::insert::picture;
+use crate::find::insert::teach::{TeachOptions, teach};
+use crate::find::{LocateOptions, LookPlan, Recipe, Report, agree, locate, plan_look};
 use crate::geometry::{Base, Flange, Rigid};
 use crate::raster::RgbImage;
 use crate::recording::Recording;
 use crate::rig::Rig;
-use crate::scan::{GridOptions, grid};
+use crate::scan::GridOptions;
+use crate::scan::grid;
 use std::path::{Path, PathBuf};
 
 /// What is known of one part: finished scans of it, and pictures of the pointer's spot on it.

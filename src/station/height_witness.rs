@@ -3,12 +3,12 @@
 //! Frame and unit: base axes; mm, rad. docs/math.md, Second look (7).
 
 use super::range::{RangeRun, Touched, touched};
-use crate::calibrate::pointer_range::{BasePoint, RIG, SharedCovariance};
-use crate::calibrate::pointer_report::BEAM_NAMES;
+use crate::calibrate::pointer::range::{BasePoint, RIG, SharedCovariance};
+use crate::calibrate::pointer::solve::BEAM_NAMES;
 use crate::fault::{Fault, Result};
-use crate::find::edge_index::EdgeIndex;
-use crate::find::levers::Lever;
-use crate::find::looks::Witness;
+use crate::find::look::levers::Lever;
+use crate::find::look::looks::Witness;
+use crate::find::model::edge_index::EdgeIndex;
 use crate::find::{Recipe, Report};
 use crate::geometry::Vec3;
 use crate::recording::Recording;

@@ -5,9 +5,9 @@
 use super::find::{different, fits};
 use crate::calibrate::verify::{FlatCheck, TouchCheck, flat, read_touches, touch};
 use crate::fault::{Fault, Result};
-use crate::find::looks::{Disagreement, Look, agree};
-use crate::find::points::Ordered;
-use crate::find::register::{Registered, register};
+use crate::find::look::looks::{Disagreement, Look, agree};
+use crate::find::look::register::{Registered, register};
+use crate::find::measure::points::Ordered;
 use crate::geometry::Vec3;
 use crate::rig::{Calibration, Rig};
 use std::collections::BTreeMap;

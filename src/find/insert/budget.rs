@@ -1,0 +1,147 @@
+//! In: a measured pose with its covariance, the calibrations of the rig, the robot's repeatability.
+//! Out: the error budget: what each of them adds to the insertion pose, and the sum
+//! (docs/math.md, Insertion (5)). Frame and unit: the part's own axes; mm, degrees; one standard deviation.
+
+use super::recipe::Recipe;
+use crate::find::look::levers::Lever;
+use crate::find::look::part_seen::PartSeen;
+use crate::find::measure::points::Ordered;
+use crate::find::measure::pose::Measured;
+use crate::find::measure::shape::Shape;
+use crate::geometry::{Base, Camera, Mat3, Rigid};
+use crate::rig::Rig;
+use nalgebra::Matrix6;
+
+/// One line of the budget.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Term {
+    pub name: &'static str,
+    /// x, y, z of the part, mm; `None` where the source does not know its uncertainty.
+    pub sigma_mm: Option<[f64; 3]>,
+    pub sigma_deg: Option<[f64; 3]>,
+    /// Where the number comes from, or why there is none.
+    pub note: String,
+}
+
+/// The budget and its sum over the terms that are known.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Budget {
+    pub terms: Vec<Term>,
+    pub sigma_mm: [f64; 3],
+    pub sigma_deg: [f64; 3],
+    /// False where a term is unknown: the sum is then a lower bound.
+    pub complete: bool,
+    #[serde(skip)]
+    pub covariance: Matrix6<f64>,
+    /// What belongs to this look alone: match and robot, the part's axes.
+    #[serde(skip)]
+    pub own: Matrix6<f64>,
+    /// What all looks of this rig share; none where the scan does not fit the rig.
+    #[serde(skip)]
+    pub levers: Vec<Lever>,
+    /// Sizes against the drawing, of this look alone.
+    #[serde(skip)]
+    pub shape: Option<Shape>,
+    /// How the part was seen, and how the camera stood over its middle.
+    #[serde(skip)]
+    pub seen: Option<PartSeen>,
+    #[serde(skip)]
+    pub base_from_camera: Option<Rigid<Base, Camera>>,
+}
+
+impl Budget {
+    /// Of a look of which only its own covariance (base axes, or the part's where it has a turn) is known.
+    pub(in crate::find) fn of_look(own: Matrix6<f64>) -> Budget {
+        let [sigma_mm, sigma_deg] = sigmas(&own);
+        Budget {
+            terms: Vec::new(),
+            sigma_mm,
+            sigma_deg,
+            complete: true,
+            covariance: own,
+            own,
+            levers: Vec::new(),
+            shape: None,
+            seen: None,
+            base_from_camera: None,
+        }
+    }
+}
+
+/// Adds up the budget. `rig` may be missing or have imported values of unknown uncertainty.
+pub fn budget(points: &Ordered, measured: &Measured, rig: Option<&Rig>, recipe: &Recipe) -> Budget {
+    let robot = &recipe.robot;
+    let (p, r) = (robot.sigma_mm.powi(2), robot.sigma_deg.to_radians().powi(2));
+    let repeatability = Matrix6::from_diagonal(&nalgebra::Vector6::new(p, p, p, r, r, r));
+    let own = measured.covariance + repeatability;
+    let mut covariance = own;
+    let mut terms = vec![
+        peak_noise(points, measured),
+        term("match", &measured.covariance, "edges and surfaces of the part, peak noise included".into()),
+    ];
+    let mut complete = true;
+    let seen = rig.and_then(|r| PartSeen::new(points, &recipe.drawing(), measured, r, &recipe.measure));
+    let levers = seen.as_ref().zip(rig).map_or(Vec::new(), |(seen, rig)| seen.levers(rig));
+    let into_part = both(&measured.base_from_part.rotation.transpose());
+    for name in ["laser plane", "hand-eye"] {
+        let known = levers.iter().find(|l| l.name == name);
+        match (known.filter(|l| l.covariance.is_some()), &seen) {
+            (Some(lever), Some(seen)) => {
+                let c = lever.of_pose();
+                let shift = c.fixed_view::<3, 3>(0, 0).trace().max(0.0).sqrt();
+                let c = into_part * c * into_part.transpose();
+                covariance += c;
+                terms.push(term(name, &c, format!("{shift:.4} mm at {:.0} mm from the camera", seen.target().norm())));
+            }
+            _ => {
+                complete = false;
+                let note = if known.is_some() { NO_COVARIANCE } else { NO_GEOMETRY }.into();
+                terms.push(Term { name, sigma_mm: None, sigma_deg: None, note });
+            }
+        }
+    }
+    terms.push(term("robot", &repeatability, "repeatability, from the recipe".into()));
+    let [sigma_mm, sigma_deg] = sigmas(&covariance);
+    let base_from_camera = seen.as_ref().map(PartSeen::base_from_camera);
+    let shape = measured.shape;
+    Budget { terms, sigma_mm, sigma_deg, complete, covariance, own, levers, shape, seen, base_from_camera }
+}
+
+/// Standard deviations of a pose's covariance: x y z in mm, turns about them in degrees.
+pub(in crate::find) fn sigmas(c: &Matrix6<f64>) -> [[f64; 3]; 2] {
+    let sd = |k: usize| c[(k, k)].max(0.0).sqrt();
+    [[sd(0), sd(1), sd(2)], [sd(3), sd(4), sd(5)].map(f64::to_degrees)]
+}
+
+fn term(name: &'static str, c: &Matrix6<f64>, note: String) -> Term {
+    let [mm, deg] = sigmas(c);
+    Term { name, sigma_mm: Some(mm), sigma_deg: Some(deg), note }
+}
+
+/// What the peaks' own sigmas alone would give; part of the match, shown beside it.
+fn peak_noise(points: &Ordered, measured: &Measured) -> Term {
+    let mut s: Vec<f32> = points.sigma.iter().copied().filter(|s| s.is_finite() && *s > 0.0).collect();
+    if s.is_empty() {
+        return Term { name: "peak noise", sigma_mm: None, sigma_deg: None, note: "the cloud holds no sigma".into() };
+    }
+    let middle = s.len() / 2;
+    let one = f64::from(*s.select_nth_unstable_by(middle, f32::total_cmp).1);
+    let (edge, surface) = (one / (measured.edges as f64).sqrt(), one / (measured.surface_points as f64).sqrt());
+    Term {
+        name: "peak noise",
+        sigma_mm: Some([edge, edge, surface]),
+        sigma_deg: None,
+        note: format!("median {one:.4} mm a point; contained in the match"),
+    }
+}
+
+/// Turns the two halves of a pose's covariance or motion alike.
+pub(in crate::find) fn both(r: &Mat3) -> Matrix6<f64> {
+    let mut out = Matrix6::zeros();
+    out.fixed_view_mut::<3, 3>(0, 0).copy_from(r);
+    out.fixed_view_mut::<3, 3>(3, 3).copy_from(r);
+    out
+}
+
+const NO_GEOMETRY: &str = "unknown: the scan does not fit the station's calibration, or none was given";
+const NO_COVARIANCE: &str = "unknown: the calibration has no covariance (imported values)";

@@ -1,0 +1,13 @@
+//! In: a scan, a recipe, the rig's calibrations. Out: the insertion pose with its error budget and gates, or a refusal.
+//! Frame and unit: base frame; mm, degrees.
+
+pub mod budget;
+mod from_drawing;
+pub mod gate;
+pub mod locate;
+pub mod picture;
+pub mod recipe;
+pub mod teach;
+pub mod verdict;
+
+pub use from_drawing::{TaskOptions, recipe_of};
