@@ -7,7 +7,7 @@ use crate::camera::Intrinsics;
 use crate::geometry::{Board, Camera, Rigid, Vec2, Vec3};
 use crate::raster::Image;
 use crate::recording::BoardSpec;
-use crate::stages::ambient::subtract;
+use crate::stages::stripe::ambient::subtract;
 
 /// Pixels between two that are looked at, each way.
 const STEP: usize = 3;
