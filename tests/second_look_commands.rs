@@ -83,6 +83,9 @@ fn state_uncertainty(station: &Path) {
     let sigmas = DVector::from_vec(vec![0.03, 0.03, 0.03, 1.5e-4, 1.5e-4, 1.5e-4]);
     rig.hand_eye.as_mut().unwrap().covariance =
         Covariance::new(&names, &DMatrix::from_diagonal(&sigmas.map(|s| s * s)));
+    let figures = &mut rig.hand_eye.as_mut().unwrap().quality.figures;
+    figures.insert("robot_sigma_mm".into(), 0.005);
+    figures.insert("robot_sigma_deg".into(), 0.001);
     let plane = rig.laser_plane.as_mut().unwrap();
     let n = plane.value.normal;
     let tangent = (sheetlight::geometry::Mat3::identity() - n * n.transpose()) * 1e-4;

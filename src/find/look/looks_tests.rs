@@ -5,6 +5,7 @@
 use super::*;
 use crate::find::insert::budget::Budget;
 use crate::find::look::part_seen::{PartSeen, travelled};
+use crate::find::look::size_check::SizeCheck;
 use crate::find::measure::shape::Shape;
 use crate::geometry::{Camera, Flange, Plane};
 use crate::rig::{Calibration, Covariance, Kind, Quality, Rig, Verdict};
@@ -222,10 +223,14 @@ fn sizes_and_a_witness_of_the_height_show_what_two_looks_hide() {
     let sized = agreed(&s, &poses).disagreement;
     println!("sized {:.2}, {:?}", sized.misfit_sigmas, sized.explained_by[0]);
     assert!(of_plane(&sized) < 0.8 * of_plane(&alone), "{} {}", of_plane(&sized), of_plane(&alone));
-    assert!(sized.misfit_sigmas > 3.0 && sized.misfit_sigmas > alone.misfit_sigmas, "{}", sized.misfit_sigmas);
-    assert_eq!(sized.explained_by[0].name, "laser plane");
-    let offset = sized.explained_by[0].off_by[3];
-    assert!(offset.0 == "offset mm" && (offset.1 + 0.3).abs() < 0.15, "{offset:?}");
+    let look = &s.looks[0];
+    let axes = look.seen.as_ref().unwrap().scan_axes();
+    let check = SizeCheck::new(&look.shape.unwrap(), &look.levers, &axes, 0.0015);
+    println!("{check:?}");
+    assert!(check.ratio > 3.0 && sized.misfit_sigmas > alone.misfit_sigmas, "{check:?} {}", sized.misfit_sigmas);
+    let plane = sized.explained_by.iter().find(|e| e.name == "laser plane").unwrap();
+    let offset = plane.off_by[3];
+    assert!(plane.share > 0.7 && offset.0 == "offset mm" && (offset.1 + 0.3).abs() < 0.15, "{plane:?}");
 }
 
 #[test]

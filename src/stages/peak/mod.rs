@@ -15,8 +15,8 @@ mod stage;
 mod turn;
 mod twin;
 
-pub(super) use frame::frame_of;
 pub use found::{Peak, Reject, SATURATED};
+pub(super) use frame::frame_of;
 pub use frame::{PeakFrame, SHARED, UNIFORM};
 pub use measure::measure;
 pub use noise::noise;
