@@ -105,7 +105,7 @@ fn state_uncertainty(station: &Path) {
 fn spots(out: &Path) {
     let station = Station::random(3);
     let (ray, turn) = (station.pointer.ray(), 3f64.to_radians());
-    let places = [[0.0, 0.0], [13.9, 4.5], [13.9, -4.5], [-13.9, 4.5], [-13.9, -4.5], [-6.0, 8.9]];
+    let places = [[0.0, 0.0], [13.9, 4.5], [13.9, -4.5], [-13.9, 4.5], [-13.9, -4.5], [-6.0, 8.4]];
     let poses: Vec<_> = places
         .iter()
         .map(|[x, y]| {
