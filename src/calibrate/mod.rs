@@ -1,6 +1,7 @@
 //! In: pictures' features, robot poses, laser peaks. Out: calibrations with covariance and verdict.
 //! Frame and unit: stated in each file; mm, rad, px.
 
+pub mod axis;
 pub mod board_print;
 pub mod boards;
 pub mod camera;

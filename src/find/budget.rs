@@ -5,8 +5,8 @@
 use super::measure::Measured;
 use super::points::Ordered;
 use super::recipe::RobotSpec;
-use crate::geometry::{Base, Camera, Mat3, Rigid, Vec2, Vec3};
-use crate::rig::{Covariance, Rig};
+use crate::geometry::{Axis, AxisKind, Base, Camera, Mat3, Ride, Rigid, Vec2, Vec3};
+use crate::rig::{Covariance, Kind, Rig};
 use nalgebra::{DMatrix, Matrix6};
 
 /// One line of the budget.
@@ -76,7 +76,8 @@ pub fn budget(points: &Ordered, measured: &Measured, rig: Option<&Rig>, robot: &
     let mut complete = true;
     let geometry = rig.and_then(|r| Geometry::at(points, measured, r));
     let levers = geometry.as_ref().zip(rig).map_or(Vec::new(), |(g, rig)| levers(&g.base_from_camera, &g.target, rig));
-    for name in ["laser plane", "hand-eye"] {
+    let carrying = if rig.is_some_and(|r| r.axis().is_some()) { AXIS } else { HAND_EYE };
+    for name in ["laser plane", carrying] {
         let known = levers.iter().find(|l| l.name == name);
         match (known.filter(|l| l.covariance.is_some()), &geometry) {
             (Some(lever), Some(g)) => {
@@ -203,6 +204,8 @@ fn align(from: &[Vec3], to: &[Vec3]) -> Option<Rigid<Base, Camera>> {
     (rms < 0.2).then_some(t)
 }
 
+const HAND_EYE: &str = "hand-eye";
+const AXIS: &str = "axis";
 const NO_GEOMETRY: &str = "unknown: the scan does not fit the station's calibration, or none was given";
 const NO_COVARIANCE: &str = "unknown: the calibration has no covariance (imported values)";
 
@@ -216,7 +219,28 @@ pub(super) fn levers(base_from_camera: &Rigid<Base, Camera>, target: &Vec3, rig:
         .hand_eye
         .as_ref()
         .map(|h| Lever { covariance: square(&h.covariance, 6), ..hand_eye_lever(base_from_camera, target, &h.value) });
-    plane.into_iter().chain(hand_eye).collect()
+    let axis = rig.axis().map(|a| {
+        let covariance = square(&a.covariance, Kind::parameters(a.kind).0.len());
+        Lever { covariance, ..axis_lever(base_from_camera, target, &a.value) }
+    });
+    plane.into_iter().chain(hand_eye).chain(axis).collect()
+}
+
+/// How a part at `target` (camera frame) that rode on an axis moves with it, against where it stood at the motion's zero.
+fn axis_lever(base_from_camera: &Rigid<Base, Camera>, target: &Vec3, axis: &Axis) -> Lever {
+    // The cloud's frame is the axis'.
+    let axis_from_camera: Rigid<Ride, Camera> = Rigid::new(base_from_camera.rotation, base_from_camera.translation);
+    let errors = axis.errors(axis.count_of(&axis_from_camera));
+    let origin = base_from_camera.point(target);
+    let parameters: &[&str] = match axis.kind {
+        AxisKind::Linear => &["dx", "dy", "dz", "pitch mm"],
+        AxisKind::Turntable => &["dx", "dy", "dz", "pitch rad", "px mm", "py mm", "pz mm"],
+    };
+    let jacobian = DMatrix::from_fn(6, errors.len(), |i, k| {
+        let e = &errors[k];
+        if i < 3 { e.at(&origin)[i] } else { e.w[i - 3] }
+    });
+    Lever { name: AXIS, parameters, jacobian, covariance: None }
 }
 
 /// How the part at `target` (camera frame) moves with the laser plane: P = ray offset / (n ray), so that
@@ -258,7 +282,7 @@ pub(super) fn hand_eye_lever(
     jacobian.fixed_view_mut::<3, 3>(0, 3).copy_from(&(base_from_flange * -arm));
     jacobian.fixed_view_mut::<3, 3>(3, 3).copy_from(&base_from_flange);
     let parameters = &["tx mm", "ty mm", "tz mm", "rx rad", "ry rad", "rz rad"];
-    Lever { name: "hand-eye", parameters, jacobian, covariance: None }
+    Lever { name: HAND_EYE, parameters, jacobian, covariance: None }
 }
 
 fn square(c: &Covariance, n: usize) -> Option<DMatrix<f64>> {

@@ -1,6 +1,6 @@
 //! In: a scan folder, a recipe, the station that scanned. Out: the insertion's report and its picture;
 //! a scan taken with another calibration than the station's is refused.
-//! Frame and unit: base frame, mm.
+//! Frame and unit: the scan's frame, mm; plans of a second look: base.
 
 use super::report::{cloud_of, load_report};
 use crate::fault::{Fault, Result};
@@ -9,7 +9,7 @@ use crate::find::{LocateOptions, LookPlan, Recipe, Report, agree, locate, pictur
 use crate::geometry::{Base, Flange, Rigid};
 use crate::raster::RgbImage;
 use crate::rig::Rig;
-use crate::scan::{GridOptions, grid};
+use crate::scan::{GridOptions, grid, parts_for};
 use std::path::{Path, PathBuf};
 
 /// Finds the recipe's part in one or more finished scans of it and brings them together ([`agree`]); the picture is the first
@@ -51,6 +51,12 @@ pub fn second_look(
     turn_deg: f64,
     tilt_deg: f64,
 ) -> Result<SecondLook> {
+    let motion = load_report(scan)?.motion;
+    if motion.frame() != "base" {
+        return Err(Fault::usage(format!("{}: was scanned in the {} frame", scan.display(), motion.frame()))
+            .cause("no robot moved the sensor, so none can be sent for a second look")
+            .next("scan the part again as it lies otherwise on the axis"));
+    }
     let (report, _) = find_part(scan, recipe, Some(station), &LocateOptions::default())?;
     let plan = plan_look(&report, &Rig::load(station)?, turn_deg, tilt_deg)?;
     let flanges = poses.iter().map(|p| plan.base_from_base * *p).collect();
@@ -65,7 +71,7 @@ pub fn find_part(
     options: &LocateOptions,
 ) -> Result<(Report, RgbImage)> {
     let scanned = load_report(scan)?;
-    let rig = station.map(Rig::load).transpose()?;
+    let rig = station.map(Rig::load).transpose()?.map(|rig| parts_for(&rig, &scanned.motion));
     if let (Some(rig), Some(station)) = (&rig, station) {
         rig.belong_together().map_err(|e| e.at(station.display()))?;
         let now = rig.fingerprint();
@@ -82,6 +88,13 @@ pub fn find_part(
     }
     let cloud = cloud_of(scan)?;
     let mut report = locate(&cloud, recipe, rig.as_ref(), options).map_err(|e| e.at(scan.display()))?;
+    if scanned.frame != report.frame {
+        report.notes.push(format!(
+            "all poses are in the {} frame of the scan, not in a robot's base (docs/conventions.md)",
+            scanned.frame
+        ));
+        report.frame = scanned.frame.clone();
+    }
     report.notes.extend(scanned.remarks);
     let image = picture::draw(&report, &recipe.drawing());
     Ok((report, image))

@@ -2,6 +2,7 @@
 //! Frame and unit: millimetres; each file names its frames.
 
 mod board_views;
+mod calibrate_axis;
 mod calibrate_hand_eye;
 mod calibrate_laser_plane;
 mod calibrate_pointer;
@@ -27,6 +28,7 @@ mod verify;
 pub mod volume;
 
 pub use board_views::{Boards, FrameBoard, boards};
+pub use calibrate_axis::{AxisRun, calibrate_axis};
 pub use calibrate_hand_eye::{
     Calibrated, HandEyeResult, HandEyeRun, PosePairs, calibrate_hand_eye, calibrate_hand_eye_from_poses,
 };

@@ -91,7 +91,7 @@ impl Values {
             pointer.as_ref().map_or(Ok(()), |c| asked(&c.value))?;
             hand_eye.as_ref().map_or(Ok(()), |c| asked(&c.value))?;
         }
-        let stored = Rig { camera, laser_plane, pointer, hand_eye }
+        let stored = Rig { camera, laser_plane, pointer, hand_eye, ..Rig::default() }
             .store_all(station)
             .map_err(|e| e.at(source.display()).next("correct the file; nothing was imported of it"))?;
         if stored.is_empty() {
