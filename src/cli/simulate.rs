@@ -1,7 +1,7 @@
 //! In: what to simulate. Out: recording folders, truth and a station with the true calibration.
 //! Frame and unit: as in the recording format; mm, degrees, pixels.
 
-use super::Console;
+use crate::cli::terminal::console::Console;
 use crate::fault::Result;
 use crate::geometry::AxisKind;
 use crate::recording::BoardSpec;
@@ -50,7 +50,7 @@ pub struct Args {
     height: Option<u32>,
     /// What moves: robot (the sensor, over the scene), linear or turntable (the parts, past a sensor that stands still; the
     /// station gets the true axis, and the set axis shows a board that rides on it)
-    #[arg(long, default_value = "robot", value_parser = super::parse::<Moved>)]
+    #[arg(long, default_value = "robot", value_parser = crate::cli::terminal::arguments::parse::<Moved>)]
     motion: Moved,
     /// Bits per pixel, 8 to 16 [default: the rig's, 8]
     #[arg(long)]
@@ -96,7 +96,7 @@ impl std::str::FromStr for Moved {
 const TURN_OVER_PASS: usize = 10;
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
-    super::outputs::check_simulation(&args.out)?;
+    crate::cli::terminal::outputs::check_simulation(&args.out)?;
     let mut sets = Vec::new();
     for name in &args.sets {
         match name.as_str() {

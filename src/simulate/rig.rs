@@ -2,7 +2,7 @@
 //! that follow from it: pixel footprint, stripe length, distances of boards.
 //! Frame and unit: camera frame, mm, degrees, px; each key shows its unit, docs/file-formats.md, Rig file.
 
-use super::station::Sensor;
+use super::sensor::Sensor;
 use crate::fault::{Fault, Result};
 use std::path::Path;
 

@@ -2,10 +2,11 @@
 //! a scan taken with another calibration than the station's is refused.
 //! Frame and unit: the scan's frame, mm; plans of a second look: base.
 
-use super::report::{cloud_of, load_report};
+use super::scan::report::{cloud_of, load_report};
 use crate::fault::{Fault, Result};
-use crate::find::teach::{TeachOptions, teach};
-use crate::find::{LocateOptions, LookPlan, Recipe, Report, agree, locate, picture, plan_look};
+use crate::find::insert::picture;
+use crate::find::insert::teach::{TeachOptions, teach};
+use crate::find::{LocateOptions, LookPlan, Recipe, Report, agree, locate, plan_look};
 use crate::geometry::{Base, Flange, Rigid};
 use crate::raster::RgbImage;
 use crate::rig::Rig;

@@ -2,12 +2,12 @@
 //! poses and a hand-eye calibration. Out: distances and points with sigmas, and the surface's normal.
 //! Frame and unit: camera and base frame; mm, rad.
 
-use super::calibrate_hand_eye::first_line;
-use crate::calibrate::hand_eye_report::HAND_EYE_NAMES;
-use crate::calibrate::pointer_range::{
+use super::calibrate::hand_eye::first_line;
+use crate::calibrate::hand_eye::report::HAND_EYE_NAMES;
+use crate::calibrate::pointer::range::{
     BasePoint, RIG, Ranged, RobotNoise, SharedCovariance, Surface, joint_covariance, range, surface, to_base,
 };
-use crate::calibrate::spot::{Spot, SpotOptions, SpotPicture, find_spots, hot_pixels};
+use crate::calibrate::pointer::spot::{Spot, SpotOptions, SpotPicture, find_spots, hot_pixels};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Mat3, Rigid, Tool, Vec3};
 use crate::recording::{Beam, Recording};

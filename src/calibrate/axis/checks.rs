@@ -2,25 +2,13 @@
 //! fits, and whether any order would.
 //! Frame and unit: camera frame, mm; squared distances in sigmas (docs/math.md, Axis (7), (8)).
 
-use super::noise::Scatter;
+use super::fit::{Order, Stop, StopResidual};
 use super::start::{Start, start};
-use super::terms::{Fit, Seen, State, fitted, information};
-use super::{Stop, StopResidual, diagonal};
+use super::terms::{Fit, Scatter, Seen, State, fitted, information};
 use crate::calibrate::scatter::beside;
 use crate::geometry::{AxisKind, CountUnit, Vec3};
 use nalgebra::DMatrix;
 use rand::{SeedableRng, seq::SliceRandom};
-
-/// How the counts as they are compare with others.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Order {
-    /// Spread of the stops about their motion, mm.
-    pub spread_mm: f64,
-    /// The same with the counts the other way round.
-    pub reversed_mm: f64,
-    /// The least of counts dealt out at random.
-    pub dealt_mm: f64,
-}
 
 /// Random deals of the counts.
 const DEALS: u64 = 20;
@@ -74,7 +62,7 @@ impl Suspects {
             let s = &seen[i];
             let (e, j) = (other.state.off(s), other.state.jacobian(s.count));
             let predicted = &j * &other.covariance * j.transpose();
-            let total = s.covariance + diagonal(scatter) + nalgebra::Matrix6::from_fn(|a, b| predicted[(a, b)]);
+            let total = s.covariance + scatter.covariance() + nalgebra::Matrix6::from_fn(|a, b| predicted[(a, b)]);
             let surprise = total.cholesky().map_or(f64::INFINITY, |c| e.dot(&c.solve(&e)));
             (surprise, Some(other.state))
         };

@@ -1,15 +1,8 @@
 //! In: stops and their fit. Out: what the axis itself scatters by from stop to stop, by restricted maximum likelihood.
 //! Frame and unit: mm, rad per axis (docs/math.md, Axis (6)).
 
-use super::terms::{Fit, Seen, information};
+use super::terms::{Fit, Scatter, Seen, information};
 use nalgebra::{DMatrix, DVector};
-
-/// Standard deviations per axis of the board's middle, mm, and of its turn, rad.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Scatter {
-    pub mm: f64,
-    pub rad: f64,
-}
 
 /// Steps of the search for each of the two, in turns.
 const ROUNDS: usize = 2;

@@ -2,7 +2,7 @@
 //! verification apart.
 //! Frame and unit: camera frame; mm, degrees.
 
-use super::AxisFit;
+use super::fit::AxisFit;
 use crate::calibrate::limits::{Judgement, Limits, rms};
 use crate::calibrate::report::{Page, bars, scatter};
 use crate::calibrate::scatter::{ENOUGH, overrule};

@@ -2,8 +2,7 @@
 //! scatter about it. Every pair (on a turntable: neighbours) proposes one; the one that the median stop likes best is taken.
 //! Frame and unit: camera frame, mm, rad, counts (docs/math.md, Axis (5)).
 
-use super::noise::Scatter;
-use super::terms::{Seen, State};
+use super::terms::{Scatter, Seen, State};
 use crate::geometry::{AxisKind, CountUnit, Mat3, Vec3, log};
 
 /// Where to start from.

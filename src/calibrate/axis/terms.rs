@@ -2,12 +2,25 @@
 //! fit, and how it follows the camera.
 //! Frame and unit: camera frame; the board's middle, mm, and its turn, rad (docs/math.md, Axis (1) to (4)).
 
-use super::noise::Scatter;
-use super::{Stop, diagonal};
+use super::fit::Stop;
 use crate::calibrate::measured_pose::ByIntrinsics;
 use crate::geometry::{Axis, AxisKind, Board, Camera, CountUnit, Mat3, Riding, Rigid, Vec3, exp, log, skew};
 use crate::solve::{LmOptions, Problem, Residuals, Stop as Ended, lm};
 use nalgebra::{DMatrix, Matrix6, Vector6};
+
+/// What the axis itself scatters by from stop to stop: standard deviations per axis of the board's middle, mm, and of its turn, rad.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Scatter {
+    pub mm: f64,
+    pub rad: f64,
+}
+
+impl Scatter {
+    pub fn covariance(&self) -> Matrix6<f64> {
+        let (p, r) = (self.mm * self.mm, self.rad * self.rad);
+        Matrix6::from_diagonal(&Vector6::new(p, p, p, r, r, r))
+    }
+}
 
 /// A board at a stop, as a measurement of its middle's place and of its turn.
 #[derive(Clone, Debug)]
@@ -183,7 +196,7 @@ struct Stops<'a> {
 
 /// Information of a stop, the axis' own scatter beside the pixels'.
 pub(super) fn information(s: &Seen, scatter: &Scatter) -> Option<Matrix6<f64>> {
-    Some((s.covariance + diagonal(scatter)).cholesky()?.inverse())
+    Some((s.covariance + scatter.covariance()).cholesky()?.inverse())
 }
 
 impl Problem for Stops<'_> {

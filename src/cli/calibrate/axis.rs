@@ -1,8 +1,8 @@
 //! In: a recording of a board that rides on a linear axis or turntable. Out: its direction and pitch, or its axis.
 //! Frame and unit: camera frame; mm, rad a count.
 
-use super::super::Console;
-use super::{Keep, finish};
+use super::store::{Keep, finish};
+use crate::cli::terminal::console::Console;
 use crate::fault::Result;
 use crate::geometry::AxisKind;
 use crate::raster::Channel;
@@ -34,7 +34,7 @@ pub struct Args {
     #[arg(long)]
     station: PathBuf,
     /// Part of a colour picture to use: red, green, blue or luma
-    #[arg(long, default_value = "luma", value_parser = crate::cli::parse::<Channel>)]
+    #[arg(long, default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
     channel: Channel,
     #[command(flatten)]
     keep: Keep,
