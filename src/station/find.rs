@@ -7,7 +7,7 @@ use crate::fault::{Fault, Result};
 use crate::find::insert::picture;
 use crate::find::insert::teach::{TeachOptions, teach};
 use crate::find::{LocateOptions, LookPlan, Recipe, Report, agree, locate, plan_look};
-use crate::geometry::{Base, Flange, Rigid};
+use crate::geometry::{AxisKind, Base, Flange, Rigid, Vec3};
 use crate::raster::RgbImage;
 use crate::rig::Rig;
 use crate::scan::{GridOptions, grid, parts_for};
@@ -88,6 +88,9 @@ pub fn find_part(
         }
     }
     let cloud = cloud_of(scan)?;
+    // A turntable's part turns before the camera: heights are those over the table, z of the axis frame.
+    let over_table = (scanned.motion.axis() == Some(AxisKind::Turntable)).then(Vec3::z);
+    let options = &LocateOptions { up: options.up.or(over_table), ..options.clone() };
     let mut report = locate(&cloud, recipe, rig.as_ref(), options).map_err(|e| e.at(scan.display()))?;
     if scanned.frame != report.frame {
         report.notes.push(format!(

@@ -96,7 +96,7 @@ pub fn scan_on(
     let cloud = if state.shots > 0 {
         CloudWriter::resume(&cloud_path, state.points)?
     } else {
-        CloudWriter::create(&cloud_path)?
+        CloudWriter::create_in(&cloud_path, options.motion.frame())?
     };
     let total = source.remaining().map(|n| n + state.shots - repeated);
     let format = source.format();
