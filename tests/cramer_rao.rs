@@ -4,8 +4,12 @@
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use sheetlight::raster::Image;
-use sheetlight::stages::peak::{Method, PeakParams, measure, peaks};
-use sheetlight::stages::{Thinning, ThresholdParams, skeleton, thin, threshold};
+use sheetlight::stages::peak::measure;
+use sheetlight::stages::peak::params::Method;
+use sheetlight::stages::peak::params::PeakParams;
+use sheetlight::stages::peak::peaks;
+use sheetlight::stages::stripe::{skeleton, thin, threshold};
+use sheetlight::stages::{Thinning, ThresholdParams};
 
 /// Sensor of the simulation: read noise, grey levels per photo-electron, dark level; rounding adds 1/12.
 const READ: f64 = 0.64;
@@ -119,7 +123,7 @@ fn centres_are_as_good_as_the_light_allows() {
                 sd_wide / wide
             );
             for (what, ratio, bias) in [("one line", sd_one / one, bias_one), ("along", sd_wide / wide, bias_wide)] {
-                if ratio > 1.10 || ratio < 0.9 || bias.abs() > 0.01 {
+                if !(0.9..=1.10).contains(&ratio) || bias.abs() > 0.01 {
                     faults.push(format!("sigma {sigma}, peak {peak}, {what}: sd {ratio:.3} bounds, bias {bias:.4} px"));
                 }
             }

@@ -113,12 +113,12 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     crate::files::write(&with(".pdf"), &drawn.pdf())?;
     let text = serde_json::to_string_pretty(&board).expect("plain data");
     crate::files::write(&with(".json"), text.as_bytes())?;
-    if let BoardSpec::Chessboard { inner_corners: [a, b], .. } = board {
-        if (a + b) % 2 == 0 {
-            console.warn(format!(
+    if let BoardSpec::Chessboard { inner_corners: [a, b], .. } = board
+        && (a + b) % 2 == 0
+    {
+        console.warn(format!(
                 "{a}x{b} inner corners look the same after a half turn; choose one even and one odd number where poses matter"
             ));
-        }
     }
     console.say(format!(
         "{}.svg .pdf .json written: {:.1} x {:.1} mm; print without scaling and check the rule",

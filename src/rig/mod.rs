@@ -6,17 +6,20 @@ mod calibration;
 mod checks;
 mod covariance;
 mod folder;
+mod hash;
 mod kind;
+mod measured;
 mod seal;
 mod volume;
 
 pub use calibration::{
     AXIS_SIGMA_DEG, AXIS_SIGMA_MM, Calibration, HandEye, Quality, ROBOT_SIGMA_DEG, ROBOT_SIGMA_MM, Verdict, axis_sigma,
-    hash_file, hash_text,
+    hash_file,
 };
-pub use checks::Measured;
 pub use covariance::Covariance;
 pub use folder::{Rig, asked};
+pub use hash::hash_text;
 pub use kind::{Kind, Place, Units};
+pub use measured::Measured;
 pub use seal::{sealed, unsealed};
 pub use volume::Volume;

@@ -3,10 +3,12 @@
 //! Frame and unit: pixels.
 
 use super::*;
-use crate::stages::cases::{self, Noise, drawn, stripe};
+use crate::stages::Window;
+use crate::stages::cases::{self, drawn, stripe};
 use crate::stages::frame::HAS_ROI;
-use crate::stages::lengthen::LengthenParams;
-use crate::stages::{Window, lengthen, point, thin};
+use crate::stages::noise::Noise;
+use crate::stages::stripe::lengthen::LengthenParams;
+use crate::stages::stripe::{lengthen, point, thin};
 
 /// The plain way, every pixel: lit, thinned, and the list after the ends were carried on.
 fn plain(image: &Image, c: &ChainConfig) -> (Mask, Mask, Vec<u32>) {
@@ -74,9 +76,14 @@ fn any_picture(w: u32, h: u32, bits: u8, random: &mut Noise) -> Image {
             let d = (f64::from(x) - 0.4 * f64::from(w) - 0.3 * f64::from(y)) / (1.0 + f64::from(at % 5));
             level(0.1 + 0.7 * (-0.5 * d * d).exp() + 0.01 * noise.normal())
         }),
-        4 => drawn(w, h, bits, |x, y| if (x / (1 + at % 13) + y / (1 + at % 7)) % 3 == 0 { full } else { full / 5 }),
+        4 => drawn(
+            w,
+            h,
+            bits,
+            |x, y| if (x / (1 + at % 13) + y / (1 + at % 7)).is_multiple_of(3) { full } else { full / 5 },
+        ),
         5 => drawn(w, h, bits, |x, y| level(f64::from(x + y) / f64::from(w + h) + 0.02 * noise.normal())),
-        _ => drawn(w, h, bits, |x, y| if (x * 7 + y * 13 + at) % 97 == 0 { full } else { level(0.1) }),
+        _ => drawn(w, h, bits, |x, y| if (x * 7 + y * 13 + at).is_multiple_of(97) { full } else { level(0.1) }),
     }
 }
 
@@ -104,7 +111,7 @@ fn masks_and_skeletons_of_random_pictures_are_those_of_the_twins() {
             thinning: if next(2) == 0 { Thinning::ZhangSuen } else { Thinning::GuoHall },
             region: roi.then(|| Mask::from_fn(w, h, |x, y| x + 2 * y > cut && x % 40 != 7)),
             lengthen: if next(2) == 0 { 0 } else { LengthenParams::default().word(WIDTH_PX) },
-            ambient: dim.then(|| drawn(w, h, bits, |x, y| (x * 3 + y * 5) % 60 << (bits - 8))),
+            ambient: dim.then(|| drawn(w, h, bits, |x, y| ((x * 3 + y * 5) % 60) << (bits - 8))),
             ..ChainConfig::new(w, h, bits)
         };
         let image = any_picture(w, h, bits, &mut random);
@@ -137,12 +144,12 @@ fn peaks_and_points_are_those_of_the_twins() {
     let image = stripe(640, 360, 8, 2.5, 5, 4);
     let optics = cases::optics(640, 360);
     let peak = peak::PeakParams { width_px: 2.5, ..Default::default() };
-    let measure = Measure { peak, choose: choose::ChooseParams::default(), optics };
+    let measure = Measure { peak, choose: crate::stages::stripe::choose_params::ChooseParams::default(), optics };
     let config = ChainConfig { measure: Some(measure), ..ChainConfig::new(640, 360, 8) };
     let found = Host::new(&config).unwrap().run(5, &image, &cases::pose(2)).unwrap();
     let mut peaks = peak::peaks(&image, &plain(&image, &config).2, 5, &peak, optics.across());
     let scene = choose::Scene { width: 640, height: 360, full_scale: 255.0, width_px: 2.5, across: optics.across() };
-    choose::choose(&mut peaks, &scene, &choose::ChooseParams::default());
+    choose::choose(&mut peaks, &scene, &crate::stages::stripe::choose_params::ChooseParams::default());
     let points = point::posed(&mut peaks, &optics, &cases::pose(2));
     assert!(peaks.len() > 600 && found.peaks == peaks);
     let bits = |p: &[Point]| bytemuck::cast_slice::<Point, u32>(p).to_vec();

@@ -19,7 +19,7 @@ use crate::raster::Image;
 use crate::recording::{Beam, Recording};
 use crate::rig::{Calibration, Kind, Rig, Volume, hash_file};
 use crate::scan::{Engine, Extraction, Format, Optical, Processor, Where};
-use crate::stages::point;
+use crate::stages::stripe::point;
 
 /// How [`calibrate_laser_plane`] is run.
 #[derive(Clone, Debug)]
@@ -121,10 +121,10 @@ fn stripes(
     let format = Format { width: first.width, height: first.height, bits: first.bits };
     let optical = Optical { camera: *camera, laser: *laser, depth_mm };
     let mut engine = Engine::new(format, &optical, &run.extraction, None, processor.clone());
-    if run.extraction.measure_stripe {
-        if let Some(stripe) = engine.measure(&images.iter().collect::<Vec<_>>()) {
-            engine.set_stripe(&stripe)?;
-        }
+    if run.extraction.measure_stripe
+        && let Some(stripe) = engine.measure(&images.iter().collect::<Vec<_>>())
+    {
+        engine.set_stripe(&stripe)?;
     }
     let camera_frame = point::pose_words(&Rigid::<crate::geometry::Camera, crate::geometry::Camera>::identity());
     for (i, image) in images.iter().enumerate() {
