@@ -1,6 +1,7 @@
 //! In: `meta.json`. Out: the recording's contents, with unknown keys, units and versions refused.
 //! Frame and unit: mm; pixel centres at integer coordinates.
 
+use super::frame::FrameRef;
 use super::{BoardSpec, Motion};
 use crate::fault::{Fault, Result};
 use crate::raster::{MOST_PIXELS, MOST_SIDE, Response};
@@ -63,28 +64,6 @@ pub struct ImageSpec {
 pub enum Beam {
     Line,
     Pointer,
-}
-
-/// One moment of the recording: pictures taken without moving.
-#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FrameRef {
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub laser: Option<String>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub ambient: Option<String>,
-    /// Index into the pose file.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub pose: Option<usize>,
-    /// Index into `boards`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub board: Option<usize>,
-    /// Where the axis stood, in `motion.unit`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub count: Option<f64>,
-    /// Number of the pulse that triggered the camera, from 0.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub trigger: Option<u64>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]

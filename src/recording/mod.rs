@@ -3,6 +3,8 @@
 
 mod board;
 mod board_poses;
+mod counts;
+mod frame;
 mod markers;
 mod meta;
 mod motion;
@@ -11,8 +13,9 @@ mod poses;
 
 pub use board::BoardSpec;
 pub use board_poses::load_board_poses;
+pub use frame::FrameRef;
 pub use markers::Markers;
-pub use meta::{AmbientRef, Beam, FrameRef, ImageSpec, Meta};
+pub use meta::{AmbientRef, Beam, ImageSpec, Meta};
 pub use motion::{Carries, Motion, MotionKind, Stand};
 pub use poses::{PoseFile, load_poses, save_poses};
 
