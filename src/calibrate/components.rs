@@ -15,7 +15,7 @@ pub struct Components {
 }
 
 impl Components {
-    /// One step of Fisher scoring for the restricted likelihood [patterson71] from `theta`:
+    /// One step of Fisher scoring for the restricted likelihood \[patterson71\] from `theta`:
     /// tr(P Uₐ P U_b) θ = eᵀ P Uₐ P e − tr(P Uₐ P V₀), P the projector that removes the fit.
     /// Components never leave `floor`. `None` where a matrix is singular.
     pub fn step(&self, theta: &[f64], floor: &[f64]) -> Option<Vec<f64>> {

@@ -8,7 +8,7 @@ use crate::geometry::{Frame, Rigid};
 /// One position register of a program.
 #[derive(Clone, Debug)]
 pub struct TpPosition<To: Frame, From: Frame> {
-    /// n of P[n].
+    /// n of `P[n]`.
     pub number: u32,
     /// The comment, where there is one: P[3:"over the ball"].
     pub comment: String,
