@@ -92,6 +92,8 @@ pub struct SimulateOptions {
     pub shots: usize,
     /// An axis moves the parts past the sensor, which stands still; `None`: a robot moves the sensor.
     pub motion: Option<AxisKind>,
+    /// Where the robot stands for each shot of a scan or of the pointer on the scene, instead of places of our choice.
+    pub poses: Option<Vec<Rigid<Base, Flange>>>,
     /// Errors of the reported robot poses, 1 sigma per axis, mm 0..=10 and degrees 0..=5.
     pub pose_noise_mm: f64,
     pub pose_noise_deg: f64,
@@ -116,6 +118,7 @@ impl SimulateOptions {
             sensor: rig.sensor,
             shots: rig.shots(),
             motion: None,
+            poses: None,
             rig: Some(rig),
             pose_noise_mm: 0.0,
             pose_noise_deg: 0.0,
@@ -127,7 +130,7 @@ impl SimulateOptions {
         let limits = [
             ("width", f64::from(self.width), 64.0, 8192.0),
             ("height", f64::from(self.height), 64.0, 8192.0),
-            ("shots", self.shots as f64, 2.0, 1e5),
+            ("shots", self.poses.as_ref().map_or(self.shots, Vec::len) as f64, 2.0, 1e5),
             ("pose noise in mm", self.pose_noise_mm, 0.0, 10.0),
             ("pose noise in degrees", self.pose_noise_deg, 0.0, 5.0),
             ("the number of sets", self.sets.len() as f64, 1.0, 100.0),
@@ -135,6 +138,10 @@ impl SimulateOptions {
         if self.motion.is_none() && self.sets.contains(&Set::Axis) {
             return Err(Fault::usage("the set axis shows a board on an axis, and no axis is simulated")
                 .next("name one: --motion linear or --motion turntable"));
+        }
+        if self.poses.is_some() && !matches!(self.sets[..], [Set::Scan] | [Set::Surface]) {
+            return Err(Fault::usage("poses were given for something else than one scan or one set surface")
+                .next("simulate scan or surface alone, or leave the poses out"));
         }
         match limits.iter().find(|(_, v, low, high)| !(*low..=*high).contains(v)) {
             Some((name, v, low, high)) => {
@@ -307,8 +314,12 @@ impl Plan {
                 let base_from_scene = plan::base_from_scene(station);
                 plan.truth = plan.truth.with_scene(scene, base_from_scene);
                 plan.scenes = vec![scene.clone()];
-                let cameras = match set {
-                    Set::Scan => plan::scan(station, scene, options.shots),
+                let cameras = match (set, &options.poses) {
+                    (Set::Scan, None) => plan::scan(station, scene, options.shots),
+                    (_, Some(poses)) => {
+                        let scene_from_base = base_from_scene.inverse();
+                        poses.iter().map(|p| scene_from_base * *p * station.flange_from_camera).collect()
+                    }
                     _ => plan::surface_views(station, scene),
                 };
                 for (i, camera) in cameras.iter().enumerate() {
