@@ -158,7 +158,7 @@ impl Scanner {
                 ambient.suits(&self.waiting[0].image, &self.waiting[0].name)?;
             }
             let PeakParams { width_px, speckle, .. } = self.extraction.peak;
-            let assumed = Stripe { width_px, speckle, noise: 0.0 };
+            let assumed = Stripe { width_px, speckle, ..Stripe::default() };
             let stripe = match self.stripe {
                 Some(s) => s,
                 None if self.extraction.measure_stripe => {
