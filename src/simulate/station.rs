@@ -209,6 +209,7 @@ impl Station {
             pointer: Some(Calibration::new(Kind::Pointer, self.pointer.ray(), with, pointer, quality.clone())),
             hand_eye: Some(Calibration::new(Kind::HandEye, self.flange_from_camera, with, hand_eye, quality)),
             camera: Some(camera),
+            ..Rig::default()
         };
         rig.store_all(folder).map(|_| ())
     }
