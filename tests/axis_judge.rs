@@ -21,7 +21,6 @@ use sheetlight::geometry::{Axis, AxisKind, Board, Camera, CountUnit, Riding, Rig
 use sheetlight::recording::BoardSpec;
 use sheetlight::rig::{Verdict, Volume};
 
-#[allow(dead_code)] // the judge of flawed sets makes the others
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Flaw {
     None,
@@ -44,6 +43,19 @@ enum Flaw {
     /// The encoder loses steps on its way.
     Lost,
 }
+
+const FLAWS: [Flaw; 10] = [
+    Flaw::None,
+    Flaw::Wobble,
+    Flaw::Slipped,
+    Flaw::Moved,
+    Flaw::Unsigned,
+    Flaw::Shuffled,
+    Flaw::Reversed,
+    Flaw::Late,
+    Flaw::Bent,
+    Flaw::Lost,
+];
 
 struct Rig {
     camera: Intrinsics,
@@ -235,9 +247,93 @@ fn error(r: &Rig, s: &Set, fit: &AxisFit, flaw: Flaw, sense: f64) -> (f64, [f64;
     (f64::sqrt(sum / n), fit.error_over(&fit.covariance, half))
 }
 
+struct Called {
+    kind: AxisKind,
+    flaw: Flaw,
+    count: usize,
+    seed: u64,
+    verdict: Option<Verdict>,
+    error: f64,
+    /// Of direction and pitch alone, and with the axis' scatter.
+    sigma: [f64; 2],
+    says: Vec<String>,
+}
+
+fn call(seed: u64, kind: AxisKind, flaw: Flaw) -> Called {
+    let rng = &mut Pcg64::seed_from_u64(seed);
+    let r = rig(rng, kind);
+    let count = rng.random_range(3..=16);
+    let s = set(rng, &r, count, flaw, &r.camera);
+    let refused = Called { kind, flaw, count, seed, verdict: None, error: 0.0, sigma: [0.0; 2], says: Vec::new() };
+    let known = ParameterCovariance::zeros();
+    let Ok(fit) = solve(&s.stops, kind, CountUnit::Count, &known, &AxisOptions::default()) else { return refused };
+    let stood = Volume::new(r.depth, r.depth, "where the boards stood");
+    let quality = judge(&fit, &Asked::default().limits(&stood, |z| r.camera.view_mm(z)), "square_mm");
+    let (error, sigma) = match flaw {
+        Flaw::Unsigned => {
+            let [up, down] = [1.0, -1.0].map(|sense| error(&r, &s, &fit, flaw, sense));
+            if up.0 < down.0 { up } else { down }
+        }
+        _ => error(&r, &s, &fit, flaw, 1.0),
+    };
+    Called { verdict: Some(quality.verdict), error, sigma, says: quality.reasons, ..refused }
+}
+
 fn rms(of: impl Iterator<Item = f64>) -> f64 {
     let (s, n) = of.fold((0.0, 0.0), |(s, n), x| (s + x * x, n + 1.0));
     f64::sqrt(s / f64::max(n, 1.0))
+}
+
+/// Any depth from 60 mm to 1.5 m, boards small and large, axes that lie anyhow, 3 to 16 stops.
+#[test]
+fn a_flawed_set_never_passes_with_an_error_above_three_sigmas() {
+    let each = if std::env::var_os("SHEETLIGHT_LONG").is_some() { 300 } else { 12 };
+    let kinds = [AxisKind::Linear, AxisKind::Turntable];
+    let all: Vec<Called> = kinds
+        .into_par_iter()
+        .flat_map(|kind| FLAWS.into_par_iter().map(move |flaw| (kind, flaw)))
+        .flat_map(|(kind, flaw)| {
+            let from = 7000 + 10_000 * flaw as u64 + 1_000_000 * kind as u64;
+            (0..each).into_par_iter().map(move |k| call(from + k, kind, flaw))
+        })
+        .collect();
+    let passed = |c: &&Called| c.verdict.is_some_and(|v| v <= Verdict::Usable);
+    for kind in kinds {
+        for flaw in FLAWS {
+            let of: Vec<&Called> = all.iter().filter(|c| c.flaw == flaw && c.kind == kind).collect();
+            let count = |v| of.iter().filter(|c| c.verdict == v).count();
+            let over = |k: usize| of.iter().copied().filter(passed).map(move |c| c.error / c.sigma[k]);
+            println!(
+                "{kind:?} {flaw:?}: good {}, usable {}, badly determined {}, refused {}; error over sigma of those that passed: \
+                 rms {:.2}, worst {:.2}; over that of direction and pitch alone: rms {:.2}",
+                count(Some(Verdict::Good)),
+                count(Some(Verdict::Usable)),
+                count(Some(Verdict::BadlyDetermined)),
+                count(None),
+                rms(over(1)),
+                over(1).fold(0.0, f64::max),
+                rms(over(0)),
+            );
+        }
+    }
+    let wrong: Vec<String> = all
+        .iter()
+        .filter(passed)
+        .filter(|c| c.error > 3.0 * c.sigma[1])
+        .map(|c| {
+            format!(
+                "{:?} {:?}, {} stops, seed {}: {:.4} mm of {:.4}: {:?}",
+                c.kind, c.flaw, c.count, c.seed, c.error, c.sigma[1], c.says
+            )
+        })
+        .collect();
+    assert!(wrong.is_empty(), "{} of {}: {wrong:#?}", wrong.len(), all.len());
+    // Sound sets of six stops or more are taken, and their errors are what is stated.
+    let sound: Vec<&Called> = all.iter().filter(|c| c.flaw == Flaw::None && c.count >= 6).collect();
+    let taken = sound.iter().copied().filter(passed).count();
+    assert!(taken as f64 >= 0.9 * sound.len() as f64, "{taken} of {} sound sets were taken", sound.len());
+    let over = rms(sound.iter().copied().filter(passed).map(|c| c.error / c.sigma[0]));
+    assert!((0.6..=1.25).contains(&over), "errors of sound sets are {over:.2} of what is stated");
 }
 
 /// One picture of a slipped board among sound ones is named, and what is left is as good as without it.
