@@ -34,9 +34,7 @@ fn pool(processors: usize, asked: Option<usize>) -> Result<()> {
         waiting.truncate(waiting.len().div_ceil(2));
     }
     if let (true, Some(e)) = (waiting.is_empty(), failed) {
-        return Err(Fault::device(format!("0 of {wanted} threads could be started, at least 1 is needed: {e}"))
-            .cause("the memory ran out, or the number of processes is limited")
-            .next("close other programs, or raise the limits (ulimit -v, ulimit -u)"));
+        return Err(Fault::threads(&e).at(format!("0 of {wanted} threads run, at least 1 is needed")));
     }
     let give = |thread: ThreadBuilder| {
         let place = thread.index();

@@ -99,6 +99,11 @@ fn rename(from: &Path, to: &Path) -> Io<()> {
     std::fs::rename(from, to)
 }
 
+/// Makes a folder and those above it; one that is there is no error.
+pub fn make_folder(folder: &Path) -> Result<()> {
+    moment().and_then(|()| std::fs::create_dir_all(folder)).map_err(|e| Fault::write(folder, e))
+}
+
 /// Takes a file, a link or a folder away; one that is not there is no error.
 pub fn remove(path: &Path) -> Io<()> {
     moment()?;

@@ -27,7 +27,7 @@ pub use extraction::Extraction;
 pub use grid::{GridOptions, GridSpec, grid, grid_on};
 pub use heightmap::HeightMap;
 pub use live::{Live, Newest};
-pub use map_files::MapScale;
+pub use map_files::{MAP_FILES, MapScale};
 pub use map_picture::{MapPlace, Shown};
 pub use pcd::write_pcd;
 pub use plateau::Plateau;

@@ -37,6 +37,7 @@ pub use find::{SecondLook, find_part, find_part_in_all, second_look, teach_part}
 pub use guide::{GuideOptions, Guided, Step, guide};
 pub use judge::{Judged, judge};
 pub use judge_parts::{FoundPart, judge_parts};
+pub use progress::Checkpoint;
 pub use range::{Distance, RangeReport, RangeRun, SurfaceFound, measure_range};
 pub use report::{HeightMapFigures, ScanReport, Spent, cloud_of, load_report};
 pub use run::{ScanOptions, scan, scan_on};

@@ -126,8 +126,8 @@ impl ScanReport {
 pub fn load_report(scan: &Path) -> Result<ScanReport> {
     settle(scan)?;
     let path = scan.join("scan.json");
-    let text = std::fs::read_to_string(&path)
-        .map_err(|e| Fault::read(&path, e).next("give the folder that sheetlight scan --out wrote"))?;
+    let text =
+        crate::files::read_text(&path).map_err(|e| e.next("give the folder that sheetlight scan --out wrote"))?;
     let strange = |what: String| {
         Fault::input(format!("{}: {what}", path.display()))
             .cause("another version, or edited by hand")

@@ -60,6 +60,34 @@ fn without_next(text: &str) -> Vec<String> {
     out
 }
 
+/// Lines of a source, its tests aside, that call one of `names`.
+fn calling<'a>(text: &'a str, names: &'a [&'a str]) -> impl Iterator<Item = String> + 'a {
+    let code = text.find("#[cfg(test)]\nmod").map_or(text, |at| &text[..at]);
+    let lines = (1..).zip(code.lines()).filter(|(_, l)| names.iter().any(|n| l.contains(n)) && !l.contains("/proc/") && !l.contains("schedstat"));
+    lines.map(|(n, l)| format!("{n}: {}", l.trim()))
+}
+
+/// What others wrote is read within limits and never from a pipe, what is written can be stopped at any moment, and where no
+/// thread can be had that is said.
+#[test]
+fn files_and_threads_are_had_in_one_way() {
+    let around = ["fs::read(", "fs::read_to_string(", "fs::write(", "create_dir_all(", "thread::spawn(", ".spawn(|"];
+    let mut files = Vec::new();
+    sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut files);
+    let outside = files.iter().filter(|f| !f.components().any(|c| c.as_os_str() == "files"));
+    let wrong: Vec<String> = outside
+        .flat_map(|file| {
+            let text = std::fs::read_to_string(file).unwrap();
+            calling(&text, &around).map(|line| format!("{}:{line}", file.display())).collect::<Vec<_>>()
+        })
+        .collect();
+    assert!(wrong.is_empty(), "go through crate::files, or std::thread::Builder:\n{}", wrong.join("\n"));
+    assert_eq!(
+        calling("a\nlet t = std::fs::read(&path);", &around).next().unwrap(),
+        "2: let t = std::fs::read(&path);"
+    );
+}
+
 #[test]
 fn every_fault_has_a_next_step() {
     assert_eq!(without_next("Fault::input(format!(\"a) {x}\")).cause(\"b\")").len(), 1);
