@@ -6,8 +6,8 @@
 use criterion::measurement::{Measurement, ValueFormatter, WallTime};
 use criterion::{Criterion, criterion_group, criterion_main};
 use sheetlight::calibrate::boards::{BoardPoint, BoardView, FindOptions, find};
-use sheetlight::calibrate::intrinsics::{Observation, SolveOptions, solve};
-use sheetlight::calibrate::lens::Lens;
+use sheetlight::calibrate::camera::intrinsics::{Observation, SolveOptions, solve};
+use sheetlight::calibrate::camera::lens::Lens;
 use sheetlight::geometry::Vec2;
 use sheetlight::raster::{Channel, Image, load};
 use sheetlight::recording::BoardSpec;

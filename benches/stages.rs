@@ -5,7 +5,8 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use sheetlight::bench::{Scene, pictures};
 use sheetlight::gpu::Device;
 use sheetlight::raster::Image;
-use sheetlight::scan::{CloudPoint, GridOptions, grid, grid_on};
+use sheetlight::scan::grid;
+use sheetlight::scan::{CloudPoint, GridOptions, grid_on};
 use sheetlight::stages::chain::{Chain, ChainConfig};
 use sheetlight::stages::{Thinning, ThresholdParams, hough, skeleton, thin, threshold};
 

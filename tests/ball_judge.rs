@@ -8,9 +8,11 @@ use common::judge::{Trial, between, gauss, gauss3, judge};
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
-use sheetlight::calibrate::profile_evaluate::evaluate;
-use sheetlight::calibrate::profile_files::Profile;
-use sheetlight::calibrate::profile_hand_eye::{BallFit, BallOptions, Side, solve};
+use sheetlight::calibrate::ball::evaluate::evaluate;
+use sheetlight::calibrate::ball::options::BallOptions;
+use sheetlight::calibrate::ball::options::Side;
+use sheetlight::calibrate::ball::profile::Profile;
+use sheetlight::calibrate::ball::solve::{BallFit, solve};
 use sheetlight::geometry::{Base, Flange, Mat3, Rigid, Sensor, Vec3, exp, log};
 
 const RADIUS: f64 = 20.0;

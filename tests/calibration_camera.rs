@@ -2,9 +2,9 @@
 //! Frame and unit: pixels, mm. Needs SHEETLIGHT_REFERENCE; says so loudly where it is missing.
 
 use sheetlight::calibrate::boards::{BoardPoint, BoardView, FindOptions, find};
-use sheetlight::calibrate::camera::{CameraOptions, calibrate};
-use sheetlight::calibrate::intrinsics::{Observation, SolveOptions, solve};
-use sheetlight::calibrate::lens::Lens;
+use sheetlight::calibrate::camera::intrinsics::{Observation, SolveOptions, solve};
+use sheetlight::calibrate::camera::lens::Lens;
+use sheetlight::calibrate::camera::procedure::{CameraOptions, calibrate};
 use sheetlight::camera::Intrinsics;
 use sheetlight::geometry::{Board, Camera, Mat3, Rigid, Vec2, orthonormalise};
 use sheetlight::raster::Channel;

@@ -10,9 +10,9 @@ use rand::{Rng, SeedableRng};
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64;
 use sheetlight::calibrate::boards::{BoardPoint, BoardView};
-use sheetlight::calibrate::camera::{CameraOptions, from_observations};
-use sheetlight::calibrate::intrinsics::{Observation, SolveOptions, solve};
-use sheetlight::calibrate::lens::Lens;
+use sheetlight::calibrate::camera::intrinsics::{Observation, SolveOptions, solve};
+use sheetlight::calibrate::camera::lens::Lens;
+use sheetlight::calibrate::camera::procedure::{CameraOptions, from_observations};
 use sheetlight::calibrate::pose::point_by_step;
 use sheetlight::calibrate::projection::project;
 use sheetlight::camera::{Intrinsics, NAMES, ParameterCovariance};
@@ -163,7 +163,7 @@ fn the_camera_does_not_ask_which_way_round_a_board_is() {
     }
 }
 
-fn judged(pictures: Vec<Observation>, s: &Station) -> sheetlight::calibrate::camera::CameraResult {
+fn judged(pictures: Vec<Observation>, s: &Station) -> sheetlight::calibrate::camera::procedure::CameraResult {
     from_observations(pictures, vec![], s.camera.width, s.camera.height, &CameraOptions::default()).unwrap()
 }
 

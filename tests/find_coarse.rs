@@ -69,7 +69,7 @@ fn a_lost_device_leaves_the_search_to_the_cpu() {
 
 #[test]
 fn the_rule_is_measured_and_weighs_both_sides() {
-    use sheetlight::find::accelerator::Rule;
+    use sheetlight::find::search::accelerator::Rule;
     let rule = Rule { fixed_s: 1e-3, here_s: 1e-11, cpu_s: 1e-10 };
     // Worth it from fixed / (cpu - here) on: 1.1e7 additions.
     assert!(!rule.pays(11_000_000) && rule.pays(11_200_000));

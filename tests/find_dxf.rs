@@ -7,8 +7,9 @@ mod common;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use sheetlight::fault::Fault;
-use sheetlight::find::drawing::{Form, Inside};
 use sheetlight::find::dxf::{DxfOptions, Imported, read};
+use sheetlight::find::model::shape::Form;
+use sheetlight::find::model::shape::Inside;
 use sheetlight::find::{Drawing, Recipe};
 use std::fmt::Write;
 
@@ -61,7 +62,7 @@ fn same_edges(a: &Drawing, b: &Drawing, within: f64) {
     for (a, b) in [(a, b), (b, a)] {
         let other = b.samples(0.02);
         for s in a.samples(0.1) {
-            let near = |o: &&sheetlight::find::drawn_edges::EdgeSample| {
+            let near = |o: &&sheetlight::find::model::drawn_edges::EdgeSample| {
                 (o.x - s.x).hypot(o.y - s.y) < within + 0.011 && o.nx * s.nx + o.ny * s.ny > 0.95
             };
             assert!(other.iter().any(|o| near(&o) && o.z == s.z), "no edge at {:.3} {:.3}", s.x, s.y);

@@ -5,7 +5,7 @@
 mod common;
 
 use common::pose::{Off, truth};
-use sheetlight::find::recipe::InsertionSpec;
+use sheetlight::find::insert::recipe::InsertionSpec;
 use sheetlight::find::{LocateOptions, Recipe, Report, locate};
 use sheetlight::geometry::{Base, Part, Rigid, Vec3};
 use sheetlight::scan::{CloudPoint, read_cloud};
@@ -271,7 +271,7 @@ fn the_program_writes_report_and_picture_and_refuses_another_calibration() {
 
 #[test]
 fn a_part_is_taught_from_half_millimetre_numbers() {
-    use sheetlight::find::teach::{TeachOptions, teach};
+    use sheetlight::find::insert::teach::{TeachOptions, teach};
     let Some(s) = scans("teaching").into_iter().find(|s| s.part == "osc") else { return };
     let map = sheetlight::scan::grid(&s.cloud, &sheetlight::scan::GridOptions::default()).unwrap();
     let grid_from_part = map.base_from_grid.inverse() * s.truth;

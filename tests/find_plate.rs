@@ -5,10 +5,11 @@
 mod common;
 
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
-use sheetlight::find::insertion::scene_of;
+use sheetlight::find::insert::locate::scene_of;
 use sheetlight::find::{Drawing, Kind, Match, ModelOptions, SearchOptions, ShapeModel, find};
 use sheetlight::geometry::{Rigid, Vec3};
-use sheetlight::scan::{CloudPoint, GridOptions, HeightMap, grid};
+use sheetlight::scan::grid;
+use sheetlight::scan::{CloudPoint, GridOptions, HeightMap};
 
 /// Cells of the map as it was recorded, mm.
 const CELL: [f64; 2] = [0.215_850_83, 0.208_819_14];

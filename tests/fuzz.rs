@@ -432,7 +432,7 @@ fn height_maps() {
 
 #[test]
 fn profiles() {
-    use sheetlight::calibrate::profile_files::{from_csv, from_yaml};
+    use sheetlight::calibrate::ball::profiles::{from_csv, from_yaml};
     let csv = "profile,x,z\n0,1.5,2.5\n0,2.5,3.5\n1,1,2\n1,2,3\n";
     let yaml = "%YAML:1.0\na: !!opencv-matrix\n   rows: 2\n   cols: 3\n   dt: f\n   data: [ 1., 2., 3., 4., 5., 6. ]\n";
     survives("profiles as CSV", seeds(&[csv]), |b| from_csv(&text(b), "a").map(drop));

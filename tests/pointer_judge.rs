@@ -12,9 +12,11 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use sheetlight::calibrate::limits::Asked;
 use sheetlight::calibrate::measured_pose::{SeenBoard, measure, pooled_factor};
-use sheetlight::calibrate::pointer::{PointerOptions, SpotView, solve};
-use sheetlight::calibrate::pointer_range::{RIG, RigCovariance, RobotNoise, SharedCovariance, range, surface, to_base};
-use sheetlight::calibrate::pointer_report::judge as judge_pointer;
+use sheetlight::calibrate::pointer::range::{
+    RIG, RigCovariance, RobotNoise, SharedCovariance, range, surface, to_base,
+};
+use sheetlight::calibrate::pointer::report::judge as judge_pointer;
+use sheetlight::calibrate::pointer::solve::{PointerOptions, SpotView, solve};
 use sheetlight::camera::{Intrinsics, ParameterCovariance, Parameters};
 use sheetlight::geometry::{Base, Board, Camera, Flange, Plane, Ray, Rigid, Vec2, Vec3, exp};
 use sheetlight::rig::{Verdict, Volume};

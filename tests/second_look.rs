@@ -9,7 +9,7 @@ use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
-use sheetlight::find::looks::other_side;
+use sheetlight::find::insert::looks::other_side;
 use sheetlight::find::{LocateOptions, Recipe, Report, agree, locate};
 use sheetlight::geometry::{Base, Camera, Flange, Mat3, Part, Plane, Rigid, Vec2, Vec3, exp};
 use sheetlight::rig::{Calibration, Covariance, Kind, Quality, Rig, Verdict};

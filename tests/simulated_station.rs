@@ -7,7 +7,8 @@ use sheetlight::recording::Recording;
 use sheetlight::rig::Rig;
 use sheetlight::scan::{Extraction, GridOptions, RecordingSource, Where, read_cloud};
 use sheetlight::simulate::{Set, SimulateOptions, simulate};
-use sheetlight::station::{Judged, ScanOptions, judge};
+use sheetlight::station::judge;
+use sheetlight::station::{Judged, ScanOptions};
 use std::path::{Path, PathBuf};
 
 fn scene(name: &str) -> PathBuf {

@@ -3,15 +3,21 @@
 
 mod machine;
 mod peer;
+mod rows;
 mod run;
 mod scaling;
 mod scenes;
+mod steady;
 mod table;
 mod ways;
 
+pub use crate::bench::rows::Latency;
+pub use crate::bench::rows::Row;
+pub use crate::bench::rows::Soak;
+pub use crate::bench::rows::Stage;
 pub use machine::{Ceilings, cpu_seconds, peak_memory_bytes};
 pub use peer::serve;
-pub use run::{BenchOptions, Latency, Report, Row, Soak, Stage, run};
+pub use run::{BenchOptions, Report, run};
 pub use scaling::Scaling;
 pub use scenes::{Scene, pictures};
 pub use table::table;

@@ -2,15 +2,17 @@
 //! memory, stage times. Frame and unit: as the fields say.
 
 use super::machine::{self, Ceilings};
+use super::rows::{Latency, Row, Soak, Stage};
 use super::scaling::{self, Scaling};
 use super::scenes::{Scene, pictures};
+use super::steady::{THRESHOLD, percentile, steady};
 use crate::fault::{Fault, Result};
 use crate::gpu::{AdapterInfo, Device};
 use crate::raster::Image;
 use crate::scan::{Extraction, Format};
+use crate::stages::cases;
 use crate::stages::chain::{Batch, Chain, ChainConfig};
 use crate::stages::peak::{self, PeakParams, Stripe};
-use crate::stages::{ThresholdParams, Window, cases};
 use std::collections::VecDeque;
 use std::time::Instant;
 
@@ -55,69 +57,6 @@ impl BenchOptions {
     }
 }
 
-/// GPU time of one stage, all its dispatches of a batch together, a shot.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct Stage {
-    pub name: String,
-    pub ms_per_shot: f64,
-    pub dispatches: usize,
-}
-
-/// Time from handing over a single shot until its points are there, nothing else under way.
-#[derive(Clone, Copy, Debug, serde::Serialize)]
-pub struct Latency {
-    pub p50_ms: f64,
-    pub p99_ms: f64,
-}
-
-/// Memory of the process over a long run.
-#[derive(Clone, Copy, Debug, serde::Serialize)]
-pub struct Soak {
-    pub shots: usize,
-    /// Resident after the first tenth, and at the end.
-    pub early_mb: f64,
-    pub late_mb: f64,
-}
-
-/// One size and scene.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct Row {
-    pub width: u32,
-    pub height: u32,
-    pub scene: Scene,
-    pub shots_per_batch: u32,
-    pub shots: usize,
-    /// Wall time a shot, median over the batches in steady state.
-    pub ms_per_shot: f64,
-    /// The same with sub-pixel peaks, their sigma, their choice and their points in mm.
-    pub full_ms_per_shot: Option<f64>,
-    /// That against the skeleton alone, median of runs in turns.
-    pub full_over_skeleton: Option<f64>,
-    /// Wall time a shot with the pictures already where the stages read them, results brought back; and of the full chain.
-    pub device_ms_per_shot: f64,
-    pub full_device_ms_per_shot: Option<f64>,
-    pub shots_per_s: f64,
-    pub mpx_per_s: f64,
-    /// CPU time of all threads a shot; on a software adapter the GPU's work is in it.
-    pub cpu_ms_per_shot: Option<f64>,
-    /// That, against one thread reading the same bytes once.
-    pub cpu_over_plain_read: Option<f64>,
-    /// Bytes that the stages move a pixel, from the buffers' sizes and the listed tiles.
-    pub bytes_per_px: f64,
-    /// Share of the memory ceiling that is reached, of all threads, or of the device's own memory with the pictures there; and
-    /// of the upload ceiling.
-    pub share_of_memory: f64,
-    pub share_of_upload: Option<f64>,
-    pub points_per_shot: f64,
-    /// Share of the tiles that could not be proven dark.
-    pub listed: f64,
-    pub latency: Latency,
-    pub gpu_memory_mb: f64,
-    pub host_peak_mb: Option<f64>,
-    pub soak: Option<Soak>,
-    pub stages: Vec<Stage>,
-}
-
 /// Everything that one run of the bench tells.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Report {
@@ -152,15 +91,6 @@ pub fn run(device: &Device, options: &BenchOptions, mut progress: impl FnMut(&st
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
     let (version, adapter) = (env!("CARGO_PKG_VERSION"), device.info.clone());
     Ok(Report { version, adapter, threads, ceilings, rows, with_pixels, with_light })
-}
-
-/// OpenCV's definition, four sigmas above the scenes' background noise.
-pub(super) const THRESHOLD: ThresholdParams = ThresholdParams { window: Window::Mean, size: 31, offset: 8, minimum: 0 };
-
-/// Percentile of times in seconds, as ms.
-pub(super) fn percentile(times: &mut [f64], p: f64) -> f64 {
-    times.sort_by(f64::total_cmp);
-    1e3 * times[((times.len() - 1) as f64 * p).round() as usize]
 }
 
 fn row(
@@ -250,54 +180,6 @@ fn row(
         soak,
         host_peak_mb: machine::peak_memory_bytes().map(|b| b as f64 / 1e6),
         stages: stage_times(device, &config, &batch_of(0))?,
-    })
-}
-
-/// What a run in steady state gave.
-pub(super) struct Steady {
-    shots: usize,
-    pub ms_per_shot: f64,
-    cpu_ms_per_shot: Option<f64>,
-    /// Skeleton pixels a shot, listed tiles a batch.
-    points: f64,
-    listed: f64,
-}
-
-/// Keeps every place of the ring busy for so many seconds.
-pub(super) fn steady<'a>(
-    chain: &mut Chain,
-    seconds: f64,
-    batch_of: &impl Fn(usize) -> Vec<&'a Image>,
-    poses: &[[f32; 12]],
-) -> Result<Steady> {
-    let per = chain.frame.shots as usize;
-    let (mut n, mut shots, mut points, mut listed) = (0usize, 0usize, 0u64, 0u64);
-    let (mut per_batch, mut batch) = (Vec::new(), Batch::default());
-    let cpu = machine::cpu_seconds();
-    let start = Instant::now();
-    let mut last = start;
-    while start.elapsed().as_secs_f64() < seconds || per_batch.len() < 3 {
-        while chain.has_room() {
-            chain.submit_posed(n as u64, &batch_of(n), poses)?;
-            n += 1;
-        }
-        chain.collect_into(true, &mut batch)?;
-        shots += per;
-        points += u64::from(batch.found);
-        listed += u64::from(batch.listed_tiles);
-        per_batch.push(last.elapsed().as_secs_f64());
-        last = Instant::now();
-    }
-    while chain.collect_into(true, &mut batch)? {
-        shots += per;
-    }
-    let batches = per_batch.len() as f64;
-    Ok(Steady {
-        shots,
-        ms_per_shot: percentile(&mut per_batch, 0.5) / per as f64,
-        cpu_ms_per_shot: cpu.and_then(|c| Some(1e3 * (machine::cpu_seconds()? - c) / shots as f64)),
-        points: points as f64 / (batches * per as f64),
-        listed: listed as f64 / batches,
     })
 }
 

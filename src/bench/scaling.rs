@@ -1,8 +1,9 @@
 //! In: times a shot at several picture sizes, and pictures with more and more lit pixels. Out: what a shot costs by itself
 //! and what every further pixel, or lit pixel, adds. Frame and unit: ms a shot, megapixels, per cent of the pixels.
 
-use super::run::{Row, THRESHOLD, steady};
+use super::rows::Row;
 use super::scenes::{Scene, noisy};
+use super::steady::{THRESHOLD, steady};
 use crate::fault::Result;
 use crate::gpu::Device;
 use crate::raster::Image;

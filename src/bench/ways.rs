@@ -2,8 +2,9 @@
 //! processor and on the device, in turns. Frame and unit: ms a shot, median of the turns.
 
 use super::machine;
-use super::run::{percentile, scan_chain};
+use super::run::scan_chain;
 use super::scenes::{Scene, pictures};
+use super::steady::percentile;
 use crate::fault::Result;
 use crate::gpu::Device;
 use crate::raster::Image;

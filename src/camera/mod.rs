@@ -1,132 +1,15 @@
-//! In: a pinhole camera with its lens. Out: pixels of camera-frame points and
-//! viewing rays of pixels (docs/math.md eq. 4 to 8; the paper's eq. 1 with the lens added).
+//! In: a pinhole camera with its lens. Out: pixels of points, rays of pixels, the parameters by name.
 //! Frame and unit: camera frame (x right, y down, z forward), mm; an integer pixel is a pixel centre.
 
 mod distortion;
+mod intrinsics;
 mod parameters;
-mod written;
 
 pub use distortion::{Distortion, TERMS};
+pub use intrinsics::Intrinsics;
 pub use parameters::{
     ALWAYS_NAMED, LENS, NAMES, PARAMETERS, ParameterCovariance, Parameters, SKEW, difference_step, named,
 };
-
-use crate::fault::{Fault, Result};
-use crate::geometry::{Camera as CameraFrame, Ray, Vec2, Vec3};
-use nalgebra::Matrix2;
-
-/// Pinhole camera with lens.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(try_from = "written::Written", into = "written::Written")]
-pub struct Intrinsics {
-    /// Focal lengths, px.
-    pub fx: f64,
-    pub fy: f64,
-    /// Principal point, px.
-    pub cx: f64,
-    pub cy: f64,
-    /// px of u per normalised y; 0 for every sensor with square rows.
-    pub skew: f64,
-    pub distortion: Distortion,
-    /// Sensor size, px.
-    pub width: u32,
-    pub height: u32,
-}
-
-impl Intrinsics {
-    /// Refuses numbers that no camera has.
-    pub fn check(&self) -> Result<()> {
-        let all = [self.fx, self.fy, self.cx, self.cy, self.skew];
-        let finite = all.iter().chain(&self.distortion.0).all(|x| x.is_finite());
-        if !finite || self.fx <= 0.0 || self.fy <= 0.0 || self.width == 0 || self.height == 0 {
-            return Err(Fault::input(format!(
-                "intrinsics fx {} fy {} cx {} cy {} for {}x{} are no camera",
-                self.fx, self.fy, self.cx, self.cy, self.width, self.height
-            ))
-            .cause("a hand-edited calibration file")
-            .next("calibrate the camera again"));
-        }
-        let [.., tau_x, tau_y] = self.distortion.0;
-        if tau_x.abs().max(tau_y.abs()) > 1.0 {
-            return Err(Fault::input(format!(
-                "the sensor is tilted by tau_x {tau_x} and tau_y {tau_y} rad, 1 rad (57 degrees) is the limit"
-            ))
-            .cause("degrees in the place of radians, or another order of the lens's terms")
-            .next("give tau_x and tau_y in rad, last of OpenCV's 14 terms"));
-        }
-        Ok(())
-    }
-
-    /// Longer side of what is seen at a depth, mm; the lens left out.
-    pub fn view_mm(&self, depth: f64) -> f64 {
-        depth.abs() * f64::max(f64::from(self.width) / self.fx, f64::from(self.height) / self.fy)
-    }
-
-    /// Ideal normalised coordinates to distorted ones.
-    pub fn distort(&self, n: &Vec2) -> Vec2 {
-        self.distortion.distort(n)
-    }
-
-    /// d(distorted)/d(ideal).
-    pub fn distort_jacobian(&self, n: &Vec2) -> Matrix2<f64> {
-        self.distortion.jacobian(n)
-    }
-
-    /// Distorted normalised coordinates to ideal ones. `None` outside the region where the lens model can be inverted.
-    pub fn undistort(&self, d: &Vec2) -> Option<Vec2> {
-        self.distortion.undistort(d)
-    }
-
-    /// Pixel to distorted normalised coordinates (K⁻¹·(u, v, 1)).
-    pub fn normalised(&self, px: &Vec2) -> Vec2 {
-        let y = (px.y - self.cy) / self.fy;
-        Vec2::new((px.x - self.cx - self.skew * y) / self.fx, y)
-    }
-
-    /// Pixel of a camera-frame point; `None` behind the camera, or behind a tilted sensor.
-    pub fn pixel_from_point(&self, p: &Vec3) -> Option<Vec2> {
-        let pixel = (p.z > 0.0).then(|| self.pixel_from_normalised(&Vec2::new(p.x / p.z, p.y / p.z)))?;
-        pixel.x.is_finite().then_some(pixel)
-    }
-
-    /// Pixel of ideal normalised coordinates.
-    pub fn pixel_from_normalised(&self, n: &Vec2) -> Vec2 {
-        let d = self.distort(n);
-        Vec2::new(self.fx * d.x + self.skew * d.y + self.cx, self.fy * d.y + self.cy)
-    }
-
-    /// Ideal normalised coordinates (x/z, y/z) of a pixel.
-    pub fn normalised_from_pixel(&self, px: &Vec2) -> Option<Vec2> {
-        self.undistort(&self.normalised(px))
-    }
-
-    /// Viewing ray of a pixel, from the centre of projection.
-    pub fn ray_from_pixel(&self, px: &Vec2) -> Option<Ray<CameraFrame>> {
-        let n = self.normalised_from_pixel(px)?;
-        Ray::new(Vec3::zeros(), Vec3::new(n.x, n.y, 1.0))
-    }
-
-    /// The same lens and field of view on a sensor with `width` pixels across; for sensors that
-    /// bin or for a calibration taken at another resolution. The lens's terms, tilt included, belong to rays and stay.
-    pub fn scaled_to(&self, width: u32, height: u32) -> Intrinsics {
-        let (sx, sy) = (f64::from(width) / f64::from(self.width), f64::from(height) / f64::from(self.height));
-        Intrinsics {
-            fx: self.fx * sx,
-            fy: self.fy * sy,
-            cx: (self.cx + 0.5) * sx - 0.5,
-            cy: (self.cy + 0.5) * sy - 0.5,
-            skew: self.skew * sx,
-            width,
-            height,
-            ..*self
-        }
-    }
-
-    /// The same camera with only a part of its sensor read out, from pixel (left, top) on.
-    pub fn region(&self, left: f64, top: f64, width: u32, height: u32) -> Intrinsics {
-        Intrinsics { cx: self.cx - left, cy: self.cy - top, width, height, ..*self }
-    }
-}
 
 #[cfg(test)]
 #[path = "tests.rs"]

@@ -1,7 +1,8 @@
 //! In: a camera. Out: its parameters as one vector under names, which calibration files, covariances and derivatives share.
 //! Frame and unit: px and the lens's own; each name ends with its unit.
 
-use super::{Distortion, Intrinsics, TERMS};
+use super::distortion::{Distortion, TERMS};
+use super::intrinsics::Intrinsics;
 use nalgebra::{SMatrix, SVector};
 
 /// How many parameters a camera has: fx fy cx cy, the lens's terms, skew.

@@ -2,6 +2,7 @@
 //! OpenCV's numbers. Frame and unit: camera frame, mm; px.
 
 use super::*;
+use crate::geometry::{Vec2, Vec3};
 use proptest::prelude::*;
 
 /// The paper's camera with a lens like the ones of the reference rigs.

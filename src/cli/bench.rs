@@ -1,8 +1,8 @@
 //! In: sizes and scenes. Out: a table of speeds of this machine, or a file of it; or the peer's side of a
 //! comparison on stdin and stdout. Frame and unit: ms, shots a second, pixels, GB/s.
 
-use super::Console;
 use crate::bench::{self, BenchOptions, Scene};
+use crate::cli::terminal::console::Console;
 use crate::fault::Result;
 use crate::gpu::Device;
 use std::path::{Path, PathBuf};

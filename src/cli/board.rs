@@ -2,8 +2,8 @@
 //! description for meta.json.
 //! Frame and unit: mm; board frame as in docs/conventions.md.
 
-use super::Console;
 use crate::calibrate::boards::print::sheet;
+use crate::cli::terminal::console::Console;
 use crate::fault::Result;
 use crate::recording::BoardSpec;
 use std::path::{Path, PathBuf};
@@ -26,7 +26,7 @@ pub struct Args {
     kind: String,
     /// COLUMNSxROWS: inner corners of a chessboard, squares of a ChArUco board, dots of a circle grid, markers
     /// (1x1: a single one)
-    #[arg(value_parser = super::parse::<Size>)]
+    #[arg(value_parser = crate::cli::terminal::arguments::parse::<Size>)]
     size: Size,
     /// Side of a square or of a single marker, or pitch of the dots, mm
     #[arg(long)]

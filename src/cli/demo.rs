@@ -2,14 +2,15 @@
 //! against the truth, and one page that shows all of it.
 //! Frame and unit: base frame, mm.
 
-use super::Console;
+use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
 use crate::find::Recipe;
 use crate::recording::Recording;
 use crate::rig::Rig;
 use crate::scan::{GridOptions, RecordingSource, Where};
 use crate::simulate::{SimulateOptions, simulate};
-use crate::station::{FoundPart, Judged, ScanOptions, ScanReport, Settings, judge, judge_parts};
+use crate::station::{FoundPart, Judged, ScanOptions, ScanReport, Settings};
+use crate::station::{judge, judge_parts};
 use std::path::PathBuf;
 
 /// Simulate a station with a board full of parts, scan it, and show how good the scan is
@@ -31,7 +32,7 @@ pub struct Args {
     #[arg(long, default_value_t = 640)]
     width: u32,
     /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
-    #[arg(long, default_value = "auto", value_parser = super::parse::<Where>)]
+    #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
     on: Where,
 }
 
@@ -54,8 +55,8 @@ struct Demo {
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
-    super::outputs::check_simulation(&args.out.join("simulated"))?;
-    super::outputs::check_scan(&args.out, LABEL)?;
+    crate::cli::terminal::outputs::check_simulation(&args.out.join("simulated"))?;
+    crate::cli::terminal::outputs::check_scan(&args.out, LABEL)?;
     let options = SimulateOptions {
         seed: args.seed,
         shots: args.shots,

@@ -2,7 +2,7 @@
 //! each step with its numbers, asking where a person would decide.
 //! Frame and unit: base frame; poses in the robot's own notation.
 
-use super::Console;
+use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
 use crate::robot::Convention;
 use crate::scan::Where;
@@ -42,10 +42,10 @@ pub struct Args {
     out: PathBuf,
     /// Notation of the poses: denso, ur, kuka, fanuc, abb, yaskawa, ros, quaternion or matrix [default:
     /// the station's robot, else matrix]
-    #[arg(long, value_parser = super::parse::<Convention>)]
+    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Convention>)]
     robot: Option<Convention>,
     /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
-    #[arg(long, default_value = "auto", value_parser = super::parse::<Where>)]
+    #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
     on: Where,
     /// Distance of the camera from the board when it looks at it squarely, mm [default: the middle of the working volume, else
     /// where the sheet meets the camera's axis]

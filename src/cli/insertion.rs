@@ -1,7 +1,7 @@
 //! In: the command line. Out: what an insertion bears and how far the tool keeps off, for recipes that are made here.
 //! Frame and unit: part frame; mm, degrees.
 
-use crate::find::recipe::InsertionSpec;
+use crate::find::insert::recipe::InsertionSpec;
 
 #[derive(clap::Args)]
 pub struct InsertionArgs {

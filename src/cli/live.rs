@@ -1,7 +1,7 @@
 //! In: raw frames on standard input, a station. Out: one line a measured frame: its points, how long it took, how many
 //! frames were passed over meanwhile. Frame and unit: camera frame, mm; milliseconds.
 
-use super::Console;
+use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
 use crate::raster::Light;
 use crate::rig::Rig;
@@ -24,7 +24,7 @@ use std::time::Instant;
       sheetlight live --raw 4096x3072:gray12le --station cell3 --points > profiles.jsonl")]
 pub struct Args {
     /// Frames on standard input: WIDTHxHEIGHT:gray8, gray10le, gray12le or gray16le
-    #[arg(long, value_parser = super::parse::<RawFormat>)]
+    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<RawFormat>)]
     raw: RawFormat,
     /// Station folder with the calibration of camera and laser plane
     #[arg(long)]
@@ -33,7 +33,7 @@ pub struct Args {
     #[arg(long)]
     points: bool,
     /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
-    #[arg(long, default_value = "auto", value_parser = super::parse::<Where>)]
+    #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
     on: Where,
 }
 

@@ -1,7 +1,7 @@
 //! In: pictures of the pointer's spot. Out: distances, points, and the normal of the surface.
 //! Frame and unit: camera and base frame; mm, degrees.
 
-use super::Console;
+use crate::cli::terminal::console::Console;
 use crate::fault::Result;
 use crate::recording::Recording;
 use crate::rig::Rig;

@@ -2,13 +2,14 @@
 //! map, overlays, figures, page.
 //! Frame and unit: base frame, mm.
 
-use super::Console;
+use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
 use crate::raster::{Channel, Image, Light, load_sized};
 use crate::recording::{Recording, load_poses};
 use crate::rig::{Rig, hash_file, hash_text};
 use crate::scan::{GridOptions, RawFormat, RawSource, RecordingSource, Where};
-use crate::station::{Judged, ScanOptions, ScanReport, Settings, judge};
+use crate::station::judge;
+use crate::station::{Judged, ScanOptions, ScanReport, Settings};
 use std::path::{Path, PathBuf};
 
 /// Turn the shots of a recording into a point cloud and a height map
@@ -35,17 +36,17 @@ pub struct Args {
     #[arg(long)]
     poses: Option<String>,
     /// Raw frames on standard input: WIDTHxHEIGHT:gray8, gray10le, gray12le or gray16le
-    #[arg(long, value_parser = super::parse::<RawFormat>, conflicts_with = "recording", requires = "poses")]
+    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<RawFormat>, conflicts_with = "recording", requires = "poses")]
     raw: Option<RawFormat>,
     /// Part of a colour picture to use: red, green, blue or luma
-    #[arg(long, default_value = "luma", value_parser = super::parse::<Channel>)]
+    #[arg(long, default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
     channel: Channel,
     /// Picture with the laser off, taken at the shots' exposure, to be subtracted from every shot: a name in the recording,
     /// or a path. Never taken by itself: the `ambient` picture that meta.json names may be exposed for room light
     #[arg(long)]
     ambient: Option<PathBuf>,
     /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
-    #[arg(long, default_value = "auto", value_parser = super::parse::<Where>)]
+    #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
     on: Where,
     /// Edge of a height map cell, mm [default: about 1.5 points a cell]
     #[arg(long)]
@@ -82,7 +83,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         overlays: args.overlays,
         skip_bad: args.skip_bad,
         resume: args.resume,
-        stop: super::interrupt::asked_for(),
+        stop: crate::cli::terminal::interrupt::asked_for(),
     };
     if let Some(truth) = &args.truth {
         // A wrong path shall not cost a scan.

@@ -2,12 +2,13 @@
 //! height map, the height of the level surface on it.
 //! Frame and unit: x along the stripe, y along the travel, z up from the bed; mm.
 
-use super::Console;
+use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
 use crate::files::{Lock, Together, remove};
 use crate::geometry::{Base, Grid, Rigid, Vec3};
 use crate::raster::Channel;
-use crate::scan::{GridOptions, MAP_FILES, ShiftReport, ShiftRig, Side, grid, shift_scan, write_cloud};
+use crate::scan::grid;
+use crate::scan::{GridOptions, MAP_FILES, ShiftReport, ShiftRig, Side, shift_scan, write_cloud};
 use std::path::{Path, PathBuf};
 
 /// Heights from the stripe's sideways shift, for a rig that has no calibrated camera
@@ -34,7 +35,7 @@ pub struct Args {
     #[arg(long)]
     baseline_mm: f64,
     /// To which side a raised surface moves the stripe: left or right
-    #[arg(long, value_parser = super::parse::<Side>)]
+    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Side>)]
     raises: Side,
     /// Travel of the bed from picture to picture, mm
     #[arg(long)]
@@ -43,7 +44,7 @@ pub struct Args {
     #[arg(long, value_delimiter = ',', required = true)]
     bed_rows: Vec<String>,
     /// Part of a colour picture to use: red, green, blue or luma
-    #[arg(long, default_value = "luma", value_parser = super::parse::<Channel>)]
+    #[arg(long, default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
     channel: Channel,
     /// Folder with pictures of the empty bed, taken in the same way: how lens and laser bend the stripe is taken out
     #[arg(long)]

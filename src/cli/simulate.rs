@@ -1,7 +1,7 @@
 //! In: what to simulate. Out: recording folders, truth and a station with the true calibration.
 //! Frame and unit: as in the recording format; mm, degrees, pixels.
 
-use super::Console;
+use crate::cli::terminal::console::Console;
 use crate::fault::Result;
 use crate::recording::BoardSpec;
 use crate::simulate::{RigSpec, Set, SimulateOptions, simulate};
@@ -70,7 +70,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
-    super::outputs::check_simulation(&args.out)?;
+    crate::cli::terminal::outputs::check_simulation(&args.out)?;
     let mut sets = Vec::new();
     for name in &args.sets {
         match name.as_str() {

@@ -1,9 +1,10 @@
 //! In: a station folder. Out: a new one, a summary of one, or values moved in and out of it.
 //! Frame and unit: camera and flange frames, mm.
 
-use super::Console;
-use super::calibrate::stale;
-use super::outputs::{self, Inputs};
+use super::calibrate::store::stale;
+use super::terminal::console::Console;
+use super::terminal::outputs;
+use super::terminal::outputs::Inputs;
 use crate::camera::{Intrinsics, LENS, NAMES};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Camera, Plane, Ray};
@@ -44,7 +45,7 @@ pub struct New {
     name: Option<String>,
     /// How the robot writes poses: denso, ur, kuka, fanuc, abb, yaskawa, ros, quaternion or matrix
     /// [default: none; poses are then read and written as matrices]
-    #[arg(long, value_parser = super::parse::<Convention>)]
+    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Convention>)]
     robot: Option<Convention>,
 }
 
@@ -73,7 +74,7 @@ pub struct Seal {
     #[arg(long)]
     station: PathBuf,
     /// Which one: camera, laser-plane, pointer or hand-eye
-    #[arg(long, value_parser = super::parse::<Kind>)]
+    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Kind>)]
     kind: Kind,
     /// Why it is to be believed; kept in the file and shown in every report
     #[arg(long)]

@@ -1,7 +1,7 @@
 //! In: a station, scans of a flat surface, touched points. Out: fit and verification, apart.
 //! Frame and unit: base frame; mm, px, degrees.
 
-use super::Console;
+use crate::cli::terminal::console::Console;
 use crate::fault::Result;
 use crate::rig::Rig;
 use crate::station::{VerifyReport, VerifyRun, verify};

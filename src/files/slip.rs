@@ -44,7 +44,11 @@ fn slip(line: &str) -> Option<&'static str> {
 
 /// Refuses a name that cannot be part of a file's, or that would break the line it is written into.
 pub fn named(what: &str, name: &str) -> Result<()> {
-    if !name.trim().is_empty() && name != "." && name != ".." && !name.contains(|c: char| c.is_control() || "/\\".contains(c)) {
+    if !name.trim().is_empty()
+        && name != "."
+        && name != ".."
+        && !name.contains(|c: char| c.is_control() || "/\\".contains(c))
+    {
         return Ok(());
     }
     Err(Fault::input(format!("{what} is {name:?}; letters, digits, spaces and signs other than / and \\ make a name"))

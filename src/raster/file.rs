@@ -2,6 +2,7 @@
 //! Frame and unit: pixels, grey levels. The only place that names the `image` crate with `image8`.
 
 use super::budget::Budget;
+use super::size::{MOST_PIXELS, fits};
 use super::{Image, Pixels};
 use crate::fault::{Fault, Result};
 use image::{DynamicImage, ImageDecoder, ImageReader};
@@ -33,10 +34,6 @@ impl std::str::FromStr for Channel {
     }
 }
 
-/// Longest side of a picture, px: stages pack a place into two numbers of 16 bits.
-pub const MOST_SIDE: u32 = 65_535;
-/// Most pixels of a picture; the largest sensors have 250 million.
-pub const MOST_PIXELS: u64 = 1 << 28;
 /// Memory for pictures while they are decoded, by all threads together, bytes.
 static DECODING: Budget = Budget::new(1 << 30);
 
@@ -55,25 +52,6 @@ fn read(path: &Path, channel: Channel, bits: u8, size: Option<[u32; 2]>) -> Resu
     let pixels = size.map_or(MOST_PIXELS, |[w, h]| u64::from(w) * u64::from(h));
     let bytes = crate::files::read(path, 8 * pixels + (16 << 20))?;
     decode_sized(&bytes, channel, bits, size).map_err(|e| e.at(path.display()))
-}
-
-/// Refuses another size than the known one, before anything is decoded.
-pub(super) fn fits(width: u32, height: u32, size: Option<[u32; 2]>) -> Result<()> {
-    match size {
-        Some([w, h]) if [w, h] != [width, height] => {
-            Err(Fault::input(format!("is {width}x{height}, it should be {w}x{h} as meta.json says"))
-                .cause("pictures of two cameras or two resolutions in one folder")
-                .next("correct meta.json, or take the odd pictures out"))
-        }
-        None if width.max(height) > MOST_SIDE || u64::from(width) * u64::from(height) > MOST_PIXELS => {
-            Err(Fault::input(format!(
-                "is {width}x{height}, at most {MOST_SIDE} a side and {MOST_PIXELS} pixels in all are read"
-            ))
-            .cause("several pictures in one, or a damaged file")
-            .next("cut it into pictures of the sensor's size"))
-        }
-        _ => Ok(()),
-    }
 }
 
 /// Decodes a picture held in memory.

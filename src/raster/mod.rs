@@ -10,14 +10,16 @@ mod light;
 mod mask;
 mod pgm;
 mod response;
+mod size;
 mod text;
 
-pub use file::{Channel, MOST_PIXELS, MOST_SIDE, decode, load, load_sized, png, save_png};
+pub use file::{Channel, decode, load, load_sized, png, save_png};
 pub use float::{float_tiff, read_float_tiff};
 pub use image8::{Rgb, RgbImage};
 pub use light::Light;
 pub use mask::Mask;
 pub use response::Response;
+pub use size::{MOST_PIXELS, MOST_SIDE};
 pub use text::text_width;
 
 /// Grey levels, row-major.

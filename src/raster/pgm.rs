@@ -43,7 +43,7 @@ pub fn decode(bytes: &[u8], bits: u8, size: Option<[u32; 2]>) -> Result<Image> {
     let Some(Header { width, height, most, start }) = header(bytes) else {
         return broken(format!("is not a readable picture ({} bytes): a PGM without a whole header", bytes.len()));
     };
-    super::file::fits(width, height, size)?;
+    super::size::fits(width, height, size)?;
     let deep = most > 255;
     if deep != (bits > 8) {
         return Err(Fault::input(format!(

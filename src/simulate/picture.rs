@@ -3,7 +3,7 @@
 //! Frame and unit: pixels; grey levels of the sensor's depth.
 
 use super::light::{Canvas, View};
-use super::station::Sensor;
+use super::sensor::Sensor;
 use crate::geometry::{Vec2, Vec3};
 use crate::raster::Image;
 use rand::Rng;

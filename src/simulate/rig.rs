@@ -2,7 +2,7 @@
 //! that follow from it: pixel footprint, stripe length, distances of boards.
 //! Frame and unit: camera frame, mm, degrees, px; each key shows its unit, docs/file-formats.md, Rig file.
 
-use super::station::Sensor;
+use super::sensor::Sensor;
 use crate::fault::{Fault, Result};
 use std::path::Path;
 
@@ -131,7 +131,11 @@ impl RigSpec {
     pub fn parse(text: &str) -> Result<RigSpec> {
         let rig: RigSpec = toml::from_str(text).map_err(|e| {
             Fault::input(format!("is not a rig file: {}", e.to_string().trim_end()))
-                .cause(crate::files::slip_at(text, e.span().map_or(0, |s| s.start), "a misspelt key, a missing size, or a value of the wrong type"))
+                .cause(crate::files::slip_at(
+                    text,
+                    e.span().map_or(0, |s| s.start),
+                    "a misspelt key, a missing size, or a value of the wrong type",
+                ))
                 .next("compare it with docs/file-formats.md, Rig file, or with data/rigs")
         })?;
         rig.check()?;

@@ -2,14 +2,16 @@
 //! a scan taken with another calibration than the station's is refused.
 //! Frame and unit: base frame, mm.
 
-use super::report::{cloud_of, load_report};
+use super::scan::report::{cloud_of, load_report};
 use crate::fault::{Fault, Result};
-use crate::find::teach::{TeachOptions, teach};
-use crate::find::{LocateOptions, LookPlan, Recipe, Report, agree, locate, picture, plan_look};
+use crate::find::insert::picture;
+use crate::find::insert::teach::{TeachOptions, teach};
+use crate::find::{LocateOptions, LookPlan, Recipe, Report, agree, locate, plan_look};
 use crate::geometry::{Base, Flange, Rigid};
 use crate::raster::RgbImage;
 use crate::rig::Rig;
-use crate::scan::{GridOptions, grid};
+use crate::scan::GridOptions;
+use crate::scan::grid;
 use std::path::{Path, PathBuf};
 
 /// Finds the recipe's part in one or more finished scans of it and brings them together ([`agree`]); the picture is the first

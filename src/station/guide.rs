@@ -4,11 +4,12 @@
 //! Frame and unit: base frame; mm, degrees.
 
 use super::range::{RangeReport, RangeRun, measure_range};
-use super::run::{ScanOptions, scan};
+use super::scan::run::{ScanOptions, scan};
 use super::settings::Settings;
 use super::volume;
 use crate::fault::{Fault, Result};
-use crate::find::{Accelerator, LocateOptions, Recipe, Report, locate, picture};
+use crate::find::insert::picture;
+use crate::find::{Accelerator, LocateOptions, Recipe, Report, locate};
 use crate::geometry::{Base, Camera, Flange, Mat3, Rigid, Vec3};
 use crate::recording::Recording;
 use crate::rig::{Rig, Volume, hash_file};
@@ -147,7 +148,7 @@ pub fn guide(options: &GuideOptions, confirm: &mut dyn FnMut(&Step) -> Result<bo
     let id = hash_file(&options.scan.join("meta.json"))?;
     let scanned = scan(&id, &options.scan.display().to_string(), open, &rig, &run, |_, _| {})?;
 
-    let cloud = super::report::cloud_of(&scan_folder)?;
+    let cloud = crate::station::scan::report::cloud_of(&scan_folder)?;
     let accelerator = (options.place != Where::Cpu).then(Accelerator::open).flatten();
     let locate_options = LocateOptions { up: Some(normal), robot: options.robot, accelerator, expected: None };
     let report = locate(&cloud, &recipe, Some(&rig), &locate_options)?;

@@ -2,14 +2,15 @@
 //! poses and a hand-eye calibration. Out: distances and points with sigmas, and the surface's normal.
 //! Frame and unit: camera and base frame; mm, rad.
 
-use super::calibrate_hand_eye::first_line;
-use crate::calibrate::hand_eye_report::HAND_EYE_NAMES;
-use crate::calibrate::pointer_range::{
+use super::calibrate::hand_eye::first_line;
+use crate::calibrate::hand_eye::report::HAND_EYE_NAMES;
+use crate::calibrate::pointer::range::{
     BasePoint, RIG, Ranged, RobotNoise, SharedCovariance, Surface, joint_covariance, range, surface, to_base,
 };
-use crate::calibrate::spot::{Spot, SpotOptions, SpotPicture, find_spots, hot_pixels};
+use crate::calibrate::pointer::spot::{Spot, SpotOptions, SpotPicture, find_spots, hot_pixels};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Mat3, Rigid, Tool, Vec3};
+use crate::raster::Light;
 use crate::recording::{Beam, Recording};
 use crate::rig::Rig;
 
@@ -150,9 +151,14 @@ pub fn measure_range(recording: &Recording, rig: &Rig, run: &RangeRun) -> Result
     }
     if out.distances.is_empty() {
         let (name, why) = out.missing.first().cloned().unwrap_or_default();
-        return Err(Fault::refused(format!("no distance could be measured; {name}: {why}"))
+        let fault = Fault::refused(format!("no distance could be measured; {name}: {why}"))
             .cause("the pointer was off, or it is not the one that was calibrated")
-            .next("look at the pictures"));
+            .next("look at the pictures");
+        let middle = frames.len() / 2;
+        return Err(match (frames.get(middle), images.get(middle)) {
+            (Some((_, name)), Some(image)) => Light::of(image).explain(name, fault),
+            _ => fault,
+        });
     }
     if run.one_surface {
         let s = surface(&points, &shared, &first_x.unwrap_or(Vec3::x()))?;

@@ -60,7 +60,11 @@ impl Settings {
     pub fn parse(text: &str) -> Result<Settings> {
         let settings: Settings = toml::from_str(text).map_err(|e| {
             Fault::input(format!("is not a station file: {}", e.to_string().trim_end()))
-                .cause(crate::files::slip_at(text, e.span().map_or(0, |s| s.start), "a misspelt key or a value of the wrong type"))
+                .cause(crate::files::slip_at(
+                    text,
+                    e.span().map_or(0, |s| s.start),
+                    "a misspelt key or a value of the wrong type",
+                ))
                 .next("compare it with docs/file-formats.md, or with what sheetlight station new writes")
         })?;
         settings.check()?;
@@ -93,9 +97,11 @@ impl Settings {
         }
         if let Some(mm) = self.tolerance_mm.filter(|mm| !(FINEST..=COARSEST).contains(mm)) {
             let unit = if mm < FINEST { "metres" } else { "micrometres" };
-            return Err(Fault::input(format!("tolerance_mm is {mm}, which looks like {unit}; {FINEST} to {COARSEST} is believed"))
-                .cause(format!("{unit} instead of millimetres"))
-                .next("give what the work tolerates in millimetres, or leave the key out"));
+            return Err(Fault::input(format!(
+                "tolerance_mm is {mm}, which looks like {unit}; {FINEST} to {COARSEST} is believed"
+            ))
+            .cause(format!("{unit} instead of millimetres"))
+            .next("give what the work tolerates in millimetres, or leave the key out"));
         }
         self.extraction.check()
     }

@@ -3,11 +3,12 @@
 
 use crate::table::{Good, Want::Says, case, check};
 use sheetlight::fault::Fault;
-use sheetlight::find::points::Ordered;
-use sheetlight::find::recipe::InsertionSpec;
-use sheetlight::find::teach::{TeachOptions, teach};
+use sheetlight::find::insert::recipe::InsertionSpec;
+use sheetlight::find::insert::teach::{TeachOptions, teach};
+use sheetlight::find::measure::points::Ordered;
 use sheetlight::geometry::{Base, Flange};
-use sheetlight::scan::{CloudPoint, GridOptions, grid};
+use sheetlight::scan::grid;
+use sheetlight::scan::{CloudPoint, GridOptions};
 
 /// A plate of 40 x 24 mm, 5 mm high, on a table; a shot every 0.2 mm.
 fn plate() -> Vec<CloudPoint> {

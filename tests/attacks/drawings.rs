@@ -3,13 +3,13 @@
 
 use crate::table::{Case, Good, Want::Says, case, check};
 use sheetlight::fault::Fault;
-use sheetlight::find::drawing::Drawing;
 use sheetlight::find::dxf::{self, DxfOptions};
-use sheetlight::find::edge_index::EdgeIndex;
-use sheetlight::find::model::{ModelOptions, ShapeModel};
+use sheetlight::find::model::drawing::Drawing;
+use sheetlight::find::model::edge_index::EdgeIndex;
+use sheetlight::find::model::shape_model::{ModelOptions, ShapeModel};
 use sheetlight::find::scene::{Kind, Layer, Scene};
-use sheetlight::find::search::find;
-use sheetlight::find::search_options::SearchOptions;
+use sheetlight::find::search::full::find;
+use sheetlight::find::search::options::SearchOptions;
 use std::fmt::Write;
 
 /// Everything that `find` does with a drawing before it looks at points, and a search of a map of 60 x 40 mm with nothing

@@ -56,8 +56,16 @@ const READ: [(&str, &str, bool); 25] = [
     ("x", "station import {}/x --station {}/station", false),
     ("x.csv", "calibrate hand-eye --board-poses {}/x.csv --poses {}/recording/poses.json --station {}/station", false),
     ("x.csv", "calibrate hand-eye --board-poses {}/boards.csv --poses {}/x.csv --station {}/station", false),
-    ("x.csv", "calibrate profile-hand-eye {}/x.csv --poses {}/recording/poses.json --station {}/station --ball-diameter-mm 20", false),
-    ("x.json", "calibrate profile-hand-eye {}/p.csv --poses {}/recording/poses.json --ball-diameter-mm 20 --evaluate {}/x.json", false),
+    (
+        "x.csv",
+        "calibrate profile-hand-eye {}/x.csv --poses {}/recording/poses.json --station {}/station --ball-diameter-mm 20",
+        false,
+    ),
+    (
+        "x.json",
+        "calibrate profile-hand-eye {}/p.csv --poses {}/recording/poses.json --ball-diameter-mm 20 --evaluate {}/x.json",
+        false,
+    ),
 ];
 
 #[test]
@@ -78,7 +86,8 @@ fn whatever_lies_where_a_file_is_wanted() {
         for kind in KINDS {
             put(kind, &path);
             // A limit of addresses, so that a read without a limit ends here and not on the machine; and of time.
-            let line = format!("ulimit -v 3000000; exec timeout 20 \"$0\" {} --quiet </dev/null", words.replace("{}", here));
+            let line =
+                format!("ulimit -v 3000000; exec timeout 20 \"$0\" {} --quiet </dev/null", words.replace("{}", here));
             let done = Command::new("bash").args(["-c", &line, env!("CARGO_BIN_EXE_sheetlight")]).output().unwrap();
             let said = String::from_utf8_lossy(&done.stderr);
             let good = match done.status.code() {

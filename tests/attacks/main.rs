@@ -11,6 +11,7 @@ mod crashes;
 mod drawings;
 mod files;
 mod inputs;
+mod light;
 mod messages;
 mod pictures;
 mod stops;

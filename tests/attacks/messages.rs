@@ -63,7 +63,9 @@ fn without_next(text: &str) -> Vec<String> {
 /// Lines of a source, its tests aside, that call one of `names`.
 fn calling<'a>(text: &'a str, names: &'a [&'a str]) -> impl Iterator<Item = String> + 'a {
     let code = text.find("#[cfg(test)]\nmod").map_or(text, |at| &text[..at]);
-    let lines = (1..).zip(code.lines()).filter(|(_, l)| names.iter().any(|n| l.contains(n)) && !l.contains("/proc/") && !l.contains("schedstat"));
+    let lines = (1..)
+        .zip(code.lines())
+        .filter(|(_, l)| names.iter().any(|n| l.contains(n)) && !l.contains("/proc/") && !l.contains("schedstat"));
     lines.map(|(n, l)| format!("{n}: {}", l.trim()))
 }
 

@@ -4,8 +4,8 @@
 
 use super::judge::{between, gauss, gauss3};
 use rand_pcg::Pcg64;
-use sheetlight::calibrate::hand_eye::Mount;
-use sheetlight::calibrate::hand_eye_closed::{Chain, Far, Near, Pair};
+use sheetlight::calibrate::hand_eye::closed::{Chain, Far, Near, Pair};
+use sheetlight::calibrate::hand_eye::options::Mount;
 use sheetlight::calibrate::measured_pose::{SeenBoard, measure};
 use sheetlight::camera::Intrinsics;
 use sheetlight::geometry::{Board, Camera, Rigid, Vec2, Vec3, exp};

@@ -1,106 +1,18 @@
-//! In: a picture and the description of a board. Out: the board's features with their ids, sub-pixel
-//! positions and sigmas, or a sentence that says why it was not found.
+//! In: pictures and descriptions of boards. Out: the boards' features, sub-pixel, with sigmas; boards to print.
 //! Frame and unit: pixels (centres at integers); feature ids index `BoardSpec::features()`.
 
-mod charuco;
-mod chessboard;
+mod chess;
 mod circles;
 mod ellipse;
-mod grid;
-mod growth;
+pub mod extent;
 mod marker_grid;
-#[cfg(test)]
-mod parity;
 pub mod print;
 mod quads;
 pub mod refine;
 mod sandwich;
-#[cfg(test)]
-mod trials;
-mod turns;
+mod search;
+mod view;
 
-pub use turns::{Turn, turns};
-
-use crate::fault::{Fault, Result};
-use crate::geometry::Vec2;
-use crate::raster::Image;
-use crate::recording::BoardSpec;
-
-/// One feature of a board as seen.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct BoardPoint {
-    /// Index into [`BoardSpec::features`].
-    pub feature_id: usize,
-    pub pixel: Vec2,
-    /// Standard deviation per axis, px.
-    pub sigma_px: f64,
-}
-
-/// A board as seen in one picture.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub struct BoardView {
-    pub points: Vec<BoardPoint>,
-    /// The board looks the same after a half (or quarter) turn: which of [`turns`] holds is unknown
-    /// here and must come from the whole set.
-    pub ambiguous: bool,
-    /// Diameter of a circle grid's dots as this picture shows it, mm, where the description leaves it open.
-    pub dot_diameter: Option<f64>,
-}
-
-/// Settings of [`find`].
-#[derive(Clone, Debug, PartialEq)]
-pub struct FindOptions {
-    /// Share of a square's side that a corner's fit reaches; 0.2..=0.48.
-    pub reach: f64,
-    /// The same in px at most; 4..=60.
-    pub longest_px: f64,
-    /// Pixels farther than this from an edge are left out of a corner's fit; 2..=30 px.
-    pub band_px: f64,
-    /// Pictures with a longer side are first searched at a size near this; 320..=8192 px.
-    pub detector_px: usize,
-    /// Share of a chessboard's corners that may be missed by the detector and are then predicted and
-    /// verified on the picture; 0..=0.3.
-    pub gaps: f64,
-}
-
-impl Default for FindOptions {
-    fn default() -> Self {
-        FindOptions { reach: 0.42, longest_px: 15.0, band_px: 6.0, detector_px: 1000, gaps: 0.1 }
-    }
-}
-
-impl FindOptions {
-    pub fn check(&self) -> Result<()> {
-        let ranges = [
-            ("reach", self.reach, 0.2, 0.48),
-            ("longest_px", self.longest_px, 4.0, 60.0),
-            ("band_px", self.band_px, 2.0, 30.0),
-            ("detector_px", self.detector_px as f64, 320.0, 8192.0),
-            ("gaps", self.gaps, 0.0, 0.3),
-        ];
-        for (name, value, low, high) in ranges {
-            if !(low..=high).contains(&value) {
-                return Err(Fault::usage(format!("{name} is {value}, {low} to {high} are allowed"))
-                    .next("choose a value in that range"));
-            }
-        }
-        Ok(())
-    }
-}
-
-/// Finds `board` in `image`. The fault says why where it is not found.
-pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<BoardView> {
-    options.check()?;
-    match board {
-        BoardSpec::Chessboard { inner_corners, first_square, .. } => {
-            chessboard::find(image, *inner_corners, first_square != "white", options)
-        }
-        BoardSpec::Charuco { squares, square_mm, marker_mm, dictionary, .. } => {
-            let layout =
-                charuco::Layout { squares: *squares, square_mm: *square_mm, marker_mm: *marker_mm, dictionary };
-            charuco::find(image, &layout, options)
-        }
-        BoardSpec::MarkerGrid { .. } => marker_grid::find(image, board, options),
-        BoardSpec::Circles { .. } => circles::find(image, board, options),
-    }
-}
+pub use chess::turns::{Turn, turns};
+pub use search::find;
+pub use view::{BoardPoint, BoardView, FindOptions};

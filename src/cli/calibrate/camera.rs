@@ -1,13 +1,13 @@
 //! In: a recording of a board and a station. Out: the station's camera calibration and a report page.
 //! Frame and unit: camera frame; pixels, mm.
 
-use super::super::Console;
-use super::{Keep, finish};
-use crate::calibrate::camera::{CameraOptions, CameraResult, calibrate};
-use crate::calibrate::camera_report::page;
-use crate::calibrate::intrinsics::SolveOptions;
-use crate::calibrate::lens::Lens;
+use super::store::{Keep, finish};
+use crate::calibrate::camera::intrinsics::SolveOptions;
+use crate::calibrate::camera::lens::Lens;
+use crate::calibrate::camera::procedure::{CameraOptions, CameraResult, calibrate};
+use crate::calibrate::camera::report::page;
 use crate::camera::NAMES;
+use crate::cli::terminal::console::Console;
 use crate::fault::Result;
 use crate::raster::Channel;
 use crate::recording::Recording;
@@ -33,7 +33,7 @@ pub struct Args {
     /// Lens: evidence (what the pictures determine), none, one (k1), four (k1 k2 p1 p2), five (k3 too),
     /// rational (five and k4 k5 k6), prism (five and s1..s4), scheimpflug (k1 k2 k3 and the sensor's tilt),
     /// all (OpenCV's 14 terms)
-    #[arg(long, default_value = "evidence", value_parser = crate::cli::parse::<Lens>)]
+    #[arg(long, default_value = "evidence", value_parser = crate::cli::terminal::arguments::parse::<Lens>)]
     lens: Lens,
     /// Estimate the skew too (sensors with square rows have none)
     #[arg(long)]
@@ -43,7 +43,7 @@ pub struct Args {
     #[arg(long)]
     working_mm: Option<f64>,
     /// Part of a colour picture to use: red, green, blue or luma
-    #[arg(long, default_value = "luma", value_parser = crate::cli::parse::<Channel>)]
+    #[arg(long, default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
     channel: Channel,
     #[command(flatten)]
     keep: Keep,

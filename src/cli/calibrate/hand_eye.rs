@@ -1,9 +1,9 @@
 //! In: a recording of a board with robot poses. Out: the camera on the flange (or in the base).
 //! Frame and unit: flange_T_camera or base_T_camera; mm, degrees.
 
-use super::super::Console;
-use super::{Keep, finish};
-use crate::calibrate::hand_eye::{HandEyeOptions, Mount};
+use super::store::{Keep, finish};
+use crate::calibrate::hand_eye::options::{HandEyeOptions, Mount};
+use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Frame, Rigid};
 use crate::recording::{Recording, load_poses};

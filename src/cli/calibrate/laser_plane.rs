@@ -1,9 +1,9 @@
 //! In: a recording of boards with the stripe on them. Out: the laser plane.
 //! Frame and unit: camera frame, mm.
 
-use super::super::Console;
-use super::{Keep, finish};
-use crate::calibrate::laser_plane::LaserPlaneOptions;
+use super::store::{Keep, finish};
+use crate::calibrate::laser_plane::options::LaserPlaneOptions;
+use crate::cli::terminal::console::Console;
 use crate::fault::Result;
 use crate::raster::Channel;
 use crate::recording::Recording;
@@ -35,10 +35,10 @@ pub struct Args {
     #[arg(long, requires = "near_mm")]
     far_mm: Option<f64>,
     /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
-    #[arg(long, default_value = "auto", value_parser = super::super::parse::<Where>)]
+    #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
     on: Where,
     /// Part of a colour picture to use: red, green, blue or luma
-    #[arg(long, default_value = "luma", value_parser = crate::cli::parse::<Channel>)]
+    #[arg(long, default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
     channel: Channel,
     #[command(flatten)]
     keep: Keep,

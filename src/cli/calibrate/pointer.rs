@@ -1,10 +1,10 @@
 //! In: a recording of boards with the pointer's spot on them. Out: the beam.
 //! Frame and unit: camera frame, mm.
 
-use super::super::Console;
-use super::{Keep, finish};
-use crate::calibrate::pointer::PointerOptions;
-use crate::calibrate::spot::SpotOptions;
+use super::store::{Keep, finish};
+use crate::calibrate::pointer::solve::PointerOptions;
+use crate::calibrate::pointer::spot::SpotOptions;
+use crate::cli::terminal::console::Console;
 use crate::fault::Result;
 use crate::raster::Channel;
 use crate::recording::Recording;
@@ -34,7 +34,7 @@ pub struct Args {
     #[arg(long, requires = "near_mm")]
     far_mm: Option<f64>,
     /// Part of a colour picture to use: red, green, blue or luma
-    #[arg(long, default_value = "luma", value_parser = crate::cli::parse::<Channel>)]
+    #[arg(long, default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
     channel: Channel,
     #[command(flatten)]
     keep: Keep,

@@ -1,10 +1,10 @@
 //! In: profiles of a ball and robot poses. Out: a line-profile sensor's pose on the flange.
 //! Frame and unit: flange_T_sensor; mm, degrees.
 
-use super::super::Console;
-use super::{Keep, finish};
+use super::store::{Keep, finish};
+use crate::calibrate::ball::options::{BallOptions, Side};
 use crate::calibrate::limits::Asked;
-use crate::calibrate::profile_hand_eye::{BallOptions, Side};
+use crate::cli::terminal::console::Console;
 use crate::fault::Result;
 use crate::rig::Volume;
 use crate::robot::Convention;
@@ -32,7 +32,7 @@ pub struct Args {
     #[arg(long)]
     ball_diameter_mm: f64,
     /// Side of the ball's centre: plus (y > 0 of the sensor, y = z × x) or minus [default: the data must tell]
-    #[arg(long, value_parser = super::super::parse::<Side>)]
+    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Side>)]
     side: Option<Side>,
     /// Station folder that the result is stored in
     #[arg(long, required_unless_present = "evaluate")]

@@ -37,3 +37,6 @@ pub fn bent(corners: &[([f64; 2], f64)], closed: bool, flat: f64) -> Vec<[f64; 2
     }
     out
 }
+
+/// How far a polyline may lie from the curve it stands for, mm: well below what a scan can tell.
+pub const FLAT: f64 = 0.002;

@@ -1,10 +1,9 @@
 //! In: curves of a drawing. Out: closed loops, joined end to end, and what could not be joined.
 //! Frame and unit: the drawing's x y z, mm.
 
-use super::FLAT;
 use super::curves::{Curve, Form};
-use super::flatten::arc;
-use crate::find::outline::area;
+use super::flatten::{FLAT, arc};
+use crate::find::model::outline::area;
 use std::collections::HashMap;
 
 /// A closed edge.

@@ -1,6 +1,11 @@
 //! In: an ASCII DXF file (LINE, ARC, CIRCLE, ELLIPSE, SPLINE, LWPOLYLINE, POLYLINE, INSERT). Out: a drawing of the part.
 //! Frame and unit: part frame, x and y as drawn, z towards the viewer; mm, from the unit that the file or the user states.
 
+use super::dxf::flatten::FLAT;
+use super::model::drawing::Drawing;
+use super::model::outline::{area, bounds};
+use super::model::shape::{Form, Inside};
+use crate::fault::{Fault, Result};
 mod curves;
 mod flatten;
 mod loops;
@@ -8,9 +13,6 @@ mod shapes;
 mod spline;
 mod tags;
 
-use super::drawing::{Drawing, Form, Inside};
-use super::outline::{area, bounds};
-use crate::fault::{Fault, Result};
 use curves::{Curve, Form as Drawn};
 
 /// A unit of length of a drawing.
@@ -42,8 +44,6 @@ impl std::str::FromStr for Unit {
 
 /// More is no drawing of a part but an assembly, bytes.
 pub const LARGEST: u64 = 64 << 20;
-/// How far a polyline may lie from the curve it stands for, mm: well below what a scan can tell.
-const FLAT: f64 = 0.002;
 
 /// What a person says about a drawing.
 #[derive(Clone, Debug, Default)]

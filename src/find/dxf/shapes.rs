@@ -3,8 +3,8 @@
 
 use super::curves::{Curve, Form as Drawn};
 use super::loops::Loop;
-use crate::find::drawing::{Form, Grid, Inside, Shape};
-use crate::find::outline::{area, bounds, contains};
+use crate::find::model::outline::{area, bounds, contains};
+use crate::find::model::shape::{Form, Grid, Inside, Shape};
 
 /// Lengths are rounded to a micrometre, so that a drawing in inches stays readable.
 fn micrometre(v: f64) -> f64 {

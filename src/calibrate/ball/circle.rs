@@ -1,0 +1,96 @@
+//! In: a profile of a ball. Out: the circle that its points lie on, with its information.
+//! Frame and unit: the sensor's plane y = 0, mm; docs/math.md, Ball (2).
+
+use super::options::BallOptions;
+use super::profile::Profile;
+use crate::fault::{Fault, Result};
+use crate::geometry::{Mat3, Vec3};
+use crate::solve::{ConsensusOptions, LmOptions, Loss, Problem, Residuals, consensus, lm};
+
+/// A profile as a measurement: centre x, z and radius of the circle, with information per point variance.
+pub(in crate::calibrate) struct Circle {
+    pub value: Vec3,
+    pub information: Mat3,
+    /// The points on the ball.
+    pub on: Vec<[f64; 2]>,
+    /// Their number, and that of the profile's points.
+    pub points: [usize; 2],
+    /// Weighted sum of the squared distances from the circle, mm².
+    pub squares: f64,
+}
+
+struct CircleFit<'a>(&'a [[f64; 2]]);
+
+impl Problem for CircleFit<'_> {
+    type State = Vec3;
+    fn width(&self) -> usize {
+        3
+    }
+    fn moved(&self, s: &Vec3, d: &[f64]) -> Vec3 {
+        s + Vec3::new(d[0], d[1], d[2])
+    }
+    fn residuals(&self, s: &Vec3, out: &mut Residuals) -> Option<()> {
+        for [x, z] in self.0 {
+            let (dx, dz) = (x - s.x, z - s.y);
+            let r = dx.hypot(dz);
+            if r < 1e-9 {
+                return None;
+            }
+            out.group(&[r - s.z], &[0, 1, 2], &[-dx / r, -dz / r, -1.0]);
+        }
+        Some(())
+    }
+}
+
+/// The circle that most points of a profile lie on; its radius may not exceed the ball's.
+pub(in crate::calibrate) fn circle(profile: &Profile, radius: f64, o: &BallOptions) -> Result<Circle> {
+    let p = &profile.points;
+    let options = ConsensusOptions { threshold: o.gate_mm, max_draws: 4000, seed: o.seed, ..Default::default() };
+    let found = consensus(
+        p.len(),
+        3,
+        &options,
+        |c| {
+            let [a, b, d] = [p[c[0]], p[c[1]], p[c[2]]];
+            // Perpendicular bisectors.
+            let m = nalgebra::Matrix2::new(b[0] - a[0], b[1] - a[1], d[0] - a[0], d[1] - a[1]) * 2.0;
+            let sq = |q: [f64; 2]| q[0] * q[0] + q[1] * q[1];
+            let c = m.lu().solve(&nalgebra::Vector2::new(sq(b) - sq(a), sq(d) - sq(a)))?;
+            let r = (a[0] - c.x).hypot(a[1] - c.y);
+            (r > 0.1 * radius && r < 1.05 * radius + o.gate_mm).then_some(Vec3::new(c.x, c.y, r))
+        },
+        |c, i| (p[i][0] - c.x).hypot(p[i][1] - c.y) - c.z,
+    );
+    let weak = |what: String| {
+        Fault::refused(format!("{}: {what}", profile.name))
+            .cause("the line missed the ball, or the diameter is wrong")
+            .next("leave this profile out, and take others through the upper half of the ball")
+    };
+    let found = found.ok_or_else(|| weak(format!("no circle of radius up to {radius:.2} mm in {} points", p.len())))?;
+    if found.inliers.len() < 8 {
+        return Err(weak(format!("only {} points lie on a circle, 8 are needed", found.inliers.len())));
+    }
+    // A sensor sees one half of the ball: what lies opposite to most points (the table that the ball
+    // stands on) is near the circle by chance.
+    let towards = |q: &[f64; 2]| nalgebra::Vector2::new(q[0] - found.model.x, q[1] - found.model.y).normalize();
+    let middle: nalgebra::Vector2<f64> = found.inliers.iter().map(|&i| towards(&p[i])).sum();
+    let on: Vec<[f64; 2]> = found.inliers.iter().map(|&i| p[i]).filter(|q| towards(q).dot(&middle) > 0.0).collect();
+    let fit = lm(
+        &CircleFit(&on),
+        found.model,
+        &LmOptions { loss: Loss::Huber(2.0), estimate_scale: true, ..Default::default() },
+    );
+    let mut information = Mat3::zeros();
+    let mut squares = 0.0;
+    for ([x, z], w) in on.iter().zip(&fit.weights) {
+        let (dx, dz) = (x - fit.state.x, z - fit.state.y);
+        let r = dx.hypot(dz);
+        let j = Vec3::new(-dx / r, -dz / r, -1.0);
+        information += j * j.transpose() * *w;
+        squares += w * (r - fit.state.z).powi(2);
+    }
+    if information.try_inverse().is_none() {
+        return Err(weak("the arc is too short for a circle".into()));
+    }
+    Ok(Circle { value: fit.state, information, points: [on.len(), p.len()], squares, on })
+}

@@ -1,0 +1,63 @@
+//! In: what a person may choose about a ball. Out: the choice, checked.
+//! Frame and unit: mm.
+
+use crate::fault::{Fault, Result};
+
+/// On which side of the profile plane (y = 0 of the sensor) the ball's centre lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Side {
+    Plus,
+    Minus,
+}
+
+impl std::str::FromStr for Side {
+    type Err = String;
+    fn from_str(s: &str) -> std::result::Result<Side, String> {
+        match s {
+            "plus" | "+y" => Ok(Side::Plus),
+            "minus" | "-y" => Ok(Side::Minus),
+            _ => Err(format!("unknown side '{s}': plus (the ball's centre at y > 0 of the sensor) or minus")),
+        }
+    }
+}
+
+/// Settings of [`solve`].
+#[derive(Clone, Debug)]
+pub struct BallOptions {
+    /// The ball's diameter, mm; 1..=1000.
+    pub diameter: f64,
+    /// The side of the ball in every profile; `None`: the data must tell.
+    pub side: Option<Side>,
+    /// A point farther than this from the circle of its profile is not of the ball, mm; 0.001..=10.
+    pub gate_mm: f64,
+    /// A profile is wrong where its squared Mahalanobis distance (3 degrees of freedom) exceeds this; 12..=1000.
+    pub gate: f64,
+    /// The other side must fit worse by this many units of squared Mahalanobis distance; 9..=1000.
+    pub clear: f64,
+    /// Fewest profiles; 6..=1000.
+    pub min_profiles: usize,
+    pub seed: u64,
+}
+
+impl BallOptions {
+    pub fn new(diameter: f64) -> BallOptions {
+        BallOptions { diameter, side: None, gate_mm: 0.3, gate: 21.0, clear: 25.0, min_profiles: 8, seed: 1 }
+    }
+    pub fn check(&self) -> Result<()> {
+        let ranges = [
+            ("diameter", self.diameter, 1.0, 1000.0),
+            ("gate_mm", self.gate_mm, 0.001, 10.0),
+            ("gate", self.gate, 12.0, 1000.0),
+            ("clear", self.clear, 9.0, 1000.0),
+            ("min_profiles", self.min_profiles as f64, 6.0, 1000.0),
+        ];
+        match ranges.iter().find(|(_, v, low, high)| !(low..=high).contains(&v)) {
+            Some((name, v, low, high)) => {
+                Err(Fault::usage(format!("{name} is {v}, {low} to {high} is allowed"))
+                    .next("choose a value in that range"))
+            }
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! In: files of line profiles (CSV, matrices and plain sequences in YAML and JSON). Out: lists of x, z points.
+//! Frame and unit: the sensor's own plane, mm.
+
+use super::profile::Profile;
+use super::sequences::{by_turns, from_brackets, value};
+use crate::fault::{Fault, Result};
+use crate::files::natural;
+use std::path::Path;
+
+/// Reads profiles from a file with many, or from a folder with a file each, in the order of their
+/// names (numbers in names count as numbers).
+pub fn load(path: &Path) -> Result<Vec<Profile>> {
+    if !path.is_dir() {
+        return load_file(path);
+    }
+    let entries = std::fs::read_dir(path).map_err(|e| Fault::read(path, e))?;
+    let mut files: Vec<_> = entries
+        .filter_map(|e| Some(e.ok()?.path()))
+        .filter(|p| {
+            p.extension()
+                .is_some_and(|e| ["csv", "txt", "yml", "yaml", "json"].iter().any(|k| e.eq_ignore_ascii_case(k)))
+        })
+        .collect();
+    files.sort_by_key(|p| natural(&p.file_name().unwrap_or_default().to_string_lossy()));
+    if files.is_empty() {
+        return Err(Fault::input(format!("{}: holds no profiles (csv, txt, yml, yaml, json)", path.display()))
+            .cause("another folder")
+            .next("give the folder with one profile a file, or one file with all"));
+    }
+    let mut out = Vec::new();
+    for f in files {
+        out.extend(load_file(&f)?);
+    }
+    Ok(out)
+}
+
+fn load_file(path: &Path) -> Result<Vec<Profile>> {
+    let text = crate::files::read_text(path)?;
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let read = match () {
+        () if text.contains("opencv-matrix") => from_yaml(&text, &stem),
+        () if text.contains('[') => from_brackets(&text, &stem),
+        () => from_csv(&text, &stem),
+    };
+    read.map_err(|e| e.at(path.display()))
+}
+
+/// Columns x, z (one profile), or profile, x, z (many). A header may name them in another order.
+pub fn from_csv(text: &str, stem: &str) -> Result<Vec<Profile>> {
+    let mut columns: Option<[Option<usize>; 3]> = None;
+    let mut out: Vec<Profile> = Vec::new();
+    for (number, line) in text.lines().enumerate() {
+        let line = line.trim();
+        if line.is_empty() || line.starts_with('#') {
+            continue;
+        }
+        let separator = if line.contains(';') {
+            ';'
+        } else if line.contains(',') {
+            ','
+        } else {
+            ' '
+        };
+        let cells: Vec<&str> = line.split(separator).map(str::trim).filter(|c| !c.is_empty()).collect();
+        let bad = |what: &str| {
+            let commas = separator == ';' && line.contains(',');
+            Fault::input(format!("line {}: '{line}' {what}", number + 1))
+                .cause(if commas { "numbers with decimal commas" } else { "not a list of x, z points in mm" })
+                .next("write x and z (mm) a line, or profile, x and z with a header")
+        };
+        let is_number = |c: &str| c.parse::<f64>().is_ok();
+        if columns.is_none() {
+            if cells.iter().any(|c| !is_number(c)) {
+                let find = |key: &str| {
+                    cells.iter().position(|c| {
+                        let c = c.trim_matches('"').to_lowercase();
+                        c == key || c == format!("{key}_mm") || c == format!("{key} mm") || c == format!("{key} [mm]")
+                    })
+                };
+                let profile = find("profile").or(find("frame")).or(find("index"));
+                columns = Some([profile, find("x"), find("z")]);
+                if find("x").is_none() || find("z").is_none() {
+                    return Err(bad("names no columns x and z"));
+                }
+                continue;
+            }
+            columns = Some(match cells.len() {
+                2 => [None, Some(0), Some(1)],
+                3 => [Some(0), Some(1), Some(2)],
+                // A profile a line.
+                _ => [None, None, None],
+            });
+        }
+        let [profile, x, z] = columns.expect("set above");
+        if x.is_none() {
+            let numbers = cells.iter().map(|c| c.parse()).collect::<std::result::Result<Vec<f64>, _>>();
+            let name = format!("{stem} line {}", number + 1);
+            let points = by_turns(&numbers.map_err(|_| bad("is no row of numbers"))?, &name)?;
+            out.push(Profile {
+                name,
+                points: points.into_iter().filter(|p| p.iter().all(|v| v.is_finite())).collect(),
+            });
+            continue;
+        }
+        let cell = |i: usize| cells.get(i).copied().ok_or_else(|| bad("is too short"));
+        let value = |i: usize| cell(i).and_then(|c| c.parse::<f64>().map_err(|_| bad("is no row of numbers")));
+        let point = [value(x.expect("checked"))?, value(z.expect("checked"))?];
+        let name = match profile {
+            Some(i) => format!("{stem} {}", cell(i)?),
+            None => stem.to_owned(),
+        };
+        if out.last().is_none_or(|p| p.name != name) {
+            if out.iter().any(|p| p.name == name) {
+                return Err(bad("belongs to a profile that was closed before: keep a profile's lines together"));
+            }
+            out.push(Profile { name, points: Vec::new() });
+        }
+        if point.iter().all(|v| v.is_finite()) {
+            out.last_mut().expect("pushed above").points.push(point);
+        }
+    }
+    if out.is_empty() {
+        return Err(Fault::input("holds no points").cause("an empty file").next("export the profiles again"));
+    }
+    Ok(out)
+}
+
+/// Every matrix of an OpenCV FileStorage file: 2 x N, N x 2, or N elements of two channels.
+pub fn from_yaml(text: &str, stem: &str) -> Result<Vec<Profile>> {
+    let bad = |name: &str, what: String| {
+        Fault::input(format!("matrix '{name}': {what}"))
+            .cause("not a list of x, z points written by cv::FileStorage")
+            .next("write each profile as a 2xN or Nx2 matrix of x and z in mm")
+    };
+    let mut out = Vec::new();
+    let pieces: Vec<&str> = text.split("!!opencv-matrix").collect();
+    for (i, body) in pieces.iter().enumerate().skip(1) {
+        let before = pieces[i - 1].trim_end().trim_end_matches(':');
+        let name = before.lines().last().unwrap_or("").trim().trim_start_matches("- ").trim().to_owned();
+        let name =
+            if name.is_empty() || name == "-" { format!("{stem} {}", out.len()) } else { format!("{stem} {name}") };
+        let field = |key: &str| {
+            body.lines().find_map(|l| l.trim().strip_prefix(key)?.trim_start().strip_prefix(':').map(str::trim))
+        };
+        let size = |key: &str| {
+            field(key).and_then(|v| v.parse::<usize>().ok()).ok_or_else(|| bad(&name, format!("has no {key}")))
+        };
+        let (rows, cols) = (size("rows")?, size("cols")?);
+        let kind = field("dt").unwrap_or("d").trim_matches('"');
+        let channels: usize = kind.chars().take_while(char::is_ascii_digit).collect::<String>().parse().unwrap_or(1);
+        let data = body
+            .split_once("data:")
+            .and_then(|(_, d)| d.split_once('[')?.1.split_once(']'))
+            .ok_or_else(|| bad(&name, "has no data".into()))?
+            .0;
+        let numbers = data
+            .split(|c: char| c == ',' || c.is_whitespace())
+            .filter(|t| !t.is_empty())
+            .map(value)
+            .collect::<Option<Vec<f64>>>()
+            .ok_or_else(|| bad(&name, "holds something that is no number".into()))?;
+        let wanted = rows.checked_mul(cols).and_then(|n| n.checked_mul(channels));
+        if wanted != Some(numbers.len()) {
+            return Err(bad(&name, format!("{} numbers for {rows}x{cols} of {channels} channels", numbers.len())));
+        }
+        let points: Vec<[f64; 2]> = match (rows, cols, channels) {
+            (_, 2, 1) if rows != 2 => numbers.chunks(2).map(|c| [c[0], c[1]]).collect(),
+            (2, n, 1) if n != 2 => (0..n).map(|k| [numbers[k], numbers[n + k]]).collect(),
+            (_, _, 2) if rows == 1 || cols == 1 => numbers.chunks(2).map(|c| [c[0], c[1]]).collect(),
+            _ => return Err(bad(&name, format!("{rows}x{cols} of {channels} channels is no list of x, z"))),
+        };
+        out.push(Profile { name, points: points.into_iter().filter(|p| p.iter().all(|v| v.is_finite())).collect() });
+    }
+    if out.is_empty() {
+        return Err(Fault::input("holds no !!opencv-matrix")
+            .cause("another kind of YAML")
+            .next("write it with cv::FileStorage"));
+    }
+    Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_layout_gives_the_same_points() {
+        let want = vec![[1.0, 10.0], [2.0, 11.5], [3.0, 12.0]];
+        assert_eq!(from_csv("x_mm,z_mm\n1,10\n2,11.5\n3,12\n", "a").unwrap()[0].points, want);
+        assert_eq!(from_csv("1;10\n2;11.5\n3;12\n2.5;nan\n", "a").unwrap()[0].points, want);
+        let many = from_csv("profile,z,x\n0,10,1\n0,11.5,2\n0,12,3\n1,5,4\n", "a").unwrap();
+        assert_eq!((many.len(), &many[0].points, many[1].points[0]), (2, &want, [4.0, 5.0]));
+        let yaml = |m: &str| format!("%YAML:1.0\n---\nprofile_0: !!opencv-matrix\n{m}\n");
+        for m in [
+            "   rows: 2\n   cols: 3\n   dt: d\n   data: [ 1., 2., 3., 10., 1.15e+01,\n       12. ]",
+            "   rows: 3\n   cols: 2\n   dt: f\n   data: [ 1., 10., 2., 11.5, 3., 12. ]",
+            "   rows: 1\n   cols: 3\n   dt: \"2d\"\n   data: [ 1., 10., 2., 11.5, 3., 12. ]",
+        ] {
+            let p = from_yaml(&yaml(m), "a").unwrap();
+            assert_eq!((p[0].points.clone(), p[0].name.as_str()), (want.clone(), "a profile_0"));
+        }
+        assert!(from_yaml(&yaml("   rows: 2\n   cols: 2\n   dt: d\n   data: [ 1., 2., 3., 4. ]"), "a").is_err());
+        let lines = from_csv("1 10 2 11.5 3 12\n4 5 5 6 6 7\n", "a").unwrap();
+        assert_eq!((lines.len(), &lines[0].points, lines[1].points[2]), (2, &want, [6.0, 7.0]));
+        assert!(from_csv("1,2,3,4\n", "a").is_err() && from_csv("a,b\n1,2\n", "a").is_err());
+    }
+
+    #[test]
+    fn numbers_in_names_count_as_numbers() {
+        assert!(natural("profile_2.csv") < natural("profile_10.csv"));
+    }
+}

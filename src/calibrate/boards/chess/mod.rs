@@ -1,0 +1,12 @@
+//! In: pictures of chessboards, plain and with markers. Out: their inner corners with ids.
+//! Frame and unit: pixels.
+
+pub(super) mod charuco;
+pub(super) mod chessboard;
+mod grid;
+mod growth;
+#[cfg(test)]
+mod parity;
+#[cfg(test)]
+mod trials;
+pub(super) mod turns;

@@ -1,0 +1,254 @@
+//! In: board features seen in several pictures. Out: the camera, every board's pose, covariance,
+//! residuals ([zhang00] section 3.2 and 3.3; docs/math.md, Camera calibration (7)).
+//! Frame and unit: pixels; board and camera frames in mm.
+
+use super::lens::{Lens, by_evidence};
+use super::zhang::{Seen, first_camera};
+use crate::calibrate::boards::BoardView;
+use crate::calibrate::homography::homography;
+use crate::calibrate::pose::{moved, point_by_step, pose_from_homography};
+use crate::calibrate::projection::project;
+use crate::camera::{Intrinsics, LENS, PARAMETERS, ParameterCovariance, Parameters, SKEW};
+use crate::fault::{Fault, Result};
+use crate::geometry::{Board, Camera, Mat3, Rigid, Vec2, Vec3};
+use crate::solve::{Blocks, LmOptions, Loss, Problem, Residuals, Solution, Stop, lm};
+use nalgebra::{DMatrix, Matrix2x6};
+
+/// A picture of a board: its name for messages, the board's features, what was seen of them.
+#[derive(Clone, Debug)]
+pub struct Observation {
+    pub name: String,
+    /// Positions in the board frame, mm; `BoardPoint::feature_id` indexes them.
+    pub features: std::sync::Arc<Vec<Vec3>>,
+    pub view: BoardView,
+}
+
+/// Settings of the camera solve.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SolveOptions {
+    pub lens: Lens,
+    /// Estimate the skew; false for every sensor with square rows.
+    pub skew: bool,
+    /// For single wrong corners; the threshold is in sigmas of the residuals.
+    pub loss: Loss,
+    /// Weigh corners by their own sigmas; false: all alike.
+    pub weigh: bool,
+}
+
+impl Default for SolveOptions {
+    fn default() -> Self {
+        SolveOptions { lens: Lens::Evidence, skew: false, loss: Loss::Huber(2.5), weigh: true }
+    }
+}
+
+/// A solved camera.
+#[derive(Clone, Debug)]
+pub struct Solved {
+    pub intrinsics: Intrinsics,
+    /// One a picture.
+    pub camera_from_board: Vec<Rigid<Camera, Board>>,
+    /// Of the intrinsic parameters (order: [`crate::camera::NAMES`]), zero rows for held ones; the residuals'
+    /// own scale is in it. `None` where something is not determined.
+    pub covariance: Option<ParameterCovariance>,
+    /// Held at their value, indices into [`crate::camera::NAMES`].
+    pub held: Vec<usize>,
+    /// Residuals (seen minus predicted) in px and robust weight, picture by picture.
+    pub residuals: Vec<Vec<(Vec2, f64)>>,
+    /// Over all corners, unweighted, px: sqrt(sum |r|² / n) as OpenCV reports it.
+    pub rms_px: f64,
+    /// Residuals over the corners' own sigmas; 1 where the corner fits' sigmas tell the truth.
+    pub sigma0: f64,
+    /// Reciprocal condition of the normal equations.
+    pub condition: f64,
+    pub iterations: usize,
+}
+
+pub(in crate::calibrate) type State = (Parameters, Vec<Rigid<Camera, Board>>);
+
+/// One corner: board frame, pixel, sigma.
+pub(in crate::calibrate) type Corner = (Vec3, Vec2, f64);
+
+pub(in crate::calibrate) struct Bundle<'a> {
+    pub pictures: &'a [Vec<Corner>],
+    pub like: &'a Intrinsics,
+    /// Intrinsic parameters that are estimated.
+    pub free: Vec<usize>,
+}
+
+impl Bundle<'_> {
+    /// Derivatives of a corner's residuals by the free parameters and by its pose's step, row by row.
+    pub fn row(
+        &self,
+        camera: &Intrinsics,
+        pose: &Rigid<Camera, Board>,
+        corner: &Corner,
+    ) -> Option<(Vec2, [Vec<f64>; 2])> {
+        let (x, pixel, sigma) = corner;
+        let rotated = pose.rotation * x;
+        let q = project(camera, &(rotated + pose.translation))?;
+        let by_pose: Matrix2x6<f64> = q.by_point * point_by_step(&rotated);
+        let of = |r: usize| {
+            let own = self.free.iter().map(|&i| q.by_intrinsics[(r, i)] / sigma);
+            own.chain(by_pose.row(r).iter().map(|d| d / sigma)).collect()
+        };
+        Some(((q.pixel - pixel) / *sigma, [of(0), of(1)]))
+    }
+}
+
+impl Problem for Bundle<'_> {
+    type State = State;
+    fn width(&self) -> usize {
+        PARAMETERS + 6 * self.pictures.len()
+    }
+    fn blocks(&self) -> Option<Blocks> {
+        Some(Blocks { first: PARAMETERS, size: 6 })
+    }
+    fn moved(&self, (k, poses): &State, step: &[f64]) -> State {
+        let k = k + Parameters::from_column_slice(&step[..PARAMETERS]);
+        let poses = poses.iter().zip(step[PARAMETERS..].chunks_exact(6)).map(|(p, s)| moved(p, s)).collect();
+        (k, poses)
+    }
+    fn residuals(&self, (k, poses): &State, out: &mut Residuals) -> Option<()> {
+        let camera = self.like.with_parameters(k);
+        if camera.fx <= 0.0 || camera.fy <= 0.0 {
+            return None;
+        }
+        for (picture, (points, pose)) in self.pictures.iter().zip(poses).enumerate() {
+            let first = PARAMETERS + 6 * picture;
+            let columns: Vec<usize> = self.free.iter().copied().chain(first..first + 6).collect();
+            for corner in points {
+                if !out.wants_jacobian() {
+                    let r = (camera.pixel_from_point(&pose.point(&corner.0))? - corner.1) / corner.2;
+                    out.group(&[r.x, r.y], &columns, &[]);
+                    continue;
+                }
+                let (r, [across, down]) = self.row(&camera, pose, corner)?;
+                out.group(&[r.x, r.y], &columns, &[across, down].concat());
+            }
+        }
+        Some(())
+    }
+}
+
+/// Solves for camera and poses together.
+///
+/// # Errors
+/// Fewer than two pictures with at least 6 corners each; corners on a line; no camera explains them.
+pub fn solve(pictures: &[Observation], width: u32, height: u32, options: &SolveOptions) -> Result<Solved> {
+    if pictures.len() < 2 {
+        return Err(Fault::refused(format!("{} picture shows the board, 3 or more are needed", pictures.len()))
+            .cause("one view of a plane gives two equations for the camera's four numbers [zhang00, section 3.1]")
+            .next("take 10 to 20 pictures with the board tilted differently each time"));
+    }
+    let points: Vec<Vec<Corner>> = pictures.iter().map(|o| measured(o, options.weigh)).collect();
+    let seen = pictures.iter().zip(&points).map(|(o, p)| see(&o.name, p)).collect::<Result<Vec<Seen>>>()?;
+    let start = first_camera(&seen, width, height).ok_or_else(|| {
+        Fault::refused("no pinhole camera explains the boards")
+            .cause("the corners belong to another board than the one described, or the pictures are mirrored")
+            .next("compare the board with its description")
+    })?;
+    let to_normalised =
+        Mat3::new(1.0 / start.fx, 0.0, -start.cx / start.fx, 0.0, 1.0 / start.fy, -start.cy / start.fy, 0.0, 0.0, 1.0);
+    let poses = seen.iter().map(|s| pose_from_homography(&(to_normalised * s.homography))).collect();
+    let fit = Fit { corners: &points, like: &start, loss: options.loss };
+    let mut held: Vec<usize> = options.lens.held();
+    if !options.skew {
+        held.push(SKEW);
+    }
+    // First without the higher lens terms and with all corners counting: the closed form is far off.
+    let rough: Vec<usize> = (LENS + 1..PARAMETERS).chain(held.iter().copied()).collect();
+    let coarse = LmOptions { max_iterations: 15, tolerance: 1e-4, ..LmOptions::default() };
+    let first = fit.with(&rough, (start.parameters(), poses), coarse);
+    let mut solution = fit.fine(&held, first.state);
+    if options.lens == Lens::Evidence {
+        by_evidence(&fit, &mut solution, &mut held);
+    }
+    if solution.stop == Stop::BadStart || solution.state.0.iter().any(|x| !x.is_finite()) {
+        return Err(Fault::refused("the camera could not be solved")
+            .cause("the corners contradict each other")
+            .next("look at the pictures and leave out those where the board was misread"));
+    }
+    Ok(finish(&fit, solution, held))
+}
+
+/// The corners with what stays the same from one choice of lens terms to the next.
+pub(in crate::calibrate) struct Fit<'a> {
+    pub corners: &'a [Vec<Corner>],
+    pub like: &'a Intrinsics,
+    pub loss: Loss,
+}
+
+impl Fit<'_> {
+    fn bundle(&self, held: &[usize]) -> Bundle<'_> {
+        let free = (0..PARAMETERS).filter(|i| !held.contains(i)).collect();
+        Bundle { pictures: self.corners, like: self.like, free }
+    }
+    fn with(&self, held: &[usize], from: State, options: LmOptions) -> Solution<State> {
+        lm(&self.bundle(held), from, &LmOptions { hold: held.to_vec(), ..options })
+    }
+    /// The optimum with these parameters held.
+    pub fn fine(&self, held: &[usize], from: State) -> Solution<State> {
+        let estimate_scale = self.loss != Loss::Squares;
+        self.with(held, from, LmOptions { loss: self.loss, estimate_scale, ..LmOptions::default() })
+    }
+    pub fn camera(&self, solution: &Solution<State>) -> Intrinsics {
+        self.like.with_parameters(&solution.state.0)
+    }
+    /// Of the intrinsic parameters.
+    pub fn covariance(&self, solution: &Solution<State>) -> Option<ParameterCovariance> {
+        let of = |c: DMatrix<f64>| c.fixed_view::<PARAMETERS, PARAMETERS>(0, 0).into();
+        solution.scaled_covariance().map(of)
+    }
+}
+
+/// Corners with sigmas for the solver. A floor keeps a few very sharp corners from ruling: printing
+/// and flatness leave about 0.01 px on any real board.
+fn measured(o: &Observation, weigh: bool) -> Vec<Corner> {
+    let sigma = |s: f64| if weigh { s.hypot(0.01) } else { 1.0 };
+    o.view.points.iter().map(|p| (o.features[p.feature_id], p.pixel, sigma(p.sigma_px))).collect()
+}
+
+fn see(name: &str, points: &[Corner]) -> Result<Seen> {
+    let plane: Vec<Vec2> = points.iter().map(|p| p.0.xy()).collect();
+    let pixels: Vec<Vec2> = points.iter().map(|p| p.1).collect();
+    let homography = (points.len() >= 6).then(|| homography(&plane, &pixels)).flatten().ok_or_else(|| {
+        Fault::refused(format!("{name}: the {} corners seen do not determine the board's place", points.len()))
+            .cause("fewer than 6 corners, or all on one line")
+            .next("leave this picture out, or take it again with more of the board in view")
+    })?;
+    Ok(Seen { plane, pixels, homography })
+}
+
+fn finish(fit: &Fit<'_>, solution: Solution<State>, held: Vec<usize>) -> Solved {
+    let camera = fit.camera(&solution);
+    let mut weights = solution.weights.iter();
+    let mut sum = 0.0;
+    let mut count = 0usize;
+    let residuals: Vec<Vec<(Vec2, f64)>> = fit
+        .corners
+        .iter()
+        .zip(&solution.state.1)
+        .map(|(points, pose)| {
+            points
+                .iter()
+                .map(|(x, pixel, _)| {
+                    let r = camera.pixel_from_point(&pose.point(x)).map_or(Vec2::repeat(f64::NAN), |p| pixel - p);
+                    sum += r.norm_squared();
+                    count += 1;
+                    (r, weights.next().copied().unwrap_or(0.0))
+                })
+                .collect()
+        })
+        .collect();
+    Solved {
+        intrinsics: camera,
+        camera_from_board: solution.state.1.clone(),
+        covariance: fit.covariance(&solution),
+        held,
+        residuals,
+        rms_px: (sum / count.max(1) as f64).sqrt(),
+        sigma0: solution.sigma0,
+        condition: solution.condition,
+        iterations: solution.iterations,
+    }
+}

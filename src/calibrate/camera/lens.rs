@@ -1,0 +1,111 @@
+//! In: corners of a board in several pictures. Out: which of the lens's terms they determine: named by a person, or chosen by
+//! what the pictures tell (docs/math.md, Camera calibration (8)).
+//! Frame and unit: indices into `camera::NAMES`.
+
+use super::intrinsics::{Fit, State};
+use super::quality::expected_ray_error;
+use crate::camera::{LENS, NAMES, SKEW};
+use crate::solve::Solution;
+use nalgebra::{DMatrix, DVector};
+
+/// Which lens terms are estimated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Lens {
+    /// k1 k2 p1 p2 k3; terms that the pictures do not determine are held at zero and said so.
+    #[default]
+    Evidence,
+    /// A pinhole.
+    None,
+    /// k1 alone.
+    One,
+    /// k1 k2 p1 p2.
+    Four,
+    /// k1 k2 p1 p2 k3, whatever comes.
+    Five,
+    /// The five and k4 k5 k6.
+    Rational,
+    /// The five and s1 s2 s3 s4.
+    Prism,
+    /// k1 k2 k3 and the sensor's tilt. p1 and p2 stay zero: both shift the centre of the radial terms against the
+    /// principal point, and pictures of boards hardly tell one from the other.
+    Scheimpflug,
+    /// All fourteen.
+    All,
+}
+
+const WORDS: [(&str, Lens); 9] = [
+    ("evidence", Lens::Evidence),
+    ("none", Lens::None),
+    ("one", Lens::One),
+    ("four", Lens::Four),
+    ("five", Lens::Five),
+    ("rational", Lens::Rational),
+    ("prism", Lens::Prism),
+    ("scheimpflug", Lens::Scheimpflug),
+    ("all", Lens::All),
+];
+
+impl std::str::FromStr for Lens {
+    type Err = String;
+    fn from_str(s: &str) -> Result<Lens, String> {
+        let names: Vec<&str> = WORDS.iter().map(|w| w.0).collect();
+        let found = WORDS.iter().find(|w| w.0 == s).map(|w| w.1);
+        found.ok_or_else(|| format!("unknown lens '{s}': {}", names.join(", ")))
+    }
+}
+
+const BROWN: &[usize] = &[4, 5, 6, 7, 8];
+const RATIONAL: &[usize] = &[9, 10, 11];
+const PRISM: &[usize] = &[12, 13, 14, 15];
+const TILT: &[usize] = &[16, 17];
+
+impl Lens {
+    /// The parameters that keep their value, the skew apart.
+    pub fn held(self) -> Vec<usize> {
+        let free = match self {
+            Lens::None => Vec::new(),
+            Lens::One => vec![4],
+            Lens::Four => vec![4, 5, 6, 7],
+            Lens::Evidence | Lens::Five => BROWN.to_vec(),
+            Lens::Rational => [BROWN, RATIONAL].concat(),
+            Lens::Prism => [BROWN, PRISM].concat(),
+            Lens::Scheimpflug => [&[4, 5, 8][..], TILT].concat(),
+            Lens::All => [BROWN, RATIONAL, PRISM, TILT].concat(),
+        };
+        (LENS..SKEW).filter(|i| !free.contains(i)).collect()
+    }
+}
+
+/// Names of the terms of the plain lens that were held.
+pub fn held_names(held: &[usize]) -> Vec<&'static str> {
+    BROWN.iter().filter(|i| held.contains(i)).map(|&i| NAMES[i]).collect()
+}
+
+/// Holds lens terms at zero, from the highest down, where the pictures cannot tell them from zero and
+/// where estimating them would cost accuracy (expected ray error over the image).
+pub(in crate::calibrate) fn by_evidence(fit: &Fit<'_>, solution: &mut Solution<State>, held: &mut Vec<usize>) {
+    for block in [&[8][..], &[6, 7], &[5], &[4]] {
+        if tells(fit, solution, block) > 4.0 * block.len() as f64 {
+            return;
+        }
+        let fewer = [held, block].concat();
+        let mut start = solution.state.clone();
+        block.iter().for_each(|&i| start.0[i] = 0.0);
+        let reduced = fit.fine(&fewer, start);
+        let cost =
+            |s: &Solution<State>| fit.covariance(s).map_or(f64::INFINITY, |c| expected_ray_error(&fit.camera(s), &c));
+        if cost(solution) < 1.25 * cost(&reduced) {
+            return;
+        }
+        *solution = reduced;
+        *held = fewer;
+    }
+}
+
+/// Squared Mahalanobis distance of some parameters from zero; 0 where they are not determined.
+fn tells(fit: &Fit<'_>, solution: &Solution<State>, block: &[usize]) -> f64 {
+    let Some(c) = fit.covariance(solution) else { return 0.0 };
+    let theta = DVector::from_iterator(block.len(), block.iter().map(|&i| solution.state.0[i]));
+    let sub = DMatrix::from_fn(block.len(), block.len(), |a, b| c[(block[a], block[b])]);
+    sub.try_inverse().map_or(0.0, |inverse| (theta.transpose() * inverse * &theta)[0])
+}

@@ -1,0 +1,10 @@
+//! In: boards as seen in pictures. Out: the camera's intrinsics and lens with covariance and verdict.
+//! Frame and unit: camera frame; px, mm (docs/math.md, Camera calibration).
+
+pub mod intrinsics;
+pub mod lens;
+mod pictures;
+pub mod procedure;
+pub mod quality;
+pub mod report;
+pub mod zhang;

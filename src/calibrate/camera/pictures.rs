@@ -1,0 +1,143 @@
+//! In: recordings of boards that one camera took. Out: the boards' corners, picture by picture, why the others have none,
+//! and the hashes of what went in.
+//! Frame and unit: px.
+
+use super::intrinsics::Observation;
+use crate::calibrate::boards::{FindOptions, find};
+use crate::fault::{Fault, Kind, Result};
+use crate::recording::{FrameRef, Recording};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// A picture of one of the recordings: its name in messages, its place on the disk.
+struct Source<'a> {
+    recording: &'a Recording,
+    frame: &'a FrameRef,
+    file: String,
+    name: String,
+}
+
+/// What stands before a recording's names: nothing where there is one recording, else its folder.
+fn labels(recordings: &[Recording]) -> Vec<String> {
+    let short = |r: &Recording| r.folder.file_name().map(|n| n.to_string_lossy().into_owned());
+    let label = |r: &Recording| {
+        let alike = recordings.iter().filter(|o| short(o) == short(r)).count();
+        let folder = short(r).filter(|_| alike == 1).unwrap_or_else(|| r.folder.display().to_string());
+        if recordings.len() > 1 { format!("{folder}/") } else { String::new() }
+    };
+    recordings.iter().map(label).collect()
+}
+
+/// All pictures of all recordings.
+fn sources(recordings: &[Recording]) -> Vec<Source<'_>> {
+    let mut out = Vec::new();
+    for (recording, label) in recordings.iter().zip(labels(recordings)) {
+        for frame in &recording.meta.frames {
+            let file = frame.ambient.as_ref().or(frame.laser.as_ref()).cloned().unwrap_or_default();
+            out.push(Source { recording, frame, name: format!("{label}{file}"), file });
+        }
+    }
+    out
+}
+
+/// All recordings must have been taken with one camera.
+pub(in crate::calibrate) fn one_size(recordings: &[Recording]) -> Result<(u32, u32)> {
+    let size = |r: &Recording| (r.meta.image.width, r.meta.image.height);
+    let first = recordings.first().ok_or_else(|| Fault::usage("no recording was given").next("give one or more"))?;
+    match recordings.iter().find(|r| size(r) != size(first)) {
+        None => Ok(size(first)),
+        Some(other) => Err(Fault::input(format!(
+            "{} holds pictures of {}x{}, {} of {}x{}",
+            first.folder.display(),
+            size(first).0,
+            size(first).1,
+            other.folder.display(),
+            size(other).0,
+            size(other).1
+        ))
+        .cause("two cameras, or one at two resolutions")
+        .next("calibrate each camera and resolution by itself")),
+    }
+}
+
+/// What was found in all pictures.
+pub(in crate::calibrate) struct Pictures {
+    pub found: Vec<Observation>,
+    /// Name and reason.
+    pub left_out: Vec<(String, String)>,
+    /// Name to SHA-256 of the pictures found, and of what describes them.
+    pub inputs: BTreeMap<String, String>,
+}
+
+/// Looks for the board in every picture (ambient ones where there are such). A picture that comes twice counts once.
+/// `progress` is called with (done, all).
+pub(in crate::calibrate) fn pictures(
+    recordings: &[Recording],
+    options: &FindOptions,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Pictures> {
+    let sources = sources(recordings);
+    let all = sources.len();
+    let done = std::sync::atomic::AtomicUsize::new(0);
+    type Seen = (String, Option<String>, Result<Observation>);
+    let seen: Vec<Seen> = sources
+        .par_iter()
+        .map(|Source { recording, frame, file, name }| {
+            let look = || {
+                let board = recording.meta.board_of(frame).ok_or_else(no_board)?;
+                let view = find(&recording.picture(file)?, board, options)?;
+                Ok(Observation { name: name.clone(), features: Arc::new(board.features()), view })
+            };
+            let seen = look();
+            progress(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1, all);
+            (name.clone(), crate::rig::hash_file(&recording.folder.join(file)).ok(), seen)
+        })
+        .collect();
+    let (mut pictures, mut left_out): (Vec<Observation>, Vec<(String, Fault)>) = Default::default();
+    // SHA-256 to name: a picture that comes again says nothing new.
+    let mut known: BTreeMap<String, String> = BTreeMap::new();
+    for (name, hash, seen) in seen {
+        let first = hash.as_ref().and_then(|h| known.get(h));
+        if let (Some(first), Ok(_)) = (first, &seen) {
+            let again = Fault::refused(format!("it is the same picture as {first}"))
+                .cause("a copied picture: its board is parallel to the first one's and tells nothing new")
+                .next("take a picture of the board at another tilt instead");
+            left_out.push((name, again));
+            continue;
+        }
+        known.extend(hash.map(|h| (h, name.clone())));
+        match seen {
+            Ok(o) => pictures.push(o),
+            // Wrong sizes, missing files and misdescribed boards are the recording's fault, not one picture's.
+            Err(fault) if fault.kind != Kind::Refused => return Err(fault),
+            Err(fault) => left_out.push((name, fault)),
+        }
+    }
+    if pictures.len() < 2 {
+        // The reason that most pictures give; of equal ones the first.
+        let votes = |l: &(String, Fault)| left_out.iter().filter(|o| o.1.cause == l.1.cause).count();
+        let first = left_out.iter().rev().max_by_key(|l| votes(l)).map(|l| l.1.clone());
+        let listed: String = left_out.iter().map(|(n, f)| format!("\n    {n}: {}", f.what)).collect();
+        return Err(Fault::refused(format!(
+            "the board was found in {} of {all} pictures, 3 or more are needed{listed}",
+            pictures.len(),
+        ))
+        .cause(first.as_ref().map_or("too few pictures", |f| f.cause.as_str()))
+        .next(first.as_ref().map_or("take 10 to 20 pictures of the board", |f| f.next.as_str())));
+    }
+    let found = |name: &String| pictures.iter().any(|o| o.name == *name);
+    let mut inputs: BTreeMap<String, String> =
+        known.into_iter().filter(|(_, name)| found(name)).map(|(hash, name)| (name, hash)).collect();
+    for (recording, label) in recordings.iter().zip(labels(recordings)) {
+        inputs.insert(format!("{label}meta.json"), crate::rig::hash_file(&recording.folder.join("meta.json"))?);
+    }
+    let left_out = left_out.into_iter().map(|(n, f)| (n, format!("{} ({})", f.what, f.cause))).collect();
+    Ok(Pictures { found: pictures, left_out, inputs })
+}
+
+fn no_board() -> Fault {
+    Fault::input("the recording describes no board")
+        .cause("meta.json has neither 'board' nor 'boards'")
+        .next("describe the board in meta.json; sheetlight board writes such a description")
+}

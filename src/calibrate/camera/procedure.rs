@@ -1,0 +1,303 @@
+//! In: recordings of boards. Out: the camera's calibration with verdict, advice and all that a
+//! report shows ([zhang00]; docs/math.md, Camera calibration).
+//! Frame and unit: camera frame; pixels, mm, degrees where the name says so.
+
+use super::intrinsics::{Observation, SolveOptions, Solved, solve};
+use super::lens::{Lens, held_names};
+use super::pictures::{Pictures, one_size, pictures};
+use super::quality;
+use super::quality::expected_ray_error;
+use crate::calibrate::boards::FindOptions;
+use crate::camera::{ALWAYS_NAMED, Intrinsics, NAMES};
+use crate::fault::{Fault, Result};
+use crate::geometry::Vec2;
+use crate::recording::Recording;
+use crate::rig::{Calibration, Covariance, Kind, Quality, Verdict};
+use std::collections::BTreeMap;
+
+/// Settings of [`calibrate`].
+#[derive(Clone, Debug, Default)]
+pub struct CameraOptions {
+    pub find: FindOptions,
+    pub solve: SolveOptions,
+    /// Distance at which the expected error in mm is stated; the median distance of the boards where
+    /// it is not given. Above 0 mm.
+    pub working_distance_mm: Option<f64>,
+}
+
+impl CameraOptions {
+    pub fn check(&self) -> Result<()> {
+        self.find.check()?;
+        match self.working_distance_mm {
+            Some(d) if !(d > 0.0 && d.is_finite()) => {
+                Err(Fault::usage(format!("working_distance_mm is {d}, a distance above 0 mm is needed"))
+                    .next("give the distance from the camera to the work in mm"))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// A camera calibration with everything a report shows.
+#[derive(Clone, Debug)]
+pub struct CameraResult {
+    pub calibration: Calibration<Intrinsics>,
+    /// Pictures that went in, in order; `solved` is indexed alike.
+    pub used: Vec<Observation>,
+    pub solved: Solved,
+    /// Pictures left out: name and reason.
+    pub left_out: Vec<(String, String)>,
+    /// Leave-one-out rms of each used picture, px.
+    pub hold_out_px: Vec<Option<f64>>,
+    /// Corners that the robust loss set aside or that stand out: picture, feature id, residual px.
+    pub worst: Vec<(String, usize, f64)>,
+}
+
+/// Finds the board in every picture (ambient ones where there are such) of recordings that one camera took, and
+/// calibrates it from all of them together. A picture that comes twice counts once. `progress` is called with
+/// (done, all).
+///
+/// # Errors
+/// No board described; no pictures; pictures of two sizes; the board found in fewer than two of them (with the
+/// reasons).
+pub fn calibrate(
+    recordings: &[Recording],
+    options: &CameraOptions,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<CameraResult> {
+    options.check()?;
+    let (width, height) = one_size(recordings)?;
+    let Pictures { found, left_out, mut inputs } = pictures(recordings, &options.find, progress)?;
+    let mut result = from_observations(found, left_out, width, height, options)?;
+    inputs.retain(|name, _| name.ends_with("meta.json") || result.used.iter().any(|o| o.name == *name));
+    result.calibration.inputs = inputs;
+    Ok(result)
+}
+
+/// A picture whose typical residual, over its corners' sigmas, is this many times the median picture's is
+/// set aside.
+const OUTLIER_PICTURE: f64 = 3.5;
+
+/// Calibrates from boards that were found already.
+pub fn from_observations(
+    mut pictures: Vec<Observation>,
+    mut left_out: Vec<(String, String)>,
+    width: u32,
+    height: u32,
+    options: &CameraOptions,
+) -> Result<CameraResult> {
+    let mut solved = solve(&pictures, width, height, &options.solve)?;
+    let most = pictures.len() / 4;
+    let (mut outliers, mut contradiction) = (0, false);
+    // One at a time, the worst first: a wrong picture bends the others' residuals too.
+    while let Some((i, ratio)) = worst_picture(&pictures, &solved).filter(|w| w.1 > OUTLIER_PICTURE) {
+        if outliers == most {
+            contradiction = true;
+            break;
+        }
+        let o = pictures.remove(i);
+        left_out.push((o.name, format!("its residuals are {ratio:.1} times those of the median picture")));
+        outliers += 1;
+        solved = solve(&pictures, width, height, &options.solve)?;
+    }
+    let hold_out_px = if pictures.len() > 2 {
+        quality::hold_out(&pictures, width, height, &options.solve)
+    } else {
+        vec![None; pictures.len()]
+    };
+    let worst = worst_corners(&pictures, &solved);
+    let judged = judge(&pictures, &solved, &left_out, contradiction, &hold_out_px, &worst, options);
+    let stated = |i: &usize| *i < ALWAYS_NAMED || !solved.held.contains(i);
+    let stated: Vec<usize> = (0..NAMES.len()).filter(stated).collect();
+    let covariance = solved.covariance.as_ref().map_or_else(Covariance::default, |c| {
+        let names: Vec<&str> = stated.iter().map(|&i| NAMES[i]).collect();
+        Covariance::new(&names, &c.select_rows(&stated).select_columns(&stated))
+    });
+    let calibration = Calibration::new(Kind::Camera, solved.intrinsics, None, covariance, judged);
+    Ok(CameraResult { calibration, used: pictures, solved, left_out, hold_out_px, worst })
+}
+
+/// Typical residual of a picture over its corners' sigmas; single wrong corners do not count.
+fn typical_misfit(o: &Observation, residuals: &[(Vec2, f64)]) -> f64 {
+    let lengths = o.view.points.iter().zip(residuals).map(|(p, (r, _))| r.norm() / p.sigma_px.hypot(0.01));
+    crate::solve::robust_scale(&mut lengths.collect::<Vec<f64>>(), 2)
+}
+
+/// Index of the picture that fits worst and how many times worse than the median picture.
+fn worst_picture(pictures: &[Observation], solved: &Solved) -> Option<(usize, f64)> {
+    if pictures.len() < 4 {
+        return None;
+    }
+    let all: Vec<f64> = pictures.iter().zip(&solved.residuals).map(|(o, r)| typical_misfit(o, r)).collect();
+    let mut sorted = all.clone();
+    sorted.sort_by(f64::total_cmp);
+    let median = sorted[sorted.len() / 2].max(1e-9);
+    let (i, worst) = all.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1))?;
+    Some((i, worst / median))
+}
+
+/// Corners more than four robust sigmas off, the worst first, at most 20.
+fn worst_corners(pictures: &[Observation], solved: &Solved) -> Vec<(String, usize, f64)> {
+    let mut lengths: Vec<f64> = solved.residuals.iter().flatten().map(|r| r.0.norm()).collect();
+    let limit = 4.0 * crate::solve::robust_scale(&mut lengths, 2);
+    let mut worst: Vec<(String, usize, f64)> = pictures
+        .iter()
+        .zip(&solved.residuals)
+        .flat_map(|(o, r)| o.view.points.iter().zip(r).map(move |(p, r)| (o.name.clone(), p.feature_id, r.0.norm())))
+        .filter(|w| w.2 > limit)
+        .collect();
+    worst.sort_by(|a, b| b.2.total_cmp(&a.2));
+    worst.truncate(20);
+    worst
+}
+
+fn rms(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, n) = values.fold((0.0, 0usize), |(s, n), v| (s + v * v, n + 1));
+    (sum / n.max(1) as f64).sqrt()
+}
+
+fn judge(
+    pictures: &[Observation],
+    solved: &Solved,
+    left_out: &[(String, String)],
+    contradiction: bool,
+    hold_out: &[Option<f64>],
+    worst: &[(String, usize, f64)],
+    options: &CameraOptions,
+) -> Quality {
+    let k = &solved.intrinsics;
+    let distance = quality::typical_distance(pictures, &solved.camera_from_board);
+    let working = options.working_distance_mm.unwrap_or(distance);
+    let mm_per_px = working / (0.5 * (k.fx + k.fy));
+    let expected = solved.covariance.as_ref().map_or(f64::INFINITY, |c| expected_ray_error(k, c));
+    let tilt = quality::tilt_spread_deg(&solved.camera_from_board);
+    let covered = quality::coverage(pictures, k.width, k.height);
+    let corners: usize = pictures.iter().map(|o| o.view.points.len()).sum();
+    let held_rms = rms(hold_out.iter().flatten().copied());
+    let left_over = held_rms.is_finite() && held_rms > 0.0;
+
+    let mut verdict = Verdict::Good;
+    let mut reasons = Vec::new();
+    let mut lower = |to: Verdict, why: String| {
+        verdict = verdict.max(to);
+        reasons.push(why);
+    };
+    if pictures.len() < 3 {
+        lower(
+            Verdict::BadlyDetermined,
+            format!(
+                "{} pictures: nothing is left over to check the result with; 3 are the least, 10 the rule",
+                pictures.len()
+            ),
+        );
+    } else if pictures.len() < 8 {
+        lower(Verdict::Usable, format!("only {} pictures", pictures.len()));
+    }
+    if tilt < 10.0 {
+        lower(
+            Verdict::BadlyDetermined,
+            format!(
+                "all boards are parallel within {tilt:.1} degrees; 10 are needed: focal length and distance cannot be told apart"
+            ),
+        );
+    }
+    if expected > 0.5 {
+        lower(
+            Verdict::BadlyDetermined,
+            if expected.is_finite() {
+                format!("the viewing rays are known to {expected:.2} px only, the limit is 0.5 px")
+            } else {
+                "the pictures do not determine all parameters".into()
+            },
+        );
+    } else if expected > 0.1 {
+        lower(Verdict::Usable, format!("the viewing rays are known to {expected:.2} px; 0.1 px is good"));
+    }
+    if contradiction {
+        lower(Verdict::BadlyDetermined, "more than a quarter of the pictures contradict the others".into());
+    }
+    if solved.rms_px > 1.0 {
+        let to = if solved.rms_px > 3.0 { Verdict::BadlyDetermined } else { Verdict::Usable };
+        lower(to, format!("reprojection rms {:.2} px; below 1 px is expected of a flat, sharp board", solved.rms_px));
+    }
+    if left_over && held_rms > 3.0 * solved.rms_px.max(0.01) {
+        lower(
+            Verdict::BadlyDetermined,
+            format!("pictures that were held out fit with {held_rms:.3} px, those used with {:.3} px", solved.rms_px),
+        );
+    }
+    if quality::folds(k) {
+        lower(Verdict::BadlyDetermined, "the lens model folds back inside the image".into());
+    }
+    if covered < 0.6 {
+        lower(
+            Verdict::Usable,
+            format!(
+                "corners cover {:.0} % of the image, 60 % are wanted: the lens is extrapolated elsewhere",
+                covered * 100.0
+            ),
+        );
+    }
+    let names = held_names(&solved.held);
+    let chosen = options.solve.lens == Lens::Evidence;
+    if chosen && !names.is_empty() {
+        reasons.push(format!(
+            "{} held at 0: the pictures do not tell {} from 0",
+            names.join(", "),
+            if names.len() > 1 { "them" } else { "it" }
+        ));
+    }
+    for (name, why) in left_out {
+        reasons.push(format!("{name} was left out: {why}"));
+    }
+    if let Some((name, id, r)) = worst.first() {
+        reasons.push(format!("worst corner: {name}, feature {id}, {r:.2} px ({} stand out)", worst.len()));
+    }
+    reasons
+        .insert(0, format!("{} pictures, {corners} corners, reprojection rms {:.3} px", pictures.len(), solved.rms_px));
+
+    let noise = rms(solved.residuals.iter().flatten().map(|r| r.0.norm())) / std::f64::consts::SQRT_2;
+    let advice = advise(pictures, solved, distance, noise, expected, verdict);
+    let mut figures = BTreeMap::from([
+        ("rms_px".to_string(), solved.rms_px),
+        ("corner_noise_ratio".into(), solved.sigma0),
+        ("expected_ray_error_px".into(), expected),
+        ("expected_error_at_working_distance_mm".into(), expected * mm_per_px),
+        ("working_distance_mm".into(), working),
+        ("pictures".into(), pictures.len() as f64),
+        ("pictures_left_out".into(), left_out.len() as f64),
+        ("corners".into(), corners as f64),
+        ("coverage_share".into(), covered),
+        ("tilt_spread_deg".into(), tilt),
+    ]);
+    if left_over {
+        figures.insert("holdout_rms_px".into(), held_rms);
+        figures.insert("holdout_rms_mm".into(), held_rms * distance / (0.5 * (k.fx + k.fy)));
+    }
+    // JSON has no infinity: an unknown figure is left out, the reason says why.
+    figures.retain(|_, v| v.is_finite());
+    let per_picture = pictures
+        .iter()
+        .zip(&solved.residuals)
+        .map(|(o, r)| (o.name.clone(), rms(r.iter().map(|r| r.0.norm()))))
+        .collect();
+    Quality { verdict, reasons, advice, figures, per_picture }
+}
+
+fn advise(
+    pictures: &[Observation],
+    solved: &Solved,
+    distance: f64,
+    noise: f64,
+    expected: f64,
+    verdict: Verdict,
+) -> Vec<String> {
+    let Some(first) = pictures.first() else { return Vec::new() };
+    match quality::next_picture(solved, &first.features, distance, noise.max(1e-3)) {
+        Some(next) if verdict > Verdict::Good || next.expected_px < 0.8 * expected => {
+            vec![format!("{}; expected ray error {expected:.3} -> {:.3} px", next.words, next.expected_px)]
+        }
+        Some(_) => Vec::new(),
+        None => vec!["tilt the board by 20 to 40 degrees about the horizontal axis in one picture and about the vertical axis in another, in different corners of the picture".into()],
+    }
+}

@@ -1,0 +1,248 @@
+//! In: a solved camera and what it was solved from. Out: how far it can be trusted: expected errors,
+//! spread of tilts, coverage, hold-out error, the next best picture.
+//! Frame and unit: pixels, mm, degrees where the name says so.
+
+use super::intrinsics::{Observation, SolveOptions, Solved, solve};
+use crate::calibrate::boards::BoardView;
+use crate::calibrate::pose::point_by_step;
+use crate::calibrate::projection::project;
+use crate::camera::{Intrinsics, PARAMETERS, ParameterCovariance};
+use crate::geometry::{Board, Camera, Rigid, Vec2, Vec3, exp, skew};
+use nalgebra::{DMatrix, Matrix2, Matrix6, SMatrix};
+
+/// How viewing rays move over the image when the intrinsics do: rows are the displacements in px (u, v)
+/// on a 9 x 7 raster, with the part that a rotation of the whole camera would explain taken out
+/// (docs/math.md, Camera calibration (8)).
+fn ray_jacobian(k: &Intrinsics) -> DMatrix<f64> {
+    let mut a = Vec::new();
+    let mut b = Vec::new();
+    for j in 0..7 {
+        for i in 0..9 {
+            let px = Vec2::new(
+                (f64::from(i) + 0.5) / 9.0 * f64::from(k.width) - 0.5,
+                (f64::from(j) + 0.5) / 7.0 * f64::from(k.height) - 0.5,
+            );
+            let Some(n) = k.normalised_from_pixel(&px) else { continue };
+            let x = Vec3::new(n.x, n.y, 1.0);
+            let Some(p) = project(k, &x) else { continue };
+            a.push(p.by_intrinsics);
+            b.push(p.by_point * -skew(&x));
+        }
+    }
+    let rows = 2 * a.len();
+    let a = DMatrix::from_fn(rows, PARAMETERS, |r, c| a[r / 2][(r % 2, c)]);
+    let b = DMatrix::from_fn(rows, 3, |r, c| b[r / 2][(r % 2, c)]);
+    let turn = (b.transpose() * &b).try_inverse().map(|inv| inv * b.transpose() * &a);
+    turn.map_or(a.clone(), |t| a - b * t)
+}
+
+/// Expected rms displacement of the viewing rays over the image, px, after the best rotation, from
+/// the covariance of the camera's parameters.
+pub fn expected_ray_error(k: &Intrinsics, covariance: &ParameterCovariance) -> f64 {
+    let j = ray_jacobian(k);
+    let sum: f64 = (&j * covariance).component_mul(&j).sum();
+    (sum / (j.nrows() as f64 / 2.0)).max(0.0).sqrt()
+}
+
+/// Largest angle between two boards' normals, degrees.
+pub fn tilt_spread_deg(poses: &[Rigid<Camera, Board>]) -> f64 {
+    let normals: Vec<Vec3> = poses.iter().map(|p| p.rotation.column(2).into()).collect();
+    let mut widest: f64 = 0.0;
+    for (i, a) in normals.iter().enumerate() {
+        for b in &normals[..i] {
+            widest = widest.max(a.cross(b).norm().atan2(a.dot(b)));
+        }
+    }
+    widest.to_degrees()
+}
+
+/// Share of the cells of an 8 x 6 raster in which a corner was seen.
+pub fn coverage(pictures: &[Observation], width: u32, height: u32) -> f64 {
+    let mut seen = [false; 48];
+    for p in pictures.iter().flat_map(|o| &o.view.points) {
+        let at = |v: f64, size: u32, n: usize| (((v + 0.5) / f64::from(size) * n as f64).max(0.0) as usize).min(n - 1);
+        seen[at(p.pixel.y, height, 6) * 8 + at(p.pixel.x, width, 8)] = true;
+    }
+    seen.iter().filter(|s| **s).count() as f64 / 48.0
+}
+
+/// Leave-one-out: the camera from all other pictures, the picture left out fitted with its pose alone.
+/// Rms per picture in px; `None` where the others do not give a camera. More than 24 pictures are
+/// left out in 24 groups.
+pub fn hold_out(pictures: &[Observation], width: u32, height: u32, options: &SolveOptions) -> Vec<Option<f64>> {
+    use rayon::prelude::*;
+    let groups = pictures.len().min(24);
+    let each: Vec<Vec<(usize, Option<f64>)>> = (0..groups)
+        .into_par_iter()
+        .map(|g| {
+            let others: Vec<Observation> =
+                pictures.iter().enumerate().filter(|(i, _)| i % groups != g).map(|(_, o)| o.clone()).collect();
+            let solved = solve(&others, width, height, options).ok();
+            (g..pictures.len())
+                .step_by(groups)
+                .map(|i| (i, solved.as_ref().and_then(|s| alone(&s.intrinsics, &pictures[i]))))
+                .collect()
+        })
+        .collect();
+    let mut rms = vec![None; pictures.len()];
+    each.into_iter().flatten().for_each(|(i, r)| rms[i] = r);
+    rms
+}
+
+/// sqrt(sum |r|² / n) of one picture with its own pose, px.
+fn alone(k: &Intrinsics, o: &Observation) -> Option<f64> {
+    let pose = crate::calibrate::pose::pose_of_points(k, &o.features, &o.view).ok()?;
+    Some(pose.rms_px * std::f64::consts::SQRT_2)
+}
+
+/// A picture worth taking, in words, and the expected ray error with it, px.
+pub struct NextPicture {
+    pub words: String,
+    pub expected_px: f64,
+}
+
+/// Tries boards at nine places of the image, four tilts and two distances, and returns the one that
+/// would improve the expected ray error most. `sigma_px` is the corners' noise as found.
+pub fn next_picture(solved: &Solved, features: &[Vec3], typical_distance: f64, sigma_px: f64) -> Option<NextPicture> {
+    let covariance = solved.covariance.as_ref()?;
+    let k = &solved.intrinsics;
+    let free: Vec<usize> = (0..PARAMETERS).filter(|i| !solved.held.contains(i)).collect();
+    let reduced = DMatrix::from_fn(free.len(), free.len(), |a, b| covariance[(free[a], free[b])]);
+    let information = reduced.try_inverse()?;
+    let centre = features.iter().sum::<Vec3>() / features.len() as f64;
+    let mut best: Option<NextPicture> = None;
+    for distance in [0.75, 1.0] {
+        for (px, py, place) in PLACES {
+            for (axis, sign, tilt) in TILTS {
+                let z = typical_distance * distance;
+                let middle = Vec3::new(
+                    (px * f64::from(k.width) - k.cx) / k.fx * z,
+                    (py * f64::from(k.height) - k.cy) / k.fy * z,
+                    z,
+                );
+                let r = exp(&(axis * (25f64.to_radians() * sign)));
+                let pose = Rigid::new(r, middle - r * centre);
+                let Some(gain) = picture_information(k, features, &pose, sigma_px) else { continue };
+                let with = &information + DMatrix::from_fn(free.len(), free.len(), |a, b| gain[(free[a], free[b])]);
+                let Some(c) = with.try_inverse() else { continue };
+                let mut whole = ParameterCovariance::zeros();
+                for (a, &i) in free.iter().enumerate() {
+                    for (b, &j) in free.iter().enumerate() {
+                        whole[(i, j)] = c[(a, b)];
+                    }
+                }
+                let expected_px = expected_ray_error(k, &whole);
+                if best.as_ref().is_none_or(|b| expected_px < b.expected_px) {
+                    let words = format!("tilt the board {tilt} by 25 degrees, {place}, about {z:.0} mm away");
+                    best = Some(NextPicture { words, expected_px });
+                }
+            }
+        }
+    }
+    best
+}
+
+const PLACES: [(f64, f64, &str); 9] = [
+    (0.5, 0.5, "in the middle of the picture"),
+    (0.3, 0.3, "nearer the upper left corner"),
+    (0.5, 0.28, "nearer the upper edge"),
+    (0.7, 0.3, "nearer the upper right corner"),
+    (0.7, 0.5, "nearer the right edge"),
+    (0.7, 0.7, "nearer the lower right corner"),
+    (0.5, 0.72, "nearer the lower edge"),
+    (0.3, 0.7, "nearer the lower left corner"),
+    (0.3, 0.5, "nearer the left edge"),
+];
+
+const TILTS: [(Vec3, f64, &str); 4] = [
+    (Vec3::new(1.0, 0.0, 0.0), 1.0, "about the horizontal axis, its lower edge away,"),
+    (Vec3::new(1.0, 0.0, 0.0), -1.0, "about the horizontal axis, its upper edge away,"),
+    (Vec3::new(0.0, 1.0, 0.0), 1.0, "about the vertical axis, its left edge away,"),
+    (Vec3::new(0.0, 1.0, 0.0), -1.0, "about the vertical axis, its right edge away,"),
+];
+
+/// Information on the intrinsics from one more picture whose pose is unknown (Schur complement). Only
+/// corners inside the image count; `None` where fewer than 8 are.
+fn picture_information(
+    k: &Intrinsics,
+    features: &[Vec3],
+    pose: &Rigid<Camera, Board>,
+    sigma_px: f64,
+) -> Option<ParameterCovariance> {
+    let mut kk = ParameterCovariance::zeros();
+    let mut kp = SMatrix::<f64, PARAMETERS, 6>::zeros();
+    let mut pp = Matrix6::<f64>::zeros();
+    let mut inside = 0;
+    for x in features {
+        let rotated: Vec3 = pose.rotation * x;
+        let p = project(k, &(rotated + pose.translation))?;
+        let within = p.pixel.x > 0.0
+            && p.pixel.y > 0.0
+            && p.pixel.x < f64::from(k.width) - 1.0
+            && p.pixel.y < f64::from(k.height) - 1.0;
+        if !within {
+            continue;
+        }
+        inside += 1;
+        let (jk, jp) = (p.by_intrinsics / sigma_px, p.by_point * point_by_step(&rotated) / sigma_px);
+        kk += jk.transpose() * jk;
+        kp += jk.transpose() * jp;
+        pp += jp.transpose() * jp;
+    }
+    (inside >= 8).then(|| pp.try_inverse().map(|inv| kk - kp * inv * kp.transpose())).flatten()
+}
+
+/// True where the lens model folds back inside the image: it cannot be inverted there.
+pub fn folds(k: &Intrinsics) -> bool {
+    let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0), (0.5, 0.0), (0.5, 1.0), (0.0, 0.5), (1.0, 0.5)];
+    corners.iter().any(|(x, y)| {
+        let px = Vec2::new(x * f64::from(k.width) - 0.5, y * f64::from(k.height) - 0.5);
+        k.normalised_from_pixel(&px).is_none()
+    })
+}
+
+/// Mean displacement of each feature on the board over all pictures and its standard error, mm: where
+/// the board is not as described (warped, badly printed), a feature is off the same way in every
+/// picture. Entries: feature id, mean, error, pictures; features in fewer than 3 pictures are left out.
+pub fn feature_bias(pictures: &[Observation], solved: &Solved) -> Vec<(usize, Vec2, f64, usize)> {
+    let count = pictures.iter().flat_map(|o| o.view.points.iter().map(|p| p.feature_id + 1)).max().unwrap_or(0);
+    let mut sums = vec![(Vec2::zeros(), 0.0, 0usize); count];
+    // The ids of another board mean other places: the board of the first picture is the one that is judged.
+    let same = |o: &Observation| pictures.first().is_some_and(|first| o.features == first.features);
+    let each = pictures.iter().zip(&solved.residuals).zip(&solved.camera_from_board);
+    for ((o, residuals), pose) in each.filter(|((o, _), _)| same(o)) {
+        for (p, (r, _)) in o.view.points.iter().zip(residuals) {
+            let Some(q) = project(&solved.intrinsics, &pose.point(&o.features[p.feature_id])) else { continue };
+            let by_board: Matrix2<f64> = q.by_point * pose.rotation.fixed_columns::<2>(0);
+            let Some(inverse) = by_board.try_inverse() else { continue };
+            let on_board = inverse * r;
+            let s = &mut sums[p.feature_id];
+            *s = (s.0 + on_board, s.1 + on_board.norm_squared(), s.2 + 1);
+        }
+    }
+    let several = sums.into_iter().enumerate().filter(|(_, s)| s.2 >= 3);
+    several
+        .map(|(id, (sum, squares, n))| {
+            let mean = sum / n as f64;
+            (id, mean, ((squares / n as f64 - mean.norm_squared()).max(0.0) / n as f64).sqrt(), n)
+        })
+        .collect()
+}
+
+/// Median distance of the boards' middles from the camera, mm.
+pub fn typical_distance(pictures: &[Observation], poses: &[Rigid<Camera, Board>]) -> f64 {
+    let mut z: Vec<f64> = pictures.iter().zip(poses).map(|(o, p)| middle(&o.features, &o.view, p).z).collect();
+    z.sort_by(f64::total_cmp);
+    z.get(z.len() / 2).copied().unwrap_or(0.0)
+}
+
+fn middle(features: &[Vec3], view: &BoardView, pose: &Rigid<Camera, Board>) -> Vec3 {
+    let sum: Vec3 = view.points.iter().map(|p| features[p.feature_id]).sum();
+    pose.point(&(sum / view.points.len().max(1) as f64))
+}
+
+/// Tilt of a board against the image plane, degrees.
+pub fn tilt_deg(pose: &Rigid<Camera, Board>) -> f64 {
+    let n: Vec3 = pose.rotation.column(2).into();
+    n.xy().norm().atan2(n.z.abs()).to_degrees()
+}

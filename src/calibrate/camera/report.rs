@@ -1,0 +1,123 @@
+//! In: a camera calibration. Out: the page that a person judges it by.
+//! Frame and unit: pixels and mm as labelled.
+
+use super::procedure::CameraResult;
+use super::quality::{feature_bias, tilt_deg};
+use crate::calibrate::report::{Page, axis_sphere, bars, coverage_map, residual_arrows, scatter};
+use crate::camera::NAMES;
+use crate::geometry::Vec3;
+
+/// The report of a camera calibration.
+pub fn page(result: &CameraResult, title: &str) -> Page {
+    let (c, solved) = (&result.calibration, &result.solved);
+    let k = &c.value;
+    let mut page = Page::new(title);
+    page.verdict(&c.quality);
+
+    let value = |name: &str| k.parameters()[NAMES.iter().position(|n| *n == name).unwrap_or(0)];
+    let parameters: Vec<Vec<String>> = c
+        .covariance
+        .parameters
+        .iter()
+        .map(|name| {
+            let held = NAMES.iter().position(|n| n == name).is_some_and(|i| solved.held.contains(&i));
+            let sigma = c.covariance.sigma(name).unwrap_or(f64::NAN);
+            let sigma = if held { "held".into() } else { format!("{sigma:.6}") };
+            vec![name.clone(), format!("{:.6}", value(name)), sigma]
+        })
+        .collect();
+    page.table("Parameters", &["name and unit", "value", "standard deviation"], &parameters);
+
+    let figures: Vec<Vec<String>> =
+        c.quality.figures.iter().map(|(name, v)| vec![name.clone(), format!("{v:.5}")]).collect();
+    page.paragraph(
+        "Fit and check are apart: rms_px is the residual of the corners that made the result; holdout_rms_px that of \
+         pictures which the result has not seen. The expected errors follow from the covariance.",
+    );
+    page.table("Figures", &["figure and unit", "value"], &figures);
+
+    let seen: Vec<_> = result.used.iter().flat_map(|o| o.view.points.iter().map(|p| p.pixel)).collect();
+    page.figure(
+        "Where corners were seen; red cells are empty, the lens is extrapolated there.",
+        &coverage_map(k.width, k.height, &seen),
+    );
+    let arrows: Vec<_> = result
+        .used
+        .iter()
+        .zip(&solved.residuals)
+        .flat_map(|(o, r)| o.view.points.iter().zip(r).map(|(p, (r, w))| (p.pixel, *r, *w < 0.5)))
+        .collect();
+    page.figure(
+        "Residuals, seen minus predicted; red ones were given less than half of their weight. Patterns that hang \
+         together mean that the lens model or the board's flatness is at fault.",
+        &residual_arrows(k.width, k.height, &arrows),
+    );
+    page.figure("Rms residual per picture", &bars(&c.quality.per_picture, "px", None));
+    let hold_out: Vec<(String, f64)> =
+        result.used.iter().zip(&result.hold_out_px).filter_map(|(o, r)| Some((o.name.clone(), (*r)?))).collect();
+    if !hold_out.is_empty() {
+        page.figure("Rms residual of each picture when it was held out", &bars(&hold_out, "px", None));
+    }
+    let normals: Vec<(Vec3, String)> = result
+        .used
+        .iter()
+        .zip(&solved.camera_from_board)
+        .map(|(o, p)| (Vec3::from(p.rotation.column(2)), short(&o.name)))
+        .collect();
+    page.figure(
+        "The boards' normals in the camera frame: the middle is a board that faces the camera; a good set is spread \
+         round the ring of 20 to 40 degrees.",
+        &axis_sphere(&normals),
+    );
+    let by_radius: Vec<(f64, f64)> =
+        arrows.iter().map(|(p, r, _)| ((p.x - k.cx).hypot(p.y - k.cy), r.norm())).collect();
+    page.figure("Residual against distance from the principal point", &scatter(&by_radius, "px from the centre", "px"));
+
+    let mut bias = feature_bias(&result.used, solved);
+    bias.sort_by(|a, b| (b.1.norm() / b.2).total_cmp(&(a.1.norm() / a.2)));
+    let rows: Vec<Vec<String>> = bias
+        .iter()
+        .take(10)
+        .map(|(id, mean, error, n)| {
+            vec![
+                id.to_string(),
+                format!("{:.4}", mean.x),
+                format!("{:.4}", mean.y),
+                format!("{error:.4}"),
+                n.to_string(),
+            ]
+        })
+        .collect();
+    page.table(
+        "Features that are off the same way in every picture (board printed or mounted unevenly), the worst first",
+        &["feature", "x mm", "y mm", "standard error mm", "pictures"],
+        &rows,
+    );
+    let worst: Vec<Vec<String>> =
+        result.worst.iter().map(|(name, id, r)| vec![name.clone(), id.to_string(), format!("{r:.3}")]).collect();
+    if !worst.is_empty() {
+        page.table("Corners that stand out", &["picture", "feature", "px"], &worst);
+    }
+    let poses: Vec<Vec<String>> = result
+        .used
+        .iter()
+        .zip(&solved.camera_from_board)
+        .map(|(o, p)| {
+            let t = p.translation;
+            let n = o.view.points.len().to_string();
+            let place = [t.x, t.y, t.z, tilt_deg(p)].map(|v| format!("{v:.2}"));
+            [vec![o.name.clone(), n], place.to_vec()].concat()
+        })
+        .collect();
+    page.table("Boards", &["picture", "corners", "x mm", "y mm", "z mm", "tilt degrees"], &poses);
+    let left: Vec<Vec<String>> = result.left_out.iter().map(|(n, why)| vec![n.clone(), why.clone()]).collect();
+    if !left.is_empty() {
+        page.table("Pictures left out", &["picture", "why"], &left);
+    }
+    page
+}
+
+/// A file name without its extension and zeros.
+fn short(name: &str) -> String {
+    name.rsplit_once('.').map_or(name, |(stem, _)| stem).trim_start_matches(|c: char| !c.is_ascii_digit()).into()
+}

@@ -1,0 +1,90 @@
+//! In: what a person may choose about a hand-eye solve. Out: the choice, checked; where the camera is mounted; the noise that is assumed.
+//! Frame and unit: mm, degrees where the name says so.
+
+use super::closed::{Chain, Far, Near};
+use crate::fault::{Fault, Result};
+use crate::geometry::{Rigid, Vec3};
+
+/// Settings of [`solve`].
+#[derive(Clone, Debug)]
+pub struct HandEyeOptions {
+    /// Sigma of the robot's position per axis, mm; `None`: estimated. 1e-6..=10.
+    pub robot_sigma_mm: Option<f64>,
+    /// Sigma of the robot's orientation per axis, degrees; `None`: estimated. 1e-7..=5.
+    pub robot_sigma_deg: Option<f64>,
+    /// A pair is wrong where its squared Mahalanobis distance (6 degrees of freedom) exceeds this;
+    /// 26.1 leaves one good pair in 5,000 out. 12..=1000.
+    pub gate: f64,
+    /// Rotation about the second axis (rms over all motions) below which the result is refused, degrees; 0.1..=30.
+    pub min_second_axis_deg: f64,
+    /// Fewest agreeing pairs; 3..=1000.
+    pub min_pairs: usize,
+    /// What states the board's lengths, as a message names it.
+    pub board_length: String,
+    /// Seed of the draws among more than 25 pairs.
+    pub seed: u64,
+}
+
+impl Default for HandEyeOptions {
+    fn default() -> Self {
+        HandEyeOptions {
+            robot_sigma_mm: None,
+            robot_sigma_deg: None,
+            gate: 26.1,
+            min_second_axis_deg: 3.0,
+            min_pairs: 4,
+            board_length: "the board's description".into(),
+            seed: 1,
+        }
+    }
+}
+
+impl HandEyeOptions {
+    pub fn check(&self) -> Result<()> {
+        let bad = |name: &str, value: f64, range: &str| {
+            Err(Fault::usage(format!("{name} is {value}, {range} is allowed")).next("choose a value in that range"))
+        };
+        if let Some(s) = self.robot_sigma_mm.filter(|s| !(1e-6..=10.0).contains(s)) {
+            return bad("robot_sigma_mm", s, "1e-6 to 10");
+        }
+        if let Some(s) = self.robot_sigma_deg.filter(|s| !(1e-7..=5.0).contains(s)) {
+            return bad("robot_sigma_deg", s, "1e-7 to 5");
+        }
+        if !(12.0..=1000.0).contains(&self.gate) {
+            return bad("gate", self.gate, "12 to 1000");
+        }
+        if !(0.1..=30.0).contains(&self.min_second_axis_deg) {
+            return bad("min_second_axis_deg", self.min_second_axis_deg, "0.1 to 30");
+        }
+        if !(3..=1000).contains(&self.min_pairs) {
+            return bad("min_pairs", self.min_pairs as f64, "3 to 1000");
+        }
+        Ok(())
+    }
+}
+
+/// Standard deviations of the robot's reported poses per axis, and the factor of the features' sigmas; for board poses
+/// that were given without sigmas the factor is their turn's, rad.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise {
+    pub robot_mm: f64,
+    pub robot_rad: f64,
+    pub feature_factor: f64,
+}
+
+/// Where the flange is, as the noise of its pose moves the board in the picture.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mount {
+    EyeInHand,
+    EyeToHand,
+}
+
+impl Mount {
+    /// The flange's origin in the camera frame.
+    pub(in crate::calibrate) fn flange(self, chain: &Chain, near_from_far: &Rigid<Near, Far>) -> Vec3 {
+        match self {
+            Mount::EyeInHand => chain.near_from_camera.inverse().translation,
+            Mount::EyeToHand => (chain.near_from_camera.inverse() * *near_from_far).translation,
+        }
+    }
+}

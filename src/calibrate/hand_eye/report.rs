@@ -1,0 +1,234 @@
+//! In: a hand-eye fit and its pairs. Out: the verdict with reasons, figures and the next best pose,
+//! and the page a person reads; fit and verification apart.
+//! Frame and unit: near = what carries the camera; mm, degrees, px.
+
+use super::camera_belief::ray_error_px;
+use super::checks::belongs_to;
+use super::closed::{Pair, axis_spread};
+use super::expected::{ExpectedError, expected_error};
+use super::fit::HandEyeFit;
+use crate::calibrate::limits::{Limits, rms};
+use crate::calibrate::report::{Page, axis_sphere, bars};
+use crate::camera::PARAMETERS;
+use crate::geometry::{Vec3, log};
+use crate::rig::{Covariance, Quality, Verdict};
+use std::collections::BTreeMap;
+
+/// Names of the hand-eye covariance's parameters ([`crate::rig::HandEye`]).
+pub const HAND_EYE_NAMES: [&str; 6] = ["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"];
+
+/// The covariance as the calibration file keeps it.
+pub fn covariance(fit: &HandEyeFit) -> Covariance {
+    Covariance::new(&HAND_EYE_NAMES, &fit.covariance.view((0, 0), (6, 6)).into_owned())
+}
+
+/// Judges a fit.
+pub fn judge(fit: &HandEyeFit, pairs: &[Pair], limits: &Limits) -> Quality {
+    let used: Vec<&Pair> = pairs.iter().zip(&fit.pairs).filter(|(_, r)| r.used).map(|(p, _)| p).collect();
+    let spread = axis_spread(&used);
+    let [first, second, third] = spread.map(|s| s.1.to_degrees());
+    let ExpectedError { whole: expected, from_camera: camera_part, with_joint_camera } =
+        expected_error(fit, limits.middle());
+    let sigma = |i: usize| fit.covariance[(i, i)].max(0.0).sqrt();
+    let holdout_mm = rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.holdout_mm));
+    let pixels = in_pixels(pairs);
+    let mut j = limits.by_error(
+        expected,
+        format!(
+            "a point at {} mm is placed in the flange frame to {expected:.3} mm (1 sigma); depths: {}",
+            limits.working.depth(limits.middle()),
+            limits.working.from
+        ),
+    );
+    j.at_best(Verdict::BadlyDetermined, second < 8.0, || {
+        format!("rotation about a second axis is {second:.1} degrees rms, 8 are needed to be usable")
+    });
+    j.at_best(Verdict::Usable, (8.0..12.0).contains(&second), || {
+        format!("rotation about a second axis is {second:.1} degrees rms, 12 are needed to be good")
+    });
+    j.at_best(Verdict::Usable, used.len() < 8, || {
+        format!("{} pairs are in the fit, 8 are needed to be good", used.len())
+    });
+    j.at_best(Verdict::BadlyDetermined, used.len() < 5, || "fewer than 5 pairs leave nothing to check".into());
+    for (i, r) in fit.pairs.iter().enumerate().filter(|(_, r)| !r.used) {
+        let whose = belongs_to(pairs, fit, i).map_or(String::new(), |n| format!("; its picture fits the pose of {n}"));
+        j.at_best(Verdict::Usable, true, || {
+            format!("{} was left out: its pose and picture disagree by {:.2} mm{whose}", r.name, r.mm)
+        });
+    }
+    j.reasons.push(format!(
+        "the robot's poses{} scatter by {:.3} mm and {:.4} degrees per axis{}",
+        if pixels { "" } else { ", with what the boards' places scatter beyond what is stated," },
+        fit.noise.robot_mm,
+        fit.noise.robot_rad.to_degrees(),
+        if pixels {
+            format!("; the camera's own uncertainty makes {camera_part:.3} mm of the error")
+        } else {
+            String::new()
+        }
+    ));
+    let boards = rms(used.iter().map(|p| p.seen.rms_px));
+    if pixels {
+        j.reasons.push(format!("each board fits its own picture to {boards:.3} px rms, whatever the robot says"));
+    }
+    let change = fit.joint_camera.parameters() - fit.camera.parameters();
+    let moved = ray_error_px(&fit.camera, &(change * change.transpose()));
+    let before = ray_error_px(&fit.camera, &fit.given.covariance());
+    let after = ray_error_px(&fit.camera, &fit.joint_covariance.fixed_view::<PARAMETERS, PARAMETERS>(12, 12).into());
+    let (surprise, freedom) = fit.camera_surprise;
+    if before > 0.0 {
+        j.reasons.push(format!(
+            "the camera was solved along, its calibration as what is known beforehand: its viewing rays move by {moved:.3} px, \
+             known to {before:.3} px before and {after:.3} px after; the station's camera stays as it is"
+        ));
+    }
+    // One good set in some thousands [wilson31]: a chi-square variable over its freedom, to the third root, is normal.
+    let changed = freedom > 0.0
+        && ((surprise / freedom).cbrt() - 1.0 + 2.0 / (9.0 * freedom)) / (2.0 / (9.0 * freedom)).sqrt() > 3.7;
+    j.at_best(Verdict::Usable, changed, || {
+        format!(
+            "the camera is not the one that was calibrated: the boards in these pictures want another, squared distance {surprise:.0}, \
+             {freedom:.0} expected; focus, zoom or the board's description changed"
+        )
+    });
+    j.advise(changed, || {
+        "calibrate the camera again with its present focus, and compare the boards' descriptions".into()
+    });
+    let name = |v: &Vec3| format!("({:.2}, {:.2}, {:.2})", v.x, v.y, v.z);
+    let (weak, axis) = if second < 12.0 { (second, spread[1].0) } else { (third, spread[2].0) };
+    j.advise(weak < 12.0, || {
+        format!(
+            "turn the flange by 20 degrees or more, both ways, about its axis {}: the poses turn by only {weak:.1} degrees rms about it",
+            name(&axis)
+        )
+    });
+    j.advise(j.verdict != Verdict::Good && weak >= 12.0 && camera_part < 0.7 * expected, || {
+        format!(
+            "take {} more pictures spread over the same tilts: the error falls with the root of their number",
+            used.len()
+        )
+    });
+    j.advise(camera_part >= 0.7 * expected && j.verdict != Verdict::Good, || {
+        "calibrate the camera with more pictures first: most of the error comes from it".into()
+    });
+    let camera_figures = [
+        ("camera_change_px", moved),
+        ("camera_known_before_px", before),
+        ("camera_known_after_px", after),
+        ("camera_surprise", surprise),
+        ("camera_surprise_expected", freedom),
+    ];
+    let t = fit.chain.far_from_board.translation;
+    let mut figures = BTreeMap::from([
+        ("expected_error_at_working_distance_mm".to_string(), expected),
+        ("expected_error_from_camera_mm".into(), camera_part),
+        ("expected_error_with_joint_camera_mm".into(), with_joint_camera),
+        ("working_distance_mm".into(), limits.middle()),
+        ("rms_mm".into(), rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.mm))),
+        ("holdout_rms_mm".into(), holdout_mm),
+        (crate::rig::ROBOT_SIGMA_MM.into(), fit.noise.robot_mm),
+        (crate::rig::ROBOT_SIGMA_DEG.into(), fit.noise.robot_rad.to_degrees()),
+        ("translation_sigma_mm".into(), (0..3).map(|i| sigma(i).powi(2)).sum::<f64>().sqrt()),
+        ("rotation_sigma_deg".into(), (3..6).map(|i| sigma(i).powi(2)).sum::<f64>().sqrt().to_degrees()),
+        ("first_axis_rms_deg".into(), first),
+        ("second_axis_rms_deg".into(), second),
+        ("third_axis_rms_deg".into(), third),
+        ("pairs".into(), pairs.len() as f64),
+        ("pairs_used".into(), used.len() as f64),
+        ("chi2_per_freedom".into(), fit.chi2),
+        ("board_x_mm".into(), t.x),
+        ("board_y_mm".into(), t.y),
+        ("board_z_mm".into(), t.z),
+    ]);
+    if pixels {
+        figures.insert("rms_px".into(), rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.px)));
+        figures.insert("holdout_rms_px".into(), rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.holdout_px)));
+        figures.insert("board_rms_px".into(), rms(used.iter().map(|p| p.seen.rms_px)));
+    }
+    if before > 0.0 {
+        figures.extend(camera_figures.map(|(name, value)| (name.to_string(), value)));
+    }
+    Quality {
+        verdict: j.verdict,
+        reasons: j.reasons,
+        advice: j.advice,
+        figures,
+        per_picture: fit.pairs.iter().map(|p| (p.name.clone(), if pixels { p.px } else { p.mm })).collect(),
+    }
+}
+
+/// Whether the boards were seen in pictures; false: their poses were given, and nothing is known in px.
+fn in_pixels(pairs: &[Pair]) -> bool {
+    pairs.iter().all(|p| p.seen.rms_px.is_finite())
+}
+
+/// The report: what was found, how it fits, how it predicts pictures that it did not see.
+pub fn page(fit: &HandEyeFit, pairs: &[Pair], quality: &Quality, carrier: &str) -> Page {
+    let mut page = Page::new("Hand-eye calibration");
+    page.verdict(quality);
+    let x = &fit.chain.near_from_camera;
+    let [rz, ry, rx] = crate::robot::zyx_of(&x.rotation);
+    let sigma = |i: usize| fit.covariance[(i, i)].max(0.0).sqrt();
+    let row = |what: &str, value: String, s: String| vec![what.to_string(), value, s];
+    let mut rows: Vec<Vec<String>> = (0..3)
+        .map(|i| {
+            row(
+                &format!("{} of the camera", ["x", "y", "z"][i]),
+                format!("{:.4} mm", x.translation[i]),
+                format!("{:.4} mm", sigma(i)),
+            )
+        })
+        .collect();
+    for (i, (name, value)) in [("RX", rx), ("RY", ry), ("RZ", rz)].into_iter().enumerate() {
+        rows.push(row(
+            &format!("{name} (R = Rz·Ry·Rx)"),
+            format!("{value:.4}°"),
+            format!("{:.4}° about the {carrier}'s {}", sigma(3 + i).to_degrees(), ["x", "y", "z"][i]),
+        ));
+    }
+    page.table(&format!("The camera on the {carrier}"), &["", "value", "sigma"], &rows);
+    let figures: Vec<Vec<String>> = quality.figures.iter().map(|(k, v)| vec![k.clone(), format!("{v:.5}")]).collect();
+    page.table("Figures", &["figure (unit in the name)", "value"], &figures);
+    let pixels = in_pixels(pairs);
+    let fits: Vec<Vec<String>> = fit
+        .pairs
+        .iter()
+        .zip(pairs)
+        .map(|(p, pair)| {
+            let fate = if p.used { "used" } else { "left out" };
+            let in_px = |px: f64| if pixels { format!("{px:.3}") } else { "-".into() };
+            vec![
+                p.name.clone(),
+                in_px(pair.seen.rms_px),
+                in_px(p.px),
+                format!("{:.4}", p.mm),
+                format!("{:.1}", p.distance2),
+                fate.into(),
+            ]
+        })
+        .collect();
+    page.paragraph("Fit: how the pictures agree with the chain that was fitted to them. A small residual does not prove a small error. The board's own px: how its corners fit a flat board in that picture, the robot aside.");
+    page.table("Fit", &["picture", "the board's own px", "px", "mm", "distance² (6 expected)", ""], &fits);
+    let bar = |f: &dyn Fn(&crate::calibrate::hand_eye::fit::PairResidual) -> f64| -> Vec<(String, f64)> {
+        fit.pairs.iter().map(|p| (p.name.clone(), f(p))).filter(|(_, v)| v.is_finite()).collect()
+    };
+    page.figure("Residual of each pose in the fit, mm at the board's corners", &bars(&bar(&|p| p.mm), "mm", None));
+    page.paragraph("Verification: each pose in turn was left out of the fit and then predicted. This is the error to expect, the robot's own scatter included.");
+    page.figure(
+        "Error of each pose predicted by the others, mm at the board's corners",
+        &bars(&bar(&|p| p.holdout_mm), "mm", None),
+    );
+    let mut axes = Vec::new();
+    let used: Vec<(usize, &Pair)> = pairs.iter().enumerate().filter(|(i, _)| fit.pairs[*i].used).collect();
+    for w in used.windows(2) {
+        let turn = log(&(w[1].1.near_from_far * w[0].1.near_from_far.inverse()).rotation);
+        if turn.norm() > 0.02 {
+            axes.push((turn.normalize(), w[1].0.to_string()));
+        }
+    }
+    page.figure(
+        &format!("Axes that the {carrier} turned about from each pose to the next ({carrier} frame): a good set fills the disc"),
+        &axis_sphere(&axes),
+    );
+    page
+}

@@ -1,0 +1,312 @@
+//! In: stripe peaks on boards of measured pose. Out: the laser plane by robust maximum likelihood,
+//! the boards' poses free within their own uncertainty, with covariance and hold-out errors.
+//! Frame and unit: camera frame, mm; peaks in px (docs/math.md, Laser plane (1) to (6)).
+
+pub use super::agree::SecondPlane;
+use super::agree::{agreeing, majority, near, second_plane};
+use super::checks::{Consistency, board_spread, consistency, depth_spread, from_camera, reach};
+use super::options::{LaserPlaneOptions, refused};
+use super::terms::{Data, Seen, State, basis, by_camera, look, mm_per_px, on_board, ratio};
+use super::views::StripeView;
+use crate::calibrate::boards::extent::{inside, to_print_edge};
+use crate::calibrate::measured_pose::MeasuredPose;
+use crate::calibrate::scatter::inflation;
+use crate::camera::{Intrinsics, ParameterCovariance, named};
+use crate::fault::Result;
+use crate::geometry::{Board, Camera, Plane, Rigid};
+use crate::solve::Loss;
+use nalgebra::{DMatrix, Matrix6};
+
+/// Why a peak does not count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PeakUse {
+    Used,
+    /// Not on the board: dots, halos, the background, reflections beside it.
+    OffBoard,
+    /// Near an edge of the print.
+    AtEdge,
+    /// On the board, but off the plane: a reflection.
+    Disagrees,
+    /// Its whole picture was left out.
+    PictureLeftOut,
+}
+
+/// How one picture fits.
+#[derive(Clone, Debug)]
+pub struct ViewResidual {
+    pub name: String,
+    pub used: bool,
+    pub peaks: usize,
+    pub peaks_used: usize,
+    /// rms of the used peaks' distance from the fitted stripe, px and mm.
+    pub px: f64,
+    pub mm: f64,
+    /// The same against the plane fitted without this picture.
+    pub holdout_px: f64,
+    pub holdout_mm: f64,
+    /// Squared distance of its stripe from where the others predict it, in sigmas of both; 2 is usual.
+    pub surprise: f64,
+    /// The same over what is usual among these pictures, where that is more than chance.
+    pub beside: f64,
+    /// It was left out although it shows a stripe: its light lies elsewhere.
+    pub contradicts: bool,
+    /// How much worse its features fit the board than those of the other pictures.
+    pub board_misfit: f64,
+}
+
+/// What [`solve`] found.
+#[derive(Clone, Debug)]
+pub struct LaserPlaneFit {
+    pub plane: Plane<Camera>,
+    /// nx ny nz offset_mm, rank 3; what pixels, poses and the pictures' scatter say, camera uncertainty included.
+    pub covariance: DMatrix<f64>,
+    pub covariance_camera_exact: DMatrix<f64>,
+    pub views: Vec<ViewResidual>,
+    /// One a peak, by view.
+    pub uses: Vec<Vec<PeakUse>>,
+    /// Peaks' residuals over their stated sigma: 1 where the sigmas are right.
+    pub sigma_ratio: f64,
+    /// Neighbouring peaks share speckle: variance counts this often; 1 where they are independent.
+    pub neighbour_factor: f64,
+    /// How much farther the pictures' stripes lie from the plane than their own sigmas say; 1 where these are right.
+    pub scatter: f64,
+    /// What the variance was multiplied by for it.
+    pub inflation: f64,
+    /// Another plane that the light left over agrees on.
+    pub second: Option<SecondPlane>,
+    /// Largest angle between two boards' normals, rad.
+    pub board_spread: f64,
+    /// Least and largest depth of a used peak, mm.
+    pub reach: [f64; 2],
+    /// Spread of the stripes across their own direction, mm (rms): what holds the plane's tilt.
+    pub depth_spread: f64,
+}
+
+/// Fits the laser plane. `feature_factor` makes the stated sigmas of the boards' features true
+/// ([`crate::calibrate::measured_pose::pooled_factor`]),
+/// `camera_covariance` that of the camera's parameters.
+pub fn solve(
+    views: &[StripeView],
+    camera: &Intrinsics,
+    camera_covariance: &ParameterCovariance,
+    feature_factor: f64,
+    o: &LaserPlaneOptions,
+) -> Result<LaserPlaneFit> {
+    o.check()?;
+    let mut uses: Vec<Vec<PeakUse>> = views.iter().map(|v| vec![PeakUse::OffBoard; v.peaks.len()]).collect();
+    let mut peaks = select(views, camera, o, &mut uses);
+    if views.len() < 2 || peaks.len() < 3 {
+        return Err(refused(format!(
+            "{} pictures with {} stripe peaks on their boards: at least 2 pictures and 3 peaks are needed",
+            views.len(),
+            peaks.len()
+        )));
+    }
+    let mut data = Data {
+        peaks: Vec::new(),
+        measured: views.iter().map(|v| v.pose.camera_from_board).collect(),
+        roots: views.iter().map(|v| root(&v.pose, feature_factor)).collect::<Result<_>>()?,
+    };
+    let first = majority(&peaks, &data.measured, camera, o)?;
+    let all = peaks.clone();
+    peaks.retain(|p| near(p, &first, &data.measured, o.gate_px));
+    let mut used = agreeing(&all, &peaks, views.len(), o);
+    data.peaks = peaks.into_iter().filter(|p| used[p.view]).collect();
+    let mut state = State { plane: first, poses: data.measured.clone() };
+    let (mut factor, mut neighbours, mut sigma_ratio) = (1.0, 1.0, 1.0);
+    let mut solution = None;
+    for round in 0..views.len() + 3 {
+        if data.peaks.len() < 3 || used.iter().filter(|u| **u).count() < 2 {
+            return Err(refused("fewer than two pictures agree on one laser plane".into()));
+        }
+        if round == 0 {
+            state = data.solve(&state, Loss::Cauchy(2.4), factor).state;
+            let scale = robust_ratio(&data, &state, factor).max(0.2);
+            data.peaks = all
+                .iter()
+                .filter(|p| used[p.view] && ratio(p, &state, 1.0).abs() < o.gate_sigmas * scale)
+                .copied()
+                .collect();
+        }
+        let s = data.solve(&state, Loss::Squares, factor);
+        state = s.state.clone();
+        let ratios: Vec<f64> = data.peaks.iter().map(|p| ratio(p, &state, 1.0)).collect();
+        sigma_ratio = (ratios.iter().map(|r| r * r).sum::<f64>() / ratios.len() as f64).sqrt();
+        neighbours = neighbour_factor(&data.peaks, &ratios);
+        let next = sigma_ratio.max(1e-3) * neighbours.sqrt();
+        let settled = (next / factor - 1.0).abs() < 0.01;
+        factor = next;
+        let beside = consistency(&data, &state, factor).beside(&used);
+        let worst = (0..views.len()).filter(|&i| used[i]).max_by(|&a, &b| beside[a].total_cmp(&beside[b]));
+        solution = Some(s);
+        match worst {
+            Some(i) if beside[i] > o.gate_surprise && used.iter().filter(|u| **u).count() > 3 => {
+                used[i] = false;
+                data.peaks.retain(|p| p.view != i);
+            }
+            _ if settled => break,
+            _ => {}
+        }
+    }
+    let solution = solution.expect("at least one round");
+    let local = solution
+        .covariance
+        .as_ref()
+        .ok_or_else(|| refused("the laser plane is not determined by these stripes".into()))?
+        .view((0, 0), (3, 3))
+        .into_owned();
+    for p in &all {
+        uses[p.view][p.index] = if used[p.view] { PeakUse::Disagrees } else { PeakUse::PictureLeftOut };
+    }
+    for p in &data.peaks {
+        uses[p.view][p.index] = PeakUse::Used;
+    }
+    let basis = basis(&state.plane);
+    let by_camera = by_camera(&data, &state, views, camera, &named(camera_covariance), factor)
+        .ok_or_else(|| refused("the laser plane is not determined by these stripes".into()))?;
+    let mut checks = consistency(&data, &state, factor);
+    if checks.freedom > 0.0 {
+        let explained = from_camera(&data, &state, factor, &by_camera, camera_covariance);
+        checks.scatter2 *= checks.freedom / (checks.freedom + explained);
+    }
+    let inflation = inflation(checks.scatter2, checks.freedom);
+    let exact = &basis * &local * basis.transpose() * inflation;
+    let follows = by_camera.plane * camera_covariance * by_camera.plane.transpose();
+    let covariance = &exact + &basis * DMatrix::from_column_slice(3, 3, follows.as_slice()) * basis.transpose();
+    let rest: Vec<Seen> = all.iter().filter(|p| uses[p.view][p.index] != PeakUse::Used).copied().collect();
+    let second = second_plane(&rest, &data, &state, views, camera, o);
+    Ok(LaserPlaneFit {
+        plane: state.plane,
+        covariance,
+        covariance_camera_exact: exact,
+        views: residuals(&data, &state, views, &used, &checks, &all, o),
+        uses,
+        sigma_ratio,
+        neighbour_factor: neighbours,
+        scatter: checks.scatter2.sqrt(),
+        inflation,
+        second,
+        board_spread: board_spread(&state, &used),
+        reach: reach(&data, &state),
+        depth_spread: depth_spread(&data, &state),
+    })
+}
+
+/// Peaks on the boards and away from the print's edges.
+fn select(views: &[StripeView], camera: &Intrinsics, o: &LaserPlaneOptions, uses: &mut [Vec<PeakUse>]) -> Vec<Seen> {
+    let mut out = Vec::new();
+    for (v, view) in views.iter().enumerate() {
+        let board_from_camera = view.pose.camera_from_board.inverse();
+        for (i, peak) in view.peaks.iter().enumerate() {
+            if !(peak.sigma_px > 0.0 && peak.sigma_px.is_finite()) {
+                continue;
+            }
+            let Some(seen) = look(camera, v, i, peak) else { continue };
+            let Some(p) = on_board(&view.pose.camera_from_board, &seen.ray) else { continue };
+            let q = board_from_camera.point(&p);
+            let margin = o.edge_widths * peak.width_px * p.z / camera.fx.min(camera.fy);
+            if inside(&view.board, q.x, q.y) < margin {
+                continue;
+            }
+            if to_print_edge(&view.board, q.x, q.y) < margin {
+                uses[v][i] = PeakUse::AtEdge;
+                continue;
+            }
+            out.push(seen);
+        }
+    }
+    out
+}
+
+fn root(pose: &MeasuredPose, factor: f64) -> Result<Matrix6<f64>> {
+    let own = pose.factor_among(factor);
+    (pose.information / (own * own))
+        .cholesky()
+        .map(|c| c.l().transpose())
+        .ok_or_else(|| refused(format!("{}: the board's pose is not determined", pose.name)))
+}
+
+fn robust_ratio(data: &Data, s: &State, factor: f64) -> f64 {
+    let mut r: Vec<f64> = data.peaks.iter().map(|p| ratio(p, s, factor).abs()).collect();
+    crate::solve::robust_scale(&mut r, 1)
+}
+
+/// Longest correlation along the stripe that is looked for, peaks.
+const LONGEST_LAG: usize = 40;
+
+/// 1 + 2 Σ ρₖ over the lags along the stripe whose correlation stands out of the noise: speckle, and broken pieces of a
+/// stripe that lie off it as a whole.
+fn neighbour_factor(peaks: &[Seen], ratios: &[f64]) -> f64 {
+    let variance = ratios.iter().map(|r| r * r).sum::<f64>() / ratios.len() as f64;
+    let apart = |a: &Seen, b: &Seen| (a.view == b.view).then(|| (b.pixel - a.pixel).norm());
+    let mut steps: Vec<f64> = peaks.windows(2).filter_map(|w| apart(&w[0], &w[1])).collect();
+    steps.sort_by(f64::total_cmp);
+    let Some(step) = steps.get(steps.len() / 2) else { return 1.0 };
+    let mut factor = 1.0;
+    for lag in 1..=LONGEST_LAG {
+        let near = |i: &usize| apart(&peaks[i - lag], &peaks[*i]).is_some_and(|d| d < 1.6 * step * lag as f64);
+        let (sum, n) = (lag..peaks.len())
+            .filter(near)
+            .fold((0.0, 0.0), |(sum, n), i| (sum + ratios[i - lag] * ratios[i], n + 1.0));
+        let rho = if n > 20.0 { sum / n / variance } else { 0.0 };
+        if rho < 2.5 / f64::max(n, 1.0).sqrt() {
+            break;
+        }
+        factor += 2.0 * rho;
+    }
+    factor
+}
+
+fn residuals(
+    data: &Data,
+    state: &State,
+    views: &[StripeView],
+    used: &[bool],
+    checks: &Consistency,
+    all: &[Seen],
+    o: &LaserPlaneOptions,
+) -> Vec<ViewResidual> {
+    let mut misfits: Vec<f64> = views.iter().map(|v| v.pose.sigma_factor).collect();
+    misfits.sort_by(f64::total_cmp);
+    let usual = misfits[(misfits.len() - 1) / 2].max(1e-12);
+    let rms = |peaks: &[&Seen], plane: &Plane<Camera>, pose: &Rigid<Camera, Board>| -> (f64, f64) {
+        let (mut px, mut mm) = (0.0, 0.0);
+        for p in peaks {
+            let Some(x) = on_board(pose, &p.ray) else { continue };
+            let d = plane.distance(&x);
+            mm += d * d;
+            px += (d / mm_per_px(plane, pose, p)).powi(2);
+        }
+        let n = f64::max(peaks.len() as f64, 1.0);
+        ((px / n).sqrt(), (mm / n).sqrt())
+    };
+    let beside = checks.beside(used);
+    (0..views.len())
+        .map(|v| {
+            let used_here: Vec<&Seen> = data.peaks.iter().filter(|p| p.view == v).collect();
+            // A picture that was left out is shown with the peaks that it would have brought.
+            let shown: Vec<&Seen> =
+                if used[v] { used_here.clone() } else { all.iter().filter(|p| p.view == v).collect() };
+            let (px, mm) = rms(&shown, &state.plane, &state.poses[v]);
+            let (holdout_px, holdout_mm) = checks.views[v]
+                .plane
+                .map_or((f64::INFINITY, f64::INFINITY), |plane| rms(&shown, &plane, &data.measured[v]));
+            let used_now = used[v] && used_here.len() >= o.min_peaks.min(3);
+            ViewResidual {
+                name: views[v].pose.name.clone(),
+                used: used_now,
+                peaks: views[v].peaks.len(),
+                peaks_used: if used[v] { used_here.len() } else { 0 },
+                px,
+                mm,
+                holdout_px,
+                holdout_mm,
+                surprise: checks.views[v].surprise,
+                beside: beside[v],
+                contradicts: !used_now && all.iter().filter(|p| p.view == v).count() >= o.min_peaks,
+                board_misfit: views[v].pose.sigma_factor / usual,
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,153 @@
+//! In: a scan folder and a recipe. Out: the insertion pose as JSON and in the robot's notation, its
+//! uncertainty and error budget, a picture; or a refusal with its reasons.
+//! Frame and unit: base frame; mm, degrees.
+
+use crate::cli::terminal::console::Console;
+use crate::cli::terminal::outputs;
+use crate::cli::terminal::outputs::Inputs;
+use crate::fault::{Fault, Result};
+use crate::find::{Accelerator, LocateOptions, Recipe, Report};
+use crate::geometry::Vec3;
+use crate::robot::Convention;
+use crate::station::{Settings, find_part_in_all};
+use std::path::{Path, PathBuf};
+
+/// Find a part in a scan and say where the robot inserts
+///
+/// No pose leaves when a gate of the recipe is missed; the report says which, and the exit code is 1.
+///
+/// One scan cannot show what calibrations, delay, convention or robot got wrong. With a second scan of the same part from
+/// another side (sheetlight second-look plans it) the pose comes from both, and what they disagree about is a gate.
+#[derive(clap::Args)]
+#[command(after_help = "Example:
+  sheetlight find scans/board7 --recipe data/recipes/led.toml --station cell3 --out led.json
+  sheetlight find scans/b7 scans/b7again --recipe led.toml --station cell3 --out led.json")]
+pub struct Args {
+    /// Folders that sheetlight scan --out wrote: one, or several looks at the same part
+    #[arg(required = true)]
+    scans: Vec<PathBuf>,
+    /// Recipe (TOML): the part's drawing, constructions, insertion, gates
+    #[arg(long)]
+    recipe: PathBuf,
+    /// File for the report (JSON); the picture goes beside it with .png
+    #[arg(long)]
+    out: PathBuf,
+    /// Station that scanned: its covariances enter the error budget, its calibration must be the scan's
+    #[arg(long)]
+    station: Option<PathBuf>,
+    /// Notation of the poses: denso, ur, kuka, fanuc, abb, yaskawa, ros, quaternion or matrix [default:
+    /// the station's robot, else matrix]
+    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Convention>)]
+    robot: Option<Convention>,
+    /// Direction towards the camera in the base frame [default: from the station, else 0,0,1]
+    #[arg(long, value_name = "X,Y,Z", value_parser = crate::cli::terminal::arguments::numbers::<3>, allow_hyphen_values = true)]
+    up: Option<[f64; 3]>,
+}
+
+pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let image = args.out.with_extension("png");
+    let scans: Vec<&Path> = args.scans.iter().map(PathBuf::as_path).collect();
+    let inputs = Inputs { files: &[&args.recipe], scans: &scans, station: args.station.as_deref() };
+    outputs::check(&[&args.out, &image], &inputs)?;
+    let recipe = Recipe::load(&args.recipe)?;
+    let of_station = args.station.as_deref().map(Settings::load).transpose()?.and_then(|s| s.robot);
+    let up = args.up.map(Vec3::from);
+    if up.is_some_and(|u| u.norm() < 1e-6) {
+        return Err(Fault::usage("--up has no direction").next("give three numbers, e.g. 0,0,1"));
+    }
+    let robot = args.robot.or(of_station).unwrap_or(Convention::Matrix);
+    let options = LocateOptions { up, robot, accelerator: Accelerator::open(), expected: None };
+    let (report, picture) = find_part_in_all(&args.scans, &recipe, args.station.as_deref(), &options)?;
+    let text = serde_json::to_string_pretty(&report).expect("plain data");
+    crate::files::write_beside((&args.out, text.as_bytes()), &[(&image, &picture.to_png())])?;
+    console.result(&report, &summary(&report));
+    console.say(format!("see {} and {}", args.out.display(), image.display()));
+    if report.passed {
+        return Ok(());
+    }
+    Err(Fault::refused(format!("no pose: {}", report.reasons.join("; ")))
+        .cause("the part is hidden in part, another one, or too badly seen")
+        .next(format!("look at {}", image.display())))
+}
+
+pub(super) fn summary(r: &Report) -> String {
+    let mut s = format!("{}: {}\n", r.recipe, if r.passed { "found" } else { "refused" });
+    if let Some(p) = &r.poses {
+        for (name, pose) in [("approach", &p.approach), ("insertion", &p.insertion), ("retract", &p.retract)] {
+            let numbers: Vec<String> = pose.numbers.iter().map(|v| format!("{v:.4}")).collect();
+            s += &format!("{name:12} {} ({}: {})\n", numbers.join(" "), pose.convention, pose.labels.join(", "));
+        }
+        s += &format!(
+            "{:12} {} mm and {} degrees, {} at 3 sigma\n",
+            "tolerance",
+            r.tolerance_mm,
+            r.tolerance_deg,
+            if r.within_tolerance { "kept" } else { "NOT kept" }
+        );
+    }
+    let row = |v: &[f64; 3], digits: usize| v.map(|x| format!("{x:.digits$}")).join(" ");
+    s += &format!("{:12} {} mm, {} degrees (x y z of the part)\n", "sigma", row(&r.sigma_mm, 4), row(&r.sigma_deg, 4));
+    for t in &r.budget.terms {
+        let mm = t.sigma_mm.as_ref().map_or("-".into(), |v| row(v, 4));
+        let deg = t.sigma_deg.as_ref().map_or("-".into(), |v| row(v, 4));
+        s += &format!("  {:12} {mm} mm, {deg} degrees; {}\n", t.name, t.note);
+    }
+    if !r.budget.complete {
+        s += "  the sum is a lower bound: a term is unknown\n";
+    }
+    s += &format!(
+        "match        score {:.3}, next best pose {:.3}; {} edges to {:.3} mm, {} surface points to {:.3} mm\n",
+        r.found.score, r.found.second_score, r.edges, r.edge_rms_mm, r.surface_points, r.surface_rms_mm
+    );
+    for c in &r.constructions {
+        s += &format!(
+            "  {:24} {:+.3} {:+.3} mm{} from where the pose puts it ({} shapes)\n",
+            c.name,
+            c.deviation_mm[0],
+            c.deviation_mm[1],
+            c.deviation_deg.map_or(String::new(), |d| format!(", {d:+.3} degrees")),
+            c.shapes
+        );
+    }
+    if let Some(d) = r.disagreement_mm {
+        s += &format!("  the two-pin construction and the lattice fit disagree by {d:.3} mm\n");
+    }
+    if let Some(l) = &r.looks {
+        s += &format!(
+            "looks        {} of them, turned by {:.0} and tilted by {:.0} degrees; looks {} and {} disagree by {} mm, {} degrees; \
+             {} mm, {} degrees are expected{}\n",
+            l.looks,
+            l.turn_deg,
+            l.tilt_deg,
+            l.between[0],
+            l.between[1],
+            row(&l.difference_mm, 4),
+            row(&l.difference_deg, 4),
+            row(&l.expected_mm, 4),
+            row(&l.expected_deg, 4),
+            if l.complete { "" } else { " at least (a calibration does not know its uncertainty)" }
+        );
+        for e in &l.explained_by {
+            s += &format!(
+                "  {:12} would explain {:.0} % of it, if it were wrong by {:.1} of its own sigmas; however wrong, it could hide {} mm\n",
+                e.name,
+                100.0 * e.share,
+                e.off_by_sigmas,
+                row(&e.unseen_mm, 3)
+            );
+        }
+    }
+    for g in &r.gates {
+        s += &format!(
+            "gate         {:16} {:8.3}  limit {:.3}  {}\n",
+            g.name,
+            g.value,
+            g.limit,
+            if g.passed { "ok" } else { "MISSED" }
+        );
+    }
+    for n in &r.notes {
+        s += &format!("note         {n}\n");
+    }
+    s
+}

@@ -1,0 +1,7 @@
+//! In: the command line's words about parts. Out: models, recipes, found poses, second looks.
+//! Frame and unit: base frame, mm.
+
+pub mod locate;
+pub mod model;
+pub mod second_look;
+pub mod teach;

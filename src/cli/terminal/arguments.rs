@@ -1,0 +1,14 @@
+//! In: an option's value as typed. Out: the value, or what was wanted.
+//! Frame and unit: the option's.
+
+/// Reads numbers parted by commas, for clap's `value_parser`.
+pub(crate) fn numbers<const N: usize>(s: &str) -> std::result::Result<[f64; N], String> {
+    let read: Option<Vec<f64>> = s.split(',').map(|v| v.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
+    let read = read.and_then(|v| v.try_into().ok());
+    read.ok_or_else(|| format!("wanted {N} numbers parted by commas, e.g. {}", vec!["0"; N].join(",")))
+}
+
+/// Reads an option's value with the type's own `FromStr`, for clap's `value_parser`.
+pub(crate) fn parse<T: std::str::FromStr<Err = String>>(s: &str) -> std::result::Result<T, String> {
+    s.parse()
+}

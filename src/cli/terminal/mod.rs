@@ -1,0 +1,9 @@
+//! In: results, talk, keys pressed. Out: stdout for data, stderr for people, options' values, a scan that ends when asked to.
+//! Frame and unit: none.
+
+pub mod arguments;
+pub mod console;
+pub mod interrupt;
+pub mod outputs;
+pub mod printable;
+pub mod threads;

@@ -1,0 +1,35 @@
+//! In: a drawing of a part and what a person says about its insertion. Out: a recipe by which the part is found without
+//! ever having been scanned. Frame and unit: part frame; mm, degrees.
+
+use super::recipe::{InsertionSpec, Recipe};
+use crate::fault::Result;
+use crate::find::measure::construct::{Build, Construction};
+use crate::find::model::drawing::Drawing;
+
+/// What a drawing does not say.
+#[derive(Clone, Debug)]
+pub struct TaskOptions {
+    pub name: String,
+    /// Edge of a cell of the map that is searched, mm.
+    pub cell_mm: f64,
+    /// How many turns about z make the part look nearly alike.
+    pub alike_turns: u32,
+    pub insertion: InsertionSpec,
+}
+
+/// A recipe with every gate at its default. Each array of shapes is offered as a lattice fit.
+pub fn recipe_of(drawing: Drawing, options: &TaskOptions) -> Result<Recipe> {
+    let arrays = drawing.shape.iter().filter(|s| s.grid.is_some()).filter_map(|s| s.name.clone());
+    let lattice = |of: String| Construction {
+        name: format!("all {of}"),
+        kind: Build::Lattice,
+        of: vec![of],
+        by_mm: None,
+        along: None,
+    };
+    let construction = arrays.map(lattice).collect();
+    let plain = Recipe::new(&options.name, options.cell_mm, drawing.shape, options.insertion.clone());
+    let recipe = Recipe { alike_turns: options.alike_turns, construction, ..plain };
+    recipe.check()?;
+    Ok(recipe)
+}

@@ -1,0 +1,461 @@
+//! In: a scan's points, a recipe, optionally the rig's calibrations. Out: where the tool goes, how sure
+//! that is and why, or a refusal: no pose leaves with a failed gate.
+//! Frame and unit: base frame; mm, degrees; sigmas along the part's own axes.
+
+use super::budget::{Budget, budget, towards_camera};
+use super::gate::Gate;
+use super::looks;
+use super::looks::{Agreed, Disagreement, Look};
+use super::recipe::{Gates, Recipe};
+use super::verdict::{Agreement, TurnVote, judge, vote};
+use crate::fault::{Fault, Result};
+use crate::find::measure::construct::{Built, build, features};
+use crate::find::measure::points::{Ordered, localise};
+use crate::find::measure::pose::{Measured, measure};
+use crate::find::measure::slide::{long_axis, slide};
+use crate::find::model::shape_model::ShapeModel;
+use crate::find::scene::{Kind, Layer, Scene};
+use crate::find::search::accelerator::Accelerator;
+use crate::find::search::full::{Match, find_on};
+use crate::find::search::refine::Pose;
+use crate::geometry::{Base, Grid, Part, Rigid, Tool, Vec3};
+use crate::rig::Rig;
+use crate::robot::Convention;
+use crate::scan::{CloudPoint, GridOptions, HeightMap, grid};
+
+/// What else is known about a scan.
+#[derive(Clone, Debug)]
+pub struct LocateOptions {
+    /// Direction towards the camera in the base frame, unit length not needed. By default where the
+    /// rig's camera stood, without a rig z.
+    pub up: Option<Vec3>,
+    /// Notation of the poses for the robot. Default the 4x4 matrix.
+    pub robot: Convention,
+    /// A GPU for the coarse search; the result is the same without.
+    pub accelerator: Option<Accelerator>,
+    /// Where another look found the part: tried before what the search finds. From the side a part hides some of its own
+    /// edges, and the best match may lie beside it.
+    pub expected: Option<Rigid<Base, Part>>,
+}
+
+impl Default for LocateOptions {
+    fn default() -> Self {
+        LocateOptions { up: None, robot: Convention::Matrix, accelerator: None, expected: None }
+    }
+}
+
+impl LocateOptions {
+    /// For another look at the part of `first`: heights stay those above that part, which is expected where it was.
+    pub fn again(self, first: &Report) -> LocateOptions {
+        let up = self.up.or_else(|| Some(first.base_from_part.direction(&Vec3::z())));
+        LocateOptions { up, expected: Some(first.base_from_part), ..self }
+    }
+}
+
+/// A pose for the robot.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct RobotPose {
+    pub base_from_tool: Rigid<Base, Tool>,
+    pub convention: &'static str,
+    pub labels: &'static [&'static str],
+    pub numbers: Vec<f64>,
+}
+
+/// The poses of one insertion.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Poses {
+    pub insertion: RobotPose,
+    pub approach: RobotPose,
+    pub retract: RobotPose,
+}
+
+/// Everything that was found out. `poses` is there only where every gate was passed.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Report {
+    pub recipe: String,
+    pub passed: bool,
+    /// Which gates failed, in words; empty when passed.
+    pub reasons: Vec<String>,
+    pub poses: Option<Poses>,
+    /// 3 sigma in the plane and of the turn within the recipe's tolerance.
+    pub within_tolerance: bool,
+    pub tolerance_mm: f64,
+    pub tolerance_deg: f64,
+    pub sigma_mm: [f64; 3],
+    pub sigma_deg: [f64; 3],
+    pub budget: Budget,
+    pub gates: Vec<Gate>,
+    pub base_from_part: Rigid<Base, Part>,
+    pub found: Match,
+    pub agreement: Agreement,
+    pub turns: Vec<TurnVote>,
+    pub constructions: Vec<Built>,
+    /// Distance between the two-pin construction and the lattice fit, mm.
+    pub disagreement_mm: Option<f64>,
+    pub edges: usize,
+    pub edge_rms_mm: f64,
+    pub surface_points: usize,
+    pub surface_rms_mm: f64,
+    pub growth_mm: [f64; 2],
+    pub notes: Vec<String>,
+    /// What further looks at the part said; `None`: one look alone, not cross-checked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub looks: Option<Disagreement>,
+    /// The part's pose moved by what was constructed: the tool goes by it.
+    #[serde(skip)]
+    pub base_from_constructed: Rigid<Base, Part>,
+    #[serde(skip)]
+    pub map: HeightMap,
+}
+
+/// Finds the part of a recipe in a cloud. A part that is not there, or that is seen too badly to be
+/// measured, is a `Fault`; one that was measured but misses a gate is a report without poses.
+pub fn locate(cloud: &[CloudPoint], recipe: &Recipe, rig: Option<&Rig>, options: &LocateOptions) -> Result<Report> {
+    recipe.check()?;
+    let drawing = recipe.drawing();
+    let points = Ordered::new(cloud)?;
+    let up = options.up.or_else(|| rig.and_then(|r| towards_camera(&points, r))).unwrap_or_else(Vec3::z);
+    let map = grid(cloud, &GridOptions { cell: Some(recipe.cell_mm), up, ..GridOptions::default() })?;
+    let scene = scene_of(&map, &recipe.layers)?;
+    let model = model_of(recipe, &scene)?;
+    let mut search = recipe.search;
+    search.max_matches = search.max_matches.max(3);
+    search.min_score = search.min_score.min(recipe.gates.min_score);
+    let matches = find_on(&scene, &model, &search, options.accelerator.as_ref())?;
+    let Some(best) = matches.first().cloned() else {
+        return Err(Fault::refused(format!(
+            "'{}' was not found: nothing scores {:.2} or more",
+            recipe.name, search.min_score
+        ))
+        .cause("the part is not there, is another one, is hidden, or lies outside the scan")
+        .next("look at the height map of the scan; scan the part again, or teach it anew"));
+    };
+    let mut notes = Vec::new();
+    if matches.len() > 1 {
+        notes.push(format!(
+            "{} places look like the part, scores {}; the best was taken",
+            matches.len(),
+            matches.iter().map(|m| format!("{:.3}", m.score)).collect::<Vec<_>>().join(" ")
+        ));
+    }
+    let Judged { found: best, mut measured } =
+        best_hypothesis(&points, &map, recipe, options.expected.as_ref(), &best, &matches)?;
+    let mut turns = vote(&points, &drawing, &measured.base_from_part, recipe.alike_turns, &recipe.measure);
+    if let Some(t) = turns.iter().find(|t| t.told() == Some(false)) {
+        notes.push(format!(
+            "turned by {:.0} degrees: {} of {} points where the turns differ say so",
+            t.rival_deg,
+            t.votes_against,
+            t.votes_for + t.votes_against
+        ));
+        let back: Rigid<Part, Part> =
+            Rigid::from_vectors(&Vec3::new(0.0, 0.0, t.rival_deg.to_radians()), Vec3::zeros());
+        measured = measure(&points, &drawing, measured.base_from_part * back, &recipe.measure)?;
+        turns = vote(&points, &drawing, &measured.base_from_part, recipe.alike_turns, &recipe.measure);
+    }
+    let agreement = judge(&points, &drawing, &measured, &recipe.measure);
+    let seen = features(&measured.observations, measured.growth, &recipe.measure);
+    let mut constructions = Vec::new();
+    for c in &recipe.construction {
+        // One construction that cannot be built does not hinder the others, unless it is the one used.
+        let earlier: Vec<_> = recipe.construction.iter().take_while(|o| o.name != c.name).cloned().collect();
+        let usable: Vec<_> =
+            earlier.into_iter().filter(|e| constructions.iter().any(|b: &Built| b.name == e.name)).collect();
+        match build(&[usable, vec![c.clone()]].concat(), &drawing, &seen, &recipe.measure) {
+            Ok(mut all) => constructions.push(all.pop().expect("one was asked for")),
+            Err(e) if recipe.insertion.construction == c.name => return Err(e),
+            Err(e) => notes.push(e.what),
+        }
+    }
+    Ok(conclude(recipe, rig, options, &points, map, best, measured, agreement, turns, constructions, notes))
+}
+
+struct Judged {
+    found: Match,
+    measured: Measured,
+}
+
+/// Measures at the best match and, where the points do not agree with the drawing there, at its rivals
+/// and at the other matches: a long part shifted along itself scores nearly as well in the search, but
+/// its surfaces do not end where they should.
+fn best_hypothesis(
+    points: &Ordered,
+    map: &HeightMap,
+    recipe: &Recipe,
+    expected: Option<&Rigid<Base, Part>>,
+    best: &Match,
+    matches: &[Match],
+) -> Result<Judged> {
+    const MOST: usize = 12;
+    let drawing = recipe.drawing();
+    let rivals = best.rivals.iter().filter(|r| r.1 > 0.6 * best.score).map(|&(pose, score)| {
+        let second_score = best.score;
+        let rivals =
+            std::iter::once((best.pose, best.score)).chain(best.rivals.iter().copied().filter(|r| r.0 != pose));
+        Match { pose, score, second_score, rivals: rivals.collect(), ..best.clone() }
+    });
+    let mut kept: Option<(f64, Judged)> = None;
+    let mut trouble = None;
+    let searched = std::iter::once(best.clone()).chain(rivals).chain(matches.iter().skip(1).cloned()).take(MOST);
+    let starts = expected.map(|e| (best.clone(), *e)).into_iter();
+    for (found, start) in starts.chain(searched.map(|m| (m.clone(), lift(&m.pose, map, points, recipe)))) {
+        let start = slide(points, &drawing, start, &recipe.measure);
+        let measured = match measure(points, &drawing, start, &recipe.measure) {
+            Ok(measured) => measured,
+            Err(e) => {
+                trouble.get_or_insert_with(|| {
+                    e.at(format!(
+                        "match at {:.1} {:.1} mm of the map, turned by {:.1} degrees, score {:.3}",
+                        (found.pose.x + 0.5) * map.cell,
+                        (found.pose.y + 0.5) * map.cell,
+                        found.pose.angle.to_degrees(),
+                        found.score
+                    ))
+                });
+                continue;
+            }
+        };
+        let a = judge(points, &drawing, &measured, &recipe.measure);
+        let value = a.agreement * a.edges * found.score;
+        let good = a.agreement >= recipe.gates.min_agreement && a.edges >= 0.5 && a.crossed <= recipe.gates.max_crossed;
+        if kept.as_ref().is_none_or(|k| value > k.0) {
+            kept = Some((value, Judged { found, measured }));
+        }
+        if good {
+            break;
+        }
+    }
+    kept.map(|k| k.1).ok_or_else(|| trouble.expect("every hypothesis failed, and there was one"))
+}
+
+/// The layers of a height map that a recipe wants.
+pub fn scene_of(map: &HeightMap, layers: &[Kind]) -> Result<Scene> {
+    let (w, h) = (map.width as usize, map.height as usize);
+    let layers = layers
+        .iter()
+        .map(|kind| Layer::new(*kind, w, h, if *kind == Kind::Height { map.z.clone() } else { map.intensity.clone() }))
+        .collect::<Result<Vec<_>>>()?;
+    Scene::new(layers, Some(map.cell))
+}
+
+fn model_of(recipe: &Recipe, scene: &Scene) -> Result<ShapeModel> {
+    let mm = scene.mm_per_px.unwrap_or(recipe.cell_mm);
+    let mut models = recipe
+        .layers
+        .iter()
+        .map(|kind| ShapeModel::from_drawing(&recipe.drawing(), mm, *kind, &recipe.model))
+        .collect::<Result<Vec<_>>>()?;
+    let mut model = models.remove(0);
+    for other in models {
+        for (mine, theirs) in model.levels.iter_mut().zip(other.levels) {
+            mine.extend(theirs);
+        }
+    }
+    Ok(model)
+}
+
+/// A match in the map as a pose in the base frame: its height is the most frequent one of the points on
+/// the drawing's first face.
+fn lift(pose: &Pose, map: &HeightMap, points: &Ordered, recipe: &Recipe) -> Rigid<Base, Part> {
+    let bin = 0.5 * recipe.measure.height_gate_mm;
+    let flat: Rigid<Grid, Part> = Rigid::from_vectors(
+        &Vec3::new(0.0, 0.0, pose.angle),
+        Vec3::new((pose.x + 0.5) * map.cell, (pose.y + 0.5) * map.cell, 0.0),
+    );
+    let base_from_part = map.base_from_grid * flat;
+    let drawing = recipe.drawing();
+    let faces = drawing.faces();
+    let face = &faces[0];
+    let mut bins = std::collections::BTreeMap::<i64, usize>::new();
+    for q in localise(points, &drawing, &base_from_part, &recipe.measure).iter().flatten() {
+        if face.material(q.x, q.y) {
+            *bins.entry(((q.z - face.z) / bin).floor() as i64).or_default() += 1;
+        }
+    }
+    // Three neighbouring bins, so that a tilted face is not split.
+    let weight = |k: i64| (k - 1..=k + 1).filter_map(|b| bins.get(&b)).sum::<usize>();
+    let best = bins.keys().copied().max_by_key(|&k| weight(k)).unwrap_or(0);
+    base_from_part * Rigid::from_vectors(&Vec3::zeros(), Vec3::new(0.0, 0.0, (best as f64 + 0.5) * bin))
+}
+
+#[allow(clippy::too_many_arguments)]
+fn conclude(
+    recipe: &Recipe,
+    rig: Option<&Rig>,
+    options: &LocateOptions,
+    points: &Ordered,
+    map: HeightMap,
+    found: Match,
+    measured: Measured,
+    agreement: Agreement,
+    turns: Vec<TurnVote>,
+    constructions: Vec<Built>,
+    mut notes: Vec<String>,
+) -> Report {
+    let spec = &recipe.insertion;
+    let budget = budget(points, &measured, rig, &recipe.robot);
+    let named = |name: &Option<String>| constructions.iter().find(|b| Some(&b.name) == name.as_ref());
+    let disagreement_mm = named(&spec.two_pin)
+        .zip(named(&spec.lattice))
+        .map(|(a, b)| (a.deviation_mm[0] - b.deviation_mm[0]).hypot(a.deviation_mm[1] - b.deviation_mm[1]));
+    let gates = gates(&recipe.gates, &found, recipe, &budget, &agreement, &turns, disagreement_mm);
+    let reasons: Vec<String> =
+        missed(&gates).chain(gates.iter().filter(|g| g.name == LOOKS).map(Gate::words)).collect();
+    // The construction's deviation moves the part pose in its plane.
+    let moved = constructions.iter().find(|b| b.name == spec.construction).map_or_else(Rigid::identity, |b| {
+        let turn = b.deviation_deg.unwrap_or(0.0).to_radians();
+        let (s, c) = turn.sin_cos();
+        let (x, y) = (b.nominal.x, b.nominal.y);
+        Rigid::<Part, Part>::from_vectors(
+            &Vec3::new(0.0, 0.0, turn),
+            Vec3::new(b.measured.x - (c * x - s * y), b.measured.y - (s * x + c * y), 0.0),
+        )
+    });
+    let base_from_constructed = measured.base_from_part * moved;
+    notes.push(ONE_LOOK.into());
+    let passed = reasons.is_empty();
+    Report {
+        recipe: recipe.name.clone(),
+        passed,
+        reasons,
+        poses: passed.then(|| poses_at(&base_from_constructed, recipe, options.robot)),
+        within_tolerance: within_tolerance(recipe, budget.sigma_mm, budget.sigma_deg),
+        tolerance_mm: spec.tolerance_mm,
+        tolerance_deg: spec.tolerance_deg,
+        sigma_mm: budget.sigma_mm,
+        sigma_deg: budget.sigma_deg,
+        budget,
+        gates,
+        base_from_part: measured.base_from_part,
+        found,
+        agreement,
+        turns,
+        constructions,
+        disagreement_mm,
+        edges: measured.edges,
+        edge_rms_mm: measured.edge_rms,
+        surface_points: measured.surface_points,
+        surface_rms_mm: measured.surface_rms,
+        growth_mm: measured.growth,
+        notes,
+        looks: None,
+        base_from_constructed,
+        map,
+    }
+}
+
+/// What is said of a pose that rests on one look.
+const ONE_LOOK: &str = "not cross-checked: one look cannot show what calibrations, delay, convention or robot got wrong; \
+    plan a second one with sheetlight second-look";
+
+/// The tool's poses for a part whose pose is known.
+fn poses_at(base_from_part: &Rigid<Base, Part>, recipe: &Recipe, robot: Convention) -> Poses {
+    let spec = &recipe.insertion;
+    let part_from_tool: Rigid<Part, Tool> =
+        Rigid::from_vectors(&Vec3::new(0.0, 0.0, spec.turn_deg.to_radians()), Vec3::from(spec.offset_mm));
+    let base_from_tool = *base_from_part * part_from_tool;
+    let above = |mm: f64| base_from_tool * Rigid::<Tool, Tool>::from_vectors(&Vec3::zeros(), Vec3::new(0.0, 0.0, mm));
+    let write = |pose: Rigid<Base, Tool>| RobotPose {
+        base_from_tool: pose,
+        convention: robot.name(),
+        labels: robot.labels(),
+        numbers: robot.write(&pose),
+    };
+    Poses {
+        insertion: write(base_from_tool),
+        approach: write(above(spec.approach_mm)),
+        retract: write(above(spec.retract_mm)),
+    }
+}
+
+/// True where the insertion bears three standard deviations.
+fn within_tolerance(recipe: &Recipe, sigma_mm: [f64; 3], sigma_deg: [f64; 3]) -> bool {
+    let turn = sigma_deg.iter().copied().fold(0.0, f64::max);
+    3.0 * sigma_mm[0].max(sigma_mm[1]) <= recipe.insertion.tolerance_mm && 3.0 * turn <= recipe.insertion.tolerance_deg
+}
+
+/// One report from several looks at the same part: the agreed pose, what the looks disagree about, and the gates on it. Every
+/// look must have met its own gates. Errors: none of the looks, or a covariance that cannot be inverted.
+pub fn agree(reports: Vec<Report>, recipe: &Recipe, robot: Convention) -> Result<Report> {
+    let looks: Vec<Look> =
+        reports.iter().map(|r| Look { base_from_part: r.base_from_constructed, budget: &r.budget }).collect();
+    let Agreed { base_from_part, covariance, disagreement } = looks::agree(&looks)?;
+    let reasons: Vec<String> =
+        (1..).zip(&reports).flat_map(|(k, r)| missed(&r.gates).map(move |why| format!("look {k}: {why}"))).collect();
+    let mut report = reports.into_iter().next().expect("looks agree about one part at least");
+    report.notes.retain(|n| n != ONE_LOOK);
+    let second = disagreement.gates(&recipe.gates);
+    report.reasons = reasons;
+    report.reasons.extend(second.iter().filter(|g| !g.passed).map(Gate::words));
+    report.gates.retain(|g| g.name != LOOKS);
+    report.gates.extend(second);
+    report.passed = report.reasons.is_empty();
+    [report.sigma_mm, report.sigma_deg] = crate::find::insert::budget::sigmas(&covariance);
+    report.base_from_part = base_from_part;
+    report.base_from_constructed = base_from_part;
+    report.within_tolerance = within_tolerance(recipe, report.sigma_mm, report.sigma_deg);
+    report.poses = report.passed.then(|| poses_at(&base_from_part, recipe, robot));
+    report.looks = Some(disagreement);
+    Ok(report)
+}
+
+/// The gate of recipes that ask for more than one look; several looks meet it together.
+const LOOKS: &str = "number of looks";
+
+/// The gates that a look missed by itself, in words.
+fn missed(gates: &[Gate]) -> impl Iterator<Item = String> {
+    gates.iter().filter(|g| !g.passed && g.name != LOOKS).map(Gate::words)
+}
+
+fn gates(
+    g: &Gates,
+    found: &Match,
+    recipe: &Recipe,
+    budget: &Budget,
+    agreement: &Agreement,
+    turns: &[TurnVote],
+    disagreement: Option<f64>,
+) -> Vec<Gate> {
+    let (least, most) = (Gate::least, Gate::most);
+    let margin = 1.0 - rival_score(found, recipe) / found.score.max(1e-9);
+    let mut out = vec![
+        least("score", found.score, g.min_score),
+        least("margin", margin, g.min_margin),
+        least("coverage", agreement.coverage, g.min_coverage),
+        least("agreement", agreement.agreement, g.min_agreement),
+        least("edges seen", agreement.edges, g.min_edges),
+        most("edges crossed", agreement.crossed, g.max_crossed),
+        most("sigma_mm", budget.sigma_mm.iter().copied().fold(0.0, f64::max), g.max_sigma_mm),
+        most("sigma_deg", budget.sigma_deg.iter().copied().fold(0.0, f64::max), g.max_sigma_deg),
+    ];
+    if let Some(d) = disagreement {
+        out.push(most("disagreement_mm", d, g.max_disagreement_mm));
+    }
+    if g.turn_must_be_told {
+        out.extend(turns.iter().map(TurnVote::gate));
+    }
+    if g.second_look {
+        out.push(least(LOOKS, 1.0, 2.0));
+    }
+    out
+}
+
+/// The best rival that is neither one of the part's alike turns nor, for a long part, a shift along
+/// itself: those are told apart by the points.
+fn rival_score(found: &Match, recipe: &Recipe) -> f64 {
+    let long = long_axis(&recipe.drawing());
+    let alike = |pose: &Pose| {
+        (0..recipe.alike_turns).any(|k| {
+            let turn = std::f64::consts::TAU * f64::from(k) / f64::from(recipe.alike_turns);
+            let d = crate::find::search::coarse::turn_between(pose.angle - found.pose.angle, turn);
+            let (s, c) = found.pose.angle.sin_cos();
+            let (dx, dy) = ((pose.x - found.pose.x) * recipe.cell_mm, (pose.y - found.pose.y) * recipe.cell_mm);
+            let (along, across) = (c * dx + s * dy, c * dy - s * dx);
+            let free = |axis: usize, shift: f64| long == Some(axis) || shift.abs() < 1.0;
+            // A shift of a long part swings its middle aside by what the turn is off.
+            let swing = if long.is_some() { 3.0 } else { 1.0 };
+            d < 3f64.to_radians() && free(0, along / swing) && free(1, across / swing)
+        })
+    };
+    found.rivals.iter().filter(|r| !alike(&r.0)).map(|r| r.1).fold(0.0, f64::max)
+}

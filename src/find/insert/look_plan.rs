@@ -1,0 +1,71 @@
+//! In: a part found in one scan, how its camera stood, the calibrations. Out: where the sensor goes for a second look, and for
+//! each number of each calibration how much of its error the two looks together can show.
+//! Frame and unit: base frame, mm; shares of 0 to 2. docs/math.md, Second look.
+
+use super::budget::Lever;
+use super::locate::Report;
+use super::looks::{other_side, seen_from};
+use crate::fault::{Fault, Result};
+use crate::geometry::{Base, Rigid};
+use crate::rig::Rig;
+
+/// What the looks can show of one number of one calibration.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Shown {
+    pub calibration: &'static str,
+    pub parameter: &'static str,
+    /// Difference between the looks over the error that it makes in the pose: in place and height, mm over mm. Below
+    /// [`HIDDEN`] the looks cannot show it.
+    pub share: f64,
+}
+
+/// A second look.
+#[derive(Clone, Debug)]
+pub struct LookPlan {
+    /// The sensor's motion: every pose of the first scan is moved by it.
+    pub base_from_base: Rigid<Base, Base>,
+    pub shown: Vec<Shown>,
+}
+
+/// An error of which less than this shows stays hidden.
+pub const HIDDEN: f64 = 0.3;
+
+impl LookPlan {
+    /// What the two looks leave to be shown by other means, in words.
+    pub fn hidden(&self) -> Vec<String> {
+        let hidden = self.shown.iter().filter(|s| s.share < HIDDEN);
+        hidden.map(|s| format!("{} {}: {:.0} % shows", s.calibration, s.parameter, 100.0 * s.share)).collect()
+    }
+}
+
+/// Plans a second look: turned about the part's normal by `turn_deg` (60 to 300) and tilted about its x by `tilt_deg` (-45 to
+/// 45). Errors: numbers out of range, a scan that does not fit the rig.
+pub fn plan_look(report: &Report, rig: &Rig, turn_deg: f64, tilt_deg: f64) -> Result<LookPlan> {
+    if !(60.0..=300.0).contains(&turn_deg) || !(10.0..=45.0).contains(&tilt_deg.abs()) {
+        return Err(Fault::usage(format!(
+            "a second look turned by {turn_deg} and tilted by {tilt_deg} degrees, 60 to 300 and 10 to 45 either way are planned"
+        ))
+        .cause("a look from nearly the same side makes the same error again")
+        .next("give --turn 180 --tilt 20, or what the robot can reach"));
+    }
+    let part = &report.base_from_part;
+    let Some(camera) = report.budget.base_from_camera else {
+        return Err(Fault::refused("the scan does not say how its camera stood")
+            .cause("another station's scan, or too few points of one shot on the part")
+            .next("give the station that scanned"));
+    };
+    let other = seen_from(&camera, part, turn_deg, tilt_deg);
+    let target = camera.inverse().point(&part.translation);
+    let second = crate::find::insert::budget::levers(&other, &target, rig);
+    let shown = report.budget.levers.iter().zip(&second).flat_map(|(a, b)| shares(a, b)).collect();
+    Ok(LookPlan { base_from_base: other_side(part, turn_deg, tilt_deg), shown })
+}
+
+fn shares<'a>(first: &'a Lever, second: &'a Lever) -> impl Iterator<Item = Shown> + 'a {
+    (0..first.jacobian.ncols()).map(move |k| {
+        let (a, b) = (first.jacobian.column(k), second.jacobian.column(k));
+        let (error, seen) = (a.rows(0, 3).norm(), (b.rows(0, 3) - a.rows(0, 3)).norm());
+        let share = if error > 0.0 { seen / error } else { 1.0 };
+        Shown { calibration: first.name, parameter: first.parameters[k], share }
+    })
+}

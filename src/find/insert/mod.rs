@@ -1,0 +1,16 @@
+//! In: a scan, a recipe, the rig's calibrations. Out: the insertion pose with its error budget and gates, or a refusal.
+//! Frame and unit: base frame; mm, degrees.
+
+pub mod budget;
+mod from_drawing;
+pub mod gate;
+pub mod locate;
+mod look_plan;
+pub mod looks;
+pub mod picture;
+pub mod recipe;
+pub mod teach;
+pub mod verdict;
+
+pub use from_drawing::{TaskOptions, recipe_of};
+pub use look_plan::{LookPlan, Shown, plan_look};

@@ -1,0 +1,287 @@
+//! In: a recipe (TOML): what a part looks like, how it is searched and measured, what is constructed on
+//! it, where the tool goes, and below which quality no pose leaves.
+//! Out: the same, checked. Frame and unit: part frame; mm, degrees.
+
+use crate::fault::{Fault, Result};
+use crate::find::measure::construct;
+use crate::find::measure::construct::Construction;
+use crate::find::measure::options::MeasureOptions;
+use crate::find::model::drawing::Drawing;
+use crate::find::model::shape::Shape;
+use crate::find::model::shape_model::ModelOptions;
+use crate::find::scene::Kind;
+use crate::find::search::options::SearchOptions;
+use std::path::Path;
+
+/// One task: a part and what is done with it.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Recipe {
+    /// Version of this format: 1.
+    pub format: u32,
+    pub name: String,
+    #[serde(default)]
+    pub title: String,
+    /// Edge of a cell of the map that is searched, mm, 0.0001 to 500. About two sampling steps.
+    pub cell_mm: f64,
+    /// Layers that are searched. Default height alone.
+    #[serde(default = "height")]
+    pub layers: Vec<Kind>,
+    /// How many turns about z make the part look nearly alike (2: half a turn). Told apart by what is
+    /// seen where they differ. 1 to 8.
+    #[serde(default = "one")]
+    pub alike_turns: u32,
+    #[serde(default)]
+    pub search: SearchOptions,
+    #[serde(default)]
+    pub model: ModelOptions,
+    #[serde(default)]
+    pub measure: MeasureOptions,
+    /// The drawing; the first shape lies on the datum surface.
+    pub shape: Vec<Shape>,
+    #[serde(default)]
+    pub construction: Vec<Construction>,
+    pub insertion: InsertionSpec,
+    #[serde(default)]
+    pub gates: Gates,
+    #[serde(default)]
+    pub robot: RobotSpec,
+}
+
+/// Where the tool goes.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InsertionSpec {
+    /// "pose": the part's pose from all edges; or the name of a construction whose deviation moves it.
+    #[serde(default = "pose")]
+    pub construction: String,
+    /// The paper's construction and the lattice fit, whose disagreement is reported and gated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub two_pin: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lattice: Option<String>,
+    /// The tool's origin in the part frame, mm.
+    #[serde(default)]
+    pub offset_mm: [f64; 3],
+    /// The tool's turn about the part's z, degrees.
+    #[serde(default)]
+    pub turn_deg: f64,
+    /// Distances above the insertion pose along the part's z, mm, 0 to 1000.
+    pub approach_mm: f64,
+    pub retract_mm: f64,
+    /// What the insertion bears: 3 sigma in the plane must stay within it, mm and degrees.
+    pub tolerance_mm: f64,
+    pub tolerance_deg: f64,
+}
+
+impl InsertionSpec {
+    /// The tool goes to the part's own pose; tolerances in the plane and as a turn, distances above it.
+    pub fn at_the_part(tolerance: (f64, f64), approach_mm: f64, retract_mm: f64) -> InsertionSpec {
+        InsertionSpec {
+            construction: pose(),
+            two_pin: None,
+            lattice: None,
+            offset_mm: [0.0; 3],
+            turn_deg: 0.0,
+            approach_mm,
+            retract_mm,
+            tolerance_mm: tolerance.0,
+            tolerance_deg: tolerance.1,
+        }
+    }
+}
+
+impl Recipe {
+    /// A drawing and a task; all else, gates too, as where a file names nothing.
+    pub fn new(name: &str, cell_mm: f64, shape: Vec<Shape>, insertion: InsertionSpec) -> Recipe {
+        Recipe {
+            format: 1,
+            name: name.into(),
+            title: String::new(),
+            cell_mm,
+            layers: height(),
+            alike_turns: one(),
+            search: Default::default(),
+            model: Default::default(),
+            measure: Default::default(),
+            shape,
+            construction: Vec::new(),
+            insertion,
+            gates: Gates::default(),
+            robot: RobotSpec::default(),
+        }
+    }
+}
+
+/// No pose leaves when one of these is missed.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Gates {
+    /// Least search score, 0 to 1.
+    pub min_score: f64,
+    /// Least lead over the best other pose, 1 - second / first, 0 to 1; alike turns are told apart apart.
+    pub min_margin: f64,
+    /// Largest standard deviation in the plane and along z, mm.
+    pub max_sigma_mm: f64,
+    /// Largest standard deviation of any turn, degrees.
+    pub max_sigma_deg: f64,
+    /// Least share of the part's surfaces that was seen, 0 to 1.
+    pub min_coverage: f64,
+    /// Least share of points at and beside the part that lie where the drawing says, 0 to 1.
+    pub min_agreement: f64,
+    /// Least share of the drawn edges at which a surface was seen to end, 0 to 1.
+    pub min_edges: f64,
+    /// Largest share of the drawn edges beyond which the surface goes on, 0 to 1.
+    pub max_crossed: f64,
+    /// Largest disagreement between the two-pin construction and the lattice fit, mm.
+    pub max_disagreement_mm: f64,
+    /// False lets a part pass whose alike turns could not be told apart.
+    pub turn_must_be_told: bool,
+    /// True refuses a pose that rests on one look alone.
+    pub second_look: bool,
+    /// Largest disagreement of two looks over what all covariances make expect, 1 to 10.
+    pub max_look_ratio: f64,
+    /// Least turn about the part's normal and least tilt against it from one look to the other, degrees, 0 to 180 and 0 to 60:
+    /// looks from one side make the same error twice.
+    pub min_look_turn_deg: f64,
+    pub min_look_tilt_deg: f64,
+}
+
+impl Default for Gates {
+    fn default() -> Self {
+        Gates {
+            min_score: 0.5,
+            min_margin: 0.04,
+            max_sigma_mm: 0.08,
+            max_sigma_deg: 0.2,
+            min_coverage: 0.3,
+            min_agreement: 0.9,
+            min_edges: 0.15,
+            max_crossed: 0.05,
+            max_disagreement_mm: 0.2,
+            turn_must_be_told: true,
+            second_look: false,
+            max_look_ratio: 3.0,
+            min_look_turn_deg: 60.0,
+            min_look_tilt_deg: 10.0,
+        }
+    }
+}
+
+/// What the robot itself adds.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RobotSpec {
+    /// Standard deviation of a reached position, mm, and turn, degrees: its repeatability.
+    pub sigma_mm: f64,
+    pub sigma_deg: f64,
+}
+
+impl Default for RobotSpec {
+    fn default() -> Self {
+        RobotSpec { sigma_mm: 0.02, sigma_deg: 0.004 }
+    }
+}
+
+fn height() -> Vec<Kind> {
+    vec![Kind::Height]
+}
+fn one() -> u32 {
+    1
+}
+fn pose() -> String {
+    "pose".into()
+}
+
+impl Recipe {
+    pub fn load(path: &Path) -> Result<Recipe> {
+        let text = crate::files::read_text(path)?;
+        Recipe::parse(&text).map_err(|e| e.at(path.display()))
+    }
+
+    /// Parses and checks; unknown keys and impossible constructions are refused.
+    pub fn parse(text: &str) -> Result<Recipe> {
+        let recipe: Recipe = toml::from_str(text).map_err(|e| {
+            Fault::input(format!("is not a recipe: {}", e.to_string().trim_end()))
+                .cause(crate::files::slip_at(
+                    text,
+                    e.span().map_or(0, |s| s.start),
+                    "a misspelt key, a missing entry, or a value of the wrong type",
+                ))
+                .next("compare it with docs/file-formats.md, Recipe")
+        })?;
+        recipe.check()?;
+        Ok(recipe)
+    }
+
+    pub fn drawing(&self) -> Drawing {
+        Drawing { shape: self.shape.clone() }
+    }
+
+    pub fn check(&self) -> Result<()> {
+        let range = |name: &str, v: f64, a: f64, b: f64| {
+            if (a..=b).contains(&v) {
+                Ok(())
+            } else {
+                Err(Fault::input(format!("{name} is {v}, wanted {a} to {b}")).next("correct the recipe"))
+            }
+        };
+        range("format", f64::from(self.format), 1.0, 1.0)?;
+        crate::files::named("name", &self.name)?;
+        range("cell_mm", self.cell_mm, 1e-4, 500.0)?;
+        range("alike_turns", f64::from(self.alike_turns), 1.0, 8.0)?;
+        if self.layers.is_empty() {
+            return Err(Fault::input("layers is empty").next("name height, intensity or both"));
+        }
+        self.search.check()?;
+        self.model.check()?;
+        self.measure.check()?;
+        let drawing = self.drawing();
+        drawing.check()?;
+        // Coarser cells show nothing of the part.
+        let b = drawing.bounds();
+        range("cell_mm", self.cell_mm, 0.0, (b[2] - b[0]).max(b[3] - b[1]) / 8.0)?;
+        if drawing.faces().is_empty() {
+            return Err(Fault::input("the recipe draws no surface: nothing gives height and tilt")
+                .cause("only lines, arcs or shapes with inside = \"either\"")
+                .next("draw the datum surface first, as a rectangle, circle or polygon"));
+        }
+        construct::check(&self.construction, &drawing)?;
+        let i = &self.insertion;
+        range("approach_mm", i.approach_mm, 0.0, 1000.0)?;
+        range("retract_mm", i.retract_mm, 0.0, 1000.0)?;
+        range("tolerance_mm", i.tolerance_mm, 1e-4, 100.0)?;
+        range("tolerance_deg", i.tolerance_deg, 1e-3, 10.0)?;
+        range("turn_deg", i.turn_deg, -360.0, 360.0)?;
+        for o in i.offset_mm {
+            range("offset_mm", o, -1e4, 1e4)?;
+        }
+        let named = [Some(&i.construction).filter(|n| *n != "pose"), i.two_pin.as_ref(), i.lattice.as_ref()];
+        for name in named.into_iter().flatten() {
+            if !self.construction.iter().any(|c| c.name == *name) {
+                return Err(Fault::input(format!("the insertion refers to '{name}', which is no construction"))
+                    .cause("a misspelt name")
+                    .next("add it under [[construction]]"));
+            }
+        }
+        let g = &self.gates;
+        for (name, v) in [
+            ("gates.min_score", g.min_score),
+            ("gates.min_margin", g.min_margin),
+            ("gates.min_coverage", g.min_coverage),
+            ("gates.min_agreement", g.min_agreement),
+            ("gates.min_edges", g.min_edges),
+            ("gates.max_crossed", g.max_crossed),
+        ] {
+            range(name, v, 0.0, 1.0)?;
+        }
+        range("gates.max_sigma_mm", g.max_sigma_mm, 1e-5, 100.0)?;
+        range("gates.max_sigma_deg", g.max_sigma_deg, 1e-4, 10.0)?;
+        range("gates.max_disagreement_mm", g.max_disagreement_mm, 1e-5, 100.0)?;
+        range("gates.max_look_ratio", g.max_look_ratio, 1.0, 10.0)?;
+        range("gates.min_look_turn_deg", g.min_look_turn_deg, 0.0, 180.0)?;
+        range("gates.min_look_tilt_deg", g.min_look_tilt_deg, 0.0, 60.0)?;
+        range("robot.sigma_mm", self.robot.sigma_mm, 0.0, 10.0)?;
+        range("robot.sigma_deg", self.robot.sigma_deg, 0.0, 10.0)
+    }
+}

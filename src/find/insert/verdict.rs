@@ -1,0 +1,214 @@
+//! In: the points of a scan and a measured pose. Out: how far the points agree with the drawing there,
+//! how much of the part was seen, and which of its alike turns it is.
+//! Frame and unit: part frame, mm.
+
+use super::gate::Gate;
+use crate::find::measure::options::MeasureOptions;
+use crate::find::measure::points::{Ordered, localise};
+use crate::find::measure::pose::Measured;
+use crate::find::model::drawing::Drawing;
+use crate::find::model::edge_index::EdgeIndex;
+use crate::find::model::face::Face;
+use crate::geometry::{Base, Part, Rigid, Vec3};
+
+/// What the points say about a pose.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Agreement {
+    /// Share of the points inside surfaces that lie on them, and how many points that were.
+    pub on_surface: f64,
+    pub surface_points: usize,
+    /// Share of the points in holes and beside the part that do not lie on a surface, and how many.
+    pub beside: f64,
+    pub beside_points: usize,
+    /// The smaller of the two.
+    pub agreement: f64,
+    /// Share of the drawn surfaces (in squares of 1.2 margins) on which points were seen.
+    pub coverage: f64,
+    /// Share of the drawn edges (in pieces of a margin) at which a surface was seen to end.
+    pub edges: f64,
+    /// Share of the drawn edges beyond which the surface goes on: another, larger part.
+    pub crossed: f64,
+}
+
+/// Lengths of the judgement, in the recipe's unit.
+struct Lengths {
+    /// Points nearer than this to an edge say nothing about what is surface and what is not, mm.
+    margin: f64,
+    /// The same where turns are told apart, mm.
+    turn_margin: f64,
+    /// Ring around the part that is looked at, mm.
+    ring: f64,
+    square: f64,
+    piece: f64,
+}
+
+impl Lengths {
+    fn of(options: &MeasureOptions) -> Lengths {
+        let at = |mm: f64| mm * options.unit();
+        Lengths { margin: at(0.4), turn_margin: at(0.3), ring: at(1.2), square: at(0.6), piece: at(0.5) }
+    }
+}
+
+/// Judges a pose.
+pub fn judge(points: &Ordered, drawing: &Drawing, measured: &Measured, options: &MeasureOptions) -> Agreement {
+    let Lengths { margin, ring, square, piece: side, .. } = Lengths::of(options);
+    let gate = options.height_gate_mm;
+    let faces = drawing.faces();
+    let edges = EdgeIndex::new(drawing, options.unit());
+    let local = localise(points, drawing, &measured.base_from_part, options);
+    let b = drawing.bounds();
+    let (mut on, mut inside, mut clear, mut beside) = (0usize, 0usize, 0usize, 0usize);
+    let cell = |x: f64, y: f64| ((x / square).floor() as i32, (y / square).floor() as i32);
+    let mut seen = std::collections::HashSet::new();
+    let mut crossed = std::collections::HashSet::new();
+    let piece = |x: f64, y: f64, shape: usize| ((x / side).floor() as i32, (y / side).floor() as i32, shape);
+    for q in local.iter().flatten() {
+        if q.x < b[0] - ring || q.x > b[2] + ring || q.y < b[1] - ring || q.y > b[3] + ring {
+            continue;
+        }
+        let at = |f: &Face| (q.z - f.z).abs() <= gate;
+        let here: Vec<&Face> = faces.iter().filter(|f| f.material(q.x, q.y)).collect();
+        if here.iter().any(|f| at(f)) {
+            seen.insert(cell(q.x, q.y));
+        }
+        if edges.nearest(q.x, q.y, margin, |_| true).is_some() {
+            continue;
+        }
+        if here.is_empty() {
+            beside += 1;
+            clear += usize::from(!faces.iter().any(at));
+            for f in faces.iter().filter(|f| at(f)) {
+                if let Some(s) = edges.nearest(q.x, q.y, ring, |s| s.z == f.z && s.locates) {
+                    crossed.insert(piece(s.x, s.y, s.shape));
+                }
+            }
+        } else {
+            inside += 1;
+            on += usize::from(here.iter().any(|f| at(f)));
+        }
+    }
+    let (x0, y0) = cell(b[0], b[1]);
+    let (x1, y1) = cell(b[2], b[3]);
+    let (mut drawn, mut covered) = (0usize, 0usize);
+    for cy in y0..=y1 {
+        for cx in x0..=x1 {
+            let (x, y) = ((f64::from(cx) + 0.5) * square, (f64::from(cy) + 0.5) * square);
+            if faces.iter().any(|f| f.material(x, y)) {
+                drawn += 1;
+                covered += usize::from(seen.contains(&(cx, cy)));
+            }
+        }
+    }
+    let all: std::collections::HashSet<_> = edges.samples().iter().map(|s| piece(s.x, s.y, s.shape)).collect();
+    let ended: std::collections::HashSet<_> = measured
+        .observations
+        .iter()
+        .filter(|o| o.weight > 0.0)
+        // By the drawing's own sample: a coordinate of an edge may lie between two pieces, where rounding decides.
+        .filter_map(|o| {
+            let (x, y) = (o.x - o.residual * o.nx, o.y - o.residual * o.ny);
+            edges.nearest(x, y, side, |s| (s.shape, s.element) == (o.shape, o.element))
+        })
+        .map(|s| piece(s.x, s.y, s.shape))
+        .collect();
+    let share = |n: usize, of: usize| if of == 0 { 0.0 } else { n as f64 / of as f64 };
+    let on_surface = share(on, inside);
+    // Without any point beside the part nothing contradicts it there.
+    let free = if beside == 0 { 1.0 } else { share(clear, beside) };
+    Agreement {
+        on_surface,
+        surface_points: inside,
+        beside: free,
+        beside_points: beside,
+        agreement: on_surface.min(free),
+        coverage: share(covered, drawn),
+        edges: share(ended.len(), all.len()),
+        crossed: share(crossed.len(), all.len()),
+    }
+}
+
+/// Votes for one turn of the part against another.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct TurnVote {
+    /// Turn of the rival, degrees.
+    pub rival_deg: f64,
+    /// Points where the two differ that speak for and against the pose.
+    pub votes_for: usize,
+    pub votes_against: usize,
+}
+
+impl TurnVote {
+    /// Fewer votes tell nothing; a larger share of them decides.
+    const LEAST: usize = 6;
+    const SHARE: f64 = 0.8;
+
+    fn all(&self) -> usize {
+        self.votes_for + self.votes_against
+    }
+
+    fn share(&self) -> f64 {
+        self.votes_for as f64 / self.all().max(1) as f64
+    }
+
+    /// `Some(true)`: the pose; `Some(false)`: the rival; `None`: not told.
+    pub fn told(&self) -> Option<bool> {
+        match self.share() {
+            _ if self.all() < Self::LEAST => None,
+            share if share >= Self::SHARE => Some(true),
+            share if share <= 1.0 - Self::SHARE => Some(false),
+            _ => None,
+        }
+    }
+
+    /// The gate that asks for it: too few votes, or what they say.
+    pub fn gate(&self) -> Gate {
+        let (name, value, limit) = if self.all() < Self::LEAST {
+            ("points that tell the turn", self.all() as f64, Self::LEAST as f64)
+        } else {
+            ("turn told", self.share(), Self::SHARE)
+        };
+        Gate { name, value, limit, passed: self.told() == Some(true) }
+    }
+}
+
+/// Counts, where the part and the part turned differ, the points that fit the one or the other.
+pub fn vote(
+    points: &Ordered,
+    drawing: &Drawing,
+    pose: &Rigid<Base, Part>,
+    turns: u32,
+    options: &MeasureOptions,
+) -> Vec<TurnVote> {
+    let (margin, gate) = (Lengths::of(options).turn_margin, options.height_gate_mm);
+    let faces = drawing.faces();
+    let edges = EdgeIndex::new(drawing, options.unit());
+    let local = localise(points, drawing, pose, options);
+    (1..turns)
+        .map(|k| {
+            let angle = std::f64::consts::TAU * f64::from(k) / f64::from(turns);
+            let back: Rigid<Part, Part> = Rigid::from_vectors(&Vec3::new(0.0, 0.0, -angle), Vec3::zeros());
+            let mut out = TurnVote { rival_deg: angle.to_degrees(), votes_for: 0, votes_against: 0 };
+            for q in local.iter().flatten() {
+                let r = back.point(q);
+                for f in &faces {
+                    let (mine, theirs) = (f.material(q.x, q.y), f.material(r.x, r.y));
+                    let near = |p: &Vec3| edges.nearest(p.x, p.y, margin, |s| s.z == f.z).is_some();
+                    if mine == theirs || near(q) || near(&r) {
+                        continue;
+                    }
+                    let on = (q.z - f.z).abs() <= gate;
+                    // A point above the surface is a thing that lies on it: no vote.
+                    if !on && q.z > f.z {
+                        continue;
+                    }
+                    if on == mine {
+                        out.votes_for += 1;
+                    } else {
+                        out.votes_against += 1;
+                    }
+                }
+            }
+            out
+        })
+        .collect()
+}

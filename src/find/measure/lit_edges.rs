@@ -1,0 +1,274 @@
+//! In: the points of a scan near a part whose pose is known to some tenths of a millimetre. Out: its place and turn from
+//! how much of the sheet's light each sample beside an edge still sends back (docs/math.md, Insertion (3) and (4)).
+//! Frame and unit: a correction in the part frame: x y mm, turn about z rad; light as a share of a fully lit sample's.
+
+use super::edge_pieces::{N, PRIORS, Row, Unknowns, solve};
+use super::options::MeasureOptions;
+use super::points::Ordered;
+use crate::find::model::drawn_edges::EdgeSample;
+use crate::find::model::edge_index::EdgeIndex;
+use crate::find::model::face::Face;
+use crate::geometry::Vec3;
+use nalgebra::{Matrix3, Vector2, Vector3};
+
+/// Least width of the fall: a sharper one would make single samples decide.
+const SHARPEST: f64 = 0.03;
+/// A sample this far inside an edge is fully lit, and so near to it at most may it be to measure the edge.
+const DEEP: f64 = 0.6;
+const NEAR: f64 = 0.8;
+/// Edges farther away than this take no light.
+const BEYOND: f64 = 1.0;
+/// Fully lit samples around a partly lit one, within the first of these distances that holds enough, give its full light:
+/// between a row of pins and an edge none are near.
+const AROUND: [f64; 4] = [1.6, 3.2, 6.4, 12.8];
+const MIN_FULL: usize = 6;
+/// A second edge at least so many widths away dims a sample a little, which is predicted; a nearer one decides it.
+const APART: f64 = 1.5;
+/// Samples lit by less than half may show another surface's light; more than 2.5 widths inside none is missing.
+const USED: [f64; 2] = [0.0, 2.5];
+const MIN_SAMPLES: usize = 60;
+const ROUNDS: usize = 6;
+/// Shots whose height noise shows how far the robot's reported poses scatter; and the share of it that is added for the
+/// scatter of its turns, which act over the length of the tool and show in the plane only.
+const MIN_SHOTS: usize = 8;
+const TURNS_TOO: f64 = 1.4;
+
+/// The place and turn that the lit samples say.
+pub(in crate::find) struct Lit {
+    /// Correction x, y, turn.
+    pub step: Vector3<f64>,
+    pub covariance: Matrix3<f64>,
+    pub samples: usize,
+    /// Robust deviation of the light from the model, as a share of full light.
+    pub sigma: f64,
+}
+
+struct Sample {
+    at: Vector2<f64>,
+    light: f64,
+    row: u32,
+    z: f64,
+}
+
+/// Fits the light of the samples beside locating edges; `None` where too few are seen.
+pub(in crate::find) fn fit_light(
+    points: &Ordered,
+    local: &[Option<Vec3>],
+    faces: &[Face],
+    edges: &EdgeIndex,
+    options: &MeasureOptions,
+) -> Option<Lit> {
+    let on: Vec<Option<f64>> = local.iter().map(|q| face_of(q.as_ref()?, faces, options.height_gate_mm)).collect();
+    let unit = edges.unit();
+    let [along, across] = sampling(points, local, &on)?;
+    let slant = slant(points, local, unit);
+    let deep: Vec<bool> = (0..on.len())
+        .map(|i| {
+            let (Some(q), Some(z)) = (&local[i], on[i]) else { return false };
+            faces.iter().any(|f| f.z == z && f.material(q.x, q.y))
+                && edges.nearest(q.x, q.y, DEEP * unit, |s| s.z == z).is_none()
+        })
+        .collect();
+    let mut samples = Vec::new();
+    for i in (0..on.len()).filter(|&i| !deep[i]) {
+        let (Some(q), Some(z)) = (&local[i], on[i]) else { continue };
+        if edges.nearest(q.x, q.y, NEAR * unit, |s| s.z == z && s.locates).is_none() {
+            continue;
+        }
+        let Some(full) = full_light(points, local, &deep, &on, i, [along.norm(), across.norm()], unit) else {
+            continue;
+        };
+        // Where the middle of the sheet meets the surface: the middle of a cut spot lies off the sheet's.
+        let at = Vector2::new(q.x, q.y) + slant * (q.z - z);
+        samples.push(Sample { at, light: f64::from(points.intensity[i]) / full, row: points.row[i], z });
+    }
+    let scatter = TURNS_TOO * pose_scatter(points, local, &deep, &on);
+    let bias = options.edge_bias * along.norm().max(across.norm());
+    let directions = [along.normalize(), across.normalize()];
+    let mut x = Unknowns::zeros();
+    PRIORS.iter().for_each(|p| x[p.0] = p.1 * unit);
+    let mut last = None;
+    for _ in 0..ROUNDS {
+        let rows: Vec<Row> = samples.iter().filter_map(|s| row(s, edges, &x, &directions)).collect();
+        if rows.len() < MIN_SAMPLES {
+            return None;
+        }
+        let solved = solve(&rows, &x, bias, scatter, unit)?;
+        x += solved.step;
+        (5..N).for_each(|k| x[k] = x[k].max(SHARPEST * unit));
+        last = Some((solved, rows.len()));
+    }
+    let (solved, samples) = last?;
+    let covariance = solved.covariance.fixed_view::<3, 3>(0, 0).into();
+    Some(Lit { step: Vector3::new(x[0], x[1], x[2]), covariance, samples, sigma: solved.sigma })
+}
+
+fn face_of(q: &Vec3, faces: &[Face], gate: f64) -> Option<f64> {
+    faces.iter().map(|f| f.z).find(|z| (q.z - z).abs() <= gate)
+}
+
+/// The usual steps between neighbouring samples along the stripe and from shot to shot, in the part's plane.
+fn sampling(points: &Ordered, local: &[Option<Vec3>], on: &[Option<f64>]) -> Option<[Vector2<f64>; 2]> {
+    let median = |mut v: Vec<f64>| {
+        let middle = v.len() / 2;
+        *v.select_nth_unstable_by(middle, f64::total_cmp).1
+    };
+    let step = |dr: i64, dc: i64| {
+        let (mut x, mut y) = (vec![], vec![]);
+        for i in (0..on.len()).filter(|&i| on[i].is_some()) {
+            let next = points.at(i64::from(points.row[i]) + dr, i64::from(points.column[i]) + dc);
+            if let (Some(p), Some(q)) = (&local[i], next.filter(|&n| on[n] == on[i]).and_then(|n| local[n])) {
+                x.push(q.x - p.x);
+                y.push(q.y - p.y);
+            }
+        }
+        (x.len() >= 20).then(|| Vector2::new(median(x), median(y))).filter(|s| s.norm() > 0.0)
+    };
+    Some([step(0, 1)?, step(1, 0)?])
+}
+
+/// How far the sheet moves in the part's plane for a millimetre of height, from the points of the shots themselves, which
+/// lie in it; zero where they all lie on one line.
+fn slant(points: &Ordered, local: &[Option<Vec3>], unit: f64) -> Vector2<f64> {
+    let mut rows = std::collections::BTreeMap::<u32, Vec<Vec3>>::new();
+    for (q, row) in local.iter().zip(&points.row) {
+        if let Some(q) = q {
+            rows.entry(*row).or_default().push(*q);
+        }
+    }
+    let (mut scatter, mut n) = (Matrix3::zeros(), 0.0);
+    for list in rows.values().filter(|l| l.len() > 10) {
+        let mean = list.iter().sum::<Vec3>() / list.len() as f64;
+        list.iter().for_each(|p| scatter += (p - mean) * (p - mean).transpose());
+        n += list.len() as f64;
+    }
+    let eigen = scatter.symmetric_eigen();
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+    let normal = eigen.eigenvectors.column(order[0]);
+    let flat = Vector2::new(normal.x, normal.y);
+    // 0.3 units of height differences, and a sheet that is not parallel to the surface.
+    let told = n > 0.0 && (eigen.eigenvalues[order[1]] / n).sqrt() > 0.3 * unit && flat.norm() > 0.1;
+    if told { flat * (normal.z / flat.norm_squared()) } else { Vector2::zeros() }
+}
+
+/// Mean light of the fully lit samples around one.
+fn full_light(
+    points: &Ordered,
+    local: &[Option<Vec3>],
+    deep: &[bool],
+    on: &[Option<f64>],
+    i: usize,
+    step: [f64; 2],
+    unit: f64,
+) -> Option<f64> {
+    let q = local[i]?;
+    for around in AROUND.map(|a| a * unit) {
+        let reach = step.map(|s| (around / s).ceil().min(80.0) as i64);
+        // A few hundred places are enough.
+        let stride = reach.map(|r| (r / 8).max(1) as usize);
+        let (mut sum, mut n) = (0.0, 0usize);
+        for dr in (-reach[1]..=reach[1]).step_by(stride[1]) {
+            for dc in (-reach[0]..=reach[0]).step_by(stride[0]) {
+                let there = points.at(i64::from(points.row[i]) + dr, i64::from(points.column[i]) + dc);
+                let Some(k) = there.filter(|&k| deep[k] && on[k] == on[i]) else { continue };
+                if local[k].is_some_and(|p| (p - q).norm() < around) {
+                    sum += f64::from(points.intensity[k]);
+                    n += 1;
+                }
+            }
+        }
+        if n >= MIN_FULL && sum > 0.0 {
+            return Some(sum / n as f64);
+        }
+    }
+    None
+}
+
+/// Standard deviation of the shots' heights beyond what their points' noise explains: the poses' own, mm.
+fn pose_scatter(points: &Ordered, local: &[Option<Vec3>], deep: &[bool], on: &[Option<f64>]) -> f64 {
+    let mut shots = std::collections::BTreeMap::<u32, Vec<f64>>::new();
+    for i in (0..deep.len()).filter(|&i| deep[i]) {
+        if let (Some(q), Some(z)) = (&local[i], on[i]) {
+            shots.entry(points.row[i]).or_default().push(q.z - z);
+        }
+    }
+    let (mut means, mut noise) = (vec![], vec![]);
+    for list in shots.values().filter(|l| l.len() >= MIN_SHOTS) {
+        let n = list.len() as f64;
+        let mean = list.iter().sum::<f64>() / n;
+        means.push(mean.abs());
+        // The stripe is smoothed along itself: about three neighbours share one noise.
+        noise.push(list.iter().map(|z| (z - mean).powi(2)).sum::<f64>() / n / (n / 3.0));
+    }
+    if means.len() < MIN_SHOTS {
+        return 0.0;
+    }
+    let median = |v: &mut Vec<f64>| {
+        let middle = v.len() / 2;
+        *v.select_nth_unstable_by(middle, f64::total_cmp).1
+    };
+    let (all, own) = (1.4826 * median(&mut means), median(&mut noise));
+    (all * all - own).max(0.0).sqrt()
+}
+
+/// The light that a sample should send back, its derivatives, and which piece of which edge it measures.
+fn row(s: &Sample, edges: &EdgeIndex, x: &Unknowns, directions: &[Vector2<f64>; 2]) -> Option<Row> {
+    let (sin, cos) = x[2].sin_cos();
+    let (dx, dy) = (s.at.x - x[0], s.at.y - x[1]);
+    let (px, py) = (cos * dx + sin * dy, cos * dy - sin * dx);
+    let edge = edges.nearest_locating(px, py, NEAR * edges.unit(), s.z)?;
+    let EdgeSample { nx, ny, .. } = *edge;
+    let (t, share, width) = widths_inside(edge, px, py, x, directions);
+    if !(USED[0]..USED[1]).contains(&t) {
+        return None;
+    }
+    // A round edge turns away by itself.
+    let same = |o: &EdgeSample| (o.shape, o.element) == (edge.shape, edge.element) && o.curvature != 0.0;
+    let other = edges.nearest(px, py, BEYOND * edges.unit(), |o| o.z == s.z && o.nx * nx + o.ny * ny < 0.8 && !same(o));
+    let spared = match other.map(|o| widths_inside(o, px, py, x, directions).0) {
+        Some(t) if t < APART => return None,
+        Some(t) => fall(t).0,
+        None => 1.0,
+    };
+    let (lit, slope) = fall(t);
+    let (lit, slope) = (lit * spared, slope * spared / width);
+    let mut j = Unknowns::zeros();
+    j[0] = slope * nx;
+    j[1] = slope * ny;
+    j[2] = slope * (px * ny - py * nx);
+    for k in 0..2 {
+        j[3 + k] = slope * share[k];
+        j[5 + k] = -slope * t * x[5 + k] * share[k] / width;
+    }
+    Some(Row { j, residual: s.light - lit, shot: s.row, slope, normal: [nx, ny], piece: edges.piece(edge, px, py) })
+}
+
+/// How many widths of the light's fall a place lies inside an edge, the shares of the two directions in its normal, and that
+/// width in mm. The light falls off along a curved edge as well: a disc is lit by less, a hole's rim by more than a straight
+/// edge.
+fn widths_inside(
+    edge: &EdgeSample,
+    px: f64,
+    py: f64,
+    x: &Unknowns,
+    directions: &[Vector2<f64>; 2],
+) -> (f64, [f64; 2], f64) {
+    let EdgeSample { nx, ny, .. } = *edge;
+    let share = directions.map(|d| (nx * d.x + ny * d.y).powi(2));
+    let width = (x[5].powi(2) * share[0] + x[6].powi(2) * share[1]).sqrt();
+    let beside = x[5].powi(2) * share[1] + x[6].powi(2) * share[0];
+    let inside = (edge.x - px) * nx + (edge.y - py) * ny - 0.5 * edge.curvature * beside;
+    ((inside + x[3] * share[0] + x[4] * share[1]) / width, share, width)
+}
+
+/// Share of a Gaussian sheet that still falls on the surface when its middle is `t` widths inside, and its derivative.
+fn fall(t: f64) -> (f64, f64) {
+    let density = (-0.5 * t * t).exp() / (2.0 * std::f64::consts::PI).sqrt();
+    // Abramowitz and Stegun 26.2.17: 7.5e-8.
+    let k = 1.0 / (1.0 + 0.231_641_9 * t.abs());
+    let poly =
+        k * (0.319_381_53 + k * (-0.356_563_782 + k * (1.781_477_937 + k * (-1.821_255_978 + k * 1.330_274_429))));
+    let upper = 1.0 - density * poly;
+    (if t >= 0.0 { upper } else { 1.0 - upper }, density)
+}

@@ -1,0 +1,147 @@
+//! In: a cloud. Out: its points in the order of the sensor: one row a shot, one column a pixel of the
+//! stripe, so that a point's neighbours along the stripe and in the next shot are known.
+//! Frame and unit: base frame, mm.
+
+use super::options::MeasureOptions;
+use crate::fault::{Fault, Result};
+use crate::find::model::drawing::Drawing;
+use crate::geometry::{Base, Part, Rigid, Vec3};
+use crate::scan::CloudPoint;
+
+const NONE: u32 = u32::MAX;
+
+/// Points by shot and column.
+pub struct Ordered {
+    pub points: Vec<Vec3>,
+    pub intensity: Vec<f32>,
+    pub sigma: Vec<f32>,
+    /// Row (existing shots, ascending) and column of each point.
+    pub row: Vec<u32>,
+    pub column: Vec<u32>,
+    /// Shot number of each row.
+    pub shot: Vec<u32>,
+    /// Pixel (u, v) of each point.
+    pub pixel: Vec<[f32; 2]>,
+    columns: usize,
+    index: Vec<u32>,
+}
+
+/// Fewer points hold no part.
+pub const MIN_POINTS: usize = 500;
+/// No sensor is wider, px.
+const FARTHEST_PX: f32 = 131_072.0;
+
+impl Ordered {
+    /// Sorts a cloud. The strongest of several points in one pixel column of a shot stays.
+    pub fn new(cloud: &[CloudPoint]) -> Result<Ordered> {
+        if cloud.len() < MIN_POINTS {
+            return Err(Fault::refused(format!(
+                "the scan has {} points, at least {MIN_POINTS} are needed",
+                cloud.len()
+            ))
+            .cause("an empty or tiny scan: no laser in the pictures, or a few shots only")
+            .next("look at the scan's report, then scan the part again"));
+        }
+        let bad = |p: &&CloudPoint| p.position.iter().any(|x| !x.is_finite()) || !(p.u.abs() + p.v.abs() < FARTHEST_PX);
+        if let Some(p) = cloud.iter().find(bad) {
+            let ([x, y, z], u, v) = (p.position, p.u, p.v);
+            return Err(Fault::input(format!(
+                "the cloud holds the point ({x}, {y}, {z}) of pixel ({u}, {v}) in shot {}; wanted finite mm, and pixels \
+                 below {FARTHEST_PX}",
+                p.shot
+            ))
+            .cause("the cloud was damaged, or not written by sheetlight scan")
+            .next("scan again"));
+        }
+        // The stripe runs along the image axis in which the points of a shot are spread wider.
+        let spread = |f: fn(&CloudPoint) -> f32| {
+            let mut sums = std::collections::HashMap::<u32, (f64, f64, f64)>::new();
+            for p in cloud {
+                let v = f64::from(f(p));
+                let s = sums.entry(p.shot).or_default();
+                *s = (s.0 + 1.0, s.1 + v, s.2 + v * v);
+            }
+            sums.values().map(|s| s.2 - s.1 * s.1 / s.0).sum::<f64>()
+        };
+        let along: fn(&CloudPoint) -> f32 = if spread(|p| p.u) >= spread(|p| p.v) { |p| p.u } else { |p| p.v };
+        let mut shot: Vec<u32> = cloud.iter().map(|p| p.shot).collect();
+        shot.sort_unstable();
+        shot.dedup();
+        let first = cloud.iter().map(along).fold(f32::MAX, f32::min).round();
+        let last = cloud.iter().map(along).fold(f32::MIN, f32::max).round();
+        let columns = (last - first) as usize + 1;
+        if columns > 1 << 16 || columns.saturating_mul(shot.len()) > 1 << 28 {
+            return Err(Fault::input(format!("the cloud spans {columns} pixel columns in {} shots", shot.len()))
+                .cause("the cloud was not written by sheetlight scan")
+                .next("scan again"));
+        }
+        let mut index = vec![NONE; columns * shot.len()];
+        for (i, p) in cloud.iter().enumerate() {
+            let r = shot.binary_search(&p.shot).expect("listed above");
+            let slot = &mut index[r * columns + (along(p).round() - first) as usize];
+            if *slot == NONE || cloud[*slot as usize].intensity < p.intensity {
+                *slot = i as u32;
+            }
+        }
+        let mut out = Ordered {
+            points: vec![],
+            intensity: vec![],
+            sigma: vec![],
+            row: vec![],
+            column: vec![],
+            pixel: vec![],
+            shot,
+            columns,
+            index: vec![],
+        };
+        for (slot, i) in index.iter_mut().enumerate() {
+            if *i != NONE {
+                let p = &cloud[*i as usize];
+                *i = out.points.len() as u32;
+                out.points.push(Vec3::from(p.position.map(f64::from)));
+                out.intensity.push(p.intensity);
+                out.sigma.push(p.sigma_mm);
+                out.row.push((slot / columns) as u32);
+                out.column.push((slot % columns) as u32);
+                out.pixel.push([p.u, p.v]);
+            }
+        }
+        out.index = index;
+        Ok(out)
+    }
+
+    /// The point in a row and column, if there is one.
+    pub fn at(&self, row: i64, column: i64) -> Option<usize> {
+        if row < 0 || column < 0 || row >= self.shot.len() as i64 || column >= self.columns as i64 {
+            return None;
+        }
+        let i = self.index[row as usize * self.columns + column as usize];
+        (i != NONE).then_some(i as usize)
+    }
+
+    /// True where `column` lies within the columns that any shot reached, so that an empty place there
+    /// says that no light was seen.
+    pub fn covers(&self, row: i64, column: i64) -> bool {
+        row >= 0 && row < self.shot.len() as i64 && column >= 0 && column < self.columns as i64
+    }
+}
+
+/// Points at and around the part in its own frame; `None` for the others.
+pub fn localise(
+    points: &Ordered,
+    drawing: &Drawing,
+    pose: &Rigid<Base, Part>,
+    options: &MeasureOptions,
+) -> Vec<Option<Vec3>> {
+    let (b, r) = (drawing.bounds(), 3.0 * options.unit());
+    let part_from_base = pose.inverse();
+    points
+        .points
+        .iter()
+        .map(|p| {
+            let q = part_from_base.point(p);
+            let near = q.x > b[0] - r && q.x < b[2] + r && q.y > b[1] - r && q.y < b[3] + r;
+            near.then_some(q)
+        })
+        .collect()
+}

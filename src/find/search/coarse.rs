@@ -1,0 +1,114 @@
+//! In: slope fields of one pyramid level and a shape model turned and scaled. Out: places where many of
+//! the model's directions are met within a few pixels (quantised and spread as in [hinterstoisser12]).
+//! Frame and unit: pixels of that level; scores are integers, 0 to 4 a feature.
+
+use super::accelerator::Accelerator;
+use super::level::{Level, Placed};
+use crate::find::model::shape_model::{ModelPoint, thin};
+use crate::stages::shape_frame::{BINS, STRIDE};
+use crate::stages::shape_sums::Peak;
+
+/// A perfect feature. 63 features of 4 fill an 8-bit sum.
+pub const FULL: u8 = 4;
+pub const MAX_FEATURES: usize = 63;
+
+/// The nearest of 16 directions.
+pub fn bin(gx: f64, gy: f64) -> usize {
+    let turn = gy.atan2(gx) / std::f64::consts::TAU * BINS as f64;
+    turn.round().rem_euclid(BINS as f64) as usize % BINS
+}
+
+/// A coarse hit: pixels of the level, index of the pose, and the share of the full score.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    pub x: f64,
+    pub y: f64,
+    pub pose: usize,
+    pub score: f32,
+}
+
+/// A turn (rad) and scale to be tried.
+#[derive(Clone, Copy, Debug)]
+pub struct Turn {
+    pub angle: f64,
+    pub scale: f64,
+}
+
+/// What is asked of a level.
+#[derive(Clone, Copy, Debug)]
+pub struct Query<'a> {
+    pub model: &'a [ModelPoint],
+    pub turns: &'a [Turn],
+    /// Pixels of level 0 in one of this level.
+    pub px: f64,
+    /// Least share of the full score.
+    pub limit: f32,
+    /// Most hits, none within one place and `apart` rad of a better one.
+    pub most: usize,
+    pub apart: f64,
+}
+
+impl Level {
+    /// Hits above the limit, best first, the same wherever the sums are computed.
+    pub fn search(&self, query: &Query, accelerator: Option<&Accelerator>) -> Vec<Hit> {
+        let features = thin(query.model, 1.5 * query.px, MAX_FEATURES);
+        let placed: Vec<Vec<Placed>> = query.turns.iter().map(|t| self.place(&features, t, query.px)).collect();
+        let full = (placed.first().map_or(0, Vec::len) * FULL as usize).max(1) as f32;
+        let least = ((query.limit * full).ceil() as u8).max(1);
+        // An adapter that fails, or whose list overflows, leaves the work to the CPU.
+        let found = accelerator
+            .filter(|a| a.pays(&self.frame, &placed))
+            .and_then(|a| a.peaks(self, &placed, least).ok().flatten())
+            .unwrap_or_else(|| self.peaks(&placed, least));
+        self.select(&found, query, full)
+    }
+
+    fn place(&self, features: &[ModelPoint], turn: &Turn, px: f64) -> Vec<Placed> {
+        let (s, c) = turn.angle.sin_cos();
+        let half = STRIDE as i64 / 2;
+        let one = |f: &ModelPoint| {
+            let layer = self.kinds.iter().position(|k| *k == f.kind)?;
+            let (fx, fy) = (f.x * turn.scale / px, f.y * turn.scale / px);
+            Some(Placed {
+                layer,
+                want: bin(c * f.gx - s * f.gy, s * f.gx + c * f.gy),
+                dx: (c * fx - s * fy).round() as i64 + half,
+                dy: (s * fx + c * fy).round() as i64 + half,
+            })
+        };
+        features.iter().filter_map(one).collect()
+    }
+
+    fn select(&self, peaks: &[Peak], query: &Query, full: f32) -> Vec<Hit> {
+        let place = |k: u32| (k as usize * STRIDE + STRIDE / 2) as f64 - f64::from(self.frame.margin) - 0.5;
+        let mut hits: Vec<Hit> = peaks
+            .iter()
+            .map(|p| Hit { x: place(p.column), y: place(p.row), pose: p.turn as usize, score: p.sum as f32 / full })
+            .collect();
+        hits.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.pose.cmp(&b.pose)));
+        let turns = query.turns;
+        let mut kept: Vec<Hit> = Vec::new();
+        for h in hits {
+            let reach = STRIDE as f64 + 0.5;
+            let taken = kept.iter().any(|k| {
+                (k.x - h.x).abs() < reach
+                    && (k.y - h.y).abs() < reach
+                    && turn_between(turns[k.pose].angle, turns[h.pose].angle) < query.apart
+                    && (turns[k.pose].scale / turns[h.pose].scale).ln().abs() < 0.05
+            });
+            if !taken {
+                kept.push(h);
+                if kept.len() == query.most {
+                    break;
+                }
+            }
+        }
+        kept
+    }
+}
+
+/// Smallest angle between two directions, rad.
+pub fn turn_between(a: f64, b: f64) -> f64 {
+    let d = (a - b).rem_euclid(std::f64::consts::TAU);
+    d.min(std::f64::consts::TAU - d)
+}

@@ -1,0 +1,278 @@
+//! In: a scene, a shape model, what is allowed. Out: matches with score, runner-up, sigma and warnings,
+//! by a pyramid search over quantised directions, then directions, then least squares ([steger02]).
+//! Frame and unit: pixels of the scene, degrees in options, radians in poses.
+
+use super::accelerator::Accelerator;
+use super::climb::{Candidate, Directions, climb, score};
+use super::coarse::{Query, Turn, turn_between};
+use super::level::Level;
+use super::options::SearchOptions;
+use super::refine::{Pose, refine};
+use crate::fault::{Fault, Result};
+use crate::find::model::gradient::{Field, slopes};
+use crate::find::model::shape_model::ShapeModel;
+use crate::find::scene::{Kind, Scene, from_level};
+use crate::stages::shape_frame::STRIDE;
+use rayon::prelude::*;
+
+/// A model that reaches farther than this many times the map is not searched: no place of it has half of its edges there, and
+/// turns and memory grow with its reach.
+const MOST_ACROSS: f64 = 4.0;
+
+/// A found instance.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Match {
+    pub pose: Pose,
+    /// Mean cosine between directions; weak places count 0, places on missing cells half.
+    pub score: f64,
+    /// Share of the model's places whose slope could be known at all.
+    pub coverage: f64,
+    /// The best score of another pose in the same place (turned, or shifted by less than the part), 0 for none.
+    pub second_score: f64,
+    /// Standard deviations of x, y, angle and scale.
+    pub sigma_px: [f64; 2],
+    pub sigma_mm: Option<[f64; 2]>,
+    pub sigma_deg: f64,
+    pub sigma_scale: f64,
+    /// Edges that the least squares used, and the robust deviation from them, px.
+    pub edges: usize,
+    pub edge_rms_px: f64,
+    /// Other poses in the same place with their scores, best first, at most eight.
+    pub rivals: Vec<(Pose, f64)>,
+    /// What fits almost as well, in words.
+    pub warning: Option<String>,
+}
+
+/// Finds the model in the scene, best first. An empty list is an answer: nothing scored above the least.
+pub fn find(scene: &Scene, model: &ShapeModel, options: &SearchOptions) -> Result<Vec<Match>> {
+    find_on(scene, model, options, None)
+}
+
+/// As [`find`], with the coarse search on a GPU where it pays; the matches are the same.
+pub fn find_on(
+    scene: &Scene,
+    model: &ShapeModel,
+    options: &SearchOptions,
+    accelerator: Option<&Accelerator>,
+) -> Result<Vec<Match>> {
+    options.check()?;
+    for p in &model.levels[0] {
+        if !scene.layers.iter().any(|l| l.kind == p.kind) {
+            return Err(Fault::usage(format!("the model has {:?} edges, the scene has no such layer", p.kind))
+                .cause("a model of heights is searched in a picture, or the other way round")
+                .next("teach the model from a map of the same kind"));
+        }
+    }
+    let across = (scene.width() as f64).hypot(scene.height() as f64);
+    if model.radius > MOST_ACROSS * across {
+        let (of, to) = match scene.mm_per_px {
+            Some(mm) => (format!("{:.0} mm", model.radius * mm), format!("{:.0} mm", across * mm)),
+            None => (format!("{:.0} px", model.radius), format!("{across:.0} px")),
+        };
+        return Err(Fault::refused(format!(
+            "the model reaches {of} from its origin, the map is {to} across, limit {MOST_ACROSS} times that"
+        ))
+        .cause("a slipped decimal point in a size, another unit, or an origin far from the part")
+        .next("correct the drawing, or scan more of the part"));
+    }
+    // The strided grid needs a few columns and rows; a smaller map is searched on a finer level.
+    let most = (0..model.levels.len()).rev().find(|l| scene.width().min(scene.height()) >> l >= 8).unwrap_or(0);
+    let levels: Vec<Vec<Directions>> = scene
+        .pyramid(most + 1)
+        .into_iter()
+        .map(|layers| {
+            layers
+                .into_iter()
+                .map(|l| {
+                    let field = slopes(&l);
+                    let threshold = options.min_contrast.map_or_else(|| automatic(&field), |c| c as f32);
+                    Directions::new(l.kind, field, threshold)
+                })
+                .collect()
+        })
+        .collect();
+    let mut candidates = coarse_candidates(&levels[most], model, most, options, accelerator);
+    for level in (0..=most).rev() {
+        let keep = if level == 0 { options.candidates.min(4 * options.max_matches + 100) } else { options.candidates };
+        candidates = candidates
+            .into_par_iter()
+            .map(|c| climb(&levels[level], &model.levels[level], level, c, model.radius, options, level == most))
+            .collect();
+        let limit = options.min_score - if level == 0 { 0.05 } else { 0.12 };
+        candidates.retain(|c| c.score >= limit);
+        candidates = distinct(candidates, (1 << level) as f64, model.radius, keep);
+    }
+    Ok(finish(scene, &levels[0], model, candidates, options))
+}
+
+/// Three times the noise, but not below a thousandth of the layer's strong slopes: a noise-free picture
+/// has rounding errors for edges otherwise.
+fn automatic(field: &Field) -> f32 {
+    let step = (field.gx.len() / 20_000).max(1);
+    let mut m: Vec<f32> = (0..field.gx.len()).step_by(step).map(|i| field.magnitude(i)).collect();
+    let top = m.len() * 99 / 100;
+    let strong = *m.select_nth_unstable_by(top, f32::total_cmp).1;
+    // In a picture that is edges everywhere the lower quartile is no noise: a fifth of the strong slopes
+    // bounds it.
+    (3.0 * field.noise()).min(0.2 * strong).max(1e-3 * strong).max(1e-6)
+}
+
+fn turns(model: &ShapeModel, level: usize, options: &SearchOptions) -> Vec<Turn> {
+    // Half the spread window at the rim of the model.
+    let rim = (model.radius / (1u64 << level) as f64).max(4.0);
+    let step = (STRIDE as f64 * 0.4) / rim;
+    let [a0, a1] = options.angles_deg.map(f64::to_radians);
+    let full = a1 - a0 > std::f64::consts::TAU - step;
+    let n = ((a1 - a0) / step).ceil() as usize + usize::from(!full);
+    let [s0, s1] = options.scales;
+    let scale_step = 1.0 + step;
+    let m = ((s1 / s0).ln() / scale_step.ln()).ceil() as usize + 1;
+    let mut out = Vec::with_capacity(n * m);
+    for k in 0..m {
+        let scale = if m == 1 { s0 } else { s0 * (s1 / s0).powf(k as f64 / (m - 1) as f64) };
+        for i in 0..n.max(1) {
+            let span = if full { n } else { n.max(2) - 1 };
+            out.push(Turn { angle: a0 + (a1 - a0) * i as f64 / span as f64, scale });
+        }
+    }
+    out
+}
+
+fn coarse_candidates(
+    layers: &[Directions],
+    model: &ShapeModel,
+    level: usize,
+    options: &SearchOptions,
+    accelerator: Option<&Accelerator>,
+) -> Vec<Candidate> {
+    let px = (1u64 << level) as f64;
+    let turns = turns(model, level, options);
+    let inputs: Vec<(Kind, &Field, f32)> = layers.iter().map(|d| (d.kind, &d.field, d.threshold)).collect();
+    let ignore = options.ignore_polarity || model.levels[level].iter().all(|p| p.either);
+    let coarse = Level::new(&inputs, ignore, (0.5 * model.radius / px) as usize);
+    let apart = 2.0 * (STRIDE as f64 * 0.5) / (model.radius / px).max(4.0);
+    // Spreading only raises a score, quantising costs up to a quarter of it.
+    let limit = (0.75 * (options.min_score - 0.1)).max(0.2) as f32;
+    let query = Query { model: &model.levels[level], turns: &turns, px, limit, most: options.candidates, apart };
+    coarse
+        .search(&query, accelerator)
+        .into_iter()
+        .map(|h| Candidate {
+            pose: Pose {
+                x: from_level(h.x, level),
+                y: from_level(h.y, level),
+                angle: turns[h.pose].angle,
+                scale: turns[h.pose].scale,
+            },
+            score: f64::from(h.score),
+        })
+        .collect()
+}
+
+/// Best first, without candidates that climbed to the same pose.
+fn distinct(mut candidates: Vec<Candidate>, px: f64, radius: f64, most: usize) -> Vec<Candidate> {
+    candidates.sort_by(|a, b| b.score.total_cmp(&a.score));
+    let mut kept: Vec<Candidate> = Vec::new();
+    for c in candidates {
+        if kept.len() < most && !kept.iter().any(|k| same(&k.pose, &c.pose, 2.5 * px, radius)) {
+            kept.push(c);
+        }
+    }
+    kept
+}
+
+/// True where two poses differ by less than `px` anywhere on the model.
+fn same(a: &Pose, b: &Pose, px: f64, radius: f64) -> bool {
+    (a.x - b.x).hypot(a.y - b.y) < px
+        && turn_between(a.angle, b.angle) * radius < 1.5 * px
+        && (a.scale / b.scale).ln().abs() * radius < 1.5 * px
+}
+
+fn finish(
+    scene: &Scene,
+    layers: &[Directions],
+    model: &ShapeModel,
+    candidates: Vec<Candidate>,
+    options: &SearchOptions,
+) -> Vec<Match> {
+    let points = &model.levels[0];
+    let fields: Vec<(Kind, &Field, f32)> = layers.iter().map(|d| (d.kind, &d.field, d.threshold)).collect();
+    let free_scale = options.scales[1] > options.scales[0];
+    let refined: Vec<_> = candidates
+        .par_iter()
+        .filter_map(|c| {
+            let r = refine(&fields, model, c.pose, free_scale, options.ignore_polarity, 8)?;
+            // A refinement that walks away was not standing on the edges that it was sent to.
+            if !same(&r.pose, &c.pose, 4.0, model.radius) {
+                return None;
+            }
+            let (s, coverage) = score(layers, points, 0, &r.pose, options.ignore_polarity);
+            Some((r, s.max(c.score), coverage))
+        })
+        .collect();
+    let mut order: Vec<usize> = (0..refined.len()).collect();
+    order.sort_by(|&a, &b| refined[b].1.total_cmp(&refined[a].1));
+    let mut out: Vec<(usize, Match)> = Vec::new();
+    for &i in &order {
+        let (r, s, coverage) = &refined[i];
+        if *s < options.min_score || out.len() == options.max_matches {
+            break;
+        }
+        if out.iter().any(|(_, m)| overlap(model, &m.pose, &r.pose) > options.max_overlap) {
+            continue;
+        }
+        let mut rivals: Vec<(Pose, f64)> = Vec::new();
+        for &k in &order {
+            let (o, score, _) = &refined[k];
+            let elsewhere = rivals.iter().map(|r| &r.0).chain([&r.pose]).all(|p| !same(p, &o.pose, 3.0, model.radius));
+            if rivals.len() < 8 && elsewhere && overlap(model, &o.pose, &r.pose) > options.max_overlap.max(0.2) {
+                rivals.push((o.pose, *score));
+            }
+        }
+        let rival = rivals.first().copied();
+        let second_score = rival.map_or(0.0, |r| r.1);
+        let warning = rival.filter(|_| second_score > options.ambiguous_at * s).map(|(o, _)| {
+            format!(
+                "a pose turned by {:.1} degrees and shifted by {:.1} px scores {second_score:.3} against {s:.3}",
+                turn_between(o.angle, r.pose.angle).to_degrees(),
+                (o.x - r.pose.x).hypot(o.y - r.pose.y)
+            )
+        });
+        let sd = |k: usize| r.covariance[(k, k)].max(0.0).sqrt();
+        out.push((
+            i,
+            Match {
+                pose: r.pose,
+                score: *s,
+                coverage: *coverage,
+                second_score,
+                sigma_px: [sd(0), sd(1)],
+                sigma_mm: scene.mm_per_px.map(|k| [sd(0) * k, sd(1) * k]),
+                sigma_deg: sd(2).to_degrees(),
+                sigma_scale: sd(3),
+                edges: r.used,
+                edge_rms_px: r.rms_px,
+                rivals,
+                warning,
+            },
+        ));
+    }
+    out.into_iter().map(|m| m.1).collect()
+}
+
+/// Share of the smaller box that two turned boxes share, by sampling a 9x9 grid of one in the other.
+fn overlap(model: &ShapeModel, a: &Pose, b: &Pose) -> f64 {
+    let (small, large) = if a.scale <= b.scale { (a, b) } else { (b, a) };
+    let (s, c) = large.angle.sin_cos();
+    let mut inside = 0;
+    for iy in 0..9 {
+        for ix in 0..9 {
+            let local = |k: usize, i: i32| model.centre[k] + model.half_size[k] * (f64::from(i) - 4.0) / 4.5;
+            let (x, y) = small.point(local(0, ix), local(1, iy));
+            let (dx, dy) = ((x - large.x) / large.scale, (y - large.y) / large.scale);
+            let (lx, ly) = (c * dx + s * dy - model.centre[0], c * dy - s * dx - model.centre[1]);
+            inside += i32::from(lx.abs() <= model.half_size[0] && ly.abs() <= model.half_size[1]);
+        }
+    }
+    f64::from(inside) / 81.0
+}

@@ -1,0 +1,10 @@
+//! In: a scene, a shape model. Out: matches with score, place, turn, scale and their sigmas.
+//! Frame and unit: scene pixels, radians (docs/math.md, Shape matching).
+
+pub mod accelerator;
+mod climb;
+pub mod coarse;
+pub mod full;
+pub mod level;
+pub mod options;
+pub mod refine;

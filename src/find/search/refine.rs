@@ -1,0 +1,167 @@
+//! In: a pose found by search, a shape model, slope fields of the finest level. Out: the pose by least
+//! squares over distances to edges, with covariance (docs/math.md, Shape matching (3) and (4)).
+//! Frame and unit: pixels of level 0, radians, scale as a factor.
+
+use crate::find::model::gradient::Field;
+use crate::find::model::shape_model::{ModelPoint, ShapeModel, ridge_offset};
+use crate::find::scene::Kind;
+use nalgebra::{Matrix4, Vector4};
+
+/// Where the model's reference point lies in the scene, its turn (x towards y) and its scale.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Pose {
+    pub x: f64,
+    pub y: f64,
+    pub angle: f64,
+    pub scale: f64,
+}
+
+impl Pose {
+    /// A model place and direction in the scene.
+    pub fn place(&self, p: &ModelPoint) -> (f64, f64, f64, f64) {
+        let (s, c) = self.angle.sin_cos();
+        (
+            self.x + self.scale * (c * p.x - s * p.y),
+            self.y + self.scale * (s * p.x + c * p.y),
+            c * p.gx - s * p.gy,
+            s * p.gx + c * p.gy,
+        )
+    }
+    pub fn point(&self, x: f64, y: f64) -> (f64, f64) {
+        let (s, c) = self.angle.sin_cos();
+        (self.x + self.scale * (c * x - s * y), self.y + self.scale * (s * x + c * y))
+    }
+}
+
+/// A refined pose.
+#[derive(Clone, Copy, Debug)]
+pub struct Refined {
+    pub pose: Pose,
+    /// Over x px, y px, angle rad, scale.
+    pub covariance: Matrix4<f64>,
+    /// Edges that took part.
+    pub used: usize,
+    /// Robust standard deviation of the distances, px.
+    pub rms_px: f64,
+}
+
+/// Farthest that an edge is looked for along its normal, px.
+const REACH: i64 = 3;
+/// Residuals beyond this many robust sigmas have no weight (Tukey).
+const TUKEY: f64 = 4.0;
+/// Sigma never falls below this: the interpolation error of one edge, px.
+const FLOOR_PX: f64 = 0.02;
+
+/// Noise is correlated along an edge by the 5x5 plane fit (sigma 1 px): this many px of edge hold one
+/// independent measurement, the sum of exp(-d^2/4) over all d.
+const CORRELATION_PX: f64 = 3.545;
+
+/// Refines by at most `rounds` rounds of matching and solving. `None` where fewer edges than unknowns
+/// remain or the geometry leaves a motion free.
+pub fn refine(
+    fields: &[(Kind, &Field, f32)],
+    model: &ShapeModel,
+    start: Pose,
+    free_scale: bool,
+    ignore_polarity: bool,
+    rounds: usize,
+) -> Option<Refined> {
+    let points = &model.levels[0];
+    let inflation = (CORRELATION_PX / model.spacing).max(1.0);
+    let mut pose = start;
+    let mut last = None;
+    for _ in 0..rounds {
+        let rows: Vec<(Vector4<f64>, f64)> =
+            points.iter().filter_map(|p| row(fields, p, &pose, ignore_polarity)).collect();
+        let unknowns = if free_scale { 4 } else { 3 };
+        if rows.len() < 2 * unknowns {
+            return None;
+        }
+        let (step, covariance, sigma) = solve(&rows, free_scale)?;
+        pose.x += step.x;
+        pose.y += step.y;
+        pose.angle += step.z;
+        pose.scale *= 1.0 + step.w;
+        last = Some(Refined { pose, covariance: covariance * inflation, used: rows.len(), rms_px: sigma });
+        if step.x.abs() + step.y.abs() + model.radius * (step.z.abs() + step.w.abs()) < 1e-3 {
+            break;
+        }
+    }
+    last
+}
+
+/// Distance along the normal to the edge, and its derivative by x, y, angle and log scale.
+fn row(fields: &[(Kind, &Field, f32)], p: &ModelPoint, pose: &Pose, ignore: bool) -> Option<(Vector4<f64>, f64)> {
+    let (_, field, threshold) = fields.iter().find(|f| f.0 == p.kind)?;
+    let (x, y, nx, ny) = pose.place(p);
+    let mut along = [f64::NAN; 2 * REACH as usize + 1];
+    for (v, s) in along.iter_mut().zip(-REACH..=REACH) {
+        if let Some((gx, gy)) = field.at(x + s as f64 * nx, y + s as f64 * ny) {
+            let g = gx * nx + gy * ny;
+            *v = if ignore || p.either { g.abs() } else { g };
+        }
+    }
+    // The ridge nearest to the model's own place, so that parallel edges do not attract.
+    let mut best: Option<f64> = None;
+    for i in 1..along.len() - 1 {
+        if along[i] > f64::from(*threshold) {
+            if let Some(o) = ridge_offset(along[i - 1], along[i], along[i + 1]) {
+                let d = i as f64 - REACH as f64 + o;
+                if best.is_none_or(|b| d.abs() < b.abs()) {
+                    best = Some(d);
+                }
+            }
+        }
+    }
+    let d = best?;
+    let (rx, ry) = (x - pose.x, y - pose.y);
+    Some((Vector4::new(nx, ny, rx * ny - ry * nx, rx * nx + ry * ny), d))
+}
+
+/// Tukey-weighted least squares; the step, the covariance and the robust sigma.
+fn solve(rows: &[(Vector4<f64>, f64)], free_scale: bool) -> Option<(Vector4<f64>, Matrix4<f64>, f64)> {
+    let mut step = Vector4::zeros();
+    let mut sigma = 1.0f64;
+    let mut inverse = Matrix4::zeros();
+    for round in 0..6 {
+        let mut residuals: Vec<f64> = rows.iter().map(|(j, d)| (d - j.dot(&step)).abs()).collect();
+        let middle = residuals.len() / 2;
+        sigma = (1.4826 * *residuals.select_nth_unstable_by(middle, f64::total_cmp).1).max(FLOOR_PX);
+        let (mut a, mut b, mut weight) = (Matrix4::zeros(), Vector4::zeros(), 0.0);
+        for (j, d) in rows {
+            let u = (d - j.dot(&step)) / (TUKEY * sigma);
+            let w = if round == 0 { 1.0 } else { (1.0 - u * u).max(0.0).powi(2) };
+            a += w * j * j.transpose();
+            b += w * d * j;
+            weight += w;
+        }
+        if weight < 6.0 {
+            return None;
+        }
+        if !free_scale {
+            for k in 0..4 {
+                a[(3, k)] = 0.0;
+                a[(k, 3)] = 0.0;
+            }
+            a[(3, 3)] = 1.0;
+            b[3] = 0.0;
+        }
+        // Scaled to unit diagonal, a free motion shows as a tiny eigenvalue.
+        let scale = Vector4::from_fn(|k, _| a[(k, k)].max(1e-300).sqrt().recip());
+        let unit = Matrix4::from_fn(|i, k| a[(i, k)] * scale[i] * scale[k]);
+        if unit.symmetric_eigenvalues().min() < 1e-6 {
+            return None;
+        }
+        let inv = unit.try_inverse()?;
+        inverse = Matrix4::from_fn(|i, k| inv[(i, k)] * scale[i] * scale[k]);
+        step = inverse * b;
+    }
+    let mut covariance = inverse * (sigma * sigma);
+    if !free_scale {
+        for k in 0..4 {
+            covariance[(3, k)] = 0.0;
+            covariance[(k, 3)] = 0.0;
+        }
+    }
+    Some((step, covariance, sigma))
+}

@@ -1,0 +1,6 @@
+//! In: pictures of a stripe on a moving bed. Out: heights from the stripe's sideways shift, no calibration needed.
+//! Frame and unit: x along the stripe, y along the travel, z up from the bed; mm (docs/math.md, Shift).
+
+mod crossing;
+pub(super) mod plateau;
+pub(super) mod scan;

@@ -1,0 +1,112 @@
+//! In: the pictures of a recording that show boards, and a calibrated camera. Out: the boards' poses
+//! as measurements, and by name why a picture has none.
+//! Frame and unit: camera_from_board, mm.
+
+use crate::calibrate::boards::{FindOptions, find};
+use crate::calibrate::measured_pose::{MeasuredPose, measure_view};
+use crate::camera::Intrinsics;
+use crate::fault::{Fault, Result};
+use crate::recording::{BoardSpec, FrameRef, Recording};
+use rayon::prelude::*;
+
+/// The board in one frame of a recording.
+#[derive(Clone, Debug)]
+pub struct FrameBoard {
+    /// Index into the recording's frames.
+    pub frame: usize,
+    pub board: BoardSpec,
+    pub pose: MeasuredPose,
+    /// The board looks the same after a turn: only its plane is known, not its origin.
+    pub ambiguous: bool,
+}
+
+/// The frames with boards, and the pictures without, each with the reason.
+#[derive(Clone, Debug, Default)]
+pub struct Boards {
+    pub found: Vec<FrameBoard>,
+    pub missing: Vec<(String, String)>,
+}
+
+/// Finds and measures the board in every frame's ambient picture. Refused: a recording without
+/// boards or ambient pictures, another picture size than the camera's.
+pub fn boards(recording: &Recording, camera: &Intrinsics, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<Boards> {
+    let meta = &recording.meta;
+    if (meta.image.width, meta.image.height) != (camera.width, camera.height) {
+        return Err(Fault::input(format!(
+            "{}: pictures of {}x{}, the camera was calibrated at {}x{}",
+            recording.folder.display(),
+            meta.image.width,
+            meta.image.height,
+            camera.width,
+            camera.height
+        ))
+        .cause("another camera, another resolution, or a cropped picture")
+        .next("calibrate the camera at this resolution"));
+    }
+    let frames: Vec<(usize, &FrameRef, &str)> =
+        meta.frames.iter().enumerate().filter_map(|(i, f)| Some((i, f, f.ambient.as_deref()?))).collect();
+    if frames.is_empty() {
+        return Err(Fault::input(format!("{}: no frame has an 'ambient' picture", recording.folder.display()))
+            .cause("boards are found in pictures taken in room light, the laser off")
+            .next("record an ambient picture with each frame"));
+    }
+    let done = std::sync::atomic::AtomicUsize::new(0);
+    // A picture that is missing or of another size is the recording's fault and ends it; a board that is not
+    // found is that picture's.
+    let each: Vec<(String, Result<(FrameBoard, Option<f64>)>)> = frames
+        .par_iter()
+        .map(|(index, frame, name)| {
+            let board = meta.board_of(frame).ok_or_else(|| {
+                Fault::input(format!("{name}: meta.json describes no board for it"))
+                    .next("describe the board under 'board' or 'boards'")
+            })?;
+            let picture = recording.picture(name)?;
+            let one = || {
+                let view = find(&picture, board, &FindOptions::default())?;
+                let pose = measure_view(name, camera, board, &view)?;
+                let found = FrameBoard { frame: *index, board: board.clone(), pose, ambiguous: view.ambiguous };
+                Ok((found, view.dot_diameter))
+            };
+            let result = one();
+            progress(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1, frames.len());
+            Ok((name.to_string(), result))
+        })
+        .collect::<Result<_>>()?;
+    let mut out = Boards::default();
+    let (mut diameters, mut faults) = (Vec::new(), Vec::new());
+    for (name, result) in each {
+        match result {
+            Ok((found, diameter)) => {
+                diameters.extend(diameter);
+                out.found.push(found);
+            }
+            Err(fault) => {
+                out.missing.push((name, fault.to_string()));
+                faults.push(fault);
+            }
+        }
+    }
+    if out.found.is_empty() {
+        // The picture that says what most pictures say.
+        let votes = |f: &Fault| faults.iter().filter(|o| o.cause == f.cause).count();
+        let (fault, (name, _)) =
+            faults.iter().zip(&out.missing).rev().max_by_key(|(f, _)| votes(f)).expect("one picture or more");
+        let what = format!("no board was found in any of {} pictures; {name}: {}", frames.len(), fault.what);
+        return Err(Fault::input(what)
+            .cause(format!("{}; or another board than meta.json describes", fault.cause))
+            .next(format!("{}; compare meta.json's board with the real one", fault.next)));
+    }
+    know_diameter(&mut out.found, diameters);
+    Ok(out)
+}
+
+/// Dots of unstated diameter get the one that the pictures show, in the median.
+fn know_diameter(found: &mut [FrameBoard], mut diameters: Vec<f64>) {
+    diameters.sort_by(f64::total_cmp);
+    let Some(median) = diameters.get(diameters.len() / 2) else { return };
+    for b in found {
+        if let BoardSpec::Circles { diameter_mm: unstated @ None, .. } = &mut b.board {
+            *unstated = Some(*median);
+        }
+    }
+}

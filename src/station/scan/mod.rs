@@ -1,0 +1,10 @@
+//! In: a source of shots, a station. Out: the scan's folder: cloud, height map, pictures, report.
+//! Frame and unit: cloud in the base frame, mm (docs/file-formats.md).
+
+mod overlays;
+mod products;
+pub mod progress;
+pub(super) mod report;
+pub(super) mod run;
+pub(super) mod scan_folder;
+pub(super) mod seen;

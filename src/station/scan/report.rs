@@ -1,0 +1,158 @@
+//! In: a scan folder. Out: what the scan came to, as scan.json holds it, and its points; both only as they were written.
+//! Frame and unit: cloud in the base frame, mm (docs/file-formats.md).
+
+use super::scan_folder::settle;
+use super::seen::Seen;
+use crate::fault::{Fault, Result};
+use crate::rig::{Volume, hash_file};
+use crate::scan::{CloudPoint, Extraction, Format, read_cloud};
+use crate::stages::peak::Stripe;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// What a scan came to; scan.json holds it.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ScanReport {
+    pub format: u32,
+    pub program: String,
+    pub created: String,
+    pub units: String,
+    pub frame: String,
+    pub recording: String,
+    /// [`crate::rig::Rig::fingerprint`] of the calibration used.
+    pub rig_fingerprint: String,
+    /// Adapter and driver, or this machine's processor and why.
+    pub ran_on: String,
+    pub image: Format,
+    pub shots: usize,
+    pub points: u64,
+    /// Depths at which points were believed; none where nothing limits them.
+    pub working_volume: Option<Volume>,
+    /// Peaks by fate: kept, and rejected by reason.
+    pub peaks: BTreeMap<String, u64>,
+    /// Shots without a single kept peak.
+    pub dark_shots: Vec<u32>,
+    /// Shots left out, with the reason.
+    pub skipped: Vec<(String, String)>,
+    /// Median over the points of the standard deviation that each carries, mm; none without points.
+    pub median_sigma_mm: Option<f64>,
+    /// Width (px) and speckle of the stripe, measured in the first shots or as set.
+    pub stripe: Option<Stripe>,
+    /// Levels of the pictures and where their light lies.
+    pub seen: Seen,
+    /// From the first shot to the closed cloud.
+    pub seconds: f64,
+    pub shots_per_second: f64,
+    /// Where the time went.
+    pub spent: Spent,
+    pub settings: Extraction,
+    pub height_map: Option<HeightMapFigures>,
+    /// What the calibrations' own files say against them, and what else a reader of the figures must know.
+    pub remarks: Vec<String>,
+    /// SHA-256 of the cloud and of the height map, by file name.
+    pub files: BTreeMap<String, String>,
+}
+
+/// Of the reports that this version writes; format 1 had no hashes.
+pub(in crate::station) const FORMAT: u32 = 2;
+
+/// Seconds of a scan by what its main thread did; pictures are decoded and stages run meanwhile on other threads, so
+/// only what had to be waited for counts.
+#[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Spent {
+    /// Opening the GPU and the recording, until the first shot could be handed over.
+    pub start_s: f64,
+    /// Until the first profile was there; stages are compiled in it.
+    pub first_profile_s: f64,
+    /// Waiting for decoded pictures.
+    pub pictures_s: f64,
+    /// Handing shots to the stages and waiting for them; judging points by their neighbours.
+    pub stages_s: f64,
+    /// Cloud, overlays and checkpoints.
+    pub writing_s: f64,
+    /// Height map, pictures and PCD, after the last shot.
+    pub products_s: f64,
+}
+
+/// The height map's figures.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HeightMapFigures {
+    pub width: u32,
+    pub height: u32,
+    pub cell_mm: f64,
+    /// Share of the cells that hold a height.
+    pub coverage: f64,
+    /// Heights between which 98 % of the cells lie, mm above the grid's plane.
+    pub z_low_mm: f64,
+    pub z_high_mm: f64,
+}
+
+impl ScanReport {
+    /// Refuses a scan without points, and says what its pictures hold.
+    pub fn has_points(&self) -> Result<()> {
+        if self.points > 0 {
+            return Ok(());
+        }
+        let rejected: Vec<String> = self.peaks.iter().map(|(fate, n)| format!("{n} peaks {fate}")).collect();
+        let peaks = if rejected.is_empty() { "no peak was found".into() } else { rejected.join(", ") };
+        let (cause, next) = self.seen.why();
+        Err(Fault::refused(format!("no point in {} shots: {}; {peaks}", self.shots, self.seen.words()))
+            .cause(cause)
+            .next(next))
+    }
+
+    /// Refuses files of a scan folder that are not those that the scan wrote.
+    pub(in crate::station) fn check_files(&self, scan: &Path) -> Result<()> {
+        self.files.par_iter().try_for_each(|(name, hash)| {
+            let is = hash_file(&scan.join(name))?;
+            if is == *hash {
+                return Ok(());
+            }
+            Err(Fault::input(format!(
+                "{}: has SHA-256 {is:.12}, its scan.json says {hash:.12}",
+                scan.join(name).display()
+            ))
+            .cause("files of two scans in one folder, edited, or damaged")
+            .next("scan again"))
+        })
+    }
+}
+
+/// Reads `scan.json` of a finished scan.
+pub fn load_report(scan: &Path) -> Result<ScanReport> {
+    settle(scan)?;
+    let path = scan.join("scan.json");
+    let text =
+        crate::files::read_text(&path).map_err(|e| e.next("give the folder that sheetlight scan --out wrote"))?;
+    let strange = |what: String| {
+        Fault::input(format!("{}: {what}", path.display()))
+            .cause("another version, or edited by hand")
+            .next("scan again")
+    };
+    let report: ScanReport =
+        serde_json::from_str(&text).map_err(|e| strange(format!("is not a scan's report: {e}")))?;
+    if report.format != FORMAT {
+        return Err(strange(format!("is of format {}, this version reads {FORMAT}", report.format)));
+    }
+    Ok(report)
+}
+
+/// The points of a finished scan, checked to be those that the scan wrote.
+pub fn cloud_of(scan: &Path) -> Result<Vec<CloudPoint>> {
+    settle(scan)?;
+    if !scan.join("cloud.ply").exists() {
+        let recording = scan.join("meta.json").exists();
+        let cause = if recording { "it is a recording, not a scan" } else { "another folder was given" };
+        return Err(Fault::input(format!("{}: holds no cloud.ply", scan.display()))
+            .cause(cause)
+            .next("give the folder that sheetlight scan wrote with --out"));
+    }
+    let report = load_report(scan)?;
+    report.has_points().map_err(|e| e.at(scan.display()))?;
+    report.check_files(scan)?;
+    read_cloud(&scan.join("cloud.ply"))
+}

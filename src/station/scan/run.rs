@@ -1,0 +1,323 @@
+//! In: a source of shots, a calibrated rig, an output folder. Out: the scan folder — cloud, height
+//! map, overlays, figures — written so that whatever ends it costs nothing that was done.
+//! Frame and unit: cloud in the base frame, height map in its grid frame; mm (docs/file-formats.md).
+
+use super::overlays::Overlays;
+use super::progress::{Checkpoint, fingerprint_of};
+use super::report::{FORMAT, ScanReport, Spent};
+use super::scan_folder::{self, FORMER_PROGRESS};
+use super::seen::Seen;
+use crate::fault::{Fault, Result};
+use crate::files::Lock;
+use crate::raster::Image;
+use crate::rig::{Rig, Volume};
+use crate::scan::{
+    BadShot, CloudWriter, Extraction, GridOptions, Processor, Profile, Scanner, Source, Where, camera_for,
+};
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// How a scan is run.
+#[derive(Clone, Debug)]
+pub struct ScanOptions {
+    /// Folder for the results; made where it is missing.
+    pub out: PathBuf,
+    /// GPU, this machine's processor, or whichever of them is faster.
+    pub place: Where,
+    pub extraction: Extraction,
+    pub grid: GridOptions,
+    /// Camera depths at which points are believed; `None` for all ([`crate::station::volume::believed`]).
+    pub volume: Option<Volume>,
+    /// A picture with the laser off and the shots' exposure, subtracted from every shot.
+    pub ambient: Option<Image>,
+    /// Shots to draw with their kept and rejected peaks, evenly spread; 0 for none.
+    pub overlays: usize,
+    /// Leave out shots that cannot be read instead of stopping; they are listed in scan.json.
+    pub skip_bad: bool,
+    /// Continue an interrupted scan of the same recording with the same rig and settings.
+    pub resume: bool,
+    /// Set by somebody who wants the scan to end: it keeps what is done and says how to go on.
+    pub stop: Arc<AtomicBool>,
+}
+
+/// Shots between two checkpoints: what a crash can cost beside those under way.
+const CHECKPOINT_SHOTS: usize = 64;
+
+/// [`scan_on`] where the options say; the device is opened while the first pictures are decoded.
+pub fn scan(
+    id: &str,
+    label: &str,
+    open: impl FnOnce(usize) -> Result<Box<dyn Source>>,
+    rig: &Rig,
+    options: &ScanOptions,
+    progress: impl FnMut(usize, Option<usize>),
+) -> Result<ScanReport> {
+    scan_on(|| options.place.open(), id, label, open, rig, options, progress)
+}
+
+/// Runs a scan from the first shot to the last file. `processor` is asked for once the source is open; `id` names the recording (a hash of its
+/// meta.json, poses and ambient picture), so that a resumed scan cannot continue another one; `open` gives the source
+/// from a shot on; `progress` is told (shots done, shots in all). Whatever ends it early, the shots that were done stay
+/// done and the next run can resume there; a former scan in the folder stays until this one is whole.
+pub fn scan_on(
+    processor: impl FnOnce() -> Result<Processor>,
+    id: &str,
+    label: &str,
+    open: impl FnOnce(usize) -> Result<Box<dyn Source>>,
+    rig: &Rig,
+    options: &ScanOptions,
+    mut progress: impl FnMut(usize, Option<usize>),
+) -> Result<ScanReport> {
+    let begun = Instant::now();
+    options.grid.check()?;
+    rig.belong_together()?;
+    rig.reaches(options.volume.as_ref())?;
+    scan_folder::make(&options.out)?;
+    let _lock = Lock::take(&options.out, "scan", "scan")?;
+    let folder = scan_folder::together(&options.out);
+    folder.settle_locked()?;
+    let state = state(id, rig, options, &folder.part())?;
+    let part = if state.shots == 0 { folder.begin()? } else { folder.part() };
+    scan_folder::sweep(&part)?;
+    let cloud_path = part.join("cloud.ply");
+    // A resumed scan reads the last finished shot again, because points are judged by the shots around them.
+    let repeated = state.shots.min(1);
+    let mut source = open(state.shots - repeated)?;
+    let processor = processor()?;
+    let cloud = if state.shots > 0 {
+        CloudWriter::resume(&cloud_path, state.points)?
+    } else {
+        CloudWriter::create(&cloud_path)?
+    };
+    let total = source.remaining().map(|n| n + state.shots - repeated);
+    let format = source.format();
+    let ambient = options.ambient.clone();
+    let mut scanner =
+        Scanner::new(rig, format, &options.extraction, options.volume.as_ref(), ambient, processor, state.stripe)?;
+    scanner.began_at(state.first_pose());
+    let seen = Seen::new(
+        &camera_for(&rig.need_camera()?.value, format)?,
+        &rig.need_laser_plane()?.value,
+        Volume::depths(options.volume.as_ref()),
+    );
+    let started = Instant::now();
+    let first = state.shots;
+    let spent = Spent { start_s: begun.elapsed().as_secs_f64(), ..Spent::default() };
+    let cut_before = state.cut;
+    let overlays = Overlays::new(&part, options.overlays, total)?;
+    let pictures = VecDeque::new();
+    let mut work = Work {
+        part: &part,
+        repeated,
+        cut_before,
+        cloud,
+        state,
+        scanner,
+        overlays,
+        seen,
+        pictures,
+        spent,
+        stopped: None,
+    };
+    let ended = work.all(source.as_mut(), options, |done| progress(done, total));
+    // Where the disk itself failed, the checkpoint before this one stands.
+    let saved = work.save();
+    ended.map_err(|fault| kept(fault, &work.state, saved.is_ok(), total))?;
+    saved?;
+    let Work { cloud, mut state, scanner, mut spent, seen, stopped, .. } = work;
+    let points = cloud.finish()?;
+    let seconds = started.elapsed().as_secs_f64();
+    let products = Instant::now();
+    let (height_map, files) = crate::station::scan::products::write(
+        &part,
+        &cloud_path,
+        points,
+        &options.grid,
+        scanner.up_in_base(),
+        scanner.device(),
+    )?;
+    spent.products_s = products.elapsed().as_secs_f64();
+    if state.cut > 0 {
+        state.peaks.insert("beyond the list: more than a twentieth of the pictures lit".into(), state.cut);
+    }
+    let report = ScanReport {
+        format: FORMAT,
+        program: format!("sheetlight {}", env!("CARGO_PKG_VERSION")),
+        created: jiff::Timestamp::now().to_string(),
+        units: "mm".into(),
+        frame: "base".into(),
+        recording: label.into(),
+        rig_fingerprint: rig.fingerprint(),
+        working_volume: options.volume.clone(),
+        ran_on: scanner.ran_on(),
+        image: format,
+        shots: state.shots,
+        points,
+        median_sigma_mm: state.median_sigma(),
+        stripe: scanner.stripe(),
+        seen,
+        peaks: state.peaks,
+        dark_shots: state.dark,
+        skipped: state.skipped,
+        seconds,
+        shots_per_second: (state.shots - first) as f64 / seconds.max(1e-9),
+        spent,
+        settings: options.extraction.clone(),
+        height_map,
+        remarks: rig.remarks().into_iter().chain(source.remarks()).chain(stopped).collect(),
+        files,
+    };
+    let text = serde_json::to_string_pretty(&report).expect("plain data");
+    crate::files::write(&part.join("scan.json"), text.as_bytes())?;
+    crate::station::judge::page::save(&part, None, &[])?;
+    folder.commit()?;
+    Ok(report)
+}
+
+/// Where the scan begins: at nothing, or where an interrupted one of the same identity stands.
+fn state(id: &str, rig: &Rig, options: &ScanOptions, part: &Path) -> Result<Checkpoint> {
+    let settings = serde_json::to_string(&(&options.extraction, &options.volume)).expect("plain data");
+    let identity = crate::rig::hash_text(format!("{id} {} {settings}", rig.fingerprint()).as_bytes());
+    let former = if options.resume { Checkpoint::load(part)? } else { None };
+    match former {
+        Some(c) if c.identity == identity => Ok(c),
+        Some(_) => Err(Fault::usage("the interrupted scan was of another recording, rig, working volume or settings")
+            .cause("something was changed since")
+            .next("scan again without --resume, or into another folder")),
+        None if options.resume && options.out.join(FORMER_PROGRESS).exists() => {
+            Err(Fault::usage(format!("{}: a former version was interrupted here", options.out.display()))
+                .cause("this version keeps what is unfinished in another way and cannot go on with it")
+                .next("scan again without --resume: the pictures are still there"))
+        }
+        None => Ok(Checkpoint::new(identity)),
+    }
+}
+
+/// Adds to what ended a scan what is kept of it and how to go on.
+fn kept(fault: Fault, state: &Checkpoint, saved: bool, total: Option<usize>) -> Fault {
+    let of = total.map_or(String::new(), |n| format!(" of {n}"));
+    let done = format!("{}{of} shots with {} points are kept", state.shots, state.points);
+    let what = if saved && state.shots > 0 { format!("{}; {done}", fault.what) } else { fault.what };
+    Fault { what, ..fault }
+}
+
+/// A scan under way.
+struct Work<'a> {
+    part: &'a Path,
+    /// Shots that an earlier run finished and this one reads again.
+    repeated: usize,
+    /// Pixels that found no room in the runs before.
+    cut_before: u64,
+    cloud: CloudWriter,
+    state: Checkpoint,
+    scanner: Scanner,
+    overlays: Overlays,
+    seen: Seen,
+    /// Fingerprints of the pictures under way, oldest first.
+    pictures: VecDeque<(u32, u32)>,
+    spent: Spent,
+    /// Said in the report where a stream was ended before its end.
+    stopped: Option<String>,
+}
+
+impl Work<'_> {
+    /// Every shot of the source, to its points in the cloud.
+    fn all(&mut self, source: &mut dyn Source, options: &ScanOptions, mut progress: impl FnMut(usize)) -> Result<()> {
+        let mut ended = false;
+        let started = Instant::now();
+        while !ended {
+            let mut next = clocked(&mut self.spent.pictures_s, || source.next());
+            if options.stop.load(Ordering::Relaxed) {
+                if source.resumable() {
+                    let ready = self.scanner.ready()?;
+                    self.take(&ready)?;
+                    return Err(Fault::output("stopped by a signal")
+                        .cause("Ctrl-C, or the session or the machine was closed")
+                        .next("run the same command with --resume to go on"));
+                }
+                // A stream cannot be had again: what came of it is made a scan.
+                self.stopped = Some("the stream was stopped by a signal before its end".into());
+                next = None;
+            }
+            match next {
+                Some(Ok(shot)) => {
+                    self.same_recording(&shot)?;
+                    self.overlays.keep(&shot);
+                    self.seen.look(shot.index, &shot.image);
+                    clocked(&mut self.spent.stages_s, || self.scanner.push(shot))?;
+                }
+                // A resumed scan may meet a bad shot that the run before has listed.
+                Some(Err(bad)) if options.skip_bad && self.state.skipped.iter().any(|(name, _)| *name == bad.name) => {}
+                Some(Err(bad)) if options.skip_bad && !bad.last => self.state.skipped.push((bad.name, bad.fault.what)),
+                Some(Err(BadShot { name, fault, last, .. })) => {
+                    // The last good shot is not taken: it still waits to be judged by its neighbour.
+                    let ready = self.scanner.ready()?;
+                    self.take(&ready)?;
+                    let again = "repair the shot and run again with --resume, or leave it out with --skip-bad";
+                    return Err(if last { fault } else { fault.at(name).next(again) });
+                }
+                None => ended = true,
+            }
+            let scanner = &mut self.scanner;
+            let ready = clocked(&mut self.spent.stages_s, || if ended { scanner.finish() } else { scanner.ready() })?;
+            if self.spent.first_profile_s == 0.0 && !ready.is_empty() {
+                self.spent.first_profile_s = started.elapsed().as_secs_f64();
+            }
+            let from = Instant::now();
+            self.take(&ready)?;
+            self.spent.writing_s += from.elapsed().as_secs_f64();
+            progress(self.state.shots);
+        }
+        Ok(())
+    }
+
+    /// The first shot of a resumed scan is the last one that is done: its picture must be the one that it was.
+    fn same_recording(&mut self, shot: &crate::scan::Shot) -> Result<()> {
+        let is = fingerprint_of(&shot.image);
+        if self.repeated > 0 && self.pictures.is_empty() && self.state.last_picture != Some(is) {
+            return Err(Fault::usage(format!("{}: is not the picture that the interrupted scan saw", shot.name))
+                .cause("the interrupted scan was of another recording, or its pictures were replaced")
+                .next("scan again without --resume, or into another folder"));
+        }
+        self.state.begin_at(&shot.base_from_flange);
+        self.pictures.push_back((shot.index, is));
+        Ok(())
+    }
+
+    fn take(&mut self, ready: &[Profile]) -> Result<()> {
+        for profile in ready {
+            let (index, picture) = self.pictures.pop_front().expect("a picture a profile");
+            assert_eq!(index, profile.shot, "profiles come in the order of their pictures");
+            if self.repeated > 0 {
+                self.repeated -= 1;
+                continue;
+            }
+            self.overlays.draw(profile)?;
+            // Points and state go together: what is counted here is what a resumed scan keeps.
+            self.cloud.append(&profile.points)?;
+            self.state.add(profile);
+            self.state.last_picture = Some(picture);
+            if self.state.shots.is_multiple_of(CHECKPOINT_SHOTS) {
+                self.save()?;
+            }
+        }
+        Ok(())
+    }
+
+    fn save(&mut self) -> Result<()> {
+        self.state.stripe = self.scanner.stripe();
+        self.state.cut = self.cut_before + self.scanner.cut();
+        self.state.save(self.part, &mut self.cloud)
+    }
+}
+
+/// Adds the time that something takes to a sum of seconds.
+fn clocked<T>(seconds: &mut f64, what: impl FnOnce() -> T) -> T {
+    let from = Instant::now();
+    let result = what();
+    *seconds += from.elapsed().as_secs_f64();
+    result
+}
