@@ -441,7 +441,7 @@ fn profiles() {
     survives(
         "profiles in brackets",
         seeds(&brackets),
-        through_file("p.json", |p| sheetlight::calibrate::profile_files::load(p).map(drop)),
+        through_file("p.json", |p| sheetlight::calibrate::ball::profiles::load(p).map(drop)),
     );
 }
 

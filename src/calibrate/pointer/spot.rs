@@ -218,7 +218,7 @@ pub fn find_spots(pictures: &[SpotPicture<'_>], hot: &[bool], o: &SpotOptions) -
             speckle = (robust * (n / f64::max(n - 5.0 * spots, 0.3 * n)).sqrt()).clamp(0.005, 1.0);
         }
     }
-    let finish = |(i, found): (usize, Result<(Patch, Shape, f64)>)| {
+    let finish = |found: Result<(Patch, Shape, f64)>| {
         let (patch, shape, rival) = found?;
         let (s, covariance) = refine(&patch, &shape, speckle);
         let width = s[3].exp();
@@ -261,7 +261,7 @@ pub fn find_spots(pictures: &[SpotPicture<'_>], hot: &[bool], o: &SpotOptions) -
             rival,
         })
     };
-    Ok(patches.into_iter().enumerate().map(finish).collect())
+    Ok(patches.into_iter().map(finish).collect())
 }
 
 fn refine(patch: &Patch, start: &Shape, speckle: f64) -> (Shape, Option<Matrix2<f64>>) {
