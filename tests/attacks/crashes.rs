@@ -281,3 +281,30 @@ fn signals_end_a_stream_with_what_came() {
     args.remove(1);
     assert!(refused(&args).contains("gave 0 frames, the pose file has 12 poses"));
 }
+
+/// Two scans that are started into one folder at once: one waits or is refused, and the folder holds one of them, whole.
+#[test]
+fn two_at_once_do_not_mix() {
+    let b = Bench::new(20);
+    b.record("other", 40);
+    for name in ["recording", "other"] {
+        run(&b.scan(name, &format!("{name} alone"), &[]));
+    }
+    let alone = ["recording alone", "other alone"].map(|n| results(&b.at(n)));
+    for round in 0..if long() { 20 } else { 3 } {
+        let out = format!("both {round}");
+        let started = ["recording", "other"].map(|name| {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_sheetlight"));
+            command.args(b.scan(name, &out, &[])).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
+        });
+        let ended = started.map(|child| child.wait_with_output().unwrap());
+        let is = results(&b.at(&out));
+        assert!(alone.contains(&is), "{out} holds two scans");
+        cloud_of(&b.at(&out)).unwrap();
+        for done in ended.iter().filter(|d| !d.status.success()) {
+            let said = String::from_utf8_lossy(&done.stderr);
+            assert!(said.contains("another scan writes here"), "{said}");
+        }
+        assert!(ended.iter().any(|d| d.status.success()));
+    }
+}

@@ -27,8 +27,7 @@ fn what_was_seen_is_said() {
         ("pointer_cal", "laser_", "pointer", 255, ["100.0 % saturated", "white"]),
     ] {
         if !Path::new(&at(set)).exists() {
-            let name = if set == "laserplane" { "laserplane" } else { "pointer" };
-            sheetlight(&["simulate", "--out", &at("sim"), "--set", name, "--width", "320", "--quiet"]);
+            sheetlight(&["simulate", "--out", &at("sim"), "--set", set, "--width", "320", "--quiet"]);
             std::fs::rename(at(&format!("sim/{set}")), at(set)).unwrap();
         }
         let kept: Vec<_> = std::fs::read_dir(at(set))

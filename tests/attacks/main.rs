@@ -14,6 +14,7 @@ mod inputs;
 mod light;
 mod messages;
 mod pictures;
+mod poses;
 mod stops;
 mod table;
 mod terminal;

@@ -33,7 +33,7 @@ fn inputs() -> &'static Path {
             scan.extend(["--quiet", "--on", "cpu", "--overlays", "0"].map(str::to_owned));
             run(&scan);
             if long() {
-                let sets = ["intrinsics", "handeye", "laserplane", "pointer"];
+                let sets = ["intrinsics", "handeye", "laserplane", "pointer_cal"];
                 let mut simulate = ["simulate", "--out", &at(&format!("cal{n}")), "--seed", &n.to_string()]
                     .map(str::to_owned)
                     .to_vec();
