@@ -192,12 +192,18 @@ fn survives(name: &'static str, seeds: Vec<Vec<u8>>, read: impl Fn(&[u8]) -> Res
     }
 }
 
+/// A folder for files by the hundred thousand: in memory, where the system has a place for that.
+fn scratch() -> tempfile::TempDir {
+    let memory = Path::new("/dev/shm");
+    if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() }.expect("a folder")
+}
+
 /// For parsers that want a file: the same file again and again.
 fn through_file(
     name: &str,
     read: impl Fn(&Path) -> Result<(), Fault> + Send + 'static,
 ) -> impl Fn(&[u8]) -> Result<(), Fault> + Send + 'static {
-    let dir = tempfile::tempdir().expect("a folder");
+    let dir = scratch();
     let name = name.to_owned();
     move |bytes| {
         let path = dir.path().join(&name);
@@ -277,7 +283,7 @@ fn rig_files() {
 /// What a scan leaves for the next command, and an interrupted one for itself.
 #[test]
 fn scans() {
-    let dir = tempfile::tempdir().unwrap();
+    let dir = scratch();
     let at = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
     let options = sheetlight::simulate::SimulateOptions { width: 64, height: 48, shots: 2, ..Default::default() };
     sheetlight::simulate::simulate(&dir.path().join("sim"), &options, &|_, _| {}).unwrap();
@@ -295,7 +301,7 @@ fn scans() {
     ]);
     scan.output().unwrap();
     let seed = std::fs::read(at("scan/scan.json")).unwrap();
-    let folder = tempfile::tempdir().unwrap();
+    let folder = scratch();
     survives("scan.json", vec![seed], move |b| {
         std::fs::write(folder.path().join("scan.json"), b).expect("a file");
         let report = load_report(folder.path())?;
@@ -328,12 +334,12 @@ fn listings() {
 
 #[test]
 fn calibrations() {
-    let dir = tempfile::tempdir().unwrap();
+    let dir = scratch();
     std::fs::write(dir.path().join("values.json"), VALUES).unwrap();
     let values = Values::load(&dir.path().join("values.json")).unwrap();
     values.store(dir.path(), &dir.path().join("values.json"), true).unwrap();
     for kind in ["camera", "laser_plane", "pointer", "hand_eye"] {
-        let station = tempfile::tempdir().unwrap();
+        let station = scratch();
         let folder = station.path().join("calibration");
         std::fs::create_dir(&folder).unwrap();
         let seed = std::fs::read(dir.path().join(format!("calibration/{kind}.json"))).unwrap();
@@ -347,7 +353,7 @@ fn calibrations() {
         "values",
         seeds(&[VALUES]),
         through_file("values.json", |p| {
-            let station = tempfile::tempdir().expect("a folder");
+            let station = scratch();
             Values::load(p)?.store(station.path(), p, true).map(drop)
         }),
     );
@@ -364,7 +370,7 @@ fn recipes_and_drawings() {
 fn scenes_and_truth() {
     survives("scenes", shipped("scenes"), |b| SceneSpec::parse(&text(b)).and_then(Scene::new).map(drop));
     let options = sheetlight::simulate::SimulateOptions { width: 64, height: 64, shots: 2, ..Default::default() };
-    let dir = tempfile::tempdir().unwrap();
+    let dir = scratch();
     let done = sheetlight::simulate::simulate(dir.path(), &options, &|_, _| {}).unwrap();
     let seed = std::fs::read(done.recordings[0].1.join("truth.json")).unwrap();
     survives("truth", vec![seed], through_file("truth.json", |p| Truth::load(p).map(drop)));
@@ -387,7 +393,7 @@ fn boards() {
 
 #[test]
 fn clouds() {
-    let dir = tempfile::tempdir().unwrap();
+    let dir = scratch();
     let path = dir.path().join("cloud.ply");
     let points: Vec<CloudPoint> =
         (0..5).map(|i| CloudPoint { position: [i as f32, 2.5, -1.0], shot: 7, ..Default::default() }).collect();
@@ -405,6 +411,12 @@ fn pictures() {
     survives("PGM", seeds(&["P5\n# a comment\n4 2\n255\n12345678", "P5 2 2 255\nabcd"]), |b| {
         decode(b, Channel::Luma, 8).map(drop)
     });
+    for (name, format) in [("JPEG", image::ImageFormat::Jpeg), ("BMP", image::ImageFormat::Bmp)] {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        let picture = image::GrayImage::from_fn(16, 16, |x, y| image::Luma([(x * y) as u8]));
+        picture.write_to(&mut bytes, format).unwrap();
+        survives(name, vec![bytes.into_inner()], |b| decode(b, Channel::Luma, 8).map(drop));
+    }
     let tiff = float_tiff(4, 3, &[1.5; 12], "mm");
     survives("TIFF", vec![tiff.clone()], |b| read_float_tiff(b).map(drop));
     survives("TIFF as a picture", vec![tiff], |b| match decode(b, Channel::Luma, 8) {
@@ -416,7 +428,7 @@ fn pictures() {
 
 #[test]
 fn height_maps() {
-    let dir = tempfile::tempdir().unwrap();
+    let dir = scratch();
     HeightMap::empty(6, 5, 0.5, sheetlight::geometry::Rigid::identity()).save(dir.path()).unwrap();
     for name in ["height.json", "height.tif", "count.png"] {
         let file = dir.path().join(name);
