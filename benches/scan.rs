@@ -7,7 +7,7 @@ use sheetlight::raster::Image;
 use sheetlight::recording::Recording;
 use sheetlight::rig::{Rig, Volume};
 use sheetlight::scan::{Engine, Optical, RecordingSource, Source, Where, camera_for};
-use sheetlight::stages::point::pose_words;
+use sheetlight::stages::stripe::point::pose_words;
 use sheetlight::station::{Settings, load_report};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};

@@ -7,8 +7,10 @@ use sheetlight::gpu::Device;
 use sheetlight::raster::Image;
 use sheetlight::scan::grid;
 use sheetlight::scan::{CloudPoint, GridOptions, grid_on};
-use sheetlight::stages::chain::{Chain, ChainConfig};
-use sheetlight::stages::{Thinning, ThresholdParams, hough, skeleton, thin, threshold};
+use sheetlight::stages::chain::batches::Chain;
+use sheetlight::stages::chain::config::ChainConfig;
+use sheetlight::stages::stripe::{hough, skeleton, thin, threshold};
+use sheetlight::stages::{Thinning, ThresholdParams};
 
 const THRESHOLD: ThresholdParams =
     ThresholdParams { window: sheetlight::stages::Window::Mean, size: 31, offset: 8, minimum: 0 };

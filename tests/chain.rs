@@ -7,13 +7,17 @@ use sheetlight::camera::Intrinsics;
 use sheetlight::geometry::{Base, Camera, Plane, Rigid, Vec2, Vec3};
 use sheetlight::gpu::Device;
 use sheetlight::raster::{Image, Mask};
-use sheetlight::stages::cases::{self, Noise, drawn, stripe};
-use sheetlight::stages::chain::{Batch, Chain, ChainConfig};
-use sheetlight::stages::choose::ChooseParams;
-use sheetlight::stages::measured::Measure;
-use sheetlight::stages::peak::{Method, PeakParams};
-use sheetlight::stages::point::pose_words;
-use sheetlight::stages::{Thinning, ThresholdParams, Window, frame, skeleton, thin, threshold};
+use sheetlight::stages::cases::{self, drawn, stripe};
+use sheetlight::stages::chain::batches::{Batch, Chain};
+use sheetlight::stages::chain::config::ChainConfig;
+use sheetlight::stages::chain::measure::Measure;
+use sheetlight::stages::noise::Noise;
+use sheetlight::stages::peak::params::Method;
+use sheetlight::stages::peak::params::PeakParams;
+use sheetlight::stages::stripe::choose_params::ChooseParams;
+use sheetlight::stages::stripe::point::pose_words;
+use sheetlight::stages::stripe::{skeleton, thin, threshold};
+use sheetlight::stages::{Thinning, ThresholdParams, Window, frame};
 
 fn expected(image: &Image, c: &ChainConfig) -> (Mask, Vec<u32>) {
     let mut lit = threshold::twin(image, &c.threshold);

@@ -4,8 +4,12 @@
 use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use sheetlight::raster::Image;
-use sheetlight::stages::peak::{Method, PeakParams, measure, peaks};
-use sheetlight::stages::{Thinning, ThresholdParams, skeleton, thin, threshold};
+use sheetlight::stages::peak::measure;
+use sheetlight::stages::peak::params::Method;
+use sheetlight::stages::peak::params::PeakParams;
+use sheetlight::stages::peak::peaks;
+use sheetlight::stages::stripe::{skeleton, thin, threshold};
+use sheetlight::stages::{Thinning, ThresholdParams};
 
 /// Sensor of the simulation: read noise, grey levels per photo-electron, dark level; rounding adds 1/12.
 const READ: f64 = 0.64;

@@ -5,8 +5,10 @@
 mod common;
 
 use sheetlight::raster::{Channel, Image, Mask, load};
-use sheetlight::stages::chain::{Chain, ChainConfig};
-use sheetlight::stages::{Thinning, ThresholdParams, Window, thin, threshold};
+use sheetlight::stages::chain::batches::Chain;
+use sheetlight::stages::chain::config::ChainConfig;
+use sheetlight::stages::stripe::{thin, threshold};
+use sheetlight::stages::{Thinning, ThresholdParams, Window};
 use std::path::{Path, PathBuf};
 
 #[derive(serde::Deserialize)]

@@ -12,7 +12,7 @@ use sheetlight::rig::Rig;
 use sheetlight::scan::{
     BadShot, CloudPoint, Extraction, Format, GridOptions, Processor, RecordingSource, Shot, Source, Where, read_cloud,
 };
-use sheetlight::stages::chain::ChainConfig;
+use sheetlight::stages::chain::config::ChainConfig;
 use sheetlight::station::{ScanOptions, scan_on};
 use std::path::{Path, PathBuf};
 use std::process::Command;

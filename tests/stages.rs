@@ -5,7 +5,9 @@ mod common;
 
 use sheetlight::fault::Result;
 use sheetlight::gpu::Device;
-use sheetlight::stages::{self, Entry, Frame, ThresholdParams, Verdict, cases, skeleton, thin, threshold};
+use sheetlight::stages;
+use sheetlight::stages::stripe::{skeleton, thin, threshold};
+use sheetlight::stages::{Entry, Frame, ThresholdParams, Verdict, cases};
 
 #[test]
 fn every_stage_equals_its_twin() {
@@ -60,7 +62,7 @@ fn the_chain_of_twins_is_the_plain_definition() {
                 None => shot.clone(),
                 Some(a) => cases::drawn(shot.width, shot.height, shot.bits, |x, y| {
                     let (v, a) = (u32::from(shot.get(x, y)), u32::from(a.get(x, y)));
-                    stages::ambient::subtract(v, a, u32::from(shot.full_scale()))
+                    stages::stripe::ambient::subtract(v, a, u32::from(shot.full_scale()))
                 }),
             };
             let mut lit = threshold::twin(&shot, &scene.params);
@@ -87,7 +89,7 @@ fn the_chain_of_twins_is_the_plain_definition() {
 /// plain picture the two are equal, and the bound is worth having only if it is never far below.
 #[test]
 fn window_sums_are_never_below_their_bound() {
-    let mut noise = cases::Noise(5);
+    let mut noise = sheetlight::stages::noise::Noise(5);
     for (size, width, height) in [(3, 70, 41), (9, 70, 41), (15, 64, 48), (31, 101, 83), (33, 96, 64), (101, 161, 120)]
     {
         for amplitude in [1, 40, 196] {
@@ -99,8 +101,8 @@ fn window_sums_are_never_below_their_bound() {
             let n = frame.tiles() as usize;
             let uniform = bytemuck::cast_slice::<Frame, u32>(&[frame]).to_vec();
             let mut bindings = vec![uniform, bytemuck::pod_collect_to_vec(&words), vec![0; 4 * n]];
-            stages::stats::twin(&mut bindings, &[(stages::frame::PX_LOG2, 2.0)]);
-            let blocks = stages::bound::Blocks::new(&frame, &bindings[2], 0);
+            stages::stripe::stats::twin(&mut bindings, &[(stages::frame::PX_LOG2, 2.0)]);
+            let blocks = stages::stripe::bound::Blocks::new(&frame, &bindings[2], 0);
             let r = (size / 2) as i32;
             let at = |x: i32, y: i32| {
                 u32::from(image.get(x.clamp(0, width as i32 - 1) as u32, y.clamp(0, height as i32 - 1) as u32))

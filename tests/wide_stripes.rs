@@ -5,7 +5,9 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 use sheetlight::raster::Image;
-use sheetlight::stages::peak::{PeakParams, measure, peaks};
+use sheetlight::stages::peak::measure;
+use sheetlight::stages::peak::params::PeakParams;
+use sheetlight::stages::peak::peaks;
 
 /// 6 px: two rows are one sample.
 const WIDTHS: [f64; 6] = [1.0, 2.0, 4.0, 6.0, 8.0, 12.0];

@@ -11,12 +11,9 @@ mod steady;
 mod table;
 mod ways;
 
-pub use crate::bench::rows::Latency;
-pub use crate::bench::rows::Row;
-pub use crate::bench::rows::Soak;
-pub use crate::bench::rows::Stage;
 pub use machine::{Ceilings, cpu_seconds, peak_memory_bytes};
 pub use peer::serve;
+pub use rows::{Latency, Row, Soak, Stage};
 pub use run::{BenchOptions, Report, run};
 pub use scaling::Scaling;
 pub use scenes::{Scene, pictures};

@@ -11,8 +11,10 @@ use crate::gpu::{AdapterInfo, Device};
 use crate::raster::Image;
 use crate::scan::{Extraction, Format};
 use crate::stages::cases;
-use crate::stages::chain::{Batch, Chain, ChainConfig};
-use crate::stages::peak::{self, PeakParams, Stripe};
+use crate::stages::chain::batches::{Batch, Chain};
+use crate::stages::chain::config::ChainConfig;
+use crate::stages::peak::params::PeakParams;
+use crate::stages::peak::{self, Stripe};
 use std::collections::VecDeque;
 use std::time::Instant;
 

@@ -7,7 +7,8 @@ use super::steady::{THRESHOLD, steady};
 use crate::fault::Result;
 use crate::gpu::Device;
 use crate::raster::Image;
-use crate::stages::chain::{Chain, ChainConfig};
+use crate::stages::chain::batches::Chain;
+use crate::stages::chain::config::ChainConfig;
 
 /// A line through times: `intercept_ms + slope_ms x`, and how far from it they lie.
 #[derive(Clone, Debug, serde::Serialize)]

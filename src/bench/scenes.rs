@@ -2,8 +2,9 @@
 //! Frame and unit: pixels, grey levels.
 
 use crate::raster::Image;
-use crate::stages::cases::{Noise, drawn, optics, stripe};
-use crate::stages::point::Optics;
+use crate::stages::cases::{drawn, optics, stripe};
+use crate::stages::noise::Noise;
+use crate::stages::stripe::point::Optics;
 
 /// What the pictures show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]

@@ -4,7 +4,7 @@
 use super::machine;
 use crate::fault::Result;
 use crate::raster::Image;
-use crate::stages::chain::{Batch, Chain};
+use crate::stages::chain::batches::{Batch, Chain};
 use crate::stages::{ThresholdParams, Window};
 use std::time::Instant;
 

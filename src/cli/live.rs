@@ -1,12 +1,12 @@
 //! In: raw frames on standard input, a station. Out: one line a measured frame: its points, how long it took, how many
 //! frames were passed over meanwhile. Frame and unit: camera frame, mm; milliseconds.
 
-use crate::cli::terminal::console::Console;
+use super::terminal::console::Console;
 use crate::fault::{Fault, Result};
 use crate::raster::Light;
 use crate::rig::Rig;
 use crate::scan::{Live, Newest, RawFormat, RawFrames, Where};
-use crate::stages::point::Point;
+use crate::stages::stripe::point::Point;
 use crate::station::Settings;
 use std::path::PathBuf;
 use std::sync::Arc;

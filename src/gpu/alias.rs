@@ -4,7 +4,7 @@
 //! Buffer and images are bound to the same bytes (VK_IMAGE_CREATE_ALIAS_BIT, linear tiling). wgpu does not know
 //! that they share them and so puts no barrier between a write of the one and a read of the other; none is needed where
 //! dispatches run one after the other, as on a software adapter, and only there is this offered, after a trial
-//! ([`super::texels::trial`]). Reasons and figures: docs/decisions/0012.
+//! ([`super::texels_trial::trial`]). Reasons and figures: docs/decisions/0012.
 
 use super::texels::{ROW_LOG2, Texel};
 use ash::vk;

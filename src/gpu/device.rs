@@ -3,7 +3,7 @@
 
 use super::alias::{self, Aliased};
 use super::background::Background;
-use super::texels::{self, Texel};
+use super::texels::Texel;
 use crate::fault::{Fault, Result};
 use rayon::ThreadPool;
 use rayon::prelude::*;
@@ -119,15 +119,8 @@ fn sorted(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
 }
 
 impl Device {
-    /// Opens the best adapter, or the one whose name holds the text of the environment variable
-    /// SHEETLIGHT_ADAPTER (any case).
-    pub fn open() -> Result<Device> {
-        let wanted = std::env::var("SHEETLIGHT_ADAPTER").ok().filter(|s| !s.is_empty());
-        Device::open_named(wanted.as_deref())
-    }
-
-    /// Opens the best adapter whose name holds `wanted`.
-    pub fn open_named(wanted: Option<&str>) -> Result<Device> {
+    /// Opens the best adapter whose name holds `wanted`; it reads arrays as every other adapter does.
+    pub(super) fn opened(wanted: Option<&str>) -> Result<Device> {
         let all = sorted(&instance());
         let names: Vec<String> = all.iter().map(|a| a.get_info().name).collect();
         let chosen = all
@@ -187,7 +180,7 @@ impl Device {
         }));
         let image_rows = raw.limits().max_texture_dimension_2d;
         let tick_ns = info.timestamps.then(|| queue.get_timestamp_period());
-        let mut device = Device {
+        Ok(Device {
             raw,
             queue,
             info,
@@ -198,9 +191,7 @@ impl Device {
             background: Default::default(),
             submitting: Default::default(),
             image_rows,
-        };
-        device.reads_texels = !device.has_own_processors() && device.info.unified_memory && texels::trial(&device)?;
-        Ok(device)
+        })
     }
 
     /// The same device with its arrays read as every other adapter reads them; for tests and comparisons.

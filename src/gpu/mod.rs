@@ -4,16 +4,20 @@
 #[cfg_attr(not(target_os = "linux"), path = "no_alias.rs")]
 mod alias;
 mod background;
+mod description;
 mod device;
+mod open;
 mod rates;
 mod recording;
 mod ring;
 mod specialise;
 mod stage;
 mod texels;
+mod texels_trial;
 
+pub use description::{Access, Binding, Field, Stage};
 pub use device::{AdapterInfo, Buffer, Device, adapters};
 pub use rates::Rates;
 pub use recording::{Dispatch, Recording, Replay, StageTime};
 pub use ring::{PART, Returned, Ring, RingSizes, Slot};
-pub use stage::{Access, Binding, Field, Pipeline, Stage, Workload, run_once};
+pub use stage::{Pipeline, Workload, run_once};

@@ -1,8 +1,8 @@
 //! In: a device. Out: how fast this machine moves pictures there, on the path that the chain takes, and results back.
 //! Frame and unit: bytes, 1e9 bytes a second.
 
+use super::description::{Access, Binding, Stage};
 use super::ring::{PART, Ring, RingSizes};
-use super::stage::{Access, Binding, Stage};
 use super::{Device, Recording, Replay};
 use crate::fault::Result;
 use std::time::Instant;

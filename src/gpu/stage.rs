@@ -1,66 +1,17 @@
 //! In: one WGSL file with its bindings and uniform layout. Out: a compiled pipeline, and one run of it.
 //! Frame and unit: none.
 
+use super::description::{Access, Stage};
 use super::specialise::specialised;
 use super::texels::{rewrite, texel_of};
 use super::{Buffer, Device};
 use crate::fault::Result;
 use std::sync::{Arc, LazyLock, OnceLock};
 
-/// How a stage uses a binding.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Access {
-    Uniform,
-    Read,
-    /// A read-only array of u32, vec2<u32> or vec4<u32> that is bound whole: read as texels where that is faster.
-    Texels,
-    ReadWrite,
-}
-
-/// One binding of group 0; its place in `Stage::bindings` is its number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Binding {
-    pub name: &'static str,
-    pub access: Access,
-}
-
-/// One member of a uniform block: WGSL name and byte offset.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Field {
-    pub name: &'static str,
-    pub offset: usize,
-}
-
-/// One shader with one entry point `main`. The shared texts are appended after the stage's own, so
-/// that line numbers in messages are those of its file.
-#[derive(Clone, Copy, Debug)]
-pub struct Stage {
-    /// The file is shaders/NAME.wgsl.
-    pub name: &'static str,
-    pub wgsl: &'static str,
-    pub shared: &'static [&'static str],
-    pub workgroup: [u32; 3],
-    pub bindings: &'static [Binding],
-    /// The uniform struct's WGSL name, members and size in bytes; every `Access::Uniform` binding has this type.
-    pub uniform: (&'static str, &'static [Field], usize),
-    /// Names of the `override` constants, which select a variant when the pipeline is built.
-    pub overrides: &'static [&'static str],
-}
-
 impl Stage {
-    /// Stage text with the shared texts after it.
-    pub fn source(&self) -> String {
-        std::iter::once(self.wgsl).chain(self.shared.iter().copied()).collect::<Vec<_>>().join("\n")
-    }
-
-    /// The same, reading `Access::Texels` as what they are called.
+    /// The stage's text, reading `Access::Texels` as what they are called.
     pub fn source_of_texels(&self) -> String {
         rewrite(self, &self.source())
-    }
-
-    /// Workgroups that cover `invocations` in each direction.
-    pub fn groups(&self, invocations: [u32; 3]) -> [u32; 3] {
-        std::array::from_fn(|i| invocations[i].div_ceil(self.workgroup[i]))
     }
 
     /// The stage with its override constants, compiled on another thread: who uses it first waits for it, or compiles it where

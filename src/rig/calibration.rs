@@ -1,6 +1,7 @@
 //! In: a calibrated value and what its solver knows about it. Out: the record that is kept on disk.
 //! Frame and unit: stated in the record; covariances in the units of their parameters squared.
 
+use super::hash::{hash_text, hex};
 use super::kind::{Place, Units};
 use super::{Covariance, Kind, Measured};
 use crate::camera::Intrinsics;
@@ -176,14 +177,4 @@ pub fn hash_file(path: &Path) -> Result<String> {
     let copied = std::fs::File::open(path).and_then(|mut f| std::io::copy(&mut f, &mut hash));
     copied.map_err(|e| Fault::read(path, e))?;
     Ok(hex(&hash.finalize()))
-}
-
-/// SHA-256 of bytes, hexadecimal.
-pub fn hash_text(bytes: &[u8]) -> String {
-    use sha2::Digest;
-    hex(&sha2::Sha256::digest(bytes))
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }

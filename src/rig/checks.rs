@@ -2,6 +2,7 @@
 //! like another unit.
 //! Frame and unit: as the values; mm, px.
 
+use super::measured::Measured;
 use super::{Rig, Volume};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
@@ -15,16 +16,6 @@ const FOCAL: [f64; 2] = [0.1, 200.0];
 const FARTHEST: f64 = 5000.0;
 /// Nearer than this to the flange's centre or to the camera's, mm, numbers look like metres.
 const METRES: f64 = 2.0;
-
-/// A value that can be calibrated.
-pub trait Measured {
-    /// Refuses numbers that no such thing has.
-    fn check(&self) -> Result<()>;
-    /// What would be odd of right numbers: asked about where a person gives them.
-    fn doubt(&self) -> Option<String> {
-        None
-    }
-}
 
 /// For values of which the caller says no more.
 const AGAIN: &str = "calibrate again, or import right values with sheetlight station import";

@@ -61,7 +61,7 @@ fn darker<T: Copy + Into<u32>>(ambient: &[T], shot: &[T], spare: u32) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stages::ambient::without;
+    use crate::stages::stripe::ambient::without;
 
     #[test]
     fn what_does_not_fit_the_shots_is_refused() {

@@ -8,11 +8,13 @@ use crate::fault::Result;
 use crate::geometry::{Camera, Plane};
 use crate::gpu::Device;
 use crate::raster::{Image, Mask};
-use crate::stages::ambient;
-use crate::stages::chain::{Batch, Chain, ChainConfig};
+use crate::stages::chain::batches::{Batch, Chain};
+use crate::stages::chain::config::ChainConfig;
 use crate::stages::host::Host;
-use crate::stages::peak::{self, Peak, Stripe};
-use crate::stages::point::{Optics, Point, plane_in_view};
+use crate::stages::peak::found::Peak;
+use crate::stages::peak::{self, Stripe};
+use crate::stages::stripe::ambient;
+use crate::stages::stripe::point::{Optics, Point, plane_in_view};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::collections::VecDeque;
@@ -28,7 +30,7 @@ pub struct Measured {
 struct Job {
     shot: u32,
     image: Image,
-    /// base_from_camera as [`crate::stages::point::pose_words`].
+    /// base_from_camera as [`crate::stages::stripe::point::pose_words`].
     pose: [f32; 12],
 }
 
@@ -190,7 +192,7 @@ impl Engine {
         Ok(())
     }
 
-    /// Takes a picture; `pose` is base_from_camera as [`crate::stages::point::pose_words`].
+    /// Takes a picture; `pose` is base_from_camera as [`crate::stages::stripe::point::pose_words`].
     pub fn submit(&mut self, shot: u32, image: Image, pose: [f32; 12]) -> Result<()> {
         self.pending.push(Job { shot, image, pose });
         let usual = match &self.way {

@@ -3,13 +3,14 @@
 
 use super::Format;
 use crate::fault::{Fault, Result};
-use crate::stages::chain::ChainConfig;
-use crate::stages::choose::ChooseParams;
-use crate::stages::lengthen::LengthenParams;
-use crate::stages::measured::Measure;
-use crate::stages::peak::{PeakParams, Stripe};
-use crate::stages::point::Optics;
-use crate::stages::support::SupportParams;
+use crate::stages::chain::config::ChainConfig;
+use crate::stages::chain::measure::Measure;
+use crate::stages::peak::Stripe;
+use crate::stages::peak::params::PeakParams;
+use crate::stages::stripe::choose_params::ChooseParams;
+use crate::stages::stripe::lengthen::LengthenParams;
+use crate::stages::stripe::point::Optics;
+use crate::stages::support::params::SupportParams;
 use crate::stages::{Thinning, ThresholdParams};
 
 /// Settings of the extraction; `[extraction]` in station.toml.

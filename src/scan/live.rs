@@ -7,7 +7,7 @@ use crate::fault::Result;
 use crate::geometry::{Camera, Rigid};
 use crate::raster::Image;
 use crate::rig::{Rig, Volume};
-use crate::stages::point::pose_words;
+use crate::stages::stripe::point::pose_words;
 use std::sync::{Condvar, Mutex, PoisonError};
 
 /// Holds the newest of what one thread puts in until another takes it out.

@@ -3,7 +3,7 @@
 //! Frame and unit: pixels of the shot.
 
 use crate::raster::{Image, Rgb, RgbImage, text_width};
-use crate::stages::peak::{Peak, Reject};
+use crate::stages::peak::found::{Peak, Reject};
 
 /// Colour of a peak's fate; kept is green, everything else is told apart by hue.
 pub fn colour(fate: Reject) -> Rgb {

@@ -10,8 +10,11 @@ use crate::geometry::{Base, Camera, Flange, Plane, Rigid, Vec2, Vec3};
 use crate::gpu::Device;
 use crate::raster::Image;
 use crate::rig::{Rig, Volume};
-use crate::stages::peak::{Peak, PeakParams, SATURATED, Stripe};
-use crate::stages::point::{self, Optics};
+use crate::stages::peak::Stripe;
+use crate::stages::peak::found::{Peak, SATURATED};
+use crate::stages::peak::params::PeakParams;
+use crate::stages::stripe::point;
+use crate::stages::stripe::point::Optics;
 use crate::stages::support::{self, Support};
 
 /// What one shot came to.

@@ -15,13 +15,13 @@ pub mod station;
 mod truth;
 mod write;
 
-pub use crate::simulate::sensor::Sensor;
 pub use light::{Canvas, InScene, LitPoint, View};
 pub use pattern::Pattern;
 pub use picture::{expose, hot_pixels};
 pub use plan::{Views, above, base_from_scene, board_views, flange, reported, scan};
 pub use rig::RigSpec;
 pub use scene::{CutSpec, Hit, Material, PartSpec, Scene, SceneSpec, ShapeSpec, SolidSpec, part_pose};
+pub use sensor::Sensor;
 pub use station::{LineLaser, Pointer, Station, TRUE_VALUES};
 pub use truth::{CloudErrors, PartTruth, PointerTruth, Truth, TruthFile};
 pub use write::{DEFAULT_SCENE, Set, SimulateOptions, Simulated, simulate};

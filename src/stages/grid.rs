@@ -4,7 +4,8 @@
 
 use super::entry::Case;
 use crate::geometry::{Base, Grid, Rigid, Vec3};
-use crate::gpu::{Access::*, Binding, Field, Stage};
+use crate::gpu::Access::*;
+use crate::gpu::{Binding, Field, Stage};
 
 /// Where the cells lie, as whole numbers; the WGSL struct of the same name, shaders/shared/grid.wgsl.
 #[repr(C)]
@@ -302,7 +303,7 @@ pub fn pick_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
 /// Cases of one of the three stages: a tilted plate with a block and strays far from the base's origin, all points in one
 /// cell, numbers that are none.
 pub fn cases(stage: &str) -> Vec<Case> {
-    let mut noise = super::cases::Noise(11);
+    let mut noise = super::noise::Noise(11);
     let mut normal = |sigma: f64| sigma * noise.normal();
     let tilt = Rigid::<Base, Grid>::from_vectors(&Vec3::new(0.2, -0.1, 0.3), Vec3::new(1400.0, -900.0, 60.0));
     let mut plate = Vec::new();
@@ -371,7 +372,7 @@ mod tests {
         let pose = Rigid::<Base, Grid>::from_vectors(&Vec3::new(1.2, -0.4, 2.3), Vec3::new(-700.0, 1300.0, 250.0));
         let (cell, step) = (0.05, 0.0004);
         let f = GridFrame::new(&pose, [900, 700], (cell, step), 100, 0.0, 255.0);
-        let mut noise = super::super::cases::Noise(3);
+        let mut noise = super::super::noise::Noise(3);
         let mut next = |range: f64| range * f64::from(noise.next() % 100_000) / 100_000.0;
         for _ in 0..2000 {
             let local = Vec3::new(next(45.0), next(35.0), next(20.0) - 10.0);

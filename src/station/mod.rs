@@ -12,7 +12,6 @@ mod values;
 mod verify;
 pub mod volume;
 
-pub use crate::station::judge::figures::Judged;
 pub use calibrate::ball::{calibrate_profile_hand_eye, evaluate_profile_hand_eye};
 pub use calibrate::board_views::{Boards, FrameBoard, boards};
 pub use calibrate::hand_eye::{
@@ -22,6 +21,7 @@ pub use calibrate::laser_plane::{LaserPlaneRun, calibrate_laser_plane};
 pub use calibrate::pointer::{PointerRun, calibrate_pointer};
 pub use find::{SecondLook, find_part, find_part_in_all, second_look, teach_part};
 pub use guide::{GuideOptions, Guided, Step, guide};
+pub use judge::figures::Judged;
 pub use judge::parts::{FoundPart, judge_parts};
 pub use judge::points::judge;
 pub use range::{Distance, RangeReport, RangeRun, SurfaceFound, measure_range};

@@ -2,17 +2,17 @@
 //! residuals ([zhang00] section 3.2 and 3.3; docs/math.md, Camera calibration (7)).
 //! Frame and unit: pixels; board and camera frames in mm.
 
-use super::lens::{Lens, by_evidence};
+use super::bundle::{Corner, Fit, State};
+use super::evidence::by_evidence;
+use super::lens::Lens;
 use super::zhang::{Seen, first_camera};
 use crate::calibrate::boards::BoardView;
 use crate::calibrate::homography::homography;
-use crate::calibrate::pose::{moved, point_by_step, pose_from_homography};
-use crate::calibrate::projection::project;
-use crate::camera::{Intrinsics, LENS, PARAMETERS, ParameterCovariance, Parameters, SKEW};
+use crate::calibrate::pose::pose_from_homography;
+use crate::camera::{Intrinsics, LENS, PARAMETERS, ParameterCovariance, SKEW};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Board, Camera, Mat3, Rigid, Vec2, Vec3};
-use crate::solve::{Blocks, LmOptions, Loss, Problem, Residuals, Solution, Stop, lm};
-use nalgebra::{DMatrix, Matrix2x6};
+use crate::solve::{LmOptions, Loss, Solution, Stop};
 
 /// A picture of a board: its name for messages, the board's features, what was seen of them.
 #[derive(Clone, Debug)]
@@ -63,73 +63,6 @@ pub struct Solved {
     pub iterations: usize,
 }
 
-pub(in crate::calibrate) type State = (Parameters, Vec<Rigid<Camera, Board>>);
-
-/// One corner: board frame, pixel, sigma.
-pub(in crate::calibrate) type Corner = (Vec3, Vec2, f64);
-
-pub(in crate::calibrate) struct Bundle<'a> {
-    pub pictures: &'a [Vec<Corner>],
-    pub like: &'a Intrinsics,
-    /// Intrinsic parameters that are estimated.
-    pub free: Vec<usize>,
-}
-
-impl Bundle<'_> {
-    /// Derivatives of a corner's residuals by the free parameters and by its pose's step, row by row.
-    pub fn row(
-        &self,
-        camera: &Intrinsics,
-        pose: &Rigid<Camera, Board>,
-        corner: &Corner,
-    ) -> Option<(Vec2, [Vec<f64>; 2])> {
-        let (x, pixel, sigma) = corner;
-        let rotated = pose.rotation * x;
-        let q = project(camera, &(rotated + pose.translation))?;
-        let by_pose: Matrix2x6<f64> = q.by_point * point_by_step(&rotated);
-        let of = |r: usize| {
-            let own = self.free.iter().map(|&i| q.by_intrinsics[(r, i)] / sigma);
-            own.chain(by_pose.row(r).iter().map(|d| d / sigma)).collect()
-        };
-        Some(((q.pixel - pixel) / *sigma, [of(0), of(1)]))
-    }
-}
-
-impl Problem for Bundle<'_> {
-    type State = State;
-    fn width(&self) -> usize {
-        PARAMETERS + 6 * self.pictures.len()
-    }
-    fn blocks(&self) -> Option<Blocks> {
-        Some(Blocks { first: PARAMETERS, size: 6 })
-    }
-    fn moved(&self, (k, poses): &State, step: &[f64]) -> State {
-        let k = k + Parameters::from_column_slice(&step[..PARAMETERS]);
-        let poses = poses.iter().zip(step[PARAMETERS..].chunks_exact(6)).map(|(p, s)| moved(p, s)).collect();
-        (k, poses)
-    }
-    fn residuals(&self, (k, poses): &State, out: &mut Residuals) -> Option<()> {
-        let camera = self.like.with_parameters(k);
-        if camera.fx <= 0.0 || camera.fy <= 0.0 {
-            return None;
-        }
-        for (picture, (points, pose)) in self.pictures.iter().zip(poses).enumerate() {
-            let first = PARAMETERS + 6 * picture;
-            let columns: Vec<usize> = self.free.iter().copied().chain(first..first + 6).collect();
-            for corner in points {
-                if !out.wants_jacobian() {
-                    let r = (camera.pixel_from_point(&pose.point(&corner.0))? - corner.1) / corner.2;
-                    out.group(&[r.x, r.y], &columns, &[]);
-                    continue;
-                }
-                let (r, [across, down]) = self.row(&camera, pose, corner)?;
-                out.group(&[r.x, r.y], &columns, &[across, down].concat());
-            }
-        }
-        Some(())
-    }
-}
-
 /// Solves for camera and poses together.
 ///
 /// # Errors
@@ -169,36 +102,6 @@ pub fn solve(pictures: &[Observation], width: u32, height: u32, options: &SolveO
             .next("look at the pictures and leave out those where the board was misread"));
     }
     Ok(finish(&fit, solution, held))
-}
-
-/// The corners with what stays the same from one choice of lens terms to the next.
-pub(in crate::calibrate) struct Fit<'a> {
-    pub corners: &'a [Vec<Corner>],
-    pub like: &'a Intrinsics,
-    pub loss: Loss,
-}
-
-impl Fit<'_> {
-    fn bundle(&self, held: &[usize]) -> Bundle<'_> {
-        let free = (0..PARAMETERS).filter(|i| !held.contains(i)).collect();
-        Bundle { pictures: self.corners, like: self.like, free }
-    }
-    fn with(&self, held: &[usize], from: State, options: LmOptions) -> Solution<State> {
-        lm(&self.bundle(held), from, &LmOptions { hold: held.to_vec(), ..options })
-    }
-    /// The optimum with these parameters held.
-    pub fn fine(&self, held: &[usize], from: State) -> Solution<State> {
-        let estimate_scale = self.loss != Loss::Squares;
-        self.with(held, from, LmOptions { loss: self.loss, estimate_scale, ..LmOptions::default() })
-    }
-    pub fn camera(&self, solution: &Solution<State>) -> Intrinsics {
-        self.like.with_parameters(&solution.state.0)
-    }
-    /// Of the intrinsic parameters.
-    pub fn covariance(&self, solution: &Solution<State>) -> Option<ParameterCovariance> {
-        let of = |c: DMatrix<f64>| c.fixed_view::<PARAMETERS, PARAMETERS>(0, 0).into();
-        solution.scaled_covariance().map(of)
-    }
 }
 
 /// Corners with sigmas for the solver. A floor keeps a few very sharp corners from ruling: printing

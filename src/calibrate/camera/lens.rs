@@ -2,11 +2,7 @@
 //! what the pictures tell (docs/math.md, Camera calibration (8)).
 //! Frame and unit: indices into `camera::NAMES`.
 
-use super::intrinsics::{Fit, State};
-use super::quality::expected_ray_error;
 use crate::camera::{LENS, NAMES, SKEW};
-use crate::solve::Solution;
-use nalgebra::{DMatrix, DVector};
 
 /// Which lens terms are estimated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -79,33 +75,4 @@ impl Lens {
 /// Names of the terms of the plain lens that were held.
 pub fn held_names(held: &[usize]) -> Vec<&'static str> {
     BROWN.iter().filter(|i| held.contains(i)).map(|&i| NAMES[i]).collect()
-}
-
-/// Holds lens terms at zero, from the highest down, where the pictures cannot tell them from zero and
-/// where estimating them would cost accuracy (expected ray error over the image).
-pub(in crate::calibrate) fn by_evidence(fit: &Fit<'_>, solution: &mut Solution<State>, held: &mut Vec<usize>) {
-    for block in [&[8][..], &[6, 7], &[5], &[4]] {
-        if tells(fit, solution, block) > 4.0 * block.len() as f64 {
-            return;
-        }
-        let fewer = [held, block].concat();
-        let mut start = solution.state.clone();
-        block.iter().for_each(|&i| start.0[i] = 0.0);
-        let reduced = fit.fine(&fewer, start);
-        let cost =
-            |s: &Solution<State>| fit.covariance(s).map_or(f64::INFINITY, |c| expected_ray_error(&fit.camera(s), &c));
-        if cost(solution) < 1.25 * cost(&reduced) {
-            return;
-        }
-        *solution = reduced;
-        *held = fewer;
-    }
-}
-
-/// Squared Mahalanobis distance of some parameters from zero; 0 where they are not determined.
-fn tells(fit: &Fit<'_>, solution: &Solution<State>, block: &[usize]) -> f64 {
-    let Some(c) = fit.covariance(solution) else { return 0.0 };
-    let theta = DVector::from_iterator(block.len(), block.iter().map(|&i| solution.state.0[i]));
-    let sub = DMatrix::from_fn(block.len(), block.len(), |a, b| c[(block[a], block[b])]);
-    sub.try_inverse().map_or(0.0, |inverse| (theta.transpose() * inverse * &theta)[0])
 }

@@ -1,10 +1,13 @@
 //! In: boards as seen in pictures. Out: the camera's intrinsics and lens with covariance and verdict.
 //! Frame and unit: camera frame; px, mm (docs/math.md, Camera calibration).
 
+mod bundle;
+mod evidence;
 pub mod intrinsics;
 pub mod lens;
 mod pictures;
 pub mod procedure;
 pub mod quality;
+pub mod ray_error;
 pub mod report;
 pub mod zhang;

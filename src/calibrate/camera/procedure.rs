@@ -6,7 +6,7 @@ use super::intrinsics::{Observation, SolveOptions, Solved, solve};
 use super::lens::{Lens, held_names};
 use super::pictures::{Pictures, one_size, pictures};
 use super::quality;
-use super::quality::expected_ray_error;
+use super::ray_error::expected_ray_error;
 use crate::calibrate::boards::FindOptions;
 use crate::camera::{ALWAYS_NAMED, Intrinsics, NAMES};
 use crate::fault::{Fault, Result};

@@ -3,7 +3,7 @@
 //! Frame and unit: px and the lens's own (docs/math.md, Hand-eye (9)).
 
 use super::closed::Pair;
-use crate::calibrate::camera::quality::expected_ray_error;
+use crate::calibrate::camera::ray_error::expected_ray_error;
 use crate::camera::{Intrinsics, ParameterCovariance, Parameters};
 
 /// Change of the camera's parameters from those that the boards were measured with: mean + root z, z ~ N(0, I).

@@ -4,9 +4,9 @@
 use super::level::{Level, Placed};
 use crate::fault::{Fault, Result};
 use crate::gpu::{Device, Pipeline, Recording, Replay};
-use crate::stages::shape_frame::ShapeFrame;
-use crate::stages::shape_maps::{QUANTISE, SPREAD};
-use crate::stages::shape_sums::{PEAKS, Peak, SCORE};
+use crate::stages::shape::frame::ShapeFrame;
+use crate::stages::shape::maps::{QUANTISE, SPREAD};
+use crate::stages::shape::sums::{PEAKS, Peak, SCORE};
 
 /// A GPU with the stages of the coarse search.
 #[derive(Clone)]

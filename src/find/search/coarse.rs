@@ -5,8 +5,8 @@
 use super::accelerator::Accelerator;
 use super::level::{Level, Placed};
 use crate::find::model::shape_model::{ModelPoint, thin};
-use crate::stages::shape_frame::{BINS, STRIDE};
-use crate::stages::shape_sums::Peak;
+use crate::stages::shape::frame::{BINS, STRIDE};
+use crate::stages::shape::sums::Peak;
 
 /// A perfect feature. 63 features of 4 fill an 8-bit sum.
 pub const FULL: u8 = 4;

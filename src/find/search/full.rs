@@ -12,7 +12,7 @@ use crate::fault::{Fault, Result};
 use crate::find::model::gradient::{Field, slopes};
 use crate::find::model::shape_model::ShapeModel;
 use crate::find::scene::{Kind, Scene, from_level};
-use crate::stages::shape_frame::STRIDE;
+use crate::stages::shape::frame::STRIDE;
 use rayon::prelude::*;
 
 /// A model that reaches farther than this many times the map is not searched: no place of it has half of its edges there, and

@@ -4,9 +4,9 @@
 
 use crate::find::model::gradient::Field;
 use crate::find::scene::Kind;
-use crate::stages::shape_frame::{BINS, STRIDE, ShapeFrame};
-use crate::stages::shape_maps::{both_polarities, direction, pack, response};
-use crate::stages::shape_sums::{Peak, peaks};
+use crate::stages::shape::frame::{BINS, STRIDE, ShapeFrame};
+use crate::stages::shape::maps::{both_polarities, direction, pack, response};
+use crate::stages::shape::sums::{Peak, peaks};
 use rayon::prelude::*;
 
 /// Every cell gets the bits of the window from -STRIDE/2 to STRIDE/2 - 1 around it.

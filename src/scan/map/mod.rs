@@ -6,3 +6,4 @@ mod filling;
 pub(super) mod grid;
 pub(super) mod heightmap;
 pub(super) mod picture;
+pub(super) mod spec;

@@ -2,7 +2,8 @@
 //! Frame and unit: pixels, grey levels; docs/math.md, Shift.
 
 use crate::raster::Image;
-use crate::stages::{Thinning, ThresholdParams, skeleton, thin, threshold};
+use crate::stages::stripe::{skeleton, thin, threshold};
+use crate::stages::{Thinning, ThresholdParams};
 
 /// The stripe in one row.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,11 +1,14 @@
 //! In: the scenes with a stripe; straight stripes of every width, direction and depth. Out: the cases of the stages after the
 //! skeleton. Frame and unit: pixels, words.
 
-use super::{Case, Noise, Scene, Walk, drawn, optics, pose, tilted};
+use super::scenes::{Scene, drawn, optics, pose, tilted};
+use super::walk::Walk;
 use crate::stages::frame::{self, px_log2};
-use crate::stages::peak::{Method, PeakParams};
-use crate::stages::point::Optics;
-use crate::stages::{Thinning, ThresholdParams, choose, peak, point};
+use crate::stages::noise::Noise;
+use crate::stages::peak::params::{Method, PeakParams};
+use crate::stages::stripe::point::Optics;
+use crate::stages::stripe::{choose, point};
+use crate::stages::{Case, Thinning, ThresholdParams, peak};
 
 /// What the stages are told of a stripe and its rig.
 struct Told {
@@ -103,7 +106,7 @@ fn cases(name: &str, scene: &Scene, told: &Told, methods: &[Method], wanted: &st
     let mut cases = Vec::new();
     for &method in methods {
         let p = PeakParams { method, width_px: told.width_px, speckle: 0.05, ..Default::default() };
-        let choice = choose::ChooseParams { echo: 0.4, ..Default::default() };
+        let choice = crate::stages::stripe::choose_params::ChooseParams { echo: 0.4, ..Default::default() };
         let frame = peak::PeakFrame::new((f.width, f.height, bits), f.shots, &p, &choice, told.optics.across());
         let quads = f64::from(frame.quads());
         let header = walk.buffers["header"].clone();

@@ -5,7 +5,7 @@
 use super::sample::Sample;
 use crate::stages::Frame;
 use crate::stages::frame::{ALL_TILES, GAUSSIAN};
-use crate::stages::stats::depth_shift;
+use crate::stages::stripe::stats::depth_shift;
 use multiversion::multiversion;
 
 /// Edge of a block, px.
@@ -80,7 +80,7 @@ impl Blocks {
         use rayon::prelude::*;
         let (margin, down) = (self.margin, f.tiles_y as usize);
         let rows = &mut self.rows[margin..margin + down];
-        let least = super::rows_at_least(f.width);
+        let least = super::share::rows_at_least(f.width);
         rows.par_iter_mut().enumerate().with_min_len(least).for_each(|(y, row)| {
             statistics(px, f, y, margin, row);
             row.repeat_sides(margin);

@@ -5,7 +5,7 @@
 use super::blocks::{EDGE, Proof, level};
 use super::sample::Sample;
 use crate::stages::frame::{ALL_TILES, GAUSSIAN};
-use crate::stages::threshold::passes_mean;
+use crate::stages::stripe::threshold::passes_mean;
 use crate::stages::{Frame, ThresholdParams};
 use multiversion::multiversion;
 

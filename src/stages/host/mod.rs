@@ -2,20 +2,24 @@
 //! order and by the proofs of the GPU's chain: statistics of every pixel, then only the tiles that may hold a lit one.
 //! Frame and unit: pixels; points in the poses' frame, mm.
 
+use super::chain::config::ChainConfig;
+use super::chain::measure::Measure;
+use super::frame::{ALL_TILES, Frame, HAS_ROI};
+use super::host::share::rows_at_least;
+use super::peak::found::Peak;
+use super::peak::{self, PeakFrame};
+use super::stripe::choose::Lines;
+use super::stripe::point::Point;
+use super::stripe::{ambient, choose, lengthen, point, skeleton, threshold};
+use super::{Thinning, ThresholdParams};
+use crate::fault::Result;
+use crate::raster::{Image, Mask, Pixels};
 mod blocks;
 mod light;
 mod sample;
+mod share;
 mod thinning;
 
-use super::chain::ChainConfig;
-use super::choose::{self, Lines};
-use super::frame::{ALL_TILES, Frame, HAS_ROI};
-use super::measured::Measure;
-use super::peak::{self, Peak, PeakFrame};
-use super::point::{self, Point};
-use super::{Thinning, ThresholdParams, ambient, lengthen, skeleton, threshold};
-use crate::fault::Result;
-use crate::raster::{Image, Mask, Pixels};
 use blocks::{Blocks, Proof};
 use light::{Sums, Tile, View};
 use rayon::prelude::*;
@@ -58,14 +62,6 @@ struct Work {
     list: Vec<u32>,
     worn: Worn,
     added: Vec<(i32, i32)>,
-}
-
-/// Pixels that one thread takes at least: handing work to another costs as much as a tenth of this.
-const LEAST: usize = 1 << 17;
-
-/// So many rows of blocks or tiles.
-fn rows_at_least(width: u32) -> usize {
-    LEAST.div_ceil(8 * width as usize)
 }
 
 impl Host {

@@ -3,10 +3,12 @@
 //! Frame and unit: pixels.
 
 use super::*;
-use crate::stages::cases::{self, Noise, drawn, stripe};
+use crate::stages::Window;
+use crate::stages::cases::{self, drawn, stripe};
 use crate::stages::frame::HAS_ROI;
-use crate::stages::lengthen::LengthenParams;
-use crate::stages::{Window, lengthen, point, thin};
+use crate::stages::noise::Noise;
+use crate::stages::stripe::lengthen::LengthenParams;
+use crate::stages::stripe::{lengthen, point, thin};
 
 /// The plain way, every pixel: lit, thinned, and the list after the ends were carried on.
 fn plain(image: &Image, c: &ChainConfig) -> (Mask, Mask, Vec<u32>) {
@@ -137,12 +139,12 @@ fn peaks_and_points_are_those_of_the_twins() {
     let image = stripe(640, 360, 8, 2.5, 5, 4);
     let optics = cases::optics(640, 360);
     let peak = peak::PeakParams { width_px: 2.5, ..Default::default() };
-    let measure = Measure { peak, choose: choose::ChooseParams::default(), optics };
+    let measure = Measure { peak, choose: crate::stages::stripe::choose_params::ChooseParams::default(), optics };
     let config = ChainConfig { measure: Some(measure), ..ChainConfig::new(640, 360, 8) };
     let found = Host::new(&config).unwrap().run(5, &image, &cases::pose(2)).unwrap();
     let mut peaks = peak::peaks(&image, &plain(&image, &config).2, 5, &peak, optics.across());
     let scene = choose::Scene { width: 640, height: 360, full_scale: 255.0, width_px: 2.5, across: optics.across() };
-    choose::choose(&mut peaks, &scene, &choose::ChooseParams::default());
+    choose::choose(&mut peaks, &scene, &crate::stages::stripe::choose_params::ChooseParams::default());
     let points = point::posed(&mut peaks, &optics, &cases::pose(2));
     assert!(peaks.len() > 600 && found.peaks == peaks);
     let bits = |p: &[Point]| bytemuck::cast_slice::<Point, u32>(p).to_vec();

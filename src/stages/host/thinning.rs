@@ -3,7 +3,7 @@
 
 use super::light::Tile;
 use crate::stages::Thinning;
-use crate::stages::thin::{Neighbours, deletions, interior};
+use crate::stages::stripe::thin::{Neighbours, deletions, interior};
 use multiversion::multiversion;
 
 /// A mask tile by tile, with a dark tile beyond every border.

@@ -1,26 +1,11 @@
 //! In: a picture, a skeleton pixel, the expected stripe. Out: the maximum-likelihood Gaussian profile across it.
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels. docs/math.md, Stripe peak (1) to (5).
 
+use super::PeakFrame;
+use super::found::{Peak, SATURATED};
+use super::grey::Grey;
 use super::profile::{Profile, SIDES, by_columns};
-use super::{Grey, Peak, PeakFrame, SATURATED};
-
-/// Places of the gradients and their weights (1 - r² / 16)²: every other one of a lattice, because a gradient looks at its
-/// four neighbours, which lie on the other colour of the board.
-pub(super) const GRADIENTS: [(i32, i32, f32); 13] = [
-    (0, 0, 1.0),
-    (-1, -1, 0.765625),
-    (1, -1, 0.765625),
-    (-1, 1, 0.765625),
-    (1, 1, 0.765625),
-    (0, -2, 0.5625),
-    (-2, 0, 0.5625),
-    (2, 0, 0.5625),
-    (0, 2, 0.5625),
-    (-2, -2, 0.25),
-    (2, -2, 0.25),
-    (-2, 2, 0.25),
-    (2, 2, 0.25),
-];
+use super::turn::GRADIENTS;
 
 /// Direction across the stripe: the strongest eigenvector of the structure tensor, on grey levels so far apart that noise
 /// of single pixels does not turn it, and what so far differences make of it is put right (docs/math.md, Stripe peak (1)).

@@ -1,12 +1,11 @@
 //! In: the pictures' layout, the settings of peaks and their choice. Out: the uniform block of the stages lines and peak,
 //! every size worked out once. Frame and unit: pixels, grey levels of the picture's depth.
 
-use super::PeakParams;
-use super::profile::SAMPLES;
+use super::params::{PeakParams, SAMPLES};
 use super::turn::{FLAT, turn};
 use crate::gpu::Field;
-use crate::stages::choose::ChooseParams;
 use crate::stages::frame::px_log2;
+use crate::stages::stripe::choose_params::ChooseParams;
 
 /// The WGSL struct of the same name, shaders/shared/peaks.wgsl.
 #[repr(C)]
@@ -84,7 +83,7 @@ impl PeakFrame {
         let upright = self.half_across.ceil() + 1.0;
         ((0.5 * (self.half_across / 0.86).max(upright)).ceil() as i32).clamp(1, SAMPLES as i32 / 4)
     }
-    /// `across`: unit image direction of depth ([`crate::stages::point::Optics::across`]).
+    /// `across`: unit image direction of depth ([`crate::stages::stripe::point::Optics::across`]).
     pub fn new(
         (width, height, bits): (u32, u32, u8),
         shots: u32,
@@ -157,4 +156,11 @@ impl PeakFrame {
             flat: (2.0 * FLAT).cos() as f32,
         }
     }
+}
+
+pub const SHARED: &str = include_str!("../../../shaders/shared/peaks.wgsl");
+
+/// The peak frame's words in a twin's bindings.
+pub(crate) fn frame_of(b: &[Vec<u32>]) -> PeakFrame {
+    *bytemuck::from_bytes(bytemuck::cast_slice(&b[0]))
 }

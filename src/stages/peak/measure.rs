@@ -1,22 +1,12 @@
 //! In: a picture with a stripe and its skeleton. Out: the stripe's width and speckle contrast, from the light itself.
 //! Frame and unit: Gaussian sigma in px; speckle is a ratio. docs/math.md, Stripe peak (6).
 
-use super::{Grey, Peak, PeakFrame, PeakParams, View, fit};
+use super::found::Peak;
+use super::grey::{Grey, View};
+use super::params::{PeakParams, Stripe};
+use super::{PeakFrame, fit};
 use crate::raster::{Image, Pixels};
-use crate::stages::choose::ChooseParams;
-
-/// What laser, lens and sensor make of a stripe: constant over a scan.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Stripe {
-    /// Gaussian sigma of the profile, px.
-    pub width_px: f32,
-    /// Standard deviation over mean of the stripe's light from pixel to pixel.
-    pub speckle: f32,
-    /// Standard deviation of a dark pixel, grey levels of an 8-bit picture; 0 where nothing is known of it.
-    #[serde(default)]
-    pub noise: f32,
-}
+use crate::stages::stripe::choose_params::ChooseParams;
 
 /// Skeleton pixels looked at, spread over the picture; the median of 400 is good to 6 % of the spread.
 const SAMPLES: usize = 400;

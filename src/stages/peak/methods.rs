@@ -1,9 +1,11 @@
 //! In: a picture, a skeleton pixel, the expected stripe. Out: peaks by centre of gravity, by derivatives, and without either.
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels.
 
+use super::PeakFrame;
 use super::fit::{background, direction, finish};
+use super::found::Peak;
+use super::grey::Grey;
 use super::profile::{Profile, SIDES};
-use super::{Grey, Peak, PeakFrame};
 
 /// Centre of gravity of the light above the background, within three widths of a first guess.
 #[inline(always)]

@@ -38,7 +38,8 @@ pub fn noise(image: &Image) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stages::cases::{Noise, drawn, stripe};
+    use crate::stages::cases::{drawn, stripe};
+    use crate::stages::noise::Noise;
 
     fn noisy(bits: u8, black: f64, sigma: f64) -> f32 {
         let clean = stripe(640, 480, bits, 2.5, 6, 3);

@@ -1,10 +1,9 @@
 //! In: a picture, a skeleton pixel, the direction across the stripe. Out: the stripe's profile there, averaged along it.
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels. docs/math.md, Stripe peak (2).
 
-use super::{Grey, PeakFrame};
-
-/// Most samples of a profile, as many as the shader has written out.
-pub(super) const SAMPLES: usize = 40;
+use super::PeakFrame;
+use super::grey::Grey;
+use super::params::SAMPLES;
 
 /// Weights along the stripe are whole numbers up to this: sums are then exact, and four pixels of a word add up in two
 /// multiplications.

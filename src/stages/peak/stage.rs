@@ -1,10 +1,16 @@
 //! In: the bindings of the peak stage as words. Out: the same bindings with the peaks and the strongest filled in, by the CPU twin.
 //! Frame and unit: words; peaks in pixels and grey levels.
 
-use super::{Grey, Method, Peak, PeakFrame, frame, one};
-use crate::gpu::{Access::*, Binding, Stage};
-use crate::stages::choose;
+use super::found::Peak;
+use super::frame;
+use super::frame::{SHARED, frame_of};
+use super::grey::Grey;
+use super::params::Method;
+use super::twin::one;
+use crate::gpu::Access::*;
+use crate::gpu::{Binding, Stage};
 use crate::stages::frame::PX_LOG2;
+use crate::stages::stripe::choose;
 use rayon::prelude::*;
 
 /// Selects the method when the pipeline is built: 0 Gaussian, 1 centroid, 2 derivative.
@@ -13,7 +19,6 @@ pub const METHOD: &str = "peak_method";
 /// Quads of samples of a profile, written out when the pipeline is built: [`PeakFrame::quads`].
 pub const QUADS: &str = "quads";
 
-pub const SHARED: &str = include_str!("../../../shaders/shared/peaks.wgsl");
 const PROFILE: &str = include_str!("../../../shaders/shared/profile.wgsl");
 
 pub const STAGE: Stage = Stage {
@@ -59,11 +64,6 @@ impl Grey for Packed<'_> {
         let word = self.words[(y * self.pitch + (x >> self.px_log2)) as usize];
         (word >> (place * bits) & ((1u32 << bits) - 1)) as f32
     }
-}
-
-/// The peak frame's words in a twin's bindings.
-pub(crate) fn frame_of(b: &[Vec<u32>]) -> PeakFrame {
-    *bytemuck::from_bytes(bytemuck::cast_slice(&b[0]))
 }
 
 pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {

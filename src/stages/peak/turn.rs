@@ -1,8 +1,6 @@
 //! In: the stripe's sigma and the lattice that its direction is taken from. Out: by how much the structure tensor's direction is
 //! to be turned. Frame and unit: sigma and lattice in px; angles in rad from the image's v axis. docs/math.md, Stripe peak (1).
 
-use super::fit::GRADIENTS;
-
 /// Angles that the correction is fitted to.
 const ANGLES: usize = 12;
 /// A stripe that is seen flatter than this, rad, keeps the lattice that is longer along it; the others take a square one.
@@ -46,3 +44,21 @@ pub(super) fn turn<const N: usize>(s0: f32, lattice: (i32, i32), k: [f64; N], up
     // A stripe of one pixel says the same at every angle: then nothing is turned.
     normal.cholesky().map_or([0.0; N], |c| std::array::from_fn(|j| c.solve(&right)[j] as f32))
 }
+
+/// Places of the gradients and their weights (1 - r² / 16)²: every other one of a lattice, because a gradient looks at its
+/// four neighbours, which lie on the other colour of the board.
+pub(super) const GRADIENTS: [(i32, i32, f32); 13] = [
+    (0, 0, 1.0),
+    (-1, -1, 0.765625),
+    (1, -1, 0.765625),
+    (-1, 1, 0.765625),
+    (1, 1, 0.765625),
+    (0, -2, 0.5625),
+    (-2, 0, 0.5625),
+    (2, 0, 0.5625),
+    (0, 2, 0.5625),
+    (-2, -2, 0.25),
+    (2, -2, 0.25),
+    (-2, 2, 0.25),
+    (2, 2, 0.25),
+];

@@ -4,7 +4,7 @@
 use super::stage::{Neighbourhood, STAGE, Site, SupportFrame};
 use crate::fault::Result;
 use crate::gpu::{Buffer, Device, Pipeline, Recording, Replay};
-use crate::stages::peak::Peak;
+use crate::stages::peak::found::Peak;
 
 /// The compiled stage with its buffers.
 pub struct OnGpu {

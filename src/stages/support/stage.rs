@@ -2,11 +2,13 @@
 //! with too few neighbours carry [`Reject::Unsupported`].
 //! Frame and unit: base frame in whole 2⁻¹⁴ mm (0.06 µm): the same neighbours are counted on every machine.
 
-use super::SupportParams;
-use crate::gpu::{Access::*, Binding, Stage};
-use crate::stages::cases::Noise;
+use super::params::SupportParams;
+use crate::gpu::Access::*;
+use crate::gpu::{Binding, Stage};
 use crate::stages::entry::Case;
-use crate::stages::peak::{Peak, Reject, SHARED as PEAKS};
+use crate::stages::noise::Noise;
+use crate::stages::peak::SHARED as PEAKS;
+use crate::stages::peak::found::{Peak, Reject};
 
 pub const STAGE: Stage = Stage {
     name: "support",

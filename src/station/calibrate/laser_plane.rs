@@ -19,7 +19,7 @@ use crate::raster::Image;
 use crate::recording::{Beam, Recording};
 use crate::rig::{Calibration, Kind, Rig, Volume, hash_file};
 use crate::scan::{Engine, Extraction, Format, Optical, Processor, Where};
-use crate::stages::point;
+use crate::stages::stripe::point;
 
 /// How [`calibrate_laser_plane`] is run.
 #[derive(Clone, Debug)]

@@ -8,7 +8,7 @@ use crate::fault::Fault;
 use crate::geometry::{Board, Camera, Rigid, Vec2, Vec3};
 use crate::raster::{Image, Light};
 use crate::recording::{BoardSpec, Recording};
-use crate::stages::ambient::subtract;
+use crate::stages::stripe::ambient::subtract;
 
 /// Pixels between two that are looked at, each way.
 const STEP: usize = 3;

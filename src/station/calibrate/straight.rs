@@ -9,7 +9,7 @@ use crate::camera::Intrinsics;
 use crate::fault::Result;
 use crate::geometry::Vec2;
 use crate::gpu::Device;
-use crate::stages::hough::{HoughFrame, HoughParams, lines, vote};
+use crate::stages::stripe::hough::{HoughFrame, HoughParams, lines, vote};
 
 /// Half width of the line's surroundings in stripe sigmas, and at least 2 px: a centre that is farther off is another's.
 const NEAR_WIDTHS: f64 = 3.0;

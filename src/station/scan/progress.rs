@@ -8,7 +8,8 @@ use crate::geometry::{Base, Flange, Rigid, Vec3};
 use crate::raster::{Image, Pixels};
 use crate::rig::{sealed, unsealed};
 use crate::scan::{CloudWriter, Profile};
-use crate::stages::peak::{Reject, Stripe};
+use crate::stages::peak::Stripe;
+use crate::stages::peak::found::Reject;
 use std::collections::BTreeMap;
 use std::path::Path;
 

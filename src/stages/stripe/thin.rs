@@ -1,15 +1,17 @@
 //! In: a mask. Out: the mask thinned to lines one pixel wide, nothing left to delete.
 //! Frame and unit: pixels. Zhang and Suen 1984 [zhang84], Guo and Hall 1989 [guo89], as OpenCV has them.
 
-use super::frame::{self, PX_LOG2, SHARED, frame_of, tile_unpack};
-use super::listing::{mask_index, tile_index};
-use crate::gpu::{Access::*, Binding, Stage};
+use crate::gpu::Access::*;
+use crate::gpu::{Binding, Stage};
 use crate::raster::Mask;
+use crate::stages::frame;
+use crate::stages::frame::{PX_LOG2, SHARED, frame_of, tile_unpack};
+use crate::stages::listing::{mask_index, tile_index};
 
 /// One sub-iteration over the listed tiles.
 pub const STAGE: Stage = Stage {
     name: "thin",
-    wgsl: include_str!("../../shaders/thin.wgsl"),
+    wgsl: include_str!("../../../shaders/thin.wgsl"),
     shared: &[SHARED],
     workgroup: [64, 1, 1],
     bindings: &[

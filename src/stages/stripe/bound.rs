@@ -1,8 +1,8 @@
 //! In: block statistics. Out: how small the sum of a window around any pixel of a block can be at least.
 //! Frame and unit: blocks of 16 x 8 pixels, 256ths of full scale.
 
-use super::frame::Frame;
 use super::stats::Block;
+use crate::stages::frame::Frame;
 
 /// How the windows of all pixels of a block lie over blocks of `edge` pixels, along one axis: blocks up to `full` away
 /// are covered whole, `rest` pixels more lie in the blocks beyond them up to `reach` away.
@@ -55,7 +55,7 @@ pub struct Blocks<'a> {
 }
 
 impl<'a> Blocks<'a> {
-    /// `stats` as [`super::stats`] leaves them: two words a block, shot by shot.
+    /// `stats` as [`crate::stages::stripe::stats`] leaves them: two words a block, shot by shot.
     pub fn new(f: &Frame, stats: &'a [u32], shot: u32) -> Blocks<'a> {
         let per_shot = (4 * f.tiles_x * f.tiles_y) as usize;
         let words = &stats[shot as usize * per_shot..][..per_shot];

@@ -2,15 +2,17 @@
 //! passes against that are settled; those with more go on as runs of one.
 //! Frame and unit: pixels, tiles of 32 x 8; sums in 256ths of full scale.
 
-use super::frame::{Frame, HAS_ROI, frame_of, tile_unpack};
-use super::listing::{append, mask_index};
 use super::stats::{depth_shift, padded_pixel};
-use super::threshold::{self, passes_mean};
-use crate::gpu::{Access::*, Binding, Stage};
+use super::threshold;
+use super::threshold::passes_mean;
+use crate::gpu::Access::*;
+use crate::gpu::{Binding, Stage};
+use crate::stages::frame::{Frame, HAS_ROI, frame_of, tile_unpack};
+use crate::stages::listing::{append, mask_index};
 
 pub const STAGE: Stage = Stage {
     name: "specks",
-    wgsl: include_str!("../../shaders/specks.wgsl"),
+    wgsl: include_str!("../../../shaders/specks.wgsl"),
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "image", access: Texels },

@@ -1,11 +1,13 @@
 //! In: a picture, its lit pixels and their skeleton. Out: the skeleton with its ends carried to the edge of the surface.
 //! Frame and unit: pixels; brightness is compared with the stripe's own, so no grey level is set here.
 
-use super::frame::{self, PIXELS, PX_LOG2, SHARED, frame_of, tile_unpack};
-use super::listing::mask_index;
 use crate::fault::{Fault, Result};
-use crate::gpu::{Access::*, Binding, Stage};
+use crate::gpu::Access::*;
+use crate::gpu::{Binding, Stage};
 use crate::raster::{Image, Mask};
+use crate::stages::frame;
+use crate::stages::frame::{PIXELS, PX_LOG2, SHARED, frame_of, tile_unpack};
+use crate::stages::listing::mask_index;
 
 /// Thinning eats a lit streak from its ends as it does from its sides, so a skeleton stops short of the edge by half
 /// of the streak's thickness. The edge itself is where a blurred step has half of its height: an end is carried on
@@ -68,7 +70,7 @@ pub fn twin(image: &Image, lit: &Mask, skeleton: &Mask, width_px: f32, p: &Lengt
 
 /// Adds the pixels beyond one end, if the pixel is an end.
 #[allow(clippy::too_many_arguments)]
-pub(super) fn carry(
+pub(in crate::stages) fn carry(
     x: i32,
     y: i32,
     (w, h): (i32, i32),
@@ -127,7 +129,7 @@ fn outward(skeleton: impl Fn(i32, i32) -> bool, x: i32, y: i32) -> Option<(f32, 
 /// Copies the listed tiles of the skeleton, to be added to.
 pub const COPY: Stage = Stage {
     name: "skeleton_copy",
-    wgsl: include_str!("../../shaders/skeleton_copy.wgsl"),
+    wgsl: include_str!("../../../shaders/skeleton_copy.wgsl"),
     shared: &[SHARED],
     workgroup: [64, 1, 1],
     bindings: &[
@@ -144,7 +146,7 @@ pub const COPY: Stage = Stage {
 /// Adds the ends. Only lit pixels are added, so they lie in listed tiles.
 pub const STAGE: Stage = Stage {
     name: "lengthen",
-    wgsl: include_str!("../../shaders/lengthen.wgsl"),
+    wgsl: include_str!("../../../shaders/lengthen.wgsl"),
     shared: &[SHARED, PIXELS],
     bindings: &[
         Binding { name: "frame", access: Uniform },
@@ -214,7 +216,8 @@ pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stages::{Thinning, ThresholdParams, skeleton, thin, threshold};
+    use crate::stages::stripe::{skeleton, thin, threshold};
+    use crate::stages::{Thinning, ThresholdParams};
 
     #[test]
     fn the_skeleton_reaches_the_edge_of_the_light() {

@@ -1,12 +1,14 @@
 //! In: pictures. Out: per block of 16 x 8 pixels (sum | largest << 15 | smallest << 24, smallest row sum |
 //! smallest column sum << 12 | half the smallest sum of 2 x 2 << 23). Frame and unit: pixels, 256ths of full scale.
 
-use super::frame::{self, Frame, PX_LOG2, SHARED, frame_of};
-use crate::gpu::{Access::*, Binding, Stage};
+use crate::gpu::Access::*;
+use crate::gpu::{Binding, Stage};
+use crate::stages::frame;
+use crate::stages::frame::{Frame, PX_LOG2, SHARED, frame_of};
 
 pub const STAGE: Stage = Stage {
     name: "stats",
-    wgsl: include_str!("../../shaders/stats.wgsl"),
+    wgsl: include_str!("../../../shaders/stats.wgsl"),
     shared: &[SHARED],
     workgroup: [64, 1, 1],
     bindings: &[

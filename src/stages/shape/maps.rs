@@ -2,12 +2,13 @@
 //! them, as WGSL stages with their CPU twins (docs/math.md, Shape matching, coarse search).
 //! Frame and unit: cells of the level, x right, y down; slopes in 1 / 64 of the threshold; responses 0 to 4.
 
-use super::shape_frame::{BINS, SHARED, STRIDE, ShapeFrame, UNIFORM};
-use crate::gpu::{Access::*, Binding, Stage};
+use super::frame::{BINS, SHARED, STRIDE, ShapeFrame, UNIFORM};
+use crate::gpu::Access::*;
+use crate::gpu::{Binding, Stage};
 
 pub const QUANTISE: Stage = Stage {
     name: "shape_quantise",
-    wgsl: include_str!("../../shaders/shape_quantise.wgsl"),
+    wgsl: include_str!("../../../shaders/shape_quantise.wgsl"),
     shared: &[SHARED],
     workgroup: [64, 1, 1],
     bindings: &[
@@ -21,7 +22,7 @@ pub const QUANTISE: Stage = Stage {
 
 pub const SPREAD: Stage = Stage {
     name: "shape_spread",
-    wgsl: include_str!("../../shaders/shape_spread.wgsl"),
+    wgsl: include_str!("../../../shaders/shape_spread.wgsl"),
     shared: &[SHARED],
     workgroup: [64, 1, 1],
     bindings: &[

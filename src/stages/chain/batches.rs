@@ -1,77 +1,18 @@
 //! In: pictures, a batch at a time. Out: the skeleton pixels of each, from the GPU, in order.
 //! Frame and unit: pixels. The pruned chain: statistics, tile list, threshold, thinning, list.
 
-use super::frame::{ALL_TILES, HAS_ROI};
-use super::measured::{Measure, Measuring, POSE_BYTES};
-use super::peak::Peak;
-use super::point::Point;
+use super::config::ChainConfig;
+use super::measured::{Measuring, POSE_BYTES};
 use super::recorded::{Pipelines, Shared};
-use super::{Frame, Thinning, ThresholdParams, skeleton};
 use crate::fault::{Fault, Result};
 use crate::gpu::{Device, PART, Recording, Replay, Ring, RingSizes, StageTime};
 use crate::raster::{Image, Mask};
+use crate::stages::Frame;
+use crate::stages::frame::{ALL_TILES, HAS_ROI};
+use crate::stages::peak::found::Peak;
+use crate::stages::stripe::point::Point;
+use crate::stages::stripe::skeleton;
 use std::collections::VecDeque;
-
-/// What a chain is built for.
-#[derive(Clone, Debug)]
-pub struct ChainConfig {
-    /// Picture size, px.
-    pub width: u32,
-    pub height: u32,
-    /// Depth of the pictures, 8..=16.
-    pub bits: u8,
-    /// Pictures in one batch, 1..=64; small pictures want many, a dispatch costs as much as 100,000 pixels.
-    pub shots: u32,
-    /// Batches in flight, 1..=8.
-    pub slots: usize,
-    pub threshold: ThresholdParams,
-    pub thinning: Thinning,
-    /// Prove tiles dark before looking at them. Off is the plain path: the same result, slower.
-    pub prune: bool,
-    /// Pixels that are looked at; `None` for all.
-    pub region: Option<Mask>,
-    /// Subtracted from every picture.
-    pub ambient: Option<Image>,
-    /// How far the ends of lines are carried on ([`super::lengthen::LengthenParams::word`]); 0 is not at all.
-    pub lengthen: u32,
-    /// Peaks, their choice and points for every skeleton pixel; `None` ends with the pixels.
-    pub measure: Option<Measure>,
-    /// Take GPU timestamps of every stage.
-    pub timed: bool,
-}
-
-impl ChainConfig {
-    pub fn new(width: u32, height: u32, bits: u8) -> ChainConfig {
-        ChainConfig {
-            width,
-            height,
-            bits,
-            shots: shots_for(width, height, 10_000_000, 32),
-            slots: 3,
-            threshold: ThresholdParams::default(),
-            thinning: Thinning::default(),
-            prune: true,
-            region: None,
-            ambient: None,
-            lengthen: 0,
-            measure: None,
-            timed: false,
-        }
-    }
-    /// With the batch that hides the fixed cost on this device: one with memory of its own has more processors to keep busy, and
-    /// a dispatch of any size takes it as long as 400,000 pixels. All three batches need less than a gigabyte.
-    pub fn on(self, device: &Device) -> ChainConfig {
-        if !device.info.unified_memory {
-            return ChainConfig { shots: shots_for(self.width, self.height, 40_000_000, 64), ..self };
-        }
-        self
-    }
-}
-
-/// Shots of a batch of about so many pixels.
-fn shots_for(width: u32, height: u32, pixels: u32, most: u32) -> u32 {
-    (pixels / width.saturating_mul(height).max(1)).clamp(1, most)
-}
 
 /// The chain on one GPU for one kind of picture.
 pub struct Chain {
@@ -238,7 +179,7 @@ impl Chain {
         self.submit_posed(tag, images, &[])
     }
 
-    /// As `submit`, with the shots' poses ([`super::point::pose_words`]), which a chain that measures needs.
+    /// As `submit`, with the shots' poses ([`crate::stages::stripe::point::pose_words`]), which a chain that measures needs.
     pub fn submit_posed(&mut self, tag: u64, images: &[&Image], poses: &[[f32; 12]]) -> Result<()> {
         assert!(self.poses.is_none() || poses.len() == images.len(), "one pose a picture");
         assert!((1..=self.frame.shots as usize).contains(&images.len()), "1 to {} pictures a batch", self.frame.shots);

@@ -1,14 +1,13 @@
 //! In: skeleton pixels. Out: the straight lines among them, voted for in whole numbers and refined on their pixels.
 //! Frame and unit: image pixels; a line is x cos(angle) + y sin(angle) = distance, angle in radians, 0..pi.
 
-use super::cases::{Walk, scenes};
-use super::entry::Case;
 use crate::fault::{Fault, Result};
-use crate::gpu::{Access::*, Binding, Device, Stage, Workload, run_once};
+use crate::gpu::Access::*;
+use crate::gpu::{Binding, Device, Stage, Workload, run_once};
 
 pub const STAGE: Stage = Stage {
     name: "hough",
-    wgsl: include_str!("../../shaders/hough.wgsl"),
+    wgsl: include_str!("../../../shaders/hough.wgsl"),
     shared: &[],
     workgroup: [64, 1, 1],
     bindings: &[
@@ -18,7 +17,7 @@ pub const STAGE: Stage = Stage {
         Binding { name: "table", access: Read },
         Binding { name: "votes", access: ReadWrite },
     ],
-    uniform: super::frame::uniform_fields!(HoughFrame: middle_x, middle_y, angles, cells),
+    uniform: crate::stages::frame::uniform_fields!(HoughFrame: middle_x, middle_y, angles, cells),
     overrides: &[],
 };
 
@@ -239,34 +238,6 @@ pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     }
 }
 
-/// Skeletons of the stripe scenes.
-pub fn cases() -> Vec<Case> {
-    scenes()
-        .iter()
-        .take(3)
-        .map(|scene| {
-            let mut walk = Walk::new(scene);
-            walk.run("");
-            let f = walk.frame;
-            let frame = HoughFrame::new(f.width, f.height, &HoughParams::default());
-            let header = walk.buffers["header"].clone();
-            let table = bytemuck::cast_slice(&frame.table()).to_vec();
-            Case {
-                name: scene.name.into(),
-                overrides: Vec::new(),
-                groups: [header[3].div_ceil(64).max(1), 1, 1],
-                bindings: vec![
-                    bytemuck::cast_slice(&[frame]).to_vec(),
-                    header,
-                    walk.buffers["points"].clone(),
-                    table,
-                    vec![0; (f.shots * frame.angles * frame.cells) as usize],
-                ],
-            }
-        })
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -290,7 +261,7 @@ mod tests {
     fn two_lines_in_specks_are_found_below_a_cell() {
         let truth = [(1.2345, 300.4), (2.9, -310.7)];
         let mut pixels: Vec<u32> = truth.iter().flat_map(|&(a, d)| drawn(a, d, 640, 480)).collect();
-        let mut noise = super::super::cases::Noise(5);
+        let mut noise = crate::stages::noise::Noise(5);
         pixels.extend((0..300).map(|_| noise.next() % 640 | (noise.next() % 480) << 16));
         let p = HoughParams { most: 2, ..Default::default() };
         let frame = HoughFrame::new(640, 480, &p);
@@ -305,7 +276,7 @@ mod tests {
 
     #[test]
     fn specks_alone_are_no_line() {
-        let mut noise = super::super::cases::Noise(6);
+        let mut noise = crate::stages::noise::Noise(6);
         let pixels: Vec<u32> = (0..200).map(|_| noise.next() % 640 | (noise.next() % 480) << 16).collect();
         let p = HoughParams::default();
         let frame = HoughFrame::new(640, 480, &p);

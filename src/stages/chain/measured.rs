@@ -1,21 +1,17 @@
 //! In: the point list of a batch, the settings of peaks and their choice, the rig, the shots' poses. Out: dispatches that
 //! turn it into chosen peaks and points. Frame and unit: pixels and grey levels; points in the poses' frame, mm.
 
-use super::frame::{PX_LOG2, px_log2};
-use super::peak::{self, Peak, PeakFrame, PeakParams};
-use super::point::{self, Optics, Point, PointFrame};
-use super::recorded::{Part, whole};
-use super::{Frame, choose, choose::ChooseParams, choose::Lines};
+use super::measure::Measure;
+use super::part::{Part, whole};
 use crate::fault::Result;
 use crate::gpu::{Buffer, Device, Pipeline, Recording};
-
-/// What the chain does with the skeleton's pixels.
-#[derive(Clone, Debug)]
-pub struct Measure {
-    pub peak: PeakParams,
-    pub choose: ChooseParams,
-    pub optics: Optics,
-}
+use crate::stages::frame::{PX_LOG2, px_log2};
+use crate::stages::peak::PeakFrame;
+use crate::stages::peak::found::Peak;
+use crate::stages::stripe::choose::Lines;
+use crate::stages::stripe::point::{Point, PointFrame};
+use crate::stages::stripe::{choose, point};
+use crate::stages::{Frame, peak};
 
 /// Bytes of one shot's pose: three rows of rotation and translation.
 pub const POSE_BYTES: u64 = 48;

@@ -1,70 +1,9 @@
-//! In: the size of a pyramid level and of a model. Out: the layout that the stages of the coarse shape search share, and
-//! their test cases. Frame and unit: cells of the level, x right, y down; strided places are 4 cells apart.
+//! In: nothing. Out: the cases of the stages of shape matching.
+//! Frame and unit: words.
 
-use super::cases::Noise;
-use super::entry::Case;
-
-pub const SHARED: &str = include_str!("../../shaders/shared/shape.wgsl");
-pub const UNIFORM: (&str, &[crate::gpu::Field], usize) = super::frame::uniform_fields!(ShapeFrame: width, height, margin,
-    columns, rows, words, first, ignore, features, least, turns, capacity);
-
-/// Directions over a full turn.
-pub const BINS: usize = 16;
-/// A level is searched every so many cells, and directions are spread over a window of that size.
-pub const STRIDE: usize = 4;
-
-/// The WGSL struct of the same name, which says what the fields are.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
-pub struct ShapeFrame {
-    pub width: u32,
-    pub height: u32,
-    pub margin: u32,
-    pub columns: u32,
-    pub rows: u32,
-    pub words: u32,
-    pub first: u32,
-    pub ignore: u32,
-    pub features: u32,
-    pub least: u32,
-    pub turns: u32,
-    pub capacity: u32,
-}
-
-impl ShapeFrame {
-    /// `margin` is rounded up to whole strides.
-    pub fn new(width: usize, height: usize, margin: usize) -> ShapeFrame {
-        let margin = margin.next_multiple_of(STRIDE);
-        let (columns, rows) = ((width + 2 * margin).div_ceil(STRIDE), (height + 2 * margin).div_ceil(STRIDE));
-        ShapeFrame {
-            width: width as u32,
-            height: height as u32,
-            margin: margin as u32,
-            columns: columns as u32,
-            rows: rows as u32,
-            words: columns.div_ceil(4) as u32,
-            ..Default::default()
-        }
-    }
-    /// Words of one turn's sums, and of one direction and phase of the responses.
-    pub fn plane(&self) -> usize {
-        (self.words * self.rows) as usize
-    }
-    /// Words of all directions and phases of one layer.
-    pub fn layer_words(&self) -> usize {
-        BINS * STRIDE * STRIDE * self.plane()
-    }
-    /// Where a feature that lies `dx`, `dy` cells from the model's place reads the responses of `layer`.
-    pub fn feature(&self, layer: usize, want: usize, dx: i64, dy: i64) -> [i32; 4] {
-        let t = STRIDE as i64;
-        let phase = (dy.rem_euclid(t) * t + dx.rem_euclid(t)) as usize;
-        let first = layer * self.layer_words() + (want * STRIDE * STRIDE + phase) * self.plane();
-        [first as i32, dx.div_euclid(t) as i32, dy.div_euclid(t) as i32, 0]
-    }
-    pub fn read(binding: &[u32]) -> ShapeFrame {
-        *bytemuck::from_bytes(bytemuck::cast_slice(binding))
-    }
-}
+use super::frame::*;
+use crate::stages::entry::Case;
+use crate::stages::noise::Noise;
 
 /// Slopes of a made-up level: two squares, noise below the threshold, a corner without slopes.
 fn slopes(frame: &ShapeFrame, seed: u64) -> Vec<u32> {
@@ -92,7 +31,7 @@ fn slopes(frame: &ShapeFrame, seed: u64) -> Vec<u32> {
                 (gx, gy)
             };
             let known = x + y > 9;
-            out.push(if known { super::shape_maps::packed(gx, gy) } else { 0 });
+            out.push(if known { crate::stages::shape::maps::packed(gx, gy) } else { 0 });
         }
     }
     out
@@ -130,15 +69,16 @@ pub fn cases(stage: &str) -> Vec<Case> {
                 done
             };
         let cells = vec![uniform.clone(), slopes(&frame, seed as u64), vec![0; w * h]];
-        let done = case("shape_quantise", cells, groups(w * h, 1), super::shape_maps::quantise_twin);
+        let done = case("shape_quantise", cells, groups(w * h, 1), crate::stages::shape::maps::quantise_twin);
         let maps = vec![uniform.clone(), done[2].clone(), vec![0; frame.layer_words()]];
-        let done = case("shape_spread", maps, groups(frame.plane(), 16), super::shape_maps::spread_twin);
+        let done = case("shape_spread", maps, groups(frame.plane(), 16), crate::stages::shape::maps::spread_twin);
         let sums = vec![0; frame.plane() * frame.turns as usize];
         let sums = vec![uniform.clone(), done[2].clone(), bytemuck::cast_slice(&features).to_vec(), sums];
-        let done = case("shape_score", sums, groups(frame.plane(), frame.turns), super::shape_sums::score_twin);
+        let done =
+            case("shape_score", sums, groups(frame.plane(), frame.turns), crate::stages::shape::sums::score_twin);
         let list = vec![0; 2 * frame.capacity as usize];
         let peaks = vec![uniform, done[3].clone(), vec![0; 4], list];
-        case("shape_peaks", peaks, groups(frame.plane(), frame.turns), super::shape_sums::peaks_twin);
+        case("shape_peaks", peaks, groups(frame.plane(), frame.turns), crate::stages::shape::sums::peaks_twin);
     }
     out
 }

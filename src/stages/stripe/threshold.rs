@@ -1,19 +1,21 @@
 //! In: a grey picture. Out: a mask, lit where a pixel is brighter than the mean of its surroundings.
 //! Frame and unit: pixels; offset and minimum in grey levels of the picture's own depth.
 
-use super::frame::{self, COLUMNS, Frame, PIXELS, PX_LOG2, SHARED, frame_of, tile_unpack};
 use super::stats::padded_pixel;
-use crate::fault::{Fault, Result};
-use crate::gpu::{Access::*, Binding, Stage};
+use super::threshold_params::{ThresholdParams, Window};
+use crate::gpu::Access::*;
+use crate::gpu::{Binding, Stage};
 use crate::raster::{Image, Mask};
+use crate::stages::frame;
+use crate::stages::frame::{COLUMNS, Frame, PIXELS, PX_LOG2, SHARED, frame_of, tile_unpack};
 
 /// Half the window's edge, less a half: a constant of the mean window's pipeline.
 pub const RADIUS: &str = "radius";
 
-/// Mean window; its list holds runs of tiles ([`super::tiles`]).
+/// Mean window; its list holds runs of tiles ([`crate::stages::stripe::tiles`]).
 pub const MEAN: Stage = Stage {
     name: "threshold",
-    wgsl: include_str!("../../shaders/threshold.wgsl"),
+    wgsl: include_str!("../../../shaders/threshold.wgsl"),
     shared: &[SHARED, COLUMNS],
     workgroup: [64, 1, 1],
     bindings: &[
@@ -34,7 +36,7 @@ pub const MEAN: Stage = Stage {
 /// Gaussian window.
 pub const GAUSSIAN: Stage = Stage {
     name: "threshold_gaussian",
-    wgsl: include_str!("../../shaders/threshold_gaussian.wgsl"),
+    wgsl: include_str!("../../../shaders/threshold_gaussian.wgsl"),
     shared: &[SHARED, PIXELS],
     bindings: &[
         Binding { name: "frame", access: Uniform },
@@ -51,7 +53,7 @@ pub const GAUSSIAN: Stage = Stage {
 /// Quads to words, cut to the picture and the region of interest.
 pub const GATHER: Stage = Stage {
     name: "gather",
-    wgsl: include_str!("../../shaders/gather.wgsl"),
+    wgsl: include_str!("../../../shaders/gather.wgsl"),
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "listing", access: Read },
@@ -66,58 +68,6 @@ pub const GATHER: Stage = Stage {
     shared: &[SHARED],
     ..GAUSSIAN
 };
-
-/// The mean that a pixel is compared with.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Window {
-    /// Every pixel of the window counts the same.
-    #[default]
-    Mean,
-    /// Gaussian weights, sigma = 0.3 ((size - 1) / 2 - 1) + 0.8 px; the published 1-4-6-4-1 like
-    /// tables for sizes up to 9 (OpenCV's getGaussianKernel).
-    Gaussian,
-}
-
-/// A pixel is lit when `value > mean + offset` and `value >= minimum`; the mean over the window is
-/// rounded to a whole grey level and pixels beyond the border repeat the border's. With minimum 0
-/// and an 8-bit picture this is OpenCV's adaptiveThreshold with C = -offset.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ThresholdParams {
-    /// Weights of the window.
-    pub window: Window,
-    /// Edge of the window, odd, 3..=101 px; at least three times the stripe's width, or the stripe hollows out.
-    pub size: u32,
-    /// How far above the mean a pixel must be, -65535..=65535 grey levels; larger finds less.
-    pub offset: i32,
-    /// Absolute minimum, 0..=65535 grey levels; above the background's noise it makes the search fast
-    /// and free of specks. 0 is off.
-    pub minimum: u16,
-}
-
-impl Default for ThresholdParams {
-    fn default() -> Self {
-        ThresholdParams { window: Window::Mean, size: 31, offset: 4, minimum: 7 }
-    }
-}
-
-impl ThresholdParams {
-    pub fn check(&self) -> Result<()> {
-        if self.size % 2 == 0 || !(3..=101).contains(&self.size) {
-            return Err(Fault::usage(format!("threshold size is {}, it must be odd and in 3..=101 px", self.size))
-                .next("choose an odd window about five times as wide as the stripe, e.g. 31"));
-        }
-        if !(-65535..=65535).contains(&self.offset) {
-            return Err(Fault::usage(format!(
-                "threshold offset is {}, it must be in -65535..=65535 grey levels",
-                self.offset
-            ))
-            .next("correct [extraction.threshold] in station.toml"));
-        }
-        Ok(())
-    }
-}
 
 /// Lit exactly when `value - offset > round(sum / n^2)`. Because n is odd the mean is never half way
 /// between two levels, so this is `n^2 (value - offset) > sum + (n^2 - 1) / 2` in whole numbers; the
@@ -277,13 +227,13 @@ fn store(f: &Frame, tile: u32, bits: impl Fn(u32) -> u32, roi: &[u32], out: [&mu
     let mut some = 0;
     for row in 0..8 {
         let region = if f.flags & frame::HAS_ROI != 0 { roi[f.mask_word(0, 32 * tx, 8 * ty + row)] } else { !0 };
-        let at = super::listing::mask_index(f, tile, row);
+        let at = crate::stages::listing::mask_index(f, tile, row);
         mask[at] = bits(row) & region;
         lit[at] = mask[at];
         some |= mask[at];
     }
     if some != 0 {
-        super::listing::append(listing, list, [tile]);
+        crate::stages::listing::append(listing, list, [tile]);
     }
 }
 

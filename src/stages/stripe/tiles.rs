@@ -3,15 +3,17 @@
 //! Frame and unit: tiles of 32 x 8 pixels, blocks of 16 x 8, sums in 256ths of full scale.
 
 use super::bound::Blocks;
-use super::frame::{self, ALL_TILES, Frame, GAUSSIAN, HAS_ROI, PX_LOG2, SHARED, frame_of, tile_pack};
-use super::listing::append;
 use super::stats::depth_shift;
 use super::threshold::RADIUS;
-use crate::gpu::{Access::*, Binding, Stage};
+use crate::gpu::Access::*;
+use crate::gpu::{Binding, Stage};
+use crate::stages::frame;
+use crate::stages::frame::{ALL_TILES, Frame, GAUSSIAN, HAS_ROI, PX_LOG2, SHARED, frame_of, tile_pack};
+use crate::stages::listing::append;
 
 pub const STAGE: Stage = Stage {
     name: "tiles",
-    wgsl: include_str!("../../shaders/tiles.wgsl"),
+    wgsl: include_str!("../../../shaders/tiles.wgsl"),
     shared: &[SHARED],
     workgroup: [64, 1, 1],
     bindings: &[
@@ -64,7 +66,7 @@ pub fn twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
         let blocks = Blocks::new(&f, stats, shot);
         let is_listed = |x: u32, y: u32| {
             let words = &roi[..];
-            let wanted = || (0..8).any(|r| words[super::listing::mask_index(&f, tile_pack(x, y, 0), r)] != 0);
+            let wanted = || (0..8).any(|r| words[crate::stages::listing::mask_index(&f, tile_pack(x, y, 0), r)] != 0);
             let lit = || (0..2).any(|side| may_be_lit(&f, &blocks, 2 * x as i32 + side, y as i32));
             (f.flags & HAS_ROI == 0 || wanted()) && (f.flags & ALL_TILES != 0 || lit())
         };

@@ -1,13 +1,15 @@
 //! In: pictures, one picture of the ambient light. Out: the pictures without it.
 //! Frame and unit: grey levels; a saturated pixel stays saturated.
 
-use super::frame::{self, Frame, PX_LOG2, SHARED, frame_of};
-use crate::gpu::{Access::*, Binding, Stage};
+use crate::gpu::Access::*;
+use crate::gpu::{Binding, Stage};
 use crate::raster::{Image, Pixels};
+use crate::stages::frame;
+use crate::stages::frame::{Frame, PX_LOG2, SHARED, frame_of};
 
 pub const STAGE: Stage = Stage {
     name: "ambient",
-    wgsl: include_str!("../../shaders/ambient.wgsl"),
+    wgsl: include_str!("../../../shaders/ambient.wgsl"),
     shared: &[SHARED],
     workgroup: [64, 1, 1],
     bindings: &[

@@ -1,10 +1,12 @@
 //! In: a thinned mask. Out: its lit pixels as a list, always in the same order.
 //! Frame and unit: pixels, packed x | y << 16.
 
-use super::frame::{self, Frame, PX_LOG2, SHARED, frame_of, tile_unpack};
-use super::listing::{HEADER_WORDS, mask_index, tile_index};
-use crate::gpu::{Access::*, Binding, Stage};
+use crate::gpu::Access::*;
+use crate::gpu::{Binding, Stage};
 use crate::raster::Mask;
+use crate::stages::frame;
+use crate::stages::frame::{Frame, PX_LOG2, SHARED, frame_of, tile_unpack};
+use crate::stages::listing::{HEADER_WORDS, mask_index, tile_index};
 
 /// Width and height of the tiles that the stages work in, in pixels: one word wide.
 pub const TILE: (u32, u32) = (32, 8);
@@ -39,7 +41,7 @@ pub fn twin(mask: &Mask) -> Vec<u32> {
 /// Lit pixels per listed tile.
 pub const COUNT: Stage = Stage {
     name: "count",
-    wgsl: include_str!("../../shaders/count.wgsl"),
+    wgsl: include_str!("../../../shaders/count.wgsl"),
     shared: &[SHARED],
     workgroup: [64, 1, 1],
     bindings: &[
@@ -56,7 +58,7 @@ pub const COUNT: Stage = Stage {
 /// Counts before each tile in its row of tiles.
 pub const SCAN_ROWS: Stage = Stage {
     name: "scan_rows",
-    wgsl: include_str!("../../shaders/scan_rows.wgsl"),
+    wgsl: include_str!("../../../shaders/scan_rows.wgsl"),
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "counts", access: Texels },
@@ -69,7 +71,7 @@ pub const SCAN_ROWS: Stage = Stage {
 /// Counts before each row of tiles in its shot, and each shot's.
 pub const SCAN_SHOTS: Stage = Stage {
     name: "scan_shots",
-    wgsl: include_str!("../../shaders/scan_shots.wgsl"),
+    wgsl: include_str!("../../../shaders/scan_shots.wgsl"),
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "rows", access: Texels },
@@ -82,7 +84,7 @@ pub const SCAN_SHOTS: Stage = Stage {
 /// The point list's header.
 pub const HEAD: Stage = Stage {
     name: "header",
-    wgsl: include_str!("../../shaders/header.wgsl"),
+    wgsl: include_str!("../../../shaders/header.wgsl"),
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "totals", access: Texels },
@@ -96,7 +98,7 @@ pub const HEAD: Stage = Stage {
 /// The point list: (x | y << 16, shot).
 pub const STAGE: Stage = Stage {
     name: "skeleton",
-    wgsl: include_str!("../../shaders/skeleton.wgsl"),
+    wgsl: include_str!("../../../shaders/skeleton.wgsl"),
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "listing", access: Read },

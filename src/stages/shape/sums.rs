@@ -2,12 +2,13 @@
 //! as WGSL stages with their CPU twins (docs/math.md, Shape matching, coarse search).
 //! Frame and unit: strided places; a perfect feature scores 4.
 
-use super::shape_frame::{SHARED, ShapeFrame, UNIFORM};
-use crate::gpu::{Access::*, Binding, Stage};
+use super::frame::{SHARED, ShapeFrame, UNIFORM};
+use crate::gpu::Access::*;
+use crate::gpu::{Binding, Stage};
 
 pub const SCORE: Stage = Stage {
     name: "shape_score",
-    wgsl: include_str!("../../shaders/shape_score.wgsl"),
+    wgsl: include_str!("../../../shaders/shape_score.wgsl"),
     shared: &[SHARED],
     workgroup: [64, 1, 1],
     bindings: &[
@@ -22,7 +23,7 @@ pub const SCORE: Stage = Stage {
 
 pub const PEAKS: Stage = Stage {
     name: "shape_peaks",
-    wgsl: include_str!("../../shaders/shape_peaks.wgsl"),
+    wgsl: include_str!("../../../shaders/shape_peaks.wgsl"),
     shared: &[SHARED],
     workgroup: [64, 1, 1],
     bindings: &[
@@ -116,5 +117,5 @@ pub fn differing_hits(gpu: &[Vec<u32>], twin: &[Vec<u32>]) -> f64 {
         list.sort_unstable();
         b
     };
-    super::differing_words(&sorted(gpu), &sorted(twin))
+    crate::stages::differing_words(&sorted(gpu), &sorted(twin))
 }

@@ -3,10 +3,12 @@
 //! Frame and unit: the frame that the given transform leads to (base or grid), mm. docs/math.md, Stripe peak (7), (8).
 
 use super::choose::{LINE_OF, Lines, beside};
-use super::peak::{Peak, Reject, SHARED as PEAKS};
 use crate::camera::{Distortion, Intrinsics};
 use crate::geometry::{Camera, Frame, Plane, Rigid, Vec2};
-use crate::gpu::{Access::*, Binding, Stage};
+use crate::gpu::Access::*;
+use crate::gpu::{Binding, Stage};
+use crate::stages::peak::SHARED as PEAKS;
+use crate::stages::peak::found::{Peak, Reject};
 
 /// A point of the profile, 4 words; not a number where the peak was refused.
 #[repr(C)]
@@ -90,7 +92,7 @@ pub fn posed(peaks: &mut [Peak], optics: &Optics, pose: &[f32; 12]) -> Vec<Point
     peaks.iter_mut().map(|k| one(k, optics, pose)).collect()
 }
 
-pub(super) fn one(k: &mut Peak, optics: &Optics, pose: &[f32; 12]) -> Point {
+pub(in crate::stages) fn one(k: &mut Peak, optics: &Optics, pose: &[f32; 12]) -> Point {
     if !k.kept() {
         return Point::NONE;
     }
@@ -298,7 +300,7 @@ impl PointFrame {
 
 pub const STAGE: Stage = Stage {
     name: "point",
-    wgsl: include_str!("../../shaders/point.wgsl"),
+    wgsl: include_str!("../../../shaders/point.wgsl"),
     shared: &[PEAKS, LINE_OF],
     workgroup: [64, 1, 1],
     bindings: &[

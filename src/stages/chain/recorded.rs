@@ -1,11 +1,13 @@
 //! In: the layout of a batch. Out: the chain's dispatches as recordings, and the buffers they share.
 //! Frame and unit: bytes, words. Order and reasons: docs/math.md, Stripe stages.
 
-use super::chain::ChainConfig;
-use super::frame::{PX_LOG2, px_log2};
-use super::{Frame, Window, ambient, lengthen, listing, skeleton, specks, stats, thin, threshold, tiles};
+use super::config::ChainConfig;
+use super::part::{Part, whole};
 use crate::fault::Result;
 use crate::gpu::{Buffer, Device, Pipeline, Recording};
+use crate::stages::frame::{PX_LOG2, px_log2};
+use crate::stages::stripe::{ambient, lengthen, skeleton, specks, stats, thin, threshold, tiles};
+use crate::stages::{Frame, Window, listing};
 
 /// Sub-iterations in one round; a stripe 50 px wide takes 52. Wider ones go further rounds.
 const STEPS: u32 = 56;
@@ -108,12 +110,6 @@ impl Pipelines {
             skeleton: build(&skeleton::STAGE)?,
         })
     }
-}
-
-pub(super) type Part<'a> = (&'a Buffer, u64, u64);
-
-pub(super) fn whole(b: &Buffer) -> Part<'_> {
-    (b, 0, b.bytes.max(16).next_multiple_of(16))
 }
 
 impl Shared {

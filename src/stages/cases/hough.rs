@@ -1,0 +1,35 @@
+//! In: the scenes with a stripe. Out: the cases of the stage that finds straight lines.
+//! Frame and unit: words.
+
+use super::scenes::scenes;
+use super::walk::Walk;
+use crate::stages::entry::Case;
+use crate::stages::stripe::hough::{HoughFrame, HoughParams};
+
+/// Skeletons of the stripe scenes.
+pub fn cases() -> Vec<Case> {
+    scenes()
+        .iter()
+        .take(3)
+        .map(|scene| {
+            let mut walk = Walk::new(scene);
+            walk.run("");
+            let f = walk.frame;
+            let frame = HoughFrame::new(f.width, f.height, &HoughParams::default());
+            let header = walk.buffers["header"].clone();
+            let table = bytemuck::cast_slice(&frame.table()).to_vec();
+            Case {
+                name: scene.name.into(),
+                overrides: Vec::new(),
+                groups: [header[3].div_ceil(64).max(1), 1, 1],
+                bindings: vec![
+                    bytemuck::cast_slice(&[frame]).to_vec(),
+                    header,
+                    walk.buffers["points"].clone(),
+                    table,
+                    vec![0; (f.shots * frame.angles * frame.cells) as usize],
+                ],
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,100 @@
+//! In: nothing. Out: one peak, as the stages write it, and why one is not taken.
+//! Frame and unit: px, grey levels.
+
+/// Why a peak is not believed; the low 8 bits of `Peak::flags`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Reject {
+    Kept = 0,
+    /// Outside the image of the working volume.
+    Region = 1,
+    /// Too little light.
+    Faint = 2,
+    /// Narrower than the laser can be: a hot pixel, a glint, or a spot cut by an edge.
+    Narrow = 3,
+    /// Wider than one stripe: two stripes in one, scattered light.
+    Wide = 4,
+    /// Its own standard deviation is too large.
+    Uncertain = 5,
+    /// The stripe runs along the direction of depth.
+    Steep = 6,
+    /// Much weaker than another peak on the same line across the stripe: a reflection.
+    Echo = 7,
+    /// No neighbour in the shots before and after: a reflection or a speck.
+    Unsupported = 8,
+    /// The ray does not meet the laser plane in front of the camera, or the lens model has no ray there.
+    NoPoint = 9,
+}
+
+impl Reject {
+    pub const ALL: [Reject; 10] = [
+        Reject::Kept,
+        Reject::Region,
+        Reject::Faint,
+        Reject::Narrow,
+        Reject::Wide,
+        Reject::Uncertain,
+        Reject::Steep,
+        Reject::Echo,
+        Reject::Unsupported,
+        Reject::NoPoint,
+    ];
+    pub fn words(self) -> &'static str {
+        match self {
+            Reject::Kept => "kept",
+            Reject::Region => "outside the working volume",
+            Reject::Faint => "faint",
+            Reject::Narrow => "narrow",
+            Reject::Wide => "wide",
+            Reject::Uncertain => "uncertain",
+            Reject::Steep => "steep",
+            Reject::Echo => "echo",
+            Reject::Unsupported => "unsupported",
+            Reject::NoPoint => "no point",
+        }
+    }
+}
+
+/// A bit of `Peak::flags`: at least one pixel of the fit was saturated.
+pub const SATURATED: u32 = 1 << 8;
+
+/// One peak, 12 words, the same layout on the GPU.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct Peak {
+    /// Centre, px.
+    pub u: f32,
+    pub v: f32,
+    /// Unit vector across the stripe; v component positive, or u where v is 0.
+    pub normal_u: f32,
+    pub normal_v: f32,
+    /// Height of the profile above the background, grey levels; may exceed full scale when saturated.
+    pub amplitude: f32,
+    pub background: f32,
+    /// Gaussian sigma of the profile, px.
+    pub width_px: f32,
+    /// Standard deviation of the centre along the normal, px.
+    pub sigma_px: f32,
+    /// Amplitude over the noise of a background pixel.
+    pub snr: f32,
+    /// Low 8 bits: [`Reject`]; bit 8: [`SATURATED`].
+    pub flags: u32,
+    /// Skeleton pixel, x | y << 16.
+    pub pixel: u32,
+    pub shot: u32,
+}
+
+impl Peak {
+    pub fn kept(&self) -> bool {
+        self.flags & 0xff == 0
+    }
+    pub fn reject(&self) -> Reject {
+        Reject::ALL[(self.flags & 0xff).min(9) as usize]
+    }
+    /// Sets the reason, unless one is set already: the first test that fails names it.
+    pub fn refuse(&mut self, why: Reject) {
+        if self.kept() {
+            self.flags |= why as u32;
+        }
+    }
+}

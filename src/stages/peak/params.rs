@@ -1,0 +1,101 @@
+//! In: what a person may choose about peaks. Out: the choice, checked.
+//! Frame and unit: px, grey levels; each field says.
+
+use crate::fault::{Fault, Result};
+
+/// How the centre across the stripe is found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// Maximum likelihood of a Gaussian profile under shot, read and speckle noise; the best.
+    #[default]
+    Gaussian,
+    /// Centre of gravity above the background; fast, pulled by whatever else is in the window.
+    Centroid,
+    /// Zero of the derivative of the Gaussian-smoothed profile ([steger98]).
+    Derivative,
+    /// The skeleton pixel itself, as in the paper that this program rebuilds: for comparisons.
+    Pixel,
+}
+
+impl Method {
+    /// In the order of their numbers.
+    pub const ALL: [Method; 4] = [Method::Gaussian, Method::Centroid, Method::Derivative, Method::Pixel];
+}
+
+/// Settings of the sub-pixel step. The stripe's width and speckle are properties of laser and lens:
+/// [`measure`] takes them from the first shots.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct PeakParams {
+    /// How the centre is found.
+    pub method: Method,
+    /// Gaussian sigma of the stripe's profile, px, 0.4..=12. All windows follow from it: laser waist, lens blur and
+    /// magnification set it, and it scales with the resolution.
+    pub width_px: f32,
+    /// Speckle contrast of one pixel, 0..=1: standard deviation over mean of coherent light. 0 is a stripe without
+    /// speckle; larger trusts the flanks more and the top less.
+    pub speckle: f32,
+    /// Read and quantisation noise, 0.1..=20 grey levels of an 8-bit picture.
+    pub read_noise: f32,
+    /// Shot noise: grey levels (8-bit) per photo-electron, 0..=5; its variance is this times the level.
+    pub gain: f32,
+    /// Sigma of the averaging along the stripe in units of `width_px`, 0..=4. At 1 the picture loses no detail that the
+    /// lens had not already blurred; 0 uses one line across the stripe.
+    pub along: f32,
+    /// Most Gauss-Newton steps, 1..=20; a bright saturated stripe needs the most.
+    pub steps: u32,
+}
+
+impl Default for PeakParams {
+    fn default() -> Self {
+        PeakParams {
+            method: Method::Gaussian,
+            width_px: 0.75,
+            speckle: 0.18,
+            read_noise: 0.7,
+            gain: 0.05,
+            along: 1.0,
+            steps: 8,
+        }
+    }
+}
+
+impl PeakParams {
+    pub fn check(&self) -> Result<()> {
+        for (name, value, low, high) in [
+            ("width_px", self.width_px, 0.4, 12.0),
+            ("speckle", self.speckle, 0.0, 1.0),
+            ("read_noise", self.read_noise, 0.1, 20.0),
+            ("gain", self.gain, 0.0, 5.0),
+            ("along", self.along, 0.0, 4.0),
+            ("steps", self.steps as f32, 1.0, 20.0),
+        ] {
+            if !(low..=high).contains(&value) {
+                return Err(Fault::usage(format!("peak {name} is {value}, it must be in {low}..={high}"))
+                    .next("correct [extraction] in station.toml"));
+            }
+        }
+        Ok(())
+    }
+    /// The same settings with the stripe's measured width and speckle.
+    pub fn with(self, stripe: &Stripe) -> PeakParams {
+        PeakParams { width_px: stripe.width_px, speckle: stripe.speckle, ..self }
+    }
+}
+
+/// What laser, lens and sensor make of a stripe: constant over a scan.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Stripe {
+    /// Gaussian sigma of the profile, px.
+    pub width_px: f32,
+    /// Standard deviation over mean of the stripe's light from pixel to pixel.
+    pub speckle: f32,
+    /// Standard deviation of a dark pixel, grey levels of an 8-bit picture; 0 where nothing is known of it.
+    #[serde(default)]
+    pub noise: f32,
+}
+
+/// Most samples of a profile, as many as the shader has written out.
+pub(super) const SAMPLES: usize = 40;

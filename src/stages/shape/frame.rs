@@ -1,0 +1,64 @@
+//! In: the size of a pyramid level and of a model. Out: the layout that the stages of the coarse shape search share, and
+//! their test cases. Frame and unit: cells of the level, x right, y down; strided places are 4 cells apart.
+
+pub const SHARED: &str = include_str!("../../../shaders/shared/shape.wgsl");
+pub const UNIFORM: (&str, &[crate::gpu::Field], usize) = crate::stages::frame::uniform_fields!(ShapeFrame: width, height, margin,
+    columns, rows, words, first, ignore, features, least, turns, capacity);
+
+/// Directions over a full turn.
+pub const BINS: usize = 16;
+/// A level is searched every so many cells, and directions are spread over a window of that size.
+pub const STRIDE: usize = 4;
+
+/// The WGSL struct of the same name, which says what the fields are.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct ShapeFrame {
+    pub width: u32,
+    pub height: u32,
+    pub margin: u32,
+    pub columns: u32,
+    pub rows: u32,
+    pub words: u32,
+    pub first: u32,
+    pub ignore: u32,
+    pub features: u32,
+    pub least: u32,
+    pub turns: u32,
+    pub capacity: u32,
+}
+
+impl ShapeFrame {
+    /// `margin` is rounded up to whole strides.
+    pub fn new(width: usize, height: usize, margin: usize) -> ShapeFrame {
+        let margin = margin.next_multiple_of(STRIDE);
+        let (columns, rows) = ((width + 2 * margin).div_ceil(STRIDE), (height + 2 * margin).div_ceil(STRIDE));
+        ShapeFrame {
+            width: width as u32,
+            height: height as u32,
+            margin: margin as u32,
+            columns: columns as u32,
+            rows: rows as u32,
+            words: columns.div_ceil(4) as u32,
+            ..Default::default()
+        }
+    }
+    /// Words of one turn's sums, and of one direction and phase of the responses.
+    pub fn plane(&self) -> usize {
+        (self.words * self.rows) as usize
+    }
+    /// Words of all directions and phases of one layer.
+    pub fn layer_words(&self) -> usize {
+        BINS * STRIDE * STRIDE * self.plane()
+    }
+    /// Where a feature that lies `dx`, `dy` cells from the model's place reads the responses of `layer`.
+    pub fn feature(&self, layer: usize, want: usize, dx: i64, dy: i64) -> [i32; 4] {
+        let t = STRIDE as i64;
+        let phase = (dy.rem_euclid(t) * t + dx.rem_euclid(t)) as usize;
+        let first = layer * self.layer_words() + (want * STRIDE * STRIDE + phase) * self.plane();
+        [first as i32, dx.div_euclid(t) as i32, dy.div_euclid(t) as i32, 0]
+    }
+    pub fn read(binding: &[u32]) -> ShapeFrame {
+        *bytemuck::from_bytes(bytemuck::cast_slice(binding))
+    }
+}

@@ -1,0 +1,18 @@
+//! In: grey pictures of the stripe. Out: the stages from picture to skeleton, and from peaks to chosen points; each with
+//! the shader of its name and its CPU twin.
+//! Frame and unit: pixels, grey levels; points in the poses' frame, mm.
+
+pub mod ambient;
+pub mod bound;
+pub mod choose;
+pub mod choose_params;
+pub mod hough;
+pub mod lengthen;
+pub mod point;
+pub mod skeleton;
+pub(in crate::stages) mod specks;
+pub mod stats;
+pub mod thin;
+pub mod threshold;
+pub mod threshold_params;
+pub mod tiles;
