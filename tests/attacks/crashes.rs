@@ -127,10 +127,11 @@ fn a_scan_that_is_killed_at_random_is_resumed_to_the_same_bytes() {
     }
 }
 
-/// Sizes of a full disk, kB: 1 kB to 20 MB in 40 steps, or some of them.
+/// Sizes of a full disk, kB: 1 kB to 20 MB in 40 steps, or some of them; no two alike.
 fn sizes() -> impl Iterator<Item = u32> {
     let steps: u32 = if long() { 40 } else { 3 };
-    (0..steps).map(move |step| 20_000f64.powf(f64::from(step) / f64::from(steps - 1)).round() as u32)
+    let size = move |step: u32| 20_000f64.powf(f64::from(step) / f64::from(steps - 1)).round() as u32;
+    (0..steps).map(move |step| size(step).max(step + 1))
 }
 
 /// The shell lets no file grow beyond a size: as on a disk that is full at that byte.
