@@ -2,6 +2,7 @@
 //! results are written.
 //! Frame and unit: none.
 
+use super::folder::{remove, sync_folder};
 use super::moment;
 use crate::fault::{Fault, Result};
 use std::io::{Result as Io, Write};
@@ -31,7 +32,7 @@ pub fn write_beside(result: (&Path, &[u8]), beside: &[(&Path, &[u8])]) -> Result
     };
     let first = aside(result)?;
     let others = beside.iter().map(|b| aside(*b)).collect::<Result<Vec<_>>>()?;
-    beside.iter().try_for_each(|(path, _)| super::remove(path).map_err(|e| Fault::write(path, e)))?;
+    beside.iter().try_for_each(|(path, _)| remove(path).map_err(|e| Fault::write(path, e)))?;
     std::iter::once(first).chain(others).try_for_each(Aside::keep)
 }
 
@@ -93,11 +94,6 @@ fn rename(file: NamedTempFile, path: &Path) -> Io<()> {
 
 fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-/// Puts a folder's list of names on the disk; only Unix can.
-pub(super) fn sync_folder(folder: &Path) -> Io<()> {
-    if cfg!(unix) { std::fs::File::open(folder)?.sync_all() } else { Ok(()) }
 }
 
 /// A temporary file that others may read as they may read any other result: temporary files are private by default, and

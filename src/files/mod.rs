@@ -3,6 +3,7 @@
 //! Frame and unit: none; bytes and paths.
 
 mod atomic;
+mod folder;
 mod inputs;
 mod lock;
 mod moment;
@@ -12,10 +13,11 @@ mod slip;
 mod together;
 
 pub use atomic::{Aside, keep_all, write, write_aside, write_beside, write_unsynced};
+pub use folder::{make_folder, remove};
 pub use inputs::{not_over, not_over_any};
 pub use lock::Lock;
 pub use moment::moment;
 pub use natural::natural;
 pub use read::{length, read, read_text, read_text_if_there};
 pub use slip::{named, slip_at, slip_in};
-pub use together::{Together, make_folder, remove};
+pub use together::Together;

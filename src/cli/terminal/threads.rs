@@ -19,13 +19,17 @@ fn pool(processors: usize, asked: Option<usize>) -> Result<()> {
     let mut waiting: Vec<Sender<ThreadBuilder>> = Vec::new();
     while waiting.len() < wanted && failed.is_none() {
         let (give, take) = channel::<ThreadBuilder>();
+        let (tell, begun) = channel();
         let body = move || {
+            let _ = tell.send(());
             if let Ok(thread) = take.recv() {
                 thread.run();
             }
         };
+        // One by one: a thread takes some memory more when it begins, and cannot do without.
         match std::thread::Builder::new().name(format!("pool {}", waiting.len())).spawn(body) {
-            Ok(_) => waiting.push(give),
+            Ok(_) if begun.recv().is_ok() => waiting.push(give),
+            Ok(_) => failed = Some(std::io::ErrorKind::OutOfMemory.into()),
             Err(e) => failed = Some(e),
         }
     }

@@ -5,7 +5,7 @@ use super::scan_folder::settle;
 use super::seen::Seen;
 use crate::fault::{Fault, Result};
 use crate::rig::{Volume, hash_file};
-use crate::scan::{CloudPoint, Extraction, Format, read_cloud};
+use crate::scan::{CloudFile, CloudPoint, Extraction, Format, read_cloud};
 use crate::stages::peak::Stripe;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -54,6 +54,9 @@ pub struct ScanReport {
     /// SHA-256 of the cloud and of the height map, by file name.
     pub files: BTreeMap<String, String>,
 }
+
+/// Bytes of a height map's file: 64 million cells and what stands before them.
+const MOST_OF_A_MAP: u64 = 257 << 20;
 
 /// Of the reports that this version writes; format 1 had no hashes.
 pub(in crate::station) const FORMAT: u32 = 2;
@@ -108,7 +111,13 @@ impl ScanReport {
     /// Refuses files of a scan folder that are not those that the scan wrote.
     pub(in crate::station) fn check_files(&self, scan: &Path) -> Result<()> {
         self.files.par_iter().try_for_each(|(name, hash)| {
-            let is = hash_file(&scan.join(name))?;
+            let path = scan.join(name);
+            if name != "cloud.ply" && crate::files::length(&path)? > MOST_OF_A_MAP {
+                return Err(Fault::input(format!("{}: is longer than any map", path.display()))
+                    .cause("another file of that name, or a damaged one")
+                    .next("scan again"));
+            }
+            let is = hash_file(&path)?;
             if is == *hash {
                 return Ok(());
             }
@@ -153,6 +162,8 @@ pub fn cloud_of(scan: &Path) -> Result<Vec<CloudPoint>> {
     }
     let report = load_report(scan)?;
     report.has_points().map_err(|e| e.at(scan.display()))?;
+    // Its header and length first: what is no cloud is not worth hashing.
+    CloudFile::open(&scan.join("cloud.ply"))?;
     report.check_files(scan)?;
     read_cloud(&scan.join("cloud.ply"))
 }
