@@ -6,7 +6,7 @@ CARGO ?= cargo
 VENV := .venv
 export XDG_RUNTIME_DIR ?= $(shell mktemp -d /tmp/sheetlight-run.XXXXXX)
 
-.PHONY: demo test bench bench-peers vulkan python build clean
+.PHONY: demo lint test bench bench-peers vulkan python build clean
 
 demo: vulkan build
 	target/release/sheetlight demo --out demo
@@ -14,8 +14,16 @@ demo: vulkan build
 build:
 	$(CARGO) build --release --locked
 
-test: vulkan python
+test: vulkan python lint
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(CARGO) test --locked -- --show-output
+
+# A toolchain without clippy says so and goes on.
+lint:
+	if $(CARGO) clippy --version >/dev/null 2>&1; then \
+		$(CARGO) clippy --locked --all-targets -- -D warnings; \
+	else echo "clippy is not installed: skipped"; fi
+	$(CARGO) check --locked --lib --no-default-features
+	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
 
 bench: vulkan build
 	target/release/sheetlight bench

@@ -1,7 +1,35 @@
-//! Sheetlight: sheet-of-light scanning with a robot.
+//! Sheet-of-light scanning with a robot: calibrate the camera and the line laser on its end effector, turn pictures of the
+//! stripe into point clouds in the robot's base frame, find parts in them by shape, and say where the tool goes.
 //!
-//! The modules stand in floor order; each imports only from floors above it in this list
-//! (ARCHITECTURE.md, enforced by tests/floors.rs).
+//! Every pixel of every picture is looked at, by WGSL stages on a GPU or by the same arithmetic on this machine's processor.
+//! Each number comes with its standard deviation; what is not known is refused, not guessed.
+//!
+//! A recording becomes a cloud, a height map and a page to look at:
+//!
+//! ```no_run
+//! use sheetlight::{recording::Recording, rig::Rig, station};
+//! # fn main() -> sheetlight::fault::Result<()> {
+//! let folder = std::path::Path::new("cell3");
+//! let (settings, rig) = (station::Settings::load(folder)?, Rig::load(folder)?);
+//! let options = station::ScanOptions::for_station(&settings, &rig, "scans/board7".as_ref());
+//! let recording = Recording::open("recordings/board7".as_ref())?;
+//! let report = station::scan_recording(&recording, None, &rig, &options, |_, _| {})?;
+//! println!("{} points, each good to {:?} mm", report.points, report.median_sigma_mm);
+//! # Ok(()) }
+//! ```
+//!
+//! `examples/` has four small programs: scan a recording, one picture to points, calibrate a camera, find a part.
+//!
+//! **Conventions.** Millimetres, radians and `f64` unless a name says otherwise (`angle_deg`, `peak_px`); an integer pixel is a
+//! pixel's centre; a transform `a_from_b` takes points of frame b to frame a, and the frames are types
+//! ([`geometry::Rigid`]). Bad input is a [`fault::Fault`]: what happened with its number and limit, the likely cause, the next
+//! step.
+//!
+//! **Features.** `cli` (default) is the command line with clap and indicatif, `bench` what it measures; a program that uses the
+//! library takes neither: `default-features = false`.
+//!
+//! The modules stand in floor order; each imports only from floors above it in this list (ARCHITECTURE.md, enforced by
+//! tests/floors.rs).
 
 pub mod fault;
 pub mod files;
@@ -24,9 +52,11 @@ pub mod stages;
 
 pub mod scan;
 
+#[cfg(feature = "bench")]
 pub mod bench;
 
 pub mod find;
 pub mod station;
 
+#[cfg(feature = "cli")]
 pub mod cli;

@@ -130,7 +130,7 @@ fn few_and_noisy_profiles_come_with_an_honest_sigma() {
     for k in 0..sets {
         let rng = &mut Pcg64::seed_from_u64(700 + k);
         let case = (k % 4) as usize;
-        let depth = if case % 2 == 0 { [-23.0, 19.0] } else { [300.0, 420.0] };
+        let depth = if case.is_multiple_of(2) { [-23.0, 19.0] } else { [300.0, 420.0] };
         let rig = Rig { depth, robot_deg: if case < 2 { 0.0 } else { 0.03 }, ..rig(rng) };
         let count = [10, 14, 24][(k / 4 % 3) as usize];
         let (profiles, poses) = scans(rng, &rig, count, [-14.0, 14.0], 0.35, 0.02, 0.15);

@@ -147,7 +147,7 @@ fn random_pictures_and_settings() {
         let full = (1u32 << bits) - 1;
         let mut config = ChainConfig::new(w, h, bits);
         config.shots = 1 + noise.next() % 3;
-        config.thinning = if noise.next() % 2 == 0 { Thinning::ZhangSuen } else { Thinning::GuoHall };
+        config.thinning = if noise.next().is_multiple_of(2) { Thinning::ZhangSuen } else { Thinning::GuoHall };
         let size = 3 + 2 * (noise.next() % 50);
         let offset = (noise.next() % (full / 4 + 2)) as i32 - (full / 16) as i32;
         let minimum = (noise.next() % 3 * (full / 5)) as u16;

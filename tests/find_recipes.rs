@@ -100,7 +100,7 @@ struct Scanned {
 fn scan(part: &'static str, seed: u64) -> Scanned {
     let mut rng = Pcg64::seed_from_u64(0xF1_0D ^ seed.wrapping_mul(0x9E37_79B9));
     let long = part == "dimm";
-    let k = if long || seed % 3 == 0 { 1.0 } else { rng.random_range(0.8..1.2) };
+    let k = if long || seed.is_multiple_of(3) { 1.0 } else { rng.random_range(0.8..1.2) };
     let (solids, height, half) = solids(part);
     let albedo: f64 = rng.random_range(0.15..0.6);
     let half = half.map(|h| h * if long { 1.0 } else { k });

@@ -121,7 +121,7 @@ impl<'a> Bytes<'a> {
         Ok(taken)
     }
     fn numbers<N: Number>(&mut self, count: u32) -> Result<Vec<N>> {
-        let bytes = (count as usize).checked_mul(N::BYTES).unwrap_or(usize::MAX);
+        let bytes = (count as usize).saturating_mul(N::BYTES);
         Ok(self.take(bytes)?.chunks_exact(N::BYTES).map(N::read).collect())
     }
     fn number<N: Number>(&mut self) -> Result<N> {
@@ -129,7 +129,7 @@ impl<'a> Bytes<'a> {
     }
     fn text(&mut self) -> Result<String> {
         let size = self.number::<u32>()? as usize;
-        if size % 2 != 0 {
+        if !size.is_multiple_of(2) {
             return Err(spoilt(format!("a text has {size} bytes, UTF-16 has an even number")));
         }
         let units: Vec<u16> = self.take(size)?.chunks_exact(2).map(u16::read).collect();

@@ -105,7 +105,7 @@ fn row(
 ) -> Result<Row> {
     let before = device.allocated_bytes();
     let config = ChainConfig { threshold: THRESHOLD, ..ChainConfig::new(width, height, 8).on(device) };
-    let images = pictures(scene, width, height, (2 * config.shots).min(16).max(3));
+    let images = pictures(scene, width, height, (2 * config.shots).clamp(3, 16));
     let refs: Vec<&Image> = images.iter().collect();
     let batch_of =
         |n: usize| -> Vec<&Image> { (0..config.shots as usize).map(|i| refs[(n + i) % refs.len()]).collect() };

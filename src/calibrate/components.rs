@@ -15,7 +15,7 @@ pub struct Components {
 }
 
 impl Components {
-    /// One step of Fisher scoring for the restricted likelihood [patterson71] from `theta`:
+    /// One step of Fisher scoring for the restricted likelihood \[patterson71\] from `theta`:
     /// tr(P Uₐ P U_b) θ = eᵀ P Uₐ P e − tr(P Uₐ P V₀), P the projector that removes the fit.
     /// Components never leave `floor`. `None` where a matrix is singular.
     pub fn step(&self, theta: &[f64], floor: &[f64]) -> Option<Vec<f64>> {
@@ -63,7 +63,7 @@ mod tests {
         let mut mean = [0.0, 0.0];
         for _ in 0..40 {
             let (a, b): (f64, f64) = (0.5, 2.0);
-            let first = |i: usize| i % 3 == 0;
+            let first = |i: usize| i.is_multiple_of(3);
             let residual = DVector::from_fn(n, |i, _| {
                 let s = (0.01 + if first(i) { a * a } else { b * b }).sqrt();
                 1.0 + 0.1 * i as f64

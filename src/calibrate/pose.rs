@@ -131,7 +131,7 @@ fn rms_px(problem: &OneBoard<'_>, pose: &Rigid<Camera, Board>) -> f64 {
     (sum / (2.0 * problem.points.len() as f64)).sqrt()
 }
 
-/// [zhang00] eq. 2 with K = 1: columns of H are λ r1, λ r2, λ t.
+/// \[zhang00\] eq. 2 with K = 1: columns of H are λ r1, λ r2, λ t.
 pub fn pose_from_homography(h: &Mat3) -> Rigid<Camera, Board> {
     let (h1, h2, h3): (Vec3, Vec3, Vec3) = (h.column(0).into(), h.column(1).into(), h.column(2).into());
     // In front of the camera: t_z > 0.
@@ -142,7 +142,7 @@ pub fn pose_from_homography(h: &Mat3) -> Rigid<Camera, Board> {
 }
 
 /// The other minimum of a plane's pose: its tilt reflected in the line of sight to `centre`, a point
-/// of the board [schweighofer06].
+/// of the board \[schweighofer06\].
 fn mirrored(pose: &Rigid<Camera, Board>, centre: &Vec3) -> Rigid<Camera, Board> {
     let c = pose.point(centre);
     let sight = c.normalize();

@@ -113,12 +113,12 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let (svg, pdf) = (drawn.svg(), drawn.pdf());
     let sheets: [(&Path, &[u8]); 2] = [(&with(".svg"), svg.as_bytes()), (&with(".pdf"), &pdf)];
     crate::files::write_beside((&with(".json"), text.as_bytes()), &sheets)?;
-    if let BoardSpec::Chessboard { inner_corners: [a, b], .. } = board {
-        if (a + b) % 2 == 0 {
-            console.warn(format!(
+    if let BoardSpec::Chessboard { inner_corners: [a, b], .. } = board
+        && (a + b) % 2 == 0
+    {
+        console.warn(format!(
                 "{a}x{b} inner corners look the same after a half turn; choose one even and one odd number where poses matter"
             ));
-        }
     }
     console.say(format!(
         "{}.svg .pdf .json written: {:.1} x {:.1} mm; print without scaling and check the rule",

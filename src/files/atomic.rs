@@ -16,7 +16,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     write_aside(path, bytes)?.keep()
 }
 
-/// [`write`] without waiting for the disk: for pictures by the hundred that can be made again. Half of one never has its
+/// [`write()`] without waiting for the disk: for pictures by the hundred that can be made again. Half of one never has its
 /// name, but a power cut may take whole ones.
 pub fn write_unsynced(path: &Path, bytes: &[u8]) -> Result<()> {
     let aside = write_aside(path, bytes)?;
@@ -59,7 +59,7 @@ pub struct Aside {
     path: PathBuf,
 }
 
-/// The first half of [`write`]; without the second, [`Aside::keep`], nothing is left of it.
+/// The first half of [`write()`]; without the second, [`Aside::keep`], nothing is left of it.
 pub fn write_aside(path: &Path, bytes: &[u8]) -> Result<Aside> {
     let mut aside = Aside::create(path)?;
     moment().and_then(|()| aside.file.write_all(bytes)).map_err(|e| Fault::write(path, e))?;

@@ -6,7 +6,7 @@
 pub enum Access {
     Uniform,
     Read,
-    /// A read-only array of u32, vec2<u32> or vec4<u32> that is bound whole: read as texels where that is faster.
+    /// A read-only array of `u32`, `vec2<u32>` or `vec4<u32>` that is bound whole: read as texels where that is faster.
     Texels,
     ReadWrite,
 }

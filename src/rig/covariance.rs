@@ -56,8 +56,7 @@ impl Covariance {
         let n = self.parameters.len();
         // A camera's further terms are named where they were free, in their order.
         let given = |from: usize, name: &String| names[from..].iter().position(|n| n == name).map(|i| from + i + 1);
-        let in_order =
-            |from: usize| self.parameters[from..].iter().try_fold(from, |at, name| given(at, name)).is_some();
+        let in_order = |from: usize| self.parameters[from..].iter().try_fold(from, &given).is_some();
         let begins = |&c: &usize| c <= n && self.parameters[..c].iter().eq(names[..c].iter());
         let longest = counts.iter().copied().max().unwrap_or(0);
         let known = counts.iter().any(|c| *c == n && begins(c)) || (begins(&longest) && in_order(longest));
@@ -92,7 +91,7 @@ impl Covariance {
             let d = correlation[(i, j)] - correlation[(j, i)];
             !(d.abs() <= ROUNDING && correlation[(i, j)].abs() <= 1.0 + ROUNDING)
         };
-        for (i, j) in (0..n).flat_map(|i| (0..i).map(move |j| (i, j))).filter(|&(i, j)| crooked(i, j)) {
+        if let Some((i, j)) = (0..n).flat_map(|i| (0..i).map(move |j| (i, j))).find(|&(i, j)| crooked(i, j)) {
             return bad(format!(
                 "has {:.3e} and {:.3e} between {} and {}: not symmetric, or beyond their variances",
                 c[(i, j)],

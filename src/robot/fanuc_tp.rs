@@ -8,7 +8,7 @@ use crate::geometry::{Frame, Rigid};
 /// One position register of a program.
 #[derive(Clone, Debug)]
 pub struct TpPosition<To: Frame, From: Frame> {
-    /// n of P[n].
+    /// n of `P[n]`.
     pub number: u32,
     /// The comment, where there is one: P[3:"over the ball"].
     pub comment: String,
@@ -50,11 +50,8 @@ pub fn read<To: Frame, From: Frame>(text: &str) -> Result<Vec<TpPosition<To, Fro
         if body.contains('*') {
             return Err(bad(format!("P[{number}]: was never taught (asterisks)")));
         }
-        let fields: Vec<(&str, &str)> = group
-            .split(|c| c == ',' || c == '\n')
-            .filter_map(|f| f.split_once('='))
-            .map(|(k, v)| (k.trim(), v.trim()))
-            .collect();
+        let fields: Vec<(&str, &str)> =
+            group.split([',', '\n']).filter_map(|f| f.split_once('=')).map(|(k, v)| (k.trim(), v.trim())).collect();
         if fields.iter().any(|(k, _)| *k == "J1") {
             return Err(bad(format!("P[{number}]: holds joint angles")));
         }
@@ -71,7 +68,7 @@ pub fn read<To: Frame, From: Frame>(text: &str) -> Result<Vec<TpPosition<To, Fro
             .collect::<Result<Vec<f64>>>()?;
         let frame = |key: &str| -> u32 {
             group
-                .split(|c: char| c == ',' || c == '\n')
+                .split([',', '\n'])
                 .filter_map(|f| f.split_once(':'))
                 .find(|(k, _)| k.trim() == key)
                 .and_then(|(_, v)| v.trim().parse().ok())

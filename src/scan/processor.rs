@@ -112,8 +112,8 @@ mod tests {
     fn a_software_adapter_is_taken_only_by_name() {
         let (gpu, software) = (adapter("discrete GPU"), adapter("CPU"));
         assert_eq!(without_gpu(&[], false), Some(Why::NoAdapter));
-        assert_eq!(without_gpu(&[software.clone()], false), Some(Why::Software("a CPU".into())));
-        assert_eq!(without_gpu(&[software.clone()], true), None);
+        assert_eq!(without_gpu(std::slice::from_ref(&software), false), Some(Why::Software("a CPU".into())));
+        assert_eq!(without_gpu(std::slice::from_ref(&software), true), None);
         assert_eq!(without_gpu(&[gpu, software], false), None);
         assert_eq!(without_gpu(&[adapter("integrated GPU")], false), None);
     }

@@ -315,7 +315,7 @@ impl Scene {
         !self.bodies.iter().any(|b| b.hit(from, &d).is_some_and(|(t, _)| t < length - 1e-4))
     }
 
-    /// Unsigned distance of a scene-frame point from the nearest surface, mm (see [`Body::distance`]).
+    /// Unsigned distance of a scene-frame point from the nearest surface, mm (see `Body::distance`).
     /// Surfaces that lie inside another body do not count.
     pub fn distance(&self, p: &Vec3) -> f64 {
         self.bodies.iter().map(|b| b.body.distance(&b.to_body(p))).fold(f64::INFINITY, f64::min).abs()

@@ -49,7 +49,7 @@ pub struct Consensus<M> {
     pub draws: usize,
 }
 
-/// RANSAC [fischler81] with truncated squared misfits as score (MSAC) and a number of draws that
+/// RANSAC \[fischler81\] with truncated squared misfits as score (MSAC) and a number of draws that
 /// adapts to the share of inliers. `fit` gets `size` different indices; `None` for degenerate ones.
 pub fn consensus<M>(
     count: usize,

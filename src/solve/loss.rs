@@ -6,7 +6,7 @@
 pub enum Loss {
     /// Plain least squares.
     Squares,
-    /// Quadratic up to k, linear beyond: bounded influence [huber81].
+    /// Quadratic up to k, linear beyond: bounded influence \[huber81\].
     Huber(f64),
     /// log(1 + s/c²): wrong data loses all influence; needs a start near the answer.
     Cauchy(f64),

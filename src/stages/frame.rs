@@ -80,7 +80,7 @@ impl Frame {
                 .next("take fewer shots a batch"));
         }
         let (tiles_x, tiles_y) = (width.div_ceil(32), height.div_ceil(8));
-        let pitch = tiles_x * 32 >> px_log2(bits);
+        let pitch = (tiles_x * 32) >> px_log2(bits);
         Ok(Frame {
             width,
             height,

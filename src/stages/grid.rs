@@ -176,7 +176,7 @@ impl GridFrame {
             .then(|| (y as usize * self.width as usize + x as usize, (z + i64::from(Z_MOST) + 1) as u32))
     }
 
-    /// First pass: lowest and highest point of each cell, as [`span_of`] reads them.
+    /// First pass: lowest and highest point of each cell, as `span_of` reads them.
     pub fn span(&self, records: &[u32], span: &mut [[u32; 2]]) {
         for (cell, z) in records.chunks_exact(RECORD).take(self.points as usize).filter_map(|p| self.place(p)) {
             let [low, high] = &mut span[cell];
@@ -221,7 +221,7 @@ fn fixed(bits: u32, places: i32) -> i32 {
         0.. => (mantissa << s) as i32,
         _ => {
             let t = (-s).min(26);
-            (mantissa + (1 << (t - 1)) >> t) as i32
+            ((mantissa + (1 << (t - 1))) >> t) as i32
         }
     };
     if bits >> 31 == 1 { -size } else { size }

@@ -70,7 +70,7 @@ pub fn verify(rig: &Rig, run: &VerifyRun) -> Result<VerifyReport> {
     for folder in &run.flats {
         let mut parts: BTreeMap<u32, Vec<Vec3>> = BTreeMap::new();
         for p in super::cloud_of(folder)? {
-            let view = if run.shots_per_view > 0 { p.shot / run.shots_per_view } else { 0 };
+            let view = p.shot.checked_div(run.shots_per_view).unwrap_or(0);
             parts.entry(view).or_default().push(Vec3::from(p.position.map(f64::from)));
         }
         let label =

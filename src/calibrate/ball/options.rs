@@ -22,7 +22,7 @@ impl std::str::FromStr for Side {
     }
 }
 
-/// Settings of [`solve`].
+/// Settings of [`super::solve::solve`].
 #[derive(Clone, Debug)]
 pub struct BallOptions {
     /// The ball's diameter, mm; 1..=1000.

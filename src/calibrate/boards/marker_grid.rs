@@ -75,7 +75,7 @@ fn read(grey: &Grey, quad: &[Vec2; 4], markers: &Markers, matcher: &Matcher) -> 
     let low = levels.iter().copied().fold(f64::INFINITY, f64::min);
     let high = levels.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let black = |k: usize| levels[k] < 0.5 * (low + high);
-    let ring = |k: usize| k % cells == 0 || k / cells == 0 || k % cells == cells - 1 || k / cells == cells - 1;
+    let ring = |k: usize| k.is_multiple_of(cells) || k / cells == 0 || k % cells == cells - 1 || k / cells == cells - 1;
     let of_ring = (0..levels.len()).filter(|k| ring(*k));
     let dark = of_ring.clone().filter(|k| black(*k)).count() as f64;
     if dark < RING * of_ring.count() as f64 {

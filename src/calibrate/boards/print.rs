@@ -188,9 +188,9 @@ impl Sheet {
         for [x, y, r] in &self.discs {
             let _ = write!(out, "<circle cx=\"{x:.5}\" cy=\"{y:.5}\" r=\"{r:.5}\"/>");
         }
-        let _ = write!(
+        let _ = writeln!(
             out,
-            "<text x=\"{:.2}\" y=\"{:.2}\" text-anchor=\"middle\" font-family=\"sans-serif\" font-size=\"2.6\">{}</text></svg>\n",
+            "<text x=\"{:.2}\" y=\"{:.2}\" text-anchor=\"middle\" font-family=\"sans-serif\" font-size=\"2.6\">{}</text></svg>",
             w / 2.0,
             h - 8.5,
             self.label
@@ -240,7 +240,7 @@ impl Sheet {
         let start = out.len();
         let _ = write!(out, "xref\n0 {}\n0000000000 65535 f \n", objects.len() + 1);
         for place in places {
-            let _ = write!(out, "{place:010} 00000 n \n");
+            let _ = writeln!(out, "{place:010} 00000 n ");
         }
         let _ = write!(out, "trailer\n<< /Size {} /Root 1 0 R >>\nstartxref\n{start}\n%%EOF\n", objects.len() + 1);
         out.into_bytes()

@@ -61,7 +61,7 @@ pub fn quads(mask: &[bool], width: usize, height: usize) -> Vec<[Vec2; 4]> {
     found
 }
 
-/// Convex hull, clockwise in the picture (y down) [andrew79].
+/// Convex hull, clockwise in the picture (y down) \[andrew79\].
 fn hull(mut points: Vec<Vec2>) -> Vec<Vec2> {
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     let turn = |a: &Vec2, b: &Vec2, c: &Vec2| (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
@@ -86,7 +86,7 @@ fn area(p: &[Vec2]) -> f64 {
     (0..n).map(|i| p[i].x * p[(i + 1) % n].y - p[i].y * p[(i + 1) % n].x).sum::<f64>() / 2.0
 }
 
-/// The four corners of a hull that is one: corners that hardly matter for the area go first [visvalingam93].
+/// The four corners of a hull that is one: corners that hardly matter for the area go first \[visvalingam93\].
 fn quadrilateral(hull: &[Vec2]) -> Option<[Vec2; 4]> {
     let whole = area(hull).abs();
     let mut p = hull.to_vec();

@@ -10,7 +10,7 @@ use nalgebra::SMatrix;
 /// is rough there, the blur is never quite the model's, and one pixel's light is its neighbour's too. With one
 /// variance for all pixels the sigma came out 1.65 times too small on rendered pictures. Each pixel's own
 /// residual stands for its noise, products with the eight neighbours for what they share; dividing by 1 - h
-/// undoes what the fit took of the residual ([white80], [mackinnon85]; neighbours as in [conley99]).
+/// undoes what the fit took of the residual (\[white80\], \[mackinnon85\]; neighbours as in \[conley99\]).
 ///
 /// `pixels` hold x, y (whole steps apart) and grey; `at` gives a pixel's residual and derivatives, `inverse` is
 /// the inverse of the normal equations' matrix.

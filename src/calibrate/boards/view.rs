@@ -7,7 +7,7 @@ use crate::geometry::Vec2;
 /// One feature of a board as seen.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct BoardPoint {
-    /// Index into [`BoardSpec::features`].
+    /// Index into [`crate::recording::BoardSpec::features`].
     pub feature_id: usize,
     pub pixel: Vec2,
     /// Standard deviation per axis, px.
@@ -18,14 +18,14 @@ pub struct BoardPoint {
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct BoardView {
     pub points: Vec<BoardPoint>,
-    /// The board looks the same after a half (or quarter) turn: which of [`turns`] holds is unknown
+    /// The board looks the same after a half (or quarter) turn: which of [`super::turns`] holds is unknown
     /// here and must come from the whole set.
     pub ambiguous: bool,
     /// Diameter of a circle grid's dots as this picture shows it, mm, where the description leaves it open.
     pub dot_diameter: Option<f64>,
 }
 
-/// Settings of [`find`].
+/// Settings of [`super::find`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct FindOptions {
     /// Share of a square's side that a corner's fit reaches; 0.2..=0.48.

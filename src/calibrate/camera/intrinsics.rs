@@ -1,5 +1,5 @@
 //! In: board features seen in several pictures. Out: the camera, every board's pose, covariance,
-//! residuals ([zhang00] section 3.2 and 3.3; docs/math.md, Camera calibration (7)).
+//! residuals (\[zhang00\] section 3.2 and 3.3; docs/math.md, Camera calibration (7)).
 //! Frame and unit: pixels; board and camera frames in mm.
 
 use super::bundle::{Corner, Fit, State};

@@ -1,5 +1,5 @@
 //! In: recordings of boards. Out: the camera's calibration with verdict, advice and all that a
-//! report shows ([zhang00]; docs/math.md, Camera calibration).
+//! report shows (\[zhang00\]; docs/math.md, Camera calibration).
 //! Frame and unit: camera frame; pixels, mm, degrees where the name says so.
 
 use super::intrinsics::{Observation, SolveOptions, Solved, solve};

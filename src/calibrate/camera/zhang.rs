@@ -1,5 +1,5 @@
 //! In: homographies from a plane to pictures of it. Out: a first pinhole camera
-//! ([zhang00] section 3.1, docs/math.md, Camera calibration (5) and (6)).
+//! (\[zhang00\] section 3.1, docs/math.md, Camera calibration (5) and (6)).
 //! Frame and unit: pixels; the plane's unit.
 
 use crate::calibrate::pose::pose_from_homography;

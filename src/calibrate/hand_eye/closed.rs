@@ -67,7 +67,7 @@ fn motion(a: &Pair, b: &Pair) -> (Rigid<Near, Near>, Rigid<Camera, Camera>) {
 /// Rotations this near to half a turn have two logarithms; their pairs are left out (rad).
 const HALF_TURN: f64 = 3.05;
 
-/// AX = XB over all pairs of pairs: the rotation by [park94] (the polar factor of Σ α βᵀ), then
+/// AX = XB over all pairs of pairs: the rotation by \[park94\] (the polar factor of Σ α βᵀ), then
 /// the translation, linear (docs/math.md, Hand-eye (2) to (4)). `None` where the robot turned
 /// about fewer than two axes.
 pub fn park_martin(pairs: &[&Pair]) -> Option<Chain> {
@@ -155,7 +155,7 @@ pub struct Agreement {
 }
 
 /// The closed form on the largest set of pairs that agree: least median of squares over triples
-/// [rousseeuw84], every triple up to 25 pairs and 3000 drawn ones beyond. Up to half of the pairs
+/// \[rousseeuw84\], every triple up to 25 pairs and 3000 drawn ones beyond. Up to half of the pairs
 /// may be wrong. The pairs must come in an order that does not depend on the recording's.
 pub fn agree(pairs: &[Pair], seed: u64) -> Option<Agreement> {
     let n = pairs.len();

@@ -24,7 +24,7 @@ pub struct PairResidual {
     pub holdout_mm: f64,
 }
 
-/// What [`solve`] found.
+/// What [`super::solve::solve`] found.
 #[derive(Clone, Debug)]
 pub struct HandEyeFit {
     pub chain: Chain,

@@ -5,7 +5,7 @@ use super::closed::{Chain, Far, Near};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Rigid, Vec3};
 
-/// Settings of [`solve`].
+/// Settings of [`super::solve::solve`].
 #[derive(Clone, Debug)]
 pub struct HandEyeOptions {
     /// Sigma of the robot's position per axis, mm; `None`: estimated. 1e-6..=10.

@@ -3,7 +3,7 @@
 
 use crate::fault::{Fault, Result};
 
-/// Settings of [`solve`].
+/// Settings of [`super::solve::solve`].
 #[derive(Clone, Debug)]
 pub struct LaserPlaneOptions {
     /// Peaks nearer to an edge of the print or the board than this many stripe widths are not used; 0..=20.

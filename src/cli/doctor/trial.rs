@@ -225,7 +225,7 @@ fn taken(id: u32) -> Option<(f64, u64)> {
     // The name before it may hold blanks.
     let fields: Vec<&str> = text.rsplit_once(')')?.1.split_whitespace().collect();
     let number = |field: usize| fields.get(field - 3)?.parse::<u64>().ok();
-    Some(((number(14)? + number(15)?) as f64 / TICKS, number(24)? * PAGE >> 20))
+    Some(((number(14)? + number(15)?) as f64 / TICKS, (number(24)? * PAGE) >> 20))
 }
 
 #[cfg(all(test, target_os = "linux"))]

@@ -32,7 +32,7 @@ pub fn shapes(mut loops: Vec<Loop>, open: &[Curve]) -> Vec<Shape> {
         depth[i] = parents[i].map_or(0, |p| depth[p] + 1);
     }
     // Material that stands in a hole belongs to the hole's outline: a slit without width leads to it.
-    let mut islands: Vec<usize> = (0..loops.len()).filter(|&i| depth[i] >= 2 && depth[i] % 2 == 0).collect();
+    let mut islands: Vec<usize> = (0..loops.len()).filter(|&i| depth[i] >= 2 && depth[i].is_multiple_of(2)).collect();
     islands.sort_by_key(|&i| depth[i]);
     for i in islands {
         let island = loops[i].points.clone();

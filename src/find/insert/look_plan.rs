@@ -15,7 +15,7 @@ pub struct Shown {
     pub calibration: &'static str,
     pub parameter: &'static str,
     /// Difference between the looks over the error that it makes in the pose: in place and height, mm over mm. Below
-    /// [`HIDDEN`] the looks cannot show it.
+    /// `HIDDEN` the looks cannot show it.
     pub share: f64,
 }
 

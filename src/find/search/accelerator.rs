@@ -100,7 +100,10 @@ impl Accelerator {
         };
         let places = f64::from(level.frame.columns * level.frame.rows);
         let additions = TRIAL_TURNS.map(|t| (t * TRIAL_FEATURES) as f64 * places);
-        let cpu_s = best(&|| Ok(drop(level.peaks(&placed[1], LEAST))))? / additions[1];
+        let cpu_s = best(&|| {
+            drop(level.peaks(&placed[1], LEAST));
+            Ok(())
+        })? / additions[1];
         // Where more work took no longer, or so much longer that less would take none, something else had the processors.
         for _ in 0..TRIAL_ROUNDS {
             let few = best(&|| self.peaks(&level, &placed[0], LEAST).map(drop))?;
@@ -125,7 +128,7 @@ impl Accelerator {
         frame.least = u32::from(least);
         frame.capacity = CAPACITY;
         let plane = frame.plane();
-        let each = (SUMS / (4 * plane)).min(4096).max(1);
+        let each = (SUMS / (4 * plane)).clamp(1, 4096);
         frame.turns = each.min(placed.len()) as u32;
         let cells = (frame.width * frame.height) as usize;
         let (layers, words) = (level.slopes.len(), frame.layer_words());

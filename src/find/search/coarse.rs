@@ -1,5 +1,5 @@
 //! In: slope fields of one pyramid level and a shape model turned and scaled. Out: places where many of
-//! the model's directions are met within a few pixels (quantised and spread as in [hinterstoisser12]).
+//! the model's directions are met within a few pixels (quantised and spread as in \[hinterstoisser12\]).
 //! Frame and unit: pixels of that level; scores are integers, 0 to 4 a feature.
 
 use super::accelerator::Accelerator;

@@ -1,5 +1,5 @@
 //! In: a scene, a shape model, what is allowed. Out: matches with score, runner-up, sigma and warnings,
-//! by a pyramid search over quantised directions, then directions, then least squares ([steger02]).
+//! by a pyramid search over quantised directions, then directions, then least squares (\[steger02\]).
 //! Frame and unit: pixels of the scene, degrees in options, radians in poses.
 
 use super::accelerator::Accelerator;

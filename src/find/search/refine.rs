@@ -104,12 +104,12 @@ fn row(fields: &[(Kind, &Field, f32)], p: &ModelPoint, pose: &Pose, ignore: bool
     // The ridge nearest to the model's own place, so that parallel edges do not attract.
     let mut best: Option<f64> = None;
     for i in 1..along.len() - 1 {
-        if along[i] > f64::from(*threshold) {
-            if let Some(o) = ridge_offset(along[i - 1], along[i], along[i + 1]) {
-                let d = i as f64 - REACH as f64 + o;
-                if best.is_none_or(|b| d.abs() < b.abs()) {
-                    best = Some(d);
-                }
+        if along[i] > f64::from(*threshold)
+            && let Some(o) = ridge_offset(along[i - 1], along[i], along[i + 1])
+        {
+            let d = i as f64 - REACH as f64 + o;
+            if best.is_none_or(|b| d.abs() < b.abs()) {
+                best = Some(d);
             }
         }
     }

@@ -148,7 +148,7 @@ mod tests {
         let frame = Rigid::from_vectors(&Vec3::new(0.3, -0.2, 1.0), Vec3::new(800.0, -500.0, 120.0));
         let point = |i: u32| {
             let (x, y) = (0.05 * f64::from(i % 400) + 0.013, 0.05 * f64::from(i / 400) + 0.017);
-            let up = if i % 3 == 0 && x > 10.0 { 2.0 } else { 0.0 };
+            let up = if i.is_multiple_of(3) && x > 10.0 { 2.0 } else { 0.0 };
             let p = frame.point(&Vec3::new(x, y, 0.3 * (x / 3.0).sin() + up));
             CloudPoint {
                 position: [p.x as f32, p.y as f32, p.z as f32],

@@ -164,7 +164,7 @@ pub fn sample(source: &(impl PointSource + ?Sized), min_quality: f32) -> Result<
                     *high = Some((value, point));
                 }
             }
-            if out.total % stride == 0 {
+            if out.total.is_multiple_of(stride) {
                 if sigmas.len() < MOST {
                     sigmas.push(p.sigma_mm);
                 }

@@ -76,9 +76,14 @@ fn any_picture(w: u32, h: u32, bits: u8, random: &mut Noise) -> Image {
             let d = (f64::from(x) - 0.4 * f64::from(w) - 0.3 * f64::from(y)) / (1.0 + f64::from(at % 5));
             level(0.1 + 0.7 * (-0.5 * d * d).exp() + 0.01 * noise.normal())
         }),
-        4 => drawn(w, h, bits, |x, y| if (x / (1 + at % 13) + y / (1 + at % 7)) % 3 == 0 { full } else { full / 5 }),
+        4 => drawn(
+            w,
+            h,
+            bits,
+            |x, y| if (x / (1 + at % 13) + y / (1 + at % 7)).is_multiple_of(3) { full } else { full / 5 },
+        ),
         5 => drawn(w, h, bits, |x, y| level(f64::from(x + y) / f64::from(w + h) + 0.02 * noise.normal())),
-        _ => drawn(w, h, bits, |x, y| if (x * 7 + y * 13 + at) % 97 == 0 { full } else { level(0.1) }),
+        _ => drawn(w, h, bits, |x, y| if (x * 7 + y * 13 + at).is_multiple_of(97) { full } else { level(0.1) }),
     }
 }
 
@@ -106,7 +111,7 @@ fn masks_and_skeletons_of_random_pictures_are_those_of_the_twins() {
             thinning: if next(2) == 0 { Thinning::ZhangSuen } else { Thinning::GuoHall },
             region: roi.then(|| Mask::from_fn(w, h, |x, y| x + 2 * y > cut && x % 40 != 7)),
             lengthen: if next(2) == 0 { 0 } else { LengthenParams::default().word(WIDTH_PX) },
-            ambient: dim.then(|| drawn(w, h, bits, |x, y| (x * 3 + y * 5) % 60 << (bits - 8))),
+            ambient: dim.then(|| drawn(w, h, bits, |x, y| ((x * 3 + y * 5) % 60) << (bits - 8))),
             ..ChainConfig::new(w, h, bits)
         };
         let image = any_picture(w, h, bits, &mut random);

@@ -44,7 +44,7 @@ pub(super) fn centroid<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak
 }
 
 /// Steger's line point: second-order Taylor expansion of the picture smoothed with a Gaussian of sigma
-/// width / √3 or more, which is where the response to a bar has one maximum ([steger98] sec. 2.2).
+/// width / √3 or more, which is where the response to a bar has one maximum (\[steger98\] sec. 2.2).
 #[inline(always)]
 pub(super) fn derivative<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak {
     let n = direction(image, x, y, s);

@@ -12,7 +12,7 @@ pub enum Method {
     Gaussian,
     /// Centre of gravity above the background; fast, pulled by whatever else is in the window.
     Centroid,
-    /// Zero of the derivative of the Gaussian-smoothed profile ([steger98]).
+    /// Zero of the derivative of the Gaussian-smoothed profile (\[steger98\]).
     Derivative,
     /// The skeleton pixel itself, as in the paper that this program rebuilds: for comparisons.
     Pixel,
@@ -24,7 +24,7 @@ impl Method {
 }
 
 /// Settings of the sub-pixel step. The stripe's width and speckle are properties of laser and lens:
-/// [`measure`] takes them from the first shots.
+/// [`super::measure`] takes them from the first shots.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct PeakParams {

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 /// Selects the method when the pipeline is built: 0 Gaussian, 1 centroid, 2 derivative.
 pub const METHOD: &str = "peak_method";
 
-/// Quads of samples of a profile, written out when the pipeline is built: [`PeakFrame::quads`].
+/// Quads of samples of a profile, written out when the pipeline is built: [`super::PeakFrame::quads`].
 pub const QUADS: &str = "quads";
 
 const PROFILE: &str = include_str!("../../../shaders/shared/profile.wgsl");

@@ -25,7 +25,7 @@ fn slopes(frame: &ShapeFrame, seed: u64) -> Vec<u32> {
             let strong = around(w / 3, h / 2, h / 4).or(around(2 * w / 3, h / 3, h / 6));
             let (gx, gy) = strong.unwrap_or_else(|| (grain(&mut noise), grain(&mut noise)));
             // Now and then any direction at any strength.
-            let (gx, gy) = if noise.next() % 11 == 0 {
+            let (gx, gy) = if noise.next().is_multiple_of(11) {
                 ((noise.next() % 16383) as i32 - 8191, (noise.next() % 16383) as i32 - 8191)
             } else {
                 (gx, gy)

@@ -102,7 +102,7 @@ impl HoughFrame {
     /// Cell of a pixel at an angle.
     fn cell(&self, pixel: u32, k: usize, [c, s]: [i32; 2]) -> usize {
         let (x, y) = ((pixel & 0xffff) as i32 - self.middle_x, (pixel >> 16) as i32 - self.middle_y);
-        k * self.cells as usize + ((x * c + y * s + 8192 >> 14) + self.cells as i32 / 2) as usize
+        k * self.cells as usize + (((x * c + y * s + 8192) >> 14) + self.cells as i32 / 2) as usize
     }
 }
 
@@ -262,7 +262,7 @@ mod tests {
         let truth = [(1.2345, 300.4), (2.9, -310.7)];
         let mut pixels: Vec<u32> = truth.iter().flat_map(|&(a, d)| drawn(a, d, 640, 480)).collect();
         let mut noise = crate::stages::noise::Noise(5);
-        pixels.extend((0..300).map(|_| noise.next() % 640 | (noise.next() % 480) << 16));
+        pixels.extend((0..300).map(|_| (noise.next() % 640) | ((noise.next() % 480) << 16)));
         let p = HoughParams { most: 2, ..Default::default() };
         let frame = HoughFrame::new(640, 480, &p);
         let found = lines(&frame, votes(&frame, &pixels), &pixels, &p);
@@ -277,7 +277,7 @@ mod tests {
     #[test]
     fn specks_alone_are_no_line() {
         let mut noise = crate::stages::noise::Noise(6);
-        let pixels: Vec<u32> = (0..200).map(|_| noise.next() % 640 | (noise.next() % 480) << 16).collect();
+        let pixels: Vec<u32> = (0..200).map(|_| (noise.next() % 640) | ((noise.next() % 480) << 16)).collect();
         let p = HoughParams::default();
         let frame = HoughFrame::new(640, 480, &p);
         assert!(lines(&frame, votes(&frame, &pixels), &pixels, &p).is_empty());

@@ -1,5 +1,5 @@
 //! In: a mask. Out: the mask thinned to lines one pixel wide, nothing left to delete.
-//! Frame and unit: pixels. Zhang and Suen 1984 [zhang84], Guo and Hall 1989 [guo89], as OpenCV has them.
+//! Frame and unit: pixels. Zhang and Suen 1984 \[zhang84\], Guo and Hall 1989 \[guo89\], as OpenCV has them.
 
 use crate::gpu::Access::*;
 use crate::gpu::{Binding, Stage};

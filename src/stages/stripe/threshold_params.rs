@@ -40,7 +40,7 @@ impl Default for ThresholdParams {
 
 impl ThresholdParams {
     pub fn check(&self) -> Result<()> {
-        if self.size % 2 == 0 || !(3..=101).contains(&self.size) {
+        if self.size.is_multiple_of(2) || !(3..=101).contains(&self.size) {
             return Err(Fault::usage(format!("threshold size is {}, it must be odd and in 3..=101 px", self.size))
                 .next("choose an odd window about five times as wide as the stripe, e.g. 31"));
         }

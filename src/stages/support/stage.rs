@@ -110,7 +110,7 @@ pub fn judge(f: &SupportFrame, shot: &Neighbourhood, sites: &[Site], p: &Site, k
         let r = (reach >> drop) as u32;
         let from = sites.partition_point(|s| s[3] < p[3] - reach);
         let near = |s: &&Site| {
-            let d: [i32; 3] = std::array::from_fn(|i| s[i] - p[i] >> drop);
+            let d: [i32; 3] = std::array::from_fn(|i| (s[i] - p[i]) >> drop);
             d.iter().all(|d| d.abs() < FAR) && d.iter().map(|d| (d * d) as u32).sum::<u32>() <= r * r
         };
         // More than are needed are not counted.
@@ -151,10 +151,10 @@ pub fn cases() -> Vec<Case> {
             let first = places.len();
             for i in 0..150 {
                 let (x, y) = (0.25 * f64::from(i), step * f64::from(shot));
-                let stray = if noise.next() % 9 == 0 { 4.0 * noise.normal() } else { 0.02 * noise.normal() };
+                let stray = if noise.next().is_multiple_of(9) { 4.0 * noise.normal() } else { 0.02 * noise.normal() };
                 let z = rough * ((x / 7.0).sin() + stray);
                 let place = [1200.0 + x, y, z, 1200.0 + x].map(whole);
-                let odd = f32::from(u8::from(noise.next() % 3 == 0));
+                let odd = f32::from(u8::from(noise.next().is_multiple_of(3)));
                 places.push(place);
                 peaks.push(Peak {
                     amplitude: 100.0,

@@ -122,10 +122,10 @@ fn stripes(
     let format = Format { width: first.width, height: first.height, bits: first.bits };
     let optical = Optical { camera: *camera, laser: *laser, depth_mm };
     let mut engine = Engine::new(format, &optical, &run.extraction, None, processor.clone());
-    if run.extraction.measure_stripe {
-        if let Some(stripe) = engine.measure(&images.iter().collect::<Vec<_>>()) {
-            engine.set_stripe(&stripe)?;
-        }
+    if run.extraction.measure_stripe
+        && let Some(stripe) = engine.measure(&images.iter().collect::<Vec<_>>())
+    {
+        engine.set_stripe(&stripe)?;
     }
     let camera_frame = point::pose_words(&Rigid::<crate::geometry::Camera, crate::geometry::Camera>::identity());
     for (i, image) in images.iter().enumerate() {

@@ -86,7 +86,7 @@ mod tests {
         let full = ((1u32 << bits) - 1) as f32;
         let unit = full / 255.0;
         // A board of dark and bright squares with a bright lamp beside it, and a line across.
-        let print = |x: u32, y: u32| if (x / 10 + y / 10) % 2 == 0 { 150.0 } else { 40.0 };
+        let print = |x: u32, y: u32| if (x / 10 + y / 10).is_multiple_of(2) { 150.0 } else { 40.0 };
         let room = |x: u32, y: u32| unit * if x > 90 { 250.0 } else { print(x, y) };
         let line = |x: u32, y: u32| unit * 120.0 * (-0.5 * ((y as f32 - 41.3 - 0.05 * x as f32) / 1.3).powi(2)).exp();
         let make = |f: &dyn Fn(u32, u32) -> f32| {

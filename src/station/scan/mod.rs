@@ -4,6 +4,7 @@
 mod overlays;
 mod products;
 pub mod progress;
+pub(super) mod recorded;
 pub(super) mod report;
 pub(super) mod run;
 pub(super) mod scan_folder;

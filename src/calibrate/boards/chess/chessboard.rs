@@ -63,7 +63,7 @@ fn accept(
     // A corner may be hidden, not out of view: of a board that goes on beyond the picture nobody knows the rest.
     let inside = |p: &Vec2| p.x > 0.0 && p.y > 0.0 && p.x < grey.width as f64 - 1.0 && p.y < grey.height as f64 - 1.0;
     let hidden = found.grid.corners.iter().zip(&found.corners).filter(|(_, c)| c.is_none());
-    if !hidden.filter_map(|(place, _)| place.as_ref()).all(|p| inside(p)) {
+    if !hidden.filter_map(|(place, _)| place.as_ref()).all(inside) {
         return Ok(None);
     }
     orient(&found, first_bright, black_first).map(Some)

@@ -62,5 +62,5 @@ impl Typical {
 }
 
 fn sign(parity: usize) -> f64 {
-    if parity % 2 == 0 { 1.0 } else { -1.0 }
+    if parity.is_multiple_of(2) { 1.0 } else { -1.0 }
 }

@@ -1,0 +1,57 @@
+//! In: a recording, a station. Out: its scan, with the station's own settings; by what a resumed scan knows the recording.
+//! Frame and unit: cloud in the base frame, mm.
+
+use super::report::ScanReport;
+use super::run::{ScanOptions, scan};
+use crate::fault::Result;
+use crate::recording::Recording;
+use crate::rig::{Rig, hash_file, hash_text};
+use crate::scan::{GridOptions, RecordingSource, Where};
+use crate::station::settings::Settings;
+use crate::station::volume::believed;
+use std::path::Path;
+
+impl ScanOptions {
+    /// What a station's settings ask for, into the folder `out`: wherever it is fastest, no overlays, no ambient picture,
+    /// nothing skipped, not resumed. `rig` is the station's calibration, which knows the believed depths where the
+    /// settings leave them open.
+    pub fn for_station(settings: &Settings, rig: &Rig, out: &Path) -> ScanOptions {
+        ScanOptions {
+            out: out.to_owned(),
+            place: Where::default(),
+            extraction: settings.extraction.clone(),
+            grid: GridOptions::default(),
+            volume: believed(settings, rig),
+            ambient: None,
+            overlays: 0,
+            skip_bad: false,
+            resume: false,
+            stop: Default::default(),
+        }
+    }
+}
+
+/// Scans a recording with the poses of that name (the one that meta.json names, where it is `None`). `progress` is told
+/// (shots done, shots in all).
+///
+/// # Errors
+/// Those of [`scan`], and of the recording's poses.
+pub fn scan_recording(
+    recording: &Recording,
+    poses: Option<&str>,
+    rig: &Rig,
+    options: &ScanOptions,
+    progress: impl FnMut(usize, Option<usize>),
+) -> Result<ScanReport> {
+    let id = identity(recording, poses)?;
+    let open = |first| Ok(Box::new(RecordingSource::open(recording, poses, first)?) as Box<_>);
+    scan(&id, &recording.folder.display().to_string(), open, rig, options, progress)
+}
+
+/// What a resumed scan must have in common with the interrupted one: a hash of meta.json, of the poses and of the channel.
+pub fn identity(recording: &Recording, poses: Option<&str>) -> Result<String> {
+    let meta = hash_file(&recording.folder.join("meta.json"))?;
+    let poses: Vec<[f64; 16]> = recording.poses(poses)?.iter().map(|p| p.to_rows()).collect();
+    let text = serde_json::to_string(&(meta, poses, recording.channel)).expect("plain data");
+    Ok(hash_text(text.as_bytes()))
+}
