@@ -1,6 +1,7 @@
 //! In: simulated stations with known truth, a part seen from two sides, and stations or recordings made wrong by one edit.
-//! Out: judgement on the second look: no wrong pose passes, right ones do, one look says that it was not cross-checked.
-//! Points come from rays of the scene, not from pictures. Frame and unit: base frame; mm, degrees.
+//! Out: judgement on the second look: no wrong pose passes, right ones do, sigmas are honest, one look says that it was not
+//! cross-checked. Points come from rays of the scene, not from pictures. Frame and unit: base frame; mm, degrees.
+//! SHEETLIGHT_LONG: ten stations of as many designs, thirty right draws each.
 
 mod common;
 
@@ -9,22 +10,30 @@ use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
-use sheetlight::find::insert::looks::other_side;
+use rayon::prelude::*;
+use sheetlight::find::look::looks::other_side;
 use sheetlight::find::{LocateOptions, Recipe, Report, agree, locate};
 use sheetlight::geometry::{Base, Camera, Flange, Mat3, Part, Plane, Rigid, Vec2, Vec3, exp};
 use sheetlight::rig::{Calibration, Covariance, Kind, Quality, Rig, Verdict};
 use sheetlight::robot::{Convention, zyx_deg, zyx_of};
 use sheetlight::scan::CloudPoint;
-use sheetlight::simulate::{InScene, Scene, SceneSpec, Station, base_from_scene, part_pose, scan};
+use sheetlight::simulate::{InScene, RigSpec, Scene, SceneSpec, Station, base_from_scene, part_pose, scan};
 use std::path::PathBuf;
 
-/// Errors of the calibrations, one standard deviation, as good stations have them.
+/// Errors of the calibrations, one standard deviation, as good stations of the paper's size have them; lengths of other designs
+/// in proportion to their field.
 const HAND_EYE_MM: f64 = 0.03;
 const HAND_EYE_RAD: f64 = 1.5e-4;
 const PLANE_RAD: f64 = 1e-4;
 const PLANE_MM: f64 = 0.015;
-const ROBOT_MM: f64 = 0.02;
+/// Of a pose's reading.
+const ROBOT_MM: f64 = 0.007;
 const PEAK_PX: f64 = 0.06;
+/// Shots of a look.
+const SHOTS: usize = 130;
+/// Designs of the long form; the first is the short form's. Stripes lie, stand and lean.
+const DESIGNS: [&str; 10] =
+    ["paper", "paper", "fine", "shallow", "slant30", "upright", "behind", "webcam", "portrait", "microscope"];
 
 /// What a program gets of one look: peaks by shot, and the robot's poses.
 #[derive(Clone)]
@@ -37,12 +46,15 @@ struct Recorded {
 #[derive(Clone)]
 struct Believed {
     station: Station,
+    /// Lengths of the design over those of the paper's rig.
+    unit: f64,
     plane: Plane<Camera>,
     hand_eye: Rigid<Flange, Camera>,
 }
 
 struct World {
     station: Station,
+    unit: f64,
     recipe: Recipe,
     truth: Rigid<Base, Part>,
     looks: [Recorded; 2],
@@ -55,16 +67,20 @@ struct Peak {
     share: f64,
 }
 
-/// Tangent of half the fan that is looked at, and beams in it: the part and its surroundings, a third of a pixel apart.
-const REACH: f64 = 0.2;
-const BEAMS: u32 = 640;
 /// Beams across the sheet, whose light a peak is the middle of.
 const ACROSS: i32 = 7;
 
 /// Rays of the sheet from one camera pose: the peaks of what it lights and the camera sees, one a column. At an edge a part of
 /// the light falls elsewhere: the peak is the middle of what is left.
-fn peaks(station: &Station, scene: &Scene, from_camera: &Rigid<InScene, Camera>, rng: &mut Pcg64) -> Vec<Peak> {
+fn peaks(station: &Station, scene: &Scene, from_camera: &Rigid<InScene, Camera>, reach: f64) -> Vec<Peak> {
     let laser = &station.laser;
+    let across = across(station);
+    let along_x = across.y.abs() >= across.x.abs();
+    let along = |p: &Vec2| if along_x { p.x } else { p.y };
+    let (width, height) = (f64::from(station.camera.width), f64::from(station.camera.height));
+    // A third of a pixel apart.
+    let range = station.working_distance - laser.source.z;
+    let beams_over = (2.0 * reach * range / station.working_distance * station.camera.fx * 3.0).ceil() as u32;
     let source = from_camera.point(&laser.source);
     let [axis, normal] = [laser.axis, laser.normal].map(|d| from_camera.direction(&d));
     let side = normal.cross(&axis);
@@ -76,8 +92,8 @@ fn peaks(station: &Station, scene: &Scene, from_camera: &Rigid<InScene, Camera>,
         faces.then(|| station.camera.pixel_from_point(&to_camera.point(&hit.point))).flatten()
     };
     let mut columns = std::collections::BTreeMap::<i64, Peak>::new();
-    for i in 0..BEAMS {
-        let slope = REACH * (2.0 * (f64::from(i) + 0.5) / f64::from(BEAMS) - 1.0);
+    for i in 0..beams_over {
+        let slope = reach * (2.0 * (f64::from(i) + 0.5) / f64::from(beams_over) - 1.0);
         let direction = (axis + side * slope).normalize();
         let radius = laser.radius(station.working_distance);
         let beams: Vec<(Vec2, f64)> = (-ACROSS..=ACROSS)
@@ -89,71 +105,115 @@ fn peaks(station: &Station, scene: &Scene, from_camera: &Rigid<InScene, Camera>,
         // Neighbouring beams whose images are far apart lie on two surfaces: two peaks, of which the stronger is taken.
         let all: f64 =
             (-ACROSS..=ACROSS).map(|k| (-2.0 * (1.5 * f64::from(k) / f64::from(ACROSS)).powi(2)).exp()).sum();
-        let pieces = beams.chunk_by(|a, b| (a.0.y - b.0.y).abs() < 1.0);
+        let pieces = beams.chunk_by(|a, b| (a.0 - b.0).dot(&across).abs() < 1.0);
         let peak = pieces.map(|piece| {
             let light: f64 = piece.iter().map(|b| b.1).sum();
             let px = piece.iter().map(|b| b.0 * b.1).sum::<Vec2>() / light;
             Peak { px, share: light / all }
         });
         let Some(peak) = peak.max_by(|a, b| a.share.total_cmp(&b.share)).filter(|p| p.share > 0.3) else { continue };
-        let slot = peak.px.x.round() as i64;
-        let inside = peak.px.x > 0.0 && peak.px.y > 0.0 && peak.px.x < 639.0 && peak.px.y < 479.0;
-        let better = |old: &Peak| (peak.px.x - slot as f64).abs() < (old.px.x - slot as f64).abs();
+        let slot = along(&peak.px).round() as i64;
+        let inside = peak.px.x > 0.0 && peak.px.y > 0.0 && peak.px.x < width - 1.0 && peak.px.y < height - 1.0;
+        let better = |old: &Peak| (along(&peak.px) - slot as f64).abs() < (along(&old.px) - slot as f64).abs();
         if inside && columns.get(&slot).is_none_or(better) {
             columns.insert(slot, peak);
         }
     }
-    let noisy = |p: Peak| {
-        let v = p.px.y + PEAK_PX * rng.sample::<f64, _>(StandardNormal);
-        Peak { px: Vec2::new(p.px.x, v), ..p }
+    columns.into_values().collect()
+}
+
+/// Direction in the picture in which the stripe moves with depth.
+fn across(station: &Station) -> Vec2 {
+    let (sin, cos) = station.rig.laser.side_deg.to_radians().sin_cos();
+    Vec2::new(cos, sin)
+}
+
+/// What a rig looks at: the LED socket of the board before the paper's, else the notched plate that fits its field.
+fn looked_at(rig: &RigSpec, name: &str) -> (SceneSpec, Recipe) {
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    let (mut spec, recipe, half, part) = if name == "paper" {
+        let spec = SceneSpec::load(&root.join("data/scenes/board.toml")).unwrap();
+        (spec, Recipe::load(&root.join("data/recipes/led.toml")).unwrap(), [20.0, 13.0], "led")
+    } else {
+        let u = rig.scale();
+        // Steps of a scan of the plate alone, turned and tilted.
+        let shots = (SHOTS as f64 * 32.0 / 30.0) as usize;
+        (rig.scene(), Recipe::parse(&rig.recipe(shots)).unwrap(), [21.0 * u, 14.5 * u], "notched")
     };
-    columns.into_values().map(noisy).collect()
+    let part = spec.part.iter().find(|p| p.name == part).unwrap().clone();
+    let (x, y) = (part.at_mm[0], part.at_mm[1]);
+    spec.region_mm = [x - half[0], y - half[1], x + half[0], y + half[1]];
+    (spec, recipe)
 }
 
 impl World {
-    fn new(seed: u64) -> World {
-        let station = Station::random(seed);
-        let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
-        let mut spec = SceneSpec::load(&root.join("data/scenes/board.toml")).unwrap();
-        let part = spec.part.iter().find(|p| p.name == "led").unwrap().clone();
-        let (x, y) = (part.at_mm[0], part.at_mm[1]);
-        spec.region_mm = [x - 20.0, y - 13.0, x + 20.0, y + 13.0];
-        let in_scene: Rigid<InScene, Part> = part_pose(&part);
+    fn new(index: usize) -> World {
+        let name = DESIGNS[index];
+        let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("data/rigs/{name}.toml"));
+        let rig = RigSpec::load(&path).unwrap();
+        let (w, h) = (rig.camera.width_px, rig.camera.height_px);
+        // What a larger sensor would cost is time.
+        let width = w.min(800);
+        let station = Station::of(&rig, 100 + index as u64).with_size(width, width * h / w);
+        let unit = rig.scale();
+        let (spec, mut recipe) = looked_at(&rig, name);
+        // What is judged is the measurement: the robot that inserts is exact.
+        (recipe.robot.sigma_mm, recipe.robot.sigma_deg) = (0.0, 0.0);
+        recipe.gates.second_look = true;
+        recipe.gates.max_unseen_height_mm *= unit.max(1.0);
+        let part = spec.part.iter().find(|p| p.name == recipe.name).unwrap();
+        let in_scene: Rigid<InScene, Part> = part_pose(part);
+        let [x0, _, x1, _] = spec.region_mm;
+        let reach = 0.72 * (x1 - x0) / (station.working_distance - station.laser.source.z);
         let scene = Scene::new(spec).unwrap();
         let placed = base_from_scene(&station);
         let truth = placed * in_scene;
         let mut rng = station.rng("second look", 0);
-        let path = scan(&station, &scene, 130);
+        let path = scan(&station, &scene, SHOTS);
         let other = other_side(&truth, 150.0 + rng.random_range(0.0..60.0), 15.0 + rng.random_range(0.0..10.0));
         let looks = [None, Some(other)].map(|side| {
-            let (mut all, mut poses) = (Vec::new(), Vec::new());
-            for in_scene in &path {
+            let shots = path.par_iter().map(|in_scene| {
                 let here = placed * *in_scene;
                 let camera = side.map_or(here, |s| s * here);
-                let flange = camera * station.flange_from_camera.inverse();
-                let noise = Vec3::from_fn(|_, _| ROBOT_MM / 3.0 * rng.sample::<f64, _>(StandardNormal));
-                poses.push(Rigid::new(flange.rotation, flange.translation + noise));
-                all.push(peaks(&station, &scene, &(placed.inverse() * camera), &mut rng));
-            }
-            Recorded { peaks: all, poses }
+                let seen = peaks(&station, &scene, &(placed.inverse() * camera), reach);
+                (seen, camera * station.flange_from_camera.inverse())
+            });
+            let (peaks, poses) = shots.unzip();
+            Recorded { peaks, poses }
         });
-        World { recipe: Recipe::load(&root.join("data/recipes/led.toml")).unwrap(), station, truth, looks }
+        World { station, unit, recipe, truth, looks }
+    }
+
+    /// What is recorded: peaks and the robot's readings with their noise.
+    fn recorded(&self, rng: &mut Pcg64) -> [Recorded; 2] {
+        let mut looks = self.looks.clone();
+        let across = across(&self.station);
+        for look in &mut looks {
+            for pose in &mut look.poses {
+                pose.translation += Vec3::from_fn(|_, _| self.unit * ROBOT_MM * rng.sample::<f64, _>(StandardNormal));
+            }
+            for peak in look.peaks.iter_mut().flatten() {
+                peak.px += across * (PEAK_PX * rng.sample::<f64, _>(StandardNormal));
+            }
+        }
+        looks
     }
 
     /// The calibrations as a good calibration would give them: off by what their covariance says.
     fn believed(&self, rng: &mut Pcg64) -> Believed {
         let mut normal = |sigma: f64| sigma * rng.sample::<f64, _>(StandardNormal);
         let w = Vec3::from_fn(|_, _| normal(HAND_EYE_RAD));
-        let t = Vec3::from_fn(|_, _| normal(HAND_EYE_MM));
+        let t = Vec3::from_fn(|_, _| normal(self.unit * HAND_EYE_MM));
         let x = self.station.flange_from_camera;
         let plane = self.station.laser.plane();
         let tilt = Vec3::from_fn(|_, _| normal(PLANE_RAD));
         let tilted = exp(&(tilt - plane.normal * plane.normal.dot(&tilt))) * plane.normal;
         // The plane turns about where it was seen: the working distance.
         let pivot = Vec3::new(0.0, 0.0, self.station.working_distance);
-        let offset = tilted.dot(&(pivot - plane.normal * plane.distance(&pivot))) + normal(PLANE_MM);
+        let offset = tilted.dot(&(pivot - plane.normal * plane.distance(&pivot))) + normal(self.unit * PLANE_MM);
         Believed {
             station: self.station.clone(),
+            unit: self.unit,
             plane: Plane::new(tilted, offset).unwrap(),
             hand_eye: Rigid::new(exp(&w) * x.rotation, x.translation + t),
         }
@@ -170,7 +230,7 @@ impl World {
                 let q = camera.point(&point);
                 out.push(CloudPoint {
                     position: [q.x as f32, q.y as f32, q.z as f32],
-                    sigma_mm: 0.02,
+                    sigma_mm: (0.02 * self.unit) as f32,
                     intensity: (150.0 * p.share) as f32,
                     quality: 1.0,
                     shot: shot as u32,
@@ -191,7 +251,7 @@ impl World {
             let options = if let Some(first) = reports.first() { options.again(first) } else { options };
             reports.push(locate(&self.cloud(b, look), &self.recipe, Some(&rig), &options).map_err(|e| e.what)?);
         }
-        let both = agree(reports.clone(), &self.recipe, Convention::Matrix).map_err(|e| e.what)?;
+        let both = agree(reports.clone(), None, &self.recipe, Convention::Matrix).map_err(|e| e.what)?;
         Ok((reports, both))
     }
 }
@@ -211,9 +271,9 @@ fn rig(b: &Believed) -> Rig {
     let mut j = DMatrix::zeros(4, 4);
     j.view_mut((0, 0), (3, 3)).copy_from(&(tangent * PLANE_RAD));
     j.view_mut((3, 0), (1, 3)).copy_from(&(pivot.transpose() * tangent * PLANE_RAD));
-    j[(3, 3)] = PLANE_MM;
+    j[(3, 3)] = b.unit * PLANE_MM;
     let plane = Covariance::new(&["nx", "ny", "nz", "offset_mm"], &(&j * j.transpose()));
-    let (t, w) = (HAND_EYE_MM.powi(2), HAND_EYE_RAD.powi(2));
+    let (t, w) = ((b.unit * HAND_EYE_MM).powi(2), HAND_EYE_RAD.powi(2));
     let names = ["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"];
     let hand_eye = Covariance::new(&names, &DMatrix::from_diagonal(&DVector::from_vec(vec![t, t, t, w, w, w])));
     let none = Covariance::default();
@@ -224,6 +284,12 @@ fn rig(b: &Believed) -> Rig {
         pointer: None,
         camera: Some(camera),
     }
+}
+
+/// Another specimen of the same design.
+fn another(b: &Believed) -> Station {
+    let (w, h) = (b.station.camera.width, b.station.camera.height);
+    Station::of(&b.station.rig, b.station.seed + 77).with_size(w, h)
 }
 
 type Edit = (&'static str, fn(&mut Believed, &mut [Recorded; 2]));
@@ -259,9 +325,9 @@ fn lost(looks: &mut [Recorded; 2], count: usize) {
 /// frame, mixed files.
 const EDITS: &[Edit] = &[
     ("hand-eye translation in metres", |b, _| b.hand_eye.translation *= 1e-3),
-    ("hand-eye 1 mm off in x", |b, _| b.hand_eye.translation.x += 1.0),
-    ("hand-eye 1 mm off in y", |b, _| b.hand_eye.translation.y += 1.0),
-    ("hand-eye 1 mm off in z", |b, _| b.hand_eye.translation.z += 1.0),
+    ("hand-eye 1 mm off in x", |b, _| b.hand_eye.translation.x += b.unit),
+    ("hand-eye 1 mm off in y", |b, _| b.hand_eye.translation.y += b.unit),
+    ("hand-eye 1 mm off in z", |b, _| b.hand_eye.translation.z += b.unit),
     ("hand-eye x with the other sign", |b, _| b.hand_eye.translation.x *= -1.0),
     ("hand-eye rotation transposed", |b, _| b.hand_eye.rotation = b.hand_eye.rotation.transpose()),
     ("hand-eye the other way round", |b, _| {
@@ -270,15 +336,15 @@ const EDITS: &[Edit] = &[
     }),
     ("hand-eye tilted by half a degree", |b, _| b.hand_eye.rotation = exp(&(Vec3::x() * 0.0087)) * b.hand_eye.rotation),
     ("hand-eye turned by half a degree", |b, _| b.hand_eye.rotation = exp(&(Vec3::z() * 0.0087)) * b.hand_eye.rotation),
-    ("hand-eye of another specimen", |b, _| b.hand_eye = Station::random(b.station.seed + 77).flange_from_camera),
-    ("plane's offset 1 mm more", |b, _| b.plane.offset += 1.0),
-    ("plane's offset 0.3 mm less", |b, _| b.plane.offset -= 0.3),
+    ("hand-eye of another specimen", |b, _| b.hand_eye = another(b).flange_from_camera),
+    ("plane's offset 1 mm more", |b, _| b.plane.offset += b.unit),
+    ("plane's offset 0.3 mm less", |b, _| b.plane.offset -= 0.3 * b.unit),
     ("plane's normal 1.01 long", |b, _| b.plane.offset /= 1.01),
     ("plane's normal 1.002 long", |b, _| b.plane.offset /= 1.002),
     ("plane tilted by half a degree", |b, _| b.plane.normal = exp(&(Vec3::x() * 0.0087)) * b.plane.normal),
     ("plane rolled by half a degree", |b, _| b.plane.normal = exp(&(Vec3::z() * 0.0087)) * b.plane.normal),
-    ("plane of another specimen", |b, _| b.plane = Station::random(b.station.seed + 77).laser.plane()),
-    ("camera of another specimen", |b, _| b.station.camera = Station::random(b.station.seed + 77).camera),
+    ("plane of another specimen", |b, _| b.plane = another(b).laser.plane()),
+    ("camera of another specimen", |b, _| b.station.camera = another(b).camera),
     ("focal length 2 % more", |b, _| {
         b.station.camera.fx *= 1.02;
         b.station.camera.fy *= 1.02;
@@ -290,11 +356,13 @@ const EDITS: &[Edit] = &[
     ("poses late by one shot", |_, l| delayed(l, -1)),
     ("one picture lost", |_, l| lost(l, 1)),
     ("three pictures lost", |_, l| lost(l, 3)),
-    ("camera's ReverseX on", |_, l| {
-        l.iter_mut().for_each(|k| k.peaks.iter_mut().flatten().for_each(|p| p.px.x = 639.0 - p.px.x))
+    ("camera's ReverseX on", |b, l| {
+        let last = f64::from(b.station.camera.width) - 1.0;
+        l.iter_mut().for_each(|k| k.peaks.iter_mut().flatten().for_each(|p| p.px.x = last - p.px.x))
     }),
-    ("camera's ReverseY on", |_, l| {
-        l.iter_mut().for_each(|k| k.peaks.iter_mut().flatten().for_each(|p| p.px.y = 479.0 - p.px.y))
+    ("camera's ReverseY on", |b, l| {
+        let last = f64::from(b.station.camera.height) - 1.0;
+        l.iter_mut().for_each(|k| k.peaks.iter_mut().flatten().for_each(|p| p.px.y = last - p.px.y))
     }),
     ("steps scaled by 1.02", |_, l| {
         each_pose(l, |first, p| Rigid::new(p.rotation, first.translation + (p.translation - first.translation) * 1.02))
@@ -311,100 +379,140 @@ const EDITS: &[Edit] = &[
     }),
 ];
 
-/// Stations that are looked at: one, or ten in the long form.
-fn worlds() -> u64 {
-    if std::env::var_os("SHEETLIGHT_LONG").is_some() { 10 } else { 1 }
+/// Stations that are looked at, and right draws of each.
+fn long() -> bool {
+    std::env::var_os("SHEETLIGHT_LONG").is_some()
+}
+fn worlds() -> usize {
+    if long() { DESIGNS.len() } else { 1 }
+}
+
+/// Wrong by more than it says and by more than can be borne.
+fn wrong(r: &Report, world: &World) -> bool {
+    let off = Off::of(&r.base_from_part, &world.truth);
+    let bar = 0.1 * world.unit.min(1.0);
+    let turn = r.sigma_deg.iter().copied().fold(0.0, f64::max);
+    (0..3).any(|k| off.by[k].abs() > (3.0 * r.sigma_mm[k]).max(bar)) || off.angle_deg > (3.0 * turn).max(0.3)
+}
+
+/// What a look alone or both came to.
+#[derive(Clone, Copy, Default)]
+struct Passed {
+    one: bool,
+    two: bool,
+}
+
+/// One edit at one station: which wrong poses pass.
+fn tried(world: &World, name: &str, edit: fn(&mut Believed, &mut [Recorded; 2])) -> Passed {
+    let mut rng = world.station.rng(name, 1);
+    let (mut believed, mut looks) = (world.believed(&mut rng), world.recorded(&mut rng));
+    edit(&mut believed, &mut looks);
+    let (alone, both) = match world.look(&believed, &looks) {
+        Ok(found) => found,
+        Err(what) => {
+            println!("{}, {name}: refused: {what}", world.station.rig.name);
+            return Passed::default();
+        }
+    };
+    let l = both.looks.as_ref().unwrap();
+    // The recipe asks for two looks: what one alone would be refused for besides.
+    let others = |r: &Report| r.gates.iter().all(|g| g.passed || g.name == "number of looks");
+    let off = |r: &Report| {
+        let off = Off::of(&r.base_from_part, &world.truth);
+        off.in_plane().max(off.in_height())
+    };
+    println!(
+        "{}, {name}: one look off by {:.3} mm ({}), both by {:.3} mm ({}), ratio {:.1}, misfit {:.1}, best explained by {:?}",
+        world.station.rig.name,
+        off(&alone[0]),
+        if others(&alone[0]) { "passed" } else { "refused" },
+        off(&both),
+        if both.passed { "passed" } else { "refused" },
+        l.ratio,
+        l.misfit_sigmas,
+        l.explained_by.first().map(|e| e.name)
+    );
+    for r in &alone {
+        assert!(!r.passed && r.notes.iter().any(|n| n.contains("not cross-checked")), "{:?}", r.notes);
+    }
+    if both.passed && wrong(&both, world) {
+        println!("  PASSED WRONG, it says that it leaves {:.2} mm unseen in height: {l:?}", l.unseen_height_mm);
+    }
+    Passed { one: others(&alone[0]) && wrong(&alone[0], world), two: both.passed && wrong(&both, world) }
 }
 
 #[test]
 fn no_edit_of_a_station_or_recording_passes_two_looks_with_a_wrong_pose() {
-    let (mut wrong_alone, mut hidden) = (0, 0);
-    for seed in 0..worlds() {
-        let world = World::new(100 + seed);
-        for (name, edit) in EDITS {
-            let mut rng = world.station.rng(name, 1);
-            let (mut believed, mut looks) = (world.believed(&mut rng), world.looks.clone());
-            edit(&mut believed, &mut looks);
-            let (alone, both) = match world.look(&believed, &looks) {
-                Ok(found) => found,
-                Err(what) => {
-                    println!("{name}: refused: {what}");
-                    continue;
-                }
-            };
-            let off = |r: &Report| Off::of(&r.base_from_part, &world.truth);
-            let beyond = |r: &Report, unseen: [f64; 3]| {
-                let (o, deg) = (off(r), r.sigma_deg.iter().copied().fold(0.0, f64::max));
-                let place = (0..3).any(|k| o.by[k].abs() > (3.0 * r.sigma_mm[k]).max(0.1).max(unseen[k]));
-                place || o.angle_deg > (3.0 * deg).max(0.3)
-            };
-            // What the report itself says that the looks cannot show is stated.
-            let unseen = |r: &Report| {
-                let said =
-                    |k: usize| r.looks.iter().flat_map(move |l| l.explained_by.iter().map(move |e| e.unseen_mm[k]));
-                [0, 1, 2].map(|k| said(k).fold(0.0, f64::max))
-            };
-            let wrong = |r: &Report| beyond(r, [0.0; 3]);
-            let l = both.looks.as_ref().unwrap();
-            println!(
-                "{name}: one look off by {:.3} mm ({}), both by {:.3} mm ({}), ratio {:.1}, best explained by {:?}",
-                off(&alone[0]).in_plane().max(off(&alone[0]).in_height()),
-                if alone[0].passed { "passed" } else { "refused" },
-                off(&both).in_plane().max(off(&both).in_height()),
-                if both.passed { "passed" } else { "refused" },
-                l.ratio,
-                l.explained_by.first().map(|e| e.name)
-            );
-            if both.passed && wrong(&both) {
-                println!("  passed: it says that it could hide {:.2?} mm", unseen(&both));
-                hidden += 1;
-            }
-            wrong_alone += usize::from(alone[0].passed && wrong(&alone[0]));
-            assert!(alone.iter().all(|r| r.notes.iter().any(|n| n.contains("not cross-checked"))));
-            let said = unseen(&both);
-            assert!(
-                !(both.passed && beyond(&both, said)),
-                "{name}, station {seed}: a wrong pose passed two looks unsaid"
-            );
-        }
+    let (mut alone, mut both) = (0, 0);
+    for index in 0..worlds() {
+        let world = World::new(index);
+        let passed: Vec<Passed> = EDITS.par_iter().map(|(name, edit)| tried(&world, name, *edit)).collect();
+        let count = |f: fn(&Passed) -> bool| passed.iter().filter(|p| f(p)).count();
+        let (one, two) = (count(|p| p.one), count(|p| p.two));
+        println!("{}: {one} wrong poses pass one look, {two} two, of {}", world.station.rig.name, EDITS.len());
+        (alone, both) = (alone + one, both + two);
     }
-    // Two looks leave a hand-eye's error along the axis of the turn between them open (docs/math.md): one edit in thirty is that.
-    println!("wrong poses that pass: {wrong_alone} one look, {hidden} two");
-    assert!(hidden * 16 <= wrong_alone, "{hidden} edits pass two looks, {wrong_alone} pass one");
+    assert_eq!(both, 0, "wrong poses pass two looks");
     // Otherwise this test would show nothing.
-    assert!(wrong_alone > 5, "{wrong_alone} edits pass one look with a wrong pose");
+    assert!(alone > 5 * worlds(), "{alone} edits pass one look with a wrong pose");
+}
+
+/// Squares of error over stated sigma, x y z of the part.
+type Squares = [f64; 3];
+
+struct Right {
+    passed: bool,
+    one: Squares,
+    two: Squares,
+    /// Two looks are farther off in the plane than one.
+    worse: bool,
+}
+
+fn right(world: &World, draw: u64) -> Right {
+    let believed = world.believed(&mut world.station.rng("right", draw));
+    let looks = world.recorded(&mut world.station.rng("right", 1000 + draw));
+    let (alone, both) = world.look(&believed, &looks).unwrap();
+    let off = |r: &Report| Off::of(&r.base_from_part, &world.truth);
+    let squares = |r: &Report| [0, 1, 2].map(|k| (off(r).by[k] / r.sigma_mm[k]).powi(2));
+    if !both.passed {
+        let l = both.looks.as_ref().unwrap();
+        let (mm, deg) = ((l.difference_mm, l.expected_mm), (l.difference_deg, l.expected_deg));
+        println!("{}, draw {draw}: {:?}, {mm:.4?} mm, {deg:.4?} degrees", world.station.rig.name, both.reasons);
+        println!("    {:?}\n    {:?}", alone[0].sizes, alone[1].sizes);
+        println!("    {:?}", l.explained_by.iter().map(|e| (e.name, e.share, &e.off_by)).collect::<Vec<_>>());
+    }
+    let worse = off(&both).in_plane() > off(&alone[0]).in_plane();
+    Right { passed: both.passed, one: squares(&alone[0]), two: squares(&both), worse }
 }
 
 #[test]
 fn right_stations_pass_two_looks_and_the_pose_is_as_good_as_it_says() {
-    let (draws, mut passed, mut all, mut worse) = (if worlds() > 1 { 30 } else { 6 }, 0u32, 0u32, 0u32);
-    let (mut squares, mut alone_squares) = ([0f64; 3], [0f64; 3]);
-    for seed in 0..worlds() {
-        let world = World::new(100 + seed);
-        for draw in 0..draws {
-            let believed = world.believed(&mut world.station.rng("right", draw));
-            let (alone, both) = world.look(&believed, &world.looks).unwrap();
-            let (one, two) =
-                (Off::of(&alone[0].base_from_part, &world.truth), Off::of(&both.base_from_part, &world.truth));
-            (0..3).for_each(|k| squares[k] += (two.by[k] / both.sigma_mm[k]).powi(2));
-            (0..3).for_each(|k| alone_squares[k] += (one.by[k] / alone[0].sigma_mm[k]).powi(2));
-            all += 1;
-            passed += u32::from(both.passed);
-            worse += u32::from(two.in_plane() > one.in_plane());
-            if !both.passed {
-                println!("station {seed}, draw {draw}: {:?} {:?}", both.reasons, both.looks);
-            }
-        }
+    let draws: u64 = if long() { 30 } else { 6 };
+    let mut all = Vec::new();
+    let rms = |of: &[Right], f: &dyn Fn(&Right) -> Squares| {
+        [0, 1, 2].map(|k| (of.iter().map(|r| f(r)[k]).sum::<f64>() / of.len() as f64).sqrt())
+    };
+    for index in 0..worlds() {
+        let world = World::new(index);
+        let here: Vec<Right> = (0..draws).into_par_iter().map(|draw| right(&world, draw)).collect();
+        println!(
+            "{}: {} of {draws} pass; error over stated sigma {:.2?} of one look, {:.2?} of two",
+            world.station.rig.name,
+            here.iter().filter(|r| r.passed).count(),
+            rms(&here, &|r| r.one),
+            rms(&here, &|r| r.two)
+        );
+        all.extend(here);
     }
-    let honest = squares.map(|s| (s / f64::from(all)).sqrt());
-    let alone = alone_squares.map(|s| (s / f64::from(all)).sqrt());
+    let (n, passed) = (all.len(), all.iter().filter(|r| r.passed).count());
+    let (one, two) = (rms(&all, &|r| r.one), rms(&all, &|r| r.two));
+    let worse = all.iter().filter(|r| r.worse).count();
     println!(
-        "{passed} of {all} pass; error over stated sigma {honest:.2?}, of one look {alone:.2?}; worse in the plane than one look: {worse}"
+        "{passed} of {n} pass; error over stated sigma {one:.2?} of one look, {two:.2?} of two; worse in the plane: {worse}"
     );
-    assert!(passed * 100 >= all * 99 - 100, "{passed} of {all} right ones pass");
-    if worlds() > 1 {
-        assert!(passed * 100 >= all * 99, "{passed} of {all} right ones pass");
-        assert!(honest.iter().all(|h| (0.8..=1.25).contains(h)), "{honest:?}");
-    }
-    assert!(worse * 2 < all, "two looks are worse than one in {worse} of {all}");
+    assert!(passed * 100 >= n * 99 - if long() { 0 } else { 100 }, "{passed} of {n} right ones pass");
+    // Six draws at one station tell a sigma to a factor of two.
+    let range = if long() { 0.8..=1.25 } else { 0.4..=2.5 };
+    assert!(one.iter().chain(&two).all(|h| range.contains(h)), "{one:.2?} {two:.2?}");
+    assert!(worse * 2 < n, "two looks are worse than one in {worse} of {n}");
 }

@@ -3,7 +3,7 @@
 
 use crate::cli::terminal::console::Console;
 use crate::fault::Result;
-use crate::recording::BoardSpec;
+use crate::recording::{BoardSpec, load_poses};
 use crate::simulate::{RigSpec, Set, SimulateOptions, simulate};
 use crate::station::{Settings, WorkingVolume};
 use std::path::PathBuf;
@@ -17,6 +17,7 @@ use std::path::PathBuf;
 /// Example: sheetlight simulate --out try --set all --seed 3
 ///          sheetlight scan try/scan --station try/station --out try/result
 ///          sheetlight simulate --rig data/rigs/webcam.toml --set all --out webcam
+///          sheetlight simulate --out again --seed 3 --poses second.json
 #[derive(clap::Args)]
 pub struct Args {
     /// Folder for the recordings (one a set) and the station
@@ -52,6 +53,9 @@ pub struct Args {
     /// Shots of a scan [default: 200; with --rig one every one and a half pixel footprints]
     #[arg(long)]
     shots: Option<usize>,
+    /// Flange poses to take the set scan or surface from instead of our own, one a shot, as second-look writes them
+    #[arg(long, value_name = "FILE", conflicts_with = "shots")]
+    poses: Option<PathBuf>,
     /// Scales shot noise, read noise, speckle and hot pixels; 0 is a noiseless sensor
     #[arg(long, default_value_t = 1.0)]
     noise: f64,
@@ -90,6 +94,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     options.board = args.board.as_deref().map(BoardSpec::load).transpose()?;
     options.seed = args.seed;
     options.shots = args.shots.unwrap_or(options.shots);
+    options.poses = args.poses.as_deref().map(|path| load_poses(path).map(|read| read.poses)).transpose()?;
     options.sensor.bits = args.bits.unwrap_or(options.sensor.bits);
     options.sensor.laser_white = args.exposure.unwrap_or(options.sensor.laser_white);
     (options.pose_noise_mm, options.pose_noise_deg) = (args.pose_noise_mm, args.pose_noise_deg);

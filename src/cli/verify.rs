@@ -10,12 +10,14 @@ use std::path::PathBuf;
 /// Check a station with data that its calibrations did not see
 ///
 /// A small residual does not prove a small error. This shows, apart from each fit, how well data that
-/// was left out is predicted; how well a flat plate scanned from several poses agrees with itself; and
+/// was left out is predicted; how well a flat plate scanned from several poses agrees with itself; how well
+/// scans of any object from several sides agree, and which calibration would explain it where they do not; and
 /// how far touched points are from where the system put them.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight verify --station cell3
-  sheetlight verify --station cell3 --flat scans/plate --shots-per-view 16 --touch touches.csv")]
+  sheetlight verify --station cell3 --flat scans/plate --shots-per-view 16 --touch touches.csv
+  sheetlight verify --station cell3 --object scans/casting --object scans/casting-turned")]
 pub struct Args {
     /// Station folder
     #[arg(long)]
@@ -26,13 +28,21 @@ pub struct Args {
     /// A flat scan holds several poses of this many shots each; 0: each scan is one view
     #[arg(long, default_value_t = 0)]
     shots_per_view: u32,
+    /// Scan folder of an object of any shape; give it for two or three scans of it from several sides
+    #[arg(long)]
+    object: Vec<PathBuf>,
     /// Touch test: a file with predicted x y z and touched x y z (base frame, mm) a line
     #[arg(long)]
     touch: Option<PathBuf>,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
-    let run = VerifyRun { flats: args.flat.clone(), shots_per_view: args.shots_per_view, touches: args.touch.clone() };
+    let run = VerifyRun {
+        flats: args.flat.clone(),
+        shots_per_view: args.shots_per_view,
+        object: args.object.clone(),
+        touches: args.touch.clone(),
+    };
     let report = verify(&Rig::load(&args.station)?, &run)?;
     console.result(&report, &text(&report));
     Ok(())
@@ -67,6 +77,19 @@ fn text(r: &VerifyReport) -> String {
                 v.name, v.height_mm, v.tilt_deg, v.own_rms_mm, v.points
             );
         }
+    }
+    if let Some(o) = &r.object {
+        s += &format!("Object from {} sides\n", o.scans.len());
+        for (name, overlap, rms) in &o.scans {
+            s += &format!(
+                "  {name:24} {:.0} % on the first scan's surfaces, {rms:.4} mm rms from them\n",
+                100.0 * overlap
+            );
+        }
+        s += &super::find::locate::looks(&o.looks);
+    }
+    for remark in &r.remarks {
+        s += &format!("note: {remark}\n");
     }
     if let Some(t) = &r.touch {
         let [x, y, z] = t.mean_mm;

@@ -4,6 +4,7 @@
 
 pub mod dxf;
 pub mod insert;
+pub mod look;
 pub mod measure;
 pub mod model;
 pub mod scene;
@@ -11,7 +12,8 @@ pub mod search;
 
 pub use insert::locate::{LocateOptions, Report, agree, locate};
 pub use insert::recipe::Recipe;
-pub use insert::{LookPlan, Shown, TaskOptions, plan_look, recipe_of};
+pub use insert::{TaskOptions, recipe_of};
+pub use look::{LookPlan, Shown, plan_look};
 pub use model::drawing::Drawing;
 pub use model::shape_model::{ModelOptions, ShapeModel};
 pub use scene::{Kind, Layer, Region, Scene};

@@ -84,6 +84,8 @@ pub struct SimulateOptions {
     pub sensor: Sensor,
     /// Shots of a scan, 2..=100000.
     pub shots: usize,
+    /// Where the robot stands for each shot of a scan or of the pointer on the scene, instead of places of our choice.
+    pub poses: Option<Vec<Rigid<Base, Flange>>>,
     /// Errors of the reported robot poses, 1 sigma per axis, mm 0..=10 and degrees 0..=5.
     pub pose_noise_mm: f64,
     pub pose_noise_deg: f64,
@@ -107,6 +109,7 @@ impl SimulateOptions {
             height: rig.camera.height_px,
             sensor: rig.sensor,
             shots: rig.shots(),
+            poses: None,
             rig: Some(rig),
             pose_noise_mm: 0.0,
             pose_noise_deg: 0.0,
@@ -118,11 +121,15 @@ impl SimulateOptions {
         let limits = [
             ("width", f64::from(self.width), 64.0, 8192.0),
             ("height", f64::from(self.height), 64.0, 8192.0),
-            ("shots", self.shots as f64, 2.0, 1e5),
+            ("shots", self.poses.as_ref().map_or(self.shots, Vec::len) as f64, 2.0, 1e5),
             ("pose noise in mm", self.pose_noise_mm, 0.0, 10.0),
             ("pose noise in degrees", self.pose_noise_deg, 0.0, 5.0),
             ("the number of sets", self.sets.len() as f64, 1.0, 100.0),
         ];
+        if self.poses.is_some() && !matches!(self.sets[..], [Set::Scan] | [Set::Surface]) {
+            return Err(Fault::usage("poses were given for something else than one scan or one set surface")
+                .next("simulate scan or surface alone, or leave the poses out"));
+        }
         match limits.iter().find(|(_, v, low, high)| !(*low..=*high).contains(v)) {
             Some((name, v, low, high)) => {
                 Err(Fault::usage(format!("{name} is {v}, allowed {low}..={high}")).next("correct the option"))
@@ -245,8 +252,12 @@ impl Plan {
                 let base_from_scene = plan::base_from_scene(station);
                 plan.truth = plan.truth.with_scene(scene, base_from_scene);
                 plan.scenes = vec![scene.clone()];
-                let cameras = match set {
-                    Set::Scan => plan::scan(station, scene, options.shots),
+                let cameras = match (set, &options.poses) {
+                    (Set::Scan, None) => plan::scan(station, scene, options.shots),
+                    (_, Some(poses)) => {
+                        let scene_from_base = base_from_scene.inverse();
+                        poses.iter().map(|p| scene_from_base * *p * station.flange_from_camera).collect()
+                    }
                     _ => plan::surface_views(station, scene),
                 };
                 for (i, camera) in cameras.iter().enumerate() {

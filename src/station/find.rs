@@ -2,38 +2,87 @@
 //! a scan taken with another calibration than the station's is refused.
 //! Frame and unit: base frame, mm.
 
-use super::scan::report::{cloud_of, load_report};
+use super::height_witness::height_witness;
+use super::scan::report::{ScanReport, cloud_of, load_report};
 use crate::fault::{Fault, Result};
 use crate::find::insert::picture;
 use crate::find::insert::teach::{TeachOptions, teach};
 use crate::find::{LocateOptions, LookPlan, Recipe, Report, agree, locate, plan_look};
 use crate::geometry::{Base, Flange, Rigid};
 use crate::raster::RgbImage;
+use crate::recording::Recording;
 use crate::rig::Rig;
 use crate::scan::GridOptions;
 use crate::scan::grid;
 use std::path::{Path, PathBuf};
 
-/// Finds the recipe's part in one or more finished scans of it and brings them together ([`agree`]); the picture is the first
-/// scan's. Errors: those of each scan; of several, the first.
+/// What is known of one part: finished scans of it, and pictures of the pointer's spot on it.
+#[derive(Clone, Copy)]
+pub struct Looked<'a> {
+    pub scans: &'a [PathBuf],
+    /// A recording of the pointer with the robot's poses.
+    pub range: Option<&'a Recording>,
+}
+
+/// Finds the recipe's part in one or more finished scans of it and brings them together ([`agree`]), with the pointer's distances
+/// as a witness of the height; the picture is the first scan's. Errors: those of each scan; of several, the first.
 pub fn find_part_in_all(
-    scans: &[PathBuf],
+    looked: &Looked,
     recipe: &Recipe,
     station: Option<&Path>,
     options: &LocateOptions,
 ) -> Result<(Report, RgbImage)> {
-    let Some((first, more)) = scans.split_first() else {
+    let Some((first, more)) = looked.scans.split_first() else {
         return Err(Fault::usage("no scan was named").next("name the folder that sheetlight scan --out wrote"));
     };
+    if !more.is_empty() || looked.range.is_some() {
+        comparable(looked.scans, station)?;
+    }
     let (report, picture) = find_part(first, recipe, station, options)?;
-    if more.is_empty() {
+    if more.is_empty() && looked.range.is_none() {
         return Ok((report, picture));
     }
     let mut reports = vec![report];
     for scan in more {
         reports.push(find_part(scan, recipe, station, &options.clone().again(&reports[0]))?.0);
     }
-    Ok((agree(reports, recipe, options.robot)?, picture))
+    let mut witness = None;
+    if let (Some(recording), Some(station)) = (looked.range, station) {
+        let at = |e: Fault| e.at(recording.folder.display());
+        let (heights, said) = height_witness(recording, &Rig::load(station)?, recipe, &reports[0]).map_err(at)?;
+        reports[0].notes.extend(said);
+        witness = Some(heights);
+    }
+    Ok((agree(reports, witness.as_ref(), recipe, options.robot)?, picture))
+}
+
+/// Refuses looks that cannot show anything: without the station nothing says what they may disagree about, and one scan agrees
+/// with itself whatever is wrong.
+fn comparable(scans: &[PathBuf], station: Option<&Path>) -> Result<()> {
+    if station.is_none() {
+        return Err(Fault::usage("looks are to be compared, and no station is given")
+            .cause("what they may disagree about comes from the covariances of the calibrations")
+            .next("name the station that scanned with --station"));
+    }
+    different(scans)
+}
+
+/// Refuses one scan under two names.
+pub(super) fn different(scans: &[PathBuf]) -> Result<()> {
+    let clouds: Vec<Option<String>> =
+        scans.iter().map(|s| Ok(load_report(s)?.files.get("cloud.ply").cloned())).collect::<Result<_>>()?;
+    for (i, (cloud, scan)) in clouds.iter().zip(scans).enumerate() {
+        if let Some(same) = clouds[..i].iter().position(|c| c.is_some() && c == cloud) {
+            return Err(Fault::usage(format!(
+                "{} and {} are one scan twice: their clouds are the same",
+                scans[same].display(),
+                scan.display()
+            ))
+            .cause("a folder was named twice or copied")
+            .next("scan the part from another side; sheetlight second-look plans it"));
+        }
+    }
+    Ok(())
 }
 
 /// Where the robot goes for a second look at the part of a scan, shot by shot, and what the two looks can show.
@@ -70,23 +119,28 @@ pub fn find_part(
     let rig = station.map(Rig::load).transpose()?;
     if let (Some(rig), Some(station)) = (&rig, station) {
         rig.belong_together().map_err(|e| e.at(station.display()))?;
-        let now = rig.fingerprint();
-        if now != scanned.rig_fingerprint {
-            return Err(Fault::refused(format!(
-                "{}: was scanned with calibration {:.12}, {} now has {now:.12}",
-                scan.display(),
-                scanned.rig_fingerprint,
-                station.display()
-            ))
-            .cause("the station was calibrated again after the scan, or this is another station's scan")
-            .next("scan again with the present calibration, or give the station that scanned"));
-        }
+        fits(rig, scan, &scanned)?;
     }
     let cloud = cloud_of(scan)?;
     let mut report = locate(&cloud, recipe, rig.as_ref(), options).map_err(|e| e.at(scan.display()))?;
     report.notes.extend(scanned.remarks);
     let image = picture::draw(&report, &recipe.drawing());
     Ok((report, image))
+}
+
+/// Refuses a scan that was made with other calibrations than the station's present ones.
+pub(super) fn fits(rig: &Rig, scan: &Path, scanned: &ScanReport) -> Result<()> {
+    let now = rig.fingerprint();
+    if now == scanned.rig_fingerprint {
+        return Ok(());
+    }
+    Err(Fault::refused(format!(
+        "{}: was scanned with calibration {:.12}, the station now has {now:.12}",
+        scan.display(),
+        scanned.rig_fingerprint,
+    ))
+    .cause("the station was calibrated again after the scan, or this is another station's scan")
+    .next("scan again with the present calibration, or give the station that scanned"))
 }
 
 /// Teaches a part from a finished scan: the recipe, its proof on that scan, and a picture of it.

@@ -4,6 +4,7 @@
 mod calibrate;
 mod find;
 mod guide;
+mod height_witness;
 mod judge;
 mod range;
 mod scan;
@@ -19,7 +20,7 @@ pub use calibrate::hand_eye::{
 };
 pub use calibrate::laser_plane::{LaserPlaneRun, calibrate_laser_plane};
 pub use calibrate::pointer::{PointerRun, calibrate_pointer};
-pub use find::{SecondLook, find_part, find_part_in_all, second_look, teach_part};
+pub use find::{Looked, SecondLook, find_part, find_part_in_all, second_look, teach_part};
 pub use guide::{GuideOptions, Guided, Step, guide};
 pub use judge::figures::Judged;
 pub use judge::parts::{FoundPart, judge_parts};

@@ -85,8 +85,28 @@ pub struct RangeReport {
     pub remarks: Vec<String>,
 }
 
+/// What the pointer touched: the report, and the points in the base frame with what they share, where poses are known.
+pub(super) struct Touched {
+    pub report: RangeReport,
+    /// With the picture that each was seen in.
+    pub points: Vec<(String, BasePoint)>,
+    pub shared: SharedCovariance,
+    first_x: Option<Vec3>,
+}
+
 /// Measures a distance in every frame that has a `laser` picture.
 pub fn measure_range(recording: &Recording, rig: &Rig, run: &RangeRun) -> Result<RangeReport> {
+    let Touched { report: mut out, points, shared, first_x } = touched(recording, rig, run)?;
+    if run.one_surface {
+        let points: Vec<BasePoint> = points.into_iter().map(|p| p.1).collect();
+        let s = surface(&points, &shared, &first_x.unwrap_or(Vec3::x()))?;
+        let left_out = s.left_out.map(|i| out.distances[i].picture.clone());
+        out.surface = Some(describe(&s, left_out));
+    }
+    Ok(out)
+}
+
+pub(super) fn touched(recording: &Recording, rig: &Rig, run: &RangeRun) -> Result<Touched> {
     if !(3.0..=100.0).contains(&run.max_off_beam) {
         return Err(Fault::usage(format!("max_off_beam is {}, 3 to 100 sigmas are allowed", run.max_off_beam))
             .next("correct max_off_beam"));
@@ -125,7 +145,7 @@ pub fn measure_range(recording: &Recording, rig: &Rig, run: &RangeRun) -> Result
     let asked: Vec<SpotPicture<'_>> =
         frames.iter().zip(&images).map(|(f, laser)| SpotPicture { name: f.1, laser, ambient: None }).collect();
     let mut out = RangeReport { distances: Vec::new(), surface: None, missing: Vec::new(), remarks };
-    let mut points: Vec<BasePoint> = Vec::new();
+    let mut points: Vec<(String, BasePoint)> = Vec::new();
     let mut first_x = None;
     for ((index, name), spot) in frames.iter().zip(find_spots(&asked, &hot, &run.spots)?) {
         let found = spot.and_then(|s| {
@@ -145,7 +165,7 @@ pub fn measure_range(recording: &Recording, rig: &Rig, run: &RangeRun) -> Result
             first_x.get_or_insert(Vec3::from(pose.rotation.column(0)));
             let p = to_base(&ranged, pose, &hand_eye.value, &shared, &robot);
             in_base = Some(p.clone());
-            points.push(p);
+            points.push((name.to_string(), p));
         }
         out.distances.push(row(name, &spot, &ranged, in_base.as_ref()));
     }
@@ -160,12 +180,7 @@ pub fn measure_range(recording: &Recording, rig: &Rig, run: &RangeRun) -> Result
             _ => fault,
         });
     }
-    if run.one_surface {
-        let s = surface(&points, &shared, &first_x.unwrap_or(Vec3::x()))?;
-        let left_out = s.left_out.map(|i| out.distances[i].picture.clone());
-        out.surface = Some(describe(&s, left_out));
-    }
-    Ok(out)
+    Ok(Touched { report: out, points, shared, first_x })
 }
 
 fn on_beam(r: &Ranged, limit: f64) -> Result<()> {

@@ -1,9 +1,13 @@
-//! In: a station, scans of a flat surface, touched points. Out: what the fits said and, apart from it,
+//! In: a station, scans of a flat surface, scans of one object from several sides, touched points. Out: what the fits said and, apart from it,
 //! what checks with other data say.
 //! Frame and unit: base frame; mm, px, degrees.
 
+use super::find::{different, fits};
 use crate::calibrate::verify::{FlatCheck, TouchCheck, flat, read_touches, touch};
 use crate::fault::{Fault, Result};
+use crate::find::look::looks::{Disagreement, Look, agree};
+use crate::find::look::register::{Registered, register};
+use crate::find::measure::points::Ordered;
 use crate::geometry::Vec3;
 use crate::rig::{Calibration, Rig};
 use std::collections::BTreeMap;
@@ -16,8 +20,19 @@ pub struct VerifyRun {
     pub flats: Vec<PathBuf>,
     /// Shots that belong to one pose of a flat scan; 0: each scan is one view.
     pub shots_per_view: u32,
+    /// Scan folders of one object of any shape, from several sides.
+    pub object: Vec<PathBuf>,
     /// File of predicted and touched points.
     pub touches: Option<PathBuf>,
+}
+
+/// How scans of one object agree.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct ObjectCheck {
+    /// By scan: its name, the share of its surfaces that the first scan saw too, and their distance from those, rms, mm.
+    pub scans: Vec<(String, f64, f64)>,
+    /// Along the base's axes about the object's middle.
+    pub looks: Disagreement,
 }
 
 /// Fit and verification of one calibration, never mixed.
@@ -36,6 +51,8 @@ pub struct VerifyReport {
     pub calibrations: BTreeMap<String, CalibrationCheck>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flat: Option<FlatCheck>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub object: Option<ObjectCheck>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub touch: Option<TouchCheck>,
     /// What the calibrations' own files say against them.
@@ -88,7 +105,45 @@ pub fn verify(rig: &Rig, run: &VerifyRun) -> Result<VerifyReport> {
         }
     };
     let flat = if run.flats.is_empty() { None } else { Some(flat(&views)?) };
+    let object = if run.object.is_empty() { None } else { Some(object(rig, &run.object)?) };
     let mut remarks = rig.remarks();
+    remarks.extend(object.as_ref().and_then(ObjectCheck::remark));
     remarks.extend(rig.belong_together().err().map(|fault| fault.what));
-    Ok(VerifyReport { calibrations, flat, touch, remarks })
+    Ok(VerifyReport { calibrations, flat, object, touch, remarks })
+}
+
+/// Disagreement beyond so many standard deviations is a calibration's, the robot's or the object's that was moved.
+const RATIO: f64 = 3.0;
+
+/// Registers the scans' surfaces and judges what they disagree about.
+fn object(rig: &Rig, folders: &[PathBuf]) -> Result<ObjectCheck> {
+    different(folders)?;
+    let mut scans = Vec::new();
+    for folder in folders {
+        fits(rig, folder, &super::load_report(folder)?)?;
+        let points = Ordered::new(&super::cloud_of(folder)?).map_err(|e| e.at(folder.display()))?;
+        scans.push((folder.display().to_string(), points));
+    }
+    let registered = register(&scans, rig)?;
+    let looks: Vec<Look> =
+        registered.iter().map(|r| Look { base_from_part: r.base_from_object, budget: &r.budget }).collect();
+    let looks = agree(&looks, None, 0.0, RATIO)?.disagreement;
+    let said = |(scan, r): (&(String, Ordered), &Registered)| (scan.0.clone(), r.overlap, r.rms_mm);
+    Ok(ObjectCheck { scans: scans.iter().zip(&registered).map(said).collect(), looks })
+}
+
+impl ObjectCheck {
+    /// What explains a disagreement that is larger than expected.
+    fn remark(&self) -> Option<String> {
+        let l = &self.looks;
+        let best = l.explained_by.first().filter(|_| l.ratio > RATIO || l.misfit_sigmas > RATIO)?;
+        let off: Vec<String> = best.off_by.iter().map(|(name, by)| format!("{name} by {by:+.3}")).collect();
+        Some(format!(
+            "the scans of the object disagree by {:.1} times what the calibrations state; the {} explains {:.0} % of it, were it wrong in {}",
+            l.ratio,
+            best.name,
+            100.0 * best.share,
+            off.join(", ")
+        ))
+    }
 }

@@ -6,10 +6,12 @@ use crate::cli::terminal::console::Console;
 use crate::cli::terminal::outputs;
 use crate::cli::terminal::outputs::Inputs;
 use crate::fault::{Fault, Result};
+use crate::find::look::looks::Disagreement;
 use crate::find::{Accelerator, LocateOptions, Recipe, Report};
 use crate::geometry::Vec3;
+use crate::recording::Recording;
 use crate::robot::Convention;
-use crate::station::{Settings, find_part_in_all};
+use crate::station::{Looked, Settings, find_part_in_all};
 use std::path::{Path, PathBuf};
 
 /// Find a part in a scan and say where the robot inserts
@@ -17,15 +19,21 @@ use std::path::{Path, PathBuf};
 /// No pose leaves when a gate of the recipe is missed; the report says which, and the exit code is 1.
 ///
 /// One scan cannot show what calibrations, delay, convention or robot got wrong. With a second scan of the same part from
-/// another side (sheetlight second-look plans it) the pose comes from both, and what they disagree about is a gate.
+/// another side (sheetlight second-look plans it) the pose comes from both, and what they disagree about is a gate. What two looks
+/// and the part's own sizes could hide is stated and has its limits too; a third look, or distances of the pointer, show more.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
   sheetlight find scans/board7 --recipe data/recipes/led.toml --station cell3 --out led.json
-  sheetlight find scans/b7 scans/b7again --recipe led.toml --station cell3 --out led.json")]
+  sheetlight find scans/b7 scans/b7again --recipe led.toml --station cell3 --out led.json
+  sheetlight find scans/b7 scans/b7again --range recordings/spots --recipe led.toml --station cell3 --out led.json")]
 pub struct Args {
     /// Folders that sheetlight scan --out wrote: one, or several looks at the same part
     #[arg(required = true)]
     scans: Vec<PathBuf>,
+    /// Recording of the pointer's spot on plain places of the part, with the robot's poses: a witness of the height that the
+    /// laser plane has no part in
+    #[arg(long, value_name = "RECORDING")]
+    range: Option<PathBuf>,
     /// Recipe (TOML): the part's drawing, constructions, insertion, gates
     #[arg(long)]
     recipe: PathBuf,
@@ -57,7 +65,9 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     }
     let robot = args.robot.or(of_station).unwrap_or(Convention::Matrix);
     let options = LocateOptions { up, robot, accelerator: Accelerator::open(), expected: None };
-    let (report, picture) = find_part_in_all(&args.scans, &recipe, args.station.as_deref(), &options)?;
+    let range = args.range.as_deref().map(Recording::open).transpose()?;
+    let looked = Looked { scans: &args.scans, range: range.as_ref() };
+    let (report, picture) = find_part_in_all(&looked, &recipe, args.station.as_deref(), &options)?;
     let text = serde_json::to_string_pretty(&report).expect("plain data");
     crate::files::write_beside((&args.out, text.as_bytes()), &[(&image, &picture.to_png())])?;
     console.result(&report, &summary(&report));
@@ -85,7 +95,6 @@ pub(super) fn summary(r: &Report) -> String {
             if r.within_tolerance { "kept" } else { "NOT kept" }
         );
     }
-    let row = |v: &[f64; 3], digits: usize| v.map(|x| format!("{x:.digits$}")).join(" ");
     s += &format!("{:12} {} mm, {} degrees (x y z of the part)\n", "sigma", row(&r.sigma_mm, 4), row(&r.sigma_deg, 4));
     for t in &r.budget.terms {
         let mm = t.sigma_mm.as_ref().map_or("-".into(), |v| row(v, 4));
@@ -112,30 +121,22 @@ pub(super) fn summary(r: &Report) -> String {
     if let Some(d) = r.disagreement_mm {
         s += &format!("  the two-pin construction and the lattice fit disagree by {d:.3} mm\n");
     }
-    if let Some(l) = &r.looks {
+    if let Some(z) = &r.sizes {
         s += &format!(
-            "looks        {} of them, turned by {:.0} and tilted by {:.0} degrees; looks {} and {} disagree by {} mm, {} degrees; \
-             {} mm, {} degrees are expected{}\n",
-            l.looks,
-            l.turn_deg,
-            l.tilt_deg,
-            l.between[0],
-            l.between[1],
-            row(&l.difference_mm, 4),
-            row(&l.difference_deg, 4),
-            row(&l.expected_mm, 4),
-            row(&l.expected_deg, 4),
-            if l.complete { "" } else { " at least (a calibration does not know its uncertainty)" }
+            "sizes        along the stripe {:+.3} %, from shot to shot {:+.3} %, difference {:+.3} %, shear {:+.4} degrees against the \
+             drawing; {:.3} {:.3} {:.3} {:.4} are expected\n",
+            z.along_percent,
+            z.across_percent,
+            z.difference_percent,
+            z.shear_deg,
+            z.expected[0],
+            z.expected[1],
+            z.expected[2],
+            z.expected[3]
         );
-        for e in &l.explained_by {
-            s += &format!(
-                "  {:12} would explain {:.0} % of it, if it were wrong by {:.1} of its own sigmas; however wrong, it could hide {} mm\n",
-                e.name,
-                100.0 * e.share,
-                e.off_by_sigmas,
-                row(&e.unseen_mm, 3)
-            );
-        }
+    }
+    if let Some(l) = &r.looks {
+        s += &looks(l);
     }
     for g in &r.gates {
         s += &format!(
@@ -148,6 +149,47 @@ pub(super) fn summary(r: &Report) -> String {
     }
     for n in &r.notes {
         s += &format!("note         {n}\n");
+    }
+    s
+}
+
+fn row(v: &[f64; 3], digits: usize) -> String {
+    v.map(|x| format!("{x:.digits$}")).join(" ")
+}
+
+/// What looks disagree about, in words.
+pub fn looks(l: &Disagreement) -> String {
+    let mut s = String::new();
+    s += &format!(
+        "looks        {} of them, turned by {:.0} and tilted by {:.0} degrees; looks {} and {} disagree by {} mm, {} degrees; \
+         {} mm, {} degrees are expected{}\n",
+        l.looks,
+        l.turn_deg,
+        l.tilt_deg,
+        l.between[0],
+        l.between[1],
+        row(&l.difference_mm, 4),
+        row(&l.difference_deg, 4),
+        row(&l.expected_mm, 4),
+        row(&l.expected_deg, 4),
+        if l.complete { "" } else { " at least (a calibration does not know its uncertainty)" }
+    );
+    for e in &l.explained_by {
+        let off: Vec<String> = e.off_by.iter().map(|(name, by)| format!("{name} {by:+.3}")).collect();
+        s += &format!(
+            "  {:16} would explain {:.0} % of it, were it wrong by {}; wrong by {:.0} of its sigmas it could go unnoticed and move the part by {} mm\n",
+            e.name,
+            100.0 * e.share,
+            off.join(", "),
+            e.unnoticed_sigmas,
+            row(&e.unseen_mm, 3)
+        );
+    }
+    if let Some(w) = &l.witness {
+        s += &format!(
+            "  the pointer puts the surface {:+.4} mm above the looks' ({} places), {:.4} mm is expected\n",
+            w.height_mm, w.places, w.expected_mm
+        );
     }
     s
 }

@@ -2,17 +2,19 @@
 //! that is and why, or a refusal: no pose leaves with a failed gate.
 //! Frame and unit: base frame; mm, degrees; sigmas along the part's own axes.
 
-use super::budget::{Budget, budget, towards_camera};
+use super::budget::{Budget, budget};
 use super::gate::Gate;
-use super::looks;
-use super::looks::{Agreed, Disagreement, Look};
 use super::recipe::{Gates, Recipe};
 use super::verdict::{Agreement, TurnVote, judge, vote};
 use crate::fault::{Fault, Result};
+use crate::find::look::looks::{self, Agreed, Disagreement, Look, Witness};
+use crate::find::look::part_seen::towards_camera;
+use crate::find::look::size_check::SizeCheck;
 use crate::find::measure::construct::{Built, build, features};
 use crate::find::measure::points::{Ordered, localise};
 use crate::find::measure::pose::{Measured, measure};
 use crate::find::measure::slide::{long_axis, slide};
+use crate::find::model::mirror::own_mirror_image;
 use crate::find::model::shape_model::ShapeModel;
 use crate::find::scene::{Kind, Layer, Scene};
 use crate::find::search::accelerator::Accelerator;
@@ -98,6 +100,9 @@ pub struct Report {
     pub surface_rms_mm: f64,
     pub growth_mm: [f64; 2],
     pub notes: Vec<String>,
+    /// What the part's own sizes say of scale, steps and shear; `None` where too few edges were seen or no station is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sizes: Option<SizeCheck>,
     /// What further looks at the part said; `None`: one look alone, not cross-checked.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub looks: Option<Disagreement>,
@@ -293,12 +298,16 @@ fn conclude(
     mut notes: Vec<String>,
 ) -> Report {
     let spec = &recipe.insertion;
-    let budget = budget(points, &measured, rig, &recipe.robot);
+    let budget = budget(points, &measured, rig, recipe);
+    let sizes = size_check(&budget, recipe);
     let named = |name: &Option<String>| constructions.iter().find(|b| Some(&b.name) == name.as_ref());
     let disagreement_mm = named(&spec.two_pin)
         .zip(named(&spec.lattice))
         .map(|(a, b)| (a.deviation_mm[0] - b.deviation_mm[0]).hypot(a.deviation_mm[1] - b.deviation_mm[1]));
-    let gates = gates(&recipe.gates, &found, recipe, &budget, &agreement, &turns, disagreement_mm);
+    let mut gates = gates(&recipe.gates, &found, recipe, &budget, &agreement, &turns, disagreement_mm);
+    // Where another look says where the part lies, no other place is in question: the looks have to agree.
+    gates.retain(|g| options.expected.is_none() || g.name != "margin");
+    gates.extend(sizes.as_ref().map(|s| s.gate(&recipe.gates)));
     let reasons: Vec<String> =
         missed(&gates).chain(gates.iter().filter(|g| g.name == LOOKS).map(Gate::words)).collect();
     // The construction's deviation moves the part pose in its plane.
@@ -313,6 +322,10 @@ fn conclude(
     });
     let base_from_constructed = measured.base_from_part * moved;
     notes.push(ONE_LOOK.into());
+    notes.extend(sizes.as_ref().and_then(SizeCheck::silent));
+    if own_mirror_image(&recipe.drawing()) {
+        notes.push(SAME_IN_A_MIRROR.into());
+    }
     let passed = reasons.is_empty();
     Report {
         recipe: recipe.name.clone(),
@@ -338,15 +351,26 @@ fn conclude(
         surface_rms_mm: measured.surface_rms,
         growth_mm: measured.growth,
         notes,
+        sizes,
         looks: None,
         base_from_constructed,
         map,
     }
 }
 
+/// The part's sizes against what the calibrations make expect; they are the robot's and the camera's as much as the part's.
+fn size_check(budget: &Budget, recipe: &Recipe) -> Option<SizeCheck> {
+    let (shape, seen) = (budget.shape.as_ref()?, budget.seen.as_ref()?);
+    Some(SizeCheck::new(shape, &budget.levers, &seen.scan_axes(), recipe.measure.size_sigma))
+}
+
 /// What is said of a pose that rests on one look.
 const ONE_LOOK: &str = "not cross-checked: one look cannot show what calibrations, delay, convention or robot got wrong; \
     plan a second one with sheetlight second-look";
+
+/// What is said of a part that cannot tell pictures from their mirror images.
+const SAME_IN_A_MIRROR: &str =
+    "the part is its own mirror image: one look cannot tell mirrored pictures (ReverseX, ReverseY)";
 
 /// The tool's poses for a part whose pose is known.
 fn poses_at(base_from_part: &Rigid<Base, Part>, recipe: &Recipe, robot: Convention) -> Poses {
@@ -376,18 +400,24 @@ fn within_tolerance(recipe: &Recipe, sigma_mm: [f64; 3], sigma_deg: [f64; 3]) ->
 
 /// One report from several looks at the same part: the agreed pose, what the looks disagree about, and the gates on it. Every
 /// look must have met its own gates. Errors: none of the looks, or a covariance that cannot be inverted.
-pub fn agree(reports: Vec<Report>, recipe: &Recipe, robot: Convention) -> Result<Report> {
+pub fn agree(reports: Vec<Report>, witness: Option<&Witness>, recipe: &Recipe, robot: Convention) -> Result<Report> {
     let looks: Vec<Look> =
         reports.iter().map(|r| Look { base_from_part: r.base_from_constructed, budget: &r.budget }).collect();
-    let Agreed { base_from_part, covariance, disagreement } = looks::agree(&looks)?;
+    let Agreed { base_from_part, covariance, disagreement } =
+        looks::agree(&looks, witness, recipe.measure.size_sigma, recipe.gates.max_look_ratio)?;
     let reasons: Vec<String> =
         (1..).zip(&reports).flat_map(|(k, r)| missed(&r.gates).map(move |why| format!("look {k}: {why}"))).collect();
     let mut report = reports.into_iter().next().expect("looks agree about one part at least");
-    report.notes.retain(|n| n != ONE_LOOK);
-    let second = disagreement.gates(&recipe.gates);
+    let alone = disagreement.looks < 2;
+    report.notes.retain(|n| alone || ![ONE_LOOK, SAME_IN_A_MIRROR].contains(&n.as_str()));
+    if alone {
+        report.notes.push("the height was cross-checked by the pointer, nothing else was".into());
+    }
+    let second = disagreement.gates(recipe);
     report.reasons = reasons;
     report.reasons.extend(second.iter().filter(|g| !g.passed).map(Gate::words));
-    report.gates.retain(|g| g.name != LOOKS);
+    report.gates.retain(|g| alone || g.name != LOOKS);
+    report.reasons.extend(report.gates.iter().filter(|g| g.name == LOOKS && !g.passed).map(Gate::words));
     report.gates.extend(second);
     report.passed = report.reasons.is_empty();
     [report.sigma_mm, report.sigma_deg] = crate::find::insert::budget::sigmas(&covariance);

@@ -5,12 +5,9 @@ pub mod budget;
 mod from_drawing;
 pub mod gate;
 pub mod locate;
-mod look_plan;
-pub mod looks;
 pub mod picture;
 pub mod recipe;
 pub mod teach;
 pub mod verdict;
 
 pub use from_drawing::{TaskOptions, recipe_of};
-pub use look_plan::{LookPlan, Shown, plan_look};

@@ -145,6 +145,9 @@ pub struct Gates {
     /// looks from one side make the same error twice.
     pub min_look_turn_deg: f64,
     pub min_look_tilt_deg: f64,
+    /// Largest error along the part's normal that several looks may leave unseen, mm, 0.00001 to 100; in the plane and as a turn
+    /// the insertion's tolerances hold.
+    pub max_unseen_height_mm: f64,
 }
 
 impl Default for Gates {
@@ -164,6 +167,7 @@ impl Default for Gates {
             max_look_ratio: 3.0,
             min_look_turn_deg: 60.0,
             min_look_tilt_deg: 10.0,
+            max_unseen_height_mm: 2.0,
         }
     }
 }
@@ -281,6 +285,7 @@ impl Recipe {
         range("gates.max_look_ratio", g.max_look_ratio, 1.0, 10.0)?;
         range("gates.min_look_turn_deg", g.min_look_turn_deg, 0.0, 180.0)?;
         range("gates.min_look_tilt_deg", g.min_look_tilt_deg, 0.0, 60.0)?;
+        range("gates.max_unseen_height_mm", g.max_unseen_height_mm, 1e-5, 100.0)?;
         range("robot.sigma_mm", self.robot.sigma_mm, 0.0, 10.0)?;
         range("robot.sigma_deg", self.robot.sigma_deg, 0.0, 10.0)
     }

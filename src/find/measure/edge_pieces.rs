@@ -40,9 +40,15 @@ struct Piece {
     rows: Vec<usize>,
 }
 
-/// Solves for the step from `x`. `bias`: prior size of a piece's offset, mm; `scatter`: of a shot's position, mm; `unit`: of the
-/// priors, mm.
-pub(in crate::find) fn solve(rows: &[Row], x: &Unknowns, bias: f64, scatter: f64, unit: f64) -> Option<Solved> {
+/// Solves for the step from `x`. `bias`: expected size of a piece's offset, mm; `scatter`: of a shot's position, mm; `unit`: the
+/// recipe's unit of length, mm.
+pub(in crate::find) fn solve(
+    rows: &[Row],
+    x: &Unknowns,
+    priors: &[Prior],
+    [bias, scatter]: [f64; 2],
+    unit: f64,
+) -> Option<Solved> {
     let mut sizes: Vec<f64> = rows.iter().map(|r| r.residual.abs()).collect();
     let middle = sizes.len() / 2;
     let sigma = (1.4826 * *sizes.select_nth_unstable_by(middle, f64::total_cmp).1).max(0.01);
@@ -51,7 +57,7 @@ pub(in crate::find) fn solve(rows: &[Row], x: &Unknowns, bias: f64, scatter: f64
         .map(|r| (1.0 - (r.residual / (TUKEY * sigma)).powi(2)).max(0.0).powi(2) / (sigma * sigma))
         .collect();
     let (mut a, mut b) = (Square::zeros(), Unknowns::zeros());
-    for (k, mean, sd) in PRIORS.map(|(k, mean, sd)| (k, mean * unit, sd * unit)) {
+    for &(k, mean, sd) in priors {
         a[(k, k)] += 1.0 / (sd * sd);
         b[k] += (mean - x[k]) / (sd * sd);
     }
@@ -160,12 +166,11 @@ fn spread(
     inverse * offsets * inverse + Square::from_fn(|i, k| known[(i, k)] * grow[i] * grow[k])
 }
 
-/// Unknowns: x, y, turn, growth along the stripe and from shot to shot, width of the light's fall there.
-pub(in crate::find) const N: usize = 7;
+/// Unknowns: x, y, turn, growth along the stripe and from shot to shot, width of the light's fall there, sizes
+/// ([`super::shape::Shape`]).
+pub(in crate::find) const N: usize = 10;
 
 pub(in crate::find) type Unknowns = SVector<f64, N>;
 
-/// Prior mean and standard deviation of the last four, in the recipe's unit of about 1 mm, as are the lengths below: optics blur a stripe's end by about a pixel, a line laser is
-/// about a tenth of a millimetre wide; both are measured where edges are sharp.
-pub(in crate::find) const PRIORS: [(usize, f64, f64); 4] =
-    [(3, 0.0, 0.05), (4, 0.0, 0.05), (5, 0.25, 0.15), (6, 0.12, 0.08)];
+/// An unknown, the mean and the standard deviation that it is expected with.
+pub(in crate::find) type Prior = (usize, f64, f64);

@@ -2,15 +2,28 @@
 //! how much of the sheet's light each sample beside an edge still sends back (docs/math.md, Insertion (3) and (4)).
 //! Frame and unit: a correction in the part frame: x y mm, turn about z rad; light as a share of a fully lit sample's.
 
-use super::edge_pieces::{N, PRIORS, Row, Unknowns, solve};
+use super::edge_pieces::{N, Prior, Row, Unknowns, solve};
 use super::options::MeasureOptions;
 use super::points::Ordered;
+use super::shape::{Shape, shape_row};
 use crate::find::model::drawn_edges::EdgeSample;
 use crate::find::model::edge_index::EdgeIndex;
 use crate::find::model::face::Face;
 use crate::geometry::Vec3;
 use nalgebra::{Matrix3, Vector2, Vector3};
 
+/// Prior mean and standard deviation of growth and width, in the recipe's unit of about 1 mm, as are the lengths below: optics
+/// blur a stripe's end by about a pixel, a line laser is about a tenth of a millimetre wide; both are measured where edges are
+/// sharp.
+const PRIORS: [Prior; 4] = [(3, 0.0, 0.05), (4, 0.0, 0.05), (5, 0.25, 0.15), (6, 0.12, 0.08)];
+/// Sizes are the drawing's where the part is placed, and are all but free where they are measured.
+const DRAWN: f64 = 1e-9;
+const FREE: f64 = 0.1;
+
+fn priors(unit: f64, sizes: f64) -> Vec<Prior> {
+    let known = PRIORS.map(|(k, mean, sd)| (k, mean * unit, sd * unit));
+    known.into_iter().chain((7..N).map(|k| (k, 0.0, sizes))).collect()
+}
 /// Least width of the fall: a sharper one would make single samples decide.
 const SHARPEST: f64 = 0.03;
 /// A sample this far inside an edge is fully lit, and so near to it at most may it be to measure the edge.
@@ -33,11 +46,12 @@ const ROUNDS: usize = 6;
 const MIN_SHOTS: usize = 8;
 const TURNS_TOO: f64 = 1.4;
 
-/// The place and turn that the lit samples say.
+/// The place, turn and, where they are asked for, sizes that the lit samples say.
 pub(in crate::find) struct Lit {
     /// Correction x, y, turn.
     pub step: Vector3<f64>,
     pub covariance: Matrix3<f64>,
+    pub shape: Shape,
     pub samples: usize,
     /// Robust deviation of the light from the model, as a share of full light.
     pub sigma: f64,
@@ -50,13 +64,15 @@ struct Sample {
     z: f64,
 }
 
-/// Fits the light of the samples beside locating edges; `None` where too few are seen.
+/// Fits the light of the samples beside locating edges; `None` where too few are seen. With `shape` the part's sizes are unknown
+/// too, and start there.
 pub(in crate::find) fn fit_light(
     points: &Ordered,
     local: &[Option<Vec3>],
     faces: &[Face],
     edges: &EdgeIndex,
     options: &MeasureOptions,
+    shape: Option<Vector3<f64>>,
 ) -> Option<Lit> {
     let on: Vec<Option<f64>> = local.iter().map(|q| face_of(q.as_ref()?, faces, options.height_gate_mm)).collect();
     let unit = edges.unit();
@@ -86,21 +102,29 @@ pub(in crate::find) fn fit_light(
     let bias = options.edge_bias * along.norm().max(across.norm());
     let directions = [along.normalize(), across.normalize()];
     let mut x = Unknowns::zeros();
-    PRIORS.iter().for_each(|p| x[p.0] = p.1 * unit);
+    let priors = priors(unit, if shape.is_some() { FREE } else { DRAWN });
+    priors.iter().for_each(|p| x[p.0] = p.1);
+    x.fixed_rows_mut::<3>(7).copy_from(&shape.unwrap_or_default());
     let mut last = None;
     for _ in 0..ROUNDS {
         let rows: Vec<Row> = samples.iter().filter_map(|s| row(s, edges, &x, &directions)).collect();
         if rows.len() < MIN_SAMPLES {
             return None;
         }
-        let solved = solve(&rows, &x, bias, scatter, unit)?;
+        let solved = solve(&rows, &x, &priors, [bias, scatter], unit)?;
         x += solved.step;
-        (5..N).for_each(|k| x[k] = x[k].max(SHARPEST * unit));
+        (5..7).for_each(|k| x[k] = x[k].max(SHARPEST * unit));
         last = Some((solved, rows.len()));
     }
     let (solved, samples) = last?;
-    let covariance = solved.covariance.fixed_view::<3, 3>(0, 0).into();
-    Some(Lit { step: Vector3::new(x[0], x[1], x[2]), covariance, samples, sigma: solved.sigma })
+    let block = |k: usize| Matrix3::from(solved.covariance.fixed_view::<3, 3>(k, k));
+    Some(Lit {
+        step: Vector3::new(x[0], x[1], x[2]),
+        covariance: block(0),
+        shape: Shape { strain: Vector3::new(x[7], x[8], x[9]), covariance: block(7) },
+        samples,
+        sigma: solved.sigma,
+    })
 }
 
 fn face_of(q: &Vec3, faces: &[Face], gate: f64) -> Option<f64> {
@@ -217,6 +241,8 @@ fn row(s: &Sample, edges: &EdgeIndex, x: &Unknowns, directions: &[Vector2<f64>; 
     let (sin, cos) = x[2].sin_cos();
     let (dx, dy) = (s.at.x - x[0], s.at.y - x[1]);
     let (px, py) = (cos * dx + sin * dy, cos * dy - sin * dx);
+    // Where the drawing has what lies there on a part of these sizes.
+    let (px, py) = (px - x[7] * px - 0.5 * x[9] * py, py - x[8] * py - 0.5 * x[9] * px);
     let edge = edges.nearest_locating(px, py, NEAR * edges.unit(), s.z)?;
     let EdgeSample { nx, ny, .. } = *edge;
     let (t, share, width) = widths_inside(edge, px, py, x, directions);
@@ -240,6 +266,9 @@ fn row(s: &Sample, edges: &EdgeIndex, x: &Unknowns, directions: &[Vector2<f64>; 
     for k in 0..2 {
         j[3 + k] = slope * share[k];
         j[5 + k] = -slope * t * x[5 + k] * share[k] / width;
+    }
+    for (k, by) in shape_row(px, py, nx, ny).into_iter().enumerate() {
+        j[7 + k] = slope * by;
     }
     Some(Row { j, residual: s.light - lit, shot: s.row, slope, normal: [nx, ny], piece: edges.piece(edge, px, py) })
 }

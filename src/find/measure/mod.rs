@@ -10,5 +10,7 @@ pub mod options;
 pub mod points;
 pub mod pose;
 mod robust;
+pub mod shape;
+mod sizes;
 pub mod slide;
 pub mod surface_ends;

@@ -16,11 +16,14 @@ pub struct MeasureOptions {
     /// Standard deviation of what a piece of an edge has in common and the model of partly lit samples does not
     /// explain (a wall that shows, a chamfer, the pixels' raster), as a share of the sampling step, 0 to 0.5.
     pub edge_bias: f64,
+    /// Standard deviation of a part's sizes against the drawing, all of them together, as a share, 0 to 0.1; a third of it is
+    /// how far one direction differs from the other.
+    pub size_sigma: f64,
 }
 
 impl Default for MeasureOptions {
     fn default() -> Self {
-        MeasureOptions { height_gate_mm: 0.2, edge_gate_mm: 0.45, margin_mm: 0.5, edge_bias: 0.07 }
+        MeasureOptions { height_gate_mm: 0.2, edge_gate_mm: 0.45, margin_mm: 0.5, edge_bias: 0.07, size_sigma: 0.0015 }
     }
 }
 
@@ -42,6 +45,7 @@ impl MeasureOptions {
         range("height_gate_mm", self.height_gate_mm, 1e-4, 100.0)?;
         range("edge_gate_mm", self.edge_gate_mm, 1e-4, 100.0)?;
         range("margin_mm", self.margin_mm, 1e-4, 100.0)?;
-        range("edge_bias", self.edge_bias, 0.0, 0.5)
+        range("edge_bias", self.edge_bias, 0.0, 0.5)?;
+        range("size_sigma", self.size_sigma, 0.0, 0.1)
     }
 }

@@ -119,6 +119,11 @@ impl Ordered {
         (i != NONE).then_some(i as usize)
     }
 
+    /// The points of one row.
+    pub fn in_row(&self, row: u32) -> std::ops::Range<usize> {
+        self.row.partition_point(|&r| r < row)..self.row.partition_point(|&r| r <= row)
+    }
+
     /// True where `column` lies within the columns that any shot reached, so that an empty place there
     /// says that no light was seen.
     pub fn covers(&self, row: i64, column: i64) -> bool {

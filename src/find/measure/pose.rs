@@ -9,6 +9,8 @@ use super::in_plane::fit_edges;
 use super::lit_edges::fit_light;
 use super::options::MeasureOptions;
 use super::points::{Ordered, localise};
+use super::shape::Shape;
+use super::sizes::measure_shape;
 use super::surface_ends::{Observation, surface_ends};
 use crate::fault::{Fault, Result};
 use crate::find::model::drawing::Drawing;
@@ -36,6 +38,8 @@ pub struct Measured {
     /// Largest distance between neighbouring samples along the stripe and from shot to shot, mm.
     pub step: [f64; 2],
     pub observations: Vec<Observation>,
+    /// The part's sizes against the drawing; `None` where too few edges were seen.
+    pub shape: Option<Shape>,
 }
 
 /// Rounds of datum and ends, then of datum and light; the pose moves by less than a micrometre in the last.
@@ -80,7 +84,7 @@ pub fn measure(
     let mut lit = None;
     for _ in 0..LIT_ROUNDS {
         level(&mut pose, ROUNDS)?;
-        lit = fit_light(points, &localise(points, drawing, &pose, options), &faces, &edges, options);
+        lit = fit_light(points, &localise(points, drawing, &pose, options), &faces, &edges, options, None);
         let Some(lit) = &lit else { break };
         pose = pose * moved(&lit.step);
     }
@@ -92,6 +96,8 @@ pub fn measure(
     for o in &mut plane.observations {
         o.residual -= o.nx * plane.step.x + o.ny * plane.step.y + (o.x * o.ny - o.y * o.nx) * plane.step.z;
     }
+    let shape =
+        measure_shape(&plane.observations, |start| fit_light(points, &local, &faces, &edges, options, Some(start)));
     let in_plane = lit.as_ref().map_or(plane.covariance, |l| l.covariance);
     let mut covariance = Matrix6::zeros();
     // Datum unknowns are z, rx, ry; edge unknowns x, y, rz.
@@ -118,5 +124,6 @@ pub fn measure(
         growth: plane.growth,
         step,
         observations: plane.observations,
+        shape,
     })
 }

@@ -6,6 +6,7 @@ pub mod drawn_edges;
 pub mod edge_index;
 pub mod face;
 pub mod gradient;
+pub mod mirror;
 pub mod outline;
 pub mod shape;
 pub mod shape_model;

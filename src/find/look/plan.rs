@@ -2,10 +2,10 @@
 //! each number of each calibration how much of its error the two looks together can show.
 //! Frame and unit: base frame, mm; shares of 0 to 2. docs/math.md, Second look.
 
-use super::budget::Lever;
-use super::locate::Report;
-use super::looks::{other_side, seen_from};
+use super::levers::Lever;
+use super::looks::other_side;
 use crate::fault::{Fault, Result};
+use crate::find::insert::locate::Report;
 use crate::geometry::{Base, Rigid};
 use crate::rig::Rig;
 
@@ -49,14 +49,12 @@ pub fn plan_look(report: &Report, rig: &Rig, turn_deg: f64, tilt_deg: f64) -> Re
         .next("give --turn 180 --tilt 20, or what the robot can reach"));
     }
     let part = &report.base_from_part;
-    let Some(camera) = report.budget.base_from_camera else {
+    let Some(seen) = &report.budget.seen else {
         return Err(Fault::refused("the scan does not say how its camera stood")
             .cause("another station's scan, or too few points of one shot on the part")
             .next("give the station that scanned"));
     };
-    let other = seen_from(&camera, part, turn_deg, tilt_deg);
-    let target = camera.inverse().point(&part.translation);
-    let second = crate::find::insert::budget::levers(&other, &target, rig);
+    let second = seen.moved(&other_side(part, turn_deg, tilt_deg)).levers(rig);
     let shown = report.budget.levers.iter().zip(&second).flat_map(|(a, b)| shares(a, b)).collect();
     Ok(LookPlan { base_from_base: other_side(part, turn_deg, tilt_deg), shown })
 }

@@ -1,0 +1,114 @@
+//! In: places that a rig saw, shot by shot, and how a measurement answers where they move. Out: for each calibration, and for
+//! what no calibration holds (delay, length of the robot's steps), what an error of each of its numbers does to the measurement.
+//! Frame and unit: base frame, mm, rad; sizes as shares, the part's axes. docs/math.md, Second look.
+
+use crate::camera::Intrinsics;
+use crate::geometry::{Base, Camera, Plane, Rigid, Vec3};
+use crate::rig::{Covariance, HandEye, Rig};
+use nalgebra::{DMatrix, Matrix6, SVector};
+
+/// Numbers of an [`Answer`].
+pub const NUMBERS: usize = 9;
+
+/// What a measurement makes of displacements: shift and turn of the part, then its sizes along x and y and its shear. Where a
+/// measurement knows no sizes they are 0.
+pub type Answer = SVector<f64, NUMBERS>;
+
+/// A place that was scanned.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    /// In the camera, on the laser plane.
+    pub at: Vec3,
+    pub base_from_camera: Rigid<Base, Camera>,
+    /// By how much the place would be put elsewhere with the pose of the next shot, and with steps twice as long.
+    pub late: Vec3,
+    pub longer: Vec3,
+}
+
+/// What an error of one calibration does. Two looks share the error; where their levers differ, they disagree.
+#[derive(Clone, Debug)]
+pub struct Lever {
+    pub name: &'static str,
+    /// The calibration's parameters, with units.
+    pub parameters: &'static [&'static str],
+    /// [`Answer`] over an error of each parameter: shift and turn in base axes, sizes in the part's; 9 x n.
+    pub jacobian: DMatrix<f64>,
+    /// Of the parameters; `None` where the calibration does not know it (imported values).
+    pub covariance: Option<DMatrix<f64>>,
+    /// True for what nothing was stated of: it does not enter sigmas, and may explain what looks disagree about. The covariance
+    /// is then a usual size of it.
+    pub supposed: bool,
+}
+
+impl Lever {
+    /// Covariance that the calibration adds to the pose, base axes; zero where it is unknown.
+    pub fn of_pose(&self) -> Matrix6<f64> {
+        match &self.covariance {
+            Some(c) if !self.supposed => {
+                let j = self.jacobian.rows(0, 6);
+                Matrix6::from_iterator((j * c * j.transpose()).iter().copied())
+            }
+            _ => Matrix6::zeros(),
+        }
+    }
+}
+
+/// The levers of all that a rig has, and of what it supposes. `answer` takes the displacement of each place, base axes.
+pub fn levers(seen: &[Seen], rig: &Rig, answer: impl Fn(&[Vec3]) -> Answer) -> Vec<Lever> {
+    let lever = |name, parameters: &'static [&'static str], by: &dyn Fn(&Seen, usize) -> Vec3| {
+        let columns: Vec<Answer> =
+            (0..parameters.len()).map(|k| answer(&seen.iter().map(|s| by(s, k)).collect::<Vec<_>>())).collect();
+        let jacobian = DMatrix::from_fn(NUMBERS, columns.len(), |r, c| columns[c][r]);
+        Lever { name, parameters, jacobian, covariance: None, supposed: false }
+    };
+    let supposed = |lever: Lever, sigmas: &[f64]| {
+        let variances = nalgebra::DVector::from_iterator(sigmas.len(), sigmas.iter().map(|s| s * s));
+        Lever { covariance: Some(DMatrix::from_diagonal(&variances)), supposed: true, ..lever }
+    };
+    let mut out = Vec::new();
+    if let Some(p) = &rig.laser_plane {
+        let of = lever("laser plane", &["nx", "ny", "nz", "offset mm"], &|s, k| by_plane(s, &p.value, k));
+        out.push(Lever { covariance: square(&p.covariance, 4), ..of });
+    }
+    if let Some(h) = &rig.hand_eye {
+        let names = &["tx mm", "ty mm", "tz mm", "rx rad", "ry rad", "rz rad"];
+        let of = lever("hand-eye", names, &|s, k| by_hand_eye(s, &h.value, k));
+        out.push(Lever { covariance: square(&h.covariance, 6), ..of });
+    }
+    if let (Some(c), Some(p)) = (&rig.camera, &rig.laser_plane) {
+        let of = lever("camera", &["fx px", "fy px", "cx px", "cy px"], &|s, k| by_camera(s, &c.value, &p.value, k));
+        out.push(supposed(of, &[1.0; 4]));
+    }
+    out.push(supposed(lever("delay", &["shots"], &|s, _| s.late), &[1.0]));
+    out.push(supposed(lever("robot's steps", &["share"], &|s, _| s.longer), &[0.01]));
+    out
+}
+
+/// P = ray offset / (n ray), so that dP = P (d offset - P dn) / offset.
+fn by_plane(s: &Seen, plane: &Plane<Camera>, k: usize) -> Vec3 {
+    let change = if k == 3 { 1.0 } else { -s.at[k] };
+    s.base_from_camera.direction(&(s.at * (change / plane.normal.dot(&s.at))))
+}
+
+/// R = exp(w) R0: a camera point moves by dt + w x (R0 p) in the flange frame.
+fn by_hand_eye(s: &Seen, hand_eye: &HandEye, k: usize) -> Vec3 {
+    let axis = Vec3::ith(k % 3, 1.0);
+    let moved = if k < 3 { axis } else { axis.cross(&(hand_eye.rotation * s.at)) };
+    s.base_from_camera.rotation * (hand_eye.rotation.transpose() * moved)
+}
+
+/// The ray through a pixel turns, and meets the plane elsewhere; the lens is left out.
+fn by_camera(s: &Seen, camera: &Intrinsics, plane: &Plane<Camera>, k: usize) -> Vec3 {
+    let (x, y) = (s.at.x / s.at.z, s.at.y / s.at.z);
+    let turned = match k {
+        0 => Vec3::x() * (-x / camera.fx),
+        1 => Vec3::y() * (-y / camera.fy),
+        2 => Vec3::x() * (-1.0 / camera.fx),
+        _ => Vec3::y() * (-1.0 / camera.fy),
+    } * s.at.z;
+    s.base_from_camera.direction(&(turned - s.at * (plane.normal.dot(&turned) / plane.normal.dot(&s.at))))
+}
+
+fn square(c: &Covariance, n: usize) -> Option<DMatrix<f64>> {
+    (c.matrix.len() == n && c.matrix.iter().all(|r| r.len() == n)).then(|| c.to_matrix())
+}

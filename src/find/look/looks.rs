@@ -1,0 +1,214 @@
+//! In: the same part found from several sides, each look with its own uncertainty and the levers of what all looks share.
+//! Out: one pose from all, what the looks disagree about beside what they may, and which calibration would explain it.
+//! Frame and unit: base frame; differences along the part's axes, mm and degrees. docs/math.md, Second look.
+
+use super::explain::{Explanation, explanations};
+use super::stack::{Stack, Vector6, motion, singular};
+use crate::fault::{Fault, Result};
+use crate::find::insert::budget::both;
+use crate::find::insert::gate::Gate;
+use crate::find::insert::recipe::Recipe;
+use crate::geometry::{Base, Mat3, Part, Rigid, Vec3, exp};
+use nalgebra::{DMatrix, Matrix6};
+
+pub use super::stack::{Look, Witness};
+
+/// What the looks disagree about.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Disagreement {
+    pub looks: usize,
+    /// The two looks that disagree most, counted from 1.
+    pub between: [usize; 2],
+    /// Second less first, along the part's axes, and what all covariances make expect (one standard deviation).
+    pub difference_mm: [f64; 3],
+    pub difference_deg: [f64; 3],
+    pub expected_mm: [f64; 3],
+    pub expected_deg: [f64; 3],
+    /// The largest of the six differences over its expected value.
+    pub ratio: f64,
+    /// All that should be zero together (differences, sizes, distances), as the standard deviations of one normal variate.
+    pub misfit_sigmas: f64,
+    /// Largest turn about the part's normal and largest tilt against it between two looks, degrees; 0 where the stations are
+    /// not known.
+    pub turn_deg: f64,
+    pub tilt_deg: f64,
+    /// Which calibration explains it best comes first; empty where none has a covariance.
+    pub explained_by: Vec<Explanation>,
+    /// The largest of what these could hide: in the part's plane, along its normal, as a turn.
+    pub unseen_in_plane_mm: f64,
+    pub unseen_height_mm: f64,
+    pub unseen_deg: f64,
+    /// A calibration without covariance takes part: more disagreement than expected may be its share, and what it could hide
+    /// is not known.
+    pub complete: bool,
+    /// What a witness of the height says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub witness: Option<Witnessed>,
+}
+
+/// Heights that something else measured on the part, against the agreed pose.
+#[derive(Clone, Copy, Debug, serde::Serialize)]
+pub struct Witnessed {
+    pub places: usize,
+    /// Measured less agreed, weighted mean, and what all covariances make expect of it, mm.
+    pub height_mm: f64,
+    pub expected_mm: f64,
+    pub ratio: f64,
+}
+
+/// What several looks say together.
+#[derive(Clone, Debug)]
+pub struct Agreed {
+    pub base_from_part: Rigid<Base, Part>,
+    /// Over x y z rx ry rz about the part's own axes.
+    pub covariance: Matrix6<f64>,
+    pub disagreement: Disagreement,
+}
+
+impl Disagreement {
+    /// The gates that several looks have to pass.
+    pub fn gates(&self, recipe: &Recipe) -> Vec<Gate> {
+        let (g, bears) = (&recipe.gates, &recipe.insertion);
+        let of_witness = self.witness.map(|w| Gate::most("range's ratio", w.ratio, g.max_look_ratio));
+        if self.looks < 2 {
+            return of_witness.into_iter().collect();
+        }
+        let mut gates = vec![
+            Gate::most("looks' ratio", self.ratio, g.max_look_ratio),
+            Gate::most("looks' misfit", self.misfit_sigmas, g.max_look_ratio),
+            Gate::least("looks' turn_deg", self.turn_deg, g.min_look_turn_deg),
+            Gate::least("looks' tilt_deg", self.tilt_deg, g.min_look_tilt_deg),
+            Gate::most("unseen in plane, mm", self.unseen_in_plane_mm, bears.tolerance_mm),
+            Gate::most("unseen height, mm", self.unseen_height_mm, g.max_unseen_height_mm),
+            Gate::most("unseen turn, deg", self.unseen_deg, bears.tolerance_deg),
+        ];
+        gates.extend(of_witness);
+        gates
+    }
+}
+
+/// Brings two or more looks together. The pose is the one of least variance under the joint covariance, in which what the
+/// calibrations got wrong is one error seen from several sides (generalised least squares; docs/math.md, Second look).
+/// `size_sigma`: of the part's own sizes; `ratio`: up to which disagreement passes. Errors: fewer than two looks, or covariances
+/// that cannot be inverted.
+pub fn agree(looks: &[Look], witness: Option<&Witness>, size_sigma: f64, ratio: f64) -> Result<Agreed> {
+    if looks.is_empty() || (looks.len() < 2 && witness.is_none()) {
+        return Err(Fault::usage(format!("{} look given, two or more can be compared", looks.len()))
+            .next("name the second scan's folder behind the first"));
+    }
+    let stack = Stack::new(looks, witness, size_sigma);
+    let (follow, covariance) = stack.agreed()?;
+    let step = &follow * &stack.values;
+    let first = looks[0].base_from_part;
+    let base_from_part = Rigid::new(
+        exp(&Vec3::new(step[3], step[4], step[5])) * first.rotation,
+        first.translation + Vec3::new(step[0], step[1], step[2]),
+    );
+    let into_part = both(&base_from_part.rotation.transpose());
+    let gauges = stack.gauges(looks, &into_part, &follow)?;
+    let explained_by = explanations(&stack, &gauges, &follow, &into_part, ratio)?;
+    let most = |f: &dyn Fn(&Explanation) -> f64| explained_by.iter().map(f).fold(0.0, f64::max);
+    let (worst, (turn_deg, tilt_deg)) = (worst_pair(looks, &stack, &into_part), sides(looks));
+    let Pair { between, difference, expected, ratio } = worst;
+    let mm = |v: &Vector6| [v[0], v[1], v[2]];
+    let deg = |v: &Vector6| [v[3], v[4], v[5]].map(f64::to_degrees);
+    let disagreement = Disagreement {
+        looks: looks.len(),
+        between,
+        difference_mm: mm(&difference),
+        difference_deg: deg(&difference),
+        expected_mm: mm(&expected),
+        expected_deg: deg(&expected),
+        ratio,
+        misfit_sigmas: misfit(&stack)?,
+        turn_deg,
+        tilt_deg,
+        unseen_in_plane_mm: most(&|e| e.unseen_mm[0].max(e.unseen_mm[1])),
+        unseen_height_mm: most(&|e| e.unseen_mm[2]),
+        unseen_deg: most(&|e| e.unseen_deg.into_iter().fold(0.0, f64::max)),
+        explained_by,
+        complete: looks.iter().all(|l| l.budget.complete),
+        witness: witness.map(|_| witnessed(&stack, &follow)).transpose()?,
+    };
+    Ok(Agreed { base_from_part, covariance: into_part * covariance * into_part.transpose(), disagreement })
+}
+
+struct Pair {
+    between: [usize; 2],
+    difference: Vector6,
+    expected: Vector6,
+    ratio: f64,
+}
+
+fn worst_pair(looks: &[Look], stack: &Stack, into_part: &Matrix6<f64>) -> Pair {
+    // One look, which only a witness checks, disagrees with none.
+    let none = Pair { between: [1, 1], difference: Vector6::zeros(), expected: Vector6::zeros(), ratio: 0.0 };
+    let mut worst: Option<Pair> = None;
+    for i in 0..looks.len() {
+        for j in i + 1..looks.len() {
+            let block = |a: usize, b: usize| stack.covariance.view((6 * a, 6 * b), (6, 6)).clone_owned();
+            let c = block(j, j) + block(i, i) - block(i, j) - block(j, i);
+            let c = into_part * Matrix6::from_iterator(c.iter().copied()) * into_part.transpose();
+            let difference = into_part * motion(&looks[i].base_from_part, &looks[j].base_from_part);
+            let expected = c.diagonal().map(|v| v.max(0.0).sqrt());
+            let ratio = (0..6).map(|k| difference[k].abs() / expected[k].max(1e-12)).fold(0.0, f64::max);
+            if worst.as_ref().is_none_or(|w| ratio > w.ratio) {
+                worst = Some(Pair { between: [i + 1, j + 1], difference, expected, ratio });
+            }
+        }
+    }
+    worst.unwrap_or(none)
+}
+
+/// chi² of all that should be zero, as a normal variate of the same probability [wilson31]; below 0 where it agrees better than
+/// the mean.
+fn misfit(stack: &Stack) -> Result<f64> {
+    let rows = stack.contrasts();
+    let (d, c) = (&rows * &stack.values, &rows * &stack.covariance * rows.transpose());
+    let sum = d.dot(&c.cholesky().ok_or_else(singular)?.solve(&d));
+    let n = d.len() as f64;
+    let spread = 2.0 / (9.0 * n);
+    Ok(((sum / n).cbrt() - (1.0 - spread)) / spread.sqrt())
+}
+
+fn witnessed(stack: &Stack, follow: &DMatrix<f64>) -> Result<Witnessed> {
+    let off = stack.witnessed(follow) * &stack.values;
+    let (weights, variance) = stack.witness_weights(follow)?;
+    let (height_mm, expected_mm) = (weights.dot(&off), variance.sqrt());
+    Ok(Witnessed { places: off.len(), height_mm, expected_mm, ratio: height_mm.abs() / expected_mm })
+}
+
+/// Largest turn about the part's normal and largest tilt against it between two looks, degrees.
+fn sides(looks: &[Look]) -> (f64, f64) {
+    let views: Vec<Mat3> = looks
+        .iter()
+        .filter_map(|l| Some(l.base_from_part.rotation.transpose() * l.budget.base_from_camera?.rotation))
+        .collect();
+    let mut most = (0f64, 0f64);
+    for (i, a) in views.iter().enumerate() {
+        for b in &views[i + 1..] {
+            let (turn, tilt) = turn_and_tilt(&(b * a.transpose()));
+            most = (most.0.max(turn), most.1.max(tilt));
+        }
+    }
+    most
+}
+
+/// A rotation in the part's axes as a turn about z and a tilt of z, degrees.
+pub(in crate::find) fn turn_and_tilt(r: &Mat3) -> (f64, f64) {
+    let q = nalgebra::UnitQuaternion::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(*r));
+    let turn = 2.0 * q.k.abs().atan2(q.w.abs());
+    (turn.to_degrees(), r[(2, 2)].clamp(-1.0, 1.0).acos().to_degrees())
+}
+
+/// The camera's motion that turns a look about the part's normal and tilts it about the part's x: base from base.
+pub fn other_side(base_from_part: &Rigid<Base, Part>, turn_deg: f64, tilt_deg: f64) -> Rigid<Base, Base> {
+    let turn = exp(&(Vec3::z() * turn_deg.to_radians()));
+    let tilt = exp(&(Vec3::x() * tilt_deg.to_radians()));
+    let part: Rigid<Part, Part> = Rigid::new(tilt * turn, Vec3::zeros());
+    *base_from_part * part * base_from_part.inverse()
+}
+
+#[cfg(test)]
+#[path = "looks_tests.rs"]
+mod tests;

@@ -1,0 +1,89 @@
+//! In: a part's sizes as they were measured, what all calibrations make expect of them. Out: what they say along the stripe and from
+//! shot to shot, and the gate on it.
+//! Frame and unit: the scan's directions in the part's plane; percent, degrees. docs/math.md, Sizes.
+
+use super::levers::Lever;
+use crate::find::insert::gate::Gate;
+use crate::find::insert::recipe::Gates;
+use crate::find::measure::shape::Shape;
+use nalgebra::{Matrix3, SMatrix, Vector2};
+
+/// What the sizes say against the drawing, along the stripe and across it.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct SizeCheck {
+    /// Along the stripe, from shot to shot, and what the first is longer than the second: percent.
+    pub along_percent: f64,
+    pub across_percent: f64,
+    pub difference_percent: f64,
+    /// Of the angle between the two directions, degrees.
+    pub shear_deg: f64,
+    /// What all covariances and the part's own sizes make expect of the four: one standard deviation.
+    pub expected: [f64; 4],
+    /// The largest of the four over its expected value.
+    pub ratio: f64,
+}
+
+/// What is said where the sizes could hide more than this, percent, three standard deviations.
+const TOLD_PERCENT: f64 = 1.0;
+
+impl SizeCheck {
+    /// `axes`: the stripe's direction in the part's plane and the one across it; `size_sigma`: of the part's own sizes.
+    pub fn new(shape: &Shape, levers: &[Lever], axes: &[Vector2<f64>; 2], size_sigma: f64) -> SizeCheck {
+        let all = expected(shape, levers, size_sigma);
+        let rows = size_rows(axes);
+        let seen = rows.map(|r| (r * shape.strain)[0]);
+        let sigma = rows.map(|r| (r * all * r.transpose())[0].max(0.0).sqrt());
+        let units = [100.0, 100.0, 100.0, 1f64.to_degrees()];
+        let [along_percent, across_percent, difference_percent, shear_deg] =
+            std::array::from_fn(|k| seen[k] * units[k]);
+        SizeCheck {
+            along_percent,
+            across_percent,
+            difference_percent,
+            shear_deg,
+            expected: std::array::from_fn(|k| sigma[k] * units[k]),
+            ratio: (0..4).map(|k| seen[k].abs() / sigma[k].max(1e-12)).fold(0.0, f64::max),
+        }
+    }
+
+    pub(in crate::find) fn gate(&self, g: &Gates) -> Gate {
+        Gate::most("sizes' ratio", self.ratio, g.max_look_ratio)
+    }
+
+    /// What the sizes of this part cannot show.
+    pub(in crate::find) fn silent(&self) -> Option<String> {
+        let worst = self.expected[0].max(self.expected[1]);
+        (3.0 * worst > TOLD_PERCENT).then(|| {
+            format!(
+                "the part's sizes tell lengths to {:.1} % only (three sigmas): smaller errors of scale and steps are not tested",
+                3.0 * worst
+            )
+        })
+    }
+}
+
+/// Lengths along the stripe and across it, their difference, and shear, over the part's own three.
+pub(in crate::find) fn size_rows(axes: &[Vector2<f64>; 2]) -> [SMatrix<f64, 1, 3>; 4] {
+    let [s, c] = axes;
+    let along = |d: &Vector2<f64>| SMatrix::<f64, 1, 3>::new(d.x * d.x, d.y * d.y, d.x * d.y);
+    let shear = SMatrix::<f64, 1, 3>::new(2.0 * s.x * c.x, 2.0 * s.y * c.y, s.x * c.y + s.y * c.x);
+    [along(s), along(c), along(s) - along(c), shear]
+}
+
+/// Covariance of the sizes under all that is stated: their own, the calibrations', the part's.
+pub(in crate::find) fn expected(shape: &Shape, levers: &[Lever], size_sigma: f64) -> Matrix3<f64> {
+    let mut all = shape.covariance + of_part(size_sigma);
+    for l in levers.iter().filter(|l| !l.supposed) {
+        if let Some(c) = &l.covariance {
+            let j = l.jacobian.rows(6, 3);
+            all += Matrix3::from_iterator((j * c * j.transpose()).iter().copied());
+        }
+    }
+    all
+}
+
+/// How far parts of one drawing differ in size: most of it is common to both directions.
+pub(in crate::find) fn of_part(sigma: f64) -> Matrix3<f64> {
+    let (common, each) = (sigma * sigma, (sigma / 3.0).powi(2));
+    Matrix3::new(common + each, common, 0.0, common, common + each, 0.0, 0.0, 0.0, 2.0 * each)
+}

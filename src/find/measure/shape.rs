@@ -1,0 +1,16 @@
+//! In: nothing. Out: the sizes of a part against its drawing, and how an edge moves with them.
+//! Frame and unit: the part's axes; shares (0.01: a hundredth longer), shear in rad. docs/math.md, Sizes.
+
+use nalgebra::{Matrix3, Vector3};
+
+/// Sizes against the drawing: lengths along the part's x and y and the shear between them.
+#[derive(Clone, Copy, Debug)]
+pub struct Shape {
+    pub strain: Vector3<f64>,
+    pub covariance: Matrix3<f64>,
+}
+
+/// By how much an edge at a place moves along its normal for each of the three.
+pub(in crate::find) fn shape_row(x: f64, y: f64, nx: f64, ny: f64) -> [f64; 3] {
+    [x * nx, y * ny, 0.5 * (x * ny + y * nx)]
+}
