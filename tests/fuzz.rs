@@ -275,7 +275,7 @@ fn rig_files() {
     survives("rig files", shipped("rigs"), |b| {
         let rig = RigSpec::parse(&text(b))?;
         // What every user of a rig asks of it.
-        Recipe::parse(&rig.recipe(50)).expect("a rig's own recipe");
+        Recipe::parse(&rig.recipe(50))?;
         Scene::new(rig.scene()).map(drop)
     });
 }
