@@ -285,7 +285,7 @@ fn rig_files() {
 fn scans() {
     let dir = scratch();
     let at = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
-    let options = sheetlight::simulate::SimulateOptions { width: 64, height: 48, shots: 2, ..Default::default() };
+    let options = sheetlight::simulate::SimulateOptions { width: 64, height: 64, shots: 2, ..Default::default() };
     sheetlight::simulate::simulate(&dir.path().join("sim"), &options, &|_, _| {}).unwrap();
     let mut scan = std::process::Command::new(env!("CARGO_BIN_EXE_sheetlight"));
     scan.args([
