@@ -18,49 +18,63 @@ const SATURATED = 256u;
 const BELIEF = 10.0;
 // Grey levels that are no light, but whose square is no denormal number: those take a CPU many times as long.
 const DARK = 1e-9;
+// Share of a number's information that is left at least where another number explains it.
+const LEAST = 1e-5;
+// Share of the ceiling over which clipped pixels fall silent.
+const SOFT = 0.05;
 
 // First word of the picture; set once.
 var<private> first: u32;
 
-fn level(x: i32, y: i32) -> f32 {
+fn whole(x: i32, y: i32) -> i32 {
     let a = u32(clamp(x, 0, frame.width - 1));
     let b = u32(clamp(y, 0, frame.height - 1));
     let bits = 32u >> px_log2;
     let place = a & ((1u << px_log2) - 1u);
-    return f32(i32((image[first + b * frame.pitch + (a >> px_log2)] >> (place * bits)) & ((1u << bits) - 1u)));
+    return i32((image[first + b * frame.pitch + (a >> px_log2)] >> (place * bits)) & ((1u << bits) - 1u));
 }
 
-// Weights (1 - r^2 / 16)^2 of gradients one step away along both axes; two along one; two along both.
-const ONE = 0.765625;
-const TWO = 0.5625;
-const FAR = 0.25;
+fn level(x: i32, y: i32) -> f32 {
+    return f32(whole(x, y));
+}
 
-// The structure tensor from 13 gradients on 24 grey levels, every other place of a lattice: half the difference of its diagonal,
-// the other element, half the difference of its eigenvalues.
+// Weights (1 - r^2 / 16)^2 in 64ths of gradients one step away along both axes; two along one; two along both; none.
+const ONE = 49;
+const TWO = 36;
+const FAR = 16;
+const NONE = 64;
+
+// The structure tensor from 13 gradients on 24 grey levels, every other place of a lattice, in whole numbers: half the difference of
+// its diagonal, the other element, half the difference of its eigenvalues.
 fn tensor(x: i32, y: i32, u: i32, v: i32) -> vec3<f32> {
-    let a = vec3(level(x - 2 * u, y - 3 * v), level(x, y - 3 * v), level(x + 2 * u, y - 3 * v));
-    let b = vec4(level(x - 3 * u, y - 2 * v), level(x - u, y - 2 * v), level(x + u, y - 2 * v), level(x + 3 * u, y - 2 * v));
-    let c = vec3(level(x - 2 * u, y - v), level(x, y - v), level(x + 2 * u, y - v));
-    let d = vec4(level(x - 3 * u, y), level(x - u, y), level(x + u, y), level(x + 3 * u, y));
-    let e = vec3(level(x - 2 * u, y + v), level(x, y + v), level(x + 2 * u, y + v));
-    let f = vec4(level(x - 3 * u, y + 2 * v), level(x - u, y + 2 * v), level(x + u, y + 2 * v), level(x + 3 * u, y + 2 * v));
-    let g = vec3(level(x - 2 * u, y + 3 * v), level(x, y + 3 * v), level(x + 2 * u, y + 3 * v));
+    let a = vec3(whole(x - 2 * u, y - 3 * v), whole(x, y - 3 * v), whole(x + 2 * u, y - 3 * v));
+    let b = vec4(whole(x - 3 * u, y - 2 * v), whole(x - u, y - 2 * v), whole(x + u, y - 2 * v), whole(x + 3 * u, y - 2 * v));
+    let c = vec3(whole(x - 2 * u, y - v), whole(x, y - v), whole(x + 2 * u, y - v));
+    let d = vec4(whole(x - 3 * u, y), whole(x - u, y), whole(x + u, y), whole(x + 3 * u, y));
+    let e = vec3(whole(x - 2 * u, y + v), whole(x, y + v), whole(x + 2 * u, y + v));
+    let f = vec4(whole(x - 3 * u, y + 2 * v), whole(x - u, y + 2 * v), whole(x + u, y + 2 * v), whole(x + 3 * u, y + 2 * v));
+    let g = vec3(whole(x - 2 * u, y + 3 * v), whole(x, y + 3 * v), whole(x + 2 * u, y + 3 * v));
+    // Ten bits a gradient.
+    let deep = max(countOneBits(u32(frame.full_scale)), 10u) - 10u;
+    let half = vec4(i32((1u << deep) >> 1u));
+    let by = vec4(deep);
     // In the rows two above, of the pixel, two below; then the diagonals.
-    let ratio = f32(v) / f32(u);
-    let ax = ratio * (b.yzw - b.xyz);
-    let ay = c - a;
-    let rx = ratio * (d.yzw - d.xyz);
-    let ry = e - c;
-    let bx = ratio * (f.yzw - f.xyz);
-    let by = g - e;
-    let dx = ratio * vec4(c.yz - c.xy, e.yz - e.xy);
-    let dy = vec4(d.yz - b.yz, f.yz - d.yz);
+    let ax = ((b.yzw - b.xyz) + half.xyz) >> by.xyz;
+    let ay = ((c - a) + half.xyz) >> by.xyz;
+    let rx = ((d.yzw - d.xyz) + half.xyz) >> by.xyz;
+    let ry = ((e - c) + half.xyz) >> by.xyz;
+    let bx = ((f.yzw - f.xyz) + half.xyz) >> by.xyz;
+    let wy = ((g - e) + half.xyz) >> by.xyz;
+    let dx = (vec4(c.yz - c.xy, e.yz - e.xy) + half) >> by;
+    let dy = (vec4(d.yz - b.yz, f.yz - d.yz) + half) >> by;
     let far = vec3(FAR, TWO, FAR);
-    let row = vec3(TWO, 1.0, TWO);
-    let xx = (dot(far, ax * ax) + dot(far, bx * bx)) + (dot(row, rx * rx) + ONE * dot(dx, dx));
-    let xy = (dot(far, ax * ay) + dot(far, bx * by)) + (dot(row, rx * ry) + ONE * dot(dx, dy));
-    let yy = (dot(far, ay * ay) + dot(far, by * by)) + (dot(row, ry * ry) + ONE * dot(dy, dy));
-    let h = 0.5 * (xx - yy);
+    let row = vec3(TWO, NONE, TWO);
+    let sxx = (dot(far, ax * ax) + dot(far, bx * bx)) + (dot(row, rx * rx) + ONE * dot(dx, dx));
+    let sxy = (dot(far, ax * ay) + dot(far, bx * wy)) + (dot(row, rx * ry) + ONE * dot(dx, dy));
+    let syy = (dot(far, ay * ay) + dot(far, wy * wy)) + (dot(row, ry * ry) + ONE * dot(dy, dy));
+    let ratio = f32(v) / f32(u);
+    let h = 0.5 * ((ratio * ratio) * f32(sxx) - f32(syy));
+    let xy = ratio * f32(sxy);
     return vec3(h, xy, sqrt(h * h + xy * xy));
 }
 
@@ -73,7 +87,7 @@ fn twice(t: vec3<f32>) -> vec2<f32> {
 fn turn_of(sc: vec2<f32>, c: vec4<f32>) -> f32 {
     let s4 = 2.0 * sc.x * sc.y;
     let c4 = sc.y * sc.y - sc.x * sc.x;
-    return c.x * sc.x + c.y * s4 + (c.z * (s4 * sc.y + c4 * sc.x) + c.w * (2.0 * s4 * c4));
+    return c.x * sc.x + (c.y * s4 + (c.z * (s4 * sc.y + c4 * sc.x) + c.w * (2.0 * (s4 * c4))));
 }
 
 // Across the stripe; what so far differences make of the direction is put right.
@@ -101,14 +115,15 @@ fn background(x: i32, y: i32, n: vec2<f32>) -> f32 {
     let start = i32(floor(4.0 * frame.s0 + 0.5));
     let end = start + max(i32(floor(2.0 * frame.s0 + 0.5)), 2);
     let along = 1.2 * frame.s0;
-    let tu = i32(floor(along * n.y + 0.5));
-    let tv = i32(floor(0.5 - along * n.x));
+    // Not 0.5: at slopes of 1 in 32 and the like rounding would decide.
+    let tu = i32(floor(along * n.y + 0.47));
+    let tv = i32(floor(0.47 - along * n.x));
     var low = 0.0;
     var high = 0.0;
     var count = 0.0;
     for (var q = start; q <= end; q += frame.stride) {
-        let du = i32(floor(f32(q) * n.x + 0.5));
-        let dv = i32(floor(f32(q) * n.y + 0.5));
+        let du = i32(floor(f32(q) * n.x + 0.47));
+        let dv = i32(floor(f32(q) * n.y + 0.47));
         low += (level(x - du, y - dv) + level(x + tu - du, y + tv - dv)) + level(x - tu - du, y - tv - dv);
         high += (level(x + du, y + dv) + level(x + tu + du, y + tv + dv)) + level(x - tu + du, y - tv + dv);
         count += 3.0;
@@ -125,7 +140,7 @@ var<private> moment: vec2<f32>;
 fn guess_pair(j: i32) {
     if j < 2 * quads {
         light[j] = level_pair(j) - base;
-        let lit = select(vec2(0.0), max(light[j], vec2(0.0)), in_span(j, near));
+        let lit = share(j, near) * max(light[j], vec2(0.0));
         sum += lit;
         moment += lit * pair(j);
     }
@@ -140,7 +155,7 @@ fn guess(profile: Profile) -> vec2<f32> {
     guess_pair(7); guess_pair(8); guess_pair(9); guess_pair(10); guess_pair(11); guess_pair(12); guess_pair(13);
     guess_pair(14); guess_pair(15); guess_pair(16); guess_pair(17); guess_pair(18); guess_pair(19);
     let all = sum.x + sum.y;
-    let count = floor(near.y) - ceil(near.x) + 1.0;
+    let count = near.y - near.x;
     let m = select(0.0, profile.offset + profile.step * ((moment.x + moment.y) / all), all > 0.0);
     return vec2(m, max(1.25 * all / max(count, 1e-6), 1.0));
 }
@@ -162,22 +177,28 @@ fn finish(at: vec2<i32>, n: vec2<f32>, m: f32, amplitude: f32, width: f32, sigma
     return peak;
 }
 
-// The light of what is not clipped, and for how much a sample counts, clipped pixels with it and without.
-var<private> clear: array<vec2<f32>, 20>;
+// For how much a sample counts, and the share of that which is clipped.
 var<private> with_all: array<vec2<f32>, 20>;
-var<private> with_clear: array<vec2<f32>, 20>;
+var<private> lost: array<vec2<f32>, 20>;
 var<private> weight: f32;
 var<private> clipped: vec2<f32>;
 fn window_pair(j: i32) {
     if j < 2 * quads {
-        let inside = in_span(j, near);
-        let lost = select(vec2(0.0), clipped_pair(j), inside);
-        let left = vec2(1.0) - lost;
-        clipped = max(clipped, lost);
-        clear[j] = (light[j] - (frame.full_scale - base) * lost) / max(left, vec2(1e-3));
-        with_all[j] = select(vec2(0.0), vec2(weight), inside);
-        with_clear[j] = with_all[j] * left;
+        let inside = share(j, near);
+        lost[j] = clipped_pair(j);
+        clipped = max(clipped, select(vec2(0.0), lost[j], inside > vec2(0.0)));
+        with_all[j] = inside * weight;
     }
+}
+
+// e to the power of x from -80 to 80, as the twin has it.
+fn exponential(x: vec2<f32>) -> vec2<f32> {
+    let t = clamp(x * 1.442695, vec2(-120.0), vec2(120.0));
+    let whole = floor(t + vec2(0.5));
+    let f = t - whole;
+    let q = 0.009618129 + f * (0.001333356 + f * 0.0001540353);
+    let p = 1.0 + f * (0.6931472 + f * (0.2402265 + f * (0.05550411 + f * q)));
+    return p * bitcast<vec2<f32>>(vec2<u32>(vec2<i32>(whole) + vec2(127)) << vec2(23u));
 }
 
 // The model at a pair of samples and what leads to the next pair.
@@ -191,6 +212,7 @@ var<private> quiet: f32;
 var<private> gain: f32;
 var<private> speckle2: f32;
 var<private> ceiling: f32;
+var<private> soft: f32;
 // Sums over certainty times model squared times z^0, z^1, .. z^4; certainty, residual, model and z^0, z^1, z^2; certainty
 // and residual squared; weights.
 var<private> e0: vec2<f32>;
@@ -206,11 +228,13 @@ var<private> believed: vec2<f32>;
 fn fit_pair(j: i32) {
     if j < 2 * quads {
         // Clipped pixels pull while the model is below them, and are silent above.
-        let above = model >= vec2(ceiling);
-        let residual = select(light[j], clear[j], above) - model;
-        let counts = select(with_all[j], with_clear[j], above);
-        let certainty = counts / (quiet + model * (gain + speckle2 * model));
-        let pull = certainty * residual;
+        let above = clamp(soft * (model - vec2(ceiling)) + vec2(0.5), vec2(0.0), vec2(1.0));
+        let silent = above * lost[j];
+        let heard = max(vec2(1.0) - silent, vec2(1e-3));
+        let residual = (light[j] - model) + silent * (model - vec2(ceiling));
+        let inverse = with_all[j] / (heard * (quiet + model * (gain + speckle2 * model)));
+        let certainty = (heard * heard) * inverse;
+        let pull = (heard * inverse) * residual;
         let p0 = pull * model;
         let p1 = p0 * z;
         let h0 = certainty * (model * model);
@@ -225,8 +249,8 @@ fn fit_pair(j: i32) {
         r0 += p0;
         r1 += p1;
         r2 += p1 * z;
-        squares += pull * residual;
-        believed += counts;
+        squares += (inverse * residual) * residual;
+        believed += with_all[j] * heard;
         model = max(model * ratio, vec2(DARK));
         ratio *= fall;
         z += dz;
@@ -255,6 +279,7 @@ fn gaussian(at: vec2<i32>) -> Peak {
     gain = frame.gain;
     speckle2 = frame.speckle2;
     ceiling = frame.full_scale - base;
+    soft = 1.0 / max(SOFT * ceiling, 1.0);
     var drop = 0.0;
     var left = frame.steps;
     while left > 0u {
@@ -265,9 +290,9 @@ fn gaussian(at: vec2<i32>) -> Peak {
         dz = vec2(wide, -wide);
         // A Gaussian at equal steps: its ratio from sample to sample falls by a constant factor. From the middle to both
         // sides, because what has become 0 stays 0.
-        model = a * exp(-0.5 * (z * z));
-        ratio = exp(-0.5 * (dz * dz) - dz * z);
-        fall = exp(-(wide * wide));
+        model = a * exponential(-0.5 * (z * z));
+        ratio = exponential(-0.5 * (dz * dz) - dz * z);
+        fall = exponential(vec2(-(wide * wide))).x;
         e0 = vec2(0.0);
         e1 = vec2(0.0);
         e2 = vec2(0.0);
@@ -290,17 +315,20 @@ fn gaussian(at: vec2<i32>) -> Peak {
         let g0 = r0.x + r0.y;
         let g1 = r1.x + r1.y;
         let g2 = (r2.x + r2.y) + (prior * width) * (s0 - width);
-        let c00 = h11 * h22 - h12 * h12;
-        let c01 = h02 * h12 - h01 * h22;
-        let c02 = h01 * h12 - h02 * h11;
-        let c11 = h00 * h22 - h02 * h02;
-        let c12 = h01 * h02 - h00 * h12;
-        let c22 = h00 * h11 - h01 * h01;
-        let det = h00 * c00 + (h01 * c01 + h02 * c02);
-        let da = clamp(a * ((c00 * g0 + (c01 * g1 + c02 * g2)) / det), -0.5 * a, a);
-        let dm = clamp(width * ((c01 * g0 + (c11 * g1 + c12 * g2)) / det), -0.7 * s0, 0.7 * s0);
-        let dw = clamp(width * ((c02 * g0 + (c12 * g1 + c22 * g2)) / det), -0.3 * s0, 0.3 * s0);
-        i11 = (width * width) * (c11 / det);
+        let l01 = h01 / h00;
+        let l02 = h02 / h00;
+        let d2 = max(h22 - l02 * h02, LEAST * h22);
+        let s12 = h12 - l02 * h01;
+        let l12 = s12 / d2;
+        let d1 = max((h11 - l01 * h01) - l12 * s12, LEAST * h11);
+        let y2 = g2 - l02 * g0;
+        let x1 = ((g1 - l01 * g0) - l12 * y2) / d1;
+        let x2 = y2 / d2 - l12 * x1;
+        let x0 = g0 / h00 - (l02 * x2 + l01 * x1);
+        let da = clamp(a * x0, -0.5 * a, a);
+        let dm = clamp(width * x1, -0.7 * s0, 0.7 * s0);
+        let dw = clamp(width * x2, -0.3 * s0, 0.3 * s0);
+        i11 = (width * width) / d1;
         // By what this step lowers the squares: they are wanted where the fit ends.
         drop = (g0 * (da / a) + g1 * (dm / width)) + g2 * (dw / width);
         a = max(a + da, 1.0);
@@ -323,15 +351,15 @@ var<private> noise2: vec2<f32>;
 var<private> top: vec2<f32>;
 fn centroid_pair(j: i32) {
     if j < 2 * quads {
-        let inside = in_span(j, near);
-        let here = select(vec2(0.0), light[j], inside);
+        let inside = share(j, near);
+        let here = inside * light[j];
         let k = pair(j);
         sum += here;
         moment += here * k;
         second += here * (k * k);
         top = max(top, here);
-        clipped = max(clipped, select(vec2(0.0), clipped_pair(j), inside));
-        let e = select(vec2(0.0), k - vec2(z.x), inside);
+        clipped = max(clipped, select(vec2(0.0), clipped_pair(j), inside > vec2(0.0)));
+        let e = inside * (k - vec2(z.x));
         let lit = max(here, vec2(0.0));
         noise2 += (e * e) * (quiet + frame.gain * here + frame.speckle2 * (lit * lit));
     }
@@ -384,7 +412,7 @@ fn derivative(at: vec2<i32>) -> Peak {
         for (var i = -r; i <= r; i++) {
             let v = level(c.x + i, c.y + j);
             let d = f32(i) * n.x + f32(j) * n.y;
-            let kernel = exp(-0.5 * inverse * f32(i * i + j * j));
+            let kernel = exponential(vec2(-0.5 * inverse * f32(i * i + j * j))).x;
             let slope = kernel * d * inverse;
             d1 += slope * (v - base);
             d2 += kernel * (d * d * inverse - 1.0) * inverse * (v - base);

@@ -138,7 +138,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let dy = (a * dyd - c * dxd) / det;
         let slope = frame.normal_x * x + (frame.normal_y * y + frame.normal_z);
         let z = frame.offset / slope;
-        let there = det > 0.0 && abs(x) < 1e9 && abs(y) < 1e9 && slope > 1e-6 && z < 1e6;
+        let there = det > 0.0 && a + d > 0.0 && abs(x) < 1e9 && abs(y) < 1e9 && slope > 1e-6 && z < 1e6;
         // dx, dy of the ray, dz from the plane.
         let dz = -z * (frame.normal_x * dx + frame.normal_y * dy) / slope;
         let mx = dz * x + z * dx;

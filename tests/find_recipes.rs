@@ -163,8 +163,9 @@ fn scan(part: &'static str, seed: u64) -> Scanned {
     let base_from_scene = base_from_scene(&station);
     let format = Format { width: station.camera.width, height: station.camera.height, bits: 8 };
     let volume = Volume::new(100.0, 230.0, "test");
+    let carrier = sheetlight::scan::Carrier::new(&rig, &sheetlight::recording::Motion::default()).unwrap();
     let mut scanner =
-        Scanner::new(&rig, format, &Extraction::default(), Some(&volume), None, Processor::host(), None).unwrap();
+        Scanner::new(&rig, carrier, format, &Extraction::default(), Some(&volume), None, Processor::host()).unwrap();
     let above_scene = scene.spec.focus_height_mm + station.working_distance;
     let mut cloud: Vec<CloudPoint> = Vec::new();
     for i in 0..(2.0 * half[1] / pitch) as usize {
@@ -176,7 +177,14 @@ fn scan(part: &'static str, seed: u64) -> Scanned {
         let image = expose(&station.sensor, &light, &dark, 0.0, &[], &mut rng);
         let pose = flange(&station, &(base_from_scene * scene_from_camera));
         let base_from_flange = reported(&pose, pose_mm, pose_deg, &mut rng);
-        scanner.push(Shot { index: i as u32, name: String::new(), image, base_from_flange }).unwrap();
+        scanner
+            .push(Shot {
+                index: i as u32,
+                name: String::new(),
+                image,
+                stand: sheetlight::recording::Stand::Robot(base_from_flange),
+            })
+            .unwrap();
         cloud.extend(scanner.ready().unwrap().into_iter().flat_map(|p| p.points));
     }
     cloud.extend(scanner.finish().unwrap().into_iter().flat_map(|p| p.points));

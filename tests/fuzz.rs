@@ -359,6 +359,46 @@ fn calibrations() {
     );
 }
 
+/// Their values without the seal, which would keep every other mutation out.
+#[test]
+fn axes_and_counts() {
+    use sheetlight::geometry::{Axis, AxisKind};
+    use sheetlight::rig::{Calibration, Kind};
+    for (axis, kind) in [(AxisKind::Linear, Kind::LinearAxis), (AxisKind::Turntable, Kind::Turntable)] {
+        let motion = Some(axis);
+        let options =
+            sheetlight::simulate::SimulateOptions { width: 64, height: 64, shots: 2, motion, ..Default::default() };
+        let dir = tempfile::tempdir().unwrap();
+        let done = sheetlight::simulate::simulate(dir.path(), &options, &|_, _| {}).unwrap();
+        let file = done.station.join("calibration").join(format!("{}.json", kind.name()));
+        let mut record: serde_json::Value = serde_json::from_slice(&std::fs::read(file).unwrap()).unwrap();
+        record.as_object_mut().unwrap().remove("seal");
+        survives(kind.name(), vec![record.to_string().into_bytes()], move |b| {
+            let read: Calibration<Axis> = serde_json::from_slice(b).map_err(|e| Fault::input(e.to_string()))?;
+            read.check(kind)?;
+            assert!(read.value.axis_from_camera(7.0).translation.norm().is_finite());
+            assert!(read.value.errors(7.0).iter().all(|e| e.v.norm().is_finite() && e.w.norm().is_finite()));
+            Ok(())
+        });
+        let meta = std::fs::read(done.recordings[0].1.join("meta.json")).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        survives("meta of an axis", vec![meta], move |b| {
+            std::fs::write(folder.path().join("meta.json"), b).expect("a file");
+            sheetlight::recording::Recording::open(folder.path()).and_then(|r| r.counts()).map(drop)
+        });
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let meta =
+        META.replacen('{', r#"{"motion":{"kind":"linear","carries":"part","unit":"mm","counts_file":"c.csv"},"#, 1);
+    std::fs::write(folder.path().join("meta.json"), meta).unwrap();
+    let recording = sheetlight::recording::Recording::open(folder.path()).unwrap();
+    survives("counts", seeds(&["frame,count\n0,-2.5e3\n"]), move |b| {
+        std::fs::write(recording.folder.join("c.csv"), b).expect("a file");
+        recording.counts().map(drop)
+    });
+    drop(folder);
+}
+
 #[test]
 fn recipes_and_drawings() {
     survives("recipes", shipped("recipes"), |b| Recipe::parse(&text(b)).map(|r| used(&r.drawing())));

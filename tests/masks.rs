@@ -125,3 +125,39 @@ fn the_gpu_gives_the_masks_and_skeletons_of_opencv() {
     println!("Gaussian windows: {differing} of {gaussian} pixels differ");
     assert!(gaussian > 300_000 && differing * 100_000 <= gaussian, "{differing} of {gaussian} pixels differ");
 }
+
+/// Stripes of one to three pixels at every angle and place, as far as they reach: every column (or row, where they stand) that
+/// crosses one has a pixel of its skeleton, there or beside it, and hardly more than one. Zhang-Suen's rule loses all of some.
+#[test]
+fn thinning_loses_no_stripe() {
+    const SIZE: u32 = 72;
+    const MARGIN: u32 = 6;
+    // What a line's own ends may lose.
+    const END: u32 = 12;
+    let mut most = 0f64;
+    for angle_deg in [0.0f64, 30.0, 40.0, 44.0, 45.0, 46.0, 60.0, 90.0, 135.0] {
+        let (sin, cos) = angle_deg.to_radians().sin_cos();
+        let lying = cos.abs() >= sin.abs() - 1e-9;
+        for (width, place) in [1.0, 1.5, 2.0, 2.5, 3.0].into_iter().flat_map(|w| (0..15).map(move |k| (w, k))) {
+            let inside = |x: u32| (MARGIN..SIZE - MARGIN).contains(&x);
+            let lit = Mask::from_fn(SIZE, SIZE, |x, y| {
+                let [x, y] = [x, y].map(|v| f64::from(v) - f64::from(SIZE / 2));
+                (x * sin + y * cos - 0.1 * f64::from(place)).abs() <= 0.5 * width
+            });
+            let lit = Mask::from_fn(SIZE, SIZE, |x, y| inside(x) && inside(y) && lit.get(x, y));
+            let thinned = thin::twin(&lit, Thinning::default());
+            let crossed = |mask: &Mask, a: u32| {
+                (0..SIZE).filter(|&b| if lying { mask.get(a, b) } else { mask.get(b, a) }).count()
+            };
+            let (mut lines, mut pixels) = (0, 0);
+            for a in (END..SIZE - END).filter(|&a| crossed(&lit, a) > 0) {
+                let near = (a - 1..=a + 1).map(|a| crossed(&thinned, a)).sum::<usize>();
+                assert!(near > 0, "{angle_deg} degrees, {width} px, place {place}: nothing is left of line {a}");
+                (lines, pixels) = (lines + 1, pixels + crossed(&thinned, a));
+            }
+            most = most.max(pixels as f64 / f64::from(lines));
+        }
+    }
+    println!("at most {most:.2} pixels a line");
+    assert!(most < 1.15, "{most} pixels a line");
+}

@@ -31,7 +31,12 @@ impl Source for Repeating {
             let base_from_flange =
                 Rigid::<Base, Flange>::from_vectors(&Vec3::zeros(), Vec3::new(0.0, 0.25 * step, 0.0));
             let image = self.pictures[i % self.pictures.len()].clone();
-            Ok(Shot { index: i as u32, name: format!("{i}"), image, base_from_flange })
+            Ok(Shot {
+                index: i as u32,
+                name: format!("{i}"),
+                image,
+                stand: sheetlight::recording::Stand::Robot(base_from_flange),
+            })
         })
     }
 }
@@ -89,6 +94,7 @@ fn a_long_scan_needs_no_more_memory_than_a_short_one() {
             // The map's size follows from the surface, not from the number of shots.
             grid: GridOptions { cell: Some(0.25), ..GridOptions::default() },
             volume: None,
+            motion: sheetlight::recording::Motion::default(),
             ambient: None,
             overlays: 2,
             skip_bad: false,

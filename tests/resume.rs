@@ -95,6 +95,7 @@ fn options(out: &Path) -> ScanOptions {
         extraction: Extraction::default(),
         grid: GridOptions::default(),
         volume: None,
+        motion: sheetlight::recording::Motion::default(),
         ambient: None,
         overlays: 0,
         skip_bad: false,

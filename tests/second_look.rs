@@ -283,6 +283,7 @@ fn rig(b: &Believed) -> Rig {
         hand_eye: Some(Calibration::new(Kind::HandEye, b.hand_eye, Some(&camera), hand_eye, quality)),
         pointer: None,
         camera: Some(camera),
+        ..Rig::default()
     }
 }
 

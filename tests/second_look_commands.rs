@@ -233,9 +233,10 @@ fn a_second_look_is_planned_taken_and_brought_together() {
     refused("scans/a scans/moved", 1, &["looks' ratio"]);
     assert!(json(&b.at("no.json"))["poses"].is_null());
 
-    // The hand-eye is 1 mm off: each look passes, both together do not, and it is named.
+    // The hand-eye is 1 mm off along the stripe (along the way a delay would do the same): each look passes, both together do
+    // not, and it is named among what explains it.
     let mut rig = Rig::load(&b.at("station")).unwrap();
-    rig.hand_eye.as_mut().unwrap().value.translation.x += 1.0;
+    rig.hand_eye.as_mut().unwrap().value.translation.y += 1.0;
     rig.store_all(&b.at("station")).unwrap();
     refused("scans/a scans/b", 1, &["was scanned with calibration"]);
     b.scan("first/scan", "scans/wrong_a");
@@ -244,17 +245,23 @@ fn a_second_look_is_planned_taken_and_brought_together() {
         b.run(&format!("find scans/wrong_{look} --recipe led.toml --out alone.json {at}"));
     }
     refused("scans/wrong_a scans/wrong_b", 1, &["looks' ratio"]);
-    assert_eq!(json(&b.at("no.json"))["looks"]["explained_by"][0]["name"], "hand-eye");
+    let by_hand_eye = |looks: &Value| {
+        let all = looks["explained_by"].as_array().unwrap();
+        all.iter().find(|e| e["name"] == "hand-eye").unwrap()["share"].as_f64().unwrap()
+    };
+    let looks = &json(&b.at("no.json"))["looks"];
+    assert!(by_hand_eye(looks) > 0.9, "{looks}");
     let seen = object("wrong_");
     println!("{}\n{}", seen["object"], seen["remarks"]);
     assert!(figure(&seen, &["object", "looks", "ratio"]) > 3.0, "{}", seen["object"]);
-    assert!(seen["remarks"].to_string().contains("the hand-eye explains"), "{}", seen["remarks"]);
+    assert!(by_hand_eye(&seen["object"]["looks"]) > 0.9, "{}", seen["object"]);
+    assert!(seen["remarks"].to_string().contains("the scans of the object disagree"), "{}", seen["remarks"]);
     // A scan with another calibration beside one with the present one.
     refused("scans/wrong_a scans/b", 1, &["was scanned with calibration"]);
 
     // The laser plane is 0.3 mm nearer: two looks hardly show it, the pointer does.
     let mut rig = Rig::load(&b.at("station")).unwrap();
-    rig.hand_eye.as_mut().unwrap().value.translation.x -= 1.0;
+    rig.hand_eye.as_mut().unwrap().value.translation.y -= 1.0;
     rig.laser_plane.as_mut().unwrap().value.offset -= 0.3;
     rig.store_all(&b.at("station")).unwrap();
     b.scan("first/scan", "scans/low_a");

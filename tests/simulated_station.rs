@@ -26,6 +26,7 @@ fn scanned(out: &Path, options: &SimulateOptions) -> Judged {
         extraction: Extraction::default(),
         grid: GridOptions::default(),
         volume: None,
+        motion: sheetlight::recording::Motion::default(),
         ambient: None,
         overlays: 1,
         skip_bad: false,

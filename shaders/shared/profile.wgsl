@@ -261,13 +261,14 @@ fn pair(j: i32) -> vec2<f32> {
     return vec2(f32(j), f32(-1 - j));
 }
 
-// First and last number of the samples whose offsets lie within `reach` of m; not whole.
+// Where the samples begin and end that lie within `reach` of m, in their numbers; not whole.
 fn span(p: Profile, m: f32, reach: f32) -> vec2<f32> {
     let a = (m - reach - p.offset) / p.step;
     let b = (m + reach - p.offset) / p.step;
-    return vec2(max(min(a, b), p.low), min(max(a, b), p.high));
+    return vec2(max(min(a, b), p.low - 0.5), min(max(a, b), p.high + 0.5));
 }
 
-fn in_span(j: i32, s: vec2<f32>) -> vec2<bool> {
-    return (pair(j) >= vec2(s.x)) & (pair(j) <= vec2(s.y));
+// How much of a pair's samples lies in a span: in or out would hang on the last bit of its ends.
+fn share(j: i32, s: vec2<f32>) -> vec2<f32> {
+    return clamp(min(pair(j) - vec2(s.x), vec2(s.y) - pair(j)) + vec2(0.5), vec2(0.0), vec2(1.0));
 }

@@ -110,7 +110,8 @@ pub fn serve(device: &Device, mut input: impl BufRead, mut output: impl Write) -
     let mut full = Chain::new(device, &ChainConfig { measure: Some(measure), lengthen, ..config.clone() })?;
     run(&mut full, &images, 1)?;
     let mut single = Chain::new(device, &ChainConfig { shots: 1, slots: 1, ..config })?;
-    let stripe = Stripe { width_px: setup.width_px, speckle: peak.speckle, noise: noise(&images[0]) };
+    let stripe =
+        Stripe { width_px: setup.width_px, speckle: peak.speckle, noise: noise(&images[0]), ..Stripe::default() };
     let format = Format { width: setup.width, height: setup.height, bits: 8 };
     let scan = Extraction::default().for_stripe(&stripe).chain(format, optics, setup.width_px);
     let host = Host::new(&scan)?;

@@ -1,6 +1,7 @@
 //! In: pictures' features, robot poses, laser peaks. Out: calibrations with covariance and verdict.
 //! Frame and unit: stated in each file; mm, rad, px. Rooms by what is calibrated; beside them what they share.
 
+pub mod axis;
 pub mod ball;
 pub mod boards;
 pub mod camera;

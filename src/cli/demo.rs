@@ -84,6 +84,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         extraction: settings.extraction.clone(),
         grid: GridOptions::default(),
         volume: crate::station::volume::believed(&settings, &rig),
+        motion: crate::recording::Motion::default(),
         ambient: None,
         overlays: 4,
         skip_bad: false,

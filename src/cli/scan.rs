@@ -5,7 +5,7 @@
 use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
 use crate::raster::{Channel, Image, Light, load_sized};
-use crate::recording::{Recording, load_poses};
+use crate::recording::{Motion, Recording, load_poses};
 use crate::rig::{Rig, hash_file, hash_text};
 use crate::scan::{GridOptions, RawFormat, RawSource, RecordingSource, Where};
 use crate::station::judge;
@@ -14,12 +14,17 @@ use std::path::{Path, PathBuf};
 
 /// Turn the shots of a recording into a point cloud and a height map
 ///
-/// Writes into --out: cloud.ply and cloud.pcd (base frame, mm, with a standard deviation for each
-/// point), height.tif (float, mm, NaN where nothing was seen), height.png with its scale beside it,
+/// meta.json says what moved: a robot with the sensor (nothing else is said), a robot with the part, a linear axis or a
+/// turntable; an axis needs no hand-eye, but its own calibration (sheetlight calibrate axis).
+///
+/// Writes into --out: cloud.ply and cloud.pcd (base frame, or that of axis or flange, mm, with a standard deviation for each
+/// point; frame: docs/conventions.md), height.tif (float, mm, NaN where nothing was seen), height.png with its scale beside it,
 /// pictures to look at, overlays of a few shots, scan.json with every figure, and index.html.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight scan recordings/board7 --station cell3 --out scans/board7
+  sheetlight calibrate axis recordings/axis --station belt1       # then, from the same belt:
+  sheetlight scan recordings/parcel4 --station belt1 --out scans/parcel4
   ffmpeg -i shots.mkv -f rawvideo -pix_fmt gray - | sheetlight scan --raw 4096x3072:gray8 \\
       --poses poses.csv --station cell3 --out scans/live")]
 pub struct Args {
@@ -80,6 +85,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         grid: GridOptions { cell: args.cell_mm, ..GridOptions::default() },
         volume: crate::station::volume::believed(&settings, &rig),
         ambient: None,
+        motion: Motion::default(),
         overlays: args.overlays,
         skip_bad: args.skip_bad,
         resume: args.resume,
@@ -99,7 +105,14 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
             let mut recording = Recording::open(folder)?;
             recording.channel = args.channel;
             recording.outside = args.pictures_outside;
-            recording.pose_file(args.poses.as_deref())?.warnings.iter().for_each(|w| console.warn(w));
+            options.motion = recording.meta.motion();
+            if options.motion.axis().is_none() {
+                recording.pose_file(args.poses.as_deref())?.warnings.iter().for_each(|w| console.warn(w));
+            } else if args.poses.is_some() {
+                return Err(Fault::usage("--poses is given, and meta.json says that an axis moved")
+                    .cause("another recording, or a motion that is not this one's")
+                    .next("leave --poses out, or correct 'motion' in meta.json"));
+            }
             let mut id = identity(folder, &recording, args.poses.as_deref())?;
             if let Some(name) = &args.ambient {
                 let inside = folder.join(name);
@@ -192,8 +205,13 @@ struct WithErrors {
 /// What a resumed scan must have in common with the interrupted one.
 fn identity(folder: &Path, recording: &Recording, poses: Option<&str>) -> Result<String> {
     let meta = hash_file(&folder.join("meta.json"))?;
-    let poses: Vec<[f64; 16]> = recording.poses(poses)?.iter().map(|p| p.to_rows()).collect();
-    let text = serde_json::to_string(&(meta, poses, recording.channel)).expect("plain data");
+    let text = if recording.meta.motion().axis().is_some() {
+        serde_json::to_string(&(meta, recording.counts()?, recording.channel))
+    } else {
+        let poses: Vec<[f64; 16]> = recording.poses(poses)?.iter().map(|p| p.to_rows()).collect();
+        serde_json::to_string(&(meta, poses, recording.channel))
+    };
+    let text = text.expect("plain data");
     Ok(hash_text(text.as_bytes()))
 }
 

@@ -3,6 +3,7 @@
 
 use crate::cli::terminal::console::Console;
 use crate::fault::Result;
+use crate::geometry::AxisKind;
 use crate::recording::{BoardSpec, load_poses};
 use crate::simulate::{RigSpec, Set, SimulateOptions, simulate};
 use crate::station::{Settings, WorkingVolume};
@@ -17,6 +18,7 @@ use std::path::PathBuf;
 /// Example: sheetlight simulate --out try --set all --seed 3
 ///          sheetlight scan try/scan --station try/station --out try/result
 ///          sheetlight simulate --rig data/rigs/webcam.toml --set all --out webcam
+///          sheetlight simulate --motion linear --set axis,scan --out belt
 ///          sheetlight simulate --out again --seed 3 --poses second.json
 #[derive(clap::Args)]
 pub struct Args {
@@ -24,7 +26,7 @@ pub struct Args {
     #[arg(long)]
     out: PathBuf,
     /// What to record, several times or separated by commas: scan, intrinsics, handeye, laserplane,
-    /// pointer_cal, pointer, surface, all
+    /// pointer_cal, pointer, surface, axis, all
     #[arg(long = "set", value_delimiter = ',', default_value = "scan")]
     sets: Vec<String>,
     /// Design of the station (TOML, see docs/file-formats.md; data/rigs holds some) [default: the paper's]
@@ -47,10 +49,15 @@ pub struct Args {
     /// Sensor height, px [default: in proportion to the width]
     #[arg(long)]
     height: Option<u32>,
+    /// What moves: robot (the sensor, over the scene), linear or turntable (the parts, past a sensor that stands still; the
+    /// station gets the true axis, and the set axis shows a board that rides on it)
+    #[arg(long, default_value = "robot", value_parser = crate::cli::terminal::arguments::parse::<Moved>)]
+    motion: Moved,
     /// Bits per pixel, 8 to 16 [default: the rig's, 8]
     #[arg(long)]
     bits: Option<u8>,
-    /// Shots of a scan [default: 200; with --rig one every one and a half pixel footprints]
+    /// Shots of a scan [default: 200; with --rig one every one and a half pixel footprints; of a turntable, which goes all the
+    /// way around, ten times as many]
     #[arg(long)]
     shots: Option<usize>,
     /// Flange poses to take the set scan or surface from instead of our own, one a shot, as second-look writes them
@@ -73,12 +80,34 @@ pub struct Args {
     pose_noise_deg: f64,
 }
 
+/// What `--motion` names.
+#[derive(Clone, Copy, Debug)]
+struct Moved(Option<AxisKind>);
+
+impl std::str::FromStr for Moved {
+    type Err = String;
+    fn from_str(s: &str) -> std::result::Result<Moved, String> {
+        match s {
+            "robot" => Ok(Moved(None)),
+            "linear" => Ok(Moved(Some(AxisKind::Linear))),
+            "turntable" => Ok(Moved(Some(AxisKind::Turntable))),
+            _ => Err(format!("unknown motion '{s}': robot, linear or turntable")),
+        }
+    }
+}
+
+/// A turn is so many times as long at the scene's ends as a pass over it.
+const TURN_OVER_PASS: usize = 10;
+
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     crate::cli::terminal::outputs::check_simulation(&args.out)?;
     let mut sets = Vec::new();
     for name in &args.sets {
         match name.as_str() {
-            "all" => sets.extend(Set::ALL),
+            "all" => {
+                sets.extend(Set::ALL);
+                sets.extend(args.motion.0.map(|_| Set::Axis));
+            }
             name => sets.push(name.parse().map_err(|e: String| crate::fault::Fault::usage(e).next("name a set"))?),
         }
     }
@@ -93,7 +122,10 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     options.scene = args.scene.clone();
     options.board = args.board.as_deref().map(BoardSpec::load).transpose()?;
     options.seed = args.seed;
-    options.shots = args.shots.unwrap_or(options.shots);
+    options.motion = args.motion.0;
+    let usual =
+        if options.motion == Some(AxisKind::Turntable) { TURN_OVER_PASS * options.shots } else { options.shots };
+    options.shots = args.shots.unwrap_or(usual);
     options.poses = args.poses.as_deref().map(|path| load_poses(path).map(|read| read.poses)).transpose()?;
     options.sensor.bits = args.bits.unwrap_or(options.sensor.bits);
     options.sensor.laser_white = args.exposure.unwrap_or(options.sensor.laser_white);

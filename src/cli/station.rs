@@ -7,7 +7,7 @@ use super::terminal::outputs;
 use super::terminal::outputs::Inputs;
 use crate::camera::{Intrinsics, LENS, NAMES};
 use crate::fault::{Fault, Result};
-use crate::geometry::{Camera, Plane, Ray};
+use crate::geometry::{Axis, AxisKind, Base, Camera, Plane, Ray, Rigid};
 use crate::rig::{Calibration, HandEye, Kind, Rig};
 use crate::robot::Convention;
 use crate::station::{Settings, Values};
@@ -73,7 +73,7 @@ pub struct Seal {
     /// Station folder
     #[arg(long)]
     station: PathBuf,
-    /// Which one: camera, laser-plane, pointer or hand-eye
+    /// Which one: camera, laser-plane, pointer, hand-eye, base-camera, linear-axis or turntable
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Kind>)]
     kind: Kind,
     /// Why it is to be believed; kept in the file and shown in every report
@@ -134,6 +134,8 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
                 Kind::Camera => Rig::vouch::<Intrinsics>,
                 Kind::LaserPlane => Rig::vouch::<Plane<Camera>>,
                 Kind::Pointer => Rig::vouch::<Ray<Camera>>,
+                Kind::BaseCamera => Rig::vouch::<Rigid<Base, Camera>>,
+                Kind::LinearAxis | Kind::Turntable => Rig::vouch::<Axis>,
                 _ => Rig::vouch::<HandEye>,
             };
             if a.because.trim().is_empty() {
@@ -182,7 +184,27 @@ fn summary(settings: &Settings, rig: &Rig) -> String {
             n[0], n[1], n[2], n[3], n[4], n[5]
         )
     });
-    format!("{}\n{camera}{plane}{pointer}{hand_eye}", settings.name)
+    let axis = |kind: AxisKind, part| {
+        let shown = |a: &Axis| {
+            let (d, p) = (a.direction(), a.origin());
+            let through = format!(", through {:.3} {:.3} {:.3} mm", p.x, p.y, p.z);
+            format!(
+                "{:.8} {} a {} along {:.6} {:.6} {:.6}{} (camera frame)",
+                a.pitch,
+                if kind == AxisKind::Linear { "mm" } else { "rad" },
+                a.unit.name(),
+                d.x,
+                d.y,
+                d.z,
+                if kind == AxisKind::Linear { "" } else { &through }
+            )
+        };
+        // Most stations have a robot.
+        if Option::is_some(part) { line(kind.words(), part, shown) } else { String::new() }
+    };
+    let linear = axis(AxisKind::Linear, &rig.linear_axis);
+    let turntable = axis(AxisKind::Turntable, &rig.turntable);
+    format!("{}\n{camera}{plane}{pointer}{hand_eye}{linear}{turntable}", settings.name)
 }
 
 fn line<T>(what: &str, calibration: &Option<Calibration<T>>, value: impl Fn(&T) -> String) -> String {

@@ -16,7 +16,8 @@ macro_rules! frames {
 }
 
 frames! {
-    /// The robot's base: where clouds and insertion poses live.
+    /// Where clouds and insertion poses live: the robot's base; in recordings of an axis the [`Ride`]'s frame, in those of a part
+    /// that the robot carries its flange's. Reports name which.
     Base = "base";
     /// The robot's mounting flange, which the robot reports its pose of.
     Flange = "flange";
@@ -30,6 +31,8 @@ frames! {
     Tool = "tool";
     /// A height map: x along columns, y along rows, z up from the datum plane.
     Grid = "grid";
+    /// The part's side of a linear axis or turntable, where it stands at count 0: docs/conventions.md.
+    Ride = "axis";
     /// A line-profile sensor: measures in its own x-z plane, y = 0.
     Sensor = "sensor";
 }

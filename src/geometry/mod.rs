@@ -2,12 +2,14 @@
 //! coordinate frames are types, so that a product of mismatched frames does not compile.
 //! Frame and unit: named in the type; millimetres, radians, f64.
 
+mod axis;
 mod frame;
 mod plane;
 mod rigid;
 mod rotation;
 
-pub use frame::{Base, Board, Camera, Flange, Frame, Grid, Part, Sensor, Tool};
+pub use axis::{Axis, AxisKind, CountUnit, Riding, Twist};
+pub use frame::{Base, Board, Camera, Flange, Frame, Grid, Part, Ride, Sensor, Tool};
 pub use plane::{Plane, Ray, fit_plane};
 pub use rigid::Rigid;
 pub use rotation::{

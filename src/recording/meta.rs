@@ -1,7 +1,8 @@
 //! In: `meta.json`. Out: the recording's contents, with unknown keys, units and versions refused.
 //! Frame and unit: mm; pixel centres at integer coordinates.
 
-use super::BoardSpec;
+use super::frame::FrameRef;
+use super::{BoardSpec, Motion};
 use crate::fault::{Fault, Result};
 use crate::raster::{MOST_PIXELS, MOST_SIDE, Response};
 use std::collections::BTreeMap;
@@ -25,6 +26,9 @@ pub struct Meta {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ambient: Option<AmbientRef>,
     pub frames: Vec<FrameRef>,
+    /// What moved between the frames; the robot with the sensor where nothing is said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub motion: Option<Motion>,
     /// Name of the pose file without extension.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pose_file: Option<String>,
@@ -60,22 +64,6 @@ pub struct ImageSpec {
 pub enum Beam {
     Line,
     Pointer,
-}
-
-/// One moment of the recording: pictures taken without moving.
-#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FrameRef {
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub laser: Option<String>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub ambient: Option<String>,
-    /// Index into the pose file.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub pose: Option<usize>,
-    /// Index into `boards`.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub board: Option<usize>,
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -165,6 +153,16 @@ impl Meta {
                 _ => {}
             }
         }
+        match &self.motion {
+            Some(motion) => motion.check(&self.frames)?,
+            None if self.frames.iter().any(|f| f.count.is_some() || f.trigger.is_some()) => {
+                return refuse(
+                    "frames have a 'count' or 'trigger', and 'motion' does not say of what".into(),
+                    "state \"motion\": its kind, unit and what it carries (docs/file-formats.md)",
+                );
+            }
+            None => {}
+        }
         let boards = self.boards.len() + usize::from(self.board.is_some());
         for (i, f) in self.frames.iter().enumerate() {
             if f.laser.is_none() && f.ambient.is_none() {
@@ -178,6 +176,11 @@ impl Meta {
             }
         }
         Ok(())
+    }
+
+    /// What moved between the frames.
+    pub fn motion(&self) -> Motion {
+        self.motion.clone().unwrap_or_default()
     }
 
     /// The board of a frame: its own, or the only one there is.

@@ -1,17 +1,22 @@
-//! In: a recording folder (`meta.json`, pictures, `poses*.json|csv`). Out: what it contains, checked.
+//! In: a recording folder (`meta.json`, pictures, `poses*.json|csv`, counts). Out: what it contains, checked.
 //! Frame and unit: poses are base_from_flange in mm; boards in mm; see docs/file-formats.md.
 
 mod board;
 mod board_poses;
+mod counts;
+mod frame;
 mod markers;
 mod meta;
+mod motion;
 mod pose_csv;
 mod poses;
 
 pub use board::BoardSpec;
 pub use board_poses::load_board_poses;
+pub use frame::FrameRef;
 pub use markers::Markers;
-pub use meta::{AmbientRef, Beam, FrameRef, ImageSpec, Meta};
+pub use meta::{AmbientRef, Beam, ImageSpec, Meta};
+pub use motion::{Carries, Motion, MotionKind, Stand};
 pub use poses::{PoseFile, load_poses, save_poses};
 
 use crate::fault::{Fault, Result};

@@ -154,6 +154,16 @@ impl<T: Measured> Calibration<T> {
     }
 }
 
+/// Figures of an axis' quality that points are judged by: what it scatters by from stop to stop.
+pub const AXIS_SIGMA_MM: &str = "axis_sigma_mm";
+pub const AXIS_SIGMA_DEG: &str = "axis_sigma_deg";
+
+/// What an axis scatters by from stop to stop, mm and rad; `None` where the values come from elsewhere.
+pub fn axis_sigma(quality: &Quality) -> Option<[f64; 2]> {
+    let of = |name: &str| quality.figures.get(name).copied();
+    Some([of(AXIS_SIGMA_MM)?, of(AXIS_SIGMA_DEG)?.to_radians()])
+}
+
 impl Calibration<HandEye> {
     /// Sigma of the robot per axis, mm and degrees, that the calibration found; `None` where the values come from elsewhere
     /// and nothing is known of it.

@@ -6,7 +6,7 @@ use super::measured::Measured;
 use super::{Rig, Volume};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
-use crate::geometry::{Camera, Frame, Plane, Ray, Rigid, Vec2, Vec3};
+use crate::geometry::{Axis, AxisKind, Camera, CountUnit, Frame, Plane, Ray, Rigid, Vec2, Vec3};
 
 /// How far from 1 the length of a direction in a file may be: rounding. Longer or shorter ones were edited.
 const UNIT: f64 = 1e-9;
@@ -134,6 +134,27 @@ impl<To: Frame, From: Frame> Measured for Rigid<To, From> {
                 (t > FARTHEST)
                     .then(|| format!("the camera lies {t:.0} mm from the flange, which looks like micrometres"))
             })
+    }
+}
+
+impl Measured for Axis {
+    fn check(&self) -> Result<()> {
+        self.camera_from_axis.check()?;
+        let odd = match self.kind {
+            AxisKind::Linear => self.unit == CountUnit::Deg,
+            AxisKind::Turntable => self.unit == CountUnit::Mm,
+        };
+        if odd {
+            let what = format!("a {} whose counts are in {}", self.kind.words(), self.unit.name());
+            return Err(bad(what, "edited by hand"));
+        }
+        // A nanometre to a metre a count, and a turntable that does not pass half a turn a count.
+        let most = if self.kind == AxisKind::Linear { 1e3 } else { std::f64::consts::PI };
+        if !(self.pitch.abs() > 1e-9 && self.pitch.abs() < most) {
+            let what = format!("the pitch is {} a count, 1e-9 to {most:.4} is believed", self.pitch);
+            return Err(bad(what, "an axis that did not move, or another unit"));
+        }
+        Ok(())
     }
 }
 

@@ -8,7 +8,7 @@ use super::{Calibration, HandEye, Kind, Measured, Verdict};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::files::Together;
-use crate::geometry::{Camera, Plane, Ray};
+use crate::geometry::{Axis, AxisKind, Base, Camera, Plane, Ray, Rigid};
 use serde::{Serialize, de::DeserializeOwned};
 use std::path::{Path, PathBuf};
 
@@ -19,6 +19,10 @@ pub struct Rig {
     pub laser_plane: Option<Calibration<Plane<Camera>>>,
     pub pointer: Option<Calibration<Ray<Camera>>>,
     pub hand_eye: Option<Calibration<HandEye>>,
+    /// A camera that stands still before a robot that carries the part.
+    pub base_camera: Option<Calibration<Rigid<Base, Camera>>>,
+    pub linear_axis: Option<Calibration<Axis>>,
+    pub turntable: Option<Calibration<Axis>>,
 }
 
 impl Rig {
@@ -29,6 +33,9 @@ impl Rig {
             laser_plane: load(station, Kind::LaserPlane)?,
             pointer: load(station, Kind::Pointer)?,
             hand_eye: load(station, Kind::HandEye)?,
+            base_camera: load(station, Kind::BaseCamera)?,
+            linear_axis: load(station, Kind::LinearAxis)?,
+            turntable: load(station, Kind::Turntable)?,
         })
     }
 
@@ -72,6 +79,9 @@ impl Rig {
         add(&mut texts, &self.laser_plane)?;
         add(&mut texts, &self.pointer)?;
         add(&mut texts, &self.hand_eye)?;
+        add(&mut texts, &self.base_camera)?;
+        add(&mut texts, &self.linear_axis)?;
+        add(&mut texts, &self.turntable)?;
         let folder = station.join("calibration");
         crate::files::make_folder(&folder)?;
         let set = together(&folder);
@@ -129,12 +139,29 @@ impl Rig {
     pub fn need_hand_eye(&self) -> Result<&Calibration<HandEye>> {
         self.belonging(&self.hand_eye)?.ok_or_else(|| missing(Kind::HandEye))
     }
+    pub fn need_base_camera(&self) -> Result<&Calibration<Rigid<Base, Camera>>> {
+        self.belonging(&self.base_camera)?.ok_or_else(|| missing(Kind::BaseCamera))
+    }
+    pub fn need_axis(&self, kind: AxisKind) -> Result<&Calibration<Axis>> {
+        let (axis, kind) = match kind {
+            AxisKind::Linear => (&self.linear_axis, Kind::LinearAxis),
+            AxisKind::Turntable => (&self.turntable, Kind::Turntable),
+        };
+        self.belonging(axis)?.ok_or_else(|| missing(kind))
+    }
+    /// The axis of a rig that has one, where it has not both.
+    pub fn axis(&self) -> Option<&Calibration<Axis>> {
+        self.linear_axis.as_ref().xor(self.turntable.as_ref())
+    }
 
     /// Refuses parts of which one was measured with another camera than the station's.
     pub fn belong_together(&self) -> Result<()> {
         self.belonging(&self.laser_plane)?;
         self.belonging(&self.pointer)?;
-        self.belonging(&self.hand_eye).map(|_| ())
+        self.belonging(&self.hand_eye)?;
+        self.belonging(&self.base_camera)?;
+        self.belonging(&self.linear_axis)?;
+        self.belonging(&self.turntable).map(|_| ())
     }
 
     fn belonging<'a, T>(&self, part: &'a Option<Calibration<T>>) -> Result<Option<&'a Calibration<T>>> {
@@ -162,17 +189,35 @@ impl Rig {
             }
             said
         }
-        [of(&self.camera), of(&self.laser_plane), of(&self.pointer), of(&self.hand_eye)].concat()
+        [
+            of(&self.camera),
+            of(&self.laser_plane),
+            of(&self.pointer),
+            of(&self.hand_eye),
+            of(&self.base_camera),
+            of(&self.linear_axis),
+            of(&self.turntable),
+        ]
+        .concat()
     }
 
     /// One hash over the values that turn pixels into points; a scan keeps it, so that a later
     /// step can tell whether it was taken with the station's present calibration.
     pub fn fingerprint(&self) -> String {
-        let values = serde_json::json!({
+        let mut values = serde_json::json!({
             "camera": self.camera.as_ref().map(|c| c.value),
             "laser_plane": self.laser_plane.as_ref().map(|c| c.value),
             "hand_eye": self.hand_eye.as_ref().map(|c| c.value),
         });
+        // Only where they are there: scans of former versions keep their fingerprint.
+        let others = [
+            ("base_camera", self.base_camera.as_ref().map(|c| serde_json::json!(c.value))),
+            ("linear_axis", self.linear_axis.as_ref().map(|c| serde_json::json!(c.value))),
+            ("turntable", self.turntable.as_ref().map(|c| serde_json::json!(c.value))),
+        ];
+        for (name, value) in others.into_iter().filter_map(|(n, v)| Some((n, v?))) {
+            values[name] = value;
+        }
         super::hash_text(values.to_string().as_bytes())
     }
 }
@@ -210,19 +255,22 @@ fn together(folder: &Path) -> Together<'_> {
 }
 
 fn again(kind: Kind) -> String {
-    let command = kind.words().replace(' ', "-");
     format!(
-        "run sheetlight calibrate {command} again, put {0}.previous.json back, or vouch for it with sheetlight station seal \
-         --kind {command} --because WHY",
-        kind.name()
+        "run sheetlight calibrate {} again, put {}.previous.json back, or vouch for it with sheetlight station seal --kind {} \
+         --because WHY",
+        kind.command(),
+        kind.name(),
+        kind.name().replace('_', "-")
     )
 }
 
 fn missing(kind: Kind) -> Fault {
-    let (what, command) = (kind.words(), kind.words().replace(' ', "-"));
-    Fault::input(format!("the station has no {what} calibration"))
+    Fault::input(format!("the station has no {} calibration", kind.words()))
         .cause("it was never calibrated, or another folder was given as --station")
-        .next(format!("run sheetlight calibrate {command}, or import known values with sheetlight station import"))
+        .next(format!(
+            "run sheetlight calibrate {}, or import known values with sheetlight station import",
+            kind.command()
+        ))
 }
 
 fn file(station: &Path, kind: Kind) -> PathBuf {

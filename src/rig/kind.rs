@@ -16,6 +16,10 @@ pub enum Kind {
     BaseCamera,
     /// A line-profile sensor on the flange.
     ProfileHandEye,
+    /// What moves parts along before the camera, or the camera along parts.
+    LinearAxis,
+    /// What turns parts before the camera.
+    Turntable,
 }
 
 /// The frame, or the transform between two, that a value is in.
@@ -50,11 +54,21 @@ const POINTER: [&str; 6 + PARAMETERS] = {
     }
     all
 };
+const LINEAR: [&str; 4] = ["dx", "dy", "dz", "pitch_mm"];
+const TURNTABLE: [&str; 7] = ["dx", "dy", "dz", "pitch_rad", "px_mm", "py_mm", "pz_mm"];
 const POSE: [&str; 6] = ["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"];
 
 impl Kind {
     /// Those that a station's scans and ranges are made with.
-    pub const OF_A_RIG: [Kind; 4] = [Kind::Camera, Kind::LaserPlane, Kind::Pointer, Kind::HandEye];
+    pub const OF_A_RIG: [Kind; 7] = [
+        Kind::Camera,
+        Kind::LaserPlane,
+        Kind::Pointer,
+        Kind::HandEye,
+        Kind::BaseCamera,
+        Kind::LinearAxis,
+        Kind::Turntable,
+    ];
 
     /// In files and their names.
     pub fn name(self) -> &'static str {
@@ -65,15 +79,25 @@ impl Kind {
             Kind::HandEye => "hand_eye",
             Kind::BaseCamera => "base_camera",
             Kind::ProfileHandEye => "profile_hand_eye",
+            Kind::LinearAxis => "linear_axis",
+            Kind::Turntable => "turntable",
         }
     }
-    /// For people, and as `sheetlight calibrate` calls it with dashes for spaces.
+    /// The `sheetlight calibrate` command that makes it.
+    pub fn command(self) -> String {
+        match self {
+            Kind::BaseCamera => "hand-eye --eye-to-hand".into(),
+            Kind::LinearAxis | Kind::Turntable => "axis".into(),
+            _ => self.words().replace(' ', "-"),
+        }
+    }
+    /// For people.
     pub fn words(self) -> String {
         if self == Kind::HandEye { "hand-eye".into() } else { self.name().replace('_', " ") }
     }
     pub fn place(self) -> Place {
         match self {
-            Kind::Camera | Kind::LaserPlane | Kind::Pointer => Place::Camera,
+            Kind::Camera | Kind::LaserPlane | Kind::Pointer | Kind::LinearAxis | Kind::Turntable => Place::Camera,
             Kind::HandEye => Place::FlangeFromCamera,
             Kind::BaseCamera => Place::BaseFromCamera,
             Kind::ProfileHandEye => Place::FlangeFromSensor,
@@ -87,6 +111,8 @@ impl Kind {
             Kind::LaserPlane => (&PLANE, &[4]),
             Kind::Pointer => (&POINTER, &[6, 6 + ALWAYS_NAMED]),
             Kind::HandEye | Kind::BaseCamera | Kind::ProfileHandEye => (&POSE, &[6]),
+            Kind::LinearAxis => (&LINEAR, &[4]),
+            Kind::Turntable => (&TURNTABLE, &[7]),
         }
     }
     /// Whether it was measured with the camera, and is of no use with another.
@@ -101,9 +127,9 @@ impl std::str::FromStr for Kind {
     fn from_str(s: &str) -> Result<Kind, String> {
         let name = s.replace('-', "_");
         let known = BTreeMap::from(Kind::OF_A_RIG.map(|k| (k.name(), k)));
-        known
-            .get(name.as_str())
-            .copied()
-            .ok_or_else(|| format!("unknown calibration '{s}': camera, laser-plane, pointer or hand-eye"))
+        known.get(name.as_str()).copied().ok_or_else(|| {
+            let names = Kind::OF_A_RIG.map(|k| k.name().replace('_', "-"));
+            format!("unknown calibration '{s}': {}", names.join(", "))
+        })
     }
 }

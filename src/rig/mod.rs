@@ -1,5 +1,5 @@
 //! In: calibration results and the station folder's `calibration/*.json`. Out: the measured rig —
-//! camera, laser plane, pointer, hand-eye — each with its covariance, origin, seal and verdict.
+//! camera, laser plane, pointer, hand-eye, axes — each with its covariance, origin, seal and verdict.
 //! Frame and unit: camera and flange; millimetres, radians, pixels (docs/file-formats.md).
 
 mod calibration;
@@ -12,7 +12,10 @@ mod measured;
 mod seal;
 mod volume;
 
-pub use calibration::{Calibration, HandEye, Quality, ROBOT_SIGMA_DEG, ROBOT_SIGMA_MM, Verdict, hash_file};
+pub use calibration::{
+    AXIS_SIGMA_DEG, AXIS_SIGMA_MM, Calibration, HandEye, Quality, ROBOT_SIGMA_DEG, ROBOT_SIGMA_MM, Verdict, axis_sigma,
+    hash_file,
+};
 pub use covariance::Covariance;
 pub use folder::{Rig, asked};
 pub use hash::hash_text;

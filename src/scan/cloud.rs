@@ -1,6 +1,6 @@
 //! In: points as they leave the scanner, shot by shot. Out: a binary PLY that grows on disk, can be
 //! resumed after a crash, and gets its final name only when it is complete; and the way back.
-//! Frame and unit: robot base, mm; (u, v) in pixels of the shot; byte layout in docs/file-formats.md.
+//! Frame and unit: the frame that the header names, mostly the robot's base, mm; (u, v) in pixels of the shot; byte layout in docs/file-formats.md.
 
 use crate::fault::{Fault, Result};
 use crate::files::{moment, remove};
@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct CloudPoint {
-    /// Base frame, mm.
+    /// The cloud's frame, mm.
     pub position: [f32; 3],
     /// Standard deviation of the position along its worst direction, mm.
     pub sigma_mm: f32,
@@ -44,9 +44,12 @@ const PROPERTIES: [(&str, &str); 9] = [
 /// Points read or written at a time: 2.3 MB.
 const CHUNK: usize = 1 << 16;
 
-fn header(count: u64) -> String {
+/// Frames that clouds are in: [`crate::recording::Motion::frame`].
+const FRAMES: [&str; 3] = ["base", "axis", "flange"];
+
+fn header(count: u64, frame: &str) -> String {
     // Leading zeros, not spaces: every PLY reader takes them as a number.
-    let mut text = String::from("ply\nformat binary_little_endian 1.0\ncomment sheetlight cloud, base frame, mm\n");
+    let mut text = format!("ply\nformat binary_little_endian 1.0\ncomment sheetlight cloud, {frame} frame, mm\n");
     text += &format!("element vertex {count:0COUNT_DIGITS$}\n");
     for (kind, name) in PROPERTIES {
         text += &format!("property {kind} {name}\n");
@@ -78,17 +81,25 @@ pub struct CloudWriter {
     path: PathBuf,
     out: BufWriter<File>,
     count: u64,
+    frame: &'static str,
 }
 
 impl CloudWriter {
     /// Starts a cloud; an unfinished one of the same name is discarded.
     pub fn create(path: &Path) -> Result<CloudWriter> {
+        CloudWriter::create_in(path, FRAMES[0])
+    }
+
+    /// The same for points in another frame than the robot's base.
+    pub fn create_in(path: &Path, frame: &'static str) -> Result<CloudWriter> {
+        debug_assert!(FRAMES.contains(&frame), "{frame}");
         let part = part_of(path);
         // Anew, so that a link of that name leads nowhere.
         let file = remove(&part).and_then(|()| File::options().write(true).create_new(true).open(&part));
         let file = file.map_err(|e| Fault::write(&part, e))?;
-        let mut writer = CloudWriter { path: path.to_owned(), out: BufWriter::with_capacity(1 << 20, file), count: 0 };
-        writer.put(header(0).as_bytes())?;
+        let out = BufWriter::with_capacity(1 << 20, file);
+        let mut writer = CloudWriter { path: path.to_owned(), out, count: 0, frame };
+        writer.put(header(0, frame).as_bytes())?;
         Ok(writer)
     }
 
@@ -101,19 +112,19 @@ impl CloudWriter {
             moment().and_then(|()| std::fs::rename(path, &part)).map_err(|e| Fault::write(&part, e))?;
         }
         let mut file = File::options().read(true).write(true).open(&part).map_err(|e| Fault::read(&part, e))?;
-        let head = header(0);
-        let mut found = vec![0; head.len()];
         // Its count may be in it already.
-        let good = file.read_exact(&mut found).is_ok() && count_in(&found).is_some();
+        let head = head_of(&mut file).map_err(|e| Fault::read(&part, e))?;
         let length = file.metadata().map_err(|e| Fault::read(&part, e))?.len();
-        let wanted = head.len() as u64 + keep * RECORD;
-        if !good || length < wanted {
+        let (frame, start) = head.as_ref().map_or((FRAMES[0], 0), |h| (h.frame, h.length));
+        let wanted = start + keep * RECORD;
+        if head.is_none() || length < wanted {
             return Err(Fault::input(format!("{}: holds {length} bytes, {wanted} needed to resume", part.display()))
                 .cause("another program's file, or the disk lost what was written")
                 .next("start the scan again without resuming"));
         }
         file.set_len(wanted).and_then(|()| file.seek(SeekFrom::End(0))).map_err(|e| Fault::write(&part, e))?;
-        Ok(CloudWriter { path: path.to_owned(), out: BufWriter::with_capacity(1 << 20, file), count: keep })
+        let out = BufWriter::with_capacity(1 << 20, file);
+        Ok(CloudWriter { path: path.to_owned(), out, count: keep, frame })
     }
 
     fn put(&mut self, bytes: &[u8]) -> Result<()> {
@@ -143,7 +154,7 @@ impl CloudWriter {
         let part = part_of(&self.path);
         let done = moment()
             .and_then(|()| self.out.seek(SeekFrom::Start(0)))
-            .and_then(|_| self.out.write_all(header(self.count).as_bytes()))
+            .and_then(|_| self.out.write_all(header(self.count, self.frame).as_bytes()))
             .and_then(|()| self.out.flush())
             .and_then(|()| moment())
             .and_then(|()| self.out.get_ref().sync_all())
@@ -154,11 +165,30 @@ impl CloudWriter {
     }
 }
 
+/// The header of this program's clouds.
+struct Head {
+    frame: &'static str,
+    count: u64,
+    /// Bytes.
+    length: u64,
+}
+
+/// None where the file begins otherwise.
+fn head_of(file: &mut File) -> std::io::Result<Option<Head>> {
+    let longest = FRAMES.iter().map(|f| header(0, f).len()).max().unwrap_or(0);
+    let mut bytes = Vec::with_capacity(longest);
+    file.take(longest as u64).read_to_end(&mut bytes)?;
+    Ok(FRAMES.into_iter().find_map(|frame| {
+        let head = bytes.get(..header(0, frame).len())?;
+        Some(Head { frame, count: count_in(head, frame)?, length: head.len() as u64 })
+    }))
+}
+
 /// The count in a header of this program's; none in any other.
-fn count_in(head: &[u8]) -> Option<u64> {
+fn count_in(head: &[u8], frame: &str) -> Option<u64> {
     let text = std::str::from_utf8(head).ok()?;
     let count = text.lines().find_map(|l| l.strip_prefix("element vertex "))?.parse().ok()?;
-    (header(count).as_bytes() == head).then_some(count)
+    (header(count, frame).as_bytes() == head).then_some(count)
 }
 
 fn part_of(path: &Path) -> PathBuf {
@@ -187,15 +217,14 @@ impl CloudFile {
     pub fn open(path: &Path) -> Result<CloudFile> {
         let length = crate::files::length(path)?;
         let mut file = File::open(path).map_err(|e| Fault::read(path, e))?;
-        let mut bytes = vec![0; header(0).len()];
         let strange = |what: &str| {
             Fault::input(format!("{}: {what}", path.display()))
                 .cause("a PLY of another program, or a truncated one")
                 .next("give the cloud.ply of a sheetlight scan")
         };
-        file.read_exact(&mut bytes).map_err(|_| strange("is too short for a cloud"))?;
-        let count = count_in(&bytes).ok_or_else(|| strange("has another header than a sheetlight cloud"))?;
-        let start = bytes.len() as u64;
+        let head = head_of(&mut file).map_err(|e| Fault::read(path, e))?;
+        let Head { count, length: start, .. } =
+            head.ok_or_else(|| strange("is too short for a cloud, or has another header"))?;
         let needed = count.saturating_mul(RECORD).saturating_add(start);
         if length != needed {
             return Err(strange(&format!("is {length} bytes long, {count} points need {needed}")));

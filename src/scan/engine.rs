@@ -154,10 +154,14 @@ impl Engine {
         };
         let mut found: Vec<Stripe> = images.par_iter().filter_map(stripe).collect();
         let middle = found.len() / 2;
-        found.sort_by(|a, b| a.speckle.total_cmp(&b.speckle));
-        let speckle = found.get(middle)?.speckle;
-        found.sort_by(|a, b| a.width_px.total_cmp(&b.width_px));
-        Some(Stripe { width_px: found[middle].width_px, speckle, noise })
+        let mut median = |of: fn(&Stripe) -> f32| {
+            found.sort_by(|a, b| of(a).total_cmp(&of(b)));
+            found.get(middle).map(of)
+        };
+        let width_px = median(|s| s.width_px)?;
+        let speckle = median(|s| s.speckle)?;
+        let [read_noise, gain] = [median(|s| s.read_noise.unwrap_or(0.0)), median(|s| s.gain.unwrap_or(0.0))];
+        Some(Stripe { width_px, speckle, noise, read_noise, gain })
     }
 
     /// Takes over a stripe: the sizes of the fit, the least window of the threshold, limits above the noise; builds the GPU's

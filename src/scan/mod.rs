@@ -1,7 +1,8 @@
 //! In: shots with poses and a calibrated rig. Out: point clouds, height maps and the files that hold them.
-//! Frame and unit: clouds in the robot's base frame, height maps in a grid frame of their own; mm.
+//! Frame and unit: clouds in the frame of what is measured ([`crate::recording::Motion::frame`], mostly the robot's base), height maps in a grid frame of their own; mm.
 
 mod ambient;
+mod carrier;
 mod cloud;
 mod engine;
 mod extraction;
@@ -15,6 +16,7 @@ mod shift;
 mod source;
 
 pub use ambient::Ambient;
+pub use carrier::{Carrier, Place, parts_for};
 pub use cloud::{CloudFile, CloudPoint, CloudWriter, PointSource, read_cloud, write_cloud};
 pub use engine::{Engine, Measured, Optical};
 pub use extraction::Extraction;

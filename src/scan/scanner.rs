@@ -1,12 +1,12 @@
 //! In: shots in order, a calibrated rig, settings. Out: their profiles in order: peaks with their fate,
 //! points with their standard deviation.
-//! Frame and unit: points in the base frame, mm (docs/math.md, Stripe peak; the paper's eq. 5 and 6).
+//! Frame and unit: points in the carrier's frame (mostly the robot's base), mm (docs/math.md, Stripe peak; the paper's eq. 5 and 6).
 
 use super::engine::{Engine, Measured, Optical};
-use super::{Ambient, CloudPoint, Extraction, Format, Processor, Shot};
+use super::{Ambient, Carrier, CloudPoint, Extraction, Format, Place, Processor, Shot};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
-use crate::geometry::{Base, Camera, Flange, Plane, Rigid, Vec2, Vec3};
+use crate::geometry::{Base, Camera, Plane, Rigid, Vec2, Vec3};
 use crate::gpu::Device;
 use crate::raster::Image;
 use crate::rig::{Rig, Volume};
@@ -36,7 +36,7 @@ const SEEN_PLACES: u32 = 16;
 pub struct Scanner {
     engine: Engine,
     ambient: Option<Ambient>,
-    camera_from_flange: Rigid<Camera, Flange>,
+    carrier: Carrier,
     optics: Optics,
     /// Where the laser plane meets the optical axis, or comes closest to it; camera frame, mm.
     anchor: Vec3,
@@ -45,30 +45,30 @@ pub struct Scanner {
     waiting: Vec<Shot>,
     stripe: Option<Stripe>,
     support: Option<Support>,
-    /// Poses of shots that the engine works on, oldest first.
-    poses: std::collections::VecDeque<(u32, Rigid<Base, Camera>)>,
+    /// Places of shots that the engine or their neighbours' judgement still works on, oldest first.
+    places: std::collections::VecDeque<(u32, Place)>,
+    /// How many of them the engine has given back.
+    measured: usize,
     up: Vec3,
-    /// Where the scan's first shot was taken, if this is not its first part.
-    first: Option<Rigid<Base, Flange>>,
+    /// Where the scan's first shot was taken.
+    first: Option<Rigid<Base, Camera>>,
 }
 
 impl Scanner {
-    /// `ambient` is subtracted from every shot; `stripe` is what an earlier part of the same scan measured, if this one
-    /// is resumed.
-    /// Refused: a rig without camera, laser plane or hand-eye; another picture shape than the camera's.
+    /// `carrier` says where the camera is at a shot; `ambient` is subtracted from every shot.
+    /// Refused: a rig without camera or laser plane; another picture shape than the camera's.
     pub fn new(
         rig: &Rig,
+        carrier: Carrier,
         format: Format,
         extraction: &Extraction,
         volume: Option<&Volume>,
         ambient: Option<Image>,
         processor: Processor,
-        stripe: Option<Stripe>,
     ) -> Result<Scanner> {
         extraction.check()?;
         let camera = camera_for(&rig.need_camera()?.value, format)?;
         let laser = rig.need_laser_plane()?.value;
-        let flange_from_camera = rig.need_hand_eye()?.value;
         let optics = Optics::new(&camera, &laser);
         let depth_mm = Volume::depths(volume);
         let optical = Optical { camera, laser, depth_mm };
@@ -76,26 +76,36 @@ impl Scanner {
         Ok(Scanner {
             engine: Engine::new(format, &optical, extraction, ambient.clone(), processor),
             ambient,
-            camera_from_flange: flange_from_camera.inverse(),
+            carrier,
             optics,
             anchor: anchor(&camera, &laser, depth_mm),
             extraction: extraction.clone(),
             waiting: Vec::new(),
-            stripe,
+            stripe: None,
             support: None,
-            poses: Default::default(),
+            places: Default::default(),
+            measured: 0,
             up: Vec3::z(),
             first: None,
         })
     }
 
-    /// Where the first shot of a resumed scan was taken: what follows from it stays what it was.
-    pub fn began_at(&mut self, first: Option<Rigid<Base, Flange>>) {
-        self.first = first;
+    /// Goes on with a scan of which an earlier part measured the stripe and began there: what follows from it stays what it was.
+    pub fn resumed(mut self, stripe: Option<Stripe>, first: Option<Rigid<Base, Camera>>) -> Scanner {
+        (self.stripe, self.first) = (stripe, first);
+        self
+    }
+
+    /// Where the scan's first shot was taken, once one was.
+    pub fn first(&self) -> Option<Rigid<Base, Camera>> {
+        self.first
     }
 
     /// Takes the next shot. Profiles become ready some shots later.
     pub fn push(&mut self, shot: Shot) -> Result<()> {
+        if self.first.is_none() {
+            self.first = Some(self.carrier.place(&shot.stand, &self.anchor)?.from_camera);
+        }
         self.waiting.push(shot);
         if self.stripe.is_some() || self.waiting.len() >= MEASURED_SHOTS || !self.extraction.measure_stripe {
             self.release()?;
@@ -119,7 +129,7 @@ impl Scanner {
         self.stripe
     }
 
-    /// Towards the camera at the first shot, base frame.
+    /// Towards the camera at the first shot; on a turntable along its axis. Cloud's frame.
     pub fn up_in_base(&self) -> Vec3 {
         self.up
     }
@@ -148,7 +158,7 @@ impl Scanner {
                 ambient.suits(&self.waiting[0].image, &self.waiting[0].name)?;
             }
             let PeakParams { width_px, speckle, .. } = self.extraction.peak;
-            let assumed = Stripe { width_px, speckle, noise: 0.0 };
+            let assumed = Stripe { width_px, speckle, ..Stripe::default() };
             let stripe = match self.stripe {
                 Some(s) => s,
                 None if self.extraction.measure_stripe => {
@@ -159,22 +169,36 @@ impl Scanner {
             };
             self.stripe = Some(stripe);
             self.engine.set_stripe(&stripe)?;
-            let first = self.first.unwrap_or(self.waiting[0].base_from_flange);
-            let base_from_camera = first * self.camera_from_flange.inverse();
-            self.up = -base_from_camera.direction(&Vec3::z());
-            let [nx, ny, _] = self.optics.normal.map(f64::from);
-            let along = Vec3::new(ny, -nx, 0.0).try_normalize(1e-9).unwrap_or(Vec3::x());
-            let axis = base_from_camera.direction(&along);
+            let base_from_camera = self.first.expect("a shot was taken");
+            let towards = -base_from_camera.direction(&Vec3::z());
+            // Seen from the camera a turntable's part turns: its map lies over the table.
+            self.up = if self.carrier.turns() { Vec3::z() * towards.z.signum() } else { towards };
+            let axis = base_from_camera.direction(&self.along());
             let device = self.device();
             let field = self.pitch() * self.engine.width() as f32;
             self.support = Some(Support::new(self.extraction.support, stripe.width_px, field, &axis, device)?);
         }
         for shot in std::mem::take(&mut self.waiting) {
-            let base_from_camera = shot.base_from_flange * self.camera_from_flange.inverse();
-            self.poses.push_back((shot.index, base_from_camera));
-            self.engine.submit(shot.index, shot.image, point::pose_words(&base_from_camera))?;
+            let place = self.carrier.place(&shot.stand, &self.anchor)?;
+            self.places.push_back((shot.index, place));
+            self.engine.submit(shot.index, shot.image, point::pose_words(&place.from_camera))?;
         }
         Ok(())
+    }
+
+    /// Direction of the stripe, camera frame.
+    fn along(&self) -> Vec3 {
+        let [nx, ny, _] = self.optics.normal.map(f64::from);
+        Vec3::new(ny, -nx, 0.0).try_normalize(1e-9).unwrap_or(Vec3::x())
+    }
+
+    /// Places by which the distance of two shots is told, camera frame: on a turntable the middle hardly moves.
+    fn anchors(&self) -> [Vec3; 3] {
+        if !self.carrier.turns() {
+            return [self.anchor; 3];
+        }
+        let half = self.along() * (0.5 * f64::from(self.pitch()) * f64::from(self.engine.width()));
+        [self.anchor - half, self.anchor, self.anchor + half]
     }
 
     /// What a pixel sees where the sheet meets the optical axis, mm.
@@ -186,10 +210,11 @@ impl Scanner {
         let pitch = self.pitch();
         let mut measured = Vec::new();
         for Measured { shot, peaks, points } in self.engine.collect(all)? {
-            let (index, base_from_camera) = self.poses.pop_front().expect("one pose a shot submitted");
-            assert_eq!(index, shot, "the engine keeps the order");
-            let anchor = base_from_camera.point(&self.anchor);
-            measured.push(support::Profile { shot, peaks, points, anchor, pitch });
+            let (index, place) = &self.places[self.measured];
+            assert_eq!(*index, shot, "the engine keeps the order");
+            self.measured += 1;
+            let anchors = self.anchors().map(|a| place.from_camera.point(&a));
+            measured.push(support::Profile { shot, peaks, points, anchors, pitch });
         }
         let judged = match &mut self.support {
             Some(support) => support.take(measured, all)?,
@@ -198,7 +223,11 @@ impl Scanner {
         Ok(judged.into_iter().map(|p| self.profile(p)).collect())
     }
 
-    fn profile(&self, judged: support::Profile) -> Profile {
+    fn profile(&mut self, judged: support::Profile) -> Profile {
+        let (index, place) = self.places.pop_front().expect("one place a shot submitted");
+        assert_eq!(index, judged.shot, "shots are judged in order");
+        self.measured -= 1;
+
         let width = self.stripe.map_or(1.0, |s| s.width_px);
         let limit = self.extraction.choose.uncertain * width;
         let points = judged
@@ -208,7 +237,7 @@ impl Scanner {
             .filter(|(k, _)| k.kept())
             .map(|(k, p)| CloudPoint {
                 position: p.position,
-                sigma_mm: p.sigma_mm,
+                sigma_mm: with_place(p.sigma_mm, &p.position, &place),
                 intensity: k.amplitude,
                 quality: quality(k, limit),
                 shot: judged.shot,
@@ -218,6 +247,15 @@ impl Scanner {
             .collect();
         Profile { shot: judged.shot, peaks: judged.peaks, points }
     }
+}
+
+/// The standard deviation along the worst direction, with what the place of the shot adds.
+fn with_place(sigma_mm: f32, position: &[f32; 3], place: &Place) -> f32 {
+    if place.covariance.is_none() {
+        return sigma_mm;
+    }
+    let more = place.variance_at(&Vec3::from(position.map(f64::from)));
+    (f64::from(sigma_mm).powi(2) + more).sqrt() as f32
 }
 
 /// The part of the allowed standard deviation that a peak leaves unused; halved where it is saturated.

@@ -1,24 +1,24 @@
 //! In: a recording folder, or raw frames on a pipe with a pose file. Out: shots in order, decoded
 //! ahead on other threads, a bounded number of them in memory.
-//! Frame and unit: poses are base_from_flange, mm; pictures in grey levels of the sensor's depth.
+//! Frame and unit: robot poses are base_from_flange, mm, an axis stands at counts; pictures in grey levels of the sensor's depth.
 
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid};
 use crate::raster::Image;
-use crate::recording::Recording;
+use crate::recording::{Recording, Stand};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::io::Read;
 use std::sync::mpsc::{Receiver, sync_channel};
 
-/// A picture of the stripe with the robot pose that it was taken at.
+/// A picture of the stripe, and where what moves stood when it was taken.
 #[derive(Clone, Debug)]
 pub struct Shot {
     /// Place in the recording, from 0.
     pub index: u32,
     pub name: String,
     pub image: Image,
-    pub base_from_flange: Rigid<Base, Flange>,
+    pub stand: Stand,
 }
 
 /// A shot that could not be had, with the reason; the next one may be fine.
@@ -73,25 +73,11 @@ impl RecordingSource {
     /// Refused: no laser pictures, a pose index outside the pose file.
     pub fn open(recording: &Recording, poses: Option<&str>, first: usize) -> Result<RecordingSource> {
         let meta = &recording.meta;
-        let poses = recording.poses(poses)?;
+        let stands = if meta.motion().axis().is_some() { counted(recording)? } else { posed(recording, poses)? };
         let mut jobs = Vec::new();
-        for (i, frame) in meta.frames.iter().enumerate() {
-            let Some(name) = &frame.laser else { continue };
-            recording.inside(name)?;
-            let pose = frame.pose.ok_or_else(|| {
-                Fault::input(format!("frame {i} ({name}) has no pose"))
-                    .cause("the recording was made without a robot")
-                    .next("add \"pose\" to each frame of meta.json")
-            })?;
-            let Some(base_from_flange) = poses.get(pose) else {
-                return Err(Fault::input(format!(
-                    "frame {i} ({name}) needs pose {pose}, the pose file has {}",
-                    poses.len()
-                ))
-                .cause("the pose file was cut short, or belongs to another recording")
-                .next("record the poses again, or leave the frames without poses out of meta.json"));
-            };
-            jobs.push((jobs.len() as u32, name.clone(), *base_from_flange));
+        for (name, stand) in stands {
+            recording.inside(&name)?;
+            jobs.push((jobs.len() as u32, name, stand));
         }
         if jobs.is_empty() {
             return Err(Fault::input(format!("{}: has no picture with the laser on", recording.folder.display()))
@@ -108,9 +94,13 @@ impl RecordingSource {
             for chunk in jobs.chunks((ahead / 2).max(rayon::current_num_threads())) {
                 let decoded: Vec<_> = chunk
                     .par_iter()
-                    .map(|(index, name, pose)| match recording.picture(name) {
-                        Ok(image) => Ok(Shot { index: *index, name: name.clone(), image, base_from_flange: *pose }),
-                        Err(fault) => Err(BadShot { index: *index, name: name.clone(), fault, last: false }),
+                    .map(|(index, name, stand)| {
+                        let (index, name) = (*index, name.clone());
+                        let shot = stand.clone().and_then(|s| Ok((s, recording.picture(&name)?)));
+                        match shot {
+                            Ok((stand, image)) => Ok(Shot { index, name, image, stand }),
+                            Err(fault) => Err(BadShot { index, name, fault, last: false }),
+                        }
                     })
                     .collect();
                 for shot in decoded {
@@ -125,6 +115,47 @@ impl RecordingSource {
         let remarks = meta.image.response.remark(meta.image.bits).into_iter().collect();
         Ok(RecordingSource { format, remarks, remaining, shots })
     }
+}
+
+/// A picture's name, and where what moves stood when it was taken.
+type Stood = (String, Result<Stand>);
+
+/// Pictures with the laser on and their robot poses.
+fn posed(recording: &Recording, poses: Option<&str>) -> Result<Vec<Stood>> {
+    let poses = recording.poses(poses)?;
+    let frames = recording.meta.frames.iter().enumerate();
+    let stand = |(i, name, pose): (usize, &String, Option<usize>)| {
+        let pose = pose.ok_or_else(|| {
+            Fault::input(format!("frame {i} ({name}) has no pose"))
+                .cause("the recording was made without a robot")
+                .next("add \"pose\" to each frame of meta.json, or state the \"motion\" of the axis that moved")
+        })?;
+        let Some(base_from_flange) = poses.get(pose) else {
+            return Err(Fault::input(format!(
+                "frame {i} ({name}) needs pose {pose}, the pose file has {}",
+                poses.len()
+            ))
+            .cause("the pose file was cut short, or belongs to another recording")
+            .next("record the poses again, or leave the frames without poses out of meta.json"));
+        };
+        Ok((name.clone(), Ok(Stand::Robot(*base_from_flange))))
+    };
+    frames.filter_map(|(i, f)| Some((i, f.laser.as_ref()?, f.pose))).map(stand).collect()
+}
+
+/// Pictures with the laser on and the axis' counts. One whose count is not known is a bad shot: nothing is made up for it.
+fn counted(recording: &Recording) -> Result<Vec<Stood>> {
+    let counts = recording.counts()?;
+    let frames = recording.meta.frames.iter().zip(counts).enumerate();
+    let stand = |(i, (name, count)): (usize, (&String, Option<f64>))| {
+        let unknown = || {
+            Fault::input(format!("frame {i} ({name}) has no count"))
+                .cause("the encoder's reading was lost")
+                .next("add its count to the recording, or leave the shot out with --skip-bad")
+        };
+        (name.clone(), count.map(Stand::Count).ok_or_else(unknown))
+    };
+    Ok(frames.filter_map(|(i, (f, count))| Some((i, (f.laser.as_ref()?, count)))).map(stand).collect())
 }
 
 impl Source for RecordingSource {
@@ -300,7 +331,7 @@ impl<R: Read> Source for RawSource<R> {
             return bad(self.uneven(format!("more than {came} frames")));
         };
         self.next += 1;
-        Some(Ok(Shot { index, name, image, base_from_flange }))
+        Some(Ok(Shot { index, name, image, stand: Stand::Robot(base_from_flange) }))
     }
 }
 

@@ -45,6 +45,9 @@ pub struct CameraSpec {
     pub focal_mm: f64,
     #[serde(rename = "distortion_k1_k2_p1_p2_k3", default)]
     pub distortion: [f64; 5],
+    /// The sensor's tilt against the lens, OpenCV's tau_x and tau_y, -30..=30 degrees (Scheimpflug).
+    #[serde(default)]
+    pub sensor_tilt_deg: [f64; 2],
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -167,6 +170,7 @@ impl RigSpec {
         ];
         limits.extend(m.at_mm.iter().map(|v| ("mount.at_mm", *v, -2000.0, 2000.0)));
         limits.extend(c.distortion.iter().map(|v| ("camera.distortion_k1_k2_p1_p2_k3", *v, -1e3, 1e3)));
+        limits.extend(c.sensor_tilt_deg.iter().map(|v| ("camera.sensor_tilt_deg", *v, -30.0, 30.0)));
         if let Some(p) = &self.pointer {
             limits.extend([
                 ("pointer.waist_radius_mm", p.waist_radius_mm, 0.001, 20.0),

@@ -4,7 +4,7 @@
 
 use super::rig::RigSpec;
 use super::sensor::Sensor;
-use crate::camera::{ALWAYS_NAMED, Intrinsics, NAMES};
+use crate::camera::{ALWAYS_NAMED, Distortion, Intrinsics, NAMES};
 use crate::fault::Result;
 use crate::geometry::{Camera, Flange, Plane, Ray, Rigid, Vec3, exp};
 use crate::rig::{Calibration, Covariance, HandEye, Kind, Quality, Rig, Verdict};
@@ -103,20 +103,29 @@ impl Station {
         let (width, height) = (f64::from(c.width_px), f64::from(c.height_px));
         let f = off(rig.focal_px(), 30.0 / 611.6 * rig.focal_px());
         let [k1, k2, p1, p2, k3] = c.distortion;
+        let [tau_x, tau_y] = c.sensor_tilt_deg.map(f64::to_radians);
         let camera = Intrinsics {
             fx: f,
             fy: f * off(1.0, 0.002),
             cx: off((width - 1.0) / 2.0, width / 80.0),
             cy: off((height - 1.0) / 2.0, height / 60.0),
             skew: 0.0,
-            distortion: [
+            distortion: Distortion([
                 off(k1, 3.0 / 11.0 * k1.abs()),
                 off(k2, 3.0 / 8.0 * k2.abs()),
                 off(p1, 8e-4),
                 off(p2, 8e-4),
                 off(k3, 2.0 / 3.0 * k3.abs()),
-            ]
-            .into(),
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                0.0,
+                tau_x,
+                tau_y,
+            ]),
             width: c.width_px,
             height: c.height_px,
         };
@@ -200,6 +209,7 @@ impl Station {
             pointer: Some(Calibration::new(Kind::Pointer, self.pointer.ray(), with, pointer, quality.clone())),
             hand_eye: Some(Calibration::new(Kind::HandEye, self.flange_from_camera, with, hand_eye, quality)),
             camera: Some(camera),
+            ..Rig::default()
         };
         rig.store_all(folder).map(|_| ())
     }

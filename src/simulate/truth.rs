@@ -1,13 +1,13 @@
 //! In: `truth.json` of a simulated recording. Out: the exact surface and poses, and how far measured
 //! points are from them.
-//! Frame and unit: base frame, mm; keys named `A_T_b` map coordinates in frame b to frame A.
+//! Frame and unit: the cloud's frame (base; of a part that rides on an axis the axis frame), mm; keys named `A_T_b` map coordinates in frame b to frame A.
 
 use super::light::InScene;
 use super::scene::{Scene, SceneSpec, part_pose};
 use super::station::Station;
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
-use crate::geometry::{Base, Board, Camera, Part, Plane, Rigid, Vec3};
+use crate::geometry::{Axis, Base, Board, Camera, Part, Plane, Rigid, Vec3};
 use crate::rig::HandEye;
 use std::path::Path;
 
@@ -24,6 +24,9 @@ pub struct TruthFile {
     pub laser_plane_camera: Plane<Camera>,
     pub laser_source_camera_mm: Vec3,
     pub pointer_camera: PointerTruth,
+    /// What moves the part, where no robot moves the sensor; `base` in other keys then stands for the axis frame.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub axis: Option<Axis>,
     #[serde(rename = "base_T_scene", default, skip_serializing_if = "Option::is_none")]
     pub base_from_scene: Option<Rigid<Base, InScene>>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -70,6 +73,7 @@ impl TruthFile {
             laser_plane_camera: station.laser.plane(),
             laser_source_camera_mm: station.laser.source,
             pointer_camera: PointerTruth { origin: station.pointer.source, direction: station.pointer.axis },
+            axis: None,
             base_from_scene: None,
             scene: None,
             parts: vec![],

@@ -5,15 +5,17 @@
 use super::light::{Canvas, InScene, View};
 use super::picture::{expose, hot_pixels};
 use super::plan::{self, Views};
+use super::ride::Ride;
 use super::rig::{RigSpec, three_digits};
 use super::scene::{Scene, SceneSpec};
 use super::sensor::Sensor;
-use super::station::Station;
+use super::station::{Station, TRUE_VALUES};
 use super::truth::TruthFile;
 use crate::fault::{Fault, Result};
-use crate::geometry::{Base, Board, Camera, Flange, Mat3, Rigid, Vec3};
+use crate::geometry::{AxisKind, Base, Board, Camera, Flange, Mat3, Rigid, Vec3};
 use crate::raster::{Image, save_png};
-use crate::recording::{AmbientRef, Beam, BoardSpec, FrameRef, ImageSpec, Meta, save_poses};
+use crate::recording::{AmbientRef, Beam, BoardSpec, FrameRef, ImageSpec, Meta, Motion, save_poses};
+use crate::rig::{Calibration, Covariance, Kind, Quality, Rig, Verdict};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
@@ -35,9 +37,12 @@ pub enum Set {
     Pointer,
     /// The pointer's spot on the scene from several robot poses, for the surface normal.
     Surface,
+    /// A chessboard that rides on the axis, at several of its stops.
+    Axis,
 }
 
 impl Set {
+    /// Those of a robot's station; one with an axis has [`Set::Axis`] beside them.
     pub const ALL: [Set; 7] =
         [Set::Scan, Set::Intrinsics, Set::Handeye, Set::Laserplane, Set::PointerCal, Set::Pointer, Set::Surface];
     pub fn name(self) -> &'static str {
@@ -49,6 +54,7 @@ impl Set {
             Set::PointerCal => "pointer_cal",
             Set::Pointer => "pointer",
             Set::Surface => "surface",
+            Set::Axis => "axis",
         }
     }
 }
@@ -56,10 +62,10 @@ impl Set {
 impl std::str::FromStr for Set {
     type Err = String;
     fn from_str(s: &str) -> std::result::Result<Set, String> {
-        Set::ALL
-            .into_iter()
+        let mut known = Set::ALL.into_iter().chain([Set::Axis]);
+        known
             .find(|x| x.name() == s)
-            .ok_or_else(|| format!("unknown set '{s}': {}, all", Set::ALL.map(Set::name).join(", ")))
+            .ok_or_else(|| format!("unknown set '{s}': {}, axis, all", Set::ALL.map(Set::name).join(", ")))
     }
 }
 
@@ -84,6 +90,8 @@ pub struct SimulateOptions {
     pub sensor: Sensor,
     /// Shots of a scan, 2..=100000.
     pub shots: usize,
+    /// An axis moves the parts past the sensor, which stands still; `None`: a robot moves the sensor.
+    pub motion: Option<AxisKind>,
     /// Where the robot stands for each shot of a scan or of the pointer on the scene, instead of places of our choice.
     pub poses: Option<Vec<Rigid<Base, Flange>>>,
     /// Errors of the reported robot poses, 1 sigma per axis, mm 0..=10 and degrees 0..=5.
@@ -109,6 +117,7 @@ impl SimulateOptions {
             height: rig.camera.height_px,
             sensor: rig.sensor,
             shots: rig.shots(),
+            motion: None,
             poses: None,
             rig: Some(rig),
             pose_noise_mm: 0.0,
@@ -126,6 +135,10 @@ impl SimulateOptions {
             ("pose noise in degrees", self.pose_noise_deg, 0.0, 5.0),
             ("the number of sets", self.sets.len() as f64, 1.0, 100.0),
         ];
+        if self.motion.is_none() && self.sets.contains(&Set::Axis) {
+            return Err(Fault::usage("the set axis shows a board on an axis, and no axis is simulated")
+                .next("name one: --motion linear or --motion turntable"));
+        }
         if self.poses.is_some() && !matches!(self.sets[..], [Set::Scan] | [Set::Surface]) {
             return Err(Fault::usage("poses were given for something else than one scan or one set surface")
                 .next("simulate scan or surface alone, or leave the poses out"));
@@ -182,11 +195,21 @@ pub fn simulate(out: &Path, options: &SimulateOptions, progress: &(dyn Fn(usize,
     let folder = out.join("station");
     crate::files::make_folder(&folder)?;
     station.store(&folder)?;
+    let ride = options.motion.map(|kind| {
+        let board = options.board.clone().unwrap_or_else(|| riding_board(&station.rig));
+        (Ride::new(kind, &station, &scene, &board, options.shots), board)
+    });
+    if let Some((ride, _)) = &ride {
+        store_axis(ride, &folder)?;
+    }
     if let (None, Some(rig)) = (&options.scene, &options.rig) {
         crate::files::write(&out.join("notched.toml"), rig.recipe(options.shots).as_bytes())?;
     }
-    let plans: Vec<Plan> =
-        options.sets.iter().map(|set| Plan::new(*set, &station, &scene, options)).collect::<Result<_>>()?;
+    let plans: Vec<Plan> = options
+        .sets
+        .iter()
+        .map(|set| Plan::new(*set, &station, &scene, options, ride.as_ref()))
+        .collect::<Result<_>>()?;
     let total = plans.iter().map(|p| p.shots.iter().map(Shot::pictures).sum::<usize>()).sum();
     let done = std::sync::atomic::AtomicUsize::new(0);
     let count = || progress(1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed), total);
@@ -222,7 +245,34 @@ struct Plan {
     shots: Vec<Shot>,
     /// True robot poses, one a shot; none for sets without a robot.
     poses: Vec<Rigid<Base, Flange>>,
+    /// Where an axis stood, one a shot; none where no axis moves.
+    counts: Vec<f64>,
     truth: TruthFile,
+    motion: Option<Motion>,
+}
+
+/// The board that rides on an axis: small enough to be in the picture along some way of it, or all around.
+fn riding_board(rig: &RigSpec) -> BoardSpec {
+    chessboard(9, 6, 6.0, 5.0, rig.board_scale())
+}
+
+/// The true axis as a calibration of the station.
+fn store_axis(ride: &Ride, station: &Path) -> Result<()> {
+    let kind = match ride.axis.kind {
+        AxisKind::Linear => Kind::LinearAxis,
+        AxisKind::Turntable => Kind::Turntable,
+    };
+    let quality = Quality {
+        verdict: Verdict::Good,
+        reasons: vec![TRUE_VALUES.into()],
+        advice: vec![],
+        figures: Default::default(),
+        per_picture: vec![],
+    };
+    let names = kind.parameters().0;
+    let covariance = Covariance::new(names, &nalgebra::DMatrix::zeros(names.len(), names.len()));
+    let camera = Rig::load_camera(station)?.camera;
+    Rig::store(station, &Calibration::new(kind, ride.axis, camera.as_ref(), covariance, quality), None).map(|_| ())
 }
 
 /// A board of our choice, `scale` times as large, to three digits.
@@ -237,9 +287,20 @@ fn scene_from_board() -> Rigid<InScene, Board> {
 }
 
 impl Plan {
-    fn new(set: Set, station: &Station, scene: &Scene, options: &SimulateOptions) -> Result<Plan> {
+    fn new(
+        set: Set,
+        station: &Station,
+        scene: &Scene,
+        options: &SimulateOptions,
+        ride: Option<&(Ride, BoardSpec)>,
+    ) -> Result<Plan> {
         let truth = TruthFile::of(station, set.name());
-        let mut plan = Plan { set, scenes: vec![], boards: vec![], shots: vec![], poses: vec![], truth };
+        let (scenes, boards, shots, poses, counts) = (vec![], vec![], vec![], vec![], vec![]);
+        let mut plan = Plan { set, scenes, boards, shots, poses, counts, truth, motion: None };
+        if let (Some((ride, board)), Set::Scan | Set::Axis) = (ride, set) {
+            plan.ride(station, scene, ride, board)?;
+            return Ok(plan);
+        }
         // Poses of boards whose middle is so many working distances away, and how large boards are beside those that the
         // default rig sees there: they come into the picture whole, and nobody holds one outside the working volume.
         let (rig, z) = (&station.rig, station.working_distance);
@@ -248,6 +309,7 @@ impl Plan {
             (Views { count, near, far, tilt_deg, turn_deg, seen: 1.0 }, rig.board_scale() * near / (wanted[0] * z))
         };
         match set {
+            Set::Axis => unreachable!("refused without an axis"),
             Set::Scan | Set::Surface => {
                 let base_from_scene = plan::base_from_scene(station);
                 plan.truth = plan.truth.with_scene(scene, base_from_scene);
@@ -312,6 +374,31 @@ impl Plan {
         Ok(plan)
     }
 
+    /// What comes past a sensor that stands still: the scene, shot by shot, or a board, stop by stop.
+    fn ride(&mut self, station: &Station, scene: &Scene, ride: &Ride, board: &BoardSpec) -> Result<()> {
+        self.motion = Some(ride.motion());
+        self.truth.axis = Some(ride.axis);
+        if self.set == Set::Axis {
+            self.scenes = vec![Scene::of_board(board, 0.85, 0.06)?];
+            self.boards = vec![board.clone()];
+            for (count, pose) in ride.stops(station, board)? {
+                let scene_from_camera = scene_from_board() * pose.inverse();
+                self.shots.push(Shot { scene_from_camera, scene: 0, laser: None, ambient: true, board: None });
+                self.counts.push(count);
+                self.truth.camera_from_board.push(pose);
+            }
+            return Ok(());
+        }
+        self.truth = self.truth.clone().with_scene(scene, ride.cloud_from_scene());
+        self.scenes = vec![scene.clone()];
+        for (i, count) in ride.counts.iter().enumerate() {
+            let (scene_from_camera, ambient) = (ride.scene_from_camera(*count), i == ride.counts.len() / 2);
+            self.shots.push(Shot { scene_from_camera, scene: 0, laser: Some(Beam::Line), ambient, board: None });
+            self.counts.push(*count);
+        }
+        Ok(())
+    }
+
     /// Boards in free poses, one after another; with a beam each pose is seen by room light and by laser.
     fn show_boards(
         &mut self,
@@ -345,7 +432,7 @@ impl Plan {
     }
 
     fn meta(&self, station: &Station) -> Meta {
-        let single = self.boards.len() == 1 && matches!(self.set, Set::Intrinsics | Set::Handeye);
+        let single = self.boards.len() == 1 && matches!(self.set, Set::Intrinsics | Set::Handeye | Set::Axis);
         let beam = self.shots.first().and_then(|s| s.laser);
         let mut meta = Meta {
             format: 1,
@@ -364,6 +451,7 @@ impl Plan {
             boards: if single { vec![] } else { self.boards.clone() },
             ambient: None,
             frames: vec![],
+            motion: self.motion.clone(),
             pose_file: None,
             pose_files: Default::default(),
             part: None,
@@ -383,6 +471,8 @@ impl Plan {
                 ambient: (shot.ambient && !lone).then(|| format!("ambient_{i:04}.png")),
                 pose,
                 board: shot.board,
+                count: self.counts.get(i).copied(),
+                ..FrameRef::default()
             });
         }
         match self.set {

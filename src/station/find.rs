@@ -1,6 +1,6 @@
 //! In: a scan folder, a recipe, the station that scanned. Out: the insertion's report and its picture;
 //! a scan taken with another calibration than the station's is refused.
-//! Frame and unit: base frame, mm.
+//! Frame and unit: the scan's frame, mm; plans of a second look: base.
 
 use super::height_witness::height_witness;
 use super::scan::report::{ScanReport, cloud_of, load_report};
@@ -8,12 +8,11 @@ use crate::fault::{Fault, Result};
 use crate::find::insert::picture;
 use crate::find::insert::teach::{TeachOptions, teach};
 use crate::find::{LocateOptions, LookPlan, Recipe, Report, agree, locate, plan_look};
-use crate::geometry::{Base, Flange, Rigid};
+use crate::geometry::{AxisKind, Base, Flange, Rigid, Vec3};
 use crate::raster::RgbImage;
 use crate::recording::Recording;
 use crate::rig::Rig;
-use crate::scan::GridOptions;
-use crate::scan::grid;
+use crate::scan::{GridOptions, grid, parts_for};
 use std::path::{Path, PathBuf};
 
 /// What is known of one part: finished scans of it, and pictures of the pointer's spot on it.
@@ -102,6 +101,12 @@ pub fn second_look(
     turn_deg: f64,
     tilt_deg: f64,
 ) -> Result<SecondLook> {
+    let motion = load_report(scan)?.motion;
+    if motion.frame() != "base" {
+        return Err(Fault::usage(format!("{}: was scanned in the {} frame", scan.display(), motion.frame()))
+            .cause("no robot moved the sensor, so none can be sent for a second look")
+            .next("scan the part again as it lies otherwise on the axis"));
+    }
     let (report, _) = find_part(scan, recipe, Some(station), &LocateOptions::default())?;
     let plan = plan_look(&report, &Rig::load(station)?, turn_deg, tilt_deg)?;
     let flanges = poses.iter().map(|p| plan.base_from_base * *p).collect();
@@ -116,13 +121,23 @@ pub fn find_part(
     options: &LocateOptions,
 ) -> Result<(Report, RgbImage)> {
     let scanned = load_report(scan)?;
-    let rig = station.map(Rig::load).transpose()?;
+    let rig = station.map(Rig::load).transpose()?.map(|rig| parts_for(&rig, &scanned.motion));
     if let (Some(rig), Some(station)) = (&rig, station) {
         rig.belong_together().map_err(|e| e.at(station.display()))?;
         fits(rig, scan, &scanned)?;
     }
     let cloud = cloud_of(scan)?;
+    // A turntable's part turns before the camera: heights are those over the table, z of the axis frame.
+    let over_table = (scanned.motion.axis() == Some(AxisKind::Turntable)).then(Vec3::z);
+    let options = &LocateOptions { up: options.up.or(over_table), ..options.clone() };
     let mut report = locate(&cloud, recipe, rig.as_ref(), options).map_err(|e| e.at(scan.display()))?;
+    if scanned.frame != report.frame {
+        report.notes.push(format!(
+            "all poses are in the {} frame of the scan, not in a robot's base (docs/conventions.md)",
+            scanned.frame
+        ));
+        report.frame = scanned.frame.clone();
+    }
     report.notes.extend(scanned.remarks);
     let image = picture::draw(&report, &recipe.drawing());
     Ok((report, image))

@@ -138,6 +138,7 @@ pub fn guide(options: &GuideOptions, confirm: &mut dyn FnMut(&Step) -> Result<bo
         extraction: settings.extraction.clone(),
         grid: GridOptions::default(),
         volume: volume::believed(&settings, &rig),
+        motion: crate::recording::Motion::default(),
         ambient: None,
         overlays: 0,
         skip_bad: false,

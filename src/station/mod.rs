@@ -13,6 +13,7 @@ mod values;
 mod verify;
 pub mod volume;
 
+pub use calibrate::axis::{AxisRun, calibrate_axis};
 pub use calibrate::ball::{calibrate_profile_hand_eye, evaluate_profile_hand_eye};
 pub use calibrate::board_views::{Boards, FrameBoard, boards};
 pub use calibrate::hand_eye::{

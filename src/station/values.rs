@@ -4,7 +4,7 @@
 
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
-use crate::geometry::{Camera, ORTHONORMAL_WARN, Plane, Ray, Vec3};
+use crate::geometry::{Axis, AxisKind, Base, Camera, ORTHONORMAL_WARN, Plane, Ray, Rigid, Vec3};
 use crate::rig::{Calibration, Covariance, HandEye, Kind, Quality, Rig, Verdict, asked};
 use std::path::Path;
 
@@ -19,6 +19,13 @@ pub struct Values {
     pub laser_plane_camera: Option<PlaneValue>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pointer_camera: Option<PointerValue>,
+    /// A camera that stands still before a robot.
+    #[serde(rename = "base_T_camera", default, skip_serializing_if = "Option::is_none")]
+    pub base_from_camera: Option<[f64; 16]>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub linear_axis: Option<Axis>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub turntable: Option<Axis>,
 }
 
 /// `normal · X = offset_mm` in the camera frame.
@@ -41,7 +48,7 @@ impl Values {
         serde_json::from_str(&text).map_err(|e| {
             Fault::input(format!("{}: holds no rig values: {e}", path.display()))
                 .cause(crate::files::slip_in(&text, e.line(), "not JSON, or an entry of another shape"))
-                .next("use the keys intrinsics, flange_T_camera, laser_plane_camera, pointer_camera of docs/file-formats.md")
+                .next("use the keys intrinsics, flange_T_camera, laser_plane_camera, pointer_camera, base_T_camera, linear_axis, turntable of docs/file-formats.md")
         })
     }
 
@@ -57,6 +64,9 @@ impl Values {
                 .pointer
                 .as_ref()
                 .map(|c| PointerValue { origin: c.value.origin.into(), direction: c.value.direction.into() }),
+            base_from_camera: rig.base_camera.as_ref().map(|c| c.value.to_rows()),
+            linear_axis: rig.linear_axis.as_ref().map(|c| c.value),
+            turntable: rig.turntable.as_ref().map(|c| c.value),
         }
     }
 
@@ -85,19 +95,36 @@ impl Values {
                 .then(|| format!("the rotation was repaired, it was {departure:.1e} from orthonormal"));
             imported(Kind::HandEye, pose, with, note, source)
         });
+        let base_camera = self.base_from_camera.as_ref().map(|rows| {
+            let (pose, departure) = Rigid::<Base, Camera>::from_rows(rows).map_err(|e| e.at("base_T_camera"))?;
+            let note = (departure > ORTHONORMAL_WARN)
+                .then(|| format!("the rotation was repaired, it was {departure:.1e} from orthonormal"));
+            imported(Kind::BaseCamera, pose, with, note, source)
+        });
+        let axis = |value: &Option<Axis>, wanted: AxisKind, kind: Kind| {
+            value.as_ref().filter(|a| a.kind == wanted).map(|a| imported(kind, *a, with, None, source)).transpose()
+        };
+        let linear_axis = axis(&self.linear_axis, AxisKind::Linear, Kind::LinearAxis)?;
+        let turntable = axis(&self.turntable, AxisKind::Turntable, Kind::Turntable)?;
+        if linear_axis.is_none() != self.linear_axis.is_none() || turntable.is_none() != self.turntable.is_none() {
+            return Err(Fault::input(format!("{}: an axis is under the other kind's key", source.display()))
+                .cause("linear_axis and turntable were exchanged")
+                .next("put each under its own key"));
+        }
+        let base_camera = base_camera.transpose()?;
         let (laser_plane, pointer, hand_eye) = (plane.transpose()?, pointer.transpose()?, hand_eye.transpose()?);
         if !as_stated {
             laser_plane.as_ref().map_or(Ok(()), |c| asked(&c.value))?;
             pointer.as_ref().map_or(Ok(()), |c| asked(&c.value))?;
             hand_eye.as_ref().map_or(Ok(()), |c| asked(&c.value))?;
         }
-        let stored = Rig { camera, laser_plane, pointer, hand_eye }
+        let stored = Rig { camera, laser_plane, pointer, hand_eye, base_camera, linear_axis, turntable }
             .store_all(station)
             .map_err(|e| e.at(source.display()).next("correct the file; nothing was imported of it"))?;
         if stored.is_empty() {
             return Err(Fault::input(format!("{}: holds none of the rig's values", source.display()))
                 .cause("another kind of JSON file")
-                .next("use the keys intrinsics, flange_T_camera, laser_plane_camera, pointer_camera"));
+                .next("use the keys intrinsics, flange_T_camera, laser_plane_camera, pointer_camera, base_T_camera, linear_axis, turntable"));
         }
         Ok(stored)
     }

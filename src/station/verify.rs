@@ -78,6 +78,9 @@ pub fn verify(rig: &Rig, run: &VerifyRun) -> Result<VerifyReport> {
     add("laser plane", rig.laser_plane.as_ref().map(check));
     add("pointer", rig.pointer.as_ref().map(check));
     add("hand-eye", rig.hand_eye.as_ref().map(check));
+    add("base camera", rig.base_camera.as_ref().map(check));
+    add("linear axis", rig.linear_axis.as_ref().map(check));
+    add("turntable", rig.turntable.as_ref().map(check));
     if calibrations.is_empty() {
         return Err(Fault::input("the station holds no calibration")
             .cause("another folder was given as --station")

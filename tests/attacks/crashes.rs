@@ -200,6 +200,7 @@ fn options(out: &Path, stop: &Arc<AtomicBool>, resume: bool) -> ScanOptions {
         extraction: Extraction::default(),
         grid: GridOptions::default(),
         volume: Some(Volume::new(60.0, 320.0, "a test")),
+        motion: sheetlight::recording::Motion::default(),
         ambient: None,
         overlays: 1,
         skip_bad: false,

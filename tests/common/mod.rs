@@ -2,6 +2,7 @@
 //! Frame and unit: as in the reference data's FORMAT.md: base frame, mm.
 #![allow(dead_code)] // each test binary uses its own part
 
+pub mod clouds;
 pub mod hand_eye;
 pub mod judge;
 pub mod pose;

@@ -1,6 +1,7 @@
 //! In: a recording and a station. Out: one calibration, stored in the station with its report.
 //! Frame and unit: mm, rad, px; each file names its frames.
 
+mod axis;
 mod camera;
 mod hand_eye;
 mod laser_plane;
@@ -13,6 +14,7 @@ use crate::fault::Result;
 
 #[derive(clap::Subcommand)]
 pub enum Command {
+    Axis(axis::Args),
     Camera(camera::Args),
     HandEye(hand_eye::Args),
     LaserPlane(laser_plane::Args),
@@ -22,6 +24,7 @@ pub enum Command {
 
 pub fn run(command: &Command, console: &Console) -> Result<()> {
     match command {
+        Command::Axis(a) => axis::run(a, console),
         Command::Camera(a) => camera::run(a, console),
         Command::HandEye(a) => hand_eye::run(a, console),
         Command::LaserPlane(a) => laser_plane::run(a, console),

@@ -82,6 +82,9 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
 
 pub(super) fn summary(r: &Report) -> String {
     let mut s = format!("{}: {}\n", r.recipe, if r.passed { "found" } else { "refused" });
+    if r.frame != "base" {
+        s += &format!("frame        {}\n", r.frame);
+    }
     if let Some(p) = &r.poses {
         for (name, pose) in [("approach", &p.approach), ("insertion", &p.insertion), ("retract", &p.retract)] {
             let numbers: Vec<String> = pose.numbers.iter().map(|v| format!("{v:.4}")).collect();

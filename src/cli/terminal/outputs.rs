@@ -42,7 +42,7 @@ pub fn check_simulation(out: &Path) -> Result<()> {
     if out.join("meta.json").exists() || out.join("station.toml").exists() {
         return refuse(format!("{}: is a recording or a station itself", out.display()));
     }
-    for set in Set::ALL {
+    for set in Set::ALL.into_iter().chain([Set::Axis]) {
         let folder = out.join(set.name());
         if folder.join("meta.json").exists() && !folder.join("truth.json").exists() {
             return refuse(format!("{}: holds a recording that was not simulated", folder.display()));

@@ -3,7 +3,7 @@
 //! (docs/math.md, Insertion (5)). Frame and unit: the part's own axes; mm, degrees; one standard deviation.
 
 use super::recipe::Recipe;
-use crate::find::look::levers::Lever;
+use crate::find::look::levers::{AXIS, HAND_EYE, Lever};
 use crate::find::look::part_seen::PartSeen;
 use crate::find::measure::points::Ordered;
 use crate::find::measure::pose::Measured;
@@ -83,7 +83,8 @@ pub fn budget(points: &Ordered, measured: &Measured, rig: Option<&Rig>, recipe: 
     let seen = rig.and_then(|r| PartSeen::new(points, &recipe.drawing(), measured, r, &recipe.measure));
     let levers = seen.as_ref().zip(rig).map_or(Vec::new(), |(seen, rig)| seen.levers(rig));
     let into_part = both(&measured.base_from_part.rotation.transpose());
-    for name in ["laser plane", "hand-eye"] {
+    let carrying = if rig.is_some_and(|r| r.axis().is_some()) { AXIS } else { HAND_EYE };
+    for name in ["laser plane", carrying] {
         let known = levers.iter().find(|l| l.name == name);
         match (known.filter(|l| l.covariance.is_some()), &seen) {
             (Some(lever), Some(seen)) => {

@@ -75,6 +75,8 @@ pub struct Poses {
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Report {
     pub recipe: String,
+    /// Frame of every pose here: the scan's. `base` in other names stands for it.
+    pub frame: String,
     pub passed: bool,
     /// Which gates failed, in words; empty when passed.
     pub reasons: Vec<String>,
@@ -329,6 +331,7 @@ fn conclude(
     let passed = reasons.is_empty();
     Report {
         recipe: recipe.name.clone(),
+        frame: "base".into(),
         passed,
         reasons,
         poses: passed.then(|| poses_at(&base_from_constructed, recipe, options.robot)),

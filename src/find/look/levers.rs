@@ -3,7 +3,7 @@
 //! Frame and unit: base frame, mm, rad; sizes as shares, the part's axes. docs/math.md, Second look.
 
 use crate::camera::Intrinsics;
-use crate::geometry::{Base, Camera, Plane, Rigid, Vec3};
+use crate::geometry::{Axis, AxisKind, Base, Camera, Plane, Ride, Rigid, Vec3};
 use crate::rig::{Covariance, HandEye, Rig};
 use nalgebra::{DMatrix, Matrix6, SVector};
 
@@ -13,6 +13,10 @@ pub const NUMBERS: usize = 9;
 /// What a measurement makes of displacements: shift and turn of the part, then its sizes along x and y and its shear. Where a
 /// measurement knows no sizes they are 0.
 pub type Answer = SVector<f64, NUMBERS>;
+
+/// Names of the levers of what carries the sensor or the part.
+pub const HAND_EYE: &str = "hand-eye";
+pub const AXIS: &str = "axis";
 
 /// A place that was scanned.
 #[derive(Clone, Copy, Debug)]
@@ -72,8 +76,16 @@ pub fn levers(seen: &[Seen], rig: &Rig, answer: impl Fn(&[Vec3]) -> Answer) -> V
     }
     if let Some(h) = &rig.hand_eye {
         let names = &["tx mm", "ty mm", "tz mm", "rx rad", "ry rad", "rz rad"];
-        let of = lever("hand-eye", names, &|s, k| by_hand_eye(s, &h.value, k));
+        let of = lever(HAND_EYE, names, &|s, k| by_hand_eye(s, &h.value, k));
         out.push(Lever { covariance: square(&h.covariance, 6), ..of });
+    }
+    if let Some(a) = rig.axis() {
+        let names: &'static [&'static str] = match a.value.kind {
+            AxisKind::Linear => &["dx", "dy", "dz", "pitch mm"],
+            AxisKind::Turntable => &["dx", "dy", "dz", "pitch rad", "px mm", "py mm", "pz mm"],
+        };
+        let of = lever(AXIS, names, &|s, k| by_axis(s, &a.value, k));
+        out.push(Lever { covariance: square(&a.covariance, names.len()), ..of });
     }
     if let (Some(c), Some(p)) = (&rig.camera, &rig.laser_plane) {
         let of = lever("camera", &["fx px", "fy px", "cx px", "cy px"], &|s, k| by_camera(s, &c.value, &p.value, k));
@@ -95,6 +107,13 @@ fn by_hand_eye(s: &Seen, hand_eye: &HandEye, k: usize) -> Vec3 {
     let axis = Vec3::ith(k % 3, 1.0);
     let moved = if k < 3 { axis } else { axis.cross(&(hand_eye.rotation * s.at)) };
     s.base_from_camera.rotation * (hand_eye.rotation.transpose() * moved)
+}
+
+/// Where an axis put the place that was seen at its count, against where it stood at the motion's zero.
+fn by_axis(s: &Seen, axis: &Axis, k: usize) -> Vec3 {
+    // The cloud's frame is the axis'.
+    let axis_from_camera: Rigid<Ride, Camera> = Rigid::new(s.base_from_camera.rotation, s.base_from_camera.translation);
+    axis.errors(axis.count_of(&axis_from_camera))[k].at(&s.base_from_camera.point(&s.at))
 }
 
 /// The ray through a pixel turns, and meets the plane elsewhere; the lens is left out.

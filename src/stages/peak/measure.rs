@@ -1,9 +1,10 @@
-//! In: a picture with a stripe and its skeleton. Out: the stripe's width and speckle contrast, from the light itself.
+//! In: a picture with a stripe and its skeleton. Out: the stripe's width, its speckle contrast and the sensor's noise, from the light itself.
 //! Frame and unit: Gaussian sigma in px; speckle is a ratio. docs/math.md, Stripe peak (6).
 
 use super::found::Peak;
 use super::grey::{Grey, View};
 use super::params::{PeakParams, Stripe};
+use super::scatter::{Scatter, Sums};
 use super::{PeakFrame, fit};
 use crate::raster::{Image, Pixels};
 use crate::stages::stripe::choose_params::ChooseParams;
@@ -13,14 +14,18 @@ const SAMPLES: usize = 400;
 /// Fewer than this many usable peaks say nothing.
 const FEWEST: usize = 20;
 
-/// Width and speckle of the stripe in one picture, and the noise as it was assumed; `None` where there is too little of it.
+/// Width, speckle and noise of the stripe in one picture, and the dark pixels' noise as it was assumed; `None` where there is too little of it.
 /// `across` is the unit image direction of depth. Start: half the pixels above half maximum. Then three rounds of fitting with the medians of the round before.
 pub fn measure(image: &Image, skeleton: &[u32], p: &PeakParams, across: [f32; 2]) -> Option<Stripe> {
     let step = (skeleton.len() / SAMPLES).max(1);
     let sample: Vec<(i32, i32)> =
         skeleton.iter().step_by(step).map(|&q| ((q & 0xffff) as i32, (q >> 16) as i32)).collect();
-    let noise = p.read_noise;
-    let mut stripe = Stripe { width_px: half_maximum(image, &sample)?.clamp(0.4, 12.0), speckle: p.speckle, noise };
+    let mut stripe = Stripe {
+        width_px: half_maximum(image, &sample)?.clamp(0.4, 12.0),
+        speckle: p.speckle,
+        noise: p.read_noise,
+        ..Stripe::default()
+    };
     for _ in 0..3 {
         let size = (image.width, image.height, image.bits);
         let setup = PeakFrame::new(size, 1, &p.with(&stripe), &ChooseParams::default(), across);
@@ -33,47 +38,47 @@ pub fn measure(image: &Image, skeleton: &[u32], p: &PeakParams, across: [f32; 2]
             return None;
         }
         let width_px = median(fits.iter().map(|f| f.0).collect());
-        // Trimmed: the worst tenth are edges and double stripes, not speckle.
-        let mut ratios: Vec<(f32, f32)> = fits.iter().map(|f| (f.1, f.2)).collect();
-        ratios.sort_by(|a, b| (a.0 / a.1).total_cmp(&(b.0 / b.1)));
-        ratios.truncate(ratios.len() * 9 / 10);
-        let (excess, light) = ratios.iter().fold((0.0, 0.0), |s, r| (s.0 + r.0 / r.1, s.1 + 1.0));
-        let contrast2: f32 = excess / light;
-        stripe = Stripe { width_px: width_px.clamp(0.4, 12.0), speckle: contrast2.clamp(0.0, 1.0).sqrt(), noise };
+        // Trimmed: the worst tenth are edges and double stripes, not noise.
+        let mut sums: Vec<Sums> = fits.iter().map(|f| f.1).collect();
+        sums.sort_by(|a, b| a.misfit().total_cmp(&b.misfit()));
+        sums.truncate(sums.len() * 9 / 10);
+        let found = Scatter::fit(&sums, &Scatter::of(p), setup.full_scale);
+        stripe = Stripe {
+            width_px: width_px.clamp(0.4, 12.0),
+            speckle: found.speckle,
+            read_noise: Some(found.read_noise),
+            gain: Some(found.gain),
+            ..stripe
+        };
     }
     Some(stripe)
 }
 
-/// Width, excess of the squared residuals over read and shot noise, and squared light, of the peaks that can be
-/// believed: clipped light hides all three, and a spot of one pixel is a hot pixel.
-fn fits<G: Grey>(image: G, sample: &[(i32, i32)], s: &PeakFrame) -> Vec<(f32, f32, f32)> {
+/// Width and squared residuals of the peaks that can be believed: clipped light hides both, and a spot of one pixel is a hot pixel.
+fn fits<G: Grey>(image: G, sample: &[(i32, i32)], s: &PeakFrame) -> Vec<(f32, Sums)> {
     let mut pixels = Vec::new();
     sample
         .iter()
         .filter_map(|&(x, y)| {
             let k = fit::gaussian(image, x, y, s);
             let usable = k.flags == 0 && k.snr > 10.0 && (0.4 * s.s0..2.5 * s.s0).contains(&k.width_px);
-            let (excess, light) = if usable { excess(image, x, y, &k, s, &mut pixels)? } else { return None };
-            Some((k.width_px, excess, light))
+            if usable { Some((k.width_px, residuals(image, x, y, &k, s, &mut pixels)?)) } else { None }
         })
         .collect()
 }
 
-/// A pixel that takes part: its weight, its residual, and what the model says of it: derivatives, light, variance without
-/// speckle and with it.
+/// A pixel that takes part: its weight, its residual, and what the model says of it: derivatives, light, variance.
 struct Pixel {
     weight: f32,
     residual: f32,
     j: nalgebra::Vector3<f32>,
     light: f32,
-    quiet: f32,
     variance: f32,
 }
 
-/// Sums over the window of residual² minus the noise that is no speckle, and of light². Three fitted numbers have
-/// eaten part of the noise, most where the light is: pixel by pixel the share that is left is 1 - leverage.
-/// `pixels` is memory that is used again.
-fn excess<G: Grey>(image: G, x: i32, y: i32, k: &Peak, s: &PeakFrame, pixels: &mut Vec<Pixel>) -> Option<(f32, f32)> {
+/// The squared residuals of the window. Three fitted numbers have eaten part of the noise, most where the light is: pixel by
+/// pixel the share that is left is 1 - leverage. `pixels` is memory that is used again.
+fn residuals<G: Grey>(image: G, x: i32, y: i32, k: &Peak, s: &PeakFrame, pixels: &mut Vec<Pixel>) -> Option<Sums> {
     let n = (k.normal_u, k.normal_v);
     let m = (k.u - x as f32) * n.0 + (k.v - y as f32) * n.1;
     pixels.clear();
@@ -81,23 +86,21 @@ fn excess<G: Grey>(image: G, x: i32, y: i32, k: &Peak, s: &PeakFrame, pixels: &m
         let z = (d - m) / k.width_px;
         let shape = (-0.5 * z * z).exp();
         let light = k.amplitude * shape;
-        let quiet = s.read2 + s.gain * (light + k.background);
         let j = nalgebra::Vector3::new(shape, light * z / k.width_px, light * z * z / k.width_px);
-        let variance = quiet + s.speckle2 * light * light;
-        pixels.push(Pixel { weight, residual: level - k.background - light, j, light, quiet, variance });
+        let variance = s.read2 + s.gain * (light + k.background) + s.speckle2 * light * light;
+        pixels.push(Pixel { weight, residual: level - k.background - light, j, light, variance });
     });
     let mut normal = nalgebra::Matrix3::zeros();
     for p in pixels.iter() {
         normal += p.j * p.j.transpose() * (p.weight / p.variance);
     }
     let inverse = normal.try_inverse()?;
-    let (mut excess, mut sum) = (0f32, 0f32);
+    let mut sums = Sums::default();
     for p in pixels.iter() {
         let left = (1.0 - p.weight / p.variance * (inverse * p.j).dot(&p.j)).max(0.0);
-        excess += p.weight * (p.residual * p.residual - left * p.quiet);
-        sum += p.weight * left * p.light * p.light;
+        sums.add(p.weight, left, p.residual, (p.light, k.background), p.variance);
     }
-    (sum > 0.0).then_some((excess, sum))
+    Some(sums)
 }
 
 /// The pixels that take part: columns (or rows) along the stripe, in each those within three widths of the line.

@@ -2,10 +2,10 @@
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels.
 
 use super::PeakFrame;
-use super::fit::{background, direction, finish};
+use super::fit::{background, direction, exponential, finish};
 use super::found::Peak;
 use super::grey::Grey;
-use super::profile::{Profile, SIDES};
+use super::profile::{Profile, SIDES, share};
 
 /// Centre of gravity of the light above the background, within three widths of a first guess.
 #[inline(always)]
@@ -21,14 +21,15 @@ pub(super) fn centroid<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak
     let (mut sum, mut moment, mut second, mut noise) = ([0f32; 2], [0f32; 2], [0f32; 2], [0f32; 2]);
     let (mut top, mut saturated) = (0f32, false);
     for (side, sample) in SIDES.into_iter().enumerate() {
-        for k in (0..profile.half).map(sample).filter(|&k| near.contains(&(k as f32))) {
-            let (light, d) = (profile.level(k) - base, k as f32);
+        for k in (0..profile.half).map(sample) {
+            let inside = share(k, near);
+            let (light, d) = (inside * (profile.level(k) - base), k as f32);
             sum[side] += light;
             moment[side] += light * d;
             second[side] += light * (d * d);
             top = top.max(light);
-            saturated = saturated || profile.clipped(k) > 0.0;
-            let (e, lit) = (d - z, light.max(0.0));
+            saturated = saturated || (inside > 0.0 && profile.clipped(k) > 0.0);
+            let (e, lit) = (inside * (d - z), light.max(0.0));
             noise[side] += (e * e) * (quiet + s.gain * light + s.speckle2 * (lit * lit));
         }
     }
@@ -61,7 +62,7 @@ pub(super) fn derivative<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Pe
         for i in -r..=r {
             let level = image.at(cx + i, cy + j);
             let d = i as f32 * n.0 + j as f32 * n.1;
-            let kernel = (-0.5 * inverse * (i * i + j * j) as f32).exp();
+            let kernel = exponential(-0.5 * inverse * (i * i + j * j) as f32);
             let first = kernel * d * inverse;
             // Derivatives along the normal only: there the expansion is one-dimensional.
             d1 += first * (level - base);

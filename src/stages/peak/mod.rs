@@ -11,6 +11,7 @@ mod methods;
 mod noise;
 pub mod params;
 mod profile;
+mod scatter;
 mod stage;
 mod turn;
 mod twin;

@@ -78,14 +78,15 @@ impl PeakParams {
         }
         Ok(())
     }
-    /// The same settings with the stripe's measured width and speckle.
+    /// The same settings with the stripe's measured width, speckle and noise.
     pub fn with(self, stripe: &Stripe) -> PeakParams {
-        PeakParams { width_px: stripe.width_px, speckle: stripe.speckle, ..self }
+        let (read_noise, gain) = (stripe.read_noise.unwrap_or(self.read_noise), stripe.gain.unwrap_or(self.gain));
+        PeakParams { width_px: stripe.width_px, speckle: stripe.speckle, read_noise, gain, ..self }
     }
 }
 
 /// What laser, lens and sensor make of a stripe: constant over a scan.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stripe {
     /// Gaussian sigma of the profile, px.
@@ -95,6 +96,11 @@ pub struct Stripe {
     /// Standard deviation of a dark pixel, grey levels of an 8-bit picture; 0 where nothing is known of it.
     #[serde(default)]
     pub noise: f32,
+    /// Read noise and shot noise as [`PeakParams`] has them; those of the settings where nothing was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub read_noise: Option<f32>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain: Option<f32>,
 }
 
 /// Most samples of a profile, as many as the shader has written out.

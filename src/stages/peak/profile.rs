@@ -38,6 +38,12 @@ pub(super) fn by_columns((nx, ny): (f32, f32)) -> bool {
 /// Samples from the middle to both sides, as the shader walks: upwards k = 0, 1, .. and downwards k = -1, -2, ..
 pub(super) const SIDES: [fn(i32) -> i32; 2] = [|j| j, |j| -1 - j];
 
+/// How much of sample k lies in a span: a sample that were in or out would hang on the last bit of the span's ends.
+#[inline(always)]
+pub(super) fn share(k: i32, (from, to): (f32, f32)) -> f32 {
+    ((k as f32 - from).min(to - k as f32) + 0.5).clamp(0.0, 1.0)
+}
+
 impl Profile {
     #[inline(always)]
     pub fn level(&self, k: i32) -> f32 {
@@ -48,11 +54,11 @@ impl Profile {
     pub fn clipped(&self, k: i32) -> f32 {
         self.clipped[(k + self.half) as usize]
     }
-    /// First and last number of the samples whose offsets lie within `reach` of m; not whole.
+    /// Where the samples begin and end that lie within `reach` of m, in their numbers; not whole.
     #[inline(always)]
-    pub fn span(&self, m: f32, reach: f32) -> std::ops::RangeInclusive<f32> {
+    pub fn span(&self, m: f32, reach: f32) -> (f32, f32) {
         let (a, b) = ((m - reach - self.offset) / self.step, (m + reach - self.offset) / self.step);
-        a.min(b).max(self.low)..=a.max(b).min(self.high)
+        (a.min(b).max(self.low - 0.5), a.max(b).min(self.high + 0.5))
     }
 
     #[inline(always)]
@@ -132,14 +138,14 @@ impl Profile {
         let near = self.span(0.0, 1.5 * s.s0 + 0.5);
         let (mut sum, mut moment) = ([0f32; 2], [0f32; 2]);
         for (side, sample) in SIDES.into_iter().enumerate() {
-            for k in (0..self.half).map(sample).filter(|&k| near.contains(&(k as f32))) {
-                let light = (self.level(k) - background).max(0.0);
+            for k in (0..self.half).map(sample) {
+                let light = share(k, near) * (self.level(k) - background).max(0.0);
                 sum[side] += light;
                 moment[side] += light * k as f32;
             }
         }
         let (sum, moment) = (sum[0] + sum[1], moment[0] + moment[1]);
-        let count = near.end().floor() - near.start().ceil() + 1.0;
+        let count = near.1 - near.0;
         let m = if sum > 0.0 { self.offset + self.step * (moment / sum) } else { 0.0 };
         (m, (1.25 * sum / count.max(1e-6)).max(1.0))
     }

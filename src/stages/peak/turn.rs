@@ -45,20 +45,20 @@ pub(super) fn turn<const N: usize>(s0: f32, lattice: (i32, i32), k: [f64; N], up
     normal.cholesky().map_or([0.0; N], |c| std::array::from_fn(|j| c.solve(&right)[j] as f32))
 }
 
-/// Places of the gradients and their weights (1 - r² / 16)²: every other one of a lattice, because a gradient looks at its
-/// four neighbours, which lie on the other colour of the board.
-pub(super) const GRADIENTS: [(i32, i32, f32); 13] = [
-    (0, 0, 1.0),
-    (-1, -1, 0.765625),
-    (1, -1, 0.765625),
-    (-1, 1, 0.765625),
-    (1, 1, 0.765625),
-    (0, -2, 0.5625),
-    (-2, 0, 0.5625),
-    (2, 0, 0.5625),
-    (0, 2, 0.5625),
-    (-2, -2, 0.25),
-    (2, -2, 0.25),
-    (-2, 2, 0.25),
-    (2, 2, 0.25),
+/// Places of the gradients and their weights (1 - r² / 16)² in 64ths: every other one of a lattice, because a gradient looks at
+/// its four neighbours, which lie on the other colour of the board.
+pub(super) const GRADIENTS: [(i32, i32, i32); 13] = [
+    (0, 0, 64),
+    (-1, -1, 49),
+    (1, -1, 49),
+    (-1, 1, 49),
+    (1, 1, 49),
+    (0, -2, 36),
+    (-2, 0, 36),
+    (2, 0, 36),
+    (0, 2, 36),
+    (-2, -2, 16),
+    (2, -2, 16),
+    (-2, 2, 16),
+    (2, 2, 16),
 ];

@@ -172,7 +172,7 @@ pub fn undistort([xv, yv, du, dv]: [f32; 4], o: &Optics) -> Option<(f32, f32, f3
         y -= (a * ey - c * ex) / det;
     }
     let (dx, dy) = ((d * dxd - b * dyd) / det, (a * dyd - c * dxd) / det);
-    (det > 0.0 && x.abs() < 1e9 && y.abs() < 1e9).then_some((x, y, dx, dy))
+    (det > 0.0 && a + d > 0.0 && x.abs() < 1e9 && y.abs() < 1e9).then_some((x, y, dx, dy))
 }
 
 /// The uniform block of the stage; the WGSL struct of the same name, shaders/point.wgsl.

@@ -33,8 +33,9 @@ pub const RULE: &str = "rule";
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Thinning {
-    #[default]
+    /// Eats stripes two pixels wide that run at 45 degrees from their ends on, until two pixels are left.
     ZhangSuen,
+    #[default]
     GuoHall,
 }
 

@@ -23,8 +23,9 @@ pub struct Profile {
     pub shot: u32,
     pub peaks: Vec<Peak>,
     pub points: Vec<Point>,
-    /// Where the laser plane meets the optical axis at this shot, base frame: the distance of two shots.
-    pub anchor: Vec3,
+    /// Places of the light, the same of every shot, base frame: two shots are as far apart as the farthest of them moves.
+    /// Where the laser plane meets the optical axis; on a turntable the stripe's ends too.
+    pub anchors: [Vec3; 3],
     /// Distance of neighbouring points along the stripe at the anchor, mm.
     pub pitch: f32,
 }
@@ -46,8 +47,8 @@ pub struct Support {
     frame: SupportFrame,
     /// Direction along the laser line, base frame; only orders the points, so the first shot's serves the scan.
     axis: Vec3,
-    /// Anchor and sites of the last judged shot.
-    before: Option<(Vec3, Vec<Site>)>,
+    /// Anchors and sites of the last judged shot.
+    before: Option<([Vec3; 3], Vec<Site>)>,
     now: Option<Held>,
     gpu: Option<OnGpu>,
 }
@@ -87,7 +88,7 @@ impl Support {
             self.judge(&mut run)?;
         }
         if let Some(last) = run.last_mut() {
-            self.before = Some((last.profile.anchor, std::mem::take(&mut last.sites)));
+            self.before = Some((last.profile.anchors, std::mem::take(&mut last.sites)));
         }
         Ok(run.into_iter().map(|h| h.profile).collect())
     }
@@ -109,13 +110,13 @@ impl Support {
 
     /// Judges every shot of a run by its two neighbours; the one behind the last is `now`.
     fn judge(&mut self, run: &mut [Held]) -> Result<()> {
-        let beside = self.before.iter().map(|(anchor, sites)| (anchor, sites));
-        let beside = beside.chain(run.iter().chain(&self.now).map(|h| (&h.profile.anchor, &h.sites)));
-        let (mut sites, mut ranges): (Vec<Site>, Vec<(Vec3, u32, u32)>) = Default::default();
-        for (anchor, some) in beside {
+        let beside = self.before.iter().map(|(anchors, sites)| (anchors, sites));
+        let beside = beside.chain(run.iter().chain(&self.now).map(|h| (&h.profile.anchors, &h.sites)));
+        let (mut sites, mut ranges): (Vec<Site>, Vec<([Vec3; 3], u32, u32)>) = Default::default();
+        for (anchors, some) in beside {
             let first = sites.len() as u32;
             sites.extend_from_slice(some);
-            ranges.push((*anchor, first, sites.len() as u32));
+            ranges.push((*anchors, first, sites.len() as u32));
         }
         let skip = usize::from(self.before.is_some());
         let shots: Vec<Neighbourhood> = (run.iter().enumerate())
@@ -145,12 +146,13 @@ impl Support {
         Ok(())
     }
 
-    fn neighbourhood(&self, profile: &Profile, beside: [Option<&(Vec3, u32, u32)>; 2]) -> Neighbourhood {
+    fn neighbourhood(&self, profile: &Profile, beside: [Option<&([Vec3; 3], u32, u32)>; 2]) -> Neighbourhood {
         let p = &self.params;
         let mut out = Neighbourhood { usual: usual_background(&profile.peaks), ..Neighbourhood::default() };
         let mut expected = 0.0;
-        for (side, (anchor, first, end)) in beside.into_iter().enumerate().filter_map(|(i, b)| Some((i, b?))) {
-            let step = (anchor - profile.anchor).norm() as f32;
+        for (side, (anchors, first, end)) in beside.into_iter().enumerate().filter_map(|(i, b)| Some((i, b?))) {
+            let moved = anchors.iter().zip(&profile.anchors).map(|(a, b)| (a - b).norm());
+            let step = moved.fold(0.0, f64::max) as f32;
             let reach2 = self.radius * self.radius + p.slope * p.slope * step * step;
             expected += 2.0 * (reach2 - step * step).sqrt() / profile.pitch;
             (out.first[side], out.end[side]) = (*first, *end);
@@ -186,7 +188,7 @@ mod tests {
             peaks.push(peaks[10]);
             points.push(Point { position: [2.5, 0.35 * index as f32, 3.0], sigma_mm: 0.02 });
         }
-        Profile { shot: index, peaks, points, anchor: Vec3::new(0.0, 0.35 * f64::from(index), 0.0), pitch: 0.25 }
+        Profile { shot: index, peaks, points, anchors: [Vec3::new(0.0, 0.35 * f64::from(index), 0.0); 3], pitch: 0.25 }
     }
     fn scan(width_px: f32, strays: &[u32]) -> Vec<Profile> {
         let mut support = Support::new(SupportParams::default(), 1.0, 162.0, &Vec3::x(), None).unwrap();

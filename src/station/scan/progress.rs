@@ -1,10 +1,10 @@
 //! In: finished profiles of a running scan. Out: a sealed checkpoint file to resume from, and running figures
 //! in memory that does not grow with the scan.
-//! Frame and unit: counts; sigma in mm; poses base_from_flange.
+//! Frame and unit: counts; sigma in mm; places of the camera in the cloud's frame.
 
 use super::scan_folder::PROGRESS;
 use crate::fault::{Fault, Result};
-use crate::geometry::{Base, Flange, Rigid, Vec3};
+use crate::geometry::{Base, Camera, Rigid, Vec3};
 use crate::raster::{Image, Pixels};
 use crate::rig::{sealed, unsealed};
 use crate::scan::{CloudWriter, Profile};
@@ -29,8 +29,8 @@ pub struct Checkpoint {
     pub cut: u64,
     /// What the first shots said of the stripe.
     pub stripe: Option<Stripe>,
-    /// Where the first shot was taken, as rows: from there the map's up and the stripe's axis follow.
-    first_pose: Option<[f64; 16]>,
+    /// Where the camera was at the first shot, as rows: from there the map's up and the stripe's axis follow.
+    first_place: Option<[f64; 16]>,
     /// [`fingerprint_of`] the last shot done, which a resumed scan reads again.
     pub last_picture: Option<u32>,
     /// Histogram of log10(sigma / mm) from -5 to 1 in 240 steps of 0.025 (6 % a step).
@@ -58,7 +58,7 @@ impl Checkpoint {
             skipped: Vec::new(),
             cut: 0,
             stripe: None,
-            first_pose: None,
+            first_place: None,
             last_picture: None,
             sigma: vec![0; SIGMA_BINS],
         }
@@ -88,17 +88,17 @@ impl Checkpoint {
         crate::files::write(&part.join(PROGRESS), sealed(self).as_bytes())
     }
 
-    /// Pose of the scan's first shot.
-    pub fn first_pose(&self) -> Option<Rigid<Base, Flange>> {
+    /// Where the camera was at the scan's first shot.
+    pub fn first_place(&self) -> Option<Rigid<Base, Camera>> {
         // Not repaired as poses from outside are: to the last bit what it was.
-        let m = self.first_pose?;
+        let m = self.first_place?;
         let rotation = crate::geometry::Mat3::new(m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]);
         Some(Rigid::new(rotation, Vec3::new(m[3], m[7], m[11])))
     }
 
-    /// Keeps the pose of the first shot of all.
-    pub fn begin_at(&mut self, pose: &Rigid<Base, Flange>) {
-        self.first_pose.get_or_insert(pose.to_rows());
+    /// Keeps where the first shot of all was taken.
+    pub fn begin_at(&mut self, place: &Rigid<Base, Camera>) {
+        self.first_place.get_or_insert(place.to_rows());
     }
 
     /// Counts a finished profile.

@@ -4,7 +4,7 @@
 use super::report::ScanReport;
 use super::run::{ScanOptions, scan};
 use crate::fault::Result;
-use crate::recording::Recording;
+use crate::recording::{Motion, Recording};
 use crate::rig::{Rig, hash_file, hash_text};
 use crate::scan::{GridOptions, RecordingSource, Where};
 use crate::station::settings::Settings;
@@ -21,6 +21,7 @@ impl ScanOptions {
             place: Where::default(),
             extraction: settings.extraction.clone(),
             grid: GridOptions::default(),
+            motion: Motion::default(),
             volume: believed(settings, rig),
             ambient: None,
             overlays: 0,
@@ -31,7 +32,8 @@ impl ScanOptions {
     }
 }
 
-/// Scans a recording with the poses of that name (the one that meta.json names, where it is `None`). `progress` is told
+/// Scans a recording by the motion that it states, a robot's with the poses of that name (the one that meta.json names, where
+/// it is `None`). `progress` is told
 /// (shots done, shots in all).
 ///
 /// # Errors
@@ -43,15 +45,22 @@ pub fn scan_recording(
     options: &ScanOptions,
     progress: impl FnMut(usize, Option<usize>),
 ) -> Result<ScanReport> {
+    let options = &ScanOptions { motion: recording.meta.motion(), ..options.clone() };
     let id = identity(recording, poses)?;
     let open = |first| Ok(Box::new(RecordingSource::open(recording, poses, first)?) as Box<_>);
     scan(&id, &recording.folder.display().to_string(), open, rig, options, progress)
 }
 
-/// What a resumed scan must have in common with the interrupted one: a hash of meta.json, of the poses and of the channel.
+/// What a resumed scan must have in common with the interrupted one: a hash of meta.json, of the poses or counts and of the
+/// channel.
 pub fn identity(recording: &Recording, poses: Option<&str>) -> Result<String> {
     let meta = hash_file(&recording.folder.join("meta.json"))?;
-    let poses: Vec<[f64; 16]> = recording.poses(poses)?.iter().map(|p| p.to_rows()).collect();
-    let text = serde_json::to_string(&(meta, poses, recording.channel)).expect("plain data");
+    let text = if recording.meta.motion().axis().is_some() {
+        serde_json::to_string(&(meta, recording.counts()?, recording.channel))
+    } else {
+        let poses: Vec<[f64; 16]> = recording.poses(poses)?.iter().map(|p| p.to_rows()).collect();
+        serde_json::to_string(&(meta, poses, recording.channel))
+    };
+    let text = text.expect("plain data");
     Ok(hash_text(text.as_bytes()))
 }

@@ -1,9 +1,10 @@
 //! In: a scan folder. Out: what the scan came to, as scan.json holds it, and its points; both only as they were written.
-//! Frame and unit: cloud in the base frame, mm (docs/file-formats.md).
+//! Frame and unit: cloud in the frame that the report names, mm (docs/file-formats.md).
 
 use super::scan_folder::settle;
 use super::seen::Seen;
 use crate::fault::{Fault, Result};
+use crate::recording::Motion;
 use crate::rig::{Volume, hash_file};
 use crate::scan::{CloudFile, CloudPoint, Extraction, Format, read_cloud};
 use crate::stages::peak::Stripe;
@@ -19,7 +20,11 @@ pub struct ScanReport {
     pub program: String,
     pub created: String,
     pub units: String,
+    /// Of the cloud: base, axis, or the flange of a robot that carries the part.
     pub frame: String,
+    /// What moved between the shots; the robot with the sensor in reports of former versions.
+    #[serde(default)]
+    pub motion: Motion,
     pub recording: String,
     /// [`crate::rig::Rig::fingerprint`] of the calibration used.
     pub rig_fingerprint: String,

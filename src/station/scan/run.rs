@@ -1,6 +1,6 @@
 //! In: a source of shots, a calibrated rig, an output folder. Out: the scan folder — cloud, height
 //! map, overlays, figures — written so that whatever ends it costs nothing that was done.
-//! Frame and unit: cloud in the base frame, height map in its grid frame; mm (docs/file-formats.md).
+//! Frame and unit: cloud in the frame of what moved (mostly the robot's base), height map in its grid frame; mm (docs/file-formats.md).
 
 use super::overlays::Overlays;
 use super::progress::{Checkpoint, fingerprint_of};
@@ -10,9 +10,11 @@ use super::seen::Seen;
 use crate::fault::{Fault, Result};
 use crate::files::Lock;
 use crate::raster::Image;
+use crate::recording::Motion;
 use crate::rig::{Rig, Volume};
 use crate::scan::{
-    BadShot, CloudWriter, Extraction, GridOptions, Processor, Profile, Scanner, Source, Where, camera_for,
+    BadShot, Carrier, CloudWriter, Extraction, GridOptions, Processor, Profile, Scanner, Source, Where, camera_for,
+    parts_for,
 };
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -29,6 +31,8 @@ pub struct ScanOptions {
     pub place: Where,
     pub extraction: Extraction,
     pub grid: GridOptions,
+    /// What moved between the shots.
+    pub motion: Motion,
     /// Camera depths at which points are believed; `None` for all ([`crate::station::volume::believed`]).
     pub volume: Option<Volume>,
     /// A picture with the laser off and the shots' exposure, subtracted from every shot.
@@ -73,6 +77,8 @@ pub fn scan_on(
 ) -> Result<ScanReport> {
     let begun = Instant::now();
     options.grid.check()?;
+    // What others moved is of no concern here, nor whether it was calibrated with this camera.
+    let rig = &parts_for(rig, &options.motion);
     rig.belong_together()?;
     rig.reaches(options.volume.as_ref())?;
     scan_folder::make(&options.out)?;
@@ -90,14 +96,14 @@ pub fn scan_on(
     let cloud = if state.shots > 0 {
         CloudWriter::resume(&cloud_path, state.points)?
     } else {
-        CloudWriter::create(&cloud_path)?
+        CloudWriter::create_in(&cloud_path, options.motion.frame())?
     };
     let total = source.remaining().map(|n| n + state.shots - repeated);
     let format = source.format();
     let ambient = options.ambient.clone();
-    let mut scanner =
-        Scanner::new(rig, format, &options.extraction, options.volume.as_ref(), ambient, processor, state.stripe)?;
-    scanner.began_at(state.first_pose());
+    let carrier = Carrier::new(rig, &options.motion)?;
+    let scanner = Scanner::new(rig, carrier, format, &options.extraction, options.volume.as_ref(), ambient, processor)?
+        .resumed(state.stripe, state.first_place());
     let seen = Seen::new(
         &camera_for(&rig.need_camera()?.value, format)?,
         &rig.need_laser_plane()?.value,
@@ -148,7 +154,8 @@ pub fn scan_on(
         program: format!("sheetlight {}", env!("CARGO_PKG_VERSION")),
         created: jiff::Timestamp::now().to_string(),
         units: "mm".into(),
-        frame: "base".into(),
+        frame: options.motion.frame().into(),
+        motion: options.motion.clone(),
         recording: label.into(),
         rig_fingerprint: rig.fingerprint(),
         working_volume: options.volume.clone(),
@@ -179,7 +186,7 @@ pub fn scan_on(
 
 /// Where the scan begins: at nothing, or where an interrupted one of the same identity stands.
 fn state(id: &str, rig: &Rig, options: &ScanOptions, part: &Path) -> Result<Checkpoint> {
-    let settings = serde_json::to_string(&(&options.extraction, &options.volume)).expect("plain data");
+    let settings = serde_json::to_string(&(&options.extraction, &options.volume, &options.motion)).expect("plain data");
     let identity = crate::rig::hash_text(format!("{id} {} {settings}", rig.fingerprint()).as_bytes());
     let former = if options.resume { Checkpoint::load(part)? } else { None };
     match former {
@@ -248,6 +255,7 @@ impl Work<'_> {
                     self.overlays.keep(&shot);
                     self.seen.look(shot.index, &shot.image);
                     clocked(&mut self.spent.stages_s, || self.scanner.push(shot))?;
+                    self.scanner.first().iter().for_each(|place| self.state.begin_at(place));
                 }
                 // A resumed scan may meet a bad shot that the run before has listed.
                 Some(Err(bad)) if options.skip_bad && self.state.skipped.iter().any(|(name, _)| *name == bad.name) => {}
@@ -282,7 +290,6 @@ impl Work<'_> {
                 .cause("the interrupted scan was of another recording, or its pictures were replaced")
                 .next("scan again without --resume, or into another folder"));
         }
-        self.state.begin_at(&shot.base_from_flange);
         self.pictures.push_back((shot.index, is));
         Ok(())
     }

@@ -1,0 +1,218 @@
+//! In: an axis' fit. Out: the verdict with reasons, figures and the next best picture, and the page a person reads; fit and
+//! verification apart.
+//! Frame and unit: camera frame; mm, degrees.
+
+use super::fit::AxisFit;
+use crate::calibrate::limits::{Judgement, Limits, rms};
+use crate::calibrate::report::{Page, bars, scatter};
+use crate::calibrate::scatter::{ENOUGH, overrule};
+use crate::geometry::AxisKind;
+use crate::rig::{AXIS_SIGMA_DEG, AXIS_SIGMA_MM, Covariance, Kind, Quality, Verdict};
+use std::collections::BTreeMap;
+
+/// Lengths of board and axis may differ by this share before one of them is called wrong.
+const SCALE_TOLERANCE: f64 = 0.01;
+/// Counts dealt out at random fit at this share of their spread or better: the true ones tell nothing.
+const BY_CHANCE: f64 = 0.45;
+/// Reversed counts that fit within so many times the spread cannot be told from the true ones.
+const TOLD: f64 = 3.0;
+/// Turned by less, rad, a table's bearing is not seen all round.
+const HALF_TURN: f64 = std::f64::consts::PI;
+/// A bow of so many of its sigmas is one.
+const BENT: f64 = 4.0;
+
+/// The kind of calibration that a fit is.
+pub fn kind(fit: &AxisFit) -> Kind {
+    match fit.axis.kind {
+        AxisKind::Linear => Kind::LinearAxis,
+        AxisKind::Turntable => Kind::Turntable,
+    }
+}
+
+pub fn covariance(fit: &AxisFit) -> Covariance {
+    Covariance::new(kind(fit).parameters().0, &fit.covariance)
+}
+
+/// Judges a fit. `board_length` names what states the board's lengths.
+pub fn judge(fit: &AxisFit, limits: &Limits, board_length: &str) -> Quality {
+    let [own, expected] = fit.expected_error(&fit.covariance);
+    let exact = fit.expected_error(&fit.covariance_camera_exact)[0];
+    let camera_part = (own * own - exact * exact).max(0.0).sqrt();
+    let used: Vec<_> = fit.stops.iter().filter(|s| s.used).collect();
+    let (low, high) = fit.counts.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), c| (a.min(*c), b.max(*c)));
+    let way = fit.axis.pitch.abs() * (high - low);
+    let unit = fit.axis.unit.name();
+    let (over, way_words) = match fit.axis.kind {
+        AxisKind::Linear => (format!("{way:.2} mm of way"), format!("{way:.2} mm")),
+        AxisKind::Turntable => ("a whole turn".into(), format!("{:.1} degrees", way.to_degrees())),
+    };
+    let mut j = limits.by_error(
+        expected,
+        format!(
+            "a point that rides along is put right to {expected:.4} mm (1 sigma) over {over}: {own:.4} mm by direction and pitch, \
+             the rest scatters from stop to stop"
+        ),
+    );
+    contradictions(fit, &mut j);
+    order(fit, &mut j);
+    j.at_best(Verdict::BadlyDetermined, used.len() < 4, || format!("{} stops leave nothing to check", used.len()));
+    j.at_best(Verdict::Usable, (4..ENOUGH).contains(&used.len()), || {
+        format!("{} stops, {ENOUGH} are needed to be good", used.len())
+    });
+    if fit.sigma_mm > 0.0 || fit.sigma_rad > 0.0 {
+        j.reasons.push(format!(
+            "the axis (or its encoder) scatters by {:.4} mm and {:.4} degrees from stop to stop beyond what pixels explain; every \
+             point's sigma contains it",
+            fit.sigma_mm,
+            fit.sigma_rad.to_degrees()
+        ));
+    }
+    let [bow, bow_sigma] = fit.bend_mm;
+    j.at_best(Verdict::Usable, bow > BENT * bow_sigma && bow > 0.25 * limits.tolerance_mm, || {
+        format!("the way is bent: {bow:.4} mm from its ends to its middle, {bow_sigma:.4} mm is chance; it is used as straight")
+    });
+    if let Some(stated) = fit.axis.unit.stated() {
+        let ratio = fit.axis.pitch.abs() / stated;
+        let sigma = fit.covariance[(3, 3)].max(0.0).sqrt() / stated;
+        j.at_best(Verdict::BadlyDetermined, (ratio - 1.0).abs() > (4.0 * sigma).max(SCALE_TOLERANCE), || {
+            format!(
+                "a {unit} of the axis is {ratio:.4} {unit} by the board: the axis states another unit, or {board_length} is wrong"
+            )
+        });
+    }
+    if camera_part > 0.0 {
+        j.reasons.push(format!("the camera's own uncertainty makes {camera_part:.4} mm of the error"));
+    }
+    j.advise(used.len() < 8, || "show the board at eight or more stops".into());
+    let partly = fit.axis.kind == AxisKind::Turntable && way < HALF_TURN;
+    j.at_best(Verdict::Usable, partly, || {
+        format!("the board was seen over {way_words} of the turn: farther round the table is taken to run true")
+    });
+    j.advise(partly, || format!("let the board turn by more than {way_words}: put it near the axis, or tilt it less"));
+    j.advise(j.verdict != Verdict::Good && camera_part > 0.7 * own, || {
+        "calibrate the camera with more pictures first: most of the error comes from it".into()
+    });
+    let figures = BTreeMap::from([
+        ("expected_error_at_working_distance_mm".to_string(), expected),
+        ("expected_error_of_direction_and_pitch_mm".into(), own),
+        ("expected_error_from_camera_mm".into(), camera_part),
+        (AXIS_SIGMA_MM.into(), fit.sigma_mm),
+        (AXIS_SIGMA_DEG.into(), fit.sigma_rad.to_degrees()),
+        ("way_mm_or_deg".into(), if fit.axis.kind == AxisKind::Linear { way } else { way.to_degrees() }),
+        ("least_count".into(), low),
+        ("greatest_count".into(), high),
+        ("pitch_sigma_mm_or_rad".into(), fit.covariance[(3, 3)].max(0.0).sqrt()),
+        (
+            "direction_sigma_deg".into(),
+            (0..3).map(|i| fit.covariance[(i, i)].max(0.0)).sum::<f64>().sqrt().to_degrees(),
+        ),
+        ("bow_mm".into(), bow),
+        ("rms_mm".into(), rms(used.iter().map(|s| s.mm))),
+        ("holdout_rms_mm".into(), rms(used.iter().map(|s| s.holdout_mm))),
+        ("scatter_over_sigma".into(), fit.chi2.sqrt()),
+        ("variance_factor".into(), fit.inflation),
+        ("pictures_contradicting".into(), (fit.stops.len() - used.len()) as f64),
+    ]);
+    Quality {
+        verdict: j.verdict,
+        reasons: j.reasons,
+        advice: j.advice,
+        figures,
+        per_picture: fit.stops.iter().map(|s| (s.name.clone(), s.mm)).collect(),
+    }
+}
+
+/// What the stops say against each other, and who says it.
+fn contradictions(fit: &AxisFit, j: &mut Judgement) {
+    for s in fit.stops.iter().filter(|s| !s.used) {
+        j.at_best(Verdict::Usable, true, || {
+            format!(
+                "{} at count {} was left out: the board lies {:.3} mm from where the others predict it (it slipped, or the count is \
+                 another picture's)",
+                s.name, s.count, s.holdout_mm
+            )
+        });
+    }
+    let used = fit.stops.iter().filter(|s| s.used).count();
+    overrule(used, fit.stops.len() - used, j);
+}
+
+/// Whether the counts are the pictures' own.
+fn order(fit: &AxisFit, j: &mut Judgement) {
+    let o = &fit.order;
+    j.at_best(Verdict::BadlyDetermined, o.spread_mm > BY_CHANCE * o.dealt_mm, || {
+        format!(
+            "counts and pictures do not belong together: the stops spread by {:.3} mm about their motion, with counts dealt out at \
+             random by {:.3} mm",
+            o.spread_mm, o.dealt_mm
+        )
+    });
+    let turned = o.reversed_mm < 0.5 * o.spread_mm;
+    j.at_best(Verdict::BadlyDetermined, turned, || {
+        format!(
+            "the counts fit the pictures in the reverse order: the stops then spread by {:.3} mm, not by {:.3} mm",
+            o.reversed_mm, o.spread_mm
+        )
+    });
+    let untold = !turned && o.reversed_mm < TOLD * o.spread_mm;
+    j.at_best(Verdict::Usable, untold, || {
+        "counts in the reverse order would fit as well, because the stops lie evenly: that they count the right way round is \
+         taken from the recording"
+            .into()
+    });
+    j.advise(untold, || "add a stop at an uneven distance from the others: then the counts' sense is seen".into());
+}
+
+/// The report.
+pub fn page(fit: &AxisFit, quality: &Quality) -> Page {
+    let mut page = Page::new(&format!("Axis calibration: {}", fit.axis.kind.words()));
+    page.verdict(quality);
+    let (d, p, s) = (fit.axis.direction(), fit.axis.origin(), |i: usize| fit.covariance[(i, i)].max(0.0).sqrt());
+    let mut rows: Vec<Vec<String>> = (0..3)
+        .map(|i| vec![format!("direction {}", ["x", "y", "z"][i]), format!("{:.7}", d[i]), format!("{:.7}", s(i))])
+        .collect();
+    let of = if fit.axis.kind == AxisKind::Linear { "mm" } else { "rad" };
+    let pitch = format!("pitch, {of} a {}", fit.axis.unit.name());
+    rows.push(vec![pitch, format!("{:.9}", fit.axis.pitch), format!("{:.9}", s(3))]);
+    if fit.axis.kind == AxisKind::Turntable {
+        rows.extend((0..3).map(|i| {
+            vec![format!("through {}", ["x", "y", "z"][i]), format!("{:.4} mm", p[i]), format!("{:.4} mm", s(4 + i))]
+        }));
+    }
+    page.table("In the camera frame", &["", "value", "sigma"], &rows);
+    let figures: Vec<Vec<String>> = quality.figures.iter().map(|(k, v)| vec![k.clone(), format!("{v:.5}")]).collect();
+    page.table("Figures", &["figure (unit in the name)", "value"], &figures);
+    page.paragraph(
+        "Fit: distance of each board from where the axis puts it. Verification: the same by the axis of the others.",
+    );
+    let stops: Vec<Vec<String>> = fit
+        .stops
+        .iter()
+        .map(|s| {
+            vec![
+                s.name.clone(),
+                format!("{}", s.count),
+                format!("{:.4}", s.mm),
+                format!("{:.4}", s.holdout_mm),
+                format!("{:.1}", s.surprise.sqrt()),
+                if s.used { "used" } else { "left out" }.into(),
+            ]
+        })
+        .collect();
+    page.table(
+        "Stops",
+        &["picture", "count", "mm", "mm by the others", "sigmas from the others' prediction", ""],
+        &stops,
+    );
+    let held: Vec<(String, f64)> =
+        fit.stops.iter().filter(|s| s.holdout_mm.is_finite()).map(|s| (s.name.clone(), s.holdout_mm)).collect();
+    page.figure("Distance of each board from where the others predict it, mm", &bars(&held, "mm", None));
+    for (i, name) in ["x", "y", "z"].iter().enumerate() {
+        let points: Vec<(f64, f64)> = fit.stops.iter().filter(|s| s.used).map(|s| (s.count, s.off[i])).collect();
+        let caption = format!(
+            "What is left of the board's place along the camera's {name}, over the count: a bow is no straight axis"
+        );
+        page.figure(&caption, &scatter(&points, "count", "mm"));
+    }
+    page
+}

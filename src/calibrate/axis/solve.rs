@@ -1,0 +1,122 @@
+//! In: a board's poses at stops of a linear axis or turntable, with the counts there. Out: direction and pitch, or the axis of
+//! rotation, by maximum likelihood, with covariance, the axis' own scatter and hold-out errors.
+//! Frame and unit: camera frame, mm, rad, counts (docs/math.md, Axis (1) to (8)).
+
+use super::checks::{self, Suspects};
+use super::fit::{AxisFit, Stop};
+use super::terms::{self, Seen, fitted};
+use super::{noise, start};
+use crate::calibrate::measured_pose::pooled_factor;
+use crate::calibrate::scatter::inflation;
+use crate::camera::ParameterCovariance;
+use crate::fault::{Fault, Result};
+use crate::geometry::{AxisKind, CountUnit};
+
+/// Settings of [`solve`].
+#[derive(Clone, Debug)]
+pub struct AxisOptions {
+    /// A picture is left out whose board lies farther than this from where the others predict it: squared Mahalanobis
+    /// distance, 6 degrees of freedom; 26.1 leaves one good picture in 5,000 out. 12..=1000.
+    pub gate: f64,
+    /// Seed of the random deals of counts that the fit is compared with.
+    pub seed: u64,
+}
+
+impl Default for AxisOptions {
+    fn default() -> Self {
+        AxisOptions { gate: 26.1, seed: 1 }
+    }
+}
+
+fn refused(what: String) -> Fault {
+    Fault::refused(what)
+        .cause("too few stops, an axis that hardly moved, or counts and pictures that do not belong together")
+        .next("show the board at eight or more stops, unevenly apart, along as much of the way as the camera sees")
+}
+
+/// Fits the axis. `camera_covariance` is that of the camera's parameters.
+///
+/// # Errors
+/// Fewer than three stops, counts that are all the same, boards that agree on no motion.
+pub fn solve(
+    stops: &[Stop],
+    kind: AxisKind,
+    unit: CountUnit,
+    camera_covariance: &ParameterCovariance,
+    o: &AxisOptions,
+) -> Result<AxisFit> {
+    if !(12.0..=1000.0).contains(&o.gate) {
+        return Err(
+            Fault::usage(format!("gate is {}, 12 to 1000 is allowed", o.gate)).next("choose a value in that range")
+        );
+    }
+    if stops.len() < 3 {
+        return Err(refused(format!("{} stops with a board and a count, 3 are needed", stops.len())));
+    }
+    let factor = pooled_factor(stops.iter().map(|s| &s.pose)).unwrap_or(1.0);
+    let seen: Vec<Seen> = stops
+        .iter()
+        .map(|s| Seen::new(s, factor))
+        .collect::<Option<_>>()
+        .ok_or_else(|| refused("a board's pose is not determined by its pixels".into()))?;
+    let (low, high) =
+        seen.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), s| (a.min(s.count), b.max(s.count)));
+    if !(high > low) {
+        return Err(refused(format!("all {} stops have the count {low}", stops.len())));
+    }
+    let first = start::start(&seen, kind, unit).ok_or_else(|| refused("no two stops tell a motion".into()))?;
+    let order = checks::order(&seen, &first, unit, o.seed);
+    let mut used = first.agreeing.clone();
+    let (mut state, mut scatter) = (first.state, first.scatter);
+    let mut settled = None;
+    for round in 0..12 {
+        let chosen: Vec<&Seen> = used.iter().map(|&i| &seen[i]).collect();
+        if chosen.len() < 3 {
+            return Err(refused(format!("{} of {} stops agree on one motion, 3 are needed", chosen.len(), seen.len())));
+        }
+        let fit =
+            fitted(&chosen, &state, &scatter).ok_or_else(|| refused("the stops do not determine the axis".into()))?;
+        scatter = noise::estimate(&chosen, &fit);
+        let fit = fitted(&chosen, &fit.state, &scatter)
+            .ok_or_else(|| refused("the stops do not determine the axis".into()))?;
+        state = fit.state;
+        let suspects = Suspects::of(&seen, &used, &fit, &scatter);
+        let next = suspects.within(o.gate, &used, round);
+        settled = Some((fit, suspects));
+        if next == used {
+            break;
+        }
+        used = next;
+    }
+    let (fit, suspects) = settled.expect("at least one round");
+    let used: Vec<usize> = suspects.used.clone();
+    let chosen: Vec<&Seen> = used.iter().map(|&i| &seen[i]).collect();
+    let freedom = (6 * chosen.len()) as f64 - fit.covariance.nrows() as f64;
+    let chi2 = if freedom > 0.0 { fit.cost / freedom } else { 1.0 };
+    // Of places alone: turns say little of a line.
+    let few = 3.0 * chosen.len() as f64 - (fit.covariance.nrows() as f64 - 3.0);
+    let share = noise::share(&chosen, &scatter);
+    let inflation = inflation(chi2.max(1.0) + share, few) / (1.0 + share);
+    let exact = &fit.covariance * inflation;
+    let by = terms::by_camera(&chosen, &fit, &scatter);
+    let follows = &by * camera_covariance * by.transpose();
+    let axis = state.axis(unit);
+    let to = state.to_parameters(&axis);
+    let covariance = &to * (&exact + follows) * to.transpose();
+    let back = axis.camera_from_axis.inverse();
+    let board = state.board();
+    Ok(AxisFit {
+        covariance,
+        covariance_camera_exact: &to * exact * to.transpose(),
+        stops: suspects.residuals(stops, &seen, &state),
+        sigma_mm: scatter.mm,
+        sigma_rad: scatter.rad,
+        chi2,
+        inflation,
+        counts: chosen.iter().map(|s| s.count).collect(),
+        landmarks: stops[used[0]].pose.landmarks.map(|l| back.point(&board.point(&l))),
+        bend_mm: checks::bend(&chosen, &state, &scatter),
+        order,
+        axis,
+    })
+}

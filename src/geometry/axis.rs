@@ -1,0 +1,257 @@
+//! In: direction and pitch of a linear axis or turntable before a camera. Out: how a part that rides on it stands at a count, and
+//! how an error of each parameter moves it.
+//! Frame and unit: camera, axis (the part's side at count 0), mm, rad; docs/math.md, Axis.
+
+use super::{Board, Camera, Mat3, Ride, Rigid, Vec3, exp, log, skew};
+use nalgebra::SMatrix;
+
+/// What moves the part past the light, or the light past the part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum AxisKind {
+    Linear,
+    Turntable,
+}
+
+impl AxisKind {
+    /// For people.
+    pub fn words(self) -> &'static str {
+        match self {
+            AxisKind::Linear => "linear axis",
+            AxisKind::Turntable => "turntable",
+        }
+    }
+}
+
+/// What a recording's counts count.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum CountUnit {
+    /// An encoder's steps.
+    Count,
+    /// Millimetres that the axis says it moved.
+    Mm,
+    /// Degrees that the turntable says it turned.
+    Deg,
+}
+
+impl CountUnit {
+    /// In files and messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            CountUnit::Count => "count",
+            CountUnit::Mm => "mm",
+            CountUnit::Deg => "deg",
+        }
+    }
+    /// What one of it is by its own statement, mm or rad; an encoder's step states nothing.
+    pub fn stated(self) -> Option<f64> {
+        match self {
+            CountUnit::Count => None,
+            CountUnit::Mm => Some(1.0),
+            CountUnit::Deg => Some(1f64.to_radians()),
+        }
+    }
+}
+
+/// A motion by small amounts: a point P goes to P + v + w x P.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Twist {
+    /// mm.
+    pub v: Vec3,
+    /// rad.
+    pub w: Vec3,
+}
+
+/// A linear axis or turntable as a fixed camera sees it. Where the axis carries the sensor it is the same: the part moves against
+/// the camera.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Axis {
+    pub kind: AxisKind,
+    pub unit: CountUnit,
+    /// Linear: mm a count along the frame's x. Turntable: rad a count about the frame's z, right-handed.
+    pub pitch: f64,
+    /// The frame of the part at count 0. Linear: x is the direction of growing counts. Turntable: z is the axis.
+    #[serde(rename = "camera_T_axis")]
+    pub camera_from_axis: Rigid<Camera, Ride>,
+}
+
+/// A motion as it is found: which way, and about where.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Riding {
+    pub kind: AxisKind,
+    pub unit: CountUnit,
+    /// Linear: of growing counts. Turntable: either way along the axis. Camera frame, of unit length.
+    pub direction: Vec3,
+    /// A point on a turntable's axis, camera frame, mm.
+    pub point: Vec3,
+    /// mm or rad a count, right-handed about `direction`.
+    pub pitch: f64,
+}
+
+impl Axis {
+    /// The axis frame by the board that rode at count 0 there (docs/conventions.md): its z leads out of the board's face, on
+    /// a turntable to the side that the camera stands on.
+    pub fn from_board(r: &Riding, camera_from_board: &Rigid<Camera, Board>) -> Axis {
+        let at = camera_from_board.translation;
+        let column = |k: usize| -> Vec3 { camera_from_board.rotation.column(k).into() };
+        let across = |v: Vec3, along: &Vec3| v - along * along.dot(&v);
+        // Of two, the one more across: a board may stand upright.
+        let cleaner = |a: Vec3, b: Vec3, along: &Vec3| if a.dot(along).abs() <= b.dot(along).abs() { a } else { b };
+        let forward = r.pitch >= 0.0;
+        let (rotation, origin, pitch) = match r.kind {
+            AxisKind::Linear => {
+                let x = if forward { r.direction } else { -r.direction };
+                let z = across(cleaner(-column(2), -column(1), &x), &x).normalize();
+                (Mat3::from_columns(&[x, z.cross(&x), z]), at, r.pitch.abs())
+            }
+            AxisKind::Turntable => {
+                let foot = r.point + r.direction * r.direction.dot(&(at - r.point));
+                let down = r.direction.dot(&at) > 0.0;
+                let z = if down { -r.direction } else { r.direction };
+                let x = across(cleaner(column(0), column(1), &z), &z).normalize();
+                (Mat3::from_columns(&[x, z.cross(&x), z]), foot, if down { -r.pitch } else { r.pitch })
+            }
+        };
+        Axis { kind: r.kind, unit: r.unit, pitch, camera_from_axis: Rigid::new(rotation, origin) }
+    }
+
+    /// Of unit length, camera frame: the direction of motion, or the axis of rotation.
+    pub fn direction(&self) -> Vec3 {
+        let column = if self.kind == AxisKind::Linear { 0 } else { 2 };
+        self.camera_from_axis.rotation.column(column).into()
+    }
+
+    /// Where the frame's origin stands at count 0; for a turntable a point on the axis. Camera frame, mm.
+    pub fn origin(&self) -> Vec3 {
+        self.camera_from_axis.translation
+    }
+
+    /// How the part has moved at a count, camera frame.
+    pub fn moved(&self, count: f64) -> Rigid<Camera, Camera> {
+        let (along, by) = (self.direction(), self.pitch * count);
+        match self.kind {
+            AxisKind::Linear => Rigid::new(Mat3::identity(), along * by),
+            AxisKind::Turntable => {
+                let turn = exp(&(along * by));
+                Rigid::new(turn, self.origin() - turn * self.origin())
+            }
+        }
+    }
+
+    /// Where the camera stands to the part at a count.
+    pub fn axis_from_camera(&self, count: f64) -> Rigid<Ride, Camera> {
+        self.camera_from_axis.inverse() * self.moved(count).inverse()
+    }
+
+    /// The count at which the camera stands so; a turntable's within half a turn of 0.
+    pub fn count_of(&self, axis_from_camera: &Rigid<Ride, Camera>) -> f64 {
+        let moved = (self.camera_from_axis * *axis_from_camera).inverse();
+        let by = match self.kind {
+            AxisKind::Linear => moved.translation,
+            AxisKind::Turntable => log(&moved.rotation),
+        };
+        by.dot(&self.direction()) / self.pitch
+    }
+
+    /// How a part measured at a count is off, in axis coordinates, for an error of one in each of dx dy dz (direction, camera
+    /// frame), pitch, and for a turntable px py pz (origin, camera frame, mm). The frame at count 0 stays.
+    pub fn errors(&self, count: f64) -> Vec<Twist> {
+        let (d, p, by) = (self.direction(), self.origin(), self.pitch * count);
+        let unit = |k: usize| Vec3::from_fn(|i, _| if i == k { 1.0 } else { 0.0 });
+        let none = Vec3::zeros();
+        let about = |w: Vec3| Twist { v: p.cross(&w), w };
+        let in_camera: Vec<Twist> = match self.kind {
+            AxisKind::Linear => {
+                (0..3).map(|k| Twist { v: unit(k) * -by, w: none }).chain([Twist { v: d * -count, w: none }]).collect()
+            }
+            // exp(-by d): by the left Jacobian of the rotation group, for a step at right angles to d.
+            AxisKind::Turntable => (0..3)
+                .map(|k| about(unit(k) * -by.sin() + d.cross(&unit(k)) * (1.0 - by.cos())))
+                .chain([about(d * -count)])
+                .chain((0..3).map(|k| Twist { v: unit(k) - exp(&(d * -by)) * unit(k), w: none }))
+                .collect(),
+        };
+        let back = self.camera_from_axis.rotation.transpose();
+        in_camera.into_iter().map(|t| Twist { v: back * (t.v + t.w.cross(&p)), w: back * t.w }).collect()
+    }
+}
+
+impl Twist {
+    /// By which a point is moved.
+    pub fn at(&self, p: &Vec3) -> Vec3 {
+        self.v + self.w.cross(p)
+    }
+    /// d(point) over (v, w).
+    pub fn lever(p: &Vec3) -> SMatrix<f64, 3, 6> {
+        let mut j = SMatrix::<f64, 3, 6>::zeros();
+        j.fixed_view_mut::<3, 3>(0, 0).copy_from(&Mat3::identity());
+        j.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew(p));
+        j
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn axis(kind: AxisKind) -> Axis {
+        let camera_from_axis = Rigid::from_vectors(&Vec3::new(2.2, 0.3, -0.4), Vec3::new(12.0, -7.0, 310.0));
+        Axis { kind, unit: CountUnit::Count, pitch: 0.004, camera_from_axis }
+    }
+
+    #[test]
+    fn a_part_rides_along_x_or_about_z() {
+        for kind in [AxisKind::Linear, AxisKind::Turntable] {
+            let a = axis(kind);
+            let p = Vec3::new(3.0, 4.0, 5.0);
+            // What the camera sees of the part at a count is the part in its own frame.
+            let seen = a.moved(250.0).point(&a.camera_from_axis.point(&p));
+            assert!((a.axis_from_camera(250.0).point(&seen) - p).norm() < 1e-9);
+            let there = a.camera_from_axis.inverse().point(&seen);
+            let want = match kind {
+                AxisKind::Linear => p + Vec3::x(),
+                AxisKind::Turntable => exp(&Vec3::z()) * p,
+            };
+            assert!((there - want).norm() < 1e-9, "{there}");
+            assert!((a.count_of(&a.axis_from_camera(250.0)) - 250.0).abs() < 1e-7);
+        }
+    }
+
+    #[test]
+    fn errors_are_derivatives() {
+        for kind in [AxisKind::Linear, AxisKind::Turntable] {
+            let (a, count, h) = (axis(kind), 330.0, 1e-6);
+            let seen = Vec3::new(15.0, 22.0, 290.0);
+            let here = a.axis_from_camera(count).point(&seen);
+            let errors = a.errors(count);
+            assert_eq!(errors.len(), if kind == AxisKind::Linear { 4 } else { 7 });
+            // The frame at count 0 stays: only the motion is another.
+            let measured = |d: Vec3, k: f64, p: Vec3| {
+                let by = k * count;
+                let back = match kind {
+                    AxisKind::Linear => seen - d * by,
+                    AxisKind::Turntable => p + exp(&(d * -by)) * (seen - p),
+                };
+                a.camera_from_axis.inverse().point(&back)
+            };
+            let unit = |k: usize| Vec3::from_fn(|i, _| if i == k { h } else { 0.0 });
+            let (d, k, p) = (a.direction(), a.pitch, a.origin());
+            for (i, e) in errors.iter().enumerate() {
+                let (there, want) = match i {
+                    // Along d itself a direction cannot err.
+                    0..=2 => {
+                        let step = unit(i) - d * d.dot(&unit(i));
+                        let along: Vec3 = (0..3).map(|j| errors[j].at(&here) * (step[j] / h)).sum();
+                        (measured(d + step, k, p), along)
+                    }
+                    3 => (measured(d, k + h, p), e.at(&here)),
+                    _ => (measured(d, k, p + unit(i - 4)), e.at(&here)),
+                };
+                let found = (there - here) / h;
+                assert!((found - want).norm() < 1e-3 * (1.0 + want.norm()), "{kind:?} {i}: {found} {want}");
+            }
+        }
+    }
+}

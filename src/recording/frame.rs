@@ -1,0 +1,24 @@
+//! In: one entry of `frames` in meta.json. Out: which pictures were taken then, and what they belong to.
+//! Frame and unit: indices; counts in the unit of the recording's motion.
+
+/// One moment of the recording: pictures taken without moving.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrameRef {
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub laser: Option<String>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub ambient: Option<String>,
+    /// Index into the pose file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pose: Option<usize>,
+    /// Index into `boards`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub board: Option<usize>,
+    /// Where the axis stood, in `motion.unit`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub count: Option<f64>,
+    /// Number of the pulse that triggered the camera, from 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trigger: Option<u64>,
+}

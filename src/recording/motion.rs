@@ -1,0 +1,133 @@
+//! In: `motion` of meta.json. Out: what moved between the frames, and what tells where it stood, checked.
+//! Frame and unit: counts in the unit that `motion` states, from its zero; robot poses are base_from_flange, mm.
+
+use super::frame::FrameRef;
+use crate::fault::{Fault, Result};
+use crate::geometry::{AxisKind, Base, CountUnit, Flange, Rigid};
+
+/// What brings part and light past each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum MotionKind {
+    #[default]
+    Robot,
+    Linear,
+    Turntable,
+}
+
+/// What is moved; the other one stands still.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Carries {
+    #[default]
+    Sensor,
+    Part,
+}
+
+/// `motion` of a recording (docs/file-formats.md).
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Motion {
+    pub kind: MotionKind,
+    pub carries: Carries,
+    /// What a count is; of an axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unit: Option<CountUnit>,
+    /// The count at which the axis frame stands; 0 unless stated.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub zero: Option<f64>,
+    /// Counts from one trigger pulse to the next, where the axis triggers the camera.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub counts_per_shot: Option<f64>,
+    /// Name of a file of counts (CSV).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub counts_file: Option<String>,
+}
+
+/// Where what moves stood at a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stand {
+    /// The robot's flange.
+    Robot(Rigid<Base, Flange>),
+    /// An axis, from the motion's zero.
+    Count(f64),
+}
+
+/// For an axis whose counts nobody wrote down.
+const WAYS: &str = "give every frame a \"count\", name a \"counts_file\", or state \"counts_per_shot\"";
+
+impl Motion {
+    /// The axis that moves; none where a robot does.
+    pub fn axis(&self) -> Option<AxisKind> {
+        match self.kind {
+            MotionKind::Robot => None,
+            MotionKind::Linear => Some(AxisKind::Linear),
+            MotionKind::Turntable => Some(AxisKind::Turntable),
+        }
+    }
+
+    /// Name of the frame that clouds of such recordings are in: docs/conventions.md.
+    pub fn frame(&self) -> &'static str {
+        match (self.kind, self.carries) {
+            (MotionKind::Robot, Carries::Sensor) => "base",
+            (MotionKind::Robot, Carries::Part) => "flange",
+            _ => "axis",
+        }
+    }
+
+    pub(super) fn check(&self, frames: &[FrameRef]) -> Result<()> {
+        let bad = |what: String, next: &str| {
+            Err(Fault::input(what).cause("'motion' of meta.json says two things, or leaves one out").next(next))
+        };
+        let (counted, triggered) =
+            (frames.iter().any(|f| f.count.is_some()), frames.iter().any(|f| f.trigger.is_some()));
+        let ways = [counted, self.counts_file.is_some(), self.counts_per_shot.is_some()];
+        let Some(axis) = self.axis() else {
+            let of_axis = self.unit.is_some() || self.zero.is_some() || triggered || ways.contains(&true);
+            return if of_axis {
+                bad(
+                    "motion is a robot's, and unit, zero or counts are stated".into(),
+                    "leave them out, or name the axis",
+                )
+            } else {
+                Ok(())
+            };
+        };
+        let units = match axis {
+            AxisKind::Linear => [CountUnit::Count, CountUnit::Mm],
+            AxisKind::Turntable => [CountUnit::Count, CountUnit::Deg],
+        };
+        let Some(unit) = self.unit.filter(|u| units.contains(u)) else {
+            let [a, b] = units.map(CountUnit::name);
+            let is = self.unit.map_or("not stated".into(), |u| format!("\"{}\"", u.name()));
+            return bad(
+                format!("the unit of the {}'s counts is {is}", axis.words()),
+                &format!("state \"unit\": \"{a}\" (an encoder's steps) or \"{b}\" (as the axis itself says)"),
+            );
+        };
+        if ways.iter().filter(|w| **w).count() != 1 {
+            let what = format!("{} ways to tell the counts are used, 1 is needed", ways.iter().filter(|w| **w).count());
+            return bad(what, WAYS);
+        }
+        if triggered && self.counts_per_shot.is_none() {
+            return bad("frames have a 'trigger', and counts_per_shot is not stated".into(), WAYS);
+        }
+        if triggered && frames.iter().any(|f| f.trigger.is_none() && f.laser.is_some()) {
+            return bad("some frames have a 'trigger' and some have none".into(), "number all frames, or none");
+        }
+        let numbers = [self.zero, self.counts_per_shot].into_iter().chain(frames.iter().map(|f| f.count)).flatten();
+        if let Some(odd) = numbers.into_iter().find(|c| !(c.abs() <= MOST)) {
+            let what = format!("a count of {odd} {}, at most {MOST:.0} is believed", unit.name());
+            return bad(what, "write counts as the encoder gives them, or set \"zero\" nearer");
+        }
+        match self.counts_per_shot {
+            Some(step) if step == 0.0 => {
+                bad("counts_per_shot is 0".into(), "state how far the axis goes from shot to shot")
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// 2^53: the integers that f64 holds.
+pub(super) const MOST: f64 = 9e15;
