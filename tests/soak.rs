@@ -49,6 +49,7 @@ fn options(out: &Path, place: Where) -> ScanOptions {
         ambient: None,
         overlays: 2,
         skip_bad: false,
+        motion: sheetlight::recording::Motion::default(),
         resume: false,
         stop: Default::default(),
     }
