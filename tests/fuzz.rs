@@ -1,6 +1,7 @@
 //! In: valid files of every format that a person or another program writes, damaged at random. Out: each
 //! parser answers with a value or an error that names something and says what to do next; none panics, hangs or eats memory.
-//! Frame and unit: none. As many mutations of each as SHEETLIGHT_LONG says, 300 without it.
+//! Frame and unit: none. As many mutations of each as SHEETLIGHT_LONG says (100,000 where it is 1), 300 without
+//! it. What once failed is in tests/corpus and is read first.
 
 #[path = "common/process.rs"]
 mod process;
@@ -15,11 +16,11 @@ use sheetlight::find::dxf::{self, DxfOptions};
 use sheetlight::find::{Drawing, Recipe};
 use sheetlight::geometry::{Base, Flange};
 use sheetlight::raster::{Channel, Image, decode, float_tiff, png, read_float_tiff};
-use sheetlight::recording::{BoardSpec, Meta, load_poses};
-use sheetlight::rig::Rig;
-use sheetlight::scan::{CloudPoint, HeightMap, RawFormat, RawFrames, read_cloud, write_cloud};
-use sheetlight::simulate::{Scene, SceneSpec, Truth};
-use sheetlight::station::{Settings, Values};
+use sheetlight::recording::{BoardSpec, Markers, Meta, load_board_poses, load_poses};
+use sheetlight::rig::{Rig, sealed};
+use sheetlight::scan::{CloudPoint, CloudWriter, HeightMap, RawFormat, RawFrames, read_cloud, write_cloud};
+use sheetlight::simulate::{RigSpec, Scene, SceneSpec, Truth};
+use sheetlight::station::{Checkpoint, Settings, Values, load_report};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::channel;
@@ -38,11 +39,15 @@ const VALUES: &str = r#"{"intrinsics": {"fx": 611.6, "fy": 611.6, "cx": 315, "cy
 const DRAWING: &str = "[[shape]]\nkind = 'rectangle'\ncentre = [0, 0]\nsize = [20, 10]\n[[shape]]\nkind = 'circle'\nname = 'hole'\ncentre = [1, 0]\nradius = 0.5\ninside = 'low'\ngrid = { count = [4, 2], pitch = [3, 6] }\n[[shape]]\nkind = 'polygon'\npoints = [[0, 0], [3, 1], [2, 4]]\nz_mm = 2.5\n[[shape]]\nkind = 'arc'\ncentre = [0, 0]\nradius = 5\nspan_deg = [0, 90]\n";
 const DXF: &str = "0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n4\n0\nENDSEC\n0\nSECTION\n2\nBLOCKS\n0\nBLOCK\n2\nA\n10\n0\n20\n0\n0\nCIRCLE\n10\n0\n20\n0\n40\n1\n0\nENDBLK\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n0\nLWPOLYLINE\n90\n4\n70\n1\n10\n0\n20\n0\n42\n0.5\n10\n30\n20\n0\n10\n30\n20\n20\n10\n0\n20\n20\n0\nINSERT\n2\nA\n10\n9\n20\n9\n41\n1\n42\n1\n50\n30\n70\n2\n71\n2\n44\n4\n45\n4\n0\nARC\n10\n5\n20\n5\n40\n2\n50\n0\n51\n270\n0\nELLIPSE\n10\n15\n20\n10\n11\n3\n21\n0\n40\n0.5\n41\n0\n42\n6.283185\n0\nSPLINE\n70\n8\n71\n3\n72\n8\n73\n4\n40\n0\n40\n0\n40\n0\n40\n0\n40\n1\n40\n1\n40\n1\n40\n1\n10\n1\n20\n1\n10\n2\n20\n3\n10\n4\n20\n3\n10\n5\n20\n1\n0\nENDSEC\n0\nEOF\n";
 const LISTING: &str = "/PROG  BALL\n/MN\n   1:J P[1] 100% FINE    ;\n/POS\nP[1]{\n   GP1:\n\tUF : 0, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n\tX =   500.125  mm,\tY =   -20.500  mm,\tZ =   300.000  mm,\n\tW =   180.000 deg,\tP =    10.000 deg,\tR =   -90.000 deg\n};\nP[2:\"over the ball\"]{\n   GP1:\n\tUF : 0, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n\tX =  1.0  mm,\tY =  2.0  mm,\tZ =  3.0  mm,\n\tW =  0.0 deg,\tP =  0.0 deg,\tR =  90.0 deg\n};\n/END\n";
-const BOARDS: [&str; 3] = [
+const BOARDS: [&str; 5] = [
     r#"{"type": "chessboard", "inner_corners": [9, 6], "square_mm": 10.0, "border_mm": 7.0, "first_square": "black"}"#,
     r#"{"type": "charuco", "squares": [7, 5], "square_mm": 10.0, "marker_mm": 7.5, "dictionary": "DICT_4X4_50"}"#,
     r#"{"type": "circles", "dots": [7, 5], "pitch_mm": 10.0, "diameter_mm": 5.0, "asymmetric": true}"#,
+    r#"{"type": "marker_grid", "markers": [5, 7], "marker_mm": 20.0, "gap_mm": 5.0, "dictionary": "DICT_APRILTAG_36h11", "first_id": 3}"#,
+    r#"{"type": "marker_grid", "markers": [1, 1], "marker_mm": 80.0, "gap_mm": 0.0, "dictionary": "DICT_4X4_50", "first_id": 49}"#,
 ];
+const BOARD_POSES: &str =
+    "# transform: camera_T_board\n# convention: denso\nframe,x,y,z,rx,ry,rz\n0,1,2,300,4,5,6\n3,-10,2.5,280,180,0,90\n";
 
 /// What damaged numbers become: where limits are forgotten.
 const NUMBERS: [&str; 20] = [
@@ -114,10 +119,35 @@ const HANGS: Duration = Duration::from_secs(120);
 /// Memory that the whole process may ever have held.
 const MOST_MB: u64 = 512;
 
-/// Lets a parser read so many damaged files.
+/// Where what once failed is kept, a folder a parser; and where what fails now is put, to be moved there.
+const CORPUS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/corpus");
+const FAILED: &str = concat!(env!("CARGO_TARGET_TMPDIR"), "/fuzz");
+
+/// What once failed of a parser.
+fn corpus(name: &str) -> Vec<Vec<u8>> {
+    let files = std::fs::read_dir(Path::new(CORPUS).join(name)).into_iter().flatten();
+    let mut files: Vec<PathBuf> = files.map(|e| e.unwrap().path()).collect();
+    files.sort();
+    files.iter().map(|f| std::fs::read(f).unwrap()).collect()
+}
+
+/// Keeps a file that failed, or may; the next one takes its place.
+fn keep(name: &str, bytes: &[u8]) -> PathBuf {
+    let path = Path::new(FAILED).join(name);
+    std::fs::create_dir_all(FAILED).expect("the target's folder");
+    std::fs::write(&path, bytes).expect("a file");
+    path
+}
+
+/// Mutations of each parser in the long form: those of a number that SHEETLIGHT_LONG gives, else 100,000.
+fn rounds() -> usize {
+    let long = std::env::var("SHEETLIGHT_LONG").ok();
+    long.map_or(300, |n| n.parse().ok().filter(|n| *n > 1).unwrap_or(100_000))
+}
+
+/// Lets a parser read what once failed, and so many damaged files.
 fn survives(name: &'static str, seeds: Vec<Vec<u8>>, read: impl Fn(&[u8]) -> Result<(), Fault> + Send + 'static) {
-    let long = std::env::var("SHEETLIGHT_LONG").ok().map(|n| n.parse().unwrap_or(20_000));
-    let rounds = long.unwrap_or(300);
+    let rounds = rounds();
     let (tell, told) = channel();
     std::thread::spawn(move || {
         for seed in &seeds {
@@ -126,14 +156,17 @@ fn survives(name: &'static str, seeds: Vec<Vec<u8>>, read: impl Fn(&[u8]) -> Res
             });
         }
         let mut rng = Pcg64::seed_from_u64(name.bytes().map(u64::from).sum());
-        for round in 0..rounds {
-            let bytes = damaged(&seeds, &mut rng);
+        let once = corpus(name);
+        for round in 0..once.len() + rounds {
+            let bytes = once.get(round).cloned().unwrap_or_else(|| damaged(&seeds, &mut rng));
             tell.send(Some((round, bytes.clone()))).expect("the test listens");
             let before = processor_seconds();
             let answer = catch_unwind(AssertUnwindSafe(|| read(&bytes)));
             let seconds = processor_seconds() - before;
-            let shown =
-                || format!("{name}, mutation {round}:\n{}", String::from_utf8_lossy(&bytes[..bytes.len().min(4000)]));
+            let shown = || {
+                let text = String::from_utf8_lossy(&bytes[..bytes.len().min(4000)]);
+                format!("{name}, mutation {round}, kept as {}:\n{text}", keep(name, &bytes).display())
+            };
             match answer {
                 Err(_) => panic!("a panic: {}", shown()),
                 Ok(Err(e)) => assert!(!e.what.is_empty() && !e.next.is_empty(), "no next step: {e}\n{}", shown()),
@@ -152,11 +185,17 @@ fn survives(name: &'static str, seeds: Vec<Vec<u8>>, read: impl Fn(&[u8]) -> Res
             // The thread has ended: it printed what happened.
             Err(std::sync::mpsc::RecvTimeoutError::Disconnected) => panic!("{name} failed, see above"),
             Err(_) => {
-                let text = last.map(|(round, bytes)| format!("{round}:\n{}", String::from_utf8_lossy(&bytes)));
-                panic!("{name}: no answer after {} s, mutation {text:?}", HANGS.as_secs())
+                let kept = last.map(|(round, bytes)| (round, keep(name, &bytes)));
+                panic!("{name}: no answer after {} s, mutation {kept:?}", HANGS.as_secs())
             }
         }
     }
+}
+
+/// A folder for files by the hundred thousand: in memory, where the system has a place for that.
+fn scratch() -> tempfile::TempDir {
+    let memory = Path::new("/dev/shm");
+    if memory.is_dir() { tempfile::tempdir_in(memory) } else { tempfile::tempdir() }.expect("a folder")
 }
 
 /// For parsers that want a file: the same file again and again.
@@ -164,12 +203,23 @@ fn through_file(
     name: &str,
     read: impl Fn(&Path) -> Result<(), Fault> + Send + 'static,
 ) -> impl Fn(&[u8]) -> Result<(), Fault> + Send + 'static {
-    let dir = tempfile::tempdir().expect("a folder");
+    let dir = scratch();
     let name = name.to_owned();
     move |bytes| {
         let path = dir.path().join(&name);
         std::fs::write(&path, bytes).expect("a file");
         read(&path)
+    }
+}
+
+/// What is still JSON gets the seal of what it holds now, or damage would never come behind the seal.
+fn sealed_anew(bytes: &[u8]) -> Vec<u8> {
+    match serde_json::from_slice::<serde_json::Value>(bytes) {
+        Ok(serde_json::Value::Object(mut object)) => {
+            object.remove("seal");
+            sealed(&object).into_bytes()
+        }
+        _ => bytes.to_vec(),
     }
 }
 
@@ -213,6 +263,67 @@ fn poses() {
 }
 
 #[test]
+fn board_poses() {
+    survives("board poses", seeds(&[BOARD_POSES]), through_file("b.csv", |p| load_board_poses(p).map(drop)));
+    let json = POSES_JSON.replace("base_T_flange", "camera_T_board").replace("1,0,0,3", "1,3,0,3");
+    let json = json.replace("0,0,1,3,", "0,0,1,300,");
+    survives("board poses as JSON", seeds(&[&json]), through_file("b.json", |p| load_board_poses(p).map(drop)));
+}
+
+#[test]
+fn rig_files() {
+    survives("rig files", shipped("rigs"), |b| {
+        let rig = RigSpec::parse(&text(b))?;
+        // What every user of a rig asks of it.
+        Recipe::parse(&rig.recipe(50))?;
+        Scene::new(rig.scene()).map(drop)
+    });
+}
+
+/// What a scan leaves for the next command, and an interrupted one for itself.
+#[test]
+fn scans() {
+    let dir = scratch();
+    let at = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    let options = sheetlight::simulate::SimulateOptions { width: 64, height: 64, shots: 2, ..Default::default() };
+    sheetlight::simulate::simulate(&dir.path().join("sim"), &options, &|_, _| {}).unwrap();
+    let mut scan = std::process::Command::new(env!("CARGO_BIN_EXE_sheetlight"));
+    scan.args([
+        "scan",
+        &at("sim/scan"),
+        "--station",
+        &at("sim/station"),
+        "--out",
+        &at("scan"),
+        "--quiet",
+        "--on",
+        "cpu",
+    ]);
+    scan.output().unwrap();
+    let seed = std::fs::read(at("scan/scan.json")).unwrap();
+    let folder = scratch();
+    survives("scan.json", vec![seed], move |b| {
+        std::fs::write(folder.path().join("scan.json"), b).expect("a file");
+        let report = load_report(folder.path())?;
+        match report.has_points() {
+            Err(e) if e.next.is_empty() => Err(e),
+            _ => Ok(()),
+        }
+    });
+    let mut cloud = CloudWriter::create(&dir.path().join("cloud.ply")).unwrap();
+    let mut state = Checkpoint::new("id".into());
+    state.save(dir.path(), &mut cloud).unwrap();
+    let seed = std::fs::read(at("progress.json")).unwrap();
+    survives("checkpoints", vec![seed], move |b| {
+        std::fs::write(dir.path().join("progress.json"), sealed_anew(b)).expect("a file");
+        let Some(found) = Checkpoint::load(dir.path())? else { return Ok(()) };
+        assert!(found.median_sigma().is_none_or(f64::is_finite));
+        std::hint::black_box(found.first_place());
+        CloudWriter::resume(&dir.path().join("cloud.ply"), found.points).map(drop)
+    });
+}
+
+#[test]
 fn listings() {
     survives("FANUC listings", seeds(&[LISTING]), |b| {
         let read = sheetlight::robot::fanuc_tp::read::<Base, Flange>(&text(b))?;
@@ -223,18 +334,18 @@ fn listings() {
 
 #[test]
 fn calibrations() {
-    let dir = tempfile::tempdir().unwrap();
+    let dir = scratch();
     std::fs::write(dir.path().join("values.json"), VALUES).unwrap();
     let values = Values::load(&dir.path().join("values.json")).unwrap();
     values.store(dir.path(), &dir.path().join("values.json"), true).unwrap();
     for kind in ["camera", "laser_plane", "pointer", "hand_eye"] {
-        let station = tempfile::tempdir().unwrap();
+        let station = scratch();
         let folder = station.path().join("calibration");
         std::fs::create_dir(&folder).unwrap();
         let seed = std::fs::read(dir.path().join(format!("calibration/{kind}.json"))).unwrap();
         let file = folder.join(format!("{kind}.json"));
         survives(kind, vec![seed], move |b| {
-            std::fs::write(&file, b).expect("a file");
+            std::fs::write(&file, sealed_anew(b)).expect("a file");
             Rig::load(station.path()).map(|rig| drop(rig.fingerprint()))
         });
     }
@@ -242,7 +353,7 @@ fn calibrations() {
         "values",
         seeds(&[VALUES]),
         through_file("values.json", |p| {
-            let station = tempfile::tempdir().expect("a folder");
+            let station = scratch();
             Values::load(p)?.store(station.path(), p, true).map(drop)
         }),
     );
@@ -299,7 +410,7 @@ fn recipes_and_drawings() {
 fn scenes_and_truth() {
     survives("scenes", shipped("scenes"), |b| SceneSpec::parse(&text(b)).and_then(Scene::new).map(drop));
     let options = sheetlight::simulate::SimulateOptions { width: 64, height: 64, shots: 2, ..Default::default() };
-    let dir = tempfile::tempdir().unwrap();
+    let dir = scratch();
     let done = sheetlight::simulate::simulate(dir.path(), &options, &|_, _| {}).unwrap();
     let seed = std::fs::read(done.recordings[0].1.join("truth.json")).unwrap();
     survives("truth", vec![seed], through_file("truth.json", |p| Truth::load(p).map(drop)));
@@ -313,6 +424,8 @@ fn boards() {
         through_file("board.json", |p| {
             let board = BoardSpec::load(p)?;
             assert!(board.features().len() < 1_000_000 && board.outline().iter().all(|v| v.is_finite()));
+            let markers = Markers::of(&board)?;
+            assert!(markers.is_none_or(|m| m.places().count() < 1_000_000));
             Scene::of_board(&board, 0.9, 0.1).map(drop)
         }),
     );
@@ -320,7 +433,7 @@ fn boards() {
 
 #[test]
 fn clouds() {
-    let dir = tempfile::tempdir().unwrap();
+    let dir = scratch();
     let path = dir.path().join("cloud.ply");
     let points: Vec<CloudPoint> =
         (0..5).map(|i| CloudPoint { position: [i as f32, 2.5, -1.0], shot: 7, ..Default::default() }).collect();
@@ -338,6 +451,12 @@ fn pictures() {
     survives("PGM", seeds(&["P5\n# a comment\n4 2\n255\n12345678", "P5 2 2 255\nabcd"]), |b| {
         decode(b, Channel::Luma, 8).map(drop)
     });
+    for (name, format) in [("JPEG", image::ImageFormat::Jpeg), ("BMP", image::ImageFormat::Bmp)] {
+        let mut bytes = std::io::Cursor::new(Vec::new());
+        let picture = image::GrayImage::from_fn(16, 16, |x, y| image::Luma([(x * y) as u8]));
+        picture.write_to(&mut bytes, format).unwrap();
+        survives(name, vec![bytes.into_inner()], |b| decode(b, Channel::Luma, 8).map(drop));
+    }
     let tiff = float_tiff(4, 3, &[1.5; 12], "mm");
     survives("TIFF", vec![tiff.clone()], |b| read_float_tiff(b).map(drop));
     survives("TIFF as a picture", vec![tiff], |b| match decode(b, Channel::Luma, 8) {
@@ -349,7 +468,7 @@ fn pictures() {
 
 #[test]
 fn height_maps() {
-    let dir = tempfile::tempdir().unwrap();
+    let dir = scratch();
     HeightMap::empty(6, 5, 0.5, sheetlight::geometry::Rigid::identity()).save(dir.path()).unwrap();
     for name in ["height.json", "height.tif", "count.png"] {
         let file = dir.path().join(name);
@@ -370,6 +489,12 @@ fn profiles() {
     let yaml = "%YAML:1.0\na: !!opencv-matrix\n   rows: 2\n   cols: 3\n   dt: f\n   data: [ 1., 2., 3., 4., 5., 6. ]\n";
     survives("profiles as CSV", seeds(&[csv]), |b| from_csv(&text(b), "a").map(drop));
     survives("profiles as YAML", seeds(&[yaml]), |b| from_yaml(&text(b), "a").map(drop));
+    let brackets = ["[[[1, 2], [2, 3], [3, 5]], [[1, 2], [2, 4]]]", "a: [1, 2, 2, 3, 3, 4]\nb: [4, 5, 6, 7, 8, 9]\n"];
+    survives(
+        "profiles in brackets",
+        seeds(&brackets),
+        through_file("p.json", |p| sheetlight::calibrate::ball::profiles::load(p).map(drop)),
+    );
 }
 
 #[test]

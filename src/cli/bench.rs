@@ -3,7 +3,7 @@
 
 use crate::bench::{self, BenchOptions, Scene};
 use crate::cli::terminal::console::Console;
-use crate::fault::{Fault, Result};
+use crate::fault::Result;
 use crate::gpu::Device;
 use std::path::{Path, PathBuf};
 
@@ -82,7 +82,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let text = bench::table(&report);
     if let Some(folder) = &args.save {
         let json = serde_json::to_string_pretty(&report).expect("plain data");
-        std::fs::create_dir_all(folder).map_err(|e| Fault::write(folder, e))?;
+        crate::files::make_folder(folder)?;
         write(&folder.join("bench.json"), &json)?;
         write(&folder.join("bench.txt"), &text)?;
     }

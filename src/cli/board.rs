@@ -4,9 +4,9 @@
 
 use crate::calibrate::boards::print::sheet;
 use crate::cli::terminal::console::Console;
-use crate::fault::{Fault, Result};
+use crate::fault::Result;
 use crate::recording::BoardSpec;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Draw a calibration board to print at true scale
 ///
@@ -102,17 +102,17 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     };
     let drawn = sheet(&board)?;
     if let Some(folder) = args.out.parent().filter(|p| !p.as_os_str().is_empty()) {
-        std::fs::create_dir_all(folder).map_err(|e| Fault::write(folder, e))?;
+        crate::files::make_folder(folder)?;
     }
     let with = |extension: &str| {
         let mut path = args.out.clone().into_os_string();
         path.push(extension);
         PathBuf::from(path)
     };
-    crate::files::write(&with(".svg"), drawn.svg().as_bytes())?;
-    crate::files::write(&with(".pdf"), &drawn.pdf())?;
     let text = serde_json::to_string_pretty(&board).expect("plain data");
-    crate::files::write(&with(".json"), text.as_bytes())?;
+    let (svg, pdf) = (drawn.svg(), drawn.pdf());
+    let sheets: [(&Path, &[u8]); 2] = [(&with(".svg"), svg.as_bytes()), (&with(".pdf"), &pdf)];
+    crate::files::write_beside((&with(".json"), text.as_bytes()), &sheets)?;
     if let BoardSpec::Chessboard { inner_corners: [a, b], .. } = board
         && (a + b) % 2 == 0
     {

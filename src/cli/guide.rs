@@ -60,7 +60,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
-    std::fs::create_dir_all(&args.out).map_err(|e| Fault::write(&args.out, e))?;
+    crate::files::make_folder(&args.out)?;
     let robot = args.robot.or(Settings::load(&args.station)?.robot).unwrap_or(Convention::Matrix);
     let options = GuideOptions {
         station: args.station.clone(),

@@ -2,7 +2,7 @@
 //! frames were passed over meanwhile. Frame and unit: camera frame, mm; milliseconds.
 
 use super::terminal::console::Console;
-use crate::fault::Result;
+use crate::fault::{Fault, Result};
 use crate::raster::Light;
 use crate::rig::Rig;
 use crate::scan::{Live, Newest, RawFormat, RawFrames, Where};
@@ -57,7 +57,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let newest = Arc::new(Newest::default());
     let (raw, filled) = (args.raw, newest.clone());
     // Not joined where measuring fails: it may wait for a camera that sends nothing.
-    let reader = std::thread::spawn(move || {
+    let reader = std::thread::Builder::new().name("frames".into()).spawn(move || {
         let mut frames = RawFrames::new(raw, std::io::stdin().lock());
         let mut n = 0u32;
         let end = loop {
@@ -71,6 +71,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         filled.close();
         end
     });
+    let reader = reader.map_err(|e| Fault::threads(&e))?;
     let (mut waits, mut without_stripe, mut unlit) = (Vec::new(), 0, None);
     while let Some((frame, image, arrived)) = newest.take() {
         // Looked at only while nothing was seen: it takes as long as a stage.

@@ -93,7 +93,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     };
     if let Some(truth) = &args.truth {
         // A wrong path shall not cost a scan.
-        std::fs::metadata(truth).map_err(|e| Fault::read(truth, e))?;
+        crate::files::length(truth)?;
     }
     let bar = console.bar("scanning", 0);
     let progress = |done: usize, total: Option<usize>| {

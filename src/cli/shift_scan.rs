@@ -4,11 +4,12 @@
 
 use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
+use crate::files::{Lock, Together, remove};
 use crate::geometry::{Base, Grid, Rigid, Vec3};
 use crate::raster::Channel;
 use crate::scan::grid;
-use crate::scan::{GridOptions, ShiftReport, ShiftRig, Side, shift_scan, write_cloud};
-use std::path::PathBuf;
+use crate::scan::{GridOptions, MAP_FILES, ShiftReport, ShiftRig, Side, shift_scan, write_cloud};
+use std::path::{Path, PathBuf};
 
 /// Heights from the stripe's sideways shift, for a rig that has no calibrated camera
 ///
@@ -78,10 +79,14 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
             bar.set_position(done as u64);
         })?;
     bar.finish_and_clear();
-    std::fs::create_dir_all(&args.out).map_err(|e| Fault::write(&args.out, e))?;
-    write_cloud(&args.out.join("cloud.ply"), &cloud)?;
+    crate::files::make_folder(&args.out)?;
+    let _lock = Lock::take(&args.out, "shift", "shift scan")?;
+    let set = Together::new(&args.out, "shift", clear);
+    set.settle_locked()?;
+    let part = set.begin()?;
+    write_cloud(&part.join("cloud.ply"), &cloud)?;
     let text = serde_json::to_string_pretty(&report).expect("plain numbers");
-    crate::files::write(&args.out.join("shift.json"), text.as_bytes())?;
+    crate::files::write(&part.join("shift.json"), text.as_bytes())?;
     if cloud.len() >= 100 {
         let far = cloud.iter().fold([0f32; 2], |m, p| [m[0].max(p.position[0]), m[1].max(p.position[1])]);
         // A cell is no finer than the travel, or rows without points would lie between the pictures.
@@ -90,10 +95,16 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         let frame: Rigid<Base, Grid> = Rigid::new(nalgebra::Matrix3::identity(), Vec3::new(0.0, -0.5 * cell, 0.0));
         let options =
             GridOptions { cell: Some(cell), base_from_grid: Some(frame), cells: Some(cells), ..GridOptions::default() };
-        grid(&cloud, &options)?.save(&args.out)?;
+        grid(&cloud, &options)?.save(&part)?;
     }
+    set.commit()?;
     console.result(&report, &summary(&report));
     Ok(())
+}
+
+/// Takes the former scan's files away when the new one's are whole.
+fn clear(out: &Path, _: &Path) -> std::io::Result<()> {
+    ["cloud.ply", "shift.json"].into_iter().chain(MAP_FILES).try_for_each(|name| remove(&out.join(name)))
 }
 
 fn rows(text: &str) -> Result<[u32; 2]> {

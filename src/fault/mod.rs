@@ -85,6 +85,12 @@ impl Fault {
                 "check the path and its permissions"
             })
     }
+    /// No thread could be started.
+    pub fn threads(e: &std::io::Error) -> Fault {
+        Fault::device(format!("no further thread can be started: {e}"))
+            .cause("the memory ran out, or the number of processes is limited")
+            .next("close other programs, or raise the limits (ulimit -v, ulimit -u)")
+    }
     /// A file or folder that could not be written.
     pub fn write(path: &Path, e: std::io::Error) -> Fault {
         let full = e.kind() == std::io::ErrorKind::StorageFull;

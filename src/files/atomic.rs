@@ -2,10 +2,12 @@
 //! results are written.
 //! Frame and unit: none.
 
+use super::folder::{remove, sync_folder};
 use super::moment;
 use crate::fault::{Fault, Result};
 use std::io::{Result as Io, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 use tempfile::NamedTempFile;
 
 /// Writes to a temporary file in the same folder, syncs it, and renames it over `path`. A link of that name is replaced,
@@ -19,6 +21,36 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<()> {
 pub fn write_unsynced(path: &Path, bytes: &[u8]) -> Result<()> {
     let aside = write_aside(path, bytes)?;
     rename(aside.file, path).map_err(|e| Fault::write(path, e))
+}
+
+/// [`write`] of a result and of what is shown beside it (its picture, its page). Whenever the program is stopped or the disk
+/// is full, the result is the old one or the new one, whole, and beside it stands its own or nothing.
+pub fn write_beside(result: (&Path, &[u8]), beside: &[(&Path, &[u8])]) -> Result<()> {
+    let aside = |(path, bytes): (&Path, &[u8])| {
+        let aside = write_aside(path, bytes)?;
+        aside.sync().map(|()| aside)
+    };
+    let first = aside(result)?;
+    let others = beside.iter().map(|b| aside(*b)).collect::<Result<Vec<_>>>()?;
+    beside.iter().try_for_each(|(path, _)| remove(path).map_err(|e| Fault::write(path, e)))?;
+    std::iter::once(first).chain(others).try_for_each(Aside::keep)
+}
+
+/// [`Aside::keep`] of many. A thread each, or as many as can be had, because files that are waited for together reach the
+/// disk together.
+pub fn keep_all(files: Vec<Aside>) -> Result<()> {
+    let threads = files.len();
+    let left = Mutex::new(files);
+    let work = || {
+        let next = || left.lock().unwrap_or_else(PoisonError::into_inner).pop();
+        std::iter::from_fn(next).try_for_each(Aside::keep)
+    };
+    std::thread::scope(|scope| {
+        let started = (1..threads).map_while(|_| std::thread::Builder::new().spawn_scoped(scope, work).ok());
+        let others: Vec<_> = started.collect();
+        let mine = work();
+        others.into_iter().fold(mine, |all, one| all.and(one.join().expect("a file is kept without a panic")))
+    })
 }
 
 /// A file that is written under another name and may not have reached the disk.
@@ -43,12 +75,14 @@ impl Aside {
     pub fn file(&self) -> &std::fs::File {
         self.file.as_file()
     }
+    /// Waits until it is on the disk.
+    fn sync(&self) -> Result<()> {
+        moment().and_then(|()| self.file.as_file().sync_all()).map_err(|e| Fault::write(&self.path, e))
+    }
     /// Waits until it is on the disk, gives it its name, and waits until the name is on the disk too.
     pub fn keep(self) -> Result<()> {
-        let kept = moment()
-            .and_then(|()| self.file.as_file().sync_all())
-            .and_then(|()| rename(self.file, &self.path))
-            .and_then(|()| sync_folder(folder_of(&self.path)));
+        self.sync()?;
+        let kept = rename(self.file, &self.path).and_then(|()| sync_folder(folder_of(&self.path)));
         kept.map_err(|e| Fault::write(&self.path, e))
     }
 }
@@ -60,11 +94,6 @@ fn rename(file: NamedTempFile, path: &Path) -> Io<()> {
 
 fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-/// Puts a folder's list of names on the disk; only Unix can.
-pub(super) fn sync_folder(folder: &Path) -> Io<()> {
-    if cfg!(unix) { std::fs::File::open(folder)?.sync_all() } else { Ok(()) }
 }
 
 /// A temporary file that others may read as they may read any other result: temporary files are private by default, and

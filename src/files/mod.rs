@@ -1,19 +1,23 @@
 //! In: bytes of results and the names they are to have, paths of files that others wrote. Out: files that are whole or not there, sets of files that take
-//! their names together, folders that one process at a time writes into, names in the order people count in, bytes and text within limits.
+//! their names together, folders that one process at a time writes into, names in the order people count in, bytes and text within limits, slips of the hand in them.
 //! Frame and unit: none; bytes and paths.
 
 mod atomic;
+mod folder;
 mod inputs;
 mod lock;
 mod moment;
 mod natural;
 mod read;
+mod slip;
 mod together;
 
-pub use atomic::{Aside, write, write_aside, write_unsynced};
+pub use atomic::{Aside, keep_all, write, write_aside, write_beside, write_unsynced};
+pub use folder::{make_folder, remove};
 pub use inputs::{not_over, not_over_any};
 pub use lock::Lock;
 pub use moment::moment;
 pub use natural::natural;
 pub use read::{length, read, read_text, read_text_if_there};
-pub use together::{Together, remove};
+pub use slip::{named, slip_at, slip_in};
+pub use together::Together;

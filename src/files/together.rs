@@ -2,10 +2,10 @@
 //! program is stopped.
 //! Frame and unit: none.
 
-use super::atomic::sync_folder;
+use super::folder::sync_folder;
 use super::{Lock, moment};
 use crate::fault::{Fault, Result};
-use std::io::{ErrorKind, Result as Io};
+use std::io::Result as Io;
 use std::path::{Path, PathBuf};
 
 /// A set of files that belong together, in `folder`. They are made in `NAME.part`. That folder's renaming to `NAME.whole`
@@ -99,19 +99,9 @@ fn rename(from: &Path, to: &Path) -> Io<()> {
     std::fs::rename(from, to)
 }
 
-/// Takes a file, a link or a folder away; one that is not there is no error.
-pub fn remove(path: &Path) -> Io<()> {
-    moment()?;
-    let gone = match std::fs::symlink_metadata(path) {
-        Ok(m) if m.is_dir() => std::fs::remove_dir_all(path),
-        Ok(_) => std::fs::remove_file(path),
-        Err(e) => Err(e),
-    };
-    gone.or_else(|e| if e.kind() == ErrorKind::NotFound { Ok(()) } else { Err(e) })
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::remove;
     use super::*;
 
     fn clear(folder: &Path, _: &Path) -> Io<()> {

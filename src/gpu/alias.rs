@@ -278,7 +278,24 @@ unsafe fn to_general(hal: &wgpu::hal::vulkan::Device, image: vk::Image) -> Resul
 mod tests {
     use crate::gpu::Device;
     use crate::gpu::texels::Texel;
+    use std::panic::{AssertUnwindSafe, catch_unwind};
     use std::sync::Arc;
+
+    #[test]
+    fn no_byte_outside_is_touched() {
+        let Some(device) = Device::open().ok().filter(|d| d.reads_texels) else { return };
+        let buffer = device.storage("ends", 4096).unwrap();
+        let memory = buffer.aliased.as_ref().unwrap();
+        let outside = |act: &dyn Fn()| catch_unwind(AssertUnwindSafe(act)).is_err();
+        let held = memory.memory.bytes as usize;
+        // SAFETY: nothing is submitted, and nobody else has the buffer; what is outside is what is tried.
+        unsafe {
+            assert!(outside(&|| memory.write(usize::MAX, &[1, 2])) && outside(&|| memory.write(held - 1, &[1, 2])));
+            assert!(outside(&|| _ = memory.read(held..held + 1)) && outside(&|| _ = memory.read(0..usize::MAX)));
+            memory.write(held - 2, &[1, 2]);
+            assert_eq!(memory.read(held - 2..held), [1, 2]);
+        }
+    }
 
     #[test]
     fn memory_lives_as_long_as_what_lies_on_it() {

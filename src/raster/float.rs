@@ -32,7 +32,10 @@ pub fn read_float_tiff(bytes: &[u8]) -> Result<(u32, u32, Vec<f32>)> {
             .next("give the height.tif of a scan, or a single-channel 32-bit float TIFF")
     };
     let decoder = Decoder::new(Cursor::new(bytes)).map_err(|e| strange(&e))?;
-    let mut decoder = decoder.with_limits(Limits::unlimited());
+    // One float a cell, whatever number of samples the file claims.
+    let mut limits = Limits::default();
+    limits.decoding_buffer_size = 4 * MOST_CELLS as usize;
+    let mut decoder = decoder.with_limits(limits);
     let (width, height) = decoder.dimensions().map_err(|e| strange(&e))?;
     let cells = u64::from(width) * u64::from(height);
     if cells > MOST_CELLS {

@@ -2,6 +2,7 @@
 //! where the brightest light lies and how it is shaped. Frame and unit: pixels, grey levels.
 
 use super::Image;
+use crate::fault::Fault;
 use std::fmt;
 
 /// What a picture's light is like.
@@ -42,6 +43,12 @@ const OUT: f64 = 10.0;
 const CROSSES: f64 = 0.3;
 const SLENDER: f64 = 3.0;
 
+/// A picture whose brightest pixel is below this share of full scale is dark.
+const DARK: f64 = 0.06;
+/// A picture is white with more than this share of its pixels saturated, or with its median above that share of full scale.
+const WHITE: f64 = 0.2;
+const BRIGHT: f64 = 0.9;
+
 impl Light {
     pub fn of(image: &Image) -> Light {
         let full = image.full_scale();
@@ -67,6 +74,29 @@ impl Light {
             saturated: counts[usize::from(full)] as f64 / all as f64,
             bright: stands_out
                 .then(|| Bright::of(image, (u32::from(levels[1]) + u32::from(levels[2])).div_ceil(2) as u16)),
+        }
+    }
+}
+
+impl Light {
+    /// Likely cause and next step where the light is what is wrong: hardly any, or far too much. `None` where it is neither.
+    pub fn why(&self) -> Option<(&'static str, &'static str)> {
+        let full = f64::from(self.full_scale);
+        if f64::from(self.levels[2]) < DARK * full {
+            let why = "the picture is dark: its light was off, the exposure far too short, or the lens is covered";
+            return Some((why, "switch the light on, or expose longer"));
+        }
+        let white = self.saturated > WHITE || f64::from(self.levels[1]) > BRIGHT * full;
+        let why = "the picture is white: room light or exposure is far too strong";
+        white.then_some((why, "expose shorter, or shade it"))
+    }
+
+    /// Adds to a fault what the picture `name` shows; where its light is what is wrong, that is the cause.
+    pub fn explain(&self, name: &str, mut fault: Fault) -> Fault {
+        fault.what = format!("{}; {name}: {self}", fault.what);
+        match self.why() {
+            Some((cause, next)) => fault.cause(cause).next(next),
+            None => fault,
         }
     }
 }
@@ -155,6 +185,8 @@ mod tests {
         ] {
             assert!(wants.iter().all(|w| text.contains(w)), "{text} {wants:?}");
         }
+        let flat = |level: u8| Light::of(&Image::from_u8(8, 8, vec![level; 64])).why().map(|(cause, _)| cause);
+        assert!(flat(3).unwrap().contains("dark") && flat(255).unwrap().contains("white") && flat(120).is_none());
         let deep = Light::of(&Image::from_u16(4, 1, 12, vec![0, 5, 9, 4095])).to_string();
         assert!(deep.contains("of 4095") && deep.contains("25.0 % saturated"), "{deep}");
         assert!(Light::of(&Image::from_u8(1, 1, vec![9])).to_string().contains("1x1 px"));

@@ -85,7 +85,11 @@ impl Meta {
         // A mark of the byte order says nothing in UTF-8.
         let meta: Meta = serde_json::from_str(text.trim_start_matches('\u{feff}')).map_err(|e| {
             Fault::input(format!("is not a recording's meta.json: {e}"))
-                .cause("a misspelt key, a missing entry, or a file of another program")
+                .cause(crate::files::slip_in(
+                    text,
+                    e.line(),
+                    "a misspelt key, a missing entry, or a file of another program",
+                ))
                 .next("compare it with docs/file-formats.md")
         })?;
         meta.check()?;

@@ -124,9 +124,16 @@ fn row(line: &str, header: &Header) -> Result<Row> {
     let cells: Vec<&str> = line.split(',').collect();
     let wanted = header.convention.labels().len() + 1;
     if cells.len() != wanted {
-        let decimal = cells.len() > wanted && cells.iter().all(|c| c.trim().parse::<i64>().is_ok());
+        let whole = |c: &&str| c.trim().trim_matches('"').parse::<i64>().is_ok();
+        let cause = if line.contains(';') {
+            "columns parted by semicolons, as spreadsheets export numbers with decimal commas"
+        } else if cells.len() > wanted && cells.iter().all(whole) {
+            "numbers with decimal commas"
+        } else {
+            "a truncated or edited file"
+        };
         return Err(Fault::input(format!("'{line}' has {} columns, the header has {wanted}", cells.len()))
-            .cause(if decimal { "numbers with decimal commas" } else { "a truncated or edited file" })
+            .cause(cause)
             .next("export the poses again, with points in numbers"));
     }
     let numbers: std::result::Result<Vec<f64>, _> = cells.iter().map(|c| c.trim().parse::<f64>()).collect();
@@ -177,6 +184,9 @@ mod tests {
         assert!(
             said("# convention: denso\nframe,x,y,z,rx,ry,rz\n0,1,5,2,5,3,5,4,5,5,5,6,5\n").contains("decimal commas")
         );
+        assert!(said("# convention: denso\nframe,x,y,z,rx,ry,rz\n0;1,5;2,5;3;4;5;6\n").contains("semicolons"));
+        let quoted = "0,\"1,5\",\"2,5\",\"3,5\",\"4,5\",\"5,5\",\"6,5\"";
+        assert!(said(&format!("# convention: denso\nframe,x,y,z,rx,ry,rz\n{quoted}\n")).contains("decimal commas"));
         assert!(said("\u{feff}# convention: denso\nframe,x,y,z,rx,ry,rz\n0,1,2,3,4,5,6\n").is_empty());
         assert!(said("frame,x,y,z,rx,ry,rz\n0,1,2,3,4,5,6\n").contains("without a convention"));
     }

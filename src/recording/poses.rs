@@ -192,7 +192,7 @@ fn from_json(text: &str) -> Result<PoseFile> {
 pub(super) fn json_rows(text: &str, transform: &str) -> Result<Vec<Row>> {
     let file: JsonPoses = serde_json::from_str(text).map_err(|e| {
         Fault::input(format!("is not a pose file: {e}"))
-            .cause("a misspelt key, NaN, or a truncated file")
+            .cause(crate::files::slip_in(text, e.line(), "a misspelt key, NaN, or a truncated file"))
             .next("compare it with docs/file-formats.md")
     })?;
     for (key, value, want) in [

@@ -183,6 +183,7 @@ impl Calibration<HandEye> {
 pub fn hash_file(path: &Path) -> Result<String> {
     use sha2::Digest;
     let mut hash = sha2::Sha256::new();
+    crate::files::length(path)?;
     let copied = std::fs::File::open(path).and_then(|mut f| std::io::copy(&mut f, &mut hash));
     copied.map_err(|e| Fault::read(path, e))?;
     Ok(hex(&hash.finalize()))

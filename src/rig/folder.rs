@@ -50,18 +50,25 @@ impl Rig {
         Ok(Rig { camera: load(station, Kind::Camera)?, ..Rig::default() })
     }
 
-    /// Stores one calibration under `station/calibration/<kind>.json`; a former one is kept as
-    /// `<kind>.previous.json`. Either the new file is complete or the old one is untouched.
-    pub fn store<T: Serialize + Measured>(station: &Path, calibration: &Calibration<T>) -> Result<PathBuf> {
+    /// Stores one calibration under `station/calibration/<kind>.json` and, where there is one, its `page` beside it as `<kind>.html`; a former one
+    /// is kept as `<kind>.previous.json`. Either the new file is complete or the old one is untouched.
+    pub fn store<T: Serialize + Measured>(
+        station: &Path,
+        calibration: &Calibration<T>,
+        page: Option<&str>,
+    ) -> Result<PathBuf> {
         calibration.check(calibration.kind)?;
         let folder = station.join("calibration");
-        std::fs::create_dir_all(&folder).map_err(|e| Fault::write(&folder, e))?;
-        together(&folder).settle()?;
+        crate::files::make_folder(&folder)?;
+        let _lock = crate::files::Lock::wait(&folder, "import")?;
+        together(&folder).settle_locked()?;
         let path = file(station, calibration.kind);
-        if let Ok(former) = std::fs::read(&path) {
-            crate::files::write(&path.with_extension("previous.json"), &former)?;
+        if let Some(former) = crate::files::read_text_if_there(&path)? {
+            crate::files::write(&path.with_extension("previous.json"), former.as_bytes())?;
         }
-        crate::files::write(&path, sealed(calibration).as_bytes())?;
+        let html = path.with_extension("html");
+        let beside: Vec<(&Path, &[u8])> = page.iter().map(|p| (html.as_path(), p.as_bytes())).collect();
+        crate::files::write_beside((&path, sealed(calibration).as_bytes()), &beside)?;
         Ok(path)
     }
 
@@ -76,7 +83,7 @@ impl Rig {
         add(&mut texts, &self.linear_axis)?;
         add(&mut texts, &self.turntable)?;
         let folder = station.join("calibration");
-        std::fs::create_dir_all(&folder).map_err(|e| Fault::write(&folder, e))?;
+        crate::files::make_folder(&folder)?;
         let set = together(&folder);
         let _lock = crate::files::Lock::take(&folder, "import", "import")?;
         set.settle_locked()?;
@@ -97,7 +104,7 @@ impl Rig {
         as_stated: bool,
     ) -> Result<PathBuf> {
         let path = file(station, kind);
-        let text = std::fs::read_to_string(&path).map_err(|e| Fault::read(&path, e))?;
+        let text = crate::files::read_text(&path)?;
         let what = path.display().to_string();
         let redo = |e: Fault| e.next(again(kind));
         let (mut value, _) = apart(&text, &what).map_err(redo)?;
@@ -116,7 +123,7 @@ impl Rig {
         if !as_stated {
             asked(&c.value).map_err(|e| e.at(&what))?;
         }
-        Rig::store(station, &c)
+        Rig::store(station, &c, None)
     }
 
     /// The camera, or what to do about its absence.
@@ -311,9 +318,9 @@ mod tests {
     fn the_former_calibration_stays_beside_the_new_one() {
         let dir = tempfile::tempdir().unwrap();
         let camera = camera(611.6);
-        Rig::store(dir.path(), &plane(70.0, &camera)).unwrap();
+        Rig::store(dir.path(), &plane(70.0, &camera), None).unwrap();
         let first = Rig::load(dir.path()).unwrap();
-        Rig::store(dir.path(), &plane(71.0, &camera)).unwrap();
+        Rig::store(dir.path(), &plane(71.0, &camera), None).unwrap();
         let second = Rig::load(dir.path()).unwrap();
         assert_ne!(first.fingerprint(), second.fingerprint());
         let former = std::fs::read_to_string(dir.path().join("calibration/laser_plane.previous.json")).unwrap();
@@ -326,10 +333,10 @@ mod tests {
     fn a_plane_is_used_with_its_own_camera_only() {
         let dir = tempfile::tempdir().unwrap();
         let (old, new) = (camera(611.6), camera(611.7));
-        Rig::store(dir.path(), &old).unwrap();
-        Rig::store(dir.path(), &plane(70.0, &old)).unwrap();
+        Rig::store(dir.path(), &old, None).unwrap();
+        Rig::store(dir.path(), &plane(70.0, &old), None).unwrap();
         Rig::load(dir.path()).unwrap().need_laser_plane().unwrap();
-        Rig::store(dir.path(), &new).unwrap();
+        Rig::store(dir.path(), &new, None).unwrap();
         let rig = Rig::load(dir.path()).unwrap();
         let said = rig.need_laser_plane().unwrap_err();
         assert!(said.what.contains("measured with camera") && said.next.contains("calibrate laser-plane"), "{said}");

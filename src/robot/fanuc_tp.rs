@@ -38,7 +38,8 @@ pub fn read<To: Frame, From: Frame>(text: &str) -> Result<Vec<TpPosition<To, Fro
         };
         let end = after.find("};").or_else(|| after.find('}')).ok_or_else(|| bad("a position is cut off".into()))?;
         if !(close < open && open < end) {
-            return Err(bad(format!("P[{}: brackets do not match", &after[..close.min(12)])));
+            let begins: String = after[..close].chars().take(12).collect();
+            return Err(bad(format!("P[{begins}: brackets do not match")));
         }
         let (number, comment) = after[..close].split_once(':').unwrap_or((&after[..close], ""));
         let number: u32 = number.trim().parse().map_err(|_| bad(format!("P[{number}]: is no position number")))?;

@@ -21,7 +21,7 @@ pub use cloud::{CloudFile, CloudPoint, CloudWriter, PointSource, read_cloud, wri
 pub use engine::{Engine, Measured, Optical};
 pub use extraction::Extraction;
 pub use live::{Live, Newest};
-pub use map::files::MapScale;
+pub use map::files::{MAP_FILES, MapScale};
 pub use map::grid::{grid, grid_on};
 pub use map::heightmap::HeightMap;
 pub use map::picture::{MapPlace, Shown};

@@ -90,7 +90,7 @@ impl RecordingSource {
         let ahead = (AHEAD_BYTES / bytes.max(1)).clamp(8, 64);
         let (send, shots) = sync_channel(ahead);
         let (remaining, recording) = (jobs.len(), recording.clone());
-        std::thread::spawn(move || {
+        let started = std::thread::Builder::new().name("pictures".into()).spawn(move || {
             for chunk in jobs.chunks((ahead / 2).max(rayon::current_num_threads())) {
                 let decoded: Vec<_> = chunk
                     .par_iter()
@@ -111,6 +111,7 @@ impl RecordingSource {
                 }
             }
         });
+        started.map_err(|e| Fault::threads(&e))?;
         let remarks = meta.image.response.remark(meta.image.bits).into_iter().collect();
         Ok(RecordingSource { format, remarks, remaining, shots })
     }

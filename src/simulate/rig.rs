@@ -127,14 +127,18 @@ impl RigSpec {
     }
 
     pub fn load(path: &Path) -> Result<RigSpec> {
-        let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+        let text = crate::files::read_text(path)?;
         RigSpec::parse(&text).map_err(|e| e.at(path.display()))
     }
 
     pub fn parse(text: &str) -> Result<RigSpec> {
         let rig: RigSpec = toml::from_str(text).map_err(|e| {
             Fault::input(format!("is not a rig file: {}", e.to_string().trim_end()))
-                .cause("a misspelt key, a missing size, or a value of the wrong type")
+                .cause(crate::files::slip_at(
+                    text,
+                    e.span().map_or(0, |s| s.start),
+                    "a misspelt key, a missing size, or a value of the wrong type",
+                ))
                 .next("compare it with docs/file-formats.md, Rig file, or with data/rigs")
         })?;
         rig.check()?;
@@ -142,6 +146,7 @@ impl RigSpec {
     }
 
     pub fn check(&self) -> Result<()> {
+        crate::files::named("name", &self.name)?;
         self.sensor.check()?;
         let (c, l, w, m) = (&self.camera, &self.laser, &self.working, &self.mount);
         let mut limits = vec![

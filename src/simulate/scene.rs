@@ -220,7 +220,7 @@ impl SceneSpec {
     pub fn parse(text: &str) -> Result<SceneSpec> {
         let spec: SceneSpec = toml::from_str(text).map_err(|e| {
             Fault::input(format!("is not a scene file: {e}"))
-                .cause("a misspelt key or a missing size")
+                .cause(crate::files::slip_at(text, e.span().map_or(0, |s| s.start), "a misspelt key or a missing size"))
                 .next("compare it with docs/file-formats.md, Scene file")
         })?;
         let [x0, y0, x1, y1] = spec.region_mm;

@@ -193,7 +193,7 @@ pub fn simulate(out: &Path, options: &SimulateOptions, progress: &(dyn Fn(usize,
     };
     let scene = Scene::new(spec)?;
     let folder = out.join("station");
-    std::fs::create_dir_all(&folder).map_err(|e| Fault::write(&folder, e))?;
+    crate::files::make_folder(&folder)?;
     station.store(&folder)?;
     let ride = options.motion.map(|kind| {
         let board = options.board.clone().unwrap_or_else(|| riding_board(&station.rig));
@@ -272,7 +272,7 @@ fn store_axis(ride: &Ride, station: &Path) -> Result<()> {
     let names = kind.parameters().0;
     let covariance = Covariance::new(names, &nalgebra::DMatrix::zeros(names.len(), names.len()));
     let camera = Rig::load_camera(station)?.camera;
-    Rig::store(station, &Calibration::new(kind, ride.axis, camera.as_ref(), covariance, quality)).map(|_| ())
+    Rig::store(station, &Calibration::new(kind, ride.axis, camera.as_ref(), covariance, quality), None).map(|_| ())
 }
 
 /// A board of our choice, `scale` times as large, to three digits.
@@ -501,7 +501,10 @@ impl Plan {
         options: &SimulateOptions,
         count: &(dyn Fn() + Sync),
     ) -> Result<usize> {
-        std::fs::create_dir_all(folder).map_err(|e| Fault::write(folder, e))?;
+        crate::files::make_folder(folder)?;
+        // A folder with a meta.json is complete: that of a former simulation goes first, the new one comes last.
+        let meta = folder.join("meta.json");
+        crate::files::remove(&meta).map_err(|e| Fault::write(&meta, e))?;
         let pixels = station.camera.width as usize * station.camera.height as usize;
         let hot = hot_pixels(&station.sensor, pixels, &mut station.rng("hot", 0));
         let visible: Vec<Vec<Vec3>> = self
@@ -533,8 +536,7 @@ impl Plan {
         }
         let json = |value: serde_json::Result<String>| value.expect("plain data").into_bytes();
         crate::files::write(&folder.join("truth.json"), &json(serde_json::to_string_pretty(&truth)))?;
-        // Last, so that a folder with a meta.json is complete.
-        crate::files::write(&folder.join("meta.json"), &json(serde_json::to_string_pretty(&self.meta(station))))?;
+        crate::files::write(&meta, &json(serde_json::to_string_pretty(&self.meta(station))))?;
         Ok(self.shots.iter().map(Shot::pictures).sum())
     }
 

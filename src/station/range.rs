@@ -10,6 +10,7 @@ use crate::calibrate::pointer::range::{
 use crate::calibrate::pointer::spot::{Spot, SpotOptions, SpotPicture, find_spots, hot_pixels};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Mat3, Rigid, Tool, Vec3};
+use crate::raster::Light;
 use crate::recording::{Beam, Recording};
 use crate::rig::Rig;
 
@@ -170,9 +171,14 @@ pub(super) fn touched(recording: &Recording, rig: &Rig, run: &RangeRun) -> Resul
     }
     if out.distances.is_empty() {
         let (name, why) = out.missing.first().cloned().unwrap_or_default();
-        return Err(Fault::refused(format!("no distance could be measured; {name}: {why}"))
+        let fault = Fault::refused(format!("no distance could be measured; {name}: {why}"))
             .cause("the pointer was off, or it is not the one that was calibrated")
-            .next("look at the pictures"));
+            .next("look at the pictures");
+        let middle = frames.len() / 2;
+        return Err(match (frames.get(middle), images.get(middle)) {
+            (Some((_, name)), Some(image)) => Light::of(image).explain(name, fault),
+            _ => fault,
+        });
     }
     Ok(Touched { report: out, points, shared, first_x })
 }

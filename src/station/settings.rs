@@ -38,6 +38,9 @@ pub struct WorkingVolume {
 /// No camera works at less than this, nor at more, mm.
 const METRES: f64 = 3.0;
 const MICROMETRES: f64 = 50_000.0;
+/// What work with a laser line tolerates, mm: from a micrometre to a hand's breadth.
+const FINEST: f64 = 1e-3;
+const COARSEST: f64 = 100.0;
 
 impl Settings {
     /// Reads `station/station.toml`; a station without one has the defaults.
@@ -57,7 +60,11 @@ impl Settings {
     pub fn parse(text: &str) -> Result<Settings> {
         let settings: Settings = toml::from_str(text).map_err(|e| {
             Fault::input(format!("is not a station file: {}", e.to_string().trim_end()))
-                .cause("a misspelt key or a value of the wrong type")
+                .cause(crate::files::slip_at(
+                    text,
+                    e.span().map_or(0, |s| s.start),
+                    "a misspelt key or a value of the wrong type",
+                ))
                 .next("compare it with docs/file-formats.md, or with what sheetlight station new writes")
         })?;
         settings.check()?;
@@ -88,6 +95,14 @@ impl Settings {
             return Err(Fault::input(format!("tolerance_mm is {mm}, a length above 0 mm is needed"))
                 .next("give what the work tolerates in millimetres, or leave the key out"));
         }
+        if let Some(mm) = self.tolerance_mm.filter(|mm| !(FINEST..=COARSEST).contains(mm)) {
+            let unit = if mm < FINEST { "metres" } else { "micrometres" };
+            return Err(Fault::input(format!(
+                "tolerance_mm is {mm}, which looks like {unit}; {FINEST} to {COARSEST} is believed"
+            ))
+            .cause(format!("{unit} instead of millimetres"))
+            .next("give what the work tolerates in millimetres, or leave the key out"));
+        }
         self.extraction.check()
     }
 
@@ -98,7 +113,7 @@ impl Settings {
 
     /// Writes `station/station.toml`.
     pub fn store(&self, station: &Path) -> Result<()> {
-        std::fs::create_dir_all(station).map_err(|e| Fault::write(station, e))?;
+        crate::files::make_folder(station)?;
         let text = toml::to_string(self).expect("plain data");
         crate::files::write(&station.join("station.toml"), text.as_bytes())
     }
@@ -116,6 +131,10 @@ mod tests {
         assert!(Settings::parse("tolerance_mm = 0").unwrap_err().what.contains("tolerance_mm"));
         let metres = Settings::parse("[working_volume]\nnear_mm = 0.06\nfar_mm = 0.32").unwrap_err();
         assert!(metres.what.contains("looks like metres"), "{metres}");
+        assert!(Settings::parse("tolerance_mm = 0.0001").unwrap_err().what.contains("looks like metres"));
+        assert!(Settings::parse("tolerance_mm = 250").unwrap_err().what.contains("looks like micrometres"));
+        let comma = Settings::parse("[working_volume]\nnear_mm = 60,5\nfar_mm = 320").unwrap_err();
+        assert!(comma.cause.contains("decimal comma") && comma.what.contains("line 2"), "{comma}");
         let s = Settings { name: "x".into(), robot: Some(Convention::Denso), ..Settings::default() };
         assert_eq!(Settings::parse(&toml::to_string(&s).unwrap()).unwrap(), s);
     }

@@ -47,7 +47,7 @@ impl Values {
         let text = crate::files::read_text(path)?;
         serde_json::from_str(&text).map_err(|e| {
             Fault::input(format!("{}: holds no rig values: {e}", path.display()))
-                .cause("not JSON, or an entry of another shape")
+                .cause(crate::files::slip_in(&text, e.line(), "not JSON, or an entry of another shape"))
                 .next("use the keys intrinsics, flange_T_camera, laser_plane_camera, pointer_camera, base_T_camera, linear_axis, turntable of docs/file-formats.md")
         })
     }

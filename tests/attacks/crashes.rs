@@ -12,12 +12,12 @@ use std::process::{Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-fn long() -> bool {
+pub fn long() -> bool {
     std::env::var_os("SHEETLIGHT_LONG").is_some()
 }
 
 /// Runs with a variable of `sheetlight::files::moment` set; whether it succeeded.
-fn cut_off(args: &[String], variable: &str, at: u64) -> bool {
+pub fn cut_off(args: &[String], variable: &str, at: u64) -> bool {
     let mut command = Command::new(env!("CARGO_BIN_EXE_sheetlight"));
     command.args(args).env(variable, at.to_string()).stdout(Stdio::null()).stderr(Stdio::piped());
     let done = command.output().unwrap();
@@ -127,60 +127,70 @@ fn a_scan_that_is_killed_at_random_is_resumed_to_the_same_bytes() {
     }
 }
 
-#[test]
-fn a_calibration_that_is_stopped_anywhere_is_old_or_new() {
-    if !long() {
-        println!("SKIPPED: calibrating a dozen times takes minutes; set SHEETLIGHT_LONG");
-        return;
-    }
-    let b = Bench::new(1);
-    run(&["simulate", "--out", &b.text("sim"), "--set", "intrinsics", "--quiet"].map(str::to_owned));
-    let args =
-        ["calibrate", "camera", &b.text("sim/intrinsics"), "--station", &b.text("sim/station")].map(str::to_owned);
-    let file = b.at("sim/station/calibration/camera.json");
-    let print = || Rig::load_camera(&b.at("sim/station")).unwrap().camera.unwrap().content();
-    let (former, old) = (std::fs::read(&file).unwrap(), print());
-    run(&args);
-    let new = print();
-    assert_ne!(old, new);
-    let (mut seen_old, mut seen_new) = (0, 0);
-    for at in 1.. {
-        std::fs::write(&file, &former).unwrap();
-        let done = cut_off(&args, "SHEETLIGHT_DIE_AT", at);
-        let is = print();
-        assert!(is == old || is == new, "{at}");
-        if done {
-            break;
-        }
-        if is == old { seen_old += 1 } else { seen_new += 1 }
-    }
-    assert!(seen_old > 3 && seen_new > 2, "{seen_old} old, {seen_new} new");
+/// Sizes of a full disk, kB: 1 kB to 20 MB in 40 steps, or some of them; no two alike.
+fn sizes() -> impl Iterator<Item = u32> {
+    let steps: u32 = if long() { 40 } else { 3 };
+    let size = move |step: u32| 20_000f64.powf(f64::from(step) / f64::from(steps - 1)).round() as u32;
+    (0..steps).map(move |step| size(step).max(step + 1))
 }
 
 /// The shell lets no file grow beyond a size: as on a disk that is full at that byte.
 #[test]
 #[cfg(target_os = "linux")]
-fn full_disks_of_every_size() {
+fn files_that_may_not_grow() {
     let b = Bench::new(3);
     run(&b.scan("recording", "whole", &[]));
     let whole = results(&b.at("whole"));
-    let steps: u32 = if long() { 40 } else { 3 };
-    for step in 0..steps {
-        // 1 kB to 20 MB, in the shell's blocks of 512 or 1,024 bytes.
-        let blocks = (20_000f64.powf(f64::from(step) / f64::from(steps - 1).max(1.0))).round();
-        let out = format!("full {step}");
-        let script = format!("trap '' XFSZ; ulimit -f {blocks}; exec \"$0\" \"$@\"");
-        let mut command = Command::new("sh");
+    for kb in sizes() {
+        let out = format!("full {kb}");
+        let script = format!("trap '' XFSZ; ulimit -f {kb}; exec \"$0\" \"$@\"");
+        let mut command = Command::new("bash");
         command.args(["-c", &script, env!("CARGO_BIN_EXE_sheetlight")]).args(b.scan("recording", &out, &[]));
         let done = command.output().unwrap();
         let said = String::from_utf8_lossy(&done.stderr);
         if !done.status.success() {
-            assert!(done.status.code() == Some(1) && said.contains("next step"), "{blocks}: {said}");
+            assert!(done.status.code() == Some(1) && said.contains("next step"), "{kb} kB: {said}");
             assert!(cloud_of(&b.at(&out)).is_err());
             run(&b.scan("recording", &out, &["--resume"]));
         }
-        assert!(results(&b.at(&out)) == whole, "{blocks} blocks");
+        assert!(results(&b.at(&out)) == whole, "{kb} kB");
     }
+}
+
+/// Disks that are full: a file system of its own of each size, which grows when the scan has failed.
+#[test]
+#[cfg(target_os = "linux")]
+fn full_disks() {
+    let mountable = Command::new("unshare").args(["-m", "mount", "-t", "tmpfs", "tmpfs", "/mnt"]).output();
+    if !mountable.is_ok_and(|done| done.status.success()) {
+        println!("*** SKIPPED: file systems of a few kB can be mounted by root only ***");
+        return;
+    }
+    let b = Bench::new(3);
+    run(&b.scan("recording", "whole", &[]));
+    let whole = results(&b.at("whole"));
+    let (disk, mut full) = (b.at("disk"), 0);
+    std::fs::create_dir(&disk).unwrap();
+    // In a name space of its own: the disk goes with the shell. $0 is the disk, $1 where the scan is copied to, $2 its size.
+    let script = "mount -t tmpfs -o size=$2k tmpfs \"$0\" || exit 9; kept=$1; shift 2; \"$@\"; code=$?; \
+                  test ! -e \"$0/out/cloud.ply\" || test $code = 0 || exit 8; \
+                  if test $code != 0; then mount -o remount,size=64m \"$0\" && \"$@\" --resume || exit 7; fi; \
+                  cp -r \"$0/out\" \"$kept\"; exit $code";
+    for kb in sizes() {
+        let kept = format!("kept {kb}");
+        let mut command = Command::new("unshare");
+        command.args(["-m", "bash", "-c", script]).arg(&disk).arg(b.at(&kept)).arg(kb.to_string());
+        command.arg(env!("CARGO_BIN_EXE_sheetlight")).args(b.scan("recording", "disk/out", &[]));
+        let done = command.output().unwrap();
+        let said = String::from_utf8_lossy(&done.stderr);
+        let code = done.status.code();
+        assert!(matches!(code, Some(0 | 1)) && !said.contains("panicked"), "{kb} kB: {code:?}\n{said}");
+        assert!(code == Some(0) || (said.contains("No space left") && said.contains("next step")), "{kb} kB: {said}");
+        assert!(results(&b.at(&kept)) == whole, "{kb} kB");
+        full += u32::from(code == Some(1));
+    }
+    println!("{full} of {} disks were full", sizes().count());
+    assert!(full > 0 && (full as usize) < sizes().count());
 }
 
 fn options(out: &Path, stop: &Arc<AtomicBool>, resume: bool) -> ScanOptions {
@@ -272,4 +282,31 @@ fn signals_end_a_stream_with_what_came() {
         b.scan("recording", "short", &["--raw", "320x240:gray8", "--poses", &b.text("recording/poses.json")]);
     args.remove(1);
     assert!(refused(&args).contains("gave 0 frames, the pose file has 12 poses"));
+}
+
+/// Two scans that are started into one folder at once: one waits or is refused, and the folder holds one of them, whole.
+#[test]
+fn two_at_once_do_not_mix() {
+    let b = Bench::new(20);
+    b.record("other", 40);
+    for name in ["recording", "other"] {
+        run(&b.scan(name, &format!("{name} alone"), &[]));
+    }
+    let alone = ["recording alone", "other alone"].map(|n| results(&b.at(n)));
+    for round in 0..if long() { 20 } else { 3 } {
+        let out = format!("both {round}");
+        let started = ["recording", "other"].map(|name| {
+            let mut command = Command::new(env!("CARGO_BIN_EXE_sheetlight"));
+            command.args(b.scan(name, &out, &[])).stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
+        });
+        let ended = started.map(|child| child.wait_with_output().unwrap());
+        let is = results(&b.at(&out));
+        assert!(alone.contains(&is), "{out} holds two scans");
+        cloud_of(&b.at(&out)).unwrap();
+        for done in ended.iter().filter(|d| !d.status.success()) {
+            let said = String::from_utf8_lossy(&done.stderr);
+            assert!(said.contains("another scan writes here"), "{said}");
+        }
+        assert!(ended.iter().any(|d| d.status.success()));
+    }
 }

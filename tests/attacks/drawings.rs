@@ -190,3 +190,27 @@ fn scenes() {
         case("a turn of nan", Says(&["NaN"]), scene("turn_deg = nan\n")),
     ]);
 }
+
+/// Files are called by a recipe's name, and lines of text by a rig's.
+#[test]
+fn names() {
+    use sheetlight::find::Recipe;
+    use sheetlight::simulate::RigSpec;
+    let shipped = |file: &str| std::fs::read_to_string(format!("{}/data/{file}", env!("CARGO_MANIFEST_DIR"))).unwrap();
+    let (led, rig) = (shipped("recipes/led.toml"), shipped("rigs/paper.toml"));
+    let mut cases = Vec::new();
+    for (what, name, want) in [
+        ("a plain name", "led 2", Good),
+        ("a path", "../../led", Says(&["name is \"../../led\""])),
+        ("an escape code", "\\u001b[31mled", Says(&["name is"])),
+        ("a line of its own", "led\\nformat = 2", Says(&["name is"])),
+        ("nothing", " ", Says(&["name is"])),
+    ] {
+        let text = led.replace("name = \"led\"", &format!("name = \"{name}\""));
+        cases.push(case(format!("{what} of a recipe"), want, move || Recipe::parse(&text)));
+    }
+    let line = rig.lines().find(|l| l.starts_with("name = ")).unwrap().to_owned();
+    let text = rig.replace(&line, "name = \"a\\n[gates]\\nmax_sigma_mm = 9\"");
+    cases.push(case("lines in a rig's name", Says(&["name is"]), move || RigSpec::parse(&text)));
+    check(cases);
+}

@@ -278,6 +278,11 @@ fn what_lies_in_the_way_is_left_alone() {
         assert!(refused(&b.scan("recording", "out", &["--resume"])).contains("without --resume"));
         run(&b.scan("recording", "out", &[]));
     }
+    // A scan that a former version left unfinished cannot be gone on with, and is in nobody's way.
+    std::fs::write(b.at("out/scan.progress.json"), "{}").unwrap();
+    assert!(refused(&b.scan("recording", "out", &["--resume"])).contains("a former version was interrupted here"));
+    run(&b.scan("recording", "out", &[]));
+    assert!(!b.at("out/scan.progress.json").exists());
     for (folder, file) in [("recording", "meta.json"), ("station", "station.toml")] {
         assert!(refused(&b.scan("recording", folder, &[])).contains(file));
     }

@@ -60,6 +60,52 @@ fn without_next(text: &str) -> Vec<String> {
     out
 }
 
+/// Whether a source is a module of tests as a whole.
+fn only_tested(file: &Path) -> bool {
+    let name = file.file_stem().unwrap().to_string_lossy();
+    let above = std::fs::read_to_string(file.with_file_name("mod.rs")).unwrap_or_default();
+    above.contains(&format!("#[cfg(test)]\nmod {name};"))
+}
+
+/// Lines of a source, its tests aside, that call one of `names`.
+fn calling<'a>(text: &'a str, names: &'a [&'a str]) -> impl Iterator<Item = String> + 'a {
+    let code = text.find("#[cfg(test)]\nmod").map_or(text, |at| &text[..at]);
+    let lines = (1..)
+        .zip(code.lines())
+        .filter(|(_, l)| names.iter().any(|n| l.contains(n)) && !l.contains("/proc/") && !l.contains("schedstat"));
+    lines.map(|(n, l)| format!("{n}: {}", l.trim()))
+}
+
+/// What others wrote is read within limits and never from a pipe, what is written can be stopped at any moment, where no thread
+/// can be had that is said, and what is printed goes to outputs that may be closed or full.
+#[test]
+fn files_threads_and_outputs_are_had_in_one_way() {
+    let around = [
+        "fs::read(",
+        "fs::read_to_string(",
+        "fs::write(",
+        "create_dir_all(",
+        "thread::spawn(",
+        ".spawn(|",
+        "println!(",
+    ];
+    let mut files = Vec::new();
+    sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut files);
+    let outside = files.iter().filter(|f| !f.components().any(|c| c.as_os_str() == "files"));
+    let wrong: Vec<String> = outside
+        .flat_map(|file| {
+            let text = std::fs::read_to_string(file).unwrap();
+            let text = if only_tested(file) { String::new() } else { text };
+            calling(&text, &around).map(|line| format!("{}:{line}", file.display())).collect::<Vec<_>>()
+        })
+        .collect();
+    assert!(wrong.is_empty(), "go through crate::files, std::thread::Builder or the console:\n{}", wrong.join("\n"));
+    assert_eq!(
+        calling("a\nlet t = std::fs::read(&path);", &around).next().unwrap(),
+        "2: let t = std::fs::read(&path);"
+    );
+}
+
 #[test]
 fn every_fault_has_a_next_step() {
     assert_eq!(without_next("Fault::input(format!(\"a) {x}\")).cause(\"b\")").len(), 1);

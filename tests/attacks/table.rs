@@ -18,7 +18,7 @@ const MOST_MB: u64 = 512;
 /// What is to come of a case.
 pub enum Want {
     Good,
-    /// A fault whose sentence holds these.
+    /// A fault that says these of what happened and of its cause.
     Says(&'static [&'static str]),
 }
 
@@ -51,7 +51,8 @@ pub fn check(cases: Vec<Case>) {
             Ok((_, seconds)) if seconds > MOST_SECONDS => (format!("an answer after {seconds:.1} s"), false),
             Ok((Ok(Ok(())), seconds)) => (format!("good, {seconds:.2} s"), matches!(want, Good)),
             Ok((Ok(Err(fault)), _)) => {
-                let fits = matches!(want, Want::Says(words) if words.iter().all(|w| fault.what.contains(w)));
+                let said = format!("{} {}", fault.what, fault.cause);
+                let fits = matches!(want, Want::Says(words) if words.iter().all(|w| said.contains(w)));
                 (fault.to_string().replace('\n', " |"), fits && !fault.next.is_empty())
             }
         };

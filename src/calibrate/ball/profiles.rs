@@ -63,8 +63,9 @@ pub fn from_csv(text: &str, stem: &str) -> Result<Vec<Profile>> {
         };
         let cells: Vec<&str> = line.split(separator).map(str::trim).filter(|c| !c.is_empty()).collect();
         let bad = |what: &str| {
+            let commas = separator == ';' && line.contains(',');
             Fault::input(format!("line {}: '{line}' {what}", number + 1))
-                .cause("not a list of x, z points in mm")
+                .cause(if commas { "numbers with decimal commas" } else { "not a list of x, z points in mm" })
                 .next("write x and z (mm) a line, or profile, x and z with a header")
         };
         let is_number = |c: &str| c.parse::<f64>().is_ok();

@@ -6,13 +6,13 @@ use super::chess::{charuco, chessboard};
 use super::view::{BoardView, FindOptions};
 use super::{circles, marker_grid};
 use crate::fault::Result;
-use crate::raster::Image;
+use crate::raster::{Image, Light};
 use crate::recording::BoardSpec;
 
 /// Finds `board` in `image`. The fault says why where it is not found.
 pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<BoardView> {
     options.check()?;
-    match board {
+    let found = match board {
         BoardSpec::Chessboard { inner_corners, first_square, .. } => {
             chessboard::find(image, *inner_corners, first_square != "white", options)
         }
@@ -23,5 +23,9 @@ pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<B
         }
         BoardSpec::MarkerGrid { .. } => marker_grid::find(image, board, options),
         BoardSpec::Circles { .. } => circles::find(image, board, options),
-    }
+    };
+    found.map_err(|fault| {
+        let light = Light::of(image);
+        if light.why().is_some() { light.explain("the picture", fault) } else { fault }
+    })
 }

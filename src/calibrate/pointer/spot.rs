@@ -218,14 +218,13 @@ pub fn find_spots(pictures: &[SpotPicture<'_>], hot: &[bool], o: &SpotOptions) -
             speckle = (robust * (n / f64::max(n - 5.0 * spots, 0.3 * n)).sqrt()).clamp(0.005, 1.0);
         }
     }
-    let finish = |(i, found): (usize, Result<(Patch, Shape, f64)>)| {
+    let finish = |found: Result<(Patch, Shape, f64)>| {
         let (patch, shape, rival) = found?;
         let (s, covariance) = refine(&patch, &shape, speckle);
-        let name = pictures[i].name;
         let width = s[3].exp();
         let noise = patch.noise.hypot(0.0);
         let missing = |what: String| {
-            Err(Fault::refused(format!("{name}: {what}"))
+            Err(Fault::refused(what)
                 .cause("the pointer was off, out of view, or drowned by room light")
                 .next("take this picture again, or leave it out"))
         };
@@ -240,7 +239,7 @@ pub fn find_spots(pictures: &[SpotPicture<'_>], hot: &[bool], o: &SpotOptions) -
         }
         if rival > o.rival {
             return Err(Fault::refused(format!(
-                "{name}: two spots, the second with {:.0} % of the first one's light (limit {:.0} %)",
+                "two spots, the second with {:.0} % of the first one's light (limit {:.0} %)",
                 rival * 100.0,
                 o.rival * 100.0
             ))
@@ -248,7 +247,7 @@ pub fn find_spots(pictures: &[SpotPicture<'_>], hot: &[bool], o: &SpotOptions) -
             .next("cover the shiny place and take this picture again"));
         }
         let covariance = covariance.ok_or_else(|| {
-            Fault::refused(format!("{name}: the spot's centre is not determined"))
+            Fault::refused("the spot's centre is not determined")
                 .next("take the picture again with a smaller or darker spot")
         })?;
         let mut saturated = 0;
@@ -262,7 +261,7 @@ pub fn find_spots(pictures: &[SpotPicture<'_>], hot: &[bool], o: &SpotOptions) -
             rival,
         })
     };
-    Ok(patches.into_iter().enumerate().map(finish).collect())
+    Ok(patches.into_iter().map(finish).collect())
 }
 
 fn refine(patch: &Patch, start: &Shape, speckle: f64) -> (Shape, Option<Matrix2<f64>>) {
@@ -302,7 +301,7 @@ fn collect_scatter(patch: &Patch, s: &Shape, out: &mut Vec<f64>) {
 fn locate(p: &SpotPicture<'_>, hot: &[bool], o: &SpotOptions) -> Result<(Patch, Shape, f64)> {
     let (w, h) = (p.laser.width as usize, p.laser.height as usize);
     if w < 16 || h < 16 {
-        return Err(Fault::input(format!("{}: {w}x{h} is too small for a spot, at least 16x16", p.name))
+        return Err(Fault::input(format!("{w}x{h} is too small for a spot, at least 16x16"))
             .next("give pictures of the whole sensor"));
     }
     let full = f64::from(p.laser.full_scale());
@@ -335,8 +334,8 @@ fn locate(p: &SpotPicture<'_>, hot: &[bool], o: &SpotOptions) -> Result<(Patch, 
     let (background, noise) = surroundings(&grey, w, h, bx, by);
     let top = best.0 - background;
     if !(top > 0.0) {
-        return Err(Fault::refused(format!("{}: no spot, the picture is dark", p.name))
-            .cause("the pointer was off, or the exposure far too short")
+        return Err(Fault::refused("no spot stands out")
+            .cause("the pointer was off, the exposure far too short, or room light hides it")
             .next("take this picture again, or leave it out"));
     }
     // Area above half of the peak gives the first width: π 2 ln 2 s² for a Gaussian.

@@ -29,7 +29,7 @@ pub fn finish<T: Serialize + Measured>(
     let q = &calibration.quality;
     if q.verdict >= Verdict::BadlyDetermined && !keep.keep_badly_determined {
         let folder = station.join("calibration");
-        std::fs::create_dir_all(&folder).map_err(|e| Fault::write(&folder, e))?;
+        crate::files::make_folder(&folder)?;
         let html = folder.join(format!("{}.refused.html", calibration.kind.name()));
         page.save(&html)?;
         console.say(format!("{value}\n{}not stored; {}: what was found", figures(q), html.display()));
@@ -38,9 +38,8 @@ pub fn finish<T: Serialize + Measured>(
             .cause("too few, too similar or contradicting pictures; the station keeps its former calibration")
             .next(q.advice.first().map_or("take more pictures", String::as_str)));
     }
-    let path = Rig::store(station, calibration)?;
-    let html = station.join("calibration").join(format!("{}.html", calibration.kind.name()));
-    page.save(&html)?;
+    let path = Rig::store(station, calibration, Some(&page.html()))?;
+    let html = path.with_extension("html");
     let mut text = format!("{value}\nverdict: {}\n", q.verdict.words());
     for r in &q.reasons {
         text += &format!("  {r}\n");

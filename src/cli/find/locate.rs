@@ -69,8 +69,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let looked = Looked { scans: &args.scans, range: range.as_ref() };
     let (report, picture) = find_part_in_all(&looked, &recipe, args.station.as_deref(), &options)?;
     let text = serde_json::to_string_pretty(&report).expect("plain data");
-    crate::files::write(&args.out, text.as_bytes())?;
-    crate::files::write(&image, &picture.to_png())?;
+    crate::files::write_beside((&args.out, text.as_bytes()), &[(&image, &picture.to_png())])?;
     console.result(&report, &summary(&report));
     console.say(format!("see {} and {}", args.out.display(), image.display()));
     if report.passed {

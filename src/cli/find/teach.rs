@@ -57,8 +57,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     };
     let (recipe, proof, picture) = teach_part(&args.scan, &options)?;
     let text = toml::to_string(&recipe).expect("plain data");
-    crate::files::write(&args.out, text.as_bytes())?;
-    crate::files::write(&image, &picture.to_png())?;
+    crate::files::write_beside((&args.out, text.as_bytes()), &[(&image, &picture.to_png())])?;
     if !proof.passed {
         console.warn(format!("the taught part misses a gate on its own scan: {}", proof.reasons.join("; ")));
     }

@@ -19,13 +19,17 @@ fn pool(processors: usize, asked: Option<usize>) -> Result<()> {
     let mut waiting: Vec<Sender<ThreadBuilder>> = Vec::new();
     while waiting.len() < wanted && failed.is_none() {
         let (give, take) = channel::<ThreadBuilder>();
+        let (tell, begun) = channel();
         let body = move || {
+            let _ = tell.send(());
             if let Ok(thread) = take.recv() {
                 thread.run();
             }
         };
+        // One by one: a thread takes some memory more when it begins, and cannot do without.
         match std::thread::Builder::new().name(format!("pool {}", waiting.len())).spawn(body) {
-            Ok(_) => waiting.push(give),
+            Ok(_) if begun.recv().is_ok() => waiting.push(give),
+            Ok(_) => failed = Some(std::io::ErrorKind::OutOfMemory.into()),
             Err(e) => failed = Some(e),
         }
     }
@@ -34,9 +38,7 @@ fn pool(processors: usize, asked: Option<usize>) -> Result<()> {
         waiting.truncate(waiting.len().div_ceil(2));
     }
     if let (true, Some(e)) = (waiting.is_empty(), failed) {
-        return Err(Fault::device(format!("0 of {wanted} threads could be started, at least 1 is needed: {e}"))
-            .cause("the memory ran out, or the number of processes is limited")
-            .next("close other programs, or raise the limits (ulimit -v, ulimit -u)"));
+        return Err(Fault::threads(&e).at(format!("0 of {wanted} threads run, at least 1 is needed")));
     }
     let give = |thread: ThreadBuilder| {
         let place = thread.index();

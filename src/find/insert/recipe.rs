@@ -207,7 +207,11 @@ impl Recipe {
     pub fn parse(text: &str) -> Result<Recipe> {
         let recipe: Recipe = toml::from_str(text).map_err(|e| {
             Fault::input(format!("is not a recipe: {}", e.to_string().trim_end()))
-                .cause("a misspelt key, a missing entry, or a value of the wrong type")
+                .cause(crate::files::slip_at(
+                    text,
+                    e.span().map_or(0, |s| s.start),
+                    "a misspelt key, a missing entry, or a value of the wrong type",
+                ))
                 .next("compare it with docs/file-formats.md, Recipe")
         })?;
         recipe.check()?;
@@ -227,6 +231,7 @@ impl Recipe {
             }
         };
         range("format", f64::from(self.format), 1.0, 1.0)?;
+        crate::files::named("name", &self.name)?;
         range("cell_mm", self.cell_mm, 1e-4, 500.0)?;
         range("alike_turns", f64::from(self.alike_turns), 1.0, 8.0)?;
         if self.layers.is_empty() {

@@ -199,9 +199,12 @@ fn one(
         }
         Build::Offset => {
             needs(1, 1)?;
-            let along = c.along.as_ref().expect("checked above");
+            let (Some(along), Some(by)) = (&c.along, c.by_mm) else {
+                return Err(Fault::input(format!("construction '{}' does not say how far along what", c.name))
+                    .cause("an offset without 'along' or 'by_mm'")
+                    .next("add both: the line to go along, and the millimetres"));
+            };
             let (p, d) = (point(&c.of[0])?, point(along)?);
-            let by = c.by_mm.expect("checked above");
             (moved(&p.0, &d.0, by)?, moved(&p.1, &d.1, by)?, p.2)
         }
         Build::Lattice => {

@@ -7,7 +7,7 @@ use super::robust::robust;
 use super::surface_ends::Observation;
 use crate::fault::{Fault, Result};
 use nalgebra::{Matrix3, SVector, Vector3};
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 /// Fewer ends do not give a place.
 const MIN_EDGES: usize = 40;
@@ -68,7 +68,8 @@ pub(in crate::find) fn fit_edges(
     let mut covariance: Matrix3<f64> = fit.covariance.fixed_view::<3, 3>(0, 0).into();
     // From shot to shot an edge that runs along the stripe is seen by one or two shots only, and all its
     // samples share the place of those shots against it: one measurement each, however many columns.
-    let mut shared: HashMap<(u32, bool), Vector3<f64>> = HashMap::new();
+    // In order, so that the same scan gives the same sums to the last bit.
+    let mut shared: BTreeMap<(u32, bool), Vector3<f64>> = BTreeMap::new();
     let mut normal = Matrix3::zeros();
     for o in observations.iter().filter(|o| o.locates && o.weight > 0.0) {
         let j = Vector3::new(o.nx, o.ny, o.x * o.ny - o.y * o.nx) * o.weight;

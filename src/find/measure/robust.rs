@@ -3,7 +3,7 @@
 //! Frame and unit: the rows' own.
 
 use nalgebra::{SMatrix, SVector};
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 
 pub(in crate::find) struct Fit<const N: usize> {
     pub step: SVector<f64, N>,
@@ -51,7 +51,8 @@ pub(in crate::find) fn robust<const N: usize>(
         inverse = SMatrix::<f64, N, N>::from_fn(|i, k| inv[(i, k)] * scale[i] * scale[k]);
         step = inverse * b;
     }
-    let mut by_shot: HashMap<u32, SVector<f64, N>> = HashMap::new();
+    // In order, so that the same scan gives the same sums to the last bit.
+    let mut by_shot: BTreeMap<u32, SVector<f64, N>> = BTreeMap::new();
     for ((j, r, shot), w) in rows.iter().zip(&weights) {
         *by_shot.entry(*shot).or_insert_with(SVector::zeros) += *w * (r - j.dot(&step)) * j;
     }

@@ -25,7 +25,11 @@ impl Drawing {
     pub fn parse(text: &str) -> Result<Drawing> {
         let drawing: Drawing = toml::from_str(text).map_err(|e| {
             Fault::input(format!("is not a drawing: {}", e.message()))
-                .cause("a misspelt key or a missing entry")
+                .cause(crate::files::slip_at(
+                    text,
+                    e.span().map_or(0, |s| s.start),
+                    "a misspelt key or a missing entry",
+                ))
                 .next("compare it with docs/file-formats.md, Drawing")
         })?;
         drawing.check()?;

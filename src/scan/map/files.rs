@@ -33,37 +33,46 @@ pub struct MapScale {
 
 /// Most bytes of one of a map's files: 64 million cells of 4 bytes, and what stands before them.
 const MOST_BYTES: u64 = (4 << 26) + (1 << 20);
+/// What [`HeightMap::save`] writes.
+pub const MAP_FILES: [&str; 10] = [
+    "height_picture.png",
+    "intensity_picture.png",
+    "sigma_picture.png",
+    "coverage_picture.png",
+    "height.png",
+    "count.png",
+    "height.tif",
+    "intensity.tif",
+    "sigma.tif",
+    "height.json",
+];
 const CENTRE: &str = "((i + 0.5) cell_mm, (j + 0.5) cell_mm), row 0 first";
 
 impl HeightMap {
     /// Writes height.tif, height.png, height.json, intensity.tif, sigma.tif, count.png and the pictures
     /// *_picture.png into `folder`.
     pub fn save(&self, folder: &Path) -> Result<()> {
-        std::fs::create_dir_all(folder).map_err(|e| Fault::write(folder, e))?;
+        crate::files::make_folder(folder)?;
         let (w, h) = (self.width, self.height);
         let (scale, pixels) = self.to_u16();
         let map = |values: &[f32], what: &str| float_tiff(w, h, values, &format!("{what}; NaN is missing"));
         let deep = |levels: Vec<u16>| png(&Image::from_u16(w, h, 16, levels));
         let picture = |what: Shown| self.picture(what).0.to_png();
-        let files: [(&str, &(dyn Fn() -> Vec<u8> + Sync)); 10] = [
-            ("height_picture.png", &|| picture(Shown::Height)),
-            ("intensity_picture.png", &|| picture(Shown::Intensity)),
-            ("sigma_picture.png", &|| picture(Shown::Sigma)),
-            ("coverage_picture.png", &|| picture(Shown::Coverage)),
-            ("height.png", &|| deep(pixels.clone())),
-            ("count.png", &|| deep(self.count.iter().map(|&n| n.min(65_535) as u16).collect())),
-            ("height.tif", &|| map(&self.z, "height above the grid plane, mm")),
-            ("intensity.tif", &|| map(&self.intensity, "stripe amplitude, grey levels")),
-            ("sigma.tif", &|| map(&self.sigma, "standard deviation of the height, mm")),
-            ("height.json", &|| serde_json::to_string_pretty(&scale).expect("plain numbers").into_bytes()),
+        let files: [&(dyn Fn() -> Vec<u8> + Sync); 10] = [
+            &|| picture(Shown::Height),
+            &|| picture(Shown::Intensity),
+            &|| picture(Shown::Sigma),
+            &|| picture(Shown::Coverage),
+            &|| deep(pixels.clone()),
+            &|| deep(self.count.iter().map(|&n| n.min(65_535) as u16).collect()),
+            &|| map(&self.z, "height above the grid plane, mm"),
+            &|| map(&self.intensity, "stripe amplitude, grey levels"),
+            &|| map(&self.sigma, "standard deviation of the height, mm"),
+            &|| serde_json::to_string_pretty(&scale).expect("plain numbers").into_bytes(),
         ];
-        let write = |(name, bytes): &(&str, &(dyn Fn() -> Vec<u8> + Sync))| write_aside(&folder.join(name), &bytes());
-        let written = files.par_iter().map(write).collect::<Result<Vec<_>>>()?;
-        // A thread each, not the cores' threads: files that are waited for together reach the disk together.
-        std::thread::scope(|scope| {
-            let waits: Vec<_> = written.into_iter().map(|file| scope.spawn(|| file.keep())).collect();
-            waits.into_iter().try_for_each(|wait| wait.join().expect("a file is kept without a panic"))
-        })
+        let write = |(name, bytes): (&&str, &&(dyn Fn() -> Vec<u8> + Sync))| write_aside(&folder.join(name), &bytes());
+        let written = MAP_FILES.par_iter().zip(&files).map(write).collect::<Result<Vec<_>>>()?;
+        crate::files::keep_all(written)
     }
 
     /// 16-bit heights with their scale: 1..=65535 spans the map, 0 is missing.
@@ -112,13 +121,12 @@ impl HeightMap {
             }
             Ok(values)
         };
-        let mut map = HeightMap::empty(scale.width, scale.height, scale.cell_mm, scale.base_from_grid);
-        (map.z, map.intensity, map.sigma) = (plane("height.tif")?, plane("intensity.tif")?, plane("sigma.tif")?);
+        // Before memory is asked for: the planes are as large as the files that hold them.
+        let (z, intensity, sigma) = (plane("height.tif")?, plane("intensity.tif")?, plane("sigma.tif")?);
         let size = [scale.width, scale.height];
         let counts = crate::raster::load_sized(&folder.join("count.png"), Default::default(), 16, size)?;
-        if (counts.width, counts.height) != (map.width, map.height) {
-            return Err(other(format!("count.png is {}x{}", counts.width, counts.height)));
-        }
+        let mut map = HeightMap::empty(scale.width, scale.height, scale.cell_mm, scale.base_from_grid);
+        (map.z, map.intensity, map.sigma) = (z, intensity, sigma);
         map.count = counts.to_f32().into_iter().map(|n| n as u32).collect();
         Ok(map)
     }

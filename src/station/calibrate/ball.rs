@@ -70,7 +70,7 @@ pub fn evaluate_profile_hand_eye(
 
 /// `flange_T_sensor` of a JSON file: a calibration's record, or an object with that key.
 fn sensor_of(path: &Path) -> Result<Rigid<Flange, Sensor>> {
-    let text = std::fs::read_to_string(path).map_err(|e| Fault::read(path, e))?;
+    let text = crate::files::read_text(path)?;
     let refuse = |what: String| {
         Fault::input(format!("{}: {what}", path.display()))
             .cause("another file, or another transform")

@@ -73,24 +73,28 @@ pub fn boards(recording: &Recording, camera: &Intrinsics, progress: &(dyn Fn(usi
         })
         .collect::<Result<_>>()?;
     let mut out = Boards::default();
-    let mut diameters = Vec::new();
+    let (mut diameters, mut faults) = (Vec::new(), Vec::new());
     for (name, result) in each {
         match result {
             Ok((found, diameter)) => {
                 diameters.extend(diameter);
                 out.found.push(found);
             }
-            Err(fault) => out.missing.push((name, fault.to_string())),
+            Err(fault) => {
+                out.missing.push((name, fault.to_string()));
+                faults.push(fault);
+            }
         }
     }
     if out.found.is_empty() {
         // The picture that says what most pictures say.
-        let line = |why: &str| why.lines().nth(1).unwrap_or_default().to_owned();
-        let votes = |m: &(String, String)| out.missing.iter().filter(|o| line(&o.1) == line(&m.1)).count();
-        let (name, why) = out.missing.iter().rev().max_by_key(|m| votes(m)).expect("one picture or more");
-        return Err(Fault::input(format!("no board was found in any of {} pictures; {name}: {why}", frames.len()))
-            .cause("a wrong board size in meta.json, too little contrast, or the board cut off")
-            .next("compare meta.json's board with the real one and look at the pictures"));
+        let votes = |f: &Fault| faults.iter().filter(|o| o.cause == f.cause).count();
+        let (fault, (name, _)) =
+            faults.iter().zip(&out.missing).rev().max_by_key(|(f, _)| votes(f)).expect("one picture or more");
+        let what = format!("no board was found in any of {} pictures; {name}: {}", frames.len(), fault.what);
+        return Err(Fault::input(what)
+            .cause(format!("{}; or another board than meta.json describes", fault.cause))
+            .next(format!("{}; compare meta.json's board with the real one", fault.next)));
     }
     know_diameter(&mut out.found, diameters);
     Ok(out)

@@ -4,7 +4,7 @@
 
 use super::board_views::{Boards, FrameBoard, boards};
 use super::hand_eye::{Calibrated, first_line};
-use super::room_light;
+use super::room_light::{self, lit};
 use super::straight::keep_straight;
 use crate::calibrate::laser_plane::options::LaserPlaneOptions;
 use crate::calibrate::laser_plane::report::{covariance, judge, page};
@@ -90,7 +90,8 @@ pub fn calibrate_laser_plane(
         r.as_ref().map_or(0, |(_, f)| f.views.iter().map(|v| v.peaks_used).sum::<usize>())
     };
     let best = if used(&guesses[0]) >= used(&guesses[1]) { 0 } else { 1 };
-    let guess = guesses.into_iter().nth(best).expect("two guesses")?.1.plane;
+    let guess = guesses.into_iter().nth(best).expect("two guesses");
+    let guess = guess.map_err(|fault| lit(recording, &names[names.len() / 2], fault))?.1.plane;
     let (views, fit) = fit_with(&guess, everywhere)?;
     let lit = Volume::new(fit.reach[0], fit.reach[1], "where the boards were lit");
     let limits = run.asked.limits(&lit, |z| camera.value.view_mm(z));

@@ -4,7 +4,7 @@
 
 use super::board_views::{Boards, boards};
 use super::hand_eye::{Calibrated, first_line};
-use super::room_light;
+use super::room_light::{self, lit};
 use crate::calibrate::limits::Asked;
 use crate::calibrate::measured_pose::{intrinsic_covariance, pooled_factor};
 use crate::calibrate::pointer::report::{covariance, judge, page};
@@ -69,7 +69,7 @@ pub fn calibrate_pointer(
         if let Some((name, why)) = missing.first() {
             fault.cause = format!("{}; {name}: {}", fault.cause, first_line(why));
         }
-        fault
+        lit(recording, &pictures[pictures.len() / 2].1, fault)
     })?;
     let mut sigmas: Vec<f64> = views.iter().map(|v| (v.covariance.trace() / 2.0).sqrt()).collect();
     sigmas.sort_by(f64::total_cmp);

@@ -4,9 +4,10 @@
 
 use crate::calibrate::boards::extent::inside;
 use crate::camera::Intrinsics;
+use crate::fault::Fault;
 use crate::geometry::{Board, Camera, Rigid, Vec2, Vec3};
-use crate::raster::Image;
-use crate::recording::BoardSpec;
+use crate::raster::{Image, Light};
+use crate::recording::{BoardSpec, Recording};
 use crate::stages::stripe::ambient::subtract;
 
 /// Pixels between two that are looked at, each way.
@@ -66,6 +67,14 @@ pub fn without(laser: &Image, ambient: &Image, share: f32) -> Image {
     match laser.bits {
         8 => Image::from_u8(w, h, left.map(|g| g as u8).collect()),
         bits => Image::from_u16(w, h, bits, left.map(|g| g as u16).collect()),
+    }
+}
+
+/// Adds to a fault what one of the laser's pictures shows, as it was taken.
+pub fn lit(recording: &Recording, name: &str, fault: Fault) -> Fault {
+    match recording.picture(name) {
+        Ok(picture) => Light::of(&picture).explain(name, fault),
+        Err(_) => fault,
     }
 }
 

@@ -4,7 +4,7 @@
 
 use super::figures::{HISTOGRAM_STEP, Judged};
 use super::parts::FoundPart;
-use crate::fault::{Fault, Result};
+use crate::fault::Result;
 use crate::geometry::Vec3;
 use crate::scan::{CloudFile, HeightMap, PointSource};
 use crate::simulate::CloudErrors;
@@ -14,6 +14,8 @@ use std::path::{Path, PathBuf};
 
 /// Points in the 3-D view; every k-th of the cloud.
 const VIEW_POINTS: u64 = 120_000;
+/// Bytes of a picture on the page.
+const MOST_PICTURE: u64 = 256 << 20;
 
 /// Writes `index.html` beside the scan's other files.
 pub fn save(scan: &Path, judged: Option<&Judged>, found: &[FoundPart]) -> Result<PathBuf> {
@@ -241,7 +243,7 @@ fn machine(body: &mut String, r: &ScanReport) {
 /// A picture as part of the page.
 fn picture(folder: &Path, name: &str, caption: &str) -> Result<String> {
     let path = folder.join(name);
-    let bytes = std::fs::read(&path).map_err(|e| Fault::read(&path, e))?;
+    let bytes = crate::files::read(&path, MOST_PICTURE)?;
     Ok(format!(
         "<figure><img alt=\"{0}\" src=\"data:image/png;base64,{1}\"><figcaption>{0}</figcaption></figure>",
         escape(caption),

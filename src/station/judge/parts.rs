@@ -49,8 +49,7 @@ pub fn judge_parts(scan: &Path, station: &Path, truth: &Path, recipes: &[Recipe]
             Ok((report, image)) => {
                 let text = serde_json::to_string_pretty(&report).expect("plain data");
                 let json = scan.join(format!("find_{}.json", recipe.name));
-                crate::files::write(&json, text.as_bytes())?;
-                crate::files::write(&scan.join(&picture), &image.to_png())?;
+                crate::files::write_beside((&json, text.as_bytes()), &[(&scan.join(&picture), &image.to_png())])?;
                 (found.passed, found.reasons) = (report.passed, report.reasons.clone());
                 (found.sigma_mm, found.picture) = (report.sigma_mm, picture);
                 if let Some(part) = truth.file.parts.iter().find(|p| p.name == recipe.name) {

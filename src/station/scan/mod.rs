@@ -3,7 +3,7 @@
 
 mod overlays;
 mod products;
-mod progress;
+pub mod progress;
 pub(super) mod recorded;
 pub(super) mod report;
 pub(super) mod run;

@@ -1,7 +1,7 @@
 //! In: shots and their profiles. Out: a few of them drawn with their peaks, evenly spread over the scan.
 //! Frame and unit: pixels of the shot.
 
-use crate::fault::{Fault, Result};
+use crate::fault::Result;
 use crate::raster::Image;
 use crate::scan::{Profile, Shot};
 use std::collections::BTreeMap;
@@ -18,7 +18,7 @@ impl Overlays {
     pub(in crate::station) fn new(out: &Path, count: usize, total: Option<usize>) -> Result<Overlays> {
         let folder = out.join("overlays");
         if count > 0 {
-            std::fs::create_dir_all(&folder).map_err(|e| Fault::write(&folder, e))?;
+            crate::files::make_folder(&folder)?;
         }
         // Of a pipe of unknown length every 100th shot is drawn.
         let every = if count == 0 { usize::MAX } else { total.map_or(100, |n| n.div_ceil(count)).max(1) };

@@ -68,11 +68,7 @@ impl Checkpoint {
     pub fn load(part: &Path) -> Result<Option<Checkpoint>> {
         let path = part.join(PROGRESS);
         let again = "scan again without --resume: the pictures are still there";
-        let text = match std::fs::read_to_string(&path) {
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            Err(e) => return Err(Fault::read(&path, e).next(again)),
-            Ok(text) => text,
-        };
+        let Some(text) = crate::files::read_text_if_there(&path).map_err(|e| e.next(again))? else { return Ok(None) };
         let what = format!("{}: the checkpoint", path.display());
         let found: Checkpoint = unsealed(&text, &what).map_err(|e| e.next(again))?;
         if found.sigma.len() != SIGMA_BINS {

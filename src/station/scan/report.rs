@@ -6,7 +6,7 @@ use super::seen::Seen;
 use crate::fault::{Fault, Result};
 use crate::recording::Motion;
 use crate::rig::{Volume, hash_file};
-use crate::scan::{CloudPoint, Extraction, Format, read_cloud};
+use crate::scan::{CloudFile, CloudPoint, Extraction, Format, read_cloud};
 use crate::stages::peak::Stripe;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -59,6 +59,9 @@ pub struct ScanReport {
     /// SHA-256 of the cloud and of the height map, by file name.
     pub files: BTreeMap<String, String>,
 }
+
+/// Bytes of a height map's file: 64 million cells and what stands before them.
+const MOST_OF_A_MAP: u64 = 257 << 20;
 
 /// Of the reports that this version writes; format 1 had no hashes.
 pub(in crate::station) const FORMAT: u32 = 2;
@@ -113,7 +116,13 @@ impl ScanReport {
     /// Refuses files of a scan folder that are not those that the scan wrote.
     pub(in crate::station) fn check_files(&self, scan: &Path) -> Result<()> {
         self.files.par_iter().try_for_each(|(name, hash)| {
-            let is = hash_file(&scan.join(name))?;
+            let path = scan.join(name);
+            if name != "cloud.ply" && crate::files::length(&path)? > MOST_OF_A_MAP {
+                return Err(Fault::input(format!("{}: is longer than any map", path.display()))
+                    .cause("another file of that name, or a damaged one")
+                    .next("scan again"));
+            }
+            let is = hash_file(&path)?;
             if is == *hash {
                 return Ok(());
             }
@@ -131,8 +140,8 @@ impl ScanReport {
 pub fn load_report(scan: &Path) -> Result<ScanReport> {
     settle(scan)?;
     let path = scan.join("scan.json");
-    let text = std::fs::read_to_string(&path)
-        .map_err(|e| Fault::read(&path, e).next("give the folder that sheetlight scan --out wrote"))?;
+    let text =
+        crate::files::read_text(&path).map_err(|e| e.next("give the folder that sheetlight scan --out wrote"))?;
     let strange = |what: String| {
         Fault::input(format!("{}: {what}", path.display()))
             .cause("another version, or edited by hand")
@@ -158,6 +167,8 @@ pub fn cloud_of(scan: &Path) -> Result<Vec<CloudPoint>> {
     }
     let report = load_report(scan)?;
     report.has_points().map_err(|e| e.at(scan.display()))?;
+    // Its header and length first: what is no cloud is not worth hashing.
+    CloudFile::open(&scan.join("cloud.ply"))?;
     report.check_files(scan)?;
     read_cloud(&scan.join("cloud.ply"))
 }

@@ -5,7 +5,7 @@
 use super::overlays::Overlays;
 use super::progress::{Checkpoint, fingerprint_of};
 use super::report::{FORMAT, ScanReport, Spent};
-use super::scan_folder;
+use super::scan_folder::{self, FORMER_PROGRESS};
 use super::seen::Seen;
 use crate::fault::{Fault, Result};
 use crate::files::Lock;
@@ -194,6 +194,11 @@ fn state(id: &str, rig: &Rig, options: &ScanOptions, part: &Path) -> Result<Chec
         Some(_) => Err(Fault::usage("the interrupted scan was of another recording, rig, working volume or settings")
             .cause("something was changed since")
             .next("scan again without --resume, or into another folder")),
+        None if options.resume && options.out.join(FORMER_PROGRESS).exists() => {
+            Err(Fault::usage(format!("{}: a former version was interrupted here", options.out.display()))
+                .cause("this version keeps what is unfinished in another way and cannot go on with it")
+                .next("scan again without --resume: the pictures are still there"))
+        }
         None => Ok(Checkpoint::new(identity)),
     }
 }

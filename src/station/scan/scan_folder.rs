@@ -3,7 +3,7 @@
 //! Frame and unit: none.
 
 use crate::fault::{Fault, Result};
-use crate::files::{Together, moment, remove};
+use crate::files::{Together, remove};
 use std::io::Result as Io;
 use std::path::Path;
 
@@ -29,9 +29,11 @@ const FILES: [&str; 20] = [
     "error_picture.png",
     // Where former versions kept an interrupted scan.
     "cloud.ply.part",
-    "scan.progress.json",
+    FORMER_PROGRESS,
     "found.json",
 ];
+/// How far a scan of a former version got.
+pub(super) const FORMER_PROGRESS: &str = "scan.progress.json";
 
 /// Whether a name is one that a scan folder uses itself.
 pub fn of_a_scan(name: &str) -> bool {
@@ -53,8 +55,8 @@ fn clear(out: &Path, whole: &Path) -> Io<()> {
     struct Found {
         name: String,
     }
-    let found = std::fs::read(out.join("found.json")).ok();
-    let found: Vec<Found> = found.and_then(|bytes| serde_json::from_slice(&bytes).ok()).unwrap_or_default();
+    let found = crate::files::read_text(&out.join("found.json")).ok();
+    let found: Vec<Found> = found.and_then(|text| serde_json::from_str(&text).ok()).unwrap_or_default();
     for name in found.iter().map(|f| &f.name).filter(|n| !n.contains(['/', '\\'])) {
         remove(&out.join(format!("find_{name}.json")))?;
         remove(&out.join(format!("find_{name}.png")))?;
@@ -82,7 +84,7 @@ pub(in crate::station) fn make(out: &Path) -> Result<()> {
             .cause("somebody else made it; what it points at is left alone")
             .next("take it away, or choose another folder"));
     }
-    moment().and_then(|()| std::fs::create_dir_all(out)).map_err(|e| Fault::write(out, e))
+    crate::files::make_folder(out)
 }
 
 /// What a killed process left half-written in the working folder of a scan that is resumed.
