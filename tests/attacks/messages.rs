@@ -64,15 +64,16 @@ fn without_next(text: &str) -> Vec<String> {
 fn only_tested(file: &Path) -> bool {
     let name = file.file_stem().unwrap().to_string_lossy();
     let above = std::fs::read_to_string(file.with_file_name("mod.rs")).unwrap_or_default();
-    above.contains(&format!("#[cfg(test)]\nmod {name};"))
+    name.ends_with("tests") || above.contains(&format!("#[cfg(test)]\nmod {name};"))
 }
 
-/// Lines of a source, its tests aside, that call one of `names`.
+/// Lines of a source, its tests and comments aside, that call one of `names`.
 fn calling<'a>(text: &'a str, names: &'a [&'a str]) -> impl Iterator<Item = String> + 'a {
     let code = text.find("#[cfg(test)]\nmod").map_or(text, |at| &text[..at]);
     let lines = (1..)
         .zip(code.lines())
-        .filter(|(_, l)| names.iter().any(|n| l.contains(n)) && !l.contains("/proc/") && !l.contains("schedstat"));
+        .filter(|(_, l)| !l.trim_start().starts_with("//") && names.iter().any(|n| l.contains(n)))
+        .filter(|(_, l)| !l.contains("/proc/") && !l.contains("schedstat"));
     lines.map(|(n, l)| format!("{n}: {}", l.trim()))
 }
 
