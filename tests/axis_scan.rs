@@ -5,6 +5,7 @@
 
 mod common;
 
+use common::clouds::apart;
 use common::{sheetlight, sheetlight_fails};
 use serde_json::{Value, json};
 use sheetlight::geometry::{Base, Vec3, fit_plane};
@@ -130,32 +131,11 @@ fn an_axis_scans_as_accurately_per_pixel_as_the_robot() {
         if common::device().is_some() && (motion == "turntable" || std::env::var_os("SHEETLIGHT_LONG").is_some()) {
             let gpu = scanned(&at, "scan", "gpu", &["--on", "gpu"]).1;
             let cpu = scanned(&at, "scan", "cpu", &[]).1;
-            let (far, alone) = apart(&cpu, &gpu);
-            println!("{motion}: GPU and twins differ by {far:.2e} mm, {alone} points are one's alone");
-            assert!(far < 1e-3 && alone * 1000 <= cpu.len(), "{far} mm, {alone} of {}", cpu.len());
+            let a = apart(&cpu, &gpu);
+            println!("{motion}: of {} points {a:?}", cpu.len());
+            assert!(a.worst_mm < 1e-3 && a.alone * 10_000 <= cpu.len(), "{a:?} of {}", cpu.len());
         }
     }
-}
-
-/// Largest distance of the same point in two clouds, mm, and points that only one has.
-fn apart(a: &[CloudPoint], b: &[CloudPoint]) -> (f64, usize) {
-    let key = |p: &CloudPoint| (p.shot, (p.u * 8.0).round() as i64, (p.v * 8.0).round() as i64);
-    let mut there: std::collections::HashMap<_, _> = b.iter().map(|p| (key(p), *p)).collect();
-    let (mut far, mut alone) = (0f64, 0);
-    for p in a {
-        let (shot, u, v) = key(p);
-        // A centre that lies between two eighths of a pixel may be rounded either way.
-        let near = (-1..=1).flat_map(|i| (-1..=1).map(move |j| (shot, u + i, v + j)));
-        let beside = |k: &(u32, i64, i64)| there.get(k).map_or(f32::INFINITY, |q| (q.u - p.u).hypot(q.v - p.v));
-        let nearest = near.filter(|k| there.contains_key(k)).min_by(|a, b| beside(a).total_cmp(&beside(b)));
-        match nearest.and_then(|k| there.remove(&k)) {
-            Some(q) => {
-                far = far.max((0..3).map(|i| f64::from((p.position[i] - q.position[i]).abs())).fold(0.0, f64::max));
-            }
-            None => alone += 1,
-        }
-    }
-    (far, alone + there.len())
 }
 
 #[test]

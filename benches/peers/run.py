@@ -62,7 +62,7 @@ def plane(rays):
 
 def opencv(image, k):
     lit = cv2.adaptiveThreshold(image, 255, cv2.ADAPTIVE_THRESH_MEAN_C, cv2.THRESH_BINARY, SIZE, -OFFSET)
-    thin = cv2.ximgproc.thinning(lit, thinningType=cv2.ximgproc.THINNING_GUOHALL)
+    thin = cv2.ximgproc.thinning(lit, thinningType=cv2.ximgproc.THINNING_ZHANGSUEN)
     px = cv2.findNonZero(thin)
     rays = cv2.undistortPoints(px.astype(np.float32), k, LENS).reshape(-1, 2)
     points = plane(np.column_stack([rays, np.ones(len(rays))]))
@@ -82,7 +82,7 @@ def opencv_tiles(image, k):
             if cv2.hasNonZero(lit[y:y + TILE, x:x + TILE]):
                 top, left = max(y - AROUND, 0), max(x - AROUND, 0)
                 part = lit[top:y + TILE + AROUND, left:x + TILE + AROUND]
-                part = cv2.ximgproc.thinning(part, thinningType=cv2.ximgproc.THINNING_GUOHALL)
+                part = cv2.ximgproc.thinning(part, thinningType=cv2.ximgproc.THINNING_ZHANGSUEN)
                 to = thin[y:y + TILE, x:x + TILE]
                 to[:] = part[y - top:y - top + to.shape[0], x - left:x - left + to.shape[1]]
     px = cv2.findNonZero(thin)

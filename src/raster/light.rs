@@ -45,9 +45,11 @@ const SLENDER: f64 = 3.0;
 
 /// A picture whose brightest pixel is below this share of full scale is dark.
 const DARK: f64 = 0.06;
-/// A picture is white with more than this share of its pixels saturated, or with its median above that share of full scale.
+/// A picture is white with more than this share of its pixels saturated, or with its median above that share of full scale and
+/// nothing dark in it: black print on white paper is not.
 const WHITE: f64 = 0.2;
 const BRIGHT: f64 = 0.9;
+const NO_DARK: f64 = 0.5;
 
 impl Light {
     pub fn of(image: &Image) -> Light {
@@ -86,7 +88,8 @@ impl Light {
             let why = "the picture is dark: its light was off, the exposure far too short, or the lens is covered";
             return Some((why, "switch the light on, or expose longer"));
         }
-        let white = self.saturated > WHITE || f64::from(self.levels[1]) > BRIGHT * full;
+        let washed_out = f64::from(self.levels[0]) > NO_DARK * full && f64::from(self.levels[1]) > BRIGHT * full;
+        let white = self.saturated > WHITE || washed_out;
         let why = "the picture is white: room light or exposure is far too strong";
         white.then_some((why, "expose shorter, or shade it"))
     }

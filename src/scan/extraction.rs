@@ -13,6 +13,30 @@ use crate::stages::stripe::point::Optics;
 use crate::stages::support::params::SupportParams;
 use crate::stages::{Thinning, ThresholdParams};
 
+/// Which rule thins the lit pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Rule {
+    /// By the direction of the stripe.
+    #[default]
+    Auto,
+    /// [`Thinning::ZhangSuen`], whatever the direction.
+    ZhangSuen,
+    /// [`Thinning::GuoHall`], whatever the direction.
+    GuoHall,
+}
+
+impl Rule {
+    /// The rule for a rig that sees its stripe move in this direction with depth.
+    pub fn thinning(self, across: [f32; 2]) -> Thinning {
+        match self {
+            Rule::Auto => Thinning::across(across),
+            Rule::ZhangSuen => Thinning::ZhangSuen,
+            Rule::GuoHall => Thinning::GuoHall,
+        }
+    }
+}
+
 /// Settings of the extraction; `[extraction]` in station.toml.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -23,7 +47,8 @@ pub struct Extraction {
     pub measure_stripe: bool,
     /// Offset and minimum in grey levels of an 8-bit picture; deeper ones scale them.
     pub threshold: ThresholdParams,
-    pub thinning: Thinning,
+    /// The thinning's rule; `auto` takes the one for the direction in which the rig sees its stripe ([`Thinning::across`]).
+    pub thinning: Rule,
     pub lengthen: LengthenParams,
     pub peak: PeakParams,
     pub choose: ChooseParams,
@@ -36,7 +61,7 @@ impl Default for Extraction {
             measure_stripe: true,
             // A peak fainter than 8 levels is not believed, so a pixel darker than that need not be looked at.
             threshold: ThresholdParams { minimum: 8, ..ThresholdParams::default() },
-            thinning: Thinning::default(),
+            thinning: Rule::default(),
             lengthen: LengthenParams::default(),
             peak: PeakParams::default(),
             choose: ChooseParams::default(),
@@ -88,7 +113,7 @@ impl Extraction {
         };
         ChainConfig {
             threshold,
-            thinning: self.thinning,
+            thinning: self.thinning.thinning(optics.across()),
             lengthen: self.lengthen.word(width_px),
             measure: Some(Measure { peak: self.peak, choose: self.choose, optics }),
             ..ChainConfig::new(format.width, format.height, format.bits)

@@ -25,7 +25,8 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "Example:
   sheetlight find scans/board7 --recipe data/recipes/led.toml --station cell3 --out led.json
   sheetlight find scans/b7 scans/b7again --recipe led.toml --station cell3 --out led.json
-  sheetlight find scans/b7 scans/b7again --range recordings/spots --recipe led.toml --station cell3 --out led.json")]
+  sheetlight find scans/b7 scans/b7again --range recordings/spots \\
+      --recipe led.toml --station cell3 --out led.json")]
 pub struct Args {
     /// Folders that sheetlight scan --out wrote: one, or several looks at the same part
     #[arg(required = true)]

@@ -123,9 +123,17 @@ mod tests {
                 .collect();
             let found = Scatter::fit(&sums, &assumed, full);
             let off = |a: f32, b: f32, least: f32| (a - b).abs() / b.max(least);
-            assert!(off(found.read_noise, truth.read_noise, 0.3) < 0.15, "{found:?}, {truth:?}");
-            assert!(off(found.gain, truth.gain, 0.03) < 0.3, "{found:?}, {truth:?}");
             assert!(off(found.speckle, truth.speckle, 0.1) < 0.15, "{found:?}, {truth:?}");
+            // What a pixel scatters by, in the dark, on the flank and on the crest, is what the fit weighs by. Where speckle drowns
+            // the other two they cannot be told apart, and need not be.
+            for light in [0.0, 0.1, 0.4, 0.8].map(|share| share * full) {
+                let [seen, true_one] = [&found, &truth].map(|s| variance(s, light, 0.02 * full));
+                assert!(off(seen, true_one, 0.0) < 0.15, "light {light}: {seen} of {true_one}; {found:?}, {truth:?}");
+            }
+            if truth.speckle < 0.2 {
+                assert!(off(found.read_noise, truth.read_noise, 0.3) < 0.15, "{found:?}, {truth:?}");
+                assert!(off(found.gain, truth.gain, 0.03) < 0.3, "{found:?}, {truth:?}");
+            }
         }
     }
 }

@@ -45,9 +45,20 @@ pub const RULE: &str = "rule";
 #[serde(rename_all = "kebab-case")]
 pub enum Thinning {
     /// Eats stripes two pixels wide that run at 45 degrees from their ends on, until two pixels are left.
-    ZhangSuen,
     #[default]
+    ZhangSuen,
+    /// Keeps those; of speckled stripes along the image's axes it keeps more pixels beside the middle.
     GuoHall,
+}
+
+/// Sine of twice the angle, off the image's axes, from which a stripe counts as slanted: 22.5 degrees.
+const SLANTED: f32 = std::f32::consts::FRAC_1_SQRT_2;
+
+impl Thinning {
+    /// The rule for a stripe that is crossed in this direction (a unit vector of the image).
+    pub fn across([x, y]: [f32; 2]) -> Thinning {
+        if 2.0 * (x * y).abs() > SLANTED { Thinning::GuoHall } else { Thinning::ZhangSuen }
+    }
 }
 
 impl Thinning {

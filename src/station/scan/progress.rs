@@ -121,10 +121,11 @@ impl Checkpoint {
 
     /// Median standard deviation of the points, mm, to 3 %; none without points.
     pub fn median_sigma(&self) -> Option<f64> {
-        let half = self.sigma.iter().sum::<u64>().div_ceil(2);
+        // A damaged checkpoint may hold any numbers.
+        let half = self.sigma.iter().map(|n| u128::from(*n)).sum::<u128>().div_ceil(2);
         let mut sum = 0;
         let bin = self.sigma.iter().position(|n| {
-            sum += n;
+            sum += u128::from(*n);
             half > 0 && sum >= half
         });
         bin.map(|b| 10f64.powf((b as f64 + 0.5) / 40.0 - 5.0))
