@@ -23,10 +23,15 @@ pub struct Extraction {
     pub measure_stripe: bool,
     /// Offset and minimum in grey levels of an 8-bit picture; deeper ones scale them.
     pub threshold: ThresholdParams,
+    /// Rule by which lit areas become lines one pixel wide.
     pub thinning: Thinning,
+    /// How far the ends of these lines are carried on.
     pub lengthen: LengthenParams,
+    /// The sub-pixel fit across the stripe.
     pub peak: PeakParams,
+    /// What a peak must be to be believed.
     pub choose: ChooseParams,
+    /// How much of a neighbourhood in the shots around it a point needs.
     pub support: SupportParams,
 }
 
@@ -95,6 +100,7 @@ impl Extraction {
         }
     }
 
+    /// Refuses settings outside their ranges.
     pub fn check(&self) -> Result<()> {
         self.threshold.check()?;
         if !(-255..=255).contains(&self.threshold.offset) || self.threshold.minimum > 255 {

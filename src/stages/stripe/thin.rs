@@ -46,6 +46,7 @@ pub const RULE: &str = "rule";
 pub enum Thinning {
     /// Eats stripes two pixels wide that run at 45 degrees from their ends on, until two pixels are left.
     ZhangSuen,
+    /// Leaves such stripes their length.
     #[default]
     GuoHall,
 }
@@ -179,7 +180,7 @@ pub fn twin(mask: &Mask, rule: Thinning) -> Mask {
     unreachable!("every sub-iteration but the last two deletes a pixel")
 }
 
-pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
+pub(crate) fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let rule = Thinning::of(overrides);
     let [_, listing, list, before, after, stamps] = b else { unreachable!() };
