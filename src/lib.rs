@@ -31,6 +31,8 @@
 //! The modules stand in floor order; each imports only from floors above it in this list (ARCHITECTURE.md, enforced by
 //! tests/floors.rs).
 
+#![warn(missing_docs)]
+
 pub mod fault;
 pub mod files;
 

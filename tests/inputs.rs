@@ -151,10 +151,12 @@ fn the_channel_of_a_colour_picture_is_a_choice() {
     let o = Original::new(8);
     for (k, name) in ["red", "green", "blue"].into_iter().enumerate() {
         let png = o.written(&format!("{name}.png"), |i, path| {
-            let colour = levels(i).into_iter().enumerate().flat_map(|(at, v)| {
-                // The other two channels show something else.
-                let mut c = [(at % 251) as u8, (at % 13) as u8 * 19, (at % 7) as u8 * 36];
-                c[k] = v as u8;
+            let shown = levels(i);
+            let colour = shown.iter().enumerate().flat_map(|(at, v)| {
+                // The other two channels show it elsewhere.
+                let below = |rows: usize| shown[(at + rows * SIZE.0 as usize) % shown.len()] as u8;
+                let mut c = [below(17), below(29), below(43)];
+                c[k] = *v as u8;
                 c
             });
             image::RgbImage::from_raw(SIZE.0, SIZE.1, colour.collect()).unwrap().save(path).unwrap();

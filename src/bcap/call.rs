@@ -8,9 +8,10 @@ macro_rules! calls {
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[repr(u32)]
         pub enum Call {
-            $($name = $id,)*
+            $(#[doc = concat!("Denso's `", $words, "`.")] $name = $id,)*
         }
         impl Call {
+            /// All of them, ascending by number.
             pub const ALL: &[Call] = &[$(Call::$name,)*];
             /// As Denso's documents write it.
             pub fn name(self) -> &'static str {
@@ -46,6 +47,7 @@ calls! {
 }
 
 impl Call {
+    /// As a request carries it.
     pub fn number(self) -> u32 {
         self as u32
     }

@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 /// How a connection waits.
 #[derive(Clone, Copy, Debug)]
 pub struct ClientOptions {
+    /// How frames travel; TCP unless stated.
     pub network: Network,
     /// Longest silence within a call. Interim replies of this call are no silence, frames of others are.
     pub patience: Duration,

@@ -12,6 +12,7 @@ pub enum Heard {
     Interim,
     /// A late answer to another call, or noise. It says nothing about this one.
     Foreign,
+    /// The answer to this call: how it went, and the values that came with it.
     Answer(Outcome, Vec<Variant>),
 }
 

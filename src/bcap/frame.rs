@@ -23,6 +23,7 @@ pub struct Frame {
     pub first_serial: u16,
     /// Requests: the call's number; replies: the HRESULT.
     pub number: u32,
+    /// Requests: what the call is given; replies: what it returns. In the call's own order.
     pub arguments: Vec<Variant>,
 }
 

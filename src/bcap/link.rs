@@ -11,7 +11,9 @@ use std::time::{Duration, Instant};
 /// that a Halt waits for the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Network {
+    /// A stream; frames of any length.
     Tcp,
+    /// Datagrams; a request has at most 503 bytes and is sent again where no answer comes.
     Udp,
 }
 
@@ -70,10 +72,12 @@ impl Link {
         Ok(Link { address: at, socket })
     }
 
+    /// The controller's, as it was resolved.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
+    /// Sends the bytes of one frame. Over UDP more than 503 bytes are refused.
     pub fn send(&mut self, bytes: &[u8]) -> Result<()> {
         let sent = match &mut self.socket {
             Socket::Tcp(stream, _) => stream.write_all(bytes),

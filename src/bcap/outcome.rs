@@ -8,23 +8,38 @@ use std::fmt;
 pub struct Outcome(pub u32);
 
 impl Outcome {
+    /// The call went well.
     pub const OK: Outcome = Outcome(0);
     /// No answer yet: the call is under way. Comes after each `WDT` milliseconds.
     pub const INTERIM: Outcome = Outcome(0x0000_0900);
+    /// The controller does not have this call.
     pub const NOT_IMPLEMENTED: Outcome = Outcome(0x8000_4001);
+    /// The motion was halted.
     pub const ABORTED: Outcome = Outcome(0x8000_4004);
+    /// There is no such robot, provider or variable.
     pub const NO_SUCH_OBJECT: Outcome = Outcome(0x8000_0204);
+    /// The variable can only be read.
     pub const NOT_WRITABLE: Outcome = Outcome(0x8000_020A);
+    /// The service was not started on this connection.
     pub const NOT_STARTED: Outcome = Outcome(0x8000_0902);
+    /// The controller does not know this command.
     pub const UNKNOWN_COMMAND: Outcome = Outcome(0x8000_0904);
+    /// The controller wants a value of another type.
     pub const BAD_TYPE: Outcome = Outcome(0x8002_0005);
+    /// The controller does not know this object any more.
     pub const BAD_HANDLE: Outcome = Outcome(0x8007_0006);
+    /// The controller refuses a value.
     pub const BAD_ARGUMENT: Outcome = Outcome(0x8007_0057);
+    /// The controller is busy with a call of this connection.
     pub const BUSY: Outcome = Outcome(0x8091_00AA);
+    /// The motor is off.
     pub const MOTOR_OFF: Outcome = Outcome(0x8150_1003);
+    /// An error is pending on the controller.
     pub const ERROR_PENDING: Outcome = Outcome(0x8150_1025);
+    /// The executable token is not set to Ethernet.
     pub const NO_TOKEN: Outcome = Outcome(0x8350_1028);
 
+    /// True for an error: the highest bit is set.
     pub fn failed(self) -> bool {
         self.0 >= 0x8000_0000
     }

@@ -20,16 +20,25 @@ macro_rules! variants {
         /// An argument of a call or a reply: nothing, a value, or an array of values of one type.
         #[derive(Clone, Debug, PartialEq)]
         pub enum Variant {
+            /// Nothing.
             Empty,
+            /// A value that says that there is none.
             Null,
             /// UTF-16 on the wire; half a surrogate pair arrives as U+FFFD.
             Text(String),
+            /// An array of texts.
             Texts(Vec<String>),
             /// 0 or -1 in two bytes; whatever is not 0 is true.
             Bool(bool),
+            /// An array of truth values.
             Bools(Vec<bool>),
+            /// An array whose values have types of their own.
             Variants(Vec<Variant>),
-            $($(#[$doc])* $one($number), $many(Vec<$number>),)*
+            $(
+                $(#[$doc])* $one($number),
+                #[doc = concat!("An array of [`Variant::", stringify!($one), "`].")]
+                $many(Vec<$number>),
+            )*
         }
 
         impl Variant {
@@ -69,14 +78,23 @@ trait Number: Sized {
 }
 
 variants! {
+    /// A whole number of 16 bits.
     I16, I16s, i16, 2;
+    /// A whole number of 32 bits.
     I32, I32s, i32, 3;
+    /// A number of single precision.
     F32, F32s, f32, 4;
+    /// A number of double precision.
     F64, F64s, f64, 5;
+    /// A byte.
     U8, U8s, u8, 17;
+    /// A whole number of 16 bits, 0 or more.
     U16, U16s, u16, 18;
+    /// A whole number of 32 bits, 0 or more.
     U32, U32s, u32, 19;
+    /// A whole number of 64 bits.
     I64, I64s, i64, 20;
+    /// A whole number of 64 bits, 0 or more.
     U64, U64s, u64, 21;
     /// Ten-thousandths of a currency unit.
     Currency, Currencies, Currency, 6;

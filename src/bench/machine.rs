@@ -15,6 +15,7 @@ pub struct Ceilings {
     pub read_all_gb_s: f64,
     /// Host to where the stages read.
     pub upload_gb_s: Option<f64>,
+    /// From where the stages write to the host.
     pub readback_gb_s: Option<f64>,
     /// Within the device's own memory, where it has its own: bytes read and written.
     pub device_gb_s: Option<f64>,

@@ -23,6 +23,7 @@ use std::time::Instant;
 pub struct BenchOptions {
     /// Picture sizes, px.
     pub sizes: Vec<(u32, u32)>,
+    /// What the pictures show; each is measured at every size.
     pub scenes: Vec<Scene>,
     /// Seconds a row runs, 0.1..=600; longer is steadier.
     pub seconds: f64,
@@ -45,6 +46,7 @@ impl Default for BenchOptions {
 }
 
 impl BenchOptions {
+    /// Refuses `seconds` out of range, and no size or no scene.
     pub fn check(&self) -> Result<()> {
         if !(0.1..=600.0).contains(&self.seconds) {
             return Err(Fault::usage(format!("{} seconds a row, 0.1 to 600 are possible", self.seconds))
@@ -62,13 +64,19 @@ impl BenchOptions {
 /// Everything that one run of the bench tells.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Report {
+    /// Of this program.
     pub version: &'static str,
+    /// The device that was measured.
     pub adapter: AdapterInfo,
+    /// Threads that this machine offers.
     pub threads: usize,
+    /// What memory and upload can carry.
     pub ceilings: Ceilings,
+    /// One a size and scene.
     pub rows: Vec<Row>,
     /// How the time a shot grows with the pixels, for scenes of two sizes and more; and with the share of lit pixels.
     pub with_pixels: Vec<Scaling>,
+    /// How the time a shot grows with the share of lit pixels, where that was asked for.
     pub with_light: Option<Scaling>,
 }
 

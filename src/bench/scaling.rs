@@ -13,15 +13,21 @@ use crate::stages::chain::config::ChainConfig;
 /// A line through times: `intercept_ms + slope_ms x`, and how far from it they lie.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Scaling {
+    /// What the line is about, in words.
     pub what: String,
     /// What x counts, and the values of it that were measured.
     pub unit: &'static str,
+    /// Smallest measured x, in `unit`.
     pub from: f64,
+    /// Largest measured x, in `unit`.
     pub to: f64,
+    /// ms a shot that one `unit` more adds.
     pub slope_ms: f64,
+    /// ms a shot at x = 0.
     pub intercept_ms: f64,
     /// Smallest and largest measured time over the line's: a cliff shows here.
     pub lowest: f64,
+    /// Largest measured time over the line's.
     pub highest: f64,
 }
 

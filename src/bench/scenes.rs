@@ -16,6 +16,7 @@ pub enum Scene {
     ThickStripe,
     /// As `OneStripe` and `ThickStripe`, seen by a camera that is turned by 90 degrees.
     UprightStripe,
+    /// As `ThickStripe`, seen by a camera that is turned by 90 degrees.
     UprightThick,
     /// A stripe in noise so dense that a tenth of all pixels is lit.
     NoiseHeavy,
@@ -24,6 +25,7 @@ pub enum Scene {
 }
 
 impl Scene {
+    /// All of them.
     pub const ALL: [Scene; 6] = [
         Scene::OneStripe,
         Scene::ThickStripe,
@@ -32,6 +34,7 @@ impl Scene {
         Scene::NoiseHeavy,
         Scene::ReflectionHeavy,
     ];
+    /// For people.
     pub fn name(self) -> &'static str {
         match self {
             Scene::OneStripe => "one stripe",

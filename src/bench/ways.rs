@@ -18,9 +18,13 @@ use std::time::Instant;
 /// One way through the chain.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct WayTime {
+    /// The processor with its number of threads, or the device's name.
     pub on: String,
+    /// Columns, px.
     pub width: u32,
+    /// Rows, px.
     pub height: u32,
+    /// Wall time, median of the turns.
     pub ms_per_shot: f64,
     /// Of all threads; on a software adapter the GPU's work is in it.
     pub cpu_ms_per_shot: Option<f64>,

@@ -6,7 +6,9 @@ use nalgebra::{DMatrix, DVector};
 
 /// The model e ~ N(J x, V₀ + Σ θₐ Uₐ).
 pub struct Components {
+    /// e, n numbers.
     pub residual: DVector<f64>,
+    /// J, n rows, a column a parameter of the fit.
     pub jacobian: DMatrix<f64>,
     /// V₀, e.g. the part that comes from pixels.
     pub known: DMatrix<f64>,

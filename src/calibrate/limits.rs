@@ -18,6 +18,7 @@ pub struct Asked {
 }
 
 impl Asked {
+    /// Refuses near beyond far and a tolerance that is not above 0.
     pub fn check(&self) -> Result<()> {
         let w = self.working.as_ref().map_or([0.0, 0.0], |w| [w.near_mm, w.far_mm]);
         let tolerance = self.tolerance_mm.unwrap_or(1.0);
@@ -52,13 +53,16 @@ pub struct Limits {
     pub tolerance_mm: f64,
     /// Where the tolerance comes from, in words.
     pub tolerance_from: String,
+    /// Depths at which the result is judged.
     pub working: Volume,
 }
 
 impl Limits {
+    /// Depth halfway through the working range, mm.
     pub fn middle(&self) -> f64 {
         self.working.middle()
     }
+    /// Largest expected error (1 sigma) that is usable: twice the tolerance, mm.
     pub fn usable_mm(&self) -> f64 {
         2.0 * self.tolerance_mm
     }
@@ -88,8 +92,11 @@ impl Limits {
 /// Collects reasons; the worst one makes the verdict.
 #[derive(Clone, Debug)]
 pub struct Judgement {
+    /// The worst that a reason has made it.
     pub verdict: Verdict,
+    /// Why, in words; one sentence each.
     pub reasons: Vec<String>,
+    /// What to do about it, in words.
     pub advice: Vec<String>,
 }
 
@@ -101,6 +108,7 @@ impl Judgement {
             self.reasons.push(reason());
         }
     }
+    /// Where `when` holds, adds this advice.
     pub fn advise(&mut self, when: bool, advice: impl FnOnce() -> String) {
         if when {
             self.advice.push(advice());

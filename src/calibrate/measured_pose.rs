@@ -68,7 +68,9 @@ impl SeenBoard {
 /// The pose of a board in one picture, with everything later solvers need from its pixels.
 #[derive(Clone, Debug)]
 pub struct MeasuredPose {
+    /// Of the picture.
     pub name: String,
+    /// The pose that fits the features best, mm.
     pub camera_from_board: Rigid<Camera, Board>,
     /// A step s from the optimum raises the sum of squared residuals, in units of the features'
     /// stated sigmas, by sᵀ·information·s.

@@ -14,6 +14,7 @@ use nalgebra::{Matrix3x6, Matrix6};
 /// A board's pose from one picture.
 #[derive(Clone, Debug)]
 pub struct BoardPose {
+    /// The pose that fits the features best, mm.
     pub camera_from_board: Rigid<Camera, Board>,
     /// Of a step (tx ty tz rx ry rz): t = t̂ + d, R = exp(r) R̂ (rotation about camera axes through
     /// the board's origin); mm and rad. The corners' common sigma is estimated from the residuals

@@ -8,8 +8,11 @@ use nalgebra::{Matrix2, Matrix2x3, SMatrix};
 
 /// A pixel with its derivatives.
 pub struct Projected {
+    /// Where the point is seen, px.
     pub pixel: Vec2,
+    /// px per mm: rows u, v; columns x, y, z of the camera frame.
     pub by_point: Matrix2x3<f64>,
+    /// px per unit of each parameter: rows u, v; columns in the order of [`crate::camera::NAMES`].
     pub by_intrinsics: SMatrix<f64, 2, PARAMETERS>,
 }
 

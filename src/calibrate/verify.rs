@@ -9,7 +9,9 @@ use rand::SeedableRng;
 /// One view of the flat surface against all views together.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct FlatView {
+    /// Of the view, as it was given.
     pub name: String,
+    /// How many of its points are in its plane's fit.
     pub points: usize,
     /// rms about the view's own plane, points beyond five robust sigmas left out, mm.
     pub own_rms_mm: f64,
@@ -22,9 +24,11 @@ pub struct FlatView {
 /// How well the views of one flat surface agree.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct FlatCheck {
+    /// One a view, in the order given.
     pub views: Vec<FlatView>,
     /// Standard deviation of the heights, and their range, mm.
     pub height_spread_mm: f64,
+    /// From the lowest to the highest, mm.
     pub height_range_mm: f64,
     /// Largest angle between a view's plane and the common one, degrees.
     pub largest_tilt_deg: f64,
@@ -131,11 +135,13 @@ pub fn flat(views: &[(String, Vec<Vec3>)]) -> Result<FlatCheck> {
 /// A touch test: where the system said a point is, and where the robot's tip touched it.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct TouchCheck {
+    /// How many pairs were compared.
     pub points: usize,
     /// Mean of predicted − touched, mm: a constant part points to the tool or the hand-eye.
     pub mean_mm: [f64; 3],
     /// Length of the errors, rms and worst, mm.
     pub rms_mm: f64,
+    /// Length of the largest error, mm.
     pub worst_mm: f64,
     /// Number of the worst pair, from 1.
     pub worst: usize,

@@ -13,15 +13,19 @@ use nalgebra::Matrix2;
 pub struct Intrinsics {
     /// Focal lengths, px.
     pub fx: f64,
+    /// px of v per normalised y.
     pub fy: f64,
     /// Principal point, px.
     pub cx: f64,
+    /// Row of the principal point, px; 0 is the middle of the topmost row.
     pub cy: f64,
     /// px of u per normalised y; 0 for every sensor with square rows.
     pub skew: f64,
+    /// The lens: fourteen terms in OpenCV's order.
     pub distortion: Distortion,
     /// Sensor size, px.
     pub width: u32,
+    /// Rows, px.
     pub height: u32,
 }
 

@@ -33,14 +33,18 @@ pub const NAMES: [&str; PARAMETERS] = [
 
 /// Of the first term of the lens, and of the skew.
 pub const LENS: usize = 4;
+/// Of the skew, the last one.
 pub const SKEW: usize = PARAMETERS - 1;
 /// Files name these always, the others where they are free.
 pub const ALWAYS_NAMED: usize = 9;
 
+/// A camera's numbers in the order of [`NAMES`], each in the unit that its name ends with.
 pub type Parameters = SVector<f64, PARAMETERS>;
+/// Their covariance: rows and columns in the order of [`NAMES`], units multiplied.
 pub type ParameterCovariance = SMatrix<f64, PARAMETERS, PARAMETERS>;
 
 impl Intrinsics {
+    /// Its numbers in the order of [`NAMES`].
     pub fn parameters(&self) -> Parameters {
         let mut v = Parameters::zeros();
         (v[0], v[1], v[2], v[3], v[SKEW]) = (self.fx, self.fy, self.cx, self.cy, self.skew);

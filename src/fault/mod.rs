@@ -25,30 +25,41 @@ pub enum Kind {
 /// cause, and the next step. A bug is a panic, never a `Fault`; missing laser pixels are neither.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Fault {
+    /// Decides the exit code.
     pub kind: Kind,
+    /// What happened, with the number seen and the limit.
     pub what: String,
+    /// The likely cause, in one sentence; empty where nothing is likely.
     pub cause: String,
+    /// The next step, in one sentence; empty where there is none.
     pub next: String,
 }
 
+/// What every function returns that bad input can stop.
 pub type Result<T> = std::result::Result<T, Fault>;
 
 impl Fault {
+    /// Without cause and next step; [`Fault::cause`] and [`Fault::next`] add them.
     pub fn new(kind: Kind, what: impl Into<String>) -> Fault {
         Fault { kind, what: what.into(), cause: String::new(), next: String::new() }
     }
+    /// The command or its options make no sense.
     pub fn usage(what: impl Into<String>) -> Fault {
         Fault::new(Kind::Usage, what)
     }
+    /// A file or its content is wrong.
     pub fn input(what: impl Into<String>) -> Fault {
         Fault::new(Kind::Input, what)
     }
+    /// The input does not determine the answer well enough.
     pub fn refused(what: impl Into<String>) -> Fault {
         Fault::new(Kind::Refused, what)
     }
+    /// A result could not be written.
     pub fn output(what: impl Into<String>) -> Fault {
         Fault::new(Kind::Output, what)
     }
+    /// The GPU or its driver failed.
     pub fn device(what: impl Into<String>) -> Fault {
         Fault::new(Kind::Device, what)
     }

@@ -72,6 +72,7 @@ impl Aside {
         let file = moment().and_then(|()| temporary(folder_of(path))).map_err(|e| Fault::write(path, e))?;
         Ok(Aside { file, path: path.to_owned() })
     }
+    /// The open file, to be written to; it is still under a temporary name.
     pub fn file(&self) -> &std::fs::File {
         self.file.as_file()
     }

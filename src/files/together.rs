@@ -19,6 +19,7 @@ pub struct Together<'a> {
 }
 
 impl<'a> Together<'a> {
+    /// Touches nothing yet. `clear(folder, new)` puts away in `folder` what the files in `new` take the place of.
     pub fn new(folder: &'a Path, name: &'a str, clear: fn(&Path, &Path) -> Io<()>) -> Together<'a> {
         Together { folder, name, clear }
     }

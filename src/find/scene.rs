@@ -9,22 +9,29 @@ use crate::raster::Image;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
+    /// Grey levels.
     Intensity,
+    /// mm.
     Height,
 }
 
 /// One map of numbers, row-major; NaN is missing and never makes an edge.
 #[derive(Clone, Debug)]
 pub struct Layer {
+    /// What the values are.
     pub kind: Kind,
+    /// Columns, px.
     pub width: usize,
+    /// Rows, px.
     pub height: usize,
+    /// Row-major, `width` x `height`; NaN is missing.
     pub values: Vec<f32>,
 }
 
 /// What is searched: one or more layers of the same size.
 #[derive(Clone, Debug)]
 pub struct Scene {
+    /// At least one, all of the same size.
     pub layers: Vec<Layer>,
     /// Edge length of a cell in mm; `None` for a picture without scale.
     pub mm_per_px: Option<f64>,
@@ -46,6 +53,7 @@ impl Layer {
         Ok(Layer { kind, width, height, values })
     }
 
+    /// A picture's grey levels; no cell is missing.
     pub fn from_image(image: &Image) -> Layer {
         Layer {
             kind: Kind::Intensity,
@@ -60,6 +68,7 @@ impl Layer {
         self.values.iter().filter(|v| !v.is_nan()).count() as f64 / self.values.len() as f64
     }
 
+    /// True where no cell is missing.
     pub fn complete(&self) -> bool {
         !self.values.iter().any(|v| v.is_nan())
     }
@@ -103,9 +112,13 @@ impl Layer {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Region {
+    /// First column.
     pub x0: usize,
+    /// First row.
     pub y0: usize,
+    /// Column behind the last one.
     pub x1: usize,
+    /// Row behind the last one.
     pub y1: usize,
 }
 
@@ -125,6 +138,7 @@ impl Region {
 }
 
 impl Scene {
+    /// `mm_per_px` is the edge of a cell, mm. Refuses no layers, and layers that differ in size.
     pub fn new(layers: Vec<Layer>, mm_per_px: Option<f64>) -> Result<Scene> {
         let Some(first) = layers.first() else {
             return Err(Fault::input("a scene without layers")
@@ -138,12 +152,15 @@ impl Scene {
         }
         Ok(Scene { layers, mm_per_px })
     }
+    /// A picture's grey levels as the only layer, without scale.
     pub fn from_image(image: &Image) -> Scene {
         Scene { layers: vec![Layer::from_image(image)], mm_per_px: None }
     }
+    /// Columns, px.
     pub fn width(&self) -> usize {
         self.layers[0].width
     }
+    /// Rows, px.
     pub fn height(&self) -> usize {
         self.layers[0].height
     }
@@ -156,6 +173,7 @@ impl Scene {
         }
         out
     }
+    /// The same cells of every layer; the region lies within the scene.
     pub fn crop(&self, region: Region) -> Scene {
         Scene { layers: self.layers.iter().map(|l| l.crop(region)).collect(), mm_per_px: self.mm_per_px }
     }

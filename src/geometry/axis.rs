@@ -9,7 +9,9 @@ use nalgebra::SMatrix;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum AxisKind {
+    /// It moves along a straight line.
     Linear,
+    /// It turns about a line that stands still.
     Turntable,
 }
 
@@ -68,7 +70,9 @@ pub struct Twist {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Axis {
+    /// Whether it moves or turns.
     pub kind: AxisKind,
+    /// What its counts count.
     pub unit: CountUnit,
     /// Linear: mm a count along the frame's x. Turntable: rad a count about the frame's z, right-handed.
     pub pitch: f64,
@@ -80,7 +84,9 @@ pub struct Axis {
 /// A motion as it is found: which way, and about where.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Riding {
+    /// Whether it moves or turns.
     pub kind: AxisKind,
+    /// What its counts count.
     pub unit: CountUnit,
     /// Linear: of growing counts. Turntable: either way along the axis. Camera frame, of unit length.
     pub direction: Vec3,

@@ -3,6 +3,7 @@
 
 /// A coordinate frame. `NAME` appears in files and messages.
 pub trait Frame: Copy + Clone + std::fmt::Debug + PartialEq + Send + Sync + 'static {
+    /// As files and messages write it, e.g. "base".
     const NAME: &'static str;
 }
 

@@ -16,6 +16,9 @@ pub use rotation::{
     ORTHONORMAL_REFUSE, ORTHONORMAL_WARN, Repaired, angle_between, exp, log, orthonormalise, repair, skew,
 };
 
+/// A pixel (u, v), px, or a point or direction in a plane.
 pub type Vec2 = nalgebra::Vector2<f64>;
+/// A point, mm, or a direction: x, y, z.
 pub type Vec3 = nalgebra::Vector3<f64>;
+/// 3 x 3: a rotation, a covariance or a homography.
 pub type Mat3 = nalgebra::Matrix3<f64>;

@@ -8,7 +8,9 @@ use std::marker::PhantomData;
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(bound = "", deny_unknown_fields)]
 pub struct Plane<F: Frame> {
+    /// Of unit length, in frame `F`.
     pub normal: Vec3,
+    /// Distance of the plane from the frame's origin along the normal, mm; negative on its other side.
     #[serde(rename = "offset_mm")]
     pub offset: f64,
     #[serde(skip)]
@@ -19,8 +21,10 @@ pub struct Plane<F: Frame> {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(bound = "", deny_unknown_fields)]
 pub struct Ray<F: Frame> {
+    /// Where it begins, in frame `F`, mm.
     #[serde(rename = "origin_mm")]
     pub origin: Vec3,
+    /// Of unit length, in frame `F`.
     pub direction: Vec3,
     #[serde(skip)]
     frame: PhantomData<F>,
@@ -48,6 +52,7 @@ impl<F: Frame> Ray<F> {
         let n = direction.norm();
         (n > 1e-300 && n.is_finite()).then(|| Ray { origin, direction: direction / n, frame: PhantomData })
     }
+    /// The point at distance `s` from the origin, mm.
     pub fn at(&self, s: f64) -> Vec3 {
         self.origin + self.direction * s
     }
@@ -60,10 +65,12 @@ impl<F: Frame> Ray<F> {
 }
 
 impl<To: Frame, From: Frame> Rigid<To, From> {
+    /// A plane of frame `From` in frame `To`.
     pub fn plane(&self, p: &Plane<From>) -> Plane<To> {
         let normal = self.direction(&p.normal);
         Plane { normal, offset: p.offset + normal.dot(&self.translation), frame: PhantomData }
     }
+    /// A ray of frame `From` in frame `To`.
     pub fn ray(&self, r: &Ray<From>) -> Ray<To> {
         Ray { origin: self.point(&r.origin), direction: self.direction(&r.direction), frame: PhantomData }
     }

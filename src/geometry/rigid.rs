@@ -10,7 +10,9 @@ use std::ops::Mul;
 /// Maps coordinates in frame `From` to coordinates in frame `To`. The rotation is orthonormal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rigid<To: Frame, From: Frame> {
+    /// 3 x 3, orthonormal, determinant 1; its columns are the axes of `From` in frame `To`.
     pub rotation: Mat3,
+    /// Origin of `From` in frame `To`, mm.
     pub translation: Vec3,
     frames: PhantomData<(To, From)>,
 }
@@ -20,6 +22,7 @@ impl<To: Frame, From: Frame> Rigid<To, From> {
     pub fn new(rotation: Mat3, translation: Vec3) -> Self {
         Rigid { rotation, translation, frames: PhantomData }
     }
+    /// No turn and no shift.
     pub fn identity() -> Self {
         Self::new(Mat3::identity(), Vec3::zeros())
     }
@@ -68,6 +71,7 @@ impl<To: Frame, From: Frame> Rigid<To, From> {
             1.0,
         ]
     }
+    /// The other way: maps `To` to `From`.
     pub fn inverse(&self) -> Rigid<From, To> {
         let rt = self.rotation.transpose();
         Rigid::new(rt, -(rt * self.translation))

@@ -53,7 +53,9 @@ pub fn orthonormalise(m: &Mat3) -> Mat3 {
 /// A rotation that was made orthonormal, with its departure before the repair.
 #[derive(Clone, Copy, Debug)]
 pub struct Repaired {
+    /// The rotation nearest to the matrix.
     pub rotation: Mat3,
+    /// Frobenius norm of RᵀR − I before the repair, 0..=[`ORTHONORMAL_REFUSE`].
     pub departure: f64,
 }
 

@@ -4,24 +4,31 @@
 /// How a stage uses a binding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
+    /// The stage's uniform block.
     Uniform,
+    /// A read-only storage buffer.
     Read,
     /// A read-only array of `u32`, `vec2<u32>` or `vec4<u32>` that is bound whole: read as texels where that is faster.
     Texels,
+    /// A storage buffer that the stage may write.
     ReadWrite,
 }
 
 /// One binding of group 0; its place in `Stage::bindings` is its number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Binding {
+    /// The WGSL variable's name.
     pub name: &'static str,
+    /// What the stage does with it.
     pub access: Access,
 }
 
 /// One member of a uniform block: WGSL name and byte offset.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Field {
+    /// The WGSL member's name.
     pub name: &'static str,
+    /// Bytes from the block's start.
     pub offset: usize,
 }
 
@@ -31,9 +38,13 @@ pub struct Field {
 pub struct Stage {
     /// The file is shaders/NAME.wgsl.
     pub name: &'static str,
+    /// WGSL text of that file.
     pub wgsl: &'static str,
+    /// WGSL texts of shaders/shared, in the order in which they are appended.
     pub shared: &'static [&'static str],
+    /// Invocations in one workgroup: x, y, z.
     pub workgroup: [u32; 3],
+    /// All of group 0, in the order of their numbers.
     pub bindings: &'static [Binding],
     /// The uniform struct's WGSL name, members and size in bytes; every `Access::Uniform` binding has this type.
     pub uniform: (&'static str, &'static [Field], usize),

@@ -16,15 +16,19 @@ const TIMEOUT: Duration = Duration::from_secs(60);
 /// What a person wants to know about an adapter.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct AdapterInfo {
+    /// As the driver gives it; SHEETLIGHT_ADAPTER is looked for in it.
     pub name: String,
     /// discrete GPU, integrated GPU, virtual GPU, CPU, other.
     pub kind: String,
+    /// The interface it is reached by: vulkan, metal or dx12.
     pub backend: String,
+    /// Name and version of the driver, as far as it says them.
     pub driver: String,
     /// Largest buffer a stage can bind, bytes.
     pub max_binding_bytes: u64,
     /// Largest workgroup, invocations.
     pub max_workgroup: u32,
+    /// Most storage buffers that one stage can bind.
     pub storage_buffers_per_stage: u32,
     /// GPU timestamps can be taken.
     pub timestamps: bool,
@@ -36,6 +40,7 @@ pub struct AdapterInfo {
 #[derive(Clone, Debug)]
 pub struct Buffer {
     pub(super) raw: wgpu::Buffer,
+    /// Bytes; on the device they are filled up to a multiple of 16.
     pub bytes: u64,
     /// Where it lies, if it can be read as texels.
     pub(super) aliased: Option<Arc<Aliased>>,
@@ -46,6 +51,7 @@ pub struct Buffer {
 pub struct Device {
     pub(super) raw: wgpu::Device,
     pub(super) queue: wgpu::Queue,
+    /// The adapter it was opened on.
     pub info: AdapterInfo,
     /// Stages read arrays as texels of images on the same memory: faster on a software adapter (decision 0012).
     pub reads_texels: bool,

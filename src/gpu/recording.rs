@@ -9,6 +9,7 @@ use std::sync::Arc;
 /// One step of a recording.
 #[derive(Clone, Debug)]
 pub struct Dispatch {
+    /// Name of the stage.
     pub label: &'static str,
     pipeline: Arc<Compiled>,
     bind: wgpu::BindGroup,
@@ -32,7 +33,9 @@ pub struct Recording {
 /// Time between two steps on the GPU.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct StageTime {
+    /// Name of the stage that ran between the two timestamps.
     pub label: &'static str,
+    /// GPU time, s.
     pub seconds: f64,
 }
 
@@ -66,12 +69,15 @@ impl Recording {
         let (pipeline, label) = (pipeline.bind(device, parts), pipeline.stage.name);
         self.steps.push(Dispatch { label, pipeline: pipeline.0, bind: pipeline.1, size });
     }
+    /// Adds the steps of another recording behind its own.
     pub fn append(&mut self, other: &Recording) {
         self.steps.extend(other.steps.iter().cloned());
     }
+    /// Number of steps.
     pub fn len(&self) -> usize {
         self.steps.len()
     }
+    /// There is nothing to run.
     pub fn is_empty(&self) -> bool {
         self.steps.is_empty()
     }

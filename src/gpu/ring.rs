@@ -59,6 +59,7 @@ pub struct Ring {
     device: Device,
     /// Copy a batch, and what comes back, together where the device works for itself.
     copiers: Option<ThreadPool>,
+    /// All places, by the number that `fill` and `keep` return.
     pub slots: Vec<Slot>,
     free: VecDeque<usize>,
     busy: VecDeque<usize>,
@@ -67,9 +68,13 @@ pub struct Ring {
 /// Sizes of a ring in bytes.
 #[derive(Clone, Debug)]
 pub struct RingSizes {
+    /// Places: most batches in flight.
     pub slots: usize,
+    /// Bytes of one batch as the stages read it.
     pub input: u64,
+    /// Bytes of one batch's small results.
     pub header: u64,
+    /// Most bytes of each large result of one batch.
     pub outputs: Vec<u64>,
 }
 
@@ -96,6 +101,7 @@ fn copiers(device: &Device) -> Result<Option<ThreadPool>> {
 }
 
 impl Ring {
+    /// Makes every buffer; `Err` where one is larger than the adapter allows, or the device is lost.
     pub fn new(device: &Device, sizes: RingSizes) -> Result<Ring> {
         let unified = device.info.unified_memory;
         let mut slots = Vec::new();
@@ -140,6 +146,7 @@ impl Ring {
     pub fn in_flight(&self) -> usize {
         self.busy.len()
     }
+    /// A place is free: without one `fill` and `keep` panic.
     pub fn has_room(&self) -> bool {
         !self.free.is_empty()
     }

@@ -104,6 +104,7 @@ pub(super) type Compiled = LazyLock<wgpu::ComputePipeline, Box<dyn FnOnce() -> w
 /// A stage with its override constants; clones share what is compiled.
 #[derive(Clone, Debug)]
 pub struct Pipeline {
+    /// Text, bindings and uniform block of what is compiled.
     pub stage: Stage,
     pub(super) compiled: Arc<Compiled>,
     layout: wgpu::BindGroupLayout,
@@ -162,7 +163,9 @@ enum Bound {
 
 /// What one run of one stage needs: bytes per binding (the uniform's too) and the workgroups.
 pub struct Workload {
+    /// Bytes of each binding, in the order of the stage's list.
     pub bindings: Vec<Vec<u8>>,
+    /// Workgroups: x, y, z.
     pub groups: [u32; 3],
 }
 

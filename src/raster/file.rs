@@ -13,8 +13,11 @@ use std::path::Path;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Channel {
+    /// The red samples alone.
     Red,
+    /// The green samples alone.
     Green,
+    /// The blue samples alone.
     Blue,
     /// (299 R + 587 G + 114 B + 500) / 1000, the luma of ITU-R BT.601.
     #[default]

@@ -4,17 +4,22 @@
 use crate::fault::Result;
 use std::path::Path;
 
+/// Red, green and blue, 0..=255.
 pub type Rgb = [u8; 3];
 
 /// A colour picture, row-major.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct RgbImage {
+    /// px
     pub width: u32,
+    /// px
     pub height: u32,
+    /// Rows from the top, each from the left, `width * height` colours.
     pub pixels: Vec<Rgb>,
 }
 
 impl RgbImage {
+    /// A picture of one colour, sizes in px.
     pub fn filled(width: u32, height: u32, colour: Rgb) -> RgbImage {
         RgbImage { width, height, pixels: vec![colour; width as usize * height as usize] }
     }
@@ -54,6 +59,7 @@ impl RgbImage {
         .expect("memory takes every picture");
         out.into_inner()
     }
+    /// Writes a PNG file; one of that name is replaced when the new one is whole.
     pub fn save_png(&self, path: &Path) -> Result<()> {
         crate::files::write(path, &self.to_png())
     }

@@ -8,10 +8,13 @@ use std::fmt;
 /// What a picture's light is like.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Light {
+    /// px
     pub width: u32,
+    /// px
     pub height: u32,
-    /// Darkest, median and brightest level, and the sensor's largest.
+    /// Darkest, median and brightest level.
     pub levels: [u16; 3],
+    /// Grey level of saturation.
     pub full_scale: u16,
     /// Share of the pixels at the largest level.
     pub saturated: f64,
@@ -52,6 +55,7 @@ const BRIGHT: f64 = 0.9;
 const NO_DARK: f64 = 0.5;
 
 impl Light {
+    /// Looks at every pixel of a picture.
     pub fn of(image: &Image) -> Light {
         let full = image.full_scale();
         let mut counts = vec![0u64; usize::from(full) + 1];

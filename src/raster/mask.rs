@@ -6,12 +6,16 @@ use super::Image;
 /// A bit mask. Rows are `words_per_row()` words long; the bits beyond `width` are always 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mask {
+    /// px
     pub width: u32,
+    /// px
     pub height: u32,
+    /// Rows from the top, `words_per_row()` words each, bit b of word i for x = 32 i + b.
     pub words: Vec<u32>,
 }
 
 impl Mask {
+    /// A mask without a lit pixel, sizes in px.
     pub fn new(width: u32, height: u32) -> Mask {
         Mask { width, height, words: vec![0; width.div_ceil(32) as usize * height as usize] }
     }
@@ -31,17 +35,21 @@ impl Mask {
     pub fn from_image(image: &Image) -> Mask {
         Mask::from_fn(image.width, image.height, |x, y| image.get(x, y) > 0)
     }
+    /// The width over 32, rounded up.
     pub fn words_per_row(&self) -> usize {
         self.width.div_ceil(32) as usize
     }
+    /// Whether a pixel inside the mask is lit.
     pub fn get(&self, x: u32, y: u32) -> bool {
         self.words[y as usize * self.words_per_row() + (x / 32) as usize] >> (x % 32) & 1 == 1
     }
+    /// Lights a pixel; panics outside the mask.
     pub fn set(&mut self, x: u32, y: u32) {
         assert!(x < self.width && y < self.height);
         let i = y as usize * self.words_per_row() + (x / 32) as usize;
         self.words[i] |= 1 << (x % 32);
     }
+    /// Darkens a pixel inside the mask.
     pub fn clear(&mut self, x: u32, y: u32) {
         let i = y as usize * self.words_per_row() + (x / 32) as usize;
         self.words[i] &= !(1 << (x % 32));

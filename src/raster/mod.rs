@@ -25,7 +25,9 @@ pub use text::text_width;
 /// Grey levels, row-major.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Pixels {
+    /// Of a sensor of 8 bits.
     U8(Vec<u8>),
+    /// Of a sensor of 9..=16 bits, not stretched to 16.
     U16(Vec<u16>),
 }
 
@@ -33,9 +35,13 @@ pub enum Pixels {
 /// a pixel never exceeds `2^bits - 1`, which is saturation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
+    /// px
     pub width: u32,
+    /// px
     pub height: u32,
+    /// Depth of the sensor, 8..=16.
     pub bits: u8,
+    /// Rows from the top, each from the left, `width * height` levels.
     pub pixels: Pixels,
 }
 
@@ -63,6 +69,7 @@ impl Image {
     pub fn full_scale(&self) -> u16 {
         ((1u32 << self.bits) - 1) as u16
     }
+    /// Width times height.
     pub fn pixel_count(&self) -> usize {
         self.width as usize * self.height as usize
     }

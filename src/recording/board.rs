@@ -10,23 +10,30 @@ use std::path::Path;
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(tag = "type", rename_all = "snake_case", deny_unknown_fields)]
 pub enum BoardSpec {
+    /// Black and white squares; the features are the inner corners.
     Chessboard {
         /// Inner corners [columns, rows].
         inner_corners: [u32; 2],
+        /// Side of a square, mm; above 0, up to 10000.
         square_mm: f64,
+        /// Plain margin around the outer squares, mm, 0..=10000; 0 unless stated.
         #[serde(default)]
         border_mm: f64,
         /// Colour of the corner square outside the origin; "black" unless stated.
         #[serde(default = "black")]
         first_square: String,
     },
+    /// A chessboard with a marker in each white square; the features are the inner corners.
     Charuco {
         /// Squares [columns, rows].
         squares: [u32; 2],
+        /// Side of a square, mm; above 0, up to 10000.
         square_mm: f64,
+        /// Side of a marker, its black ring included, mm; smaller than a square.
         marker_mm: f64,
         /// OpenCV's name, e.g. DICT_5X5_250.
         dictionary: String,
+        /// Plain margin around the outer squares, mm, 0..=10000; 0 unless stated.
         #[serde(default)]
         border_mm: f64,
     },
@@ -34,6 +41,7 @@ pub enum BoardSpec {
     MarkerGrid {
         /// Markers [columns, rows]; [1, 1] for a single one.
         markers: [u32; 2],
+        /// Side of a marker, its black ring included, mm; above 0, up to 10000.
         marker_mm: f64,
         /// White between two markers; not needed for a single one.
         #[serde(default)]
@@ -43,18 +51,23 @@ pub enum BoardSpec {
         /// Id of the first marker; the others follow row by row.
         #[serde(default)]
         first_id: u32,
+        /// White margin around the outer markers, mm, 0..=10000; 0 unless stated.
         #[serde(default)]
         border_mm: f64,
     },
     /// Dots on a square grid [columns, rows]; asymmetric grids shift every other row by half a pitch.
     Circles {
+        /// Dots [columns, rows], 2..=1000 each.
         dots: [u32; 2],
+        /// Between two rows, and between the dots of a row (twice as far in an asymmetric grid), mm.
         pitch_mm: f64,
         /// Unstated: it is measured in each picture.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         diameter_mm: Option<f64>,
+        /// OpenCV's layout: odd rows are shifted by `pitch_mm`.
         #[serde(default)]
         asymmetric: bool,
+        /// Plain margin around the outer dots, or their centres where no diameter is stated, mm, 0..=10000; or 0.
         #[serde(default)]
         border_mm: f64,
     },

@@ -5,8 +5,10 @@
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FrameRef {
+    /// File name of the picture with the laser on.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub laser: Option<String>,
+    /// File name of the picture with the laser off.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ambient: Option<String>,
     /// Index into the pose file.

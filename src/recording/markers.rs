@@ -45,6 +45,7 @@ impl Markers {
         }
         Ok(Some(Markers { codes, cells, pitch_mm, marker_mm, checker, first_id }))
     }
+    /// The dictionary that its markers are from.
     pub fn dictionary(&self) -> Dictionary {
         self.codes
     }

@@ -12,19 +12,27 @@ use std::path::Path;
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Meta {
+    /// Version of the file's format; 1 is read.
     pub format: u32,
+    /// A name for what was recorded.
     pub set: String,
+    /// Unit of boards and poses; only "mm" is read.
     pub units: String,
+    /// What all pictures have in common.
     pub image: ImageSpec,
+    /// Which laser was on, where one was.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beam: Option<Beam>,
+    /// The board of all frames, where there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub board: Option<BoardSpec>,
+    /// Several boards; frames refer to them by index.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub boards: Vec<BoardSpec>,
     /// The one picture with the laser off, where a scan has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ambient: Option<AmbientRef>,
+    /// The moments, one or more.
     pub frames: Vec<FrameRef>,
     /// What moved between the frames; the robot with the sensor where nothing is said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -35,26 +43,35 @@ pub struct Meta {
     /// Several pose files for the same pictures, with what they are.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub pose_files: BTreeMap<String, String>,
+    /// Free text: the part.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub part: Option<String>,
     /// Path of the part's nominal model, relative to the folder.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model: Option<String>,
+    /// Free text: what stood before the camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub target: Option<String>,
+    /// Free text: from where to where a distance is measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub distance_definition: Option<String>,
 }
 
+/// What all pictures of a recording have in common.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ImageSpec {
+    /// Columns, px.
     pub width: u32,
+    /// Rows, px.
     pub height: u32,
+    /// Depth of the sensor's grey levels, 8..=16; files of more than 8 have 16.
     pub bits: u8,
+    /// Values a pixel, 1; [`super::Recording::channel`] makes one of a colour picture's three.
     pub channels: u8,
     /// How the levels follow the light: "linear", "srgb", or a gamma.
     pub response: Response,
+    /// Where pixel centres are; only "integer coordinates" is read.
     pub pixel_centre: String,
 }
 
@@ -62,19 +79,25 @@ pub struct ImageSpec {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Beam {
+    /// A sheet of light: a stripe.
     Line,
+    /// A round beam: a spot.
     Pointer,
 }
 
+/// A picture with the laser off.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AmbientRef {
+    /// File name.
     pub file: String,
+    /// Index into the pose file: where it was taken.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pose: Option<usize>,
 }
 
 impl Meta {
+    /// Reads and checks the file, as [`Meta::parse`] does.
     pub fn load(path: &Path) -> Result<Meta> {
         let text = crate::files::read_text(path)?;
         Meta::parse(&text).map_err(|e| e.at(path.display()))

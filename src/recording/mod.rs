@@ -27,7 +27,9 @@ use std::path::{Component, Path, PathBuf};
 /// A recording on disk. Pictures are read one at a time, never all at once.
 #[derive(Clone, Debug)]
 pub struct Recording {
+    /// Where it lies; names of files are relative to it.
     pub folder: PathBuf,
+    /// Content of its `meta.json`, checked.
     pub meta: Meta,
     /// Which part of colour pictures is used.
     pub channel: Channel,

@@ -9,9 +9,12 @@ use crate::geometry::{AxisKind, Base, CountUnit, Flange, Rigid};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum MotionKind {
+    /// The robot; poses tell where it stood.
     #[default]
     Robot,
+    /// A linear axis; counts tell where it stood.
     Linear,
+    /// A turntable; counts tell where it stood.
     Turntable,
 }
 
@@ -19,8 +22,10 @@ pub enum MotionKind {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Carries {
+    /// Camera and laser; the part stands still.
     #[default]
     Sensor,
+    /// The part; camera and laser stand still.
     Part,
 }
 
@@ -28,7 +33,9 @@ pub enum Carries {
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Motion {
+    /// What moves.
     pub kind: MotionKind,
+    /// What it moves.
     pub carries: Carries,
     /// What a count is; of an axis.
     #[serde(default, skip_serializing_if = "Option::is_none")]

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 /// The poses of a file, and what a person should know about them.
 #[derive(Clone, Debug)]
 pub struct PoseFile {
+    /// base_from_flange, mm, in the file's order.
     pub poses: Vec<Rigid<Base, Flange>>,
     /// Repairs above the warning limit, in words.
     pub warnings: Vec<String>,

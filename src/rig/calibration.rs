@@ -15,13 +15,18 @@ use std::path::Path;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
+    /// What the work needs, with room to spare.
     Good,
+    /// It can be worked with; the reasons say what limits it.
     Usable,
+    /// The data says too little for the work; better pictures are needed.
     BadlyDetermined,
+    /// It is of no use and is not loaded.
     Refused,
 }
 
 impl Verdict {
+    /// For people.
     pub fn words(self) -> &'static str {
         match self {
             Verdict::Good => "good",
@@ -36,6 +41,7 @@ impl Verdict {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Quality {
+    /// How far the result can be trusted.
     pub verdict: Verdict,
     /// Why, in words; one sentence each.
     pub reasons: Vec<String>,
@@ -55,6 +61,7 @@ pub type HandEye = Rigid<Flange, Camera>;
 
 /// Figures of a hand-eye's quality that ranges are worked out with: the robot's sigma per axis.
 pub const ROBOT_SIGMA_MM: &str = "robot_sigma_mm";
+/// Of its orientation, degrees; the one above is of its position, mm.
 pub const ROBOT_SIGMA_DEG: &str = "robot_sigma_deg";
 
 /// A calibrated value with its origin. `T` is `Intrinsics`, `Plane<Camera>`, `Ray<Camera>` or `HandEye`.
@@ -64,20 +71,27 @@ pub const ROBOT_SIGMA_DEG: &str = "robot_sigma_deg";
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Calibration<T> {
+    /// Version of the file's format; 2 is written.
     pub format: u32,
+    /// What the value is.
     pub kind: Kind,
     /// RFC 3339.
     pub created: String,
     /// Program and version.
     pub program: String,
+    /// Of value and covariance.
     pub units: Units,
+    /// The frame, or the transform between two, that the value is in.
     pub frame: Place,
     /// File name to SHA-256 of everything that went in.
     pub inputs: BTreeMap<String, String>,
     /// The calibrations that it was made with and is of no use without: kind to [`Calibration::content`].
     pub rests_on: BTreeMap<Kind, String>,
+    /// What was found.
     pub value: T,
+    /// Of the value's parameters.
     pub covariance: Covariance,
+    /// What the solver says of it.
     pub quality: Quality,
     /// What a person has vouched for, and when; every report shows it.
     pub remarks: Vec<String>,
@@ -156,6 +170,7 @@ impl<T: Measured> Calibration<T> {
 
 /// Figures of an axis' quality that points are judged by: what it scatters by from stop to stop.
 pub const AXIS_SIGMA_MM: &str = "axis_sigma_mm";
+/// Of its turn, degrees; the one above is of its place, mm.
 pub const AXIS_SIGMA_DEG: &str = "axis_sigma_deg";
 
 /// What an axis scatters by from stop to stop, mm and rad; `None` where the values come from elsewhere.

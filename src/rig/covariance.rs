@@ -10,7 +10,9 @@ use nalgebra::{DMatrix, SMatrix};
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Covariance {
+    /// Names, in the order of the matrix; empty where nothing is known.
     pub parameters: Vec<String>,
+    /// Square and symmetric, row by row.
     pub matrix: Vec<Vec<f64>>,
 }
 
@@ -18,6 +20,7 @@ pub struct Covariance {
 const ROUNDING: f64 = 1e-6;
 
 impl Covariance {
+    /// `matrix` has a row and a column a name; anything else is a panic.
     pub fn new(parameters: &[&str], matrix: &DMatrix<f64>) -> Covariance {
         assert_eq!((parameters.len(), parameters.len()), matrix.shape());
         Covariance {

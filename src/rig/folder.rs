@@ -15,13 +15,19 @@ use std::path::{Path, PathBuf};
 /// What has been measured of a station; every part may be missing.
 #[derive(Clone, Debug, Default)]
 pub struct Rig {
+    /// Camera and lens.
     pub camera: Option<Calibration<Intrinsics>>,
+    /// The sheet of light, camera frame.
     pub laser_plane: Option<Calibration<Plane<Camera>>>,
+    /// The pointer's beam, camera frame.
     pub pointer: Option<Calibration<Ray<Camera>>>,
+    /// The camera on the flange.
     pub hand_eye: Option<Calibration<HandEye>>,
     /// A camera that stands still before a robot that carries the part.
     pub base_camera: Option<Calibration<Rigid<Base, Camera>>>,
+    /// What moves parts along, or the camera along parts.
     pub linear_axis: Option<Calibration<Axis>>,
+    /// What turns parts before the camera.
     pub turntable: Option<Calibration<Axis>>,
 }
 
@@ -130,18 +136,23 @@ impl Rig {
     pub fn need_camera(&self) -> Result<&Calibration<Intrinsics>> {
         self.camera.as_ref().ok_or_else(|| missing(Kind::Camera))
     }
+    /// The sheet of light; refused where it is missing or was measured with another camera.
     pub fn need_laser_plane(&self) -> Result<&Calibration<Plane<Camera>>> {
         self.belonging(&self.laser_plane)?.ok_or_else(|| missing(Kind::LaserPlane))
     }
+    /// The pointer's beam; refused where it is missing or was measured with another camera.
     pub fn need_pointer(&self) -> Result<&Calibration<Ray<Camera>>> {
         self.belonging(&self.pointer)?.ok_or_else(|| missing(Kind::Pointer))
     }
+    /// The camera on the flange; refused where it is missing or was measured with another camera.
     pub fn need_hand_eye(&self) -> Result<&Calibration<HandEye>> {
         self.belonging(&self.hand_eye)?.ok_or_else(|| missing(Kind::HandEye))
     }
+    /// The camera that stands still; refused where it is missing or was measured with another camera.
     pub fn need_base_camera(&self) -> Result<&Calibration<Rigid<Base, Camera>>> {
         self.belonging(&self.base_camera)?.ok_or_else(|| missing(Kind::BaseCamera))
     }
+    /// The axis of this kind; refused where it is missing or was measured with another camera.
     pub fn need_axis(&self, kind: AxisKind) -> Result<&Calibration<Axis>> {
         let (axis, kind) = match kind {
             AxisKind::Linear => (&self.linear_axis, Kind::LinearAxis),

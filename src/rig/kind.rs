@@ -8,9 +8,13 @@ use std::collections::BTreeMap;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kind {
+    /// A camera with its lens.
     Camera,
+    /// A sheet of light.
     LaserPlane,
+    /// A pointer's beam.
     Pointer,
+    /// A camera on the flange.
     HandEye,
     /// A camera that stands still.
     BaseCamera,
@@ -25,12 +29,16 @@ pub enum Kind {
 /// The frame, or the transform between two, that a value is in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Place {
+    /// Camera frame.
     #[serde(rename = "camera")]
     Camera,
+    /// Maps the camera frame to the flange frame.
     #[serde(rename = "flange_T_camera")]
     FlangeFromCamera,
+    /// Maps the camera frame to the base frame.
     #[serde(rename = "base_T_camera")]
     BaseFromCamera,
+    /// Maps the frame of a line-profile sensor to the flange frame.
     #[serde(rename = "flange_T_sensor")]
     FlangeFromSensor,
 }
@@ -38,6 +46,7 @@ pub enum Place {
 /// Units of every calibration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Units {
+    /// The only ones there are.
     #[serde(rename = "mm, rad, px")]
     MmRadPx,
 }
@@ -95,6 +104,7 @@ impl Kind {
     pub fn words(self) -> String {
         if self == Kind::HandEye { "hand-eye".into() } else { self.name().replace('_', " ") }
     }
+    /// The frame, or the transform between two, of such a value.
     pub fn place(self) -> Place {
         match self {
             Kind::Camera | Kind::LaserPlane | Kind::Pointer | Kind::LinearAxis | Kind::Turntable => Place::Camera,

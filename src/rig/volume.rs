@@ -6,13 +6,16 @@
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Volume {
+    /// Nearest depth.
     pub near_mm: f64,
+    /// Farthest depth.
     pub far_mm: f64,
     /// Who stated it, in words: "station.toml", "where the boards stood".
     pub from: String,
 }
 
 impl Volume {
+    /// `from` says in words who stated the depths.
     pub fn new(near_mm: f64, far_mm: f64, from: &str) -> Volume {
         Volume { near_mm, far_mm, from: from.into() }
     }
@@ -26,9 +29,11 @@ impl Volume {
     pub fn depths(volume: Option<&Volume>) -> [f64; 2] {
         volume.map_or([0.0, f64::INFINITY], |v| [v.near_mm, v.far_mm])
     }
+    /// Depth halfway, mm.
     pub fn middle(&self) -> f64 {
         (self.near_mm + self.far_mm) / 2.0
     }
+    /// From the nearest depth to the farthest, mm.
     pub fn length(&self) -> f64 {
         self.far_mm - self.near_mm
     }

@@ -14,7 +14,9 @@ pub struct TpPosition<To: Frame, From: Frame> {
     pub comment: String,
     /// Numbers of the user frame and of the tool frame that the pose relates.
     pub user_frame: u32,
+    /// Number of the tool frame, n of `UT : n`.
     pub tool_frame: u32,
+    /// The tool frame in the user frame, mm.
     pub pose: Rigid<To, From>,
 }
 

@@ -32,6 +32,7 @@ pub enum Convention {
 }
 
 impl Convention {
+    /// All of them.
     pub const ALL: [Convention; 9] = [
         Convention::Denso,
         Convention::Ur,
@@ -44,6 +45,7 @@ impl Convention {
         Convention::Matrix,
     ];
 
+    /// As options and files write it.
     pub fn name(self) -> &'static str {
         match self {
             Convention::Denso => "denso",

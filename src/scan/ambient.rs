@@ -15,6 +15,7 @@ const DARKER: f64 = 0.1;
 /// Light that is in every shot.
 #[derive(Clone, Debug)]
 pub struct Ambient {
+    /// One picture with the laser off, of the shots' size and depth; grey levels.
     pub image: Image,
 }
 

@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, Matrix3, Matrix6};
 /// How the camera stood to the part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
+    /// Camera frame to the cloud's frame, for which `Base` stands whatever moved; mm.
     pub from_camera: Rigid<Base, Camera>,
     /// Of a motion (v, w) of the cloud's points, mm and rad. `None`: the robot's share and the hand-eye's are in the budget of
     /// what is found, where all points of a part share them.

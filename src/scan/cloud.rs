@@ -24,6 +24,7 @@ pub struct CloudPoint {
     pub shot: u32,
     /// Sub-pixel place of the peak in that shot, px.
     pub u: f32,
+    /// Its place down the rows of that shot, px.
     pub v: f32,
 }
 
@@ -131,6 +132,10 @@ impl CloudWriter {
         self.out.write_all(bytes).map_err(|e| Fault::write(&part_of(&self.path), e))
     }
 
+    /// Adds points at the end.
+    ///
+    /// # Errors
+    /// A write that fails; what [`CloudWriter::checkpoint`] returned can still be resumed.
     pub fn append(&mut self, points: &[CloudPoint]) -> Result<()> {
         self.put(bytemuck::cast_slice(points))?;
         self.count += points.len() as u64;
@@ -231,6 +236,7 @@ impl CloudFile {
         }
         Ok(CloudFile { path: path.to_owned(), count, start })
     }
+    /// Points in the file.
     pub fn count(&self) -> u64 {
         self.count
     }

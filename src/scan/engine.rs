@@ -21,8 +21,11 @@ use std::collections::VecDeque;
 
 /// The peaks of one shot and their points, entry by entry.
 pub struct Measured {
+    /// Number of the shot, as it was submitted.
     pub shot: u32,
+    /// Every peak, the rejected ones too; px and grey levels.
     pub peaks: Vec<Peak>,
+    /// In the frame of the submitted pose, mm; not a number where the peak was refused.
     pub points: Vec<Point>,
 }
 
@@ -36,7 +39,9 @@ struct Job {
 
 /// What the engine needs to know of the rig: where in the picture the laser can be, and where its points lie.
 pub struct Optical {
+    /// At the resolution of the pictures; px.
     pub camera: Intrinsics,
+    /// The sheet of light, camera frame, mm.
     pub laser: Plane<Camera>,
     /// Nearest and farthest camera depth believed, mm.
     pub depth_mm: [f64; 2],

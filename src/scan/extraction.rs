@@ -49,9 +49,13 @@ pub struct Extraction {
     pub threshold: ThresholdParams,
     /// The thinning's rule; `auto` takes the one for the direction in which the rig sees its stripe ([`Thinning::across`]).
     pub thinning: Rule,
+    /// How far the ends of lines are carried on.
     pub lengthen: LengthenParams,
+    /// The sub-pixel fit across the stripe.
     pub peak: PeakParams,
+    /// What a peak must be to be believed.
     pub choose: ChooseParams,
+    /// How much of a neighbourhood in the shots around it a point needs.
     pub support: SupportParams,
 }
 
@@ -120,6 +124,7 @@ impl Extraction {
         }
     }
 
+    /// Refuses settings outside their ranges.
     pub fn check(&self) -> Result<()> {
         self.threshold.check()?;
         if !(-255..=255).contains(&self.threshold.offset) || self.threshold.minimum > 255 {

@@ -10,7 +10,9 @@ pub enum Where {
     /// On the GPU where there is one with processors of its own, else on this machine's, which gives the same results.
     #[default]
     Auto,
+    /// On the best GPU adapter, a software one too; a machine without any is refused.
     Gpu,
+    /// On this machine's own processor.
     Cpu,
 }
 
@@ -29,7 +31,9 @@ impl std::str::FromStr for Where {
 /// Why the stages run without a GPU.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Why {
+    /// Somebody chose the processor.
     Asked,
+    /// This machine has no GPU adapter.
     NoAdapter,
     /// The best adapter is software of this name: it has the same cores and a longer way to them.
     Software(String),
@@ -53,6 +57,7 @@ impl std::fmt::Display for Why {
 pub enum Processor {
     /// This machine's own.
     Host(Why),
+    /// A GPU, opened.
     Gpu(Device),
 }
 

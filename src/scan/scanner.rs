@@ -20,6 +20,7 @@ use crate::stages::support::{self, Support};
 /// What one shot came to.
 #[derive(Clone, Debug)]
 pub struct Profile {
+    /// Index of the shot in the recording, from 0.
     pub shot: u32,
     /// Every peak, the rejected ones with their reason.
     pub peaks: Vec<Peak>,

@@ -16,16 +16,22 @@ use std::sync::mpsc::{Receiver, sync_channel};
 pub struct Shot {
     /// Place in the recording, from 0.
     pub index: u32,
+    /// What messages and reports call the picture.
     pub name: String,
+    /// Grey levels of the sensor's depth.
     pub image: Image,
+    /// Where the robot's flange or the axis stood at it.
     pub stand: Stand,
 }
 
 /// A shot that could not be had, with the reason; the next one may be fine.
 #[derive(Clone, Debug)]
 pub struct BadShot {
+    /// Place in the recording, from 0.
     pub index: u32,
+    /// What messages and reports call the picture.
     pub name: String,
+    /// Why it could not be had.
     pub fault: Fault,
     /// The source has ended with it: there is no next shot, and leaving this one out mends nothing.
     pub last: bool,
@@ -34,13 +40,17 @@ pub struct BadShot {
 /// Size and depth of every shot of a source.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Format {
+    /// Columns, px.
     pub width: u32,
+    /// Rows, px.
     pub height: u32,
+    /// Bits of a grey level, 8 to 16.
     pub bits: u8,
 }
 
 /// Where shots come from: a folder, a pipe, a camera.
 pub trait Source {
+    /// Size and depth of all its shots.
     fn format(&self) -> Format;
     /// Number of shots still to come, where that is known.
     fn remaining(&self) -> Option<usize>;
@@ -178,6 +188,7 @@ impl Source for RecordingSource {
 /// Pixel layouts of `ffmpeg -f rawvideo` that carry one grey channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RawFormat {
+    /// Size and depth of a frame; levels of more than 8 bits come as two bytes, little endian.
     pub format: Format,
 }
 
@@ -210,6 +221,7 @@ pub struct RawFrames<R: Read> {
 }
 
 impl<R: Read> RawFrames<R> {
+    /// Takes frames of this size and depth from `reader`.
     pub fn new(raw: RawFormat, reader: R) -> RawFrames<R> {
         RawFrames { format: raw.format, reader }
     }

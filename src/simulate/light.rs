@@ -16,12 +16,16 @@ impl Frame for InScene {
 /// A grey picture in the making.
 #[derive(Clone, Debug)]
 pub struct Canvas {
+    /// Columns, px.
     pub width: u32,
+    /// Rows, px.
     pub height: u32,
+    /// Share of full scale, row by row from the top left; may exceed 1.
     pub pixels: Vec<f32>,
 }
 
 impl Canvas {
+    /// All dark.
     pub fn new(width: u32, height: u32) -> Canvas {
         Canvas { width, height, pixels: vec![0.0; width as usize * height as usize] }
     }
@@ -68,13 +72,17 @@ pub struct LitPoint {
     pub point: Vec3,
     /// Pixel.
     pub u: f64,
+    /// Its row, px.
     pub v: f64,
 }
 
 /// One moment: a station whose camera stands somewhere in a scene.
 pub struct View<'a> {
+    /// Camera, lasers and sensor.
     pub station: &'a Station,
+    /// What is lit.
     pub scene: &'a Scene,
+    /// Where the camera stands, mm.
     pub scene_from_camera: Rigid<InScene, Camera>,
 }
 

@@ -7,6 +7,7 @@ use crate::recording::{BoardSpec, Markers};
 /// A board as it is printed.
 #[derive(Clone, Debug)]
 pub struct Pattern {
+    /// The description that it was made of.
     pub board: BoardSpec,
     markers: Option<Markers>,
     /// Centres of the dots of a circle grid.

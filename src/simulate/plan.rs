@@ -88,9 +88,11 @@ pub fn reported(pose: &Rigid<Base, Flange>, mm: f64, deg: f64, rng: &mut Pcg64) 
 /// What is asked of the pose of a board before the camera.
 #[derive(Clone, Copy, Debug)]
 pub struct Views {
+    /// How many poses.
     pub count: usize,
     /// Distance of the board's middle, mm.
     pub near: f64,
+    /// Largest distance of the board's middle, mm.
     pub far: f64,
     /// Largest tilt out of the image plane, degrees.
     pub tilt_deg: f64,

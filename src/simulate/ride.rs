@@ -14,6 +14,7 @@ use rand::Rng;
 /// A part's way past a sensor that stands still.
 #[derive(Clone, Debug)]
 pub struct Ride {
+    /// The true one, camera frame.
     pub axis: Axis,
     /// Where the scene stands at count 0.
     camera_from_scene: Rigid<Camera, InScene>,

@@ -20,12 +20,18 @@ pub fn three_digits(x: f64) -> f64 {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RigSpec {
+    /// Of the design; can be part of a file's name.
     pub name: String,
+    /// Camera and lens.
     pub camera: CameraSpec,
+    /// What turns light into grey levels; [`Sensor::default`] unless stated.
     #[serde(default)]
     pub sensor: Sensor,
+    /// The sheet of light.
     pub laser: LaserSpec,
+    /// Where it works.
     pub working: WorkingSpec,
+    /// The camera on the flange; [`MountSpec::default`] unless stated.
     #[serde(default)]
     pub mount: MountSpec,
     /// Without it the default rig's pointer, scaled with the working distance.
@@ -33,16 +39,19 @@ pub struct RigSpec {
     pub pointer: Option<PointerSpec>,
 }
 
+/// A camera with its lens as designed.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraSpec {
     /// Sensor size, px, 64..=8192 each.
     pub width_px: u32,
+    /// Rows, px, 64..=8192.
     pub height_px: u32,
     /// Edge of a pixel, 0.5..=50 µm.
     pub pixel_um: f64,
     /// Distance from the lens's projection centre to the sensor, 0.5..=2000 mm.
     pub focal_mm: f64,
+    /// k1 k2 p1 p2 k3 in OpenCV's order, -1000..=1000 each; zeros unless stated.
     #[serde(rename = "distortion_k1_k2_p1_p2_k3", default)]
     pub distortion: [f64; 5],
     /// The sensor's tilt against the lens, OpenCV's tau_x and tau_y, -30..=30 degrees (Scheimpflug).
@@ -50,6 +59,7 @@ pub struct CameraSpec {
     pub sensor_tilt_deg: [f64; 2],
 }
 
+/// A line laser as designed: where it stands and how its sheet of light spreads.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LaserSpec {
@@ -73,6 +83,7 @@ pub struct LaserSpec {
     pub wavelength_nm: f64,
 }
 
+/// Where a design works: depths along the camera's optical axis.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WorkingSpec {
@@ -80,6 +91,7 @@ pub struct WorkingSpec {
     pub distance_mm: f64,
     /// Camera depths between which boards and parts stand, mm; near <= distance <= far.
     pub near_mm: f64,
+    /// Farthest depth of boards and parts, mm, up to 20000.
     pub far_mm: f64,
     /// How far the camera leans away from the laser during a scan, -80..=80 degrees: at the laser's angle the sheet is
     /// upright. The sheet still meets the scene where it met the axis.
@@ -109,14 +121,17 @@ impl Default for MountSpec {
 pub struct PointerSpec {
     /// Camera frame, mm: where the beam leaves and a place that it passes.
     pub source_mm: [f64; 3],
+    /// A place that the beam passes, camera frame, mm; farther than the source in z.
     pub aim_mm: [f64; 3],
     /// 1/e² radius at the waist, 0.001..=20 mm, which lies this far from the source, 1..=20000 mm.
     pub waist_radius_mm: f64,
+    /// Distance of the waist from the source, 1..=20000 mm.
     pub waist_at_mm: f64,
     /// 300..=1100 nm.
     pub wavelength_nm: f64,
     /// Camera depths that it measures between, mm.
     pub near_mm: f64,
+    /// Farthest depth that it measures, mm, up to 20000.
     pub far_mm: f64,
 }
 
@@ -126,11 +141,13 @@ impl RigSpec {
         RigSpec::parse(include_str!("../../data/rigs/paper.toml")).expect("ships with the program")
     }
 
+    /// Reads and checks a rig file.
     pub fn load(path: &Path) -> Result<RigSpec> {
         let text = crate::files::read_text(path)?;
         RigSpec::parse(&text).map_err(|e| e.at(path.display()))
     }
 
+    /// Reads and checks a rig file's text.
     pub fn parse(text: &str) -> Result<RigSpec> {
         let rig: RigSpec = toml::from_str(text).map_err(|e| {
             Fault::input(format!("is not a rig file: {}", e.to_string().trim_end()))
@@ -145,6 +162,7 @@ impl RigSpec {
         Ok(rig)
     }
 
+    /// Refuses values out of the ranges that the fields state.
     pub fn check(&self) -> Result<()> {
         crate::files::named("name", &self.name)?;
         self.sensor.check()?;

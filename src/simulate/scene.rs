@@ -20,8 +20,10 @@ pub struct SceneSpec {
     /// Height that the sheet meets on the optical axis, mm: the middle of the part's heights.
     #[serde(default)]
     pub focus_height_mm: f64,
+    /// Solids in the scene's own frame.
     #[serde(default)]
     pub solid: Vec<SolidSpec>,
+    /// Groups of solids, each in a frame of its own.
     #[serde(default)]
     pub part: Vec<PartSpec>,
 }
@@ -30,6 +32,7 @@ pub struct SceneSpec {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PartSpec {
+    /// As truth.json reports it.
     pub name: String,
     /// The part's origin in the scene, mm.
     pub at_mm: [f64; 3],
@@ -39,6 +42,7 @@ pub struct PartSpec {
     /// Then tilts about the scene's x and y, degrees.
     #[serde(default)]
     pub tilt_deg: [f64; 2],
+    /// Solids in the part's frame.
     #[serde(default)]
     pub solid: Vec<SolidSpec>,
 }
@@ -47,12 +51,17 @@ pub struct PartSpec {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SolidSpec {
+    /// Its outer shape.
     pub shape: ShapeSpec,
+    /// Middle of the top face in the scene, or in the part that it belongs to, mm.
     pub at_mm: [f64; 3],
+    /// Turn about z, degrees.
     #[serde(default)]
     pub turn_deg: f64,
+    /// Of all its faces, cut-outs included.
     #[serde(default)]
     pub material: Material,
+    /// Holes and pockets; none unless stated.
     #[serde(default)]
     pub cut: Vec<CutSpec>,
     /// Copies [along x, along y] ...
@@ -67,14 +76,18 @@ pub struct SolidSpec {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CutSpec {
+    /// Shape of what is taken away.
     pub shape: ShapeSpec,
+    /// Middle of the opening, origin in the middle of the solid's top face, mm; that middle unless stated.
     #[serde(default)]
     pub at_mm: [f64; 3],
     /// Turn about z, degrees.
     #[serde(default)]
     pub turn_deg: f64,
+    /// Copies [along x, along y]; one unless stated.
     #[serde(default = "one")]
     pub repeat: [u32; 2],
+    /// Distance of the copies [along x, along y], mm; they are centred on `at_mm`.
     #[serde(default)]
     pub pitch_mm: [f64; 2],
 }
@@ -83,29 +96,41 @@ fn one() -> [u32; 2] {
     [1, 1]
 }
 
+/// A shape; sizes are 0.001..=100000 mm, and it lies below its top face at z = 0.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum ShapeSpec {
     /// Size x, y, z.
     Block {
+        /// Size along x, y, z, mm.
         size_mm: [f64; 3],
     },
     /// A block whose top falls by `drop_mm` from its -x to its +x side.
     Wedge {
+        /// Size along x, y, z, mm; z at the high side.
         size_mm: [f64; 3],
+        /// How far the top falls, mm; less than the size along z.
         drop_mm: f64,
     },
+    /// An upright cylinder.
     Cylinder {
+        /// Across, mm.
         diameter_mm: f64,
+        /// From top to bottom, mm.
         depth_mm: f64,
     },
     /// A frustum: a funnel as a cut-out.
     Cone {
+        /// Diameter of the top, mm.
         top_mm: f64,
+        /// Diameter of the bottom, mm.
         bottom_mm: f64,
+        /// From top to bottom, mm.
         depth_mm: f64,
     },
+    /// A ball that touches z = 0 from below.
     Ball {
+        /// Across, mm.
         diameter_mm: f64,
     },
 }
@@ -199,24 +224,29 @@ struct Print {
 pub struct Hit {
     /// Along the ray, mm.
     pub t: f64,
+    /// Where, scene frame, mm.
     pub point: Vec3,
     /// Outward, of unit length.
     pub normal: Vec3,
+    /// Of the surface there, its print included.
     pub material: Material,
 }
 
 /// A scene ready for rays.
 #[derive(Clone, Debug)]
 pub struct Scene {
+    /// What it was made of.
     pub spec: SceneSpec,
     bodies: Vec<Placed>,
 }
 
 impl SceneSpec {
+    /// Reads and checks a scene file.
     pub fn load(path: &Path) -> Result<SceneSpec> {
         let text = crate::files::read_text(path)?;
         SceneSpec::parse(&text).map_err(|e| e.at(path.display()))
     }
+    /// Reads and checks a scene file's text; the solids are checked by [`Scene::new`].
     pub fn parse(text: &str) -> Result<SceneSpec> {
         let spec: SceneSpec = toml::from_str(text).map_err(|e| {
             Fault::input(format!("is not a scene file: {e}"))
@@ -237,6 +267,7 @@ impl SceneSpec {
 }
 
 impl PartSpec {
+    /// Rotation and translation, mm: part frame to scene frame.
     pub fn scene_from_part(&self) -> (crate::geometry::Mat3, Vec3) {
         let axis = |v: Vec3, deg: f64| crate::geometry::exp(&(v * deg.to_radians()));
         let r = axis(Vec3::y(), self.tilt_deg[1]) * axis(Vec3::x(), self.tilt_deg[0]) * axis(Vec3::z(), self.turn_deg);
@@ -245,6 +276,7 @@ impl PartSpec {
 }
 
 impl Scene {
+    /// Refuses senseless sizes and materials, too many solids, and a scene that holds nothing.
     pub fn new(spec: SceneSpec) -> Result<Scene> {
         let mut bodies = Vec::new();
         let world = (crate::geometry::Mat3::identity(), Vec3::zeros());

@@ -44,6 +44,7 @@ impl Default for Sensor {
 }
 
 impl Sensor {
+    /// Refuses values out of the ranges that the fields state.
     pub fn check(&self) -> Result<()> {
         let limits = [
             ("bits", f64::from(self.bits), 8.0, 16.0),

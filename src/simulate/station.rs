@@ -15,26 +15,34 @@ use std::path::Path;
 /// A sheet of light from a (virtual) point source: a Gaussian beam across the sheet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LineLaser {
+    /// Where the fan starts, camera frame, mm.
     pub source: Vec3,
     /// Middle of the fan, in the sheet's plane, of unit length.
     pub axis: Vec3,
     /// Normal of the sheet, of unit length.
     pub normal: Vec3,
+    /// Half of the fan's full opening, degrees.
     pub half_fan_deg: f64,
     /// 1/e² radius across the sheet at the waist, mm ...
     pub waist_radius: f64,
     /// ... which lies this far from the source, mm.
     pub waist_distance: f64,
+    /// nm.
     pub wavelength_nm: f64,
 }
 
 /// A round Gaussian beam.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pointer {
+    /// Where the beam leaves, camera frame, mm.
     pub source: Vec3,
+    /// Direction of the beam, camera frame, of unit length.
     pub axis: Vec3,
+    /// 1/e² radius at the waist, mm.
     pub waist_radius: f64,
+    /// Distance of the waist from the source, mm.
     pub waist_distance: f64,
+    /// nm.
     pub wavelength_nm: f64,
 }
 
@@ -45,18 +53,22 @@ fn beam_radius(waist: f64, waist_distance: f64, wavelength_nm: f64, distance: f6
 }
 
 impl LineLaser {
+    /// 1/e² radius across the sheet at a distance from the source, mm.
     pub fn radius(&self, distance: f64) -> f64 {
         beam_radius(self.waist_radius, self.waist_distance, self.wavelength_nm, distance)
     }
+    /// The sheet of light, mm.
     pub fn plane(&self) -> Plane<Camera> {
         Plane::new(self.normal, self.normal.dot(&self.source)).expect("of unit length")
     }
 }
 
 impl Pointer {
+    /// 1/e² radius at a distance from the source, mm.
     pub fn radius(&self, distance: f64) -> f64 {
         beam_radius(self.waist_radius, self.waist_distance, self.wavelength_nm, distance)
     }
+    /// The beam from its source on, mm.
     pub fn ray(&self) -> Ray<Camera> {
         Ray::new(self.source, self.axis).expect("of unit length")
     }
@@ -67,15 +79,21 @@ impl Pointer {
 pub struct Station {
     /// The design that it was built after.
     pub rig: RigSpec,
+    /// Camera and lens as they truly are.
     pub camera: Intrinsics,
+    /// What turns light into grey levels.
     pub sensor: Sensor,
+    /// The true hand-eye transform, mm.
     pub flange_from_camera: HandEye,
+    /// The sheet of light, camera frame.
     pub laser: LineLaser,
+    /// The pointer's beam, camera frame.
     pub pointer: Pointer,
     /// Depths that the pointer measures between, mm.
     pub pointer_range: [f64; 2],
     /// Camera depth that scans are taken at, mm.
     pub working_distance: f64,
+    /// Of this specimen; 0 is the design itself.
     pub seed: u64,
 }
 

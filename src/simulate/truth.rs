@@ -15,26 +15,39 @@ use std::path::Path;
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TruthFile {
+    /// Name of the simulated set.
     pub set: String,
+    /// Always "mm".
     pub units: String,
+    /// Of the station.
     pub seed: u64,
+    /// Camera and lens.
     pub intrinsics: Intrinsics,
+    /// The hand-eye transform, mm.
     #[serde(rename = "flange_T_camera")]
     pub flange_from_camera: HandEye,
+    /// The sheet of light, camera frame, mm.
     pub laser_plane_camera: Plane<Camera>,
+    /// Where the fan starts, camera frame, mm.
     pub laser_source_camera_mm: Vec3,
+    /// The pointer's beam, camera frame.
     pub pointer_camera: PointerTruth,
     /// What moves the part, where no robot moves the sensor; `base` in other keys then stands for the axis frame.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub axis: Option<Axis>,
+    /// Where the scene stood, mm; of sets that show it.
     #[serde(rename = "base_T_scene", default, skip_serializing_if = "Option::is_none")]
     pub base_from_scene: Option<Rigid<Base, InScene>>,
+    /// What stood there; of sets that show it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scene: Option<SceneSpec>,
+    /// The scene's parts and where they stood.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub parts: Vec<PartTruth>,
+    /// Where the board stood, mm; of hand-eye sets.
     #[serde(rename = "base_T_board", default, skip_serializing_if = "Option::is_none")]
     pub base_from_board: Option<Rigid<Base, Board>>,
+    /// One board pose a frame, mm; of sets that show boards.
     #[serde(rename = "camera_T_board", default, skip_serializing_if = "Vec::is_empty")]
     pub camera_from_board: Vec<Rigid<Camera, Board>>,
     /// Distances of the pointer's plate along the optical axis.
@@ -42,6 +55,7 @@ pub struct TruthFile {
     pub distances_mm: Vec<f64>,
     /// Errors of the reported poses, 1 sigma per axis.
     pub pose_noise_mm: f64,
+    /// Orientation, degrees.
     pub pose_noise_deg: f64,
 }
 
@@ -49,14 +63,19 @@ pub struct TruthFile {
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PointerTruth {
+    /// The source, camera frame, mm.
     pub origin: Vec3,
+    /// Camera frame, of unit length.
     pub direction: Vec3,
 }
 
+/// A part of the scene and where it stood.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PartTruth {
+    /// As the scene file calls it.
     pub name: String,
+    /// Origin and axes of the part, mm.
     #[serde(rename = "base_T_part")]
     pub base_from_part: Rigid<Base, Part>,
 }
@@ -103,6 +122,7 @@ impl TruthFile {
 /// The exact surface of a simulated scan.
 #[derive(Clone, Debug)]
 pub struct Truth {
+    /// What the file says.
     pub file: TruthFile,
     scene: Scene,
     scene_from_base: Rigid<InScene, Base>,
@@ -111,18 +131,24 @@ pub struct Truth {
 /// How far a cloud is from the truth, mm.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct CloudErrors {
+    /// How many were compared; the other figures are 0 without any.
     pub points: usize,
     /// Root mean square, median, 95th percentile and largest distance from the nearest surface.
     pub rms_mm: f64,
+    /// Median distance from the nearest surface, mm.
     pub median_mm: f64,
+    /// 95th percentile of the distances, mm.
     pub p95_mm: f64,
+    /// Largest distance, mm.
     pub largest_mm: f64,
     /// Root mean square of the points within 1 mm, and the share beyond.
     pub rms_without_outliers_mm: f64,
+    /// Share of the points that are more than 1 mm off, 0..=1.
     pub outliers_share: f64,
 }
 
 impl Truth {
+    /// Reads the file and builds its scene; refuses the truth of a set without one.
     pub fn load(path: &Path) -> Result<Truth> {
         let text = crate::files::read_text(path)?;
         let strange = |what: String| {

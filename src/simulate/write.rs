@@ -45,6 +45,7 @@ impl Set {
     /// Those of a robot's station; one with an axis has [`Set::Axis`] beside them.
     pub const ALL: [Set; 7] =
         [Set::Scan, Set::Intrinsics, Set::Handeye, Set::Laserplane, Set::PointerCal, Set::Pointer, Set::Surface];
+    /// As options, folders and files write it.
     pub fn name(self) -> &'static str {
         match self {
             Set::Scan => "scan",
@@ -75,6 +76,7 @@ pub const DEFAULT_SCENE: &str = include_str!("../../data/scenes/board.toml");
 /// What to simulate.
 #[derive(Clone, Debug)]
 pub struct SimulateOptions {
+    /// What to record, 1..=100 of them.
     pub sets: Vec<Set>,
     /// The design that stations are built after; the paper's when not given.
     pub rig: Option<RigSpec>,
@@ -86,7 +88,9 @@ pub struct SimulateOptions {
     pub seed: u64,
     /// Sensor size, px, 64..=8192 each.
     pub width: u32,
+    /// Rows, px.
     pub height: u32,
+    /// What turns light into grey levels.
     pub sensor: Sensor,
     /// Shots of a scan, 2..=100000.
     pub shots: usize,
@@ -96,6 +100,7 @@ pub struct SimulateOptions {
     pub poses: Option<Vec<Rigid<Base, Flange>>>,
     /// Errors of the reported robot poses, 1 sigma per axis, mm 0..=10 and degrees 0..=5.
     pub pose_noise_mm: f64,
+    /// Orientation, 1 sigma per axis, degrees, 0..=5.
     pub pose_noise_deg: f64,
 }
 
@@ -125,6 +130,7 @@ impl SimulateOptions {
         }
     }
 
+    /// Refuses values out of the ranges that the fields state, and options that do not go together.
     pub fn check(&self) -> Result<()> {
         self.sensor.check()?;
         let limits = [
@@ -177,6 +183,7 @@ impl SimulateOptions {
 /// What was written.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Simulated {
+    /// Folder of the station with its true calibration.
     pub station: PathBuf,
     /// Name of the set, its folder, its pictures.
     pub recordings: Vec<(String, PathBuf, usize)>,

@@ -25,6 +25,7 @@ impl Default for ConsensusOptions {
 }
 
 impl ConsensusOptions {
+    /// Refuses values out of the ranges that the fields state.
     pub fn check(&self) -> Result<()> {
         if !(self.threshold > 0.0)
             || !(0.5..1.0).contains(&self.confidence)
@@ -43,9 +44,11 @@ impl ConsensusOptions {
 /// The winner of a [`consensus`].
 #[derive(Clone, Debug)]
 pub struct Consensus<M> {
+    /// As `fit` made it of the best draw; it is not fitted to the inliers.
     pub model: M,
     /// Indices of the samples that agree, ascending.
     pub inliers: Vec<usize>,
+    /// Sets of samples that were drawn, degenerate ones included.
     pub draws: usize,
 }
 

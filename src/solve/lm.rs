@@ -11,6 +11,7 @@ use nalgebra::DMatrix;
 /// Something to minimise. A state lives where it likes (rotations included); a step is a vector of
 /// `width` numbers, and Jacobians are derivatives by such a step at zero.
 pub trait Problem {
+    /// What is estimated.
     type State: Clone;
     /// Number of parameters of a step.
     fn width(&self) -> usize;
@@ -54,6 +55,7 @@ impl Default for LmOptions {
 }
 
 impl LmOptions {
+    /// Refuses values out of the ranges that the fields state.
     pub fn check(&self) -> Result<()> {
         let bad = |what: String| Err(Fault::usage(what).next("choose a value in that range"));
         if !(1..=1000).contains(&self.max_iterations) {
@@ -74,6 +76,7 @@ impl LmOptions {
 /// Why the iteration ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
+    /// The cost falls by no more than the tolerance, or by nothing that its digits show.
     Converged,
     /// Ran out of iterations.
     Exhausted,
@@ -84,8 +87,11 @@ pub enum Stop {
 /// What [`lm`] found.
 #[derive(Clone, Debug)]
 pub struct Solution<S> {
+    /// Where it ended.
     pub state: S,
+    /// Why it ended there; `state` is a solution only where it converged.
     pub stop: Stop,
+    /// Steps taken, all rounds together.
     pub iterations: usize,
     /// Root mean square of all measured residuals, unweighted, in the residuals' unit.
     pub rms: f64,

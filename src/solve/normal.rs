@@ -8,7 +8,9 @@ use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 /// camera calibration, each seen in one picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Blocks {
+    /// Index of the first parameter that is in a block; those before it are shared.
     pub first: usize,
+    /// Parameters a block.
     pub size: usize,
 }
 

@@ -8,34 +8,48 @@ use crate::gpu::{Device, Pipeline, Stage, Workload, run_once};
 
 /// One stage as the tests and `sheetlight doctor` see it.
 pub struct Entry {
+    /// The shader with its bindings.
     pub stage: &'static Stage,
+    /// The same arithmetic on the CPU.
     pub twin: Twin,
+    /// Makes the inputs that the two are compared on.
     pub cases: Box<dyn Fn() -> Vec<Case> + Send + Sync>,
+    /// How far the two may be apart.
     pub same: Same,
 }
 
 /// Input of one run of a stage.
 #[derive(Clone, Debug)]
 pub struct Case {
+    /// What the input shows, for messages.
     pub name: String,
+    /// Override constants that the pipeline is built with: name, value.
     pub overrides: Vec<(&'static str, f64)>,
+    /// Words of each binding in the stage's order, the uniform block first.
     pub bindings: Vec<Vec<u32>>,
+    /// Workgroups: x, y, z.
     pub groups: [u32; 3],
 }
 
 /// What the comparison of one stage gave.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Verdict {
+    /// Name of the stage.
     pub stage: &'static str,
+    /// How many cases ran.
     pub cases: usize,
+    /// Of all cases, in the stage's own unit.
     pub largest_difference: f64,
+    /// Largest difference allowed, in the same unit; 0 where every word counts.
     pub limit: f64,
+    /// Why results within the limit count as the same.
     pub reason: &'static str,
     /// The case with the largest difference.
     pub worst_case: String,
 }
 
 impl Verdict {
+    /// No case is further apart than the limit.
     pub fn passed(&self) -> bool {
         self.largest_difference <= self.limit
     }

@@ -11,20 +11,35 @@ use std::ops::Range;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Frame {
+    /// px
     pub width: u32,
+    /// px
     pub height: u32,
+    /// Words of one picture row, padded to whole tiles.
     pub pitch: u32,
+    /// Words of one picture.
     pub shot_words: u32,
+    /// Tiles in a row of tiles, each 32 px wide.
     pub tiles_x: u32,
+    /// Rows of tiles in one picture, each 8 px high.
     pub tiles_y: u32,
+    /// Pictures in a batch.
     pub shots: u32,
+    /// Edge of the threshold's window, px, odd.
     pub size: u32,
+    /// What a lit pixel exceeds the window's mean by, grey levels of the picture's depth; may be negative.
     pub offset: i32,
+    /// Least level of a lit pixel, grey levels of the picture's depth.
     pub minimum: u32,
+    /// Sum of [`ALL_TILES`], [`HAS_ROI`] and [`GAUSSIAN`].
     pub flags: u32,
+    /// Sub-iteration of thinning, counted from 0.
     pub step: u32,
+    /// Most skeleton pixels that a batch keeps.
     pub capacity: u32,
+    /// Grey level of saturation.
     pub full_scale: u32,
+    /// Most pixels added to an end of a line, and from bit 16 on the share of brightness in 4096ths; 0 is off.
     pub lengthen: u32,
 }
 
@@ -46,16 +61,18 @@ macro_rules! uniform_fields {
 
 pub(crate) use uniform_fields;
 
+/// WGSL name, members and bytes of [`Frame`], for the contract tests.
 pub const UNIFORM: (&str, &[Field], usize) = uniform_fields!(Frame: width, height, pitch, shot_words, tiles_x,
     tiles_y, shots, size, offset, minimum, flags, step, capacity, full_scale, lengthen);
 
-pub const SHARED: &str = include_str!("../../shaders/shared/frame.wgsl");
-pub const COLUMNS: &str = include_str!("../../shaders/shared/columns.wgsl");
-pub const PIXELS: &str = include_str!("../../shaders/shared/pixels.wgsl");
-pub const ACTIVITY: &str = include_str!("../../shaders/shared/activity.wgsl");
+pub(crate) const SHARED: &str = include_str!("../../shaders/shared/frame.wgsl");
+pub(crate) const COLUMNS: &str = include_str!("../../shaders/shared/columns.wgsl");
+pub(crate) const PIXELS: &str = include_str!("../../shaders/shared/pixels.wgsl");
+pub(crate) const ACTIVITY: &str = include_str!("../../shaders/shared/activity.wgsl");
 /// Selects 8-bit (2) or deeper (1) pictures; pixels a word as a power of two.
 pub const PX_LOG2: &str = "px_log2";
 
+/// The value of the override [`PX_LOG2`] for pictures of so many bits.
 pub fn px_log2(bits: u8) -> u32 {
     if bits == 8 { 2 } else { 1 }
 }
@@ -101,15 +118,19 @@ impl Frame {
             lengthen: 0,
         })
     }
+    /// Tiles of all pictures of a batch.
     pub fn tiles(&self) -> u32 {
         self.tiles_x * self.tiles_y * self.shots
     }
+    /// Words of a mask of a whole batch, 8 a tile.
     pub fn mask_words(&self) -> u32 {
         self.tiles() * 8
     }
+    /// Bytes of one picture, rows padded to whole tiles.
     pub fn image_bytes(&self) -> usize {
         self.shot_words as usize * 4
     }
+    /// The settings that it was made from.
     pub fn threshold(&self) -> ThresholdParams {
         ThresholdParams {
             window: if self.flags & GAUSSIAN != 0 { Window::Gaussian } else { Window::Mean },
@@ -191,7 +212,7 @@ impl Frame {
 pub fn tile_unpack(tile: u32) -> (u32, u32, u32) {
     (tile & 1023, tile >> 10 & 4095, tile >> 22)
 }
-pub fn tile_pack(x: u32, y: u32, shot: u32) -> u32 {
+pub(crate) fn tile_pack(x: u32, y: u32, shot: u32) -> u32 {
     x | y << 10 | shot << 22
 }
 

@@ -13,6 +13,7 @@ use crate::gpu::{Binding, Field, Stage};
 pub struct GridFrame {
     /// Cells.
     pub width: u32,
+    /// Cells along the grid's y axis.
     pub height: u32,
     /// Two surfaces where a cell spans more height steps than this.
     pub layer_steps: i32,
@@ -22,31 +23,49 @@ pub struct GridFrame {
     pub least_quality: i32,
     /// The grid's origin in the base frame, 2⁻¹⁴ mm, at most 2³⁰ of them: differences stay within 32 bits.
     pub origin_x: i32,
+    /// The same along the base's y axis.
     pub origin_y: i32,
+    /// The same along the base's z axis.
     pub origin_z: i32,
     /// Rows of the rotation over the cell's edge and the height step, each times a power of two that fills 30 bits.
     pub xx: i32,
+    /// Cells along x for a way along the base's y axis.
     pub xy: i32,
+    /// Cells along x for a way along the base's z axis.
     pub xz: i32,
+    /// Cells along y for a way along the base's x axis.
     pub yx: i32,
+    /// Cells along y for a way along the base's y axis.
     pub yy: i32,
+    /// Cells along y for a way along the base's z axis.
     pub yz: i32,
+    /// Height steps for a way along the base's x axis.
     pub zx: i32,
+    /// Height steps for a way along the base's y axis.
     pub zy: i32,
+    /// Height steps for a way along the base's z axis.
     pub zz: i32,
     /// That power and the 14 places of the positions.
     pub shift_x: u32,
+    /// The same for the cells along y.
     pub shift_y: u32,
+    /// The same for the height steps.
     pub shift_z: u32,
-    /// 64-bit offsets: what the origin was rounded by, and half a step of height.
+    /// The 64-bit offset of the cells along x, low 32 bits: what the origin was rounded by.
     pub add_x_low: u32,
+    /// The high 32 bits of it.
     pub add_x_high: u32,
+    /// The same for the cells along y, low 32 bits.
     pub add_y_low: u32,
+    /// The high 32 bits of it.
     pub add_y_high: u32,
+    /// The same for the height steps and half a step, low 32 bits.
     pub add_z_low: u32,
+    /// The high 32 bits of it.
     pub add_z_high: u32,
     /// Binary places of intensities: 4, or 0 where a sensor of 13 bits and more would saturate the terms.
     pub intensity_places: i32,
+    /// Always 0: fills the block to a multiple of 16 bytes.
     pub reserved: u32,
 }
 
@@ -72,9 +91,13 @@ const BEYOND: i32 = 0x2000_0000;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Layer {
+    /// Number of points.
     pub count: u32,
+    /// Sum of heights above the grid's plane, height steps.
     pub z: i32,
+    /// Sum of grey levels in units of [`GridFrame::intensity_step`]; each term saturates at 65,535 of them.
     pub intensity: u32,
+    /// Sum of the points' standard deviations in units of [`SIGMA_STEP`].
     pub sigma: u32,
 }
 
@@ -152,6 +175,7 @@ impl GridFrame {
         1.0 / f64::from(1 << self.intensity_places)
     }
 
+    /// Width times height.
     pub fn cells(&self) -> usize {
         self.width as usize * self.height as usize
     }
@@ -242,16 +266,19 @@ const fn stage(name: &'static str, wgsl: &'static str, bindings: &'static [Bindi
 const FRAME: Binding = Binding { name: "frame", access: Uniform };
 const RECORDS: Binding = Binding { name: "records", access: Texels };
 
+/// Lowest and highest point of each cell; one invocation a point.
 pub const SPAN: Stage = stage(
     "grid_span",
     include_str!("../../shaders/grid_span.wgsl"),
     &[FRAME, RECORDS, Binding { name: "span", access: ReadWrite }],
 );
+/// Sums below and above the middle of each cell's span; one invocation a point.
 pub const SUM: Stage = stage(
     "grid_sum",
     include_str!("../../shaders/grid_sum.wgsl"),
     &[FRAME, RECORDS, Binding { name: "span", access: Texels }, Binding { name: "layers", access: ReadWrite }],
 );
+/// Sums of one surface in each cell; one invocation a cell.
 pub const PICK: Stage = stage(
     "grid_pick",
     include_str!("../../shaders/grid_pick.wgsl"),
@@ -278,19 +305,19 @@ fn frame_of(b: &[Vec<u32>]) -> GridFrame {
     *bytemuck::from_bytes(bytemuck::cast_slice(&b[0]))
 }
 
-pub fn span_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn span_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, records, span] = b else { unreachable!() };
     f.span(records, bytemuck::cast_slice_mut(span));
 }
 
-pub fn sum_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn sum_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, records, span, layers] = b else { unreachable!() };
     f.sum(records, bytemuck::cast_slice(span), bytemuck::cast_slice_mut(layers));
 }
 
-pub fn pick_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn pick_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, span, layers, cells] = b else { unreachable!() };
     let (span, layers): (&[[u32; 2]], &[[Layer; 2]]) = (bytemuck::cast_slice(span), bytemuck::cast_slice(layers));

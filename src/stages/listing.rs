@@ -9,6 +9,7 @@ use crate::stages::step::{Groups, Step};
 /// Words between the headers of two lists: 256 bytes, which every adapter can bind.
 pub const HEADER_WORDS: u32 = 64;
 
+/// Empties list headers; at a further round of thinning (step 1) only those of the shortened lists.
 pub const RESET: Stage = Stage {
     name: "reset",
     wgsl: include_str!("../../shaders/reset.wgsl"),
@@ -34,6 +35,7 @@ pub const RESETTING: Step = Step {
     same: Same::Words,
 };
 
+/// Zeroes masks, stamps and counts of the tiles that the last batch listed; one invocation a tile.
 pub const CLEAR: Stage = Stage {
     name: "clear",
     wgsl: include_str!("../../shaders/clear.wgsl"),
@@ -59,6 +61,7 @@ pub const CLEARING: Step = Step {
     same: Same::Words,
 };
 
+/// Lists the lit tiles that changed in the last two sub-iterations, or lie beside one; one invocation a tile.
 pub const COMPACT: Stage = Stage {
     name: "compact",
     wgsl: include_str!("../../shaders/compact.wgsl"),
@@ -83,6 +86,7 @@ pub const COMPACTING: Step = Step {
     same: Same::Lists(&[(5, 1)]),
 };
 
+/// Zeroes the stamps of the lit tiles; one invocation a tile.
 pub const REBASE: Stage = Stage {
     name: "rebase",
     wgsl: include_str!("../../shaders/rebase.wgsl"),
@@ -132,7 +136,7 @@ pub fn latest(f: &Frame, stamps: &[u32], tile: u32) -> u32 {
     near_tiles(f, tile).map(|at| stamps[at]).max().expect("the tile itself")
 }
 
-pub fn reset_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn reset_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     const EMPTY: [u32; 4] = [0, 1, 1, 0];
     if frame_of(b).step == 0 {
         b[1].chunks_mut(HEADER_WORDS as usize).for_each(|h| h[..4].copy_from_slice(&EMPTY));
@@ -142,7 +146,7 @@ pub fn reset_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     b[4].chunks_mut(HEADER_WORDS as usize).for_each(|h| h[..4].copy_from_slice(&EMPTY));
 }
 
-pub fn clear_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn clear_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, listing, list, mask, other, lit, stamps, counts] = b else { unreachable!() };
     for &tile in &list[..listing[3] as usize] {
@@ -156,7 +160,7 @@ pub fn clear_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     }
 }
 
-pub fn compact_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn compact_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, all, list, stamps, listing, active] = b else { unreachable!() };
     for &tile in list[..all[3] as usize].iter().filter(|&&t| latest(&f, stamps, t) > f.step) {
@@ -164,7 +168,7 @@ pub fn compact_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     }
 }
 
-pub fn rebase_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn rebase_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, listing, list, stamps] = b else { unreachable!() };
     for &tile in &list[..listing[3] as usize] {

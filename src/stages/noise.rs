@@ -5,6 +5,7 @@
 pub struct Noise(pub u64);
 
 impl Noise {
+    /// The next number, of 31 bits.
     pub fn next(&mut self) -> u32 {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 33) as u32

@@ -22,6 +22,7 @@ impl Same {
         }
     }
 
+    /// The largest difference allowed, in the stage's own unit.
     pub fn limit(&self) -> f64 {
         match self {
             Same::Words | Same::Lists(_) => 0.0,
@@ -29,6 +30,7 @@ impl Same {
         }
     }
 
+    /// Why results so far apart count as the same.
     pub fn reason(&self) -> &'static str {
         match self {
             Same::Words => "whole numbers only: every word is the same",

@@ -18,6 +18,7 @@ use std::path::{Path, PathBuf};
 /// What is known of one part: finished scans of it, and pictures of the pointer's spot on it.
 #[derive(Clone, Copy)]
 pub struct Looked<'a> {
+    /// Folders of finished scans, one or more; the first gives picture and map.
     pub scans: &'a [PathBuf],
     /// A recording of the pointer with the robot's poses.
     pub range: Option<&'a Recording>,
@@ -86,7 +87,9 @@ pub(super) fn different(scans: &[PathBuf]) -> Result<()> {
 
 /// Where the robot goes for a second look at the part of a scan, shot by shot, and what the two looks can show.
 pub struct SecondLook {
+    /// The part as the first scan shows it.
     pub report: Report,
+    /// The sensor's motion, and what the two looks can show.
     pub plan: LookPlan,
     /// base_from_flange for each shot of the first scan that saw the part's surroundings.
     pub flanges: Vec<Rigid<Base, Flange>>,

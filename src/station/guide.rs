@@ -20,18 +20,23 @@ use std::path::PathBuf;
 /// What the procedure works on.
 #[derive(Clone, Debug)]
 pub struct GuideOptions {
+    /// Folder of the station: station.toml and calibrations.
     pub station: PathBuf,
     /// Recording of the pointer's spot on three or more places of the board, with robot poses.
     pub touch: PathBuf,
+    /// Name of the pose file in `touch`; `None`: the one that meta.json names.
     pub touch_poses: Option<String>,
     /// Recording of the line over the part, with robot poses.
     pub scan: PathBuf,
+    /// Name of the pose file in `scan`; `None`: the one that meta.json names.
     pub scan_poses: Option<String>,
+    /// File of the part's recipe.
     pub recipe: PathBuf,
     /// Folder for the scan, the report, the picture and guide.json.
     pub out: PathBuf,
     /// Notation of the poses.
     pub robot: Convention,
+    /// Where the scan's stages run.
     pub place: Where,
     /// Distance of the camera from the board when it looks at it squarely, mm; `None`: where the rig works.
     pub view_mm: Option<f64>,
@@ -43,6 +48,7 @@ pub struct GuideOptions {
 /// A step that was done, or that is about to be done.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Step {
+    /// One or two words, e.g. "approach".
     pub name: &'static str,
     /// What was found or will be done, one sentence a line.
     pub says: Vec<String>,
@@ -55,16 +61,22 @@ pub struct Step {
 /// The procedure as it went.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Guided {
+    /// In the order in which they were done.
     pub steps: Vec<Step>,
     /// True when every step was done and confirmed.
     pub finished: bool,
+    /// Notation of the steps' poses, see [`Convention::name`].
     pub convention: &'static str,
+    /// Of the touched board: unit length, towards the camera; base frame.
     pub normal: [f64; 3],
+    /// Angle between the part's top and the touched board, degrees.
     pub tilt_to_part_deg: f64,
+    /// What was found of the part.
     pub report: Report,
 }
 
 impl GuideOptions {
+    /// Refuses numbers outside their ranges.
     pub fn check(&self) -> Result<()> {
         let (tilt, view) = (self.max_tilt_deg, self.view_mm.unwrap_or(1.0));
         if !(0.1..=20.0).contains(&tilt) {

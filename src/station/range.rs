@@ -17,6 +17,7 @@ use crate::rig::Rig;
 /// How [`measure_range`] is run.
 #[derive(Clone, Debug)]
 pub struct RangeRun {
+    /// How the spot is found in the pictures.
     pub spots: SpotOptions,
     /// Pose file of the recording; `None`: the one that meta.json names, if any.
     pub poses: Option<String>,
@@ -35,32 +36,46 @@ impl Default for RangeRun {
 /// One measured distance.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Distance {
+    /// Name of the laser picture.
     pub picture: String,
     /// Distance from the beam's origin along the beam, and its sigma, mm.
     pub along_beam_mm: f64,
+    /// One standard deviation of the distance along the beam, mm.
     pub along_beam_sigma_mm: f64,
     /// Distance from the camera along the optical axis, and its sigma, mm.
     pub along_axis_mm: f64,
+    /// One standard deviation of the distance along the axis, mm.
     pub along_axis_sigma_mm: f64,
+    /// Where the beam meets the surface, camera frame, mm.
     pub point_camera_mm: [f64; 3],
+    /// One standard deviation along the camera's x, y, z, mm.
     pub point_camera_sigma_mm: [f64; 3],
+    /// The same point in the base frame, mm; `None` without robot poses or hand-eye calibration.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub point_base_mm: Option<[f64; 3]>,
+    /// One standard deviation along the base's x, y, z, mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub point_base_sigma_mm: Option<[f64; 3]>,
+    /// Centre of the spot, column and row, px.
     pub spot_px: [f64; 2],
+    /// One standard deviation of column and row, px.
     pub spot_sigma_px: [f64; 2],
+    /// Distance of the spot from the beam's image, px.
     pub off_beam_px: f64,
 }
 
 /// The surface through three or more points, base frame.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct SurfaceFound {
+    /// Of unit length, towards the camera; base frame.
     pub normal: [f64; 3],
+    /// Mean of the points, base frame, mm.
     pub centre_mm: [f64; 3],
     /// Axes of the normal's uncertainty, degrees.
     pub tilt_sigma_deg: [f64; 2],
+    /// One standard deviation of the height at the centre, mm.
     pub height_sigma_mm: f64,
+    /// rms distance of the points from the plane, mm; 0 for three points.
     pub rms_mm: f64,
     /// Squared distances from the plane over what the spots' own noise makes expect: far above 1 the surface is
     /// not flat, and its sigmas say so; 0 for three points.
@@ -76,7 +91,9 @@ pub struct SurfaceFound {
 /// What [`measure_range`] found.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct RangeReport {
+    /// One a picture whose spot was measured, in the recording's order.
     pub distances: Vec<Distance>,
+    /// `None` unless [`RangeRun::one_surface`] asks for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub surface: Option<SurfaceFound>,
     /// Pictures without a distance, with the reason.

@@ -57,6 +57,10 @@ impl Settings {
         Settings::parse(&text).map_err(|e| e.at(path.display()))
     }
 
+    /// Parses the text of a station.toml and checks it.
+    ///
+    /// # Errors
+    /// Unknown keys, and what [`Settings::check`] refuses.
     pub fn parse(text: &str) -> Result<Settings> {
         let settings: Settings = toml::from_str(text).map_err(|e| {
             Fault::input(format!("is not a station file: {}", e.to_string().trim_end()))
@@ -71,6 +75,7 @@ impl Settings {
         Ok(settings)
     }
 
+    /// Refuses values out of range, and lengths that look like another unit than mm.
     pub fn check(&self) -> Result<()> {
         if let Some(v) =
             self.working_volume.filter(|v| !(v.near_mm > 0.0 && v.far_mm > v.near_mm && v.far_mm.is_finite()))

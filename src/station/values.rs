@@ -11,19 +11,25 @@ use std::path::Path;
 /// The values of a rig as one JSON object; every entry may be missing, other keys are left alone.
 #[derive(Clone, Debug, Default, serde::Serialize, serde::Deserialize)]
 pub struct Values {
+    /// Pinhole camera with lens; px.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub intrinsics: Option<Intrinsics>,
+    /// Hand-eye transform, 4 x 4 row-major, mm.
     #[serde(rename = "flange_T_camera", default, skip_serializing_if = "Option::is_none")]
     pub flange_from_camera: Option<[f64; 16]>,
+    /// The sheet of light, camera frame, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub laser_plane_camera: Option<PlaneValue>,
+    /// The pointer's beam, camera frame, mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pointer_camera: Option<PointerValue>,
     /// A camera that stands still before a robot.
     #[serde(rename = "base_T_camera", default, skip_serializing_if = "Option::is_none")]
     pub base_from_camera: Option<[f64; 16]>,
+    /// A linear axis as a fixed camera sees it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub linear_axis: Option<Axis>,
+    /// A turntable as a fixed camera sees it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub turntable: Option<Axis>,
 }
@@ -43,6 +49,7 @@ pub struct PointerValue {
 }
 
 impl Values {
+    /// Reads a JSON file.
     pub fn load(path: &Path) -> Result<Values> {
         let text = crate::files::read_text(path)?;
         serde_json::from_str(&text).map_err(|e| {
@@ -52,6 +59,7 @@ impl Values {
         })
     }
 
+    /// What a rig holds; what it lacks stays `None`.
     pub fn of(rig: &Rig) -> Values {
         Values {
             intrinsics: rig.camera.as_ref().map(|c| c.value),

@@ -38,6 +38,7 @@ pub struct ObjectCheck {
 /// Fit and verification of one calibration, never mixed.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct CalibrationCheck {
+    /// good, usable, badly determined or refused.
     pub verdict: String,
     /// Residuals of the data that was fitted.
     pub fit: BTreeMap<String, f64>,
@@ -48,11 +49,15 @@ pub struct CalibrationCheck {
 /// What [`verify`] found.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct VerifyReport {
+    /// By name of the calibration, e.g. "laser plane".
     pub calibrations: BTreeMap<String, CalibrationCheck>,
+    /// How the views of the flat surface agree; `None` where no flat scan was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub flat: Option<FlatCheck>,
+    /// How the scans of the object agree; `None` where none was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub object: Option<ObjectCheck>,
+    /// How predicted and touched points agree; `None` where no file was given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub touch: Option<TouchCheck>,
     /// What the calibrations' own files say against them.

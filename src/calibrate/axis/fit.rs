@@ -10,18 +10,22 @@ use nalgebra::DMatrix;
 pub struct Stop {
     /// From the motion's zero.
     pub count: f64,
+    /// The board before the camera, as the picture measured it.
     pub pose: MeasuredPose,
 }
 
 /// How one picture fits: its step from the expected to the seen board.
 #[derive(Clone, Debug)]
 pub struct StopResidual {
+    /// Of the picture.
     pub name: String,
+    /// From the motion's zero.
     pub count: f64,
     /// In the fit; false: it contradicts the others and was left out.
     pub used: bool,
     /// Board corners, rms, mm; and with the picture left out of the fit.
     pub mm: f64,
+    /// Board corners with the picture left out of the fit, rms, mm.
     pub holdout_mm: f64,
     /// Squared distance from where the others predict it, in sigmas of both; 6 is usual.
     pub surprise: f64,
@@ -32,13 +36,17 @@ pub struct StopResidual {
 /// What [`super::solve::solve`] found.
 #[derive(Clone, Debug)]
 pub struct AxisFit {
+    /// The axis as found.
     pub axis: Axis,
     /// Of dx dy dz pitch and for a turntable px py pz, as [`crate::rig::Kind::parameters`] names them; camera uncertainty included.
     pub covariance: DMatrix<f64>,
+    /// The same with the camera taken as exact.
     pub covariance_camera_exact: DMatrix<f64>,
+    /// One a stop, in the order given.
     pub stops: Vec<StopResidual>,
     /// What the axis scatters by from stop to stop beyond what pixels explain, per axis: mm, and rad about the board's middle.
     pub sigma_mm: f64,
+    /// Scatter of the turn from stop to stop about the board's middle, per axis, rad.
     pub sigma_rad: f64,
     /// Squared distances over their degrees of freedom; near 1.
     pub chi2: f64,
@@ -46,9 +54,11 @@ pub struct AxisFit {
     pub inflation: f64,
     /// Counts of the used stops, and the board's corners and middle in axis coordinates at count 0.
     pub counts: Vec<f64>,
+    /// Corners of the board and then its middle, axis frame at count 0, mm.
     pub landmarks: [Vec3; 5],
     /// How far the used stops lie from a straight line as a bow over the whole way, mm, and its sigma; 0 for a turntable.
     pub bend_mm: [f64; 2],
+    /// Whether the counts seem to belong to the pictures.
     pub order: Order,
 }
 

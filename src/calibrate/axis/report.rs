@@ -29,6 +29,7 @@ pub fn kind(fit: &AxisFit) -> Kind {
     }
 }
 
+/// Under the names that the axis' file gives the parameters; camera uncertainty included.
 pub fn covariance(fit: &AxisFit) -> Covariance {
     Covariance::new(kind(fit).parameters().0, &fit.covariance)
 }

@@ -21,6 +21,7 @@ pub struct Evaluation {
     /// The same with the diameter left free, and that diameter, mm.
     #[serde(rename = "free_rms_mm")]
     pub free_rms: f64,
+    /// The diameter that fits the points best, mm.
     #[serde(rename = "free_diameter_mm")]
     pub free_diameter: f64,
     /// A profile: its name, its points on the ball, the rms of their distances from the sphere, mm.

@@ -7,7 +7,9 @@ use crate::fault::{Fault, Result};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Side {
+    /// At y > 0 of the sensor.
     Plus,
+    /// At y < 0 of the sensor.
     Minus,
 }
 
@@ -37,13 +39,16 @@ pub struct BallOptions {
     pub clear: f64,
     /// Fewest profiles; 6..=1000.
     pub min_profiles: usize,
+    /// Same seed, same result.
     pub seed: u64,
 }
 
 impl BallOptions {
+    /// The defaults for a ball of this diameter, mm.
     pub fn new(diameter: f64) -> BallOptions {
         BallOptions { diameter, side: None, gate_mm: 0.3, gate: 21.0, clear: 25.0, min_profiles: 8, seed: 1 }
     }
+    /// Refuses values out of the ranges that the fields state.
     pub fn check(&self) -> Result<()> {
         let ranges = [
             ("diameter", self.diameter, 1.0, 1000.0),

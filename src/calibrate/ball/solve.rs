@@ -14,13 +14,17 @@ use nalgebra::{DMatrix, DVector, SMatrix};
 /// How one profile fits.
 #[derive(Clone, Debug)]
 pub struct ProfileResidual {
+    /// Of the profile.
     pub name: String,
+    /// In the fit; false: it disagreed and was left out.
     pub used: bool,
     /// Points on the ball, and points in the profile.
     pub points: [usize; 2],
     /// Length of the residual of centre and radius, mm.
     pub mm: f64,
+    /// The same with the profile left out of the fit, mm; infinite where the others determine nothing.
     pub holdout_mm: f64,
+    /// Squared Mahalanobis distance, 3 degrees of freedom.
     pub distance2: f64,
     /// The ball's centre over the profile plane, mm, with its side.
     pub height: f64,
@@ -29,6 +33,7 @@ pub struct ProfileResidual {
 /// What [`solve`] found.
 #[derive(Clone, Debug)]
 pub struct BallFit {
+    /// The sensor on the flange, mm.
     pub flange_from_sensor: Rigid<Flange, Sensor>,
     /// Ball's centre in the base frame, mm.
     pub ball: Vec3,
@@ -38,10 +43,13 @@ pub struct BallFit {
     pub point_sigma: f64,
     /// Sigma of the robot's position as the ball sees it, per axis, mm.
     pub robot_sigma: f64,
+    /// On which side of the profile plane the ball's centre lies, in most profiles.
     pub side: Side,
     /// By how much the other side fits worse (squared Mahalanobis distance); infinite where it has no solution.
     pub side_margin: f64,
+    /// One a profile, in the order given.
     pub profiles: Vec<ProfileResidual>,
+    /// Squared Mahalanobis distances over their degrees of freedom; near 1.
     pub chi2: f64,
 }
 

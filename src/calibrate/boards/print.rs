@@ -8,7 +8,9 @@ use std::fmt::Write;
 /// Black shapes on a white sheet.
 #[derive(Clone, Debug, Default)]
 pub struct Sheet {
+    /// Across the sheet, mm: the board with its border.
     pub width: f64,
+    /// Down the sheet, mm: the board with its border, and 12 mm for label and rule.
     pub height: f64,
     /// x, y, width, height.
     pub rectangles: Vec<[f64; 4]>,

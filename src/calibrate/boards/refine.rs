@@ -8,12 +8,16 @@ use nalgebra::{SMatrix, SVector};
 
 /// A grey picture as the fits want it.
 pub struct Grey {
+    /// Columns, px.
     pub width: usize,
+    /// Rows, px.
     pub height: usize,
+    /// Grey levels as the picture has them, row by row from the top left.
     pub levels: Vec<f32>,
 }
 
 impl Grey {
+    /// All pixels of a picture.
     pub fn new(image: &crate::raster::Image) -> Grey {
         Grey { width: image.width as usize, height: image.height as usize, levels: image.to_f32() }
     }
@@ -44,6 +48,7 @@ impl Grey {
 /// A refined corner.
 #[derive(Clone, Copy, Debug)]
 pub struct Corner {
+    /// Where it is, px.
     pub pixel: Vec2,
     /// Standard deviation per axis, px, from the pixels' own residuals.
     pub sigma_px: f64,

@@ -9,6 +9,7 @@ use crate::geometry::Vec2;
 pub struct BoardPoint {
     /// Index into [`crate::recording::BoardSpec::features`].
     pub feature_id: usize,
+    /// Where it was seen, px.
     pub pixel: Vec2,
     /// Standard deviation per axis, px.
     pub sigma_px: f64,
@@ -17,6 +18,7 @@ pub struct BoardPoint {
 /// A board as seen in one picture.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct BoardView {
+    /// The features that were found.
     pub points: Vec<BoardPoint>,
     /// The board looks the same after a half (or quarter) turn: which of [`super::turns`] holds is unknown
     /// here and must come from the whole set.
@@ -48,6 +50,7 @@ impl Default for FindOptions {
 }
 
 impl FindOptions {
+    /// Refuses values out of the ranges that the fields state.
     pub fn check(&self) -> Result<()> {
         let ranges = [
             ("reach", self.reach, 0.2, 0.48),

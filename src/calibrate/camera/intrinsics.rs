@@ -17,15 +17,18 @@ use crate::solve::{LmOptions, Loss, Solution, Stop};
 /// A picture of a board: its name for messages, the board's features, what was seen of them.
 #[derive(Clone, Debug)]
 pub struct Observation {
+    /// Of the picture.
     pub name: String,
     /// Positions in the board frame, mm; `BoardPoint::feature_id` indexes them.
     pub features: std::sync::Arc<Vec<Vec3>>,
+    /// What was seen of the features, px.
     pub view: BoardView,
 }
 
 /// Settings of the camera solve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SolveOptions {
+    /// Which terms of the lens are estimated.
     pub lens: Lens,
     /// Estimate the skew; false for every sensor with square rows.
     pub skew: bool,
@@ -44,6 +47,7 @@ impl Default for SolveOptions {
 /// A solved camera.
 #[derive(Clone, Debug)]
 pub struct Solved {
+    /// The camera that explains all pictures together.
     pub intrinsics: Intrinsics,
     /// One a picture.
     pub camera_from_board: Vec<Rigid<Camera, Board>>,
@@ -60,6 +64,7 @@ pub struct Solved {
     pub sigma0: f64,
     /// Reciprocal condition of the normal equations.
     pub condition: f64,
+    /// Steps that the last solve took.
     pub iterations: usize,
 }
 

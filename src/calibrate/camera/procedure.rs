@@ -18,7 +18,9 @@ use std::collections::BTreeMap;
 /// Settings of [`calibrate`].
 #[derive(Clone, Debug, Default)]
 pub struct CameraOptions {
+    /// Of the search for the board.
     pub find: FindOptions,
+    /// Of the solve.
     pub solve: SolveOptions,
     /// Distance at which the expected error in mm is stated; the median distance of the boards where
     /// it is not given. Above 0 mm.
@@ -26,6 +28,7 @@ pub struct CameraOptions {
 }
 
 impl CameraOptions {
+    /// Refuses values out of the ranges that the fields state.
     pub fn check(&self) -> Result<()> {
         self.find.check()?;
         match self.working_distance_mm {
@@ -41,9 +44,11 @@ impl CameraOptions {
 /// A camera calibration with everything a report shows.
 #[derive(Clone, Debug)]
 pub struct CameraResult {
+    /// As it is stored.
     pub calibration: Calibration<Intrinsics>,
     /// Pictures that went in, in order; `solved` is indexed alike.
     pub used: Vec<Observation>,
+    /// The camera with every board's pose and every corner's residual.
     pub solved: Solved,
     /// Pictures left out: name and reason.
     pub left_out: Vec<(String, String)>,

@@ -64,7 +64,9 @@ fn alone(k: &Intrinsics, o: &Observation) -> Option<f64> {
 
 /// A picture worth taking, in words, and the expected ray error with it, px.
 pub struct NextPicture {
+    /// Where to hold the board, and how tilted.
     pub words: String,
+    /// Expected error of a viewing ray once it is taken, px.
     pub expected_px: f64,
 }
 

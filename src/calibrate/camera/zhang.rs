@@ -9,8 +9,11 @@ use nalgebra::{DMatrix, Matrix5, Vector5};
 
 /// One plane as seen: where its points are, where they were seen, and the homography between.
 pub struct Seen {
+    /// Places in the plane, in its unit.
     pub plane: Vec<Vec2>,
+    /// Where they were seen, px; same order.
     pub pixels: Vec<Vec2>,
+    /// Maps places in the plane to pixels, both homogeneous.
     pub homography: Mat3,
 }
 

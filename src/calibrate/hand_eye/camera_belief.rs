@@ -10,17 +10,21 @@ use crate::camera::{Intrinsics, ParameterCovariance, Parameters};
 /// The root has no inverse where a parameter counts as known.
 #[derive(Clone, Copy, Debug)]
 pub struct CameraBelief {
+    /// Expected change, in the order and units of [`crate::camera::NAMES`].
     pub mean: Parameters,
+    /// A root of the change's covariance: z has the columns, the parameters have the rows.
     pub root: ParameterCovariance,
 }
 
 /// A belief after pictures were seen.
 pub struct Sharpened {
+    /// What is believed now.
     pub belief: CameraBelief,
     /// New z by the old one: how the belief follows the camera that was given.
     pub by_given: ParameterCovariance,
     /// Squared Mahalanobis distance of what the pictures say from what was given, and its degrees of freedom.
     pub surprise: f64,
+    /// Directions of z that the pictures say something about.
     pub freedom: f64,
 }
 
@@ -43,6 +47,7 @@ impl CameraBelief {
         (0..self.root.ncols()).filter(|&i| self.root.column(i).amax() > 0.0).collect()
     }
 
+    /// Of the change of the camera's parameters.
     pub fn covariance(&self) -> ParameterCovariance {
         self.root * self.root.transpose()
     }

@@ -23,14 +23,18 @@ impl Frame for Far {
 /// One pair: what the robot said and what the camera saw.
 #[derive(Clone, Debug)]
 pub struct Pair {
+    /// The robot's pose: flange_from_base with eye in hand, base_from_flange with eye to hand; mm.
     pub near_from_far: Rigid<Near, Far>,
+    /// The board's pose as the camera measured it.
     pub seen: MeasuredPose,
 }
 
 /// Both unknowns of the chain camera ← near ← far ← board.
 #[derive(Clone, Copy, Debug)]
 pub struct Chain {
+    /// The hand-eye transform, mm.
     pub near_from_camera: Rigid<Near, Camera>,
+    /// Where the board is fixed, mm.
     pub far_from_board: Rigid<Far, Board>,
 }
 
@@ -147,6 +151,7 @@ fn mean_board(pairs: &[&Pair], near_from_camera: &Rigid<Near, Camera>) -> Rigid<
 /// The pairs that agree with each other.
 #[derive(Clone, Debug)]
 pub struct Agreement {
+    /// The closed form of the agreeing pairs.
     pub chain: Chain,
     /// Indices of the agreeing pairs, ascending.
     pub agreeing: Vec<usize>,

@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, SMatrix};
 /// Expected error of a point on the optical axis, mm rms over the three axes together.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExpectedError {
+    /// Of the point seen with the given camera; robot, pixels and that camera's error together.
     pub whole: f64,
     /// The share of it that the given camera makes: its viewing ray and, by way of the fit, the hand-eye transform.
     pub from_camera: f64,

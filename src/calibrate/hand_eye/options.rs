@@ -40,6 +40,7 @@ impl Default for HandEyeOptions {
 }
 
 impl HandEyeOptions {
+    /// Refuses values out of the ranges that the fields state.
     pub fn check(&self) -> Result<()> {
         let bad = |name: &str, value: f64, range: &str| {
             Err(Fault::usage(format!("{name} is {value}, {range} is allowed")).next("choose a value in that range"))
@@ -67,15 +68,20 @@ impl HandEyeOptions {
 /// that were given without sigmas the factor is their turn's, rad.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
+    /// Position, per axis, mm.
     pub robot_mm: f64,
+    /// Orientation, per axis, rad.
     pub robot_rad: f64,
+    /// Times a feature's stated sigma is its true one; rad for board poses without sigmas.
     pub feature_factor: f64,
 }
 
 /// Where the flange is, as the noise of its pose moves the board in the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mount {
+    /// On the camera's side: it carries the camera, and the board stands still.
     EyeInHand,
+    /// On the board's side: it carries the board, and the camera stands still.
     EyeToHand,
 }
 

@@ -38,6 +38,7 @@ impl Default for LaserPlaneOptions {
 }
 
 impl LaserPlaneOptions {
+    /// Refuses values out of the ranges that the fields state.
     pub fn check(&self) -> Result<()> {
         let ranges = [
             ("edge_widths", self.edge_widths, 0.0, 20.0),

@@ -18,6 +18,7 @@ use std::collections::BTreeMap;
 /// Names of the plane's covariance parameters.
 pub const PLANE_NAMES: [&str; 4] = ["nx", "ny", "nz", "offset_mm"];
 
+/// Under [`PLANE_NAMES`]; camera uncertainty included.
 pub fn covariance(fit: &LaserPlaneFit) -> Covariance {
     Covariance::new(&PLANE_NAMES, &fit.covariance)
 }

@@ -21,6 +21,7 @@ use nalgebra::{DMatrix, Matrix6};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PeakUse {
+    /// In the fit.
     Used,
     /// Not on the board: dots, halos, the background, reflections beside it.
     OffBoard,
@@ -35,15 +36,21 @@ pub enum PeakUse {
 /// How one picture fits.
 #[derive(Clone, Debug)]
 pub struct ViewResidual {
+    /// Of the picture.
     pub name: String,
+    /// In the fit; false: it was left out.
     pub used: bool,
+    /// How many were found in the picture.
     pub peaks: usize,
+    /// How many of them are in the fit.
     pub peaks_used: usize,
     /// rms of the used peaks' distance from the fitted stripe, px and mm.
     pub px: f64,
+    /// rms of the used peaks' distance from the laser plane, mm.
     pub mm: f64,
     /// The same against the plane fitted without this picture.
     pub holdout_px: f64,
+    /// rms of their distance from the plane fitted without this picture, mm.
     pub holdout_mm: f64,
     /// Squared distance of its stripe from where the others predict it, in sigmas of both; 2 is usual.
     pub surprise: f64,
@@ -58,10 +65,13 @@ pub struct ViewResidual {
 /// What [`solve`] found.
 #[derive(Clone, Debug)]
 pub struct LaserPlaneFit {
+    /// The sheet of light, mm.
     pub plane: Plane<Camera>,
     /// nx ny nz offset_mm, rank 3; what pixels, poses and the pictures' scatter say, camera uncertainty included.
     pub covariance: DMatrix<f64>,
+    /// The same with the camera taken as exact.
     pub covariance_camera_exact: DMatrix<f64>,
+    /// One a view, in the order given.
     pub views: Vec<ViewResidual>,
     /// One a peak, by view.
     pub uses: Vec<Vec<PeakUse>>,

@@ -19,7 +19,10 @@ pub struct StripePeak {
 /// One board with the stripe on it.
 #[derive(Clone, Debug)]
 pub struct StripeView {
+    /// The board before the camera, as the picture measured it.
     pub pose: MeasuredPose,
+    /// How it is printed: peaks at its edges do not count.
     pub board: BoardSpec,
+    /// The stripe's peaks in the whole picture, on the board and beside it.
     pub peaks: Vec<StripePeak>,
 }

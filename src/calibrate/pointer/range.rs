@@ -14,7 +14,9 @@ pub const RIG: usize = 6 + PARAMETERS;
 pub const SHARED: usize = RIG + 6;
 /// Derivatives of a point by what it was computed from.
 pub type ByRig = SMatrix<f64, 3, RIG>;
+/// Rows and columns: the beam's ox oy oz (mm) dx dy dz, then the camera's ([`NAMES`]).
 pub type RigCovariance = SMatrix<f64, RIG, RIG>;
+/// The same, then the hand-eye transform's tx ty tz (mm) rx ry rz (rad).
 pub type SharedCovariance = SMatrix<f64, SHARED, SHARED>;
 
 /// A point that the pointer touched.
@@ -22,9 +24,11 @@ pub type SharedCovariance = SMatrix<f64, SHARED, SHARED>;
 pub struct Ranged {
     /// Distance from the beam's origin along the beam, mm.
     pub along_beam: f64,
+    /// Its standard deviation, mm.
     pub along_beam_sigma: f64,
     /// Distance from the camera along its optical axis, mm.
     pub along_axis: f64,
+    /// Its standard deviation, mm.
     pub along_axis_sigma: f64,
     /// Camera frame, mm.
     pub point: Vec3,
@@ -36,6 +40,7 @@ pub struct Ranged {
     pub by_rig: ByRig,
     /// Distance of the spot from the beam's image, px, and in sigmas.
     pub off_beam_px: f64,
+    /// Distance of the spot from the beam's image, in sigmas.
     pub off_beam_sigmas: f64,
 }
 
@@ -133,6 +138,7 @@ fn nearest(pixel: &Vec2, whitener: &Matrix2<f64>, camera: &Intrinsics, beam: &Ra
 /// A ranged point in the base frame, its shared parts kept apart.
 #[derive(Clone, Debug)]
 pub struct BasePoint {
+    /// Base frame, mm.
     pub point: Vec3,
     /// mm²; everything.
     pub covariance: Mat3,
@@ -147,7 +153,9 @@ pub struct BasePoint {
 /// The robot's noise per axis that an error budget takes over from the hand-eye calibration.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RobotNoise {
+    /// Position, 1 sigma per axis, mm.
     pub mm: f64,
+    /// Orientation, 1 sigma per axis, rad.
     pub rad: f64,
 }
 

@@ -12,6 +12,7 @@ use crate::rig::{Covariance, Quality, Verdict};
 use nalgebra::Matrix2;
 use std::collections::BTreeMap;
 
+/// Of the beam and the camera it was found with, under the names that the pointer's file has.
 pub fn covariance(fit: &PointerFit) -> Covariance {
     let camera: ParameterCovariance = fit.covariance.fixed_view::<PARAMETERS, PARAMETERS>(6, 6).into();
     let kept: Vec<usize> = (0..6).chain(named(&camera).into_iter().map(|i| 6 + i)).collect();

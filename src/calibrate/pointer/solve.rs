@@ -13,7 +13,9 @@ use nalgebra::{DMatrix, Matrix2, Matrix6, SMatrix};
 /// One board with the pointer's spot on it.
 #[derive(Clone, Debug)]
 pub struct SpotView {
+    /// The board before the camera, as the picture measured it.
     pub pose: MeasuredPose,
+    /// The spot's centre, px.
     pub pixel: Vec2,
     /// px².
     pub covariance: Matrix2<f64>,
@@ -40,6 +42,7 @@ impl Default for PointerOptions {
 }
 
 impl PointerOptions {
+    /// Refuses values out of the ranges that the fields state.
     pub fn check(&self) -> Result<()> {
         let ranges = [
             ("gate", self.gate, 9.0, 1000.0),
@@ -60,14 +63,21 @@ impl PointerOptions {
 /// How one spot fits.
 #[derive(Clone, Debug)]
 pub struct SpotResidual {
+    /// Of the picture.
     pub name: String,
+    /// In the fit; false: it disagreed and was left out.
     pub used: bool,
     /// Distance along the optical axis, mm.
     pub depth: f64,
+    /// Distance of the spot from where the beam meets the board, px.
     pub px: f64,
+    /// The same on the board, mm.
     pub mm: f64,
+    /// `px` with the spot left out of the fit; infinite where the others determine nothing.
     pub holdout_px: f64,
+    /// `mm` with the spot left out of the fit; infinite where the others determine nothing.
     pub holdout_mm: f64,
+    /// Squared Mahalanobis distance, 2 degrees of freedom.
     pub distance2: f64,
     /// The same over what is usual among these spots, where that is more than chance.
     pub beside: f64,
@@ -76,12 +86,14 @@ pub struct SpotResidual {
 /// What [`solve`] found.
 #[derive(Clone, Debug)]
 pub struct PointerFit {
+    /// The beam, mm.
     pub beam: Ray<Camera>,
     /// ox oy oz (mm) dx dy dz, then the camera's ([`crate::camera::NAMES`]). The beam was found with this
     /// camera, so their errors belong together.
     pub covariance: DMatrix<f64>,
     /// The beam's 6x6 with the camera taken as exact.
     pub covariance_camera_exact: DMatrix<f64>,
+    /// One a view, in the order given.
     pub spots: Vec<SpotResidual>,
     /// sqrt of chi² over its degrees of freedom.
     pub sigma_ratio: f64,

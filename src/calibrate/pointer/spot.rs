@@ -30,6 +30,7 @@ impl Default for SpotOptions {
 }
 
 impl SpotOptions {
+    /// Refuses values out of the ranges that the fields state.
     pub fn check(&self) -> Result<()> {
         let ranges = [
             ("speckle", self.speckle.unwrap_or(0.1), 0.005, 1.0),
@@ -51,6 +52,7 @@ impl SpotOptions {
 /// A spot's centre.
 #[derive(Clone, Copy, Debug)]
 pub struct Spot {
+    /// Its centre, px.
     pub pixel: Vec2,
     /// px².
     pub covariance: Matrix2<f64>,
@@ -58,6 +60,7 @@ pub struct Spot {
     pub width_px: f64,
     /// Peak above the background, grey levels; beyond full scale where it saturates.
     pub amplitude: f64,
+    /// How many pixels of its window are at full scale.
     pub saturated_pixels: usize,
     /// Light of the brightest other spot over this one's.
     pub rival: f64,
@@ -192,7 +195,9 @@ impl Problem for SpotProblem<'_> {
 /// What a spot is looked for in.
 #[derive(Clone, Copy)]
 pub struct SpotPicture<'a> {
+    /// As messages call it.
     pub name: &'a str,
+    /// The picture with the laser on.
     pub laser: &'a Image,
     /// The same view in room light, where the spot lies on a printed board: its print modulates the spot.
     pub ambient: Option<&'a Image>,

@@ -25,6 +25,7 @@ pub struct Page {
 }
 
 impl Page {
+    /// Empty, under this title.
     pub fn new(title: &str) -> Page {
         Page { title: title.into(), body: String::new() }
     }
@@ -47,6 +48,7 @@ impl Page {
         self.body.push_str("</section>");
         self
     }
+    /// Plain text; characters that HTML reads are escaped.
     pub fn paragraph(&mut self, text: &str) -> &mut Page {
         let _ = write!(self.body, "<p>{}</p>", escape(text));
         self
@@ -79,6 +81,7 @@ impl Page {
             env!("CARGO_PKG_VERSION")
         )
     }
+    /// Writes the page as one file.
     pub fn save(&self, path: &Path) -> Result<()> {
         crate::files::write(path, self.html().as_bytes())
     }

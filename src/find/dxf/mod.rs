@@ -18,7 +18,9 @@ use curves::{Curve, Form as Drawn};
 /// A unit of length of a drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unit {
+    /// mm, inch, cm, m, um, mil or foot.
     pub name: &'static str,
+    /// Its length, mm.
     pub mm: f64,
     /// Its number in $INSUNITS.
     code: i64,
@@ -59,7 +61,9 @@ pub struct DxfOptions {
 /// A drawing that was read.
 #[derive(Clone, Debug)]
 pub struct Imported {
+    /// The part's shapes; part frame, mm.
     pub drawing: Drawing,
+    /// Name of the unit that the drawing is in, see [`Unit::name`].
     pub unit: &'static str,
     /// The part frame's origin in the drawing, in the drawing's unit.
     pub origin: [f64; 2],

@@ -15,9 +15,11 @@ use nalgebra::Matrix6;
 /// One line of the budget.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Term {
+    /// Source of the uncertainty, e.g. "laser plane".
     pub name: &'static str,
     /// x, y, z of the part, mm; `None` where the source does not know its uncertainty.
     pub sigma_mm: Option<[f64; 3]>,
+    /// Turns about x, y, z of the part, degrees; `None` where the source does not know its uncertainty.
     pub sigma_deg: Option<[f64; 3]>,
     /// Where the number comes from, or why there is none.
     pub note: String,
@@ -26,11 +28,15 @@ pub struct Term {
 /// The budget and its sum over the terms that are known.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Budget {
+    /// One a source; "peak noise" is contained in "match" and not added again.
     pub terms: Vec<Term>,
+    /// One standard deviation along x, y, z of the part, mm.
     pub sigma_mm: [f64; 3],
+    /// One standard deviation of the turns about x, y, z of the part, degrees.
     pub sigma_deg: [f64; 3],
     /// False where a term is unknown: the sum is then a lower bound.
     pub complete: bool,
+    /// Of the pose, 6 x 6 over x y z rx ry rz along the part's own axes, mm and rad.
     #[serde(skip)]
     pub covariance: Matrix6<f64>,
     /// What belongs to this look alone: match and robot, the part's axes.
@@ -45,6 +51,7 @@ pub struct Budget {
     /// How the part was seen, and how the camera stood over its middle.
     #[serde(skip)]
     pub seen: Option<PartSeen>,
+    /// The camera over the part's middle, mm; `None` where the scan does not fit the rig.
     #[serde(skip)]
     pub base_from_camera: Option<Rigid<Base, Camera>>,
 }

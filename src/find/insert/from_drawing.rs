@@ -9,11 +9,13 @@ use crate::find::model::drawing::Drawing;
 /// What a drawing does not say.
 #[derive(Clone, Debug)]
 pub struct TaskOptions {
+    /// What the recipe and its files are called.
     pub name: String,
     /// Edge of a cell of the map that is searched, mm.
     pub cell_mm: f64,
     /// How many turns about z make the part look nearly alike.
     pub alike_turns: u32,
+    /// Where the tool goes, and what the insertion bears.
     pub insertion: InsertionSpec,
 }
 

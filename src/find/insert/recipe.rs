@@ -19,7 +19,9 @@ use std::path::Path;
 pub struct Recipe {
     /// Version of this format: 1.
     pub format: u32,
+    /// What messages and files call the part.
     pub name: String,
+    /// For people; may be empty.
     #[serde(default)]
     pub title: String,
     /// Edge of a cell of the map that is searched, mm, 0.0001 to 500. About two sampling steps.
@@ -31,19 +33,26 @@ pub struct Recipe {
     /// seen where they differ. 1 to 8.
     #[serde(default = "one")]
     pub alike_turns: u32,
+    /// How the part is searched in the map.
     #[serde(default)]
     pub search: SearchOptions,
+    /// How the drawing becomes the edge places of the search.
     #[serde(default)]
     pub model: ModelOptions,
+    /// How the pose is measured on the points.
     #[serde(default)]
     pub measure: MeasureOptions,
     /// The drawing; the first shape lies on the datum surface.
     pub shape: Vec<Shape>,
+    /// Points, lines and lattices built on the measured part; later ones may use earlier ones.
     #[serde(default)]
     pub construction: Vec<Construction>,
+    /// Where the tool goes, and what the insertion bears.
     pub insertion: InsertionSpec,
+    /// Below which quality no pose leaves.
     #[serde(default)]
     pub gates: Gates,
+    /// What the robot adds to the uncertainty.
     #[serde(default)]
     pub robot: RobotSpec,
 }
@@ -58,6 +67,7 @@ pub struct InsertionSpec {
     /// The paper's construction and the lattice fit, whose disagreement is reported and gated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub two_pin: Option<String>,
+    /// Name of the lattice construction that `two_pin` is compared with.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lattice: Option<String>,
     /// The tool's origin in the part frame, mm.
@@ -68,9 +78,11 @@ pub struct InsertionSpec {
     pub turn_deg: f64,
     /// Distances above the insertion pose along the part's z, mm, 0 to 1000.
     pub approach_mm: f64,
+    /// The same for the way back, mm, 0 to 1000.
     pub retract_mm: f64,
     /// What the insertion bears: 3 sigma in the plane must stay within it, mm and degrees.
     pub tolerance_mm: f64,
+    /// Of any turn, 3 sigma, degrees, 0.001 to 10.
     pub tolerance_deg: f64,
 }
 
@@ -144,6 +156,7 @@ pub struct Gates {
     /// Least turn about the part's normal and least tilt against it from one look to the other, degrees, 0 to 180 and 0 to 60:
     /// looks from one side make the same error twice.
     pub min_look_turn_deg: f64,
+    /// Least tilt against the part's normal from one look to the other, degrees, 0 to 60.
     pub min_look_tilt_deg: f64,
     /// Largest error along the part's normal that several looks may leave unseen, mm, 0.00001 to 100; in the plane and as a turn
     /// the insertion's tolerances hold.
@@ -178,6 +191,7 @@ impl Default for Gates {
 pub struct RobotSpec {
     /// Standard deviation of a reached position, mm, and turn, degrees: its repeatability.
     pub sigma_mm: f64,
+    /// Standard deviation of a reached turn about each axis, degrees, 0 to 10.
     pub sigma_deg: f64,
 }
 
@@ -198,6 +212,10 @@ fn pose() -> String {
 }
 
 impl Recipe {
+    /// Reads a recipe from a file.
+    ///
+    /// # Errors
+    /// A file that cannot be read, and what [`Recipe::parse`] refuses.
     pub fn load(path: &Path) -> Result<Recipe> {
         let text = crate::files::read_text(path)?;
         Recipe::parse(&text).map_err(|e| e.at(path.display()))
@@ -218,10 +236,12 @@ impl Recipe {
         Ok(recipe)
     }
 
+    /// The shapes alone; part frame, mm.
     pub fn drawing(&self) -> Drawing {
         Drawing { shape: self.shape.clone() }
     }
 
+    /// Refuses values out of range, a drawing without a surface, and names that refer to nothing.
     pub fn check(&self) -> Result<()> {
         let range = |name: &str, v: f64, a: f64, b: f64| {
             if (a..=b).contains(&v) {

@@ -17,6 +17,7 @@ use crate::scan::{CloudPoint, HeightMap};
 /// A few clicks' worth of numbers.
 #[derive(Clone, Debug)]
 pub struct TeachOptions {
+    /// What the recipe and its files are called.
     pub name: String,
     /// Two opposite corners of the body's outline: x0 y0 x1 y1 in the grid, mm. The part's origin is its
     /// centre, its x axis the grid's x turned by `angle_deg`.
@@ -27,6 +28,7 @@ pub struct TeachOptions {
     pub windows: Vec<[f64; 4]>,
     /// Round holes: centre x y and radius.
     pub holes: Vec<[f64; 3]>,
+    /// Where the tool goes, and what the insertion bears; the recipe takes it over.
     pub insertion: InsertionSpec,
 }
 

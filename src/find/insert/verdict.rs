@@ -16,9 +16,11 @@ use crate::geometry::{Base, Part, Rigid, Vec3};
 pub struct Agreement {
     /// Share of the points inside surfaces that lie on them, and how many points that were.
     pub on_surface: f64,
+    /// Points inside surfaces, those near edges not counted.
     pub surface_points: usize,
     /// Share of the points in holes and beside the part that do not lie on a surface, and how many.
     pub beside: f64,
+    /// Points in holes and beside the part, those near edges not counted.
     pub beside_points: usize,
     /// The smaller of the two.
     pub agreement: f64,
@@ -134,6 +136,7 @@ pub struct TurnVote {
     pub rival_deg: f64,
     /// Points where the two differ that speak for and against the pose.
     pub votes_for: usize,
+    /// Points that speak for the rival.
     pub votes_against: usize,
 }
 

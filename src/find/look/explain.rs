@@ -9,6 +9,7 @@ use nalgebra::{DMatrix, DVector, Matrix6, SVector};
 /// How much of the disagreement one calibration would explain, if it were free to be wrong, and what it could hide.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Explanation {
+    /// The calibration, or what nobody stated, e.g. "delay".
     pub name: &'static str,
     /// Share of the squared disagreement that goes away, 0 to 1.
     pub share: f64,
@@ -19,7 +20,9 @@ pub struct Explanation {
     /// Largest error of the agreed pose, along the part's axes, that an error along one axis of its covariance alone can make
     /// and be noticed by a gate in 95 of 100 cases only; and that error, in its own sigmas, where it moves the part most.
     pub unseen_mm: [f64; 3],
+    /// The same of the turns about the part's axes, degrees.
     pub unseen_deg: [f64; 3],
+    /// Size of that error in its own sigmas, where it moves the part most.
     pub unnoticed_sigmas: f64,
 }
 

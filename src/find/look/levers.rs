@@ -16,6 +16,7 @@ pub type Answer = SVector<f64, NUMBERS>;
 
 /// Names of the levers of what carries the sensor or the part.
 pub const HAND_EYE: &str = "hand-eye";
+/// Name of the lever of a linear axis or a turntable.
 pub const AXIS: &str = "axis";
 
 /// A place that was scanned.
@@ -23,15 +24,18 @@ pub const AXIS: &str = "axis";
 pub struct Seen {
     /// In the camera, on the laser plane.
     pub at: Vec3,
+    /// Where the camera stood at that shot, mm.
     pub base_from_camera: Rigid<Base, Camera>,
     /// By how much the place would be put elsewhere with the pose of the next shot, and with steps twice as long.
     pub late: Vec3,
+    /// The displacement with steps twice as long, base frame, mm.
     pub longer: Vec3,
 }
 
 /// What an error of one calibration does. Two looks share the error; where their levers differ, they disagree.
 #[derive(Clone, Debug)]
 pub struct Lever {
+    /// The calibration, or what is only supposed, e.g. "delay".
     pub name: &'static str,
     /// The calibration's parameters, with units.
     pub parameters: &'static [&'static str],

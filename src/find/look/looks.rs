@@ -16,13 +16,17 @@ pub use super::stack::{Look, Witness};
 /// What the looks disagree about.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Disagreement {
+    /// Number of looks that were compared.
     pub looks: usize,
     /// The two looks that disagree most, counted from 1.
     pub between: [usize; 2],
     /// Second less first, along the part's axes, and what all covariances make expect (one standard deviation).
     pub difference_mm: [f64; 3],
+    /// Turn of the second against the first, about the part's axes, degrees.
     pub difference_deg: [f64; 3],
+    /// One standard deviation of the difference along the part's axes, mm.
     pub expected_mm: [f64; 3],
+    /// One standard deviation of the turn about the part's axes, degrees.
     pub expected_deg: [f64; 3],
     /// The largest of the six differences over its expected value.
     pub ratio: f64,
@@ -31,12 +35,15 @@ pub struct Disagreement {
     /// Largest turn about the part's normal and largest tilt against it between two looks, degrees; 0 where the stations are
     /// not known.
     pub turn_deg: f64,
+    /// Largest tilt against the part's normal between two looks, degrees.
     pub tilt_deg: f64,
     /// Which calibration explains it best comes first; empty where none has a covariance.
     pub explained_by: Vec<Explanation>,
     /// The largest of what these could hide: in the part's plane, along its normal, as a turn.
     pub unseen_in_plane_mm: f64,
+    /// The largest along the part's normal, mm.
     pub unseen_height_mm: f64,
+    /// The largest turn about any of the part's axes, degrees.
     pub unseen_deg: f64,
     /// A calibration without covariance takes part: more disagreement than expected may be its share, and what it could hide
     /// is not known.
@@ -49,19 +56,24 @@ pub struct Disagreement {
 /// Heights that something else measured on the part, against the agreed pose.
 #[derive(Clone, Copy, Debug, serde::Serialize)]
 pub struct Witnessed {
+    /// Number of heights that were measured.
     pub places: usize,
     /// Measured less agreed, weighted mean, and what all covariances make expect of it, mm.
     pub height_mm: f64,
+    /// One standard deviation that all covariances make expect of that mean, mm.
     pub expected_mm: f64,
+    /// Size of the mean over its expected value.
     pub ratio: f64,
 }
 
 /// What several looks say together.
 #[derive(Clone, Debug)]
 pub struct Agreed {
+    /// Pose of least variance over all looks, base frame, mm.
     pub base_from_part: Rigid<Base, Part>,
     /// Over x y z rx ry rz about the part's own axes.
     pub covariance: Matrix6<f64>,
+    /// How far the looks contradict each other.
     pub disagreement: Disagreement,
 }
 

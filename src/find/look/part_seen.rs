@@ -21,6 +21,7 @@ const MIN_PLACES: usize = 20;
 /// A part as a rig saw it.
 #[derive(Clone, Debug)]
 pub struct PartSeen {
+    /// The part's measured pose, mm.
     pub base_from_part: Rigid<Base, Part>,
     seen: Vec<Seen>,
     /// Places and normals of the edges that located the part.

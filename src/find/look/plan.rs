@@ -12,7 +12,9 @@ use crate::rig::Rig;
 /// What the looks can show of one number of one calibration.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Shown {
+    /// Its name, see [`Lever::name`].
     pub calibration: &'static str,
+    /// The number, with its unit.
     pub parameter: &'static str,
     /// Difference between the looks over the error that it makes in the pose: in place and height, mm over mm. Below
     /// `HIDDEN` the looks cannot show it.
@@ -24,6 +26,7 @@ pub struct Shown {
 pub struct LookPlan {
     /// The sensor's motion: every pose of the first scan is moved by it.
     pub base_from_base: Rigid<Base, Base>,
+    /// One entry a number of each calibration.
     pub shown: Vec<Shown>,
 }
 

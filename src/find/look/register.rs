@@ -19,9 +19,11 @@ type Vector6 = SVector<f64, 6>;
 pub struct Registered {
     /// Base axes about the object's middle, moved by what the scan differs by.
     pub base_from_object: Rigid<Base, Part>,
+    /// How uncertain that is, and how the rig's errors move it.
     pub budget: Budget,
     /// Share of its pieces of surface that lie on the first scan's, and their distance from it, rms, mm.
     pub overlap: f64,
+    /// Distance of these pieces from the first scan's surfaces, rms, mm.
     pub rms_mm: f64,
 }
 

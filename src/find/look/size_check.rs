@@ -13,7 +13,9 @@ use nalgebra::{Matrix3, SMatrix, Vector2};
 pub struct SizeCheck {
     /// Along the stripe, from shot to shot, and what the first is longer than the second: percent.
     pub along_percent: f64,
+    /// From shot to shot, percent longer than drawn.
     pub across_percent: f64,
+    /// What the first is longer than the second, percent.
     pub difference_percent: f64,
     /// Of the angle between the two directions, degrees.
     pub shear_deg: f64,

@@ -14,7 +14,9 @@ pub(in crate::find) type Vector6 = SVector<f64, 6>;
 /// One look at the part.
 #[derive(Clone, Copy)]
 pub struct Look<'a> {
+    /// The part's pose as this look found it, mm.
     pub base_from_part: Rigid<Base, Part>,
+    /// Its uncertainty, and the levers that it shares with other looks.
     pub budget: &'a Budget,
 }
 

@@ -29,7 +29,9 @@ pub enum Build {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Construction {
+    /// By which the insertion and later constructions refer to it.
     pub name: String,
+    /// What is built.
     pub kind: Build,
     /// Shapes (`name`, `name[column,row]`) or earlier constructions.
     pub of: Vec<String>,
@@ -44,7 +46,9 @@ pub struct Construction {
 /// What a construction gives: a point, with a direction where it has one.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Value {
+    /// Along the part's x, mm.
     pub x: f64,
+    /// Along the part's y, mm.
     pub y: f64,
     /// Direction from the part's x, rad; `None` for a bare point.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -56,11 +60,15 @@ pub struct Value {
 /// A construction's outcome.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Built {
+    /// The construction's name in the recipe.
     pub name: String,
+    /// Built from the measured shapes; part frame.
     pub measured: Value,
+    /// Built from the drawing; part frame, sigma 0.
     pub nominal: Value,
     /// Measured less nominal, mm, and the same of the direction, degrees.
     pub deviation_mm: [f64; 2],
+    /// Measured less nominal direction, degrees, -180 to 180; `None` for a bare point.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub deviation_deg: Option<f64>,
     /// How many measured shapes went in.
@@ -70,7 +78,9 @@ pub struct Built {
 /// A measured shape: its offset from the drawing.
 #[derive(Clone, Copy, Debug)]
 pub struct Feature {
+    /// Measured less drawn centre along the part's x and y, mm.
     pub offset: [f64; 2],
+    /// Standard deviation of the offset per axis, mm.
     pub sigma: f64,
 }
 

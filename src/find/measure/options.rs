@@ -34,6 +34,7 @@ impl MeasureOptions {
         self.margin_mm / 0.5
     }
 
+    /// Refuses options outside their ranges.
     pub fn check(&self) -> Result<()> {
         let range = |name: &str, v: f64, a: f64, b: f64| {
             if (a..=b).contains(&v) {

@@ -12,11 +12,15 @@ const NONE: u32 = u32::MAX;
 
 /// Points by shot and column.
 pub struct Ordered {
+    /// Place of each point in the cloud's frame, mm.
     pub points: Vec<Vec3>,
+    /// Stripe amplitude of each point, grey levels.
     pub intensity: Vec<f32>,
+    /// Standard deviation of each point along its worst direction, mm.
     pub sigma: Vec<f32>,
     /// Row (existing shots, ascending) and column of each point.
     pub row: Vec<u32>,
+    /// Pixel along the stripe, counted from the first that any shot reached.
     pub column: Vec<u32>,
     /// Shot number of each row.
     pub shot: Vec<u32>,

@@ -21,22 +21,28 @@ use nalgebra::{Matrix6, Vector3};
 /// A measured pose.
 #[derive(Clone, Debug)]
 pub struct Measured {
+    /// The measured pose, mm.
     pub base_from_part: Rigid<Base, Part>,
+    /// 6 x 6 over x y z rx ry rz about the part's own axes, mm and rad.
     pub covariance: Matrix6<f64>,
     /// Points that gave height and tilt, and their robust deviation, mm.
     pub surface_points: usize,
+    /// Robust deviation of these points from their faces, mm.
     pub surface_rms: f64,
     /// Surface ends at the drawn edges, and their robust deviation, mm.
     pub edges: usize,
+    /// Robust deviation of these ends from the drawn edges, mm.
     pub edge_rms: f64,
     /// Samples whose light gave place and turn, and its robust deviation as a share; 0 where too few were seen and the
     /// ends gave them.
     pub lit: usize,
+    /// Robust deviation of that light, as a share of a fully lit sample's.
     pub lit_rms: f64,
     /// How much farther than drawn surfaces reach along the stripe and from shot to shot, mm.
     pub growth: [f64; 2],
     /// Largest distance between neighbouring samples along the stripe and from shot to shot, mm.
     pub step: [f64; 2],
+    /// The surface ends themselves, those that locate nothing too.
     pub observations: Vec<Observation>,
     /// The part's sizes against the drawing; `None` where too few edges were seen.
     pub shape: Option<Shape>,

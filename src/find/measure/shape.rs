@@ -6,7 +6,9 @@ use nalgebra::{Matrix3, Vector3};
 /// Sizes against the drawing: lengths along the part's x and y and the shear between them.
 #[derive(Clone, Copy, Debug)]
 pub struct Shape {
+    /// How much longer than drawn along x and y, as shares, and the shear between them, rad.
     pub strain: Vector3<f64>,
+    /// Covariance of these three, 3 x 3 in the same order.
     pub covariance: Matrix3<f64>,
 }
 

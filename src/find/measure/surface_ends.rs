@@ -13,18 +13,25 @@ use crate::geometry::Vec3;
 pub struct Observation {
     /// Place in the part frame, mm.
     pub x: f64,
+    /// Along the part's y, mm.
     pub y: f64,
     /// Distance beyond the drawn edge (positive: the surface reaches farther), and the edge's normal.
     pub residual: f64,
+    /// x of the drawn edge's unit normal, away from the material.
     pub nx: f64,
+    /// y of the drawn edge's unit normal.
     pub ny: f64,
     /// 0 along the stripe, 1 from shot to shot.
     pub axis: usize,
+    /// Row of the ordered points, one a shot, whose sample ends there.
     pub row: u32,
+    /// Index of the drawing's shape that the edge belongs to.
     pub shape: usize,
+    /// Element of that shape's grid, row by row, from 0.
     pub element: usize,
     /// Took part in locating the part.
     pub locates: bool,
+    /// Weight in the robust fit, 0 to 1; stays 1 where the end does not locate.
     pub weight: f64,
 }
 

@@ -10,6 +10,7 @@ use crate::fault::{Fault, Result};
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Drawing {
+    /// In the order of the file; part frame, mm.
     pub shape: Vec<Shape>,
 }
 
@@ -22,6 +23,10 @@ const MOST_LENGTH_MM: f64 = 1e4;
 const MOST_BOX_MM2: f64 = 4e6;
 
 impl Drawing {
+    /// Parses TOML and checks it.
+    ///
+    /// # Errors
+    /// Text that is no drawing, and what [`Drawing::check`] refuses.
     pub fn parse(text: &str) -> Result<Drawing> {
         let drawing: Drawing = toml::from_str(text).map_err(|e| {
             Fault::input(format!("is not a drawing: {}", e.message()))

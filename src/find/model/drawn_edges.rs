@@ -25,10 +25,13 @@ struct Contour {
 /// A place on an edge of the drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeSample {
+    /// Along the part's x, mm.
     pub x: f64,
+    /// Along the part's y, mm.
     pub y: f64,
     /// Unit normal, away from the material (the high side).
     pub nx: f64,
+    /// y of that normal.
     pub ny: f64,
     /// Height of the high side.
     pub z: f64,
@@ -36,11 +39,15 @@ pub struct EdgeSample {
     pub either: bool,
     /// Size of the shape that the edge belongs to.
     pub extent: f64,
+    /// Used by the search for the part.
     pub search: bool,
+    /// Measured on the points: of closed shapes whose high side is known.
     pub measure: bool,
+    /// Takes part in locating the part.
     pub locates: bool,
     /// Index of the shape, and of the element of its grid (row by row).
     pub shape: usize,
+    /// Element of that shape's grid, row by row, from 0.
     pub element: usize,
     /// 1 / radius of a circle or an arc, positive where the material is inside, 1/mm; 0 for straight edges.
     pub curvature: f64,

@@ -25,6 +25,7 @@ fn key(unit: f64, x: f64, y: f64) -> (i32, i32) {
 }
 
 impl EdgeIndex {
+    /// The measurable edges of a drawing; `unit` is the recipe's unit of length, mm.
     pub fn new(drawing: &Drawing, unit: f64) -> EdgeIndex {
         let samples: Vec<EdgeSample> = drawing.samples(SPACING * unit).into_iter().filter(|s| s.measure).collect();
         let mut buckets: HashMap<(i32, i32), Vec<u32>> = HashMap::new();
@@ -33,6 +34,7 @@ impl EdgeIndex {
         }
         EdgeIndex { samples, unit, buckets }
     }
+    /// The recipe's unit of length, mm.
     pub fn unit(&self) -> f64 {
         self.unit
     }
@@ -63,9 +65,11 @@ impl EdgeIndex {
         let direction = (s.ny.atan2(s.nx) / std::f64::consts::FRAC_PI_4).round() as i32;
         (s.shape, s.element, direction, ((s.nx * y - s.ny * x) / (PIECE * self.unit)).floor() as i32)
     }
+    /// True where the drawing has no measurable edge.
     pub fn is_empty(&self) -> bool {
         self.samples.is_empty()
     }
+    /// Samples of all measurable edges, 0.05 units apart.
     pub fn samples(&self) -> &[EdgeSample] {
         &self.samples
     }

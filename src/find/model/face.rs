@@ -6,6 +6,7 @@ use super::outline::crosses;
 /// A level surface: union of the high shapes less the low ones at one height.
 #[derive(Clone, Debug)]
 pub struct Face {
+    /// Height along the part's z, mm.
     pub z: f64,
     high: Outlines,
     low: Outlines,

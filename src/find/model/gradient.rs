@@ -16,14 +16,20 @@ const MIN_SPREAD: f32 = 0.10;
 /// Slopes of a layer; both 0 and `seen` false where they cannot be known.
 #[derive(Clone, Debug)]
 pub struct Field {
+    /// Columns, px.
     pub width: usize,
+    /// Rows, px.
     pub height: usize,
+    /// Slope towards larger columns, the layer's unit per px; row-major.
     pub gx: Vec<f32>,
+    /// Slope towards larger rows, the layer's unit per px; row-major.
     pub gy: Vec<f32>,
+    /// Whether the slope is known; row-major.
     pub seen: Vec<bool>,
 }
 
 impl Field {
+    /// Steepness at cell `i` (row-major), the layer's unit per px.
     pub fn magnitude(&self, i: usize) -> f32 {
         self.gx[i].hypot(self.gy[i])
     }

@@ -12,10 +12,15 @@ const MOST_ELEMENTS: u64 = 10_000;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Form {
+    /// Closed; has centre, size and turn.
     Rectangle,
+    /// Closed; has centre and radius.
     Circle,
+    /// Closed; has three corners or more.
     Polygon,
+    /// Open; has two ends.
     Line,
+    /// Open; has centre, radius and span.
     Arc,
 }
 
@@ -46,6 +51,7 @@ pub struct Grid {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Shape {
+    /// Says which of the other keys are needed.
     pub kind: Form,
     /// A name by which constructions refer to it: `name`, or `name[column,row]` in a grid, from 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -68,11 +74,13 @@ pub struct Shape {
     /// polygon: corners; line: its two ends; mm.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub points: Option<Vec<[f64; 2]>>,
+    /// Which side of its edges is the higher one. Default high.
     #[serde(default)]
     pub inside: Inside,
     /// Height of the surface that the shape is (high) or cuts into (low), mm. Default 0, the datum.
     #[serde(default)]
     pub z_mm: f64,
+    /// Repeats the shape about its own place. Default once.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grid: Option<Grid>,
     /// Used by the search for the part. Default true.
@@ -109,7 +117,7 @@ impl Shape {
     }
 }
 
-pub fn yes() -> bool {
+fn yes() -> bool {
     true
 }
 

@@ -10,10 +10,15 @@ use crate::find::scene::{Kind, Region, Scene, from_level};
 /// An edge place: where, and the unit direction in which values rise.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ModelPoint {
+    /// Right of the reference point, px of level 0.
     pub x: f64,
+    /// Below the reference point, px of level 0.
     pub y: f64,
+    /// x of the direction in which values rise.
     pub gx: f64,
+    /// y of the direction in which values rise.
     pub gy: f64,
+    /// Of the layer in which the edge is looked for.
     pub kind: Kind,
     /// The direction of contrast is unknown: rising and falling both fit.
     pub either: bool,
@@ -28,6 +33,7 @@ pub struct ShapeModel {
     pub radius: f64,
     /// Half width and half height of the box around the edges, and its centre; px.
     pub half_size: [f64; 2],
+    /// Centre of that box from the reference point, px.
     pub centre: [f64; 2],
     /// Median distance of an edge place of level 0 from its neighbour, px.
     pub spacing: f64,
@@ -53,6 +59,7 @@ impl Default for ModelOptions {
 }
 
 impl ModelOptions {
+    /// Refuses options outside their ranges.
     pub fn check(&self) -> Result<()> {
         if !(0.02..=1.0).contains(&self.contrast) {
             return Err(
@@ -195,10 +202,15 @@ fn spacing(points: &[ModelPoint]) -> f64 {
 /// An edge place of a field with its sub-pixel position.
 #[derive(Clone, Copy, Debug)]
 pub struct Edge {
+    /// Column, px.
     pub x: f64,
+    /// Row, px.
     pub y: f64,
+    /// x of the unit direction in which values rise.
     pub gx: f64,
+    /// y of the unit direction in which values rise.
     pub gy: f64,
+    /// Slope at the edge's cell, the layer's unit per px.
     pub strength: f64,
 }
 

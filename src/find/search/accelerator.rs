@@ -27,10 +27,12 @@ pub struct Rule {
     pub fixed_s: f64,
     /// One addition of a feature's response to a place's sum, s.
     pub here_s: f64,
+    /// The same addition on the CPU, s.
     pub cpu_s: f64,
 }
 
 impl Rule {
+    /// Whether a search of so many additions takes no longer here than on the CPU.
     pub fn pays(&self, additions: u64) -> bool {
         self.fixed_s + self.here_s * additions as f64 <= self.cpu_s * additions as f64
     }

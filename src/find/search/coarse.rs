@@ -10,6 +10,7 @@ use crate::stages::shape::sums::Peak;
 
 /// A perfect feature. 63 features of 4 fill an 8-bit sum.
 pub const FULL: u8 = 4;
+/// Most features of a model that are summed.
 pub const MAX_FEATURES: usize = 63;
 
 /// The nearest of 16 directions.
@@ -21,23 +22,31 @@ pub fn bin(gx: f64, gy: f64) -> usize {
 /// A coarse hit: pixels of the level, index of the pose, and the share of the full score.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
+    /// Column, px of the level.
     pub x: f64,
+    /// Row, px of the level.
     pub y: f64,
+    /// Index into [`Query::turns`].
     pub pose: usize,
+    /// Share of the full score, 0 to 1.
     pub score: f32,
 }
 
 /// A turn (rad) and scale to be tried.
 #[derive(Clone, Copy, Debug)]
 pub struct Turn {
+    /// About the model's reference point, x towards y, rad.
     pub angle: f64,
+    /// Factor on the model's size.
     pub scale: f64,
 }
 
 /// What is asked of a level.
 #[derive(Clone, Copy, Debug)]
 pub struct Query<'a> {
+    /// Edge places of the level, in px of level 0.
     pub model: &'a [ModelPoint],
+    /// Every turn and scale to be tried.
     pub turns: &'a [Turn],
     /// Pixels of level 0 in one of this level.
     pub px: f64,
@@ -45,6 +54,7 @@ pub struct Query<'a> {
     pub limit: f32,
     /// Most hits, none within one place and `apart` rad of a better one.
     pub most: usize,
+    /// Hits of one place that are turned by less are one, rad.
     pub apart: f64,
 }
 

@@ -22,6 +22,7 @@ const MOST_ACROSS: f64 = 4.0;
 /// A found instance.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Match {
+    /// Place (px of the scene), turn (rad) and scale.
     pub pose: Pose,
     /// Mean cosine between directions; weak places count 0, places on missing cells half.
     pub score: f64,
@@ -31,11 +32,15 @@ pub struct Match {
     pub second_score: f64,
     /// Standard deviations of x, y, angle and scale.
     pub sigma_px: [f64; 2],
+    /// Of x and y, mm; `None` for a scene without scale.
     pub sigma_mm: Option<[f64; 2]>,
+    /// Of the turn, degrees.
     pub sigma_deg: f64,
+    /// Of the scale, as a share of it; 0 where the scale was given.
     pub sigma_scale: f64,
     /// Edges that the least squares used, and the robust deviation from them, px.
     pub edges: usize,
+    /// Robust deviation of these edges, px.
     pub edge_rms_px: f64,
     /// Other poses in the same place with their scores, best first, at most eight.
     pub rivals: Vec<(Pose, f64)>,

@@ -44,6 +44,7 @@ impl Default for SearchOptions {
 }
 
 impl SearchOptions {
+    /// Refuses options outside their ranges.
     pub fn check(&self) -> Result<()> {
         let bad = |what: String| Err(Fault::usage(what).next("correct the search options"));
         let [a0, a1] = self.angles_deg;

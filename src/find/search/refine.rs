@@ -10,9 +10,13 @@ use nalgebra::{Matrix4, Vector4};
 /// Where the model's reference point lies in the scene, its turn (x towards y) and its scale.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Pose {
+    /// Column of the reference point, px.
     pub x: f64,
+    /// Row of the reference point, px.
     pub y: f64,
+    /// Turn, x towards y, rad.
     pub angle: f64,
+    /// Factor on the model's size.
     pub scale: f64,
 }
 
@@ -27,6 +31,7 @@ impl Pose {
             s * p.gx + c * p.gy,
         )
     }
+    /// A place of the model in the scene, px.
     pub fn point(&self, x: f64, y: f64) -> (f64, f64) {
         let (s, c) = self.angle.sin_cos();
         (self.x + self.scale * (c * x - s * y), self.y + self.scale * (s * x + c * y))
@@ -36,6 +41,7 @@ impl Pose {
 /// A refined pose.
 #[derive(Clone, Copy, Debug)]
 pub struct Refined {
+    /// By least squares, in px of the scene and rad.
     pub pose: Pose,
     /// Over x px, y px, angle rad, scale.
     pub covariance: Matrix4<f64>,

@@ -15,17 +15,24 @@ use std::path::Path;
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MapScale {
+    /// Version of this file: 1.
     pub format: u32,
+    /// Unit of all lengths here: "mm".
     pub units: String,
+    /// Columns of the map: cells along the grid's x.
     pub width: u32,
+    /// Rows of the map: cells along the grid's y.
     pub height: u32,
     /// Edge of a cell, mm.
     pub cell_mm: f64,
+    /// Where the grid stands in the cloud's frame, mm; its origin is the outer corner of cell (0, 0).
     #[serde(rename = "base_T_grid")]
     pub base_from_grid: Rigid<Base, Grid>,
     /// height.png: z = offset_mm + step_mm · (value - 1); value 0 is missing.
     pub png_offset_mm: f64,
+    /// Height between two neighbouring values of height.png, mm, at least 0.0001.
     pub png_step_mm: f64,
+    /// Value of height.png where nothing was measured: 0.
     pub png_missing: u16,
     /// Where the centre of the pixel in column i and row j lies in the grid frame.
     pub pixel_centre: String,

@@ -7,10 +7,13 @@ use crate::geometry::{Base, Grid, Rigid, Vec3};
 /// ((ix + 0.5) · cell, (iy + 0.5) · cell) in the grid frame.
 #[derive(Clone, Debug)]
 pub struct HeightMap {
+    /// Columns: cells along the grid's x.
     pub width: u32,
+    /// Rows: cells along the grid's y.
     pub height: u32,
     /// Edge of a cell, mm.
     pub cell: f64,
+    /// Where the grid stands in the cloud's frame, mm; its origin is the outer corner of cell (0, 0).
     pub base_from_grid: Rigid<Base, Grid>,
     /// Height, mm; NaN where nothing was measured.
     pub z: Vec<f32>,

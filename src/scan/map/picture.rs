@@ -9,8 +9,11 @@ use crate::scan::HeightMap;
 /// Which of a height map's values is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shown {
+    /// Above the grid's plane, mm; with hillshade.
     Height,
+    /// Mean stripe amplitude, grey levels.
     Intensity,
+    /// Standard deviation of the height, mm.
     Sigma,
     /// Points per cell.
     Coverage,
@@ -91,6 +94,7 @@ impl HeightMap {
 pub struct MapPlace {
     /// Pixel of the grid's origin.
     pub origin: (f64, f64),
+    /// Scale of the picture: px per mm of the grid.
     pub pixels_per_mm: f64,
 }
 

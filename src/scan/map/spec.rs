@@ -44,6 +44,7 @@ pub const FEW_CELLS: u64 = 1 << 22;
 pub const SLOPE: f64 = 0.6;
 
 impl GridOptions {
+    /// Refuses options outside their ranges.
     pub fn check(&self) -> Result<()> {
         let bad = |name: &str, value: f64, range: &str| {
             Err(Fault::usage(format!("{name} is {value}, allowed {range}")).next("correct the grid options"))
@@ -69,8 +70,11 @@ impl GridOptions {
 /// Where the cells lie and how heights become integers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GridSpec {
+    /// Where the grid stands in the cloud's frame, mm; its origin is the outer corner of cell (0, 0).
     pub base_from_grid: Rigid<Base, Grid>,
+    /// Columns: cells along the grid's x.
     pub width: u32,
+    /// Rows: cells along the grid's y.
     pub height: u32,
     /// mm
     pub cell: f64,

@@ -13,7 +13,9 @@ pub struct Plateau {
     pub noise_mm: f64,
     /// Standard deviation of the medians of single pictures, mm: what travels with the picture and does not average.
     pub between_shots_mm: f64,
+    /// How many lie within 0.5 mm of the most frequent height.
     pub points: usize,
+    /// Pictures with ten or more of these points.
     pub shots: usize,
 }
 

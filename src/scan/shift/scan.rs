@@ -13,7 +13,9 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Side {
+    /// Towards smaller columns.
     Left,
+    /// Towards larger columns.
     Right,
 }
 
@@ -37,15 +39,18 @@ pub struct ShiftRig {
     pub camera_height_mm: f64,
     /// Laser beside the camera, mm, 1..=10000.
     pub baseline_mm: f64,
+    /// To which side of the picture a raised surface moves the stripe.
     pub raises: Side,
     /// Travel of the bed from picture to picture, mm, 0.001..=100.
     pub travel_mm: f64,
     /// Rows that always show the bare bed: they give the zero of each picture.
     pub bed_rows: Vec<[u32; 2]>,
+    /// Which part of a colour picture is taken as grey.
     pub channel: Channel,
 }
 
 impl ShiftRig {
+    /// Refuses numbers outside their ranges, and bed rows that name no rows.
     pub fn check(&self) -> Result<()> {
         for (name, value, low, high) in [
             ("pixels per mm", self.pixels_per_mm, 0.1, 1000.0),
@@ -156,8 +161,11 @@ fn robust_line(points: &[(f64, f64)]) -> Option<(f64, f64)> {
 /// What a shift scan came to.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct ShiftReport {
+    /// The rig as it was given.
     pub rig: ShiftRig,
+    /// Pictures of the scan, those of the empty bed not counted.
     pub pictures: usize,
+    /// Points of the cloud, those on the bed included.
     pub points: usize,
     /// Pictures whose bed rows did not show the bed.
     pub without_bed: Vec<String>,
@@ -165,6 +173,7 @@ pub struct ShiftReport {
     pub reference: usize,
     /// The bed itself: noise of the zero.
     pub bed_noise_mm: f64,
+    /// The level surface above the bed; `None` where what is there does not hang together.
     pub plateau: Option<Plateau>,
 }
 

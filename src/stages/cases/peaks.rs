@@ -43,6 +43,7 @@ const DEPTHS: [u8; 4] = [8, 10, 12, 16];
 pub enum Space {
     /// Every two of width, direction and depth meet once.
     Pairs,
+    /// Every width with every direction, depth and method.
     Whole,
 }
 

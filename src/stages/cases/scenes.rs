@@ -11,11 +11,17 @@ use crate::stages::{Thinning, ThresholdParams, Window, frame};
 /// Pictures of one batch with their settings.
 #[derive(Clone, Debug)]
 pub struct Scene {
+    /// What the pictures show, for the cases' names.
     pub name: &'static str,
+    /// The pictures, all of one size and depth.
     pub shots: Vec<Image>,
+    /// Settings of the threshold: px, and grey levels of the pictures' depth.
     pub params: ThresholdParams,
+    /// Rule of the thinning.
     pub thinning: Thinning,
+    /// Bits to set in [`frame::Frame::flags`] beside those of the settings.
     pub flags: u32,
+    /// Picture of the ambient light, of the same size and depth; `None` subtracts nothing.
     pub ambient: Option<Image>,
 }
 

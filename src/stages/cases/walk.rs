@@ -18,13 +18,16 @@ pub fn of(stage: &str) -> Vec<Case> {
 /// The chain on the twins, buffer by buffer.
 pub struct Walk<'a> {
     scene: &'a Scene,
+    /// Layout and settings of the scene's batch.
     pub frame: Frame,
+    /// Words of every buffer, by the names of [`crate::stages::chain::table`].
     pub buffers: BTreeMap<&'static str, Vec<u32>>,
     captured: Vec<Case>,
     wanted: &'a str,
 }
 
 impl<'a> Walk<'a> {
+    /// The scene's pictures and settings in their buffers; every other buffer is 0.
     pub fn new(scene: &'a Scene) -> Walk<'a> {
         let first = &scene.shots[0];
         let mut f = Frame::new(first.width, first.height, first.bits, scene.shots.len() as u32, &scene.params)

@@ -16,6 +16,7 @@ use std::collections::VecDeque;
 
 /// The chain on one GPU for one kind of picture.
 pub struct Chain {
+    /// Layout and settings of a batch.
     pub frame: Frame,
     device: Device,
     ring: Ring,
@@ -75,6 +76,7 @@ pub struct Batch {
     pub points: Vec<[u32; 2]>,
     /// One peak a skeleton pixel, and its point, where peaks are measured.
     pub peaks: Vec<Peak>,
+    /// The peaks' points, entry by entry, mm in the poses' frame; not a number where the peak was refused.
     pub spots: Vec<Point>,
     /// First point of every shot, and the end.
     pub starts: Vec<u32>,
@@ -92,6 +94,7 @@ impl Batch {
 }
 
 impl Chain {
+    /// Compiles the stages and makes every buffer; `Err` on settings out of range or too large for the device.
     pub fn new(device: &Device, config: &ChainConfig) -> Result<Chain> {
         if !(1..=64).contains(&config.shots) || !(1..=8).contains(&config.slots) {
             return Err(Fault::usage(format!(
@@ -164,6 +167,7 @@ impl Chain {
         })
     }
 
+    /// The GPU that it runs on.
     pub fn device(&self) -> &Device {
         &self.device
     }
@@ -171,6 +175,7 @@ impl Chain {
     pub fn has_room(&self) -> bool {
         self.ring.has_room()
     }
+    /// Batches that were submitted and not yet collected.
     pub fn in_flight(&self) -> usize {
         self.ring.in_flight()
     }

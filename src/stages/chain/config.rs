@@ -11,6 +11,7 @@ use crate::stages::{Thinning, ThresholdParams};
 pub struct ChainConfig {
     /// Picture size, px.
     pub width: u32,
+    /// Picture size, px.
     pub height: u32,
     /// Depth of the pictures, 8..=16.
     pub bits: u8,
@@ -18,7 +19,9 @@ pub struct ChainConfig {
     pub shots: u32,
     /// Batches in flight, 1..=8.
     pub slots: usize,
+    /// Which pixels are lit: px, and grey levels of the pictures' depth.
     pub threshold: ThresholdParams,
+    /// Which boundary pixels thinning deletes.
     pub thinning: Thinning,
     /// Prove tiles dark before looking at them. Off is the plain path: the same result, slower.
     pub prune: bool,
@@ -35,6 +38,7 @@ pub struct ChainConfig {
 }
 
 impl ChainConfig {
+    /// Defaults for pictures of `width` x `height` px and 8..=16 bits: 10 million px or 32 shots a batch, no peaks.
     pub fn new(width: u32, height: u32, bits: u8) -> ChainConfig {
         ChainConfig {
             width,

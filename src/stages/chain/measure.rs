@@ -8,7 +8,10 @@ use crate::stages::stripe::point::Optics;
 /// What the chain does with the skeleton's pixels.
 #[derive(Clone, Debug)]
 pub struct Measure {
+    /// How the sub-pixel peak is found.
     pub peak: PeakParams,
+    /// Which peaks are believed.
     pub choose: ChooseParams,
+    /// Camera and laser plane, camera frame.
     pub optics: Optics,
 }

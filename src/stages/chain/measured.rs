@@ -30,6 +30,7 @@ pub struct Measuring {
 }
 
 impl Measuring {
+    /// Compiles the stages and makes their buffers for batches as `f` lays them out, of pictures of `bits`, 8..=16.
     pub fn new(device: &Device, f: &Frame, bits: u8, m: &Measure) -> Result<Measuring> {
         let frame = PeakFrame::new((f.width, f.height, bits), f.shots, &m.peak, &m.choose, m.optics.across());
         let uniform = device.storage("peak frame", size_of::<PeakFrame>() as u64)?;

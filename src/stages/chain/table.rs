@@ -81,9 +81,13 @@ const SHORTENED: [&str; 9] = [
 /// A step, what it binds in this place, and the sub-iteration that its uniform block holds.
 #[derive(Clone, Debug)]
 pub struct Placed {
+    /// What is stated of the step once; `binds` and `groups` here go before its own.
     pub step: Step,
+    /// Buffers by name, in the order of the stage's bindings.
     pub binds: Vec<&'static str>,
+    /// Workgroups in this place.
     pub groups: Groups,
+    /// [`Frame::step`] in this place: a sub-iteration of thinning, counted from 0.
     pub iteration: u32,
 }
 

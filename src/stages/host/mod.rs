@@ -49,6 +49,7 @@ pub struct Found {
     pub pixels: Vec<u32>,
     /// One peak a skeleton pixel, and its point, where they are measured.
     pub peaks: Vec<Peak>,
+    /// The peaks' points, entry by entry, mm in the poses' frame; not a number where the peak was refused.
     pub points: Vec<Point>,
 }
 
@@ -65,6 +66,7 @@ struct Work {
 }
 
 impl Host {
+    /// Works out what all pictures share; `Err` on settings out of range or an ambient picture that does not fit.
     pub fn new(config: &ChainConfig) -> Result<Host> {
         let mut frame = Frame::new(config.width, config.height, config.bits, 1, &config.threshold)?;
         frame.flags |= if config.prune { 0 } else { ALL_TILES };

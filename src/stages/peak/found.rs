@@ -5,6 +5,7 @@
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Reject {
+    /// No reason against it.
     Kept = 0,
     /// Outside the image of the working volume.
     Region = 1,
@@ -27,6 +28,7 @@ pub enum Reject {
 }
 
 impl Reject {
+    /// All of them, in the order of their numbers.
     pub const ALL: [Reject; 10] = [
         Reject::Kept,
         Reject::Region,
@@ -39,6 +41,7 @@ impl Reject {
         Reject::Unsupported,
         Reject::NoPoint,
     ];
+    /// In words, for reports and legends.
     pub fn words(self) -> &'static str {
         match self {
             Reject::Kept => "kept",
@@ -62,14 +65,17 @@ pub const SATURATED: u32 = 1 << 8;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Peak {
-    /// Centre, px.
+    /// Centre, px from the middle of the left column.
     pub u: f32,
+    /// Centre, px from the middle of the top row.
     pub v: f32,
     /// Unit vector across the stripe; v component positive, or u where v is 0.
     pub normal_u: f32,
+    /// Its v component, 0..=1.
     pub normal_v: f32,
     /// Height of the profile above the background, grey levels; may exceed full scale when saturated.
     pub amplitude: f32,
+    /// Level beside the stripe, grey levels of the picture's depth.
     pub background: f32,
     /// Gaussian sigma of the profile, px.
     pub width_px: f32,
@@ -81,13 +87,16 @@ pub struct Peak {
     pub flags: u32,
     /// Skeleton pixel, x | y << 16.
     pub pixel: u32,
+    /// Number of the shot; from the GPU within its batch.
     pub shot: u32,
 }
 
 impl Peak {
+    /// No test has refused it.
     pub fn kept(&self) -> bool {
         self.flags & 0xff == 0
     }
+    /// Why it was refused; [`Reject::Kept`] where it was not.
     pub fn reject(&self) -> Reject {
         Reject::ALL[(self.flags & 0xff).min(9) as usize]
     }

@@ -11,18 +11,23 @@ use crate::stages::stripe::choose_params::ChooseParams;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct PeakFrame {
+    /// px
     pub width: i32,
+    /// px
     pub height: i32,
-    /// Words of one picture row, and of one picture.
+    /// Words of one picture row.
     pub pitch: u32,
+    /// Words of one picture.
     pub shot_words: u32,
     /// Expected sigma of the profile, px.
     pub s0: f32,
+    /// Grey level of saturation.
     pub full_scale: f32,
     /// Variance of read noise; grey levels squared.
     pub read2: f32,
     /// Variance per grey level.
     pub gain: f32,
+    /// Square of the speckle contrast, 0..=1.
     pub speckle2: f32,
     /// 1 / R², px⁻²; the weight along the stripe is (1 - t² / R²)², close to a Gaussian of sigma R / 2.4.
     pub along_factor: f32,
@@ -32,20 +37,29 @@ pub struct PeakFrame {
     pub stride_across: i32,
     /// Spacing of the grey levels that the direction is taken from along the picture's axes, px.
     pub lattice_u: i32,
+    /// The same along the columns.
     pub lattice_v: i32,
     /// Step of the background's samples, px.
     pub stride: i32,
+    /// Most Gauss-Newton steps, 1..=20.
     pub steps: u32,
-    /// Limits of the choice: grey levels, px, px, px, cosine.
+    /// Least amplitude of a peak, grey levels of the picture's depth.
     pub faintest: f32,
+    /// Least sigma of the profile, px.
     pub narrowest: f32,
+    /// Largest sigma of the profile, px.
     pub widest: f32,
+    /// Largest standard deviation of a centre, px.
     pub uncertain: f32,
+    /// Least cosine of the angle between a peak's normal and the direction of depth.
     pub upright: f32,
+    /// Direction of depth in the picture, a unit vector: along the rows.
     pub across_u: f32,
+    /// Direction of depth in the picture: along the columns.
     pub across_v: f32,
-    /// Lines across the stripe in one picture; 1 where they are columns, 0 where they are rows.
+    /// Lines across the stripe in one picture.
     pub lines: u32,
+    /// 1 where those lines are columns, 0 where they are rows.
     pub columns: u32,
     /// Entries of the strongest peaks' list, all shots.
     pub entries: u32,
@@ -57,18 +71,23 @@ pub struct PeakFrame {
     pub half_across: f32,
     /// Rows of a sample of the profile, each `stride_across` from the next.
     pub rows: i32,
-    /// Turn of the direction that was seen, rad: times sine of twice, four, six and eight times its angle; and for steep stripes,
-    /// on a square lattice, times sine of four and eight times.
+    /// Turn of the direction that was seen, rad: times sine of twice its angle.
     pub turn_2: f32,
+    /// The same for four times the angle.
     pub turn_4: f32,
+    /// The same for six times the angle.
     pub turn_6: f32,
+    /// The same for eight times the angle.
     pub turn_8: f32,
+    /// For steep stripes, on a square lattice: four times the angle.
     pub square_4: f32,
+    /// For steep stripes, on a square lattice: eight times the angle.
     pub square_8: f32,
     /// Cosine of twice the angle up to which a stripe is flat.
     pub flat: f32,
 }
 
+/// WGSL name, members and bytes of [`PeakFrame`], for the contract tests.
 pub const UNIFORM: (&str, &[Field], usize) = crate::stages::frame::uniform_fields!(PeakFrame: width, height, pitch, shot_words, s0, full_scale,
     read2, gain, speckle2, along_factor, reach_along, stride_across, lattice_u, lattice_v, stride, steps, faintest, narrowest,
     widest, uncertain, upright, across_u, across_v, lines, columns, entries,
@@ -158,6 +177,7 @@ impl PeakFrame {
     }
 }
 
+/// WGSL text of the structs `PeakFrame` and `Peak`.
 pub const SHARED: &str = include_str!("../../../shaders/shared/peaks.wgsl");
 
 /// The peak frame's words in a twin's bindings.

@@ -6,11 +6,12 @@ pub(crate) trait Grey: Copy + Sync {
     fn at(&self, x: i32, y: i32) -> f32;
 }
 
+/// A picture as it lies in memory: rows from the top, sizes in px.
 #[derive(Clone, Copy)]
-pub struct View<'a, T> {
-    pub pixels: &'a [T],
-    pub width: i32,
-    pub height: i32,
+pub(crate) struct View<'a, T> {
+    pub(crate) pixels: &'a [T],
+    pub(crate) width: i32,
+    pub(crate) height: i32,
 }
 
 impl<T: Copy + Sync + Into<f32>> Grey for View<'_, T> {

@@ -62,6 +62,7 @@ impl Default for PeakParams {
 }
 
 impl PeakParams {
+    /// Refuses what is out of its range.
     pub fn check(&self) -> Result<()> {
         for (name, value, low, high) in [
             ("width_px", self.width_px, 0.4, 12.0),
@@ -99,6 +100,7 @@ pub struct Stripe {
     /// Read noise and shot noise as [`PeakParams`] has them; those of the settings where nothing was measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub read_noise: Option<f32>,
+    /// Grey levels (8-bit) per photo-electron, as [`PeakParams::gain`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gain: Option<f32>,
 }

@@ -21,6 +21,7 @@ pub const QUADS: &str = "quads";
 
 const PROFILE: &str = include_str!("../../../shaders/shared/profile.wgsl");
 
+/// One peak a skeleton pixel, and the strongest of each line across the stripe; one invocation a pixel.
 pub const STAGE: Stage = Stage {
     name: "peak",
     wgsl: include_str!("../../../shaders/peak.wgsl"),
@@ -66,6 +67,7 @@ impl Grey for Packed<'_> {
     }
 }
 
+/// CPU twin: the peaks of all pixels of a batch.
 pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let value = |name: &str| overrides.iter().find(|o| o.0 == name).map_or(0.0, |o| o.1) as u32;

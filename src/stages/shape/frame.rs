@@ -1,7 +1,8 @@
 //! In: the size of a pyramid level and of a model. Out: the layout that the stages of the coarse shape search share, and
 //! their test cases. Frame and unit: cells of the level, x right, y down; strided places are 4 cells apart.
 
-pub const SHARED: &str = include_str!("../../../shaders/shared/shape.wgsl");
+pub(crate) const SHARED: &str = include_str!("../../../shaders/shared/shape.wgsl");
+/// WGSL name, members and bytes of [`ShapeFrame`], for the contract tests.
 pub const UNIFORM: (&str, &[crate::gpu::Field], usize) = crate::stages::frame::uniform_fields!(ShapeFrame: width, height, margin,
     columns, rows, words, first, ignore, features, least, turns, capacity);
 
@@ -14,17 +15,29 @@ pub const STRIDE: usize = 4;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct ShapeFrame {
+    /// Size of the level, cells.
     pub width: u32,
+    /// Size of the level, cells.
     pub height: u32,
+    /// Empty border on every side of the level, cells, a multiple of [`STRIDE`].
     pub margin: u32,
+    /// Strided places in a row, border included.
     pub columns: u32,
+    /// Rows of strided places, border included.
     pub rows: u32,
+    /// Words of one row of strided places, four places a word.
     pub words: u32,
+    /// Words of the responses of all layers before this one.
     pub first: u32,
+    /// 1 where rising and falling edges are the same, else 0.
     pub ignore: u32,
+    /// Features of the model at one turn, at most 63.
     pub features: u32,
+    /// Least sum that is kept, 0..=255.
     pub least: u32,
+    /// Turns of the model in this run.
     pub turns: u32,
+    /// Places in the list of hits.
     pub capacity: u32,
 }
 
@@ -58,6 +71,7 @@ impl ShapeFrame {
         let first = layer * self.layer_words() + (want * STRIDE * STRIDE + phase) * self.plane();
         [first as i32, dx.div_euclid(t) as i32, dy.div_euclid(t) as i32, 0]
     }
+    /// The block out of a binding's words.
     pub fn read(binding: &[u32]) -> ShapeFrame {
         *bytemuck::from_bytes(bytemuck::cast_slice(binding))
     }

@@ -6,6 +6,7 @@ use super::frame::{BINS, SHARED, STRIDE, ShapeFrame, UNIFORM};
 use crate::gpu::Access::*;
 use crate::gpu::{Binding, Stage};
 
+/// The direction of each cell's slope as one bit of 16; one invocation a cell.
 pub const QUANTISE: Stage = Stage {
     name: "shape_quantise",
     wgsl: include_str!("../../../shaders/shape_quantise.wgsl"),
@@ -20,6 +21,7 @@ pub const QUANTISE: Stage = Stage {
     overrides: &[],
 };
 
+/// How well each strided place meets each direction; one invocation for four places of one phase.
 pub const SPREAD: Stage = Stage {
     name: "shape_spread",
     wgsl: include_str!("../../../shaders/shape_spread.wgsl"),
@@ -84,14 +86,14 @@ pub fn both_polarities(bits: u16) -> u16 {
     bits | bits.rotate_left(8)
 }
 
-pub fn quantise_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn quantise_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let [_, slopes, bits] = b else { unreachable!() };
     for (out, &slope) in bits.iter_mut().zip(slopes.iter()) {
         *out = u32::from(direction(slope));
     }
 }
 
-pub fn spread_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn spread_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let frame = ShapeFrame::read(&b[0]);
     let [_, bits, responses] = b else { unreachable!() };
     let (w, h) = (i64::from(frame.width), i64::from(frame.height));

@@ -6,6 +6,7 @@ use super::frame::{SHARED, ShapeFrame, UNIFORM};
 use crate::gpu::Access::*;
 use crate::gpu::{Binding, Stage};
 
+/// Sums of all features at every strided place and turn; one invocation for four places of one turn.
 pub const SCORE: Stage = Stage {
     name: "shape_score",
     wgsl: include_str!("../../../shaders/shape_score.wgsl"),
@@ -21,6 +22,7 @@ pub const SCORE: Stage = Stage {
     overrides: &[],
 };
 
+/// The places whose sum is large enough and that no neighbour exceeds; one invocation for four places of one turn.
 pub const PEAKS: Stage = Stage {
     name: "shape_peaks",
     wgsl: include_str!("../../../shaders/shape_peaks.wgsl"),
@@ -39,13 +41,18 @@ pub const PEAKS: Stage = Stage {
 /// A peak of the sums.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Peak {
+    /// Number of the turn within the run.
     pub turn: u32,
+    /// Strided place from the top, border included.
     pub row: u32,
+    /// Strided place from the left, border included.
     pub column: u32,
+    /// Sum over the features, each 0..=4.
     pub sum: u32,
 }
 
 impl Peak {
+    /// Out of the two words of the list: turn | sum << 24, column | row << 16.
     pub fn unpack([a, b]: [u32; 2]) -> Peak {
         Peak { turn: a & 0xff_ffff, sum: a >> 24, column: b & 0xffff, row: b >> 16 }
     }
@@ -74,7 +81,7 @@ pub fn peaks(sums: &[u8], stride: usize, columns: usize, rows: usize, least: u8,
     found
 }
 
-pub fn score_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn score_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let frame = ShapeFrame::read(&b[0]);
     let [_, responses, features, sums] = b else { unreachable!() };
     let responses: &[u8] = bytemuck::cast_slice(responses);
@@ -93,7 +100,7 @@ pub fn score_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     }
 }
 
-pub fn peaks_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn peaks_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let frame = ShapeFrame::read(&b[0]);
     let [_, sums, header, hits] = b else { unreachable!() };
     let sums: &[u8] = bytemuck::cast_slice(sums);

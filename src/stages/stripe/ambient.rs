@@ -9,6 +9,7 @@ use crate::stages::frame::{Frame, PX_LOG2, SHARED, frame_of};
 use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
 
+/// Subtracts the ambient light where the pictures lie; one invocation for 4 words of one shot.
 pub const STAGE: Stage = Stage {
     name: "ambient",
     wgsl: include_str!("../../../shaders/ambient.wgsl"),
@@ -57,7 +58,7 @@ pub fn without(image: &Image, ambient: &Image) -> Image {
     Image { pixels, ..*image }
 }
 
-pub fn twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
+pub(crate) fn twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let bits = 32 >> overrides[0].1 as u32;
     let [_, image, ambient] = b else { unreachable!() };

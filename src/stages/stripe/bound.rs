@@ -62,6 +62,7 @@ impl<'a> Blocks<'a> {
         Blocks { words, columns: 2 * f.tiles_x as i32, rows: f.tiles_y as i32, size: f.size }
     }
 
+    /// The block in column `x`, row `y` of blocks; beyond the picture the nearest one.
     pub fn block(&self, x: i32, y: i32) -> Block {
         let near = (x.clamp(0, self.columns - 1), y.clamp(0, self.rows - 1));
         Block::unpack(&self.words[2 * (near.1 * self.columns + near.0) as usize..][..2])

@@ -11,7 +11,9 @@ use crate::stages::peak::{PeakFrame, SHARED, UNIFORM, frame_of};
 /// What the step knows about picture, stripe and laser.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene {
+    /// Of the picture, px.
     pub width: u32,
+    /// Of the picture, px.
     pub height: u32,
     /// Grey level of saturation.
     pub full_scale: f32,
@@ -81,17 +83,22 @@ pub(in crate::stages) fn reason(k: &Peak, f: &PeakFrame) -> Reject {
 pub struct Lines {
     /// As in [`PeakFrame`].
     pub lines: u32,
+    /// As in [`PeakFrame`]: 1 where the lines are columns, 0 where they are rows.
     pub columns: u32,
+    /// As in [`PeakFrame`]: columns or rows of one line, px.
     pub line_px: u32,
     /// Half window of lines.
     pub reach: i32,
+    /// Least amplitude over the strongest of those lines, 0..=1.
     pub echo: f32,
     /// px
     pub cut_width: f32,
+    /// Amplitude over the strongest of those lines, 0..=1, that a narrower peak needs.
     pub cut_amplitude: f32,
 }
 
 impl Lines {
+    /// The choice in px and lines of the pictures that `f` was made for.
     pub fn new(f: &PeakFrame, p: &ChooseParams) -> Lines {
         Lines {
             lines: f.lines,
@@ -137,7 +144,7 @@ pub fn lines_groups(f: &PeakFrame) -> [u32; 3] {
     LINES.groups([f.entries, 1, 1])
 }
 
-pub fn lines_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn lines_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     b[1][..f.entries as usize].fill(0);
 }

@@ -17,6 +17,7 @@ pub struct ChooseParams {
     /// the strongest nearby, 0..=1, that it then needs. What is left of a cut spot has lost width and light at once,
     /// and its centre is off the sheet's centre by up to a beam radius.
     pub cut_width: f32,
+    /// That amplitude over the strongest nearby, 0..=1.
     pub cut_amplitude: f32,
     /// Largest standard deviation of a centre over the stripe's sigma, 0.01..=2.
     pub uncertain: f32,
@@ -61,6 +62,7 @@ impl ChooseParams {
             echo_reach: 0.0,
         }
     }
+    /// Refuses what is out of its range.
     pub fn check(&self) -> Result<()> {
         for (name, value, low, high) in [
             ("faintest", self.faintest, 0.0, 255.0),

@@ -5,6 +5,7 @@ use crate::fault::{Fault, Result};
 use crate::gpu::Access::*;
 use crate::gpu::{Binding, Device, Stage, Workload, run_once};
 
+/// Votes of skeleton pixels for the lines through them; one invocation a pixel.
 pub const STAGE: Stage = Stage {
     name: "hough",
     wgsl: include_str!("../../../shaders/hough.wgsl"),
@@ -25,9 +26,13 @@ pub const STAGE: Stage = Stage {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct HoughFrame {
+    /// Half the picture's width, px, rounded down.
     pub middle_x: i32,
+    /// Half the picture's height, px, rounded down.
     pub middle_y: i32,
+    /// Directions of the line's normal in half a turn, from the x axis on.
     pub angles: u32,
+    /// Distances an angle has, one px each; the middle one is a line through the picture's middle.
     pub cells: u32,
 }
 
@@ -52,6 +57,7 @@ impl Default for HoughParams {
 }
 
 impl HoughParams {
+    /// Refuses what is out of its range.
     pub fn check(&self) -> Result<()> {
         for (name, value, low, high) in [
             ("angles", f64::from(self.angles), 45.0, 1440.0),
@@ -71,7 +77,9 @@ impl HoughParams {
 /// A straight line x cos(angle) + y sin(angle) = distance.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Line {
+    /// Of the normal, from x towards y, rad, 0..pi.
     pub angle: f64,
+    /// From pixel (0, 0) along the normal, px; negative where the line lies behind it.
     pub distance_px: f64,
     /// Pixels that belong to it.
     pub pixels: u32,
@@ -80,6 +88,7 @@ pub struct Line {
 }
 
 impl HoughFrame {
+    /// For pictures of `width` x `height` px.
     pub fn new(width: u32, height: u32, p: &HoughParams) -> HoughFrame {
         // Farthest pixel from the middle, both signs, and one for rounding.
         let reach = (f64::from(width / 2 + 1).hypot(f64::from(height / 2 + 1))).ceil() as u32 + 1;
@@ -227,7 +236,7 @@ fn total_least_squares(pixels: &[u32]) -> Option<((f64, f64, f64), f64)> {
     Some(((c, s, c * mx + s * my), (across.max(0.0) / n).sqrt()))
 }
 
-pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let frame: HoughFrame = *bytemuck::from_bytes(bytemuck::cast_slice(&b[0]));
     let [_, header, points, table, votes] = b else { unreachable!() };
     let table: &[[i32; 2]] = bytemuck::cast_slice(table);

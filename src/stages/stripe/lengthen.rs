@@ -30,6 +30,7 @@ impl Default for LengthenParams {
 }
 
 impl LengthenParams {
+    /// Refuses what is out of its range.
     pub fn check(&self) -> Result<()> {
         if !(0.0..=6.0).contains(&self.reach) || !(0.2..=1.0).contains(&self.share) {
             return Err(Fault::usage(format!(
@@ -180,7 +181,7 @@ pub const STEP: Step = Step {
     same: Same::Words,
 };
 
-pub fn copy_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn copy_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, listing, list, mask, long] = b else { unreachable!() };
     for &tile in &list[..listing[3] as usize] {
@@ -190,7 +191,7 @@ pub fn copy_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     }
 }
 
-pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
+pub(crate) fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let px_log2 = overrides.iter().find(|o| o.0 == PX_LOG2).map_or(2, |o| o.1 as u32);
     let [_, image, listing, list, mask, lit, long] = b else { unreachable!() };

@@ -22,6 +22,7 @@ pub struct Point {
 }
 
 impl Point {
+    /// What stands for no point: not a number in all four words.
     pub const NONE: Point = Point { position: [f32::NAN; 3], sigma_mm: f32::NAN };
 }
 
@@ -36,10 +37,12 @@ pub struct Optics {
     pub untilt: [f32; 9],
     /// normal · X = offset, mm; the offset is positive.
     pub normal: [f32; 3],
+    /// Distance of the plane from the camera's centre, mm.
     pub offset: f32,
 }
 
 impl Optics {
+    /// Rounded to f32; the plane's normal is turned so that its offset is positive.
     pub fn new(camera: &Intrinsics, laser: &Plane<Camera>) -> Optics {
         let laser = if laser.offset < 0.0 { laser.flipped() } else { *laser };
         Optics {
@@ -179,52 +182,90 @@ pub fn undistort([xv, yv, du, dv]: [f32; 4], o: &Optics) -> Option<(f32, f32, f3
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct PointFrame {
+    /// Focal length along the rows, px.
     pub fx: f32,
+    /// Focal length along the columns, px.
     pub fy: f32,
+    /// Principal point, px from the middle of the left column.
     pub cx: f32,
+    /// Principal point, px from the middle of the top row.
     pub cy: f32,
+    /// Shear of the pixel grid: u grows by so many px as y grows by 1 on the plane z = 1.
     pub skew: f32,
+    /// Radial distortion, numerator: r².
     pub k1: f32,
+    /// Radial distortion, numerator: r⁴.
     pub k2: f32,
+    /// Tangential distortion: 2 xy along the rows, r² + 2 y² along the columns.
     pub p1: f32,
+    /// Tangential distortion: r² + 2 x² along the rows, 2 xy along the columns.
     pub p2: f32,
+    /// Radial distortion, numerator: r⁶.
     pub k3: f32,
+    /// Radial distortion, denominator: r².
     pub k4: f32,
+    /// Radial distortion, denominator: r⁴.
     pub k5: f32,
+    /// Radial distortion, denominator: r⁶.
     pub k6: f32,
+    /// Thin prism along the rows: r².
     pub s1: f32,
+    /// Thin prism along the rows: r⁴.
     pub s2: f32,
+    /// Thin prism along the columns: r².
     pub s3: f32,
+    /// Thin prism along the columns: r⁴.
     pub s4: f32,
     /// Rows of [`Optics::untilt`].
     pub t0: f32,
+    /// Row 1, column 2.
     pub t1: f32,
+    /// Row 1, column 3.
     pub t2: f32,
+    /// Row 2, column 1.
     pub t3: f32,
+    /// Row 2, column 2.
     pub t4: f32,
+    /// Row 2, column 3.
     pub t5: f32,
+    /// Row 3, column 1.
     pub t6: f32,
+    /// Row 3, column 2.
     pub t7: f32,
+    /// Row 3, column 3.
     pub t8: f32,
+    /// The laser plane's unit normal, camera frame: x.
     pub normal_x: f32,
+    /// The laser plane's unit normal, camera frame: y.
     pub normal_y: f32,
+    /// The laser plane's unit normal, camera frame: z.
     pub normal_z: f32,
+    /// Distance of the laser plane from the camera's centre, mm.
     pub offset: f32,
     /// Bits of the number that stands for no point; a shader cannot write them down.
     pub none: u32,
     /// As in [`Lines`].
     pub lines: u32,
+    /// As in [`Lines`].
     pub columns: u32,
+    /// As in [`Lines`], px.
     pub line_px: u32,
+    /// [`Lines::reach`], lines.
     pub echo_reach: i32,
+    /// As in [`Lines`], 0..=1.
     pub echo: f32,
+    /// As in [`Lines`], px.
     pub cut_width: f32,
+    /// As in [`Lines`], 0..=1.
     pub cut_amplitude: f32,
+    /// Always 0: fills the block to a multiple of 16 bytes.
     pub reserved_1: u32,
+    /// Always 0, as well.
     pub reserved_2: u32,
 }
 
 impl PointFrame {
+    /// The rig and the lines in one block.
     pub fn new(o: &Optics, l: &Lines) -> PointFrame {
         let ([fx, fy, cx, cy, skew], [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4]) = (o.pinhole, o.distortion);
         let [t0, t1, t2, t3, t4, t5, t6, t7, t8] = o.untilt;
@@ -273,6 +314,7 @@ impl PointFrame {
             reserved_2: 0,
         }
     }
+    /// Camera and laser plane that it was made from.
     pub fn optics(&self) -> Optics {
         Optics {
             pinhole: [self.fx, self.fy, self.cx, self.cy, self.skew],
@@ -285,6 +327,7 @@ impl PointFrame {
             offset: self.offset,
         }
     }
+    /// Lines that it was made from.
     pub fn lines(&self) -> Lines {
         Lines {
             lines: self.lines,
@@ -298,6 +341,7 @@ impl PointFrame {
     }
 }
 
+/// The last choice of each peak and its point; one invocation a peak.
 pub const STAGE: Stage = Stage {
     name: "point",
     wgsl: include_str!("../../../shaders/point.wgsl"),
@@ -322,7 +366,7 @@ pub fn pose_words<To: Frame>(to_from_camera: &Rigid<To, Camera>) -> [f32; 12] {
     std::array::from_fn(|i| if i % 4 == 3 { t[i / 4] as f32 } else { r[(i / 4, i % 4)] as f32 })
 }
 
-pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let frame: PointFrame = *bytemuck::from_bytes(bytemuck::cast_slice(&b[0]));
     let (optics, lines) = (frame.optics(), frame.lines());
     let [_, header, poses, strongest, peaks, spots] = b else { unreachable!() };

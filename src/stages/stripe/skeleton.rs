@@ -13,9 +13,11 @@ use crate::stages::step::{Groups, Step};
 /// Width and height of the tiles that the stages work in, in pixels: one word wide.
 pub const TILE: (u32, u32) = (32, 8);
 
+/// A pixel in one word: x | y << 16.
 pub fn pack(x: u32, y: u32) -> u32 {
     x | y << 16
 }
+/// Column and row of a packed pixel.
 pub fn unpack(pixel: u32) -> (u32, u32) {
     (pixel & 0xffff, pixel >> 16)
 }
@@ -162,14 +164,14 @@ pub const STEP: Step = Step {
 /// Words of the point list's header before the shots' first points.
 pub const HEADER: usize = 8;
 
-pub fn rows_groups(f: &Frame) -> [u32; 3] {
+pub(crate) fn rows_groups(f: &Frame) -> [u32; 3] {
     SCAN_ROWS.groups([f.tiles_y * f.shots, 1, 1])
 }
-pub fn shots_groups(f: &Frame) -> [u32; 3] {
+pub(crate) fn shots_groups(f: &Frame) -> [u32; 3] {
     SCAN_SHOTS.groups([f.shots, 1, 1])
 }
 
-pub fn count_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn count_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, listing, list, mask, counts] = b else { unreachable!() };
     for &tile in &list[..listing[3] as usize] {
@@ -177,7 +179,7 @@ pub fn count_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     }
 }
 
-pub fn scan_rows_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn scan_rows_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, counts, starts, rows] = b else { unreachable!() };
     for (y, row) in counts.chunks_exact(f.tiles_x as usize).enumerate() {
@@ -190,7 +192,7 @@ pub fn scan_rows_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     }
 }
 
-pub fn scan_shots_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn scan_shots_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, rows, row_starts, totals] = b else { unreachable!() };
     for (shot, rows) in rows.chunks_exact(f.tiles_y as usize).enumerate() {
@@ -203,7 +205,7 @@ pub fn scan_shots_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     }
 }
 
-pub fn head_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn head_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, totals, listing, shortened, header] = b else { unreachable!() };
     let mut sum = 0;
@@ -217,7 +219,7 @@ pub fn head_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     header[HEADER + f.shots as usize] = kept;
 }
 
-pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, listing, list, mask, starts, row_starts, header, points] = b else { unreachable!() };
     for &tile in &list[..listing[3] as usize] {

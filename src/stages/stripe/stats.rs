@@ -8,6 +8,7 @@ use crate::stages::frame::{Frame, PX_LOG2, SHARED, frame_of};
 use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
 
+/// Sums and extremes of blocks of 16 x 8 pixels; one invocation a block.
 pub const STAGE: Stage = Stage {
     name: "stats",
     wgsl: include_str!("../../../shaders/stats.wgsl"),
@@ -45,16 +46,22 @@ pub fn depth_shift(f: &Frame) -> u32 {
 /// Statistics of one block, unpacked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Block {
+    /// Sum of all 128 pixels, rounded down.
     pub sum: u32,
+    /// Largest pixel, rounded up, 0..=256.
     pub largest: u32,
+    /// Smallest pixel, rounded down.
     pub smallest: u32,
+    /// Smallest sum of a row of 16 pixels, rounded down.
     pub row: u32,
+    /// Smallest sum of a column of 8 pixels, rounded down.
     pub column: u32,
     /// Half the smallest sum of 2 x 2 pixels that begin at an even column and row of the block.
     pub half_quad: u32,
 }
 
 impl Block {
+    /// Out of the two words of a block.
     pub fn unpack(words: &[u32]) -> Block {
         Block {
             sum: words[0] & 0x7fff,
@@ -77,6 +84,7 @@ pub fn padded_pixel(f: &Frame, image: &[u32], px_log2: u32, shot: u32, x: u32, y
     image[at as usize] >> (x % (1 << px_log2) * bits) & ((1u64 << bits) - 1) as u32
 }
 
+/// CPU twin: the blocks of all pictures of a batch.
 pub fn twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, image, stats] = b else { unreachable!() };

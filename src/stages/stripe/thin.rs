@@ -190,7 +190,7 @@ pub fn twin(mask: &Mask, rule: Thinning) -> Mask {
     unreachable!("every sub-iteration but the last two deletes a pixel")
 }
 
-pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
+pub(crate) fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let rule = Thinning::of(overrides);
     let [_, listing, list, before, after, stamps] = b else { unreachable!() };

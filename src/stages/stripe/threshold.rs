@@ -235,7 +235,7 @@ fn padded_shot(f: &Frame, image: &[u32], px_log2: u32, shot: u32) -> Image {
     Image { width: w, height: h, bits: 16, pixels: crate::raster::Pixels::U16(px.collect()) }
 }
 
-pub fn mean_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
+pub(crate) fn mean_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let p = f.threshold();
     let masks: Vec<Mask> = (0..f.shots).map(|s| twin(&padded_shot(&f, &b[1], overrides[0].1 as u32, s), &p)).collect();
@@ -270,7 +270,7 @@ fn store(f: &Frame, tile: u32, bits: impl Fn(u32) -> u32, roi: &[u32], out: [&mu
     }
 }
 
-pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
+pub(crate) fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let quads = b.len() - 1;
     let masks: Vec<Mask> =
@@ -285,7 +285,7 @@ pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     }
 }
 
-pub fn gather_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn gather_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, listing, list, quads, roi, mask, kept, lit_listing, lit_list] = b else { unreachable!() };
     for slot in 0..listing[3] as usize {

@@ -39,6 +39,7 @@ impl Default for ThresholdParams {
 }
 
 impl ThresholdParams {
+    /// Refuses what is out of its range.
     pub fn check(&self) -> Result<()> {
         if self.size.is_multiple_of(2) || !(3..=101).contains(&self.size) {
             return Err(Fault::usage(format!("threshold size is {}, it must be odd and in 3..=101 px", self.size))

@@ -13,6 +13,7 @@ use crate::stages::listing::append;
 use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
 
+/// Which tiles may hold a lit pixel; one invocation for four tiles, one below the other.
 pub const STAGE: Stage = Stage {
     name: "tiles",
     wgsl: include_str!("../../../shaders/tiles.wgsl"),
@@ -69,7 +70,7 @@ fn may_be_lit(f: &Frame, blocks: &Blocks, x: i32, y: i32) -> bool {
     area * (largest as i32 - f.offset) > sum + half && largest >= f.minimum
 }
 
-pub fn twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+pub(crate) fn twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, stats, roi, listing, single_listing, singles, run_listing, runs] = b else { unreachable!() };
     let longest = if f.flags & GAUSSIAN != 0 { 1 } else { LONGEST };

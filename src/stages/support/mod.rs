@@ -20,8 +20,11 @@ use stage::{Neighbourhood, Site, SupportFrame, whole};
 /// One shot: peaks and their points, entry by entry.
 #[derive(Clone, Debug)]
 pub struct Profile {
+    /// Number of the shot in its scan.
     pub shot: u32,
+    /// Of all skeleton pixels, refused ones too.
     pub peaks: Vec<Peak>,
+    /// One a peak, base frame, mm; not a number where the peak was refused.
     pub points: Vec<Point>,
     /// Places of the light, the same of every shot, base frame: two shots are as far apart as the farthest of them moves.
     /// Where the laser plane meets the optical axis; on a turntable the stripe's ends too.

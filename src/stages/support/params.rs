@@ -49,6 +49,7 @@ impl Default for SupportParams {
 }
 
 impl SupportParams {
+    /// Refuses what is out of its range.
     pub fn check(&self) -> Result<()> {
         for (name, value, low, high) in [
             ("radius_mm", self.radius_mm.unwrap_or(1.0), 1e-4, 1e3),

@@ -10,6 +10,7 @@ use crate::stages::noise::Noise;
 use crate::stages::peak::SHARED as PEAKS;
 use crate::stages::peak::found::{Peak, Reject};
 
+/// Flags of peaks after a look at the points of the shots beside theirs; one invocation a peak.
 pub const STAGE: Stage = Stage {
     name: "support",
     wgsl: include_str!("../../../shaders/support.wgsl"),
@@ -121,6 +122,7 @@ pub fn judge(f: &SupportFrame, shot: &Neighbourhood, sites: &[Site], p: &Site, k
     if found < need { k.flags | Reject::Unsupported as u32 } else { k.flags }
 }
 
+/// CPU twin: the peaks of all shots of a run.
 pub fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f: SupportFrame = *bytemuck::from_bytes(bytemuck::cast_slice(&b[0]));
     let [_, shots, sites, places, peaks, flags] = b else { unreachable!() };

@@ -18,7 +18,9 @@ use crate::rig::{Calibration, Rig, Volume, hash_file};
 /// How [`calibrate_axis`] is run.
 #[derive(Clone, Debug, Default)]
 pub struct AxisRun {
+    /// Gate and seed of the fit.
     pub solver: AxisOptions,
+    /// Depths and tolerance by which the result is judged.
     pub asked: Asked,
 }
 

@@ -14,7 +14,9 @@ use rayon::prelude::*;
 pub struct FrameBoard {
     /// Index into the recording's frames.
     pub frame: usize,
+    /// As meta.json describes it; a dot diameter that it leaves out is the pictures' median, mm.
     pub board: BoardSpec,
+    /// camera_from_board as measured, mm, with what its pixels say.
     pub pose: MeasuredPose,
     /// The board looks the same after a turn: only its plane is known, not its origin.
     pub ambiguous: bool,
@@ -23,7 +25,9 @@ pub struct FrameBoard {
 /// The frames with boards, and the pictures without, each with the reason.
 #[derive(Clone, Debug, Default)]
 pub struct Boards {
+    /// In the order of the recording's frames.
     pub found: Vec<FrameBoard>,
+    /// Name of the picture, and the reason.
     pub missing: Vec<(String, String)>,
 }
 

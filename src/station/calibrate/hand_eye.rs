@@ -25,7 +25,9 @@ use std::path::{Path, PathBuf};
 pub struct HandEyeRun {
     /// Name of the pose file in the recording; `None`: the one that meta.json names.
     pub poses: Option<String>,
+    /// On the flange, or beside the robot.
     pub mount: Mount,
+    /// Noise of the robot, gates and seed of the fit.
     pub solver: HandEyeOptions,
     /// Judged where the laser plane is used, unless stated; without a laser plane where the boards stood.
     pub asked: Asked,
@@ -34,7 +36,9 @@ pub struct HandEyeRun {
 /// Files of pose pairs.
 #[derive(Clone, Debug)]
 pub struct PosePairs {
+    /// File of the robot's poses, base_from_flange.
     pub robot: PathBuf,
+    /// File of the boards' poses, camera_from_board, each with the index of its robot pose.
     pub boards: PathBuf,
     /// Sigmas of the board poses per axis, mm and rad, where they are known.
     pub board_sigma: Option<[f64; 2]>,
@@ -42,7 +46,9 @@ pub struct PosePairs {
 
 /// What a calibration command leaves: the record to be stored, the page to be read.
 pub struct Calibrated<T> {
+    /// Value, covariance, quality and hashes of what went in.
     pub calibration: Calibration<T>,
+    /// The report for people.
     pub page: Page,
     /// Pictures that could not be used, with the reason.
     pub missing: Vec<(String, String)>,
@@ -50,7 +56,9 @@ pub struct Calibrated<T> {
 
 /// Where the camera sits.
 pub enum HandEyeResult {
+    /// Eye in hand: flange_from_camera, mm.
     OnFlange(Calibrated<HandEye>),
+    /// Eye to hand: base_from_camera, mm.
     InBase(Calibrated<Rigid<Base, Camera>>),
 }
 

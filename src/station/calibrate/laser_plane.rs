@@ -24,9 +24,13 @@ use crate::stages::stripe::point;
 /// How [`calibrate_laser_plane`] is run.
 #[derive(Clone, Debug)]
 pub struct LaserPlaneRun {
+    /// Gates and seed of the fit.
     pub solver: LaserPlaneOptions,
+    /// Depths and tolerance by which the result is judged.
     pub asked: Asked,
+    /// How the stripe is found, as in a scan.
     pub extraction: Extraction,
+    /// Where the stages run.
     pub place: Where,
 }
 

@@ -18,8 +18,11 @@ use crate::rig::{Calibration, Kind, Rig, Volume, hash_file};
 /// How [`calibrate_pointer`] is run.
 #[derive(Clone, Debug)]
 pub struct PointerRun {
+    /// How the spot is found in the pictures.
     pub spots: SpotOptions,
+    /// Settings of the fit.
     pub solver: PointerOptions,
+    /// Depths and tolerance by which the result is judged.
     pub asked: Asked,
 }
 

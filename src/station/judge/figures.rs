@@ -7,6 +7,7 @@ use std::collections::BTreeMap;
 /// A scan's errors against the truth.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Judged {
+    /// Errors of all points, mm.
     pub cloud: CloudErrors,
     /// Errors of the points nearest to each part; "board" is everything else.
     pub by_part: BTreeMap<String, CloudErrors>,

@@ -11,7 +11,9 @@ use std::path::Path;
 /// A part that was looked for.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct FoundPart {
+    /// Name of the recipe.
     pub name: String,
+    /// Title of the recipe, for people.
     pub title: String,
     /// Every gate of the recipe kept: a pose left.
     pub passed: bool,

@@ -21,9 +21,13 @@ pub struct Checkpoint {
     pub identity: String,
     /// Shots done, the skipped ones included.
     pub shots: usize,
+    /// Points of the cloud that are on the disk.
     pub points: u64,
+    /// Number of peaks by fate: kept, and rejected by reason.
     pub peaks: BTreeMap<String, u64>,
+    /// Indices of the shots without a single point.
     pub dark: Vec<u32>,
+    /// Shots left out: name and reason.
     pub skipped: Vec<(String, String)>,
     /// Pixels that found no room in the stages' list.
     pub cut: u64,
@@ -48,6 +52,7 @@ pub fn fingerprint_of(image: &Image) -> u32 {
 }
 
 impl Checkpoint {
+    /// The state before the first shot; for `identity` see the field.
     pub fn new(identity: String) -> Checkpoint {
         Checkpoint {
             identity,

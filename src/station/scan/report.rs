@@ -16,22 +16,30 @@ use std::path::Path;
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ScanReport {
+    /// Version of this file: 2.
     pub format: u32,
+    /// Name and version of the program that wrote it.
     pub program: String,
+    /// Time at which the report was written, UTC, RFC 3339.
     pub created: String,
+    /// Unit of all lengths: "mm".
     pub units: String,
     /// Of the cloud: base, axis, or the flange of a robot that carries the part.
     pub frame: String,
     /// What moved between the shots; the robot with the sensor in reports of former versions.
     #[serde(default)]
     pub motion: Motion,
+    /// What was scanned, as the caller named it.
     pub recording: String,
     /// [`crate::rig::Rig::fingerprint`] of the calibration used.
     pub rig_fingerprint: String,
     /// Adapter and driver, or this machine's processor and why.
     pub ran_on: String,
+    /// Size and depth of the shots.
     pub image: Format,
+    /// Number of shots done, those left out included.
     pub shots: usize,
+    /// Number of points in the cloud.
     pub points: u64,
     /// Depths at which points were believed; none where nothing limits them.
     pub working_volume: Option<Volume>,
@@ -49,10 +57,13 @@ pub struct ScanReport {
     pub seen: Seen,
     /// From the first shot to the closed cloud.
     pub seconds: f64,
+    /// Of this run: shots that an earlier run did are not counted.
     pub shots_per_second: f64,
     /// Where the time went.
     pub spent: Spent,
+    /// Extraction settings as they were given.
     pub settings: Extraction,
+    /// `None` where there were too few points for a map.
     pub height_map: Option<HeightMapFigures>,
     /// What the calibrations' own files say against them, and what else a reader of the figures must know.
     pub remarks: Vec<String>,
@@ -89,13 +100,17 @@ pub struct Spent {
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HeightMapFigures {
+    /// Columns: cells along the grid's x.
     pub width: u32,
+    /// Rows: cells along the grid's y.
     pub height: u32,
+    /// Edge of a cell, mm.
     pub cell_mm: f64,
     /// Share of the cells that hold a height.
     pub coverage: f64,
     /// Heights between which 98 % of the cells lie, mm above the grid's plane.
     pub z_low_mm: f64,
+    /// The upper one of the two, mm above the grid's plane.
     pub z_high_mm: f64,
 }
 

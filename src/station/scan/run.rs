@@ -29,7 +29,9 @@ pub struct ScanOptions {
     pub out: PathBuf,
     /// GPU, this machine's processor, or whichever of them is faster.
     pub place: Where,
+    /// How the stripe is found.
     pub extraction: Extraction,
+    /// How the cloud becomes a height map.
     pub grid: GridOptions,
     /// What moved between the shots.
     pub motion: Motion,

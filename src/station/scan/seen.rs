@@ -10,10 +10,13 @@ use crate::raster::{Image, Pixels};
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Seen {
+    /// Number of shots looked at.
     pub pictures: u32,
     /// Median of the pictures' medians, the brightest pixel of all, and the level of a saturated one.
     pub median_level: u16,
+    /// Level of the brightest pixel in all of them.
     pub brightest_level: u16,
+    /// Level of a saturated pixel, from the pictures' depth.
     pub full_scale: u16,
     /// Largest share of saturated pixels in a picture.
     pub saturated: f64,
