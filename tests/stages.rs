@@ -75,7 +75,12 @@ fn the_chain_of_twins_is_the_plain_definition() {
                 "{}, shot {i}: mask",
                 scene.name
             );
-            let list = skeleton::twin(&thinned);
+            // The list is that of the lines carried on.
+            let long = walk.frame.unpack_mask(&walk.buffers["long"], i as u32);
+            let mut kept = thinned.clone();
+            kept.intersect(&long);
+            assert!(kept == thinned, "{}, shot {i}: carrying on takes nothing away", scene.name);
+            let list = skeleton::twin(&long);
             let header = &walk.buffers["header"];
             let (from, to) = (header[skeleton::HEADER + i] as usize, header[skeleton::HEADER + 1 + i] as usize);
             let points = &walk.buffers["points"][2 * from..2 * to];

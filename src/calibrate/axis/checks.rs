@@ -104,9 +104,10 @@ impl Suspects {
     }
 }
 
-/// Bow of a line over the whole way, from end to middle, mm, and its sigma: places over count, squared count beside the line.
+/// Bow over the whole way, from end to middle, mm, and its sigma: what is left of the places over count, squared count beside the
+/// line. A linear axis that is bent and a table that does not run true both leave one.
 pub(super) fn bend(seen: &[&Seen], state: &State, scatter: &Scatter) -> [f64; 2] {
-    if state.kind != AxisKind::Linear || seen.len() < 4 {
+    if seen.len() < 4 {
         return [0.0, 0.0];
     }
     let (low, high) =

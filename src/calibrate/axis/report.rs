@@ -69,8 +69,16 @@ pub fn judge(fit: &AxisFit, limits: &Limits, board_length: &str) -> Quality {
         ));
     }
     let [bow, bow_sigma] = fit.bend_mm;
-    j.at_best(Verdict::Usable, bow > BENT * bow_sigma && bow > 0.25 * limits.tolerance_mm, || {
+    let bent = bow > BENT * bow_sigma && bow > 0.25 * limits.tolerance_mm;
+    let linear = fit.axis.kind == AxisKind::Linear;
+    j.at_best(Verdict::Usable, bent && linear, || {
         format!("the way is bent: {bow:.4} mm from its ends to its middle, {bow_sigma:.4} mm is chance; it is used as straight")
+    });
+    // Where a table's error lies farther round than the board was seen, nobody knows.
+    j.at_best(Verdict::BadlyDetermined, bent && !linear, || {
+        format!(
+            "the table does not run true: over the turn seen, the board's place bows by {bow:.4} mm, {bow_sigma:.4} mm is chance"
+        )
     });
     if let Some(stated) = fit.axis.unit.stated() {
         let ratio = fit.axis.pitch.abs() / stated;
