@@ -6,7 +6,7 @@ use super::fit::{Order, Stop, StopResidual};
 use super::start::{Start, start};
 use super::terms::{Fit, Scatter, Seen, State, fitted, information};
 use crate::calibrate::scatter::beside;
-use crate::geometry::{AxisKind, CountUnit, Vec3};
+use crate::geometry::{CountUnit, Vec3};
 use nalgebra::DMatrix;
 use rand::{SeedableRng, seq::SliceRandom};
 
