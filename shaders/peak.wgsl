@@ -320,9 +320,9 @@ fn gaussian(at: vec2<i32>) -> Peak {
         let d2 = max(h22 - l02 * h02, LEAST * h22);
         let s12 = h12 - l02 * h01;
         let l12 = s12 / d2;
-        let d1 = max((h11 - l01 * h01) - l12 * s12, LEAST * h11);
+        let d1 = max(h11 - (l01 * h01 + l12 * s12), LEAST * h11);
         let y2 = g2 - l02 * g0;
-        let x1 = ((g1 - l01 * g0) - l12 * y2) / d1;
+        let x1 = (g1 - (l01 * g0 + l12 * y2)) / d1;
         let x2 = y2 / d2 - l12 * x1;
         let x0 = g0 / h00 - (l02 * x2 + l01 * x1);
         let da = clamp(a * x0, -0.5 * a, a);

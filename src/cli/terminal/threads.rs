@@ -5,6 +5,10 @@ use crate::fault::{Fault, Result};
 use rayon::{ThreadBuilder, ThreadPoolBuilder};
 use std::sync::mpsc::{Sender, channel};
 
+/// More threads than this, and than four a processor, are a slip of the hand: a thread that finds no memory for its signal
+/// stack takes the whole process with it.
+const MOST: usize = 256;
+
 /// Starts as many threads as there are processors, or as many of them as the process gets. rayon's own way is all or a
 /// panic in whatever needs the first of them, and cannot be tried twice.
 pub fn start() -> Result<()> {
@@ -13,7 +17,7 @@ pub fn start() -> Result<()> {
 }
 
 fn pool(processors: usize, asked: Option<usize>) -> Result<()> {
-    let wanted = asked.filter(|n| *n > 0).unwrap_or(processors);
+    let wanted = asked.filter(|n| *n > 0).unwrap_or(processors).min(MOST.max(4 * processors));
     let mut failed = None;
     // Each waits for what it is to be in the pool.
     let mut waiting: Vec<Sender<ThreadBuilder>> = Vec::new();

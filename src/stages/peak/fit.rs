@@ -178,9 +178,9 @@ pub(super) fn gaussian<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak
         let d2 = (h22 - l02 * h02).max(LEAST * h22);
         let s12 = h12 - l02 * h01;
         let l12 = s12 / d2;
-        let d1 = ((h11 - l01 * h01) - l12 * s12).max(LEAST * h11);
+        let d1 = (h11 - (l01 * h01 + l12 * s12)).max(LEAST * h11);
         let y2 = g2 - l02 * g0;
-        let x1 = ((g1 - l01 * g0) - l12 * y2) / d1;
+        let x1 = (g1 - (l01 * g0 + l12 * y2)) / d1;
         let x2 = y2 / d2 - l12 * x1;
         let x0 = g0 / h00 - (l02 * x2 + l01 * x1);
         // Bounded steps: the model is not linear far from the answer.
