@@ -23,7 +23,7 @@ pub fn write_unsynced(path: &Path, bytes: &[u8]) -> Result<()> {
     rename(aside.file, path).map_err(|e| Fault::write(path, e))
 }
 
-/// [`write`] of a result and of what is shown beside it (its picture, its page). Whenever the program is stopped or the disk
+/// [`write()`] of a result and of what is shown beside it (its picture, its page). Whenever the program is stopped or the disk
 /// is full, the result is the old one or the new one, whole, and beside it stands its own or nothing.
 pub fn write_beside(result: (&Path, &[u8]), beside: &[(&Path, &[u8])]) -> Result<()> {
     let aside = |(path, bytes): (&Path, &[u8])| {

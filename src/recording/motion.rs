@@ -127,12 +127,10 @@ impl Motion {
             let what = format!("a count of {odd} {}, at most {MOST:.0} is believed", unit.name());
             return bad(what, "write counts as the encoder gives them, or set \"zero\" nearer");
         }
-        match self.counts_per_shot {
-            Some(step) if step == 0.0 => {
-                bad("counts_per_shot is 0".into(), "state how far the axis goes from shot to shot")
-            }
-            _ => Ok(()),
+        if self.counts_per_shot == Some(0.0) {
+            return bad("counts_per_shot is 0".into(), "state how far the axis goes from shot to shot");
         }
+        Ok(())
     }
 }
 

@@ -25,13 +25,8 @@ pub const STAGE: Stage = Stage {
 };
 
 /// Subtracts the ambient light from the pictures where they lie.
-pub const STEP: Step = Step {
-    stage: &STAGE,
-    twin: twin,
-    binds: &["frame", "image", "ambient"],
-    groups: Groups::Of(groups),
-    same: Same::Words,
-};
+pub const STEP: Step =
+    Step { stage: &STAGE, twin, binds: &["frame", "image", "ambient"], groups: Groups::Of(groups), same: Same::Words };
 
 /// One invocation for 4 words of one shot.
 pub fn groups(f: &Frame) -> [u32; 3] {

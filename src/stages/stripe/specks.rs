@@ -34,7 +34,7 @@ pub const STAGE: Stage = Stage {
 /// Lit pixels of the tiles that stand alone.
 pub const STEP: Step = Step {
     stage: &STAGE,
-    twin: twin,
+    twin,
     binds: &[
         "frame",
         "image",

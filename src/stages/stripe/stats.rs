@@ -24,13 +24,8 @@ pub const STAGE: Stage = Stage {
 };
 
 /// Sums and extremes of every block.
-pub const STEP: Step = Step {
-    stage: &STAGE,
-    twin: twin,
-    binds: &["frame", "image", "stats"],
-    groups: Groups::Of(groups),
-    same: Same::Words,
-};
+pub const STEP: Step =
+    Step { stage: &STAGE, twin, binds: &["frame", "image", "stats"], groups: Groups::Of(groups), same: Same::Words };
 
 /// One invocation a block, two blocks a tile.
 pub fn groups(f: &Frame) -> [u32; 3] {

@@ -36,7 +36,7 @@ pub const STAGE: Stage = Stage {
 /// Lists the tiles that may hold a lit pixel.
 pub const STEP: Step = Step {
     stage: &STAGE,
-    twin: twin,
+    twin,
     binds: &["frame", "stats", "roi", "all header", "single header", "singles", "run header", "runs"],
     groups: Groups::Of(groups),
     same: Same::Lists(&[(5, 2), (7, 2)]),

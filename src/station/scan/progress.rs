@@ -35,7 +35,7 @@ pub struct Checkpoint {
     pub stripe: Option<Stripe>,
     /// Where the camera was at the first shot, as rows: from there the map's up and the stripe's axis follow.
     first_place: Option<[f64; 16]>,
-    /// [`fingerprint_of`] the last shot done, which a resumed scan reads again.
+    /// Fingerprint of the last shot done, which a resumed scan reads again.
     pub last_picture: Option<u32>,
     /// Histogram of log10(sigma / mm) from -5 to 1 in 240 steps of 0.025 (6 % a step).
     sigma: Vec<u64>,
