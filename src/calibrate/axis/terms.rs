@@ -155,7 +155,7 @@ impl State {
         Axis::from_board(&Riding { kind: self.kind, unit, direction, point: self.point, pitch }, &self.board())
     }
     /// d(dx dy dz pitch px py pz) over the unknowns.
-    pub fn to_parameters(&self, axis: &Axis) -> DMatrix<f64> {
+    pub fn to_parameters(self, axis: &Axis) -> DMatrix<f64> {
         let d = axis.direction();
         if self.kind == AxisKind::Linear {
             let k = axis.pitch;

@@ -216,7 +216,7 @@ fn sizes_and_a_witness_of_the_height_show_what_two_looks_hide() {
     assert!(of_plane(&seen) < 0.4 * of_plane(&alone), "{} {}", of_plane(&seen), of_plane(&alone));
     for b in &mut s.looks {
         let plane = b.levers.iter().find(|l| l.name == "laser plane").unwrap();
-        let strain = &plane.jacobian.rows(6, 3) * &wrong[0];
+        let strain = plane.jacobian.rows(6, 3) * &wrong[0];
         let covariance = Matrix3::identity() * 3e-4f64.powi(2);
         b.shape = Some(Shape { strain: nalgebra::Vector3::new(strain[0], strain[1], strain[2]), covariance });
     }

@@ -92,6 +92,8 @@ const LEAST: f32 = 1e-5;
 /// Share of the ceiling over which clipped pixels fall silent: at once, and rounding would decide.
 const SOFT: f32 = 0.05;
 
+// The digits of the shader.
+#[allow(clippy::approx_constant)]
 /// e to the power of x from -80 to 80, to 2e-7 of itself: every machine has its own `exp`, this one is the shader's.
 #[inline(always)]
 pub(super) fn exponential(x: f32) -> f32 {
