@@ -7,7 +7,7 @@ use crate::fault::{Fault, Result};
 use crate::find::Recipe;
 use crate::recording::Recording;
 use crate::rig::Rig;
-use crate::scan::{GridOptions, RecordingSource, Where};
+use crate::scan::{RecordingSource, Where};
 use crate::simulate::{SimulateOptions, simulate};
 use crate::station::{FoundPart, Judged, ScanOptions, ScanReport, Settings};
 use crate::station::{judge, judge_parts};
@@ -78,19 +78,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     })?;
     let out = args.out.clone();
     let (settings, rig) = (Settings::load(&made.station)?, Rig::load(&made.station)?);
-    let scan = ScanOptions {
-        out: out.clone(),
-        place: args.on,
-        extraction: settings.extraction.clone(),
-        grid: GridOptions::default(),
-        volume: crate::station::volume::believed(&settings, &rig),
-        motion: crate::recording::Motion::default(),
-        ambient: None,
-        overlays: 4,
-        skip_bad: false,
-        resume: false,
-        stop: Default::default(),
-    };
+    let scan = ScanOptions { place: args.on, overlays: 4, ..ScanOptions::for_station(&settings, &rig, &out) };
     console.say("scanning it through the whole chain");
     let bar = console.bar("scanning", options.shots as u64);
     let recording = Recording::open(&folder)?;

@@ -5,11 +5,11 @@
 use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
 use crate::raster::{Channel, Image, Light, load_sized};
-use crate::recording::{Motion, Recording, load_poses};
-use crate::rig::{Rig, hash_file, hash_text};
-use crate::scan::{GridOptions, RawFormat, RawSource, RecordingSource, Where};
+use crate::recording::{Recording, load_poses};
+use crate::rig::Rig;
+use crate::scan::{GridOptions, RawFormat, RawSource, Where};
 use crate::station::judge;
-use crate::station::{Judged, ScanOptions, ScanReport, Settings};
+use crate::station::{Judged, ScanOptions, ScanReport, Settings, scan_recording};
 use std::path::{Path, PathBuf};
 
 /// Turn the shots of a recording into a point cloud and a height map
@@ -79,17 +79,13 @@ pub struct Args {
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let (settings, rig) = (Settings::load(&args.station)?, Rig::load(&args.station)?);
     let mut options = ScanOptions {
-        out: args.out.clone(),
         place: args.on,
-        extraction: settings.extraction.clone(),
         grid: GridOptions { cell: args.cell_mm, ..GridOptions::default() },
-        volume: crate::station::volume::believed(&settings, &rig),
-        ambient: None,
-        motion: Motion::default(),
         overlays: args.overlays,
         skip_bad: args.skip_bad,
         resume: args.resume,
         stop: crate::cli::terminal::interrupt::asked_for(),
+        ..ScanOptions::for_station(&settings, &rig, &args.out)
     };
     if let Some(truth) = &args.truth {
         // A wrong path shall not cost a scan.
@@ -105,23 +101,19 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
             let mut recording = Recording::open(folder)?;
             recording.channel = args.channel;
             recording.outside = args.pictures_outside;
-            options.motion = recording.meta.motion();
-            if options.motion.axis().is_none() {
+            if recording.meta.motion().axis().is_none() {
                 recording.pose_file(args.poses.as_deref())?.warnings.iter().for_each(|w| console.warn(w));
             } else if args.poses.is_some() {
                 return Err(Fault::usage("--poses is given, and meta.json says that an axis moved")
                     .cause("another recording, or a motion that is not this one's")
                     .next("leave --poses out, or correct 'motion' in meta.json"));
             }
-            let mut id = identity(folder, &recording, args.poses.as_deref())?;
             if let Some(name) = &args.ambient {
                 let inside = folder.join(name);
                 let path = if inside.is_file() { inside } else { name.clone() };
                 options.ambient = Some(recording.load(&path).map_err(no_ambient)?);
-                id += &hash_file(&path)?;
             }
-            let open = |first| Ok(Box::new(RecordingSource::open(&recording, args.poses.as_deref(), first)?) as Box<_>);
-            crate::station::scan(&id, &folder.display().to_string(), open, &rig, &options, progress)?
+            scan_recording(&recording, args.poses.as_deref(), &rig, &options, progress)?
         }
         (None, Some(raw)) => {
             let file = load_poses(Path::new(args.poses.as_deref().expect("required by --raw")))?;
@@ -200,19 +192,6 @@ struct WithErrors {
     #[serde(flatten)]
     scan: ScanReport,
     errors: Judged,
-}
-
-/// What a resumed scan must have in common with the interrupted one.
-fn identity(folder: &Path, recording: &Recording, poses: Option<&str>) -> Result<String> {
-    let meta = hash_file(&folder.join("meta.json"))?;
-    let text = if recording.meta.motion().axis().is_some() {
-        serde_json::to_string(&(meta, recording.counts()?, recording.channel))
-    } else {
-        let poses: Vec<[f64; 16]> = recording.poses(poses)?.iter().map(|p| p.to_rows()).collect();
-        serde_json::to_string(&(meta, poses, recording.channel))
-    };
-    let text = text.expect("plain data");
-    Ok(hash_text(text.as_bytes()))
 }
 
 fn summary(r: &ScanReport, out: &Path) -> String {

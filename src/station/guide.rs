@@ -4,7 +4,8 @@
 //! Frame and unit: base frame; mm, degrees.
 
 use super::range::{RangeReport, RangeRun, measure_range};
-use super::scan::run::{ScanOptions, scan};
+use super::scan::recorded::scan_recording;
+use super::scan::run::ScanOptions;
 use super::settings::Settings;
 use super::volume;
 use crate::fault::{Fault, Result};
@@ -12,9 +13,9 @@ use crate::find::insert::picture;
 use crate::find::{Accelerator, LocateOptions, Recipe, Report, locate};
 use crate::geometry::{Base, Camera, Flange, Mat3, Rigid, Vec3};
 use crate::recording::Recording;
-use crate::rig::{Rig, Volume, hash_file};
+use crate::rig::{Rig, Volume};
 use crate::robot::Convention;
-use crate::scan::{GridOptions, RecordingSource, Where};
+use crate::scan::Where;
 use std::path::PathBuf;
 
 /// What the procedure works on.
@@ -144,22 +145,8 @@ pub fn guide(options: &GuideOptions, confirm: &mut dyn FnMut(&Step) -> Result<bo
     let recording = Recording::open(&options.scan)?;
     let scan_folder = options.out.join("scan");
     let poses = options.scan_poses.as_deref();
-    let run = ScanOptions {
-        out: scan_folder.clone(),
-        place: options.place,
-        extraction: settings.extraction.clone(),
-        grid: GridOptions::default(),
-        volume: volume::believed(&settings, &rig),
-        motion: crate::recording::Motion::default(),
-        ambient: None,
-        overlays: 0,
-        skip_bad: false,
-        resume: false,
-        stop: Default::default(),
-    };
-    let open = |first| Ok(Box::new(RecordingSource::open(&recording, poses, first)?) as Box<_>);
-    let id = hash_file(&options.scan.join("meta.json"))?;
-    let scanned = scan(&id, &options.scan.display().to_string(), open, &rig, &run, |_, _| {})?;
+    let run = ScanOptions { place: options.place, ..ScanOptions::for_station(&settings, &rig, &scan_folder) };
+    let scanned = scan_recording(&recording, poses, &rig, &run, |_, _| {})?;
 
     let cloud = crate::station::scan::report::cloud_of(&scan_folder)?;
     let accelerator = (options.place != Where::Cpu).then(Accelerator::open).flatten();

@@ -28,7 +28,7 @@ pub use judge::parts::{FoundPart, judge_parts};
 pub use judge::points::judge;
 pub use range::{Distance, RangeReport, RangeRun, SurfaceFound, measure_range};
 pub use scan::progress::Checkpoint;
-pub use scan::recorded::{identity, scan_recording};
+pub use scan::recorded::scan_recording;
 pub use scan::report::{HeightMapFigures, ScanReport, Spent, cloud_of, load_report};
 pub use scan::run::{ScanOptions, scan, scan_on};
 pub use scan::scan_folder::of_a_scan;

@@ -17,11 +17,6 @@ pub const TILE: (u32, u32) = (32, 8);
 pub fn pack(x: u32, y: u32) -> u32 {
     x | y << 16
 }
-/// Column and row of a packed pixel.
-pub fn unpack(pixel: u32) -> (u32, u32) {
-    (pixel & 0xffff, pixel >> 16)
-}
-
 /// CPU twin: lit pixels tile by tile (rows of tiles from the top, tiles from the left), within a
 /// tile row by row. One tile is one unit of GPU work, hence this order and not the plain one.
 pub fn twin(mask: &Mask) -> Vec<u32> {

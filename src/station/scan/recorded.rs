@@ -4,6 +4,7 @@
 use super::report::ScanReport;
 use super::run::{ScanOptions, scan};
 use crate::fault::Result;
+use crate::raster::{Image, Pixels};
 use crate::recording::{Motion, Recording};
 use crate::rig::{Rig, hash_file, hash_text};
 use crate::scan::{GridOptions, RecordingSource, Where};
@@ -33,11 +34,10 @@ impl ScanOptions {
 }
 
 /// Scans a recording by the motion that it states, a robot's with the poses of that name (the one that meta.json names, where
-/// it is `None`). `progress` is told
-/// (shots done, shots in all).
+/// it is `None`). `progress` is told (shots done, shots in all).
 ///
 /// # Errors
-/// Those of [`scan`], and of the recording's poses.
+/// Those of [`scan`], and of the recording's poses or counts.
 pub fn scan_recording(
     recording: &Recording,
     poses: Option<&str>,
@@ -46,21 +46,24 @@ pub fn scan_recording(
     progress: impl FnMut(usize, Option<usize>),
 ) -> Result<ScanReport> {
     let options = &ScanOptions { motion: recording.meta.motion(), ..options.clone() };
-    let id = identity(recording, poses)?;
+    let id = identity(recording, poses, options.ambient.as_ref())?;
     let open = |first| Ok(Box::new(RecordingSource::open(recording, poses, first)?) as Box<_>);
     scan(&id, &recording.folder.display().to_string(), open, rig, options, progress)
 }
 
-/// What a resumed scan must have in common with the interrupted one: a hash of meta.json, of the poses or counts and of the
-/// channel.
-pub fn identity(recording: &Recording, poses: Option<&str>) -> Result<String> {
+/// What a resumed scan must have in common with the interrupted one: a hash of meta.json, of the poses or counts, of the channel
+/// and of the ambient picture.
+fn identity(recording: &Recording, poses: Option<&str>, ambient: Option<&Image>) -> Result<String> {
     let meta = hash_file(&recording.folder.join("meta.json"))?;
+    let ambient = ambient.map(|image| match &image.pixels {
+        Pixels::U8(px) => hash_text(px),
+        Pixels::U16(px) => hash_text(bytemuck::cast_slice(px)),
+    });
     let text = if recording.meta.motion().axis().is_some() {
-        serde_json::to_string(&(meta, recording.counts()?, recording.channel))
+        serde_json::to_string(&(meta, recording.counts()?, recording.channel, ambient))
     } else {
         let poses: Vec<[f64; 16]> = recording.poses(poses)?.iter().map(|p| p.to_rows()).collect();
-        serde_json::to_string(&(meta, poses, recording.channel))
+        serde_json::to_string(&(meta, poses, recording.channel, ambient))
     };
-    let text = text.expect("plain data");
-    Ok(hash_text(text.as_bytes()))
+    Ok(hash_text(text.expect("plain data").as_bytes()))
 }
