@@ -42,12 +42,16 @@ pub mod gpu;
 pub mod raster;
 pub mod solve;
 
+pub mod arm;
 pub mod camera;
 pub mod recording;
 pub mod rig;
 pub mod robot;
 
 pub mod calibrate;
+pub mod capture;
+#[cfg(feature = "cell")]
+pub mod cell;
 pub mod simulate;
 
 pub mod stages;
@@ -59,6 +63,9 @@ pub mod bench;
 
 pub mod find;
 pub mod station;
+
+#[cfg(feature = "web")]
+pub mod web;
 
 #[cfg(feature = "cli")]
 pub mod cli;
