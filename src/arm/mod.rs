@@ -6,6 +6,7 @@ mod denso;
 mod file;
 mod link;
 mod motion;
+pub mod rules;
 mod state;
 mod uri;
 

@@ -5,6 +5,7 @@
 mod atomic;
 mod folder;
 mod inputs;
+mod journal;
 mod lock;
 mod moment;
 mod natural;
@@ -15,6 +16,7 @@ mod together;
 pub use atomic::{Aside, keep_all, write, write_aside, write_beside, write_unsynced};
 pub use folder::{make_folder, remove};
 pub use inputs::{not_over, not_over_any};
+pub use journal::append_line;
 pub use lock::Lock;
 pub use moment::moment;
 pub use natural::natural;
