@@ -6,6 +6,8 @@ mod common;
 
 #[path = "cell/golden.rs"]
 mod golden;
+#[path = "cell/job.rs"]
+mod job;
 #[path = "cell/rules.rs"]
 mod rules;
 #[path = "cell/wire.rs"]

@@ -6,11 +6,13 @@ mod denso;
 mod file;
 mod link;
 mod motion;
+mod outputs;
 pub mod rules;
 mod state;
 mod uri;
 
 pub use link::{Arm, Halt, PoseSource};
 pub use motion::{Allowed, Motion, Way};
+pub use outputs::Outputs;
 pub use state::{ControllerError, Mode, Reach, State, TimedPose};
 pub use uri::{RobotUri, open};

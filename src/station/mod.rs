@@ -5,6 +5,7 @@ mod calibrate;
 mod find;
 mod guide;
 mod height_witness;
+pub mod job;
 mod judge;
 mod range;
 mod scan;
@@ -33,6 +34,6 @@ pub use scan::report::{HeightMapFigures, ScanReport, Spent, cloud_of, load_repor
 pub use scan::run::{ScanOptions, scan, scan_on};
 pub use scan::scan_folder::of_a_scan;
 pub use scan::seen::Seen;
-pub use settings::{Settings, WorkingVolume};
+pub use settings::{Settings, ToolSpec, WorkingVolume};
 pub use values::Values;
 pub use verify::{CalibrationCheck, VerifyReport, VerifyRun, verify};
