@@ -5,7 +5,9 @@ use super::doctor::command as doctor;
 use super::find::{locate as find, model, second_look, teach};
 use super::terminal::console::Console;
 use super::terminal::threads;
-use super::{bench, board, calibrate, demo, guide, live, range, scan, shift_scan, simulate, station, verify};
+use super::{
+    bench, board, calibrate, cell, demo, guide, job, live, range, scan, shift_scan, simulate, station, verify,
+};
 use crate::fault::Result;
 use clap::{Parser, Subcommand};
 
@@ -41,10 +43,14 @@ enum Command {
     /// Calibrate a station's camera, laser plane, pointer or hand-eye from a recording
     #[command(subcommand)]
     Calibrate(calibrate::Command),
+    /// A simulated robot cell
+    #[command(subcommand)]
+    Cell(cell::Command),
     Demo(demo::Args),
     Doctor(doctor::Args),
     Find(find::Args),
     Guide(guide::Args),
+    Job(job::Args),
     Live(live::Args),
     Model(model::Args),
     Range(range::Args),
@@ -65,10 +71,12 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Bench(a) => bench::run(a, console),
         Command::Board(a) => board::run(a, console),
         Command::Calibrate(c) => calibrate::run(c, console),
+        Command::Cell(c) => cell::run(c, console),
         Command::Demo(a) => demo::run(a, console),
         Command::Doctor(a) => doctor::run(a, console),
         Command::Find(a) => find::run(a, console),
         Command::Guide(a) => guide::run(a, console),
+        Command::Job(a) => job::run(a, console),
         Command::Live(a) => live::run(a, console),
         Command::Model(a) => model::run(a, console),
         Command::Range(a) => range::run(a, console),

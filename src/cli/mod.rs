@@ -4,12 +4,14 @@
 mod bench;
 mod board;
 mod calibrate;
+mod cell;
 mod commands;
 mod demo;
 mod doctor;
 mod find;
 mod guide;
 mod insertion;
+mod job;
 mod live;
 mod range;
 mod scan;

@@ -36,14 +36,14 @@ impl Operator for Yes {
     }
 }
 
-/// The circuit board with one part of the shipped scene alone, near the middle, turned by the seed.
+/// The circuit board with one part of the shipped scene alone, turned by the seed.
 fn scene(part: &str, seed: u64) -> SceneSpec {
     let mut spec = SceneSpec::parse(sheetlight::simulate::DEFAULT_SCENE).unwrap();
     spec.part.retain(|p| p.name == part);
     spec.solid.truncate(2);
     let k = seed as f64;
     if let Some(p) = spec.part.first_mut() {
-        (p.at_mm[0], p.at_mm[1], p.turn_deg) = (8.0 * (1.3 * k).sin(), 5.0 * (2.1 * k).cos(), 8.0 * (0.7 * k).sin());
+        (p.at_mm[0], p.at_mm[1], p.turn_deg) = (0.0, 0.0, 8.0 * (0.7 * k).sin());
     }
     spec
 }
@@ -55,9 +55,17 @@ struct Set {
     _dir: tempfile::TempDir,
 }
 
-fn set(spec: SceneSpec, seed: u64, tilt_deg: f64) -> Set {
-    let options = CellOptions { speed: 20.0, tilt_deg, ..CellOptions::of(spec, seed) };
+fn set(mut spec: SceneSpec, seed: u64, tilt_deg: f64) -> Set {
+    let options = CellOptions { speed: 20.0, tilt_deg, ..CellOptions::of(spec.clone(), seed) };
     let served = Served::here(Cell::new(options).unwrap()).unwrap();
+    // The operator jogs until the part is in view; here it is laid where the camera looks, by some millimetres.
+    let camera = served.cell.true_flange(0.0) * served.cell.station().flange_from_camera;
+    let seen = served.cell.base_from_scene().inverse() * camera;
+    let axis = seen.rotation.column(2).into_owned();
+    let foot = seen.translation - axis * (seen.translation.z / axis.z);
+    let k = seed as f64;
+    (spec.part[0].at_mm[0], spec.part[0].at_mm[1]) = (foot.x + 4.0 * (1.3 * k).sin(), foot.y + 4.0 * (2.1 * k).cos());
+    served.cell.lay(&spec, None).unwrap();
     served.controller.set_motor(true);
     let dir = tempfile::tempdir().unwrap();
     let station = dir.path().join("station");
@@ -113,7 +121,7 @@ fn inserted(part: &str, seed: u64, tilt_deg: f64, sweep_mm: f64) -> (JobReport, 
 
 #[test]
 fn a_component_goes_into_its_socket() {
-    let (report, insertion, collisions, _) = inserted("osc", 3, 5.0, 30.0);
+    let (report, insertion, collisions, _) = inserted("osc", 3, 5.0, 34.0);
     assert_eq!(report.outcome, Outcome::Inserted, "{}", report.why);
     let judged = insertion.expect("the gripper has let go");
     println!("{judged:?}");
@@ -145,9 +153,7 @@ fn sockets_of_many_cells_are_filled() {
 #[test]
 fn nothing_moves_towards_a_part_that_is_another_one() {
     // An LED's socket lies there, the oscillator's is looked for.
-    let mut spec = scene("led", 2);
-    spec.part[0].at_mm[2] = 4.2;
-    let set = set(spec, 2, 2.0);
+    let set = set(scene("led", 2), 2, 2.0);
     let mut who = Yes::always();
     let report = set.run(&set.options("osc.toml", "job", 24.0), &mut who).unwrap();
     assert_eq!(report.outcome, Outcome::Stopped);
