@@ -8,6 +8,8 @@ mod common;
 mod golden;
 #[path = "cell/job.rs"]
 mod job;
+#[path = "cell/programs.rs"]
+mod programs;
 #[path = "cell/rules.rs"]
 mod rules;
 #[path = "cell/wire.rs"]

@@ -9,6 +9,7 @@ mod motion;
 mod outputs;
 pub mod rules;
 mod state;
+pub mod ur;
 mod uri;
 
 pub use link::{Arm, Halt, PoseSource};

@@ -2,12 +2,11 @@
 //! Frame and unit: none.
 
 use super::doctor::command as doctor;
-use super::find::{locate as find, model, second_look, teach};
+use super::find::{locate as find, model, program, second_look, teach};
+use super::insert::{guide, job};
 use super::terminal::console::Console;
 use super::terminal::threads;
-use super::{
-    bench, board, calibrate, cell, demo, guide, job, live, range, scan, shift_scan, simulate, station, verify,
-};
+use super::{bench, board, calibrate, cell, demo, live, range, scan, shift_scan, simulate, station, verify};
 use crate::fault::Result;
 use clap::{Parser, Subcommand};
 
@@ -53,6 +52,7 @@ enum Command {
     Job(job::Args),
     Live(live::Args),
     Model(model::Args),
+    Program(program::Args),
     Range(range::Args),
     Scan(scan::Args),
     SecondLook(second_look::Args),
@@ -79,6 +79,7 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Job(a) => job::run(a, console),
         Command::Live(a) => live::run(a, console),
         Command::Model(a) => model::run(a, console),
+        Command::Program(a) => program::run(a, console),
         Command::Range(a) => range::run(a, console),
         Command::Scan(a) => scan::run(a, console),
         Command::SecondLook(a) => second_look::run(a, console),

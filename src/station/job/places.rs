@@ -4,8 +4,9 @@
 
 use crate::geometry::{Base, Camera, Flange, Plane, Ray, Rigid, Vec2, Vec3};
 
-/// Touches lie at these shares of the field around its middle: corners and the middles of two sides.
-const TOUCHES: [[f64; 2]; 6] = [[-1.0, -1.0], [-1.0, 0.0], [-1.0, 1.0], [1.0, 1.0], [1.0, 0.0], [1.0, -1.0]];
+/// Touches lie at these shares of the field around its middle: corners and the middles of the picture's long sides, where a long
+/// part along the stripe is not.
+const TOUCHES: [[f64; 2]; 6] = [[-1.0, -1.0], [0.0, -1.0], [1.0, -1.0], [1.0, 1.0], [0.0, 1.0], [-1.0, 1.0]];
 
 /// Flange poses from which the pointer's spots lie around the foot of the camera's axis, `half` mm to each side. The camera stands
 /// `now` from the board along its axis, and goes to `then`.
