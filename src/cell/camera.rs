@@ -1,10 +1,9 @@
 //! In: the cell at a moment. Out: the picture that the camera on the flange takes, or the small one in the gripper.
 //! Frame and unit: grey levels of the sensor's depth; s of the cell. A picture shows the middle of its exposure, unmoved.
 
-use super::cell::Cell;
 use crate::geometry::{Camera, Flange, Rigid, Vec3};
 use crate::raster::Image;
-use crate::simulate::{Canvas, InScene, Sensor, Station, View, expose};
+use crate::simulate::{Canvas, InScene, Scene, Sensor, Station, View, expose};
 
 /// Rays a pixel's side of pictures in room light.
 const RAYS: u32 = 2;
@@ -21,13 +20,14 @@ pub(super) struct Lit {
 
 /// One picture. `number` keeps its noise apart from others'.
 pub(super) fn picture(
-    cell: &Cell,
     station: &Station,
+    scene: &Scene,
+    hot: &[(usize, f32)],
     scene_from_camera: Rigid<InScene, Camera>,
     lit: Lit,
     number: u64,
 ) -> Image {
-    let view = View { station, scene: &cell.scene(), scene_from_camera };
+    let view = View { station, scene, scene_from_camera };
     let (w, h) = (station.camera.width, station.camera.height);
     let mut laser = Canvas::new(w, h);
     if lit.line {
@@ -43,7 +43,7 @@ pub(super) fn picture(
         (false, false) => (Canvas::new(w, h), 0.0),
     };
     let mut rng = station.rng("cell picture", number);
-    expose(&station.sensor, &laser, &room, gain as f32, cell.hot(), &mut rng)
+    expose(&station.sensor, &laser, &room, gain as f32, hot, &mut rng)
 }
 
 /// The small camera in the gripper: looks along the tool's way, quarter of the large one's width.

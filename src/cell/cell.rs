@@ -90,17 +90,15 @@ impl Cell {
     pub(super) fn world(&self) -> MutexGuard<'_, World> {
         self.0.world.lock().unwrap_or_else(PoisonError::into_inner)
     }
-    pub(super) fn scene(&self) -> Arc<Scene> {
+    fn scene(&self) -> Arc<Scene> {
         self.0.scene.lock().unwrap_or_else(PoisonError::into_inner).clone()
-    }
-    pub(super) fn hot(&self) -> &[(usize, f32)] {
-        &self.0.hot
     }
 
     /// The picture of a moment that has come: what was lit then, seen from where the flange truly was.
     pub fn picture(&self, t: f64) -> Image {
         let (lit, scene_from_camera) = self.seen(t, &self.0.station);
-        camera::picture(self, &self.0.station, scene_from_camera, lit, self.0.pictures.fetch_add(1, Ordering::Relaxed))
+        let number = self.0.pictures.fetch_add(1, Ordering::Relaxed);
+        camera::picture(&self.0.station, &self.scene(), &self.0.hot, scene_from_camera, lit, number)
     }
 
     /// The picture of the small camera in the gripper, in room light.

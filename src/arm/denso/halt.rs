@@ -1,8 +1,8 @@
 //! In: the wish to stop. Out: Halt over a connection of its own, which no motion blocks and which does not hold the arm.
 //! Frame and unit: times in ms.
 
-use super::super::Halt;
 use super::session::Session;
+use crate::arm::Halt;
 use crate::bcap::{Call, ClientOptions, Variant};
 use crate::fault::Result;
 use std::sync::{Mutex, PoisonError};

@@ -1,8 +1,8 @@
 //! In: a controller's address. Out: one connection with its handles; poses, errors and numbers read over it.
 //! Frame and unit: mm and degrees on the wire, base_from_flange in mm here.
 
-use super::super::{ControllerError, PoseSource, TimedPose};
-use super::{read_position, words};
+use super::words;
+use crate::arm::{ControllerError, PoseSource, TimedPose};
 use crate::bcap::{Call, Client, ClientOptions, Handle, Network, Outcome, Variant};
 use crate::fault::{Fault, Result};
 use std::time::{Duration, Instant};
@@ -97,7 +97,7 @@ impl PoseSource for Session {
             Some((ms, pose)) if self.timed => (Some(Duration::from_secs_f64(ms.max(0.0) * 1e-3)), pose),
             _ => (None, &numbers[..]),
         };
-        let (base_from_flange, figure) = read_position(numbers).map_err(|e| e.at(command))?;
+        let (base_from_flange, figure) = words::read_position(numbers).map_err(|e| e.at(command))?;
         Ok(TimedPose { base_from_flange, figure, asked, here, device })
     }
 }

@@ -2,6 +2,7 @@
 //! Frame and unit: mm and degrees, Denso's X Y Z RX RY RZ and figure.
 
 use crate::bcap::Variant;
+use crate::fault::Result;
 use crate::geometry::{Base, Flange, Rigid};
 use crate::robot::Convention;
 
@@ -28,6 +29,12 @@ pub fn out_of_range(code: i64) -> String {
 /// A controller's text without what would steer a terminal.
 pub fn plain(text: &str) -> String {
     text.chars().filter(|c| !c.is_control()).take(200).collect()
+}
+
+/// The seven numbers of a position and its figure.
+pub fn read_position(numbers: &[f64]) -> Result<(Rigid<Base, Flange>, Option<i32>)> {
+    let pose = Convention::Denso.read(numbers.get(..6).unwrap_or(numbers))?;
+    Ok((pose, numbers.get(6).map(|f| *f as i32)))
 }
 
 #[cfg(test)]

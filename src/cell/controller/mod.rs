@@ -4,6 +4,7 @@
 
 mod commands;
 mod goal;
+mod hands;
 mod motion;
 mod panel;
 mod variables;
@@ -11,7 +12,7 @@ mod variables;
 use super::cell::Cell;
 use crate::bcap::{Call, Outcome, Variant};
 pub use motion::Ticket;
-use panel::Panel;
+use panel::{Object, Panel};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -48,15 +49,6 @@ pub struct Controller {
     cell: Cell,
     panel: Arc<Mutex<Panel>>,
     connections: Arc<AtomicU64>,
-}
-
-/// What a handle stands for.
-#[derive(Clone, Debug)]
-enum Object {
-    Controller,
-    Robot,
-    /// Its name.
-    Variable(String),
 }
 
 /// One client's connection.

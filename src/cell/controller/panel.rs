@@ -1,13 +1,21 @@
 //! In: nothing. Out: what stands on the controller's panel: mode, motor, errors, speeds, variables, who has the arm.
 //! Frame and unit: speeds in per cent.
 
-use super::{Controller, Object, Outcome};
-use crate::bcap::Variant;
+use crate::bcap::{Outcome, Variant};
 use crate::geometry::Vec3;
 use std::collections::BTreeMap;
 
 /// What @MODE says when programs may move the arm.
 pub const AUTOMATIC: i32 = 3;
+
+/// What a handle stands for.
+#[derive(Clone, Debug)]
+pub enum Object {
+    Controller,
+    Robot,
+    /// Its name.
+    Variable(String),
+}
 
 /// Everything on the panel.
 pub struct Panel {
@@ -77,67 +85,5 @@ pub fn text(code: u32, japanese: bool) -> String {
         0x8320_F007 => "Virtual fence.".into(),
         0x8320_4071..=0x8320_4078 => format!("J{} is out of its range.", code & 0xf),
         _ => "Undefined error.".into(),
-    }
-}
-
-/// What a person does at the controller, and what tests do instead.
-impl Controller {
-    /// Presses the emergency stop: the arm brakes, the motor loses its power, the error stands.
-    pub fn emergency_stop(&self) {
-        self.halt(None, super::EMERGENCY);
-        let mut panel = self.panel();
-        panel.emergency = true;
-        panel.motor = false;
-        let text = text(super::EMERGENCY.0, panel.japanese);
-        panel.errors.insert(0, (super::EMERGENCY.0, text));
-    }
-    /// Lets it go again; the error stands until it is cleared.
-    pub fn release_emergency_stop(&self) {
-        self.panel().emergency = false;
-    }
-    /// An error comes up.
-    pub fn fail(&self, code: u32) {
-        self.halt(None, Outcome(code));
-        let mut panel = self.panel();
-        let text = text(code, panel.japanese);
-        panel.errors.insert(0, (code, text));
-    }
-    /// Clears the errors on the pendant.
-    pub fn clear_errors(&self) {
-        self.panel().errors.clear();
-    }
-    /// Turns the mode switch: 1 manual, 2 teach check, 3 automatic.
-    pub fn set_mode(&self, mode: i32) {
-        self.panel().mode = mode;
-    }
-    /// Switches the motor by hand.
-    pub fn set_motor(&self, on: bool) {
-        self.panel().motor = on;
-    }
-    /// Error texts in Japanese.
-    pub fn set_japanese(&self, on: bool) {
-        self.panel().japanese = on;
-    }
-    /// Sets tool and work frame as a program on the pendant does.
-    pub fn set_frames(&self, tool: i32, work: i32) {
-        let mut panel = self.panel();
-        (panel.tool, panel.work) = (tool, work);
-    }
-    /// A box that the flange may not enter, mm.
-    pub fn set_fence(&self, fence: Option<[Vec3; 2]>) {
-        self.panel().fence = fence;
-    }
-    /// Another client takes the arm.
-    pub fn take_by_another(&self) {
-        self.panel().taken = Some(u64::MAX);
-    }
-
-    /// A client has gone: its handles and the arm are free.
-    pub(super) fn leave(&self, connection: u64) {
-        let mut panel = self.panel();
-        panel.objects.retain(|_, (owner, _)| *owner != connection);
-        if panel.taken == Some(connection) {
-            panel.taken = None;
-        }
     }
 }
