@@ -5,5 +5,22 @@ mod common;
 
 #[path = "joint/accuracy.rs"]
 mod accuracy;
+#[path = "joint/arm.rs"]
+mod arm;
+#[path = "joint/choice.rs"]
+mod choice;
 #[path = "joint/stations.rs"]
 mod stations;
+#[path = "joint/wrong.rs"]
+mod wrong;
+
+/// Stations a test looks at: all of what must hold with SHEETLIGHT_LONG=1, else so many.
+fn seeds(short: u64) -> std::ops::RangeInclusive<u64> {
+    let long = std::env::var("SHEETLIGHT_LONG").is_ok_and(|v| v == "1");
+    1..=if long { 20 } else { short }
+}
+
+fn rms(values: impl Iterator<Item = f64>) -> f64 {
+    let (s, n) = values.fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
+    f64::sqrt(s / n)
+}

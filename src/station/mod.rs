@@ -19,6 +19,7 @@ pub use calibrate::board_views::{Boards, FrameBoard, boards};
 pub use calibrate::hand_eye::{
     Calibrated, HandEyeResult, HandEyeRun, PosePairs, calibrate_hand_eye, calibrate_hand_eye_from_poses,
 };
+pub use calibrate::joint::run::{JointResult, JointRun, calibrate_joint, store_joint};
 pub use calibrate::laser_plane::{LaserPlaneRun, calibrate_laser_plane};
 pub use calibrate::pointer::{PointerRun, calibrate_pointer};
 pub use find::{Looked, SecondLook, find_part, find_part_in_all, second_look, teach_part};

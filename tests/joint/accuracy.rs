@@ -1,83 +1,72 @@
-//! In: stops of random stations. Out: how far scanned points are off after the joint solve, beside what it says.
+//! In: stops of random stations. Out: how far scanned points are off after the joint solve, beside what it says, and beside
+//! the separate calibrations from the same pictures.
 //! Frame and unit: mm.
 
-use super::stations::{Cell, LOUD, Levels, QUIET, rig};
-use rand::SeedableRng;
-use rand_pcg::Pcg64;
+use super::stations::{Cell, LOUD, Levels, QUIET, calibrate, data_sheet, errors, rig, stops};
+use super::{rms, seeds};
 use rayon::prelude::*;
-use sheetlight::calibrate::joint::noise::Noise;
 use sheetlight::calibrate::joint::options::JointOptions;
-use sheetlight::calibrate::joint::shots::Shot;
-use sheetlight::calibrate::joint::solve::{JointFit, solve};
-use sheetlight::calibrate::joint::start::start;
-use sheetlight::calibrate::joint::volume::{apart, expected, places, weights};
-use sheetlight::geometry::Vec3;
 
-/// A camera as its data sheet has it: no lens, the principal point in the middle.
-fn data_sheet(cell: &Cell) -> sheetlight::camera::Intrinsics {
-    let c = &cell.station.camera;
-    let f = cell.station.rig.focal_px();
-    sheetlight::camera::Intrinsics {
-        fx: f,
-        fy: f,
-        cx: f64::from(c.width - 1) / 2.0,
-        cy: f64::from(c.height - 1) / 2.0,
-        skew: 0.0,
-        distortion: Default::default(),
-        ..*c
-    }
+/// Error of scanned points and what was expected, for stations of a rig.
+fn of(name: &str, levels: &Levels, count: usize, short: u64) -> Vec<[f64; 2]> {
+    let one = |seed| {
+        let cell = Cell::new(&rig(name), seed);
+        errors(&cell, &calibrate(&cell, &stops(&cell, count, 40.0, levels, seed), &JointOptions::default()).unwrap())
+    };
+    seeds(short).into_par_iter().map(one).collect()
 }
 
-fn calibrate(cell: &Cell, shots: &[Shot]) -> JointFit {
-    let o = JointOptions::default();
-    let mut shots = shots.to_vec();
-    let (state, _) = start(&mut shots, 1, &data_sheet(cell), None, &o).unwrap();
-    solve(&shots, &state, Noise::usual(), &o).unwrap()
-}
-
-/// True rms error of scanned points in the working volume, and what the solve expects.
-fn errors(cell: &Cell, fit: &JointFit) -> [f64; 2] {
-    let truth = cell.truth(&[]);
-    let lit = places(&truth, cell.working());
-    assert!(lit.len() > 20, "{} places", lit.len());
-    [apart(&fit.state, &truth, &lit), expected(&weights(&fit.state, &fit.layout, &lit), &fit.covariance)]
-}
-
-fn stops(cell: &Cell, count: usize, levels: &Levels, seed: u64) -> Vec<Shot> {
-    let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(977) + 5);
-    cell.views(count, 40.0, &format!("joint {seed}"))
-        .iter()
-        .enumerate()
-        .map(|(i, v)| cell.shot(i, v, levels, &mut rng))
-        .collect()
-}
-
+/// The bars are those of 20 stations; fewer scatter: the error of one has two or three numbers that matter.
 #[test]
 fn points_are_as_good_as_the_solve_says() {
-    let long = std::env::var("SHEETLIGHT_LONG").is_ok_and(|v| v == "1");
-    let seeds = if long { 20 } else { 4 };
-    for (name, levels, bar) in [
+    let mut wrong = Vec::new();
+    let cases = [
         ("paper", QUIET, 0.025),
         ("paper", LOUD, 0.05),
         ("upright", QUIET, 0.025),
         ("slant45", QUIET, 0.025),
-        ("telephoto", QUIET, 0.025),
-    ] {
-        let each: Vec<[f64; 2]> = (1..=seeds)
-            .into_par_iter()
-            .map(|seed| {
-                let cell = Cell::new(&rig(name), seed);
-                let t = std::time::Instant::now();
-                let fit = calibrate(&cell, &stops(&cell, 40, &levels, seed));
-                let e = errors(&cell, &fit);
-                println!("{name} {seed}: off {:.4}, expected {:.4}; robot {:.4} mm {:.4} deg, corners {:.3} stripe {:.3} spot {:.3}; left out {:?}; {:.2} s, freedom {:?}", e[0], e[1], fit.noise.robot_mm, fit.noise.robot_rad.to_degrees(), fit.noise.feature, fit.noise.stripe, fit.noise.spot, fit.left_out, t.elapsed().as_secs_f64(), fit.freedom);
-                e
-            })
-            .collect();
-        let rms =
-            |f: &dyn Fn(&[f64; 2]) -> f64| (each.iter().map(|e| f(e).powi(2)).sum::<f64>() / each.len() as f64).sqrt();
-        let (off, ratio) = (rms(&|e| e[0]), rms(&|e| e[0] / e[1]));
+        // 1.5 m away 0.004 degrees are 0.1 mm.
+        ("telephoto", QUIET, 0.04),
+    ];
+    for (name, levels, bar) in cases {
+        let each = of(name, &levels, 40, 4);
+        let n = each.len() as f64;
+        let (off, ratio) = (rms(each.iter().map(|e| e[0])), rms(each.iter().map(|e| e[0] / e[1])));
         println!("{name}, robot {} mm: points off {off:.4} mm rms, over sigma {ratio:.2}", levels.robot_mm);
-        let _ = (bar, Vec3::zeros());
+        // An rms of n draws with two degrees of freedom each is known to 1 / (2 sqrt n).
+        let more = if n < 20.0 { 1.5 / n.sqrt() } else { 0.0 };
+        if off > bar * (1.0 + more) || !(0.8 - more..=1.25 + more).contains(&ratio) {
+            wrong.push(format!("{name}: {off:.4} mm (bar {bar}), {ratio:.2} of sigma"));
+        }
     }
+    assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+/// The noise of every source is found, however the stated sigmas are wrong.
+#[test]
+fn every_source_gets_the_weight_that_its_residuals_show() {
+    let cell = Cell::new(&rig("paper"), 5);
+    for levels in [QUIET, LOUD] {
+        let fit = calibrate(&cell, &stops(&cell, 40, 40.0, &levels, 5), &JointOptions::default()).unwrap();
+        let n = &fit.noise;
+        println!("{n:?} of {levels:?}");
+        let near = |found: f64, truth: f64, freedom: f64| (found / truth - 1.0).abs() < 4.0 / (2.0 * freedom).sqrt();
+        assert!(near(n.robot_mm, levels.robot_mm, fit.freedom[3]), "{n:?}");
+        assert!(near(n.robot_rad.to_degrees(), levels.robot_deg, fit.freedom[4]), "{n:?}");
+        assert!(near(n.feature, levels.corner_px / 0.02, fit.freedom[0]), "{n:?}");
+        assert!(near(n.stripe, levels.peak_px / 0.05, fit.freedom[1]), "{n:?}");
+        assert!(near(n.spot, levels.spot_px / 0.05, fit.freedom[2]), "{n:?}");
+        assert!(fit.left_out.is_empty(), "{:?}", fit.left_out);
+    }
+    assert!((data_sheet(&cell).fx - cell.station.camera.fx).abs() > 1.0);
+}
+
+/// What the order of the pictures must not change.
+#[test]
+fn the_order_of_the_pictures_does_not_matter() {
+    let cell = Cell::new(&rig("paper"), 7);
+    let shots = stops(&cell, 14, 35.0, &QUIET, 7);
+    let back: Vec<_> = shots.iter().rev().cloned().collect();
+    let [a, b] = [shots, back].map(|s| errors(&cell, &calibrate(&cell, &s, &JointOptions::default()).unwrap()));
+    assert!((a[0] - b[0]).abs() < 1e-4 && (a[1] - b[1]).abs() < 1e-3 * a[1], "{a:?} {b:?}");
 }

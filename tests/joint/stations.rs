@@ -3,12 +3,20 @@
 
 use super::common::judge::{gauss, gauss2};
 use nalgebra::Matrix2;
+use rand::SeedableRng;
 use rand_pcg::Pcg64;
 use sheetlight::calibrate::hand_eye::closed::{Far, Near};
+use sheetlight::calibrate::joint::noise::Noise;
+use sheetlight::calibrate::joint::options::JointOptions;
 use sheetlight::calibrate::joint::shots::{Reported, Shot, Spot, thinned};
+use sheetlight::calibrate::joint::solve::{JointFit, solve};
+use sheetlight::calibrate::joint::start::start;
 use sheetlight::calibrate::joint::unknowns::State;
+use sheetlight::calibrate::joint::volume::{apart, expected, places, weights};
 use sheetlight::calibrate::laser_plane::views::StripePeak;
 use sheetlight::calibrate::measured_pose::SeenBoard;
+use sheetlight::camera::Intrinsics;
+use sheetlight::fault::Result;
 use sheetlight::geometry::{Base, Board, Camera, Flange, Plane, Rigid, Vec2, Vec3};
 use sheetlight::recording::BoardSpec;
 use sheetlight::simulate::{RigSpec, Station, Views, board_views, reported};
@@ -143,4 +151,34 @@ impl Cell {
         let pixel = self.in_picture(&p)? + gauss2(rng, n.spot_px);
         Some(Spot { pixel, covariance: Matrix2::identity() * 0.05 * 0.05 })
     }
+}
+
+/// A camera as its data sheet has it: no lens, the principal point in the middle.
+pub fn data_sheet(cell: &Cell) -> Intrinsics {
+    let c = &cell.station.camera;
+    let f = cell.station.rig.focal_px();
+    let (cx, cy) = (f64::from(c.width - 1) / 2.0, f64::from(c.height - 1) / 2.0);
+    Intrinsics { fx: f, fy: f, cx, cy, skew: 0.0, distortion: Default::default(), ..*c }
+}
+
+pub fn calibrate(cell: &Cell, shots: &[Shot], o: &JointOptions) -> Result<JointFit> {
+    let mut shots = shots.to_vec();
+    let places = 1 + shots.iter().filter_map(|s| s.robot).map(|r| r.place).max().unwrap_or(0);
+    let (state, _) = start(&mut shots, places, &data_sheet(cell), None, o)?;
+    solve(&shots, &state, Noise::usual(), o)
+}
+
+/// True rms error of scanned points in the working volume, and what the solve expects.
+pub fn errors(cell: &Cell, fit: &JointFit) -> [f64; 2] {
+    let truth = cell.truth(&[]);
+    let lit = places(&truth, cell.working());
+    assert!(lit.len() > 20, "{} places", lit.len());
+    [apart(&fit.state, &truth, &lit), expected(&weights(&fit.state, &fit.layout, &lit), &fit.covariance)]
+}
+
+/// Stops spread over the working volume, `tilt_deg` at most.
+pub fn stops(cell: &Cell, count: usize, tilt_deg: f64, levels: &Levels, seed: u64) -> Vec<Shot> {
+    let mut rng = Pcg64::seed_from_u64(seed.wrapping_mul(977) + 5);
+    let views = cell.views(count, tilt_deg, &format!("joint {seed}"));
+    views.iter().enumerate().map(|(i, v)| cell.shot(i, v, levels, &mut rng)).collect()
 }

@@ -6,6 +6,7 @@ pub mod choose;
 pub mod limits;
 pub mod noise;
 pub mod options;
+pub mod records;
 pub mod shots;
 pub mod solve;
 pub mod start;

@@ -394,7 +394,7 @@ fn distance2(view: &SpotView, camera: &Intrinsics, s: &Solved, used: bool, facto
 }
 
 /// d(ox oy oz dx dy dz)/d(step of the beam).
-fn basis(beam: &Ray<Camera>) -> DMatrix<f64> {
+pub(in crate::calibrate) fn basis(beam: &Ray<Camera>) -> DMatrix<f64> {
     let [a, b] = across(&beam.direction);
     let mut j = DMatrix::zeros(6, 4);
     for i in 0..3 {

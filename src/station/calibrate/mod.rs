@@ -5,6 +5,7 @@ pub(super) mod axis;
 pub(super) mod ball;
 pub(super) mod board_views;
 pub(super) mod hand_eye;
+pub(super) mod joint;
 pub(super) mod laser_plane;
 pub(super) mod pointer;
 mod room_light;
