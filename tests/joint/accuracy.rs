@@ -29,7 +29,7 @@ fn points_are_as_good_as_the_solve_says() {
         ("telephoto", QUIET, 0.04),
     ];
     for (name, levels, bar) in cases {
-        let each = of(name, &levels, 40, 4);
+        let each = of(name, &levels, 40, 2);
         let n = each.len() as f64;
         let (off, ratio) = (rms(each.iter().map(|e| e[0])), rms(each.iter().map(|e| e[0] / e[1])));
         println!("{name}, robot {} mm: points off {off:.4} mm rms, over sigma {ratio:.2}", levels.robot_mm);

@@ -2,8 +2,7 @@
 //! point is expected to be least.
 //! Frame and unit: see `unknowns`; mm, rad, px (docs/math.md, Joint calibration (9), (10)).
 
-use super::noise::Noise;
-use super::options::JointOptions;
+use super::options::{JointOptions, Noise};
 use super::shots::{PEAKS_A_STOP, Reported, Shot, Spot};
 use super::solve::JointFit;
 use super::terms::{Term, Terms, flange, lit};

@@ -2,39 +2,11 @@
 //! freedom tell it, and which stops stand out.
 //! Frame and unit: mm, rad; factors of stated sigmas (docs/math.md, Joint calibration (6), (7)).
 
+use super::options::Noise;
 use super::shots::Part;
 use super::terms::{Term, Terms};
 use super::unknowns::State;
 use nalgebra::DMatrix;
-
-/// What each source scatters by.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Noise {
-    /// Times a corner's stated sigma is its true one.
-    pub feature: f64,
-    /// Times a peak's stated sigma is its true one, speckle that neighbours share included.
-    pub stripe: f64,
-    /// Times a spot's stated sigma is its true one.
-    pub spot: f64,
-    /// The robot's position, per axis, mm.
-    pub robot_mm: f64,
-    /// The robot's orientation, per axis, rad.
-    pub robot_rad: f64,
-}
-
-impl Noise {
-    /// Before any residual is known: sigmas as they are stated, a robot of its data sheet's repeatability.
-    pub fn usual() -> Noise {
-        Noise { feature: 1.0, stripe: 1.0, spot: 1.0, robot_mm: 0.05, robot_rad: 2e-4 }
-    }
-    /// One a part, in the order of [`Part::ALL`].
-    pub fn factors(&self) -> [f64; 5] {
-        [self.feature, self.stripe, self.spot, self.robot_mm, self.robot_rad]
-    }
-    fn of(f: [f64; 5]) -> Noise {
-        Noise { feature: f[0], stripe: f[1], spot: f[2], robot_mm: f[3], robot_rad: f[4] }
-    }
-}
 
 /// Below these a source no longer matters beside any other; mm and rad for the robot.
 const FLOOR: [f64; 5] = [1e-3, 1e-3, 1e-3, 1e-4, 1e-6];

@@ -1,9 +1,39 @@
-//! In: what a person may choose about a joint solve. Out: the choice, checked.
+//! In: what a person may choose about a joint solve. Out: the choice, checked; the noise that is assumed.
 //! Frame and unit: mm, degrees where the name says so.
 
 use crate::calibrate::hand_eye::options::Mount;
 use crate::camera::{ALWAYS_NAMED, ParameterCovariance, Parameters};
 use crate::fault::{Fault, Result};
+
+/// What each source scatters by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Noise {
+    /// Times a corner's stated sigma is its true one.
+    pub feature: f64,
+    /// Times a peak's stated sigma is its true one, speckle that neighbours share included.
+    pub stripe: f64,
+    /// Times a spot's stated sigma is its true one.
+    pub spot: f64,
+    /// The robot's position, per axis, mm.
+    pub robot_mm: f64,
+    /// The robot's orientation, per axis, rad.
+    pub robot_rad: f64,
+}
+
+impl Noise {
+    /// Before any residual is known: sigmas as they are stated, a robot of its data sheet's repeatability.
+    pub fn usual() -> Noise {
+        Noise { feature: 1.0, stripe: 1.0, spot: 1.0, robot_mm: 0.05, robot_rad: 2e-4 }
+    }
+    /// One a part, in the order of [`super::shots::Part::ALL`].
+    pub fn factors(&self) -> [f64; 5] {
+        [self.feature, self.stripe, self.spot, self.robot_mm, self.robot_rad]
+    }
+    /// From the same.
+    pub(super) fn of(f: [f64; 5]) -> Noise {
+        Noise { feature: f[0], stripe: f[1], spot: f[2], robot_mm: f[3], robot_rad: f[4] }
+    }
+}
 
 /// What another calibration says of the camera, from pictures that are not among those solved here.
 #[derive(Clone, Debug)]

@@ -74,7 +74,7 @@ pub enum Part {
 }
 
 impl Part {
-    /// All of them, in the order of [`super::noise::Noise::factors`].
+    /// All of them, in the order of [`super::options::Noise::factors`].
     pub const ALL: [Part; 5] = [Part::Features, Part::Stripe, Part::Spot, Part::RobotPlace, Part::RobotTurn];
 
     /// For people.

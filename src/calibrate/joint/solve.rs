@@ -2,8 +2,8 @@
 //! source; what was left out and why.
 //! Frame and unit: see `unknowns`; mm, rad, px (docs/math.md, Joint calibration).
 
-use super::noise::{Leavings, Noise, leavings};
-use super::options::JointOptions;
+use super::noise::{Leavings, leavings};
+use super::options::{JointOptions, Noise};
 use super::shots::{LeftOut, Part, Shot};
 use super::terms::{Terms, prior};
 use super::unknowns::{Layout, State};

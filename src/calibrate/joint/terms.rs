@@ -1,19 +1,17 @@
 //! In: stops at a state. Out: each measurement's residual in sigmas with its derivatives by the unknowns.
 //! Frame and unit: see `unknowns`; residuals in sigmas (docs/math.md, Joint calibration (1) to (5)).
 
-use super::noise::Noise;
-use super::options::CameraPrior;
+use super::options::{CameraPrior, Noise};
 use super::shots::{Part, Reported, Shot, Spot};
 use super::unknowns::{Layout, State};
 use crate::calibrate::hand_eye::closed::{Far, Near};
 use crate::calibrate::hand_eye::options::Mount;
 use crate::calibrate::laser_plane::terms::{look, mm_per_px, on_board, row};
 use crate::calibrate::laser_plane::views::StripePeak;
-use crate::calibrate::measured_pose::point_by_step;
 use crate::calibrate::pointer::solve::across;
 use crate::calibrate::projection::project;
 use crate::camera::{Intrinsics, PARAMETERS};
-use crate::geometry::{Base, Board, Camera, Flange, Mat3, Rigid, Vec2, Vec3, log, skew};
+use crate::geometry::{Base, Board, Camera, Flange, Mat3, Rigid, Twist, Vec2, Vec3, log, skew};
 use crate::solve::{Blocks, Problem, Residuals};
 use nalgebra::{DMatrix, DVector, Matrix2, Matrix2x3, SMatrix};
 
@@ -189,7 +187,7 @@ pub fn spot(s: &State, board: &Rigid<Camera, Board>, seen: &Vec2) -> Option<Spot
         e: at.pixel - seen,
         by_camera: at.by_intrinsics,
         by_beam,
-        by_board: to_pixel * back * point_by_step(&p),
+        by_board: to_pixel * back * Twist::lever(&p),
     })
 }
 
@@ -263,7 +261,7 @@ impl Terms<'_> {
             let r = (at.pixel - pixel) * scale;
             jacobian.clear();
             if wants {
-                let by_board = at.by_point * point_by_step(&p) * scale;
+                let by_board = at.by_point * Twist::lever(&p) * scale;
                 for k in 0..2 {
                     jacobian.extend(self.layout.camera.iter().map(|&c| at.by_intrinsics[(k, c)] * scale));
                     jacobian.extend(by_board.row(k).iter());

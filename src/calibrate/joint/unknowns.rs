@@ -3,10 +3,9 @@
 
 use crate::calibrate::hand_eye::closed::{Far, Near};
 use crate::calibrate::laser_plane::terms::stepped;
-use crate::calibrate::measured_pose::moved;
 use crate::calibrate::pointer::solve::moved_beam;
 use crate::camera::{Intrinsics, Parameters};
-use crate::geometry::{Board, Camera, Frame, Plane, Ray, Rigid, Vec3, exp};
+use crate::geometry::{Board, Camera, LeftStep, Plane, Ray, Rigid, Twist, Vec3};
 
 /// Everything that is solved for.
 #[derive(Clone, Debug)]
@@ -57,7 +56,7 @@ impl Layout {
     pub fn shared(&self) -> usize {
         self.beam() + 4
     }
-    /// Of the board's pose at a stop, six ([`crate::calibrate::measured_pose::Step`]).
+    /// Of the board's pose at a stop, six ([`Twist`]).
     pub fn shot(&self, i: usize) -> usize {
         self.shared() + 6 * i
     }
@@ -65,10 +64,6 @@ impl Layout {
     pub fn width(&self) -> usize {
         self.shot(self.shots)
     }
-}
-
-fn turned<A: Frame, B: Frame>(t: &Rigid<A, B>, s: &[f64]) -> Rigid<A, B> {
-    Rigid::new(exp(&Vec3::new(s[3], s[4], s[5])) * t.rotation, t.translation + Vec3::new(s[0], s[1], s[2]))
 }
 
 impl State {
@@ -81,12 +76,14 @@ impl State {
         let boards = self.boards.iter().enumerate();
         State {
             camera: self.camera.changed(&change),
-            near_from_camera: turned(&self.near_from_camera, at(l.hand_eye(), 6)),
-            far_from_board: places.map(|(i, w)| turned(w, at(l.place(i), 6))).collect(),
+            near_from_camera: LeftStep::new(at(l.hand_eye(), 6)).moved(&self.near_from_camera),
+            far_from_board: places.map(|(i, w)| LeftStep::new(at(l.place(i), 6)).moved(w)).collect(),
             plane: stepped(&self.plane, &Vec3::new(s[l.plane()], s[l.plane() + 1], s[l.plane() + 2]))
                 .unwrap_or(self.plane),
             beam: moved_beam(&self.beam, at(l.beam(), 4)),
-            boards: boards.map(|(i, t)| if s.len() > l.shot(i) { moved(t, at(l.shot(i), 6)) } else { *t }).collect(),
+            boards: boards
+                .map(|(i, t)| if s.len() > l.shot(i) { Twist::new(at(l.shot(i), 6)).moved(t) } else { *t })
+                .collect(),
         }
     }
 }

@@ -13,7 +13,7 @@ use crate::calibrate::hand_eye::closed::Pair;
 use crate::calibrate::hand_eye::fit::HandEyeFit;
 use crate::calibrate::hand_eye::options::{HandEyeOptions, Mount};
 use crate::calibrate::hand_eye::solve::solve as solve_hand_eye;
-use crate::calibrate::hand_eye::turns::resolve;
+use crate::calibrate::hand_eye::turns::{read_with, resolve};
 use crate::calibrate::joint::shots::{LeftOut, Part, Shot, Spot, thinned};
 use crate::calibrate::joint::start::near_from_far;
 use crate::calibrate::laser_plane::solve::{LaserPlaneFit, PeakUse};
@@ -50,8 +50,14 @@ pub struct Measured {
     pub separate: Separate,
 }
 
-/// How stripes and spots are found, and who carries the camera.
+/// What stops are measured with.
 pub struct Finders<'a> {
+    /// Whose pictures the stops name.
+    pub recordings: &'a [Recording],
+    /// The camera that is roughly right.
+    pub camera: &'a Intrinsics,
+    /// Of its parameters.
+    pub covariance: &'a ParameterCovariance,
     /// Of the stripe.
     pub line: &'a LaserPlaneRun,
     /// Of the spot.
@@ -60,8 +66,27 @@ pub struct Finders<'a> {
     pub mount: Mount,
 }
 
-fn picture(recordings: &[Recording], p: &Picture) -> Result<Image> {
-    recordings[p.recording].picture(&p.file)
+/// A stop with its board's pose.
+type Placed<'a> = (&'a Stop, MeasuredPose);
+
+impl Finders<'_> {
+    fn picture(&self, p: &Picture) -> Result<Image> {
+        self.recordings[p.recording].picture(&p.file)
+    }
+
+    /// A laser's picture of a stop without the room's light, and the picture in room light.
+    fn alone(&self, (stop, pose): &Placed<'_>, laser: &Picture) -> Result<(Image, Image, FrameBoard)> {
+        let board = stop.board.clone();
+        let b = FrameBoard { frame: 0, board, pose: pose.clone(), ambiguous: stop.view.ambiguous };
+        let room = self.picture(&stop.room)?;
+        Ok((room_light::alone(self.picture(laser)?, &room, &b, self.camera), room, b))
+    }
+}
+
+impl Measured {
+    fn leave_out(&mut self, (stop, _): &Placed<'_>, part: Part, why: String) {
+        self.left_out.push(LeftOut { name: stop.name.clone(), part, why });
+    }
 }
 
 /// Measures boards, stripes and spots of all stops.
@@ -69,151 +94,108 @@ fn picture(recordings: &[Recording], p: &Picture) -> Result<Image> {
 /// # Errors
 /// Pictures that cannot be read; poses that do not belong to the pictures of their board; a stripe or a spot that no sheet or
 /// beam explains.
-pub fn measure(
-    recordings: &[Recording],
-    gathered: &Gathered,
-    camera: &Intrinsics,
-    covariance: &ParameterCovariance,
-    how: &Finders<'_>,
-) -> Result<Measured> {
+pub fn measure(gathered: &Gathered, how: &Finders<'_>) -> Result<Measured> {
     let mut left_out = Vec::new();
-    let mut boards: Vec<(&Stop, MeasuredPose)> = Vec::new();
+    let mut boards: Vec<Placed<'_>> = Vec::new();
     for stop in &gathered.stops {
-        match measure_view(&stop.name, camera, &stop.board, &stop.view) {
+        match measure_view(&stop.name, how.camera, &stop.board, &stop.view) {
             Ok(pose) => boards.push((stop, pose)),
             Err(fault) => {
                 left_out.push(LeftOut { name: stop.name.clone(), part: Part::Features, why: fault.what });
             }
         }
     }
-    let seen = |(stop, _): &(&Stop, MeasuredPose)| SeenBoard::from_view(&stop.name, &stop.board, &stop.view);
-    let mut shots: Vec<Shot> =
-        boards.iter().map(|b| Shot { seen: seen(b), robot: b.0.robot, stripe: Vec::new(), spot: None }).collect();
-    let mut separate = Separate::default();
-    robots(&boards, gathered.places, camera, covariance, how, &mut shots, &mut left_out, &mut separate)?;
-    stripes(recordings, &boards, camera, covariance, how, &mut shots, &mut left_out, &mut separate)?;
-    spots(recordings, &boards, camera, covariance, how, &mut shots, &mut left_out, &mut separate)?;
-    Ok(Measured { shots, left_out, separate })
+    let seen = |(stop, _): &Placed<'_>| SeenBoard::from_view(&stop.name, &stop.board, &stop.view);
+    let shot = |b: &Placed<'_>| Shot { seen: seen(b), robot: b.0.robot, stripe: Vec::new(), spot: None };
+    let shots = boards.iter().map(shot).collect();
+    let mut out = Measured { shots, left_out, separate: Separate::default() };
+    for place in 0..gathered.places {
+        robots(&boards, place, how, &mut out)?;
+    }
+    stripes(&boards, how, &mut out)?;
+    spots(&boards, how, &mut out)?;
+    Ok(out)
 }
 
-/// Reads turned boards alike, leaves out the poses that contradict the others of their board, place by place.
-#[allow(clippy::too_many_arguments)]
-fn robots(
-    boards: &[(&Stop, MeasuredPose)],
-    places: usize,
-    camera: &Intrinsics,
-    covariance: &ParameterCovariance,
-    how: &Finders<'_>,
-    shots: &mut [Shot],
-    left_out: &mut Vec<LeftOut>,
-    separate: &mut Separate,
-) -> Result<()> {
-    let mut most = 0;
-    for place in 0..places {
-        let here: Vec<usize> =
-            (0..boards.len()).filter(|&i| boards[i].0.robot.is_some_and(|r| r.place == place)).collect();
-        if here.len() < FEWEST_PAIRS {
-            for &i in &here {
-                shots[i].robot = None;
-                let why = format!("{} pictures of this board have a pose, {FEWEST_PAIRS} are needed", here.len());
-                left_out.push(LeftOut { name: boards[i].0.name.clone(), part: Part::RobotPlace, why });
-            }
-            continue;
+/// Reads a place's turned boards alike, leaves out the poses that contradict the others.
+fn robots(boards: &[Placed<'_>], place: usize, how: &Finders<'_>, out: &mut Measured) -> Result<()> {
+    let here: Vec<usize> = (0..boards.len()).filter(|&i| boards[i].0.robot.is_some_and(|r| r.place == place)).collect();
+    if here.len() < FEWEST_PAIRS {
+        for &i in &here {
+            out.shots[i].robot = None;
+            let why = format!("{} pictures of this board have a pose, {FEWEST_PAIRS} are needed", here.len());
+            out.leave_out(&boards[i], Part::RobotPlace, why);
         }
-        let pair = |&i: &usize| {
-            let reported = boards[i].0.robot.expect("filtered");
-            Pair { near_from_far: near_from_far(how.mount, &reported.pose), seen: boards[i].1.clone() }
-        };
-        let mut pairs: Vec<Pair> = here.iter().map(pair).collect();
-        if here.iter().any(|&i| boards[i].0.view.ambiguous) {
-            let turns = turns(&boards[here[0]].0.board);
-            for ((k, &i), pair) in resolve(&pairs, &turns, 1)?.into_iter().zip(&here).zip(&mut pairs) {
-                *pair = crate::calibrate::hand_eye::turns::read_with(pair, &turns[k]);
-                shots[i].seen.points.iter_mut().for_each(|p| *p = turns[k].turn.point(p));
-            }
+        return Ok(());
+    }
+    let pair = |&i: &usize| {
+        let reported = boards[i].0.robot.expect("filtered");
+        Pair { near_from_far: near_from_far(how.mount, &reported.pose), seen: boards[i].1.clone() }
+    };
+    let mut pairs: Vec<Pair> = here.iter().map(pair).collect();
+    if here.iter().any(|&i| boards[i].0.view.ambiguous) {
+        let turns = turns(&boards[here[0]].0.board);
+        for ((k, &i), pair) in resolve(&pairs, &turns, 1)?.into_iter().zip(&here).zip(&mut pairs) {
+            *pair = read_with(pair, &turns[k]);
+            out.shots[i].seen.points.iter_mut().for_each(|p| *p = turns[k].turn.point(p));
         }
-        let o = HandEyeOptions {
-            board_length: format!("{} in meta.json", boards[here[0]].0.board.length_key()),
-            ..HandEyeOptions::default()
-        };
-        let fit = solve_hand_eye(&pairs, how.mount, covariance, camera, &o)?;
-        for (r, &i) in fit.pairs.iter().zip(&here).filter(|(r, _)| !r.used) {
-            shots[i].robot = None;
-            let why = format!("pose and picture disagree by {:.2} mm", r.mm);
-            left_out.push(LeftOut { name: boards[i].0.name.clone(), part: Part::RobotPlace, why });
-        }
-        if here.len() > most {
-            most = here.len();
-            separate.hand_eye = Some(fit);
-        }
+    }
+    let board_length = format!("{} in meta.json", boards[here[0]].0.board.length_key());
+    let o = HandEyeOptions { board_length, ..HandEyeOptions::default() };
+    let fit = solve_hand_eye(&pairs, how.mount, how.covariance, how.camera, &o)?;
+    for (r, &i) in fit.pairs.iter().zip(&here).filter(|(r, _)| !r.used) {
+        out.shots[i].robot = None;
+        out.leave_out(&boards[i], Part::RobotPlace, format!("pose and picture disagree by {:.2} mm", r.mm));
+    }
+    if out.separate.hand_eye.as_ref().is_none_or(|f| f.pairs.len() < here.len()) {
+        out.separate.hand_eye = Some(fit);
     }
     Ok(())
 }
 
-#[allow(clippy::too_many_arguments)]
-fn stripes(
-    recordings: &[Recording],
-    boards: &[(&Stop, MeasuredPose)],
-    camera: &Intrinsics,
-    covariance: &ParameterCovariance,
-    how: &Finders<'_>,
-    shots: &mut [Shot],
-    left_out: &mut Vec<LeftOut>,
-    separate: &mut Separate,
-) -> Result<()> {
-    let lit: Vec<usize> = (0..boards.len()).filter(|&i| boards[i].0.line.is_some()).collect();
+fn stripes(boards: &[Placed<'_>], how: &Finders<'_>, out: &mut Measured) -> Result<()> {
+    let (mut lit, mut images, mut seen) = (Vec::new(), Vec::new(), Vec::new());
+    for (i, b) in boards.iter().enumerate() {
+        if let Some(laser) = &b.0.line {
+            let (image, _, board) = how.alone(b, laser)?;
+            lit.push(i);
+            images.push(image);
+            seen.push(board);
+        }
+    }
     if lit.len() < 2 {
         return Ok(());
     }
-    let (mut images, mut seen) = (Vec::new(), Vec::new());
-    for &i in &lit {
-        let (stop, pose) = &boards[i];
-        let b = FrameBoard { frame: 0, board: stop.board.clone(), pose: pose.clone(), ambiguous: stop.view.ambiguous };
-        let laser = picture(recordings, stop.line.as_ref().expect("filtered"))?;
-        images.push(room_light::alone(laser, &picture(recordings, &stop.room)?, &b, camera));
-        seen.push(b);
-    }
-    let (views, fit) = sheet_on_boards(&seen, &images, camera, covariance, how.line)?;
+    let (views, fit) = sheet_on_boards(&seen, &images, how.camera, how.covariance, how.line)?;
     for (k, &i) in lit.iter().enumerate() {
         let used = views[k].peaks.iter().zip(&fit.uses[k]).filter(|(_, u)| **u == PeakUse::Used).map(|(p, _)| *p);
         let used: Vec<StripePeak> = used.collect();
-        if !fit.views[k].used || used.is_empty() {
-            let why = if fit.views[k].contradicts {
-                "its stripe lies off the sheet of the others".into()
-            } else {
-                format!("{} of {} peaks lie on the board and on the sheet", used.len(), views[k].peaks.len())
-            };
-            left_out.push(LeftOut { name: boards[i].0.name.clone(), part: Part::Stripe, why });
+        if fit.views[k].used && !used.is_empty() {
+            out.shots[i].stripe = thinned(&used);
             continue;
         }
-        shots[i].stripe = thinned(&used);
+        let why = if fit.views[k].contradicts {
+            "its stripe lies off the sheet of the others".into()
+        } else {
+            format!("{} of {} peaks lie on the board and on the sheet", used.len(), views[k].peaks.len())
+        };
+        out.leave_out(&boards[i], Part::Stripe, why);
     }
-    separate.sheet = Some(fit);
+    out.separate.sheet = Some(fit);
     Ok(())
 }
 
-#[allow(clippy::too_many_arguments)]
-fn spots(
-    recordings: &[Recording],
-    boards: &[(&Stop, MeasuredPose)],
-    camera: &Intrinsics,
-    covariance: &ParameterCovariance,
-    how: &Finders<'_>,
-    shots: &mut [Shot],
-    left_out: &mut Vec<LeftOut>,
-    separate: &mut Separate,
-) -> Result<()> {
-    let lit: Vec<usize> = (0..boards.len()).filter(|&i| boards[i].0.pointer.is_some()).collect();
+fn spots(boards: &[Placed<'_>], how: &Finders<'_>, out: &mut Measured) -> Result<()> {
+    let (mut lit, mut pictures) = (Vec::new(), Vec::new());
+    for (i, b) in boards.iter().enumerate() {
+        if let Some(laser) = &b.0.pointer {
+            let (image, room, _) = how.alone(b, laser)?;
+            lit.push(i);
+            pictures.push((image, room));
+        }
+    }
     if lit.is_empty() {
         return Ok(());
-    }
-    let mut pictures = Vec::new();
-    for &i in &lit {
-        let (stop, pose) = &boards[i];
-        let b = FrameBoard { frame: 0, board: stop.board.clone(), pose: pose.clone(), ambiguous: stop.view.ambiguous };
-        let room = picture(recordings, &stop.room)?;
-        let laser = picture(recordings, stop.pointer.as_ref().expect("filtered"))?;
-        pictures.push((room_light::alone(laser, &room, &b, camera), room));
     }
     let hot = hot_pixels(&pictures.iter().map(|p| &p.0).collect::<Vec<_>>());
     let asked: Vec<SpotPicture<'_>> = pictures
@@ -228,22 +210,18 @@ fn spots(
                 views.push(SpotView { pose: boards[i].1.clone(), pixel: spot.pixel, covariance: spot.covariance });
                 of.push(i);
             }
-            Err(fault) => {
-                let why = first_line(&fault.to_string()).to_owned();
-                left_out.push(LeftOut { name: boards[i].0.name.clone(), part: Part::Spot, why });
-            }
+            Err(fault) => out.leave_out(&boards[i], Part::Spot, first_line(&fault.to_string()).to_owned()),
         }
     }
     let factor = pooled_factor(views.iter().map(|v| &v.pose)).unwrap_or(f64::NAN);
-    let fit = solve_pointer(&views, camera, covariance, factor, &how.pointer.solver)?;
+    let fit = solve_pointer(&views, how.camera, how.covariance, factor, &how.pointer.solver)?;
     for ((view, r), &i) in views.iter().zip(&fit.spots).zip(&of) {
         if r.used {
-            shots[i].spot = Some(Spot { pixel: view.pixel, covariance: view.covariance });
+            out.shots[i].spot = Some(Spot { pixel: view.pixel, covariance: view.covariance });
         } else {
-            let why = format!("the spot lies {:.1} px off the beam of the others", r.px);
-            left_out.push(LeftOut { name: boards[i].0.name.clone(), part: Part::Spot, why });
+            out.leave_out(&boards[i], Part::Spot, format!("it lies {:.1} px off the beam of the others", r.px));
         }
     }
-    separate.beam = Some(fit);
+    out.separate.beam = Some(fit);
     Ok(())
 }

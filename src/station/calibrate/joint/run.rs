@@ -11,8 +11,7 @@ use crate::calibrate::camera::procedure::{CameraOptions, from_observations};
 use crate::calibrate::hand_eye::closed::Near;
 use crate::calibrate::hand_eye::options::Mount;
 use crate::calibrate::joint::limits::systematic;
-use crate::calibrate::joint::noise::Noise;
-use crate::calibrate::joint::options::{CameraPrior, JointOptions};
+use crate::calibrate::joint::options::{CameraPrior, JointOptions, Noise};
 use crate::calibrate::joint::records::{Beside, Together, covariances, judge, separately, together};
 use crate::calibrate::joint::shots::{Part, Shot};
 use crate::calibrate::joint::solve::{JointFit, solve};
@@ -68,6 +67,15 @@ impl JointRun {
             },
             asked,
         }
+    }
+
+    pub(in crate::station) fn finders<'a>(
+        &'a self,
+        recordings: &'a [Recording],
+        first: &'a FirstCamera,
+    ) -> Finders<'a> {
+        let (camera, covariance) = (&first.value, &first.covariance);
+        Finders { recordings, camera, covariance, line: &self.line, pointer: &self.pointer, mount: self.mount }
     }
 }
 
@@ -140,8 +148,7 @@ pub fn calibrate_joint(
     let gathered = gather(recordings, run.poses.as_deref(), progress)?;
     let size = [recordings[0].meta.image.width, recordings[0].meta.image.height];
     let first = first_camera(&gathered, size, rig, run)?;
-    let how = Finders { line: &run.line, pointer: &run.pointer, mount: run.mount };
-    let measured = measure(recordings, &gathered, &first.value, &first.covariance, &how)?;
+    let measured = measure(&gathered, &run.finders(recordings, &first))?;
     concluded(&gathered, &first, measured, run)
 }
 
