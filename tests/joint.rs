@@ -7,8 +7,12 @@ mod common;
 mod accuracy;
 #[path = "joint/arm.rs"]
 mod arm;
+#[path = "joint/auto.rs"]
+mod auto;
 #[path = "joint/choice.rs"]
 mod choice;
+#[path = "joint/recordings.rs"]
+mod recordings;
 #[path = "joint/stations.rs"]
 mod stations;
 #[path = "joint/wrong.rs"]

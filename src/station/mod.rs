@@ -13,6 +13,9 @@ mod values;
 mod verify;
 pub mod volume;
 
+pub use calibrate::auto::cell::{Cell, Light};
+pub use calibrate::auto::check::SelfCheck;
+pub use calibrate::auto::procedure::{AutoResult, AutoRun, Ended, calibrate_auto};
 pub use calibrate::axis::{AxisRun, calibrate_axis};
 pub use calibrate::ball::{calibrate_profile_hand_eye, evaluate_profile_hand_eye};
 pub use calibrate::board_views::{Boards, FrameBoard, boards};

@@ -1,6 +1,7 @@
 //! In: recordings of boards, balls, stripes and spots. Out: calibrations in the station's folder.
 //! Frame and unit: millimetres; each file names its frames.
 
+pub(super) mod auto;
 pub(super) mod axis;
 pub(super) mod ball;
 pub(super) mod board_views;

@@ -185,7 +185,8 @@ fn stripes(boards: &[Placed<'_>], how: &Finders<'_>, out: &mut Measured) -> Resu
     Ok(())
 }
 
-fn spots(boards: &[Placed<'_>], how: &Finders<'_>, out: &mut Measured) -> Result<()> {
+/// The spots that pictures show, whether they lie on one beam or not: the stop's index, and its spot.
+fn found_spots(boards: &[Placed<'_>], how: &Finders<'_>, out: &mut Measured) -> Result<Vec<(usize, SpotView)>> {
     let (mut lit, mut pictures) = (Vec::new(), Vec::new());
     for (i, b) in boards.iter().enumerate() {
         if let Some(laser) = &b.0.pointer {
@@ -194,25 +195,30 @@ fn spots(boards: &[Placed<'_>], how: &Finders<'_>, out: &mut Measured) -> Result
             pictures.push((image, room));
         }
     }
-    if lit.is_empty() {
-        return Ok(());
-    }
     let hot = hot_pixels(&pictures.iter().map(|p| &p.0).collect::<Vec<_>>());
     let asked: Vec<SpotPicture<'_>> = pictures
         .iter()
         .zip(&lit)
         .map(|((laser, room), &i)| SpotPicture { name: &boards[i].0.name, laser, ambient: Some(room) })
         .collect();
-    let (mut views, mut of) = (Vec::new(), Vec::new());
+    let mut views = Vec::new();
     for (found, &i) in find_spots(&asked, &hot, &how.pointer.spots)?.into_iter().zip(&lit) {
         match found {
             Ok(spot) => {
-                views.push(SpotView { pose: boards[i].1.clone(), pixel: spot.pixel, covariance: spot.covariance });
-                of.push(i);
+                let pose = boards[i].1.clone();
+                views.push((i, SpotView { pose, pixel: spot.pixel, covariance: spot.covariance }));
             }
             Err(fault) => out.leave_out(&boards[i], Part::Spot, first_line(&fault.to_string()).to_owned()),
         }
     }
+    Ok(views)
+}
+
+fn spots(boards: &[Placed<'_>], how: &Finders<'_>, out: &mut Measured) -> Result<()> {
+    if boards.iter().all(|b| b.0.pointer.is_none()) {
+        return Ok(());
+    }
+    let (of, views): (Vec<usize>, Vec<SpotView>) = found_spots(boards, how, out)?.into_iter().unzip();
     let factor = pooled_factor(views.iter().map(|v| &v.pose)).unwrap_or(f64::NAN);
     let fit = solve_pointer(&views, how.camera, how.covariance, factor, &how.pointer.solver)?;
     for ((view, r), &i) in views.iter().zip(&fit.spots).zip(&of) {
@@ -224,4 +230,22 @@ fn spots(boards: &[Placed<'_>], how: &Finders<'_>, out: &mut Measured) -> Result
     }
     out.separate.beam = Some(fit);
     Ok(())
+}
+
+/// Stops whose poses, stripes and spots nothing has been compared with yet: the joint solve does that. A stop whose board has
+/// no pose is refused.
+pub fn unjudged(stops: &[&Stop], how: &Finders<'_>) -> Result<Vec<Shot>> {
+    let mut boards: Vec<Placed<'_>> = Vec::new();
+    for stop in stops {
+        boards.push((stop, measure_view(&stop.name, how.camera, &stop.board, &stop.view)?));
+    }
+    let seen = |(stop, _): &Placed<'_>| SeenBoard::from_view(&stop.name, &stop.board, &stop.view);
+    let shot = |b: &Placed<'_>| Shot { seen: seen(b), robot: b.0.robot, stripe: Vec::new(), spot: None };
+    let shots = boards.iter().map(shot).collect();
+    let mut out = Measured { shots, left_out: Vec::new(), separate: Separate::default() };
+    stripes(&boards, how, &mut out)?;
+    for (i, view) in found_spots(&boards, how, &mut out)? {
+        out.shots[i].spot = Some(Spot { pixel: view.pixel, covariance: view.covariance });
+    }
+    Ok(out.shots)
 }

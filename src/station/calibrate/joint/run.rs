@@ -28,7 +28,7 @@ use crate::camera::{Intrinsics, ParameterCovariance, named};
 use crate::fault::Result;
 use crate::geometry::{Base, Camera, Plane, Ray, Rigid, Vec3};
 use crate::recording::Recording;
-use crate::rig::{Calibration, HandEye, Kind, Quality, Rig, Volume, sealed};
+use crate::rig::{Calibration, HandEye, Kind, Quality, Rig, Verdict, Volume, sealed};
 use crate::scan::{Extraction, Where};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -91,9 +91,31 @@ pub struct JointResult {
     pub page: Page,
     /// The solve itself.
     pub fit: JointFit,
+    /// What separate calibrations of the same pictures come to, one after another.
+    pub separate: State,
+}
+
+impl JointResult {
+    /// Expected error of a scanned point in the working volume, mm rms.
+    pub fn expected_mm(&self) -> f64 {
+        self.quality.figures.get("expected_error_mm").copied().unwrap_or(f64::INFINITY)
+    }
+
+    /// Adds to the verdict what was found out afterwards, in every record.
+    pub(in crate::station) fn remark(&mut self, at_best: Verdict, reasons: &[String]) {
+        self.quality.verdict = self.quality.verdict.max(at_best);
+        self.quality.reasons.extend_from_slice(reasons);
+        let q = &self.quality;
+        self.rig.camera.iter_mut().for_each(|c| c.quality = q.clone());
+        self.rig.laser_plane.iter_mut().for_each(|c| c.quality = q.clone());
+        self.rig.pointer.iter_mut().for_each(|c| c.quality = q.clone());
+        self.rig.hand_eye.iter_mut().for_each(|c| c.quality = q.clone());
+        self.rig.base_camera.iter_mut().for_each(|c| c.quality = q.clone());
+    }
 }
 
 /// A camera to start from, what is free in it, and what is known of it from elsewhere.
+#[derive(Clone)]
 pub(in crate::station) struct FirstCamera {
     pub value: Intrinsics,
     pub covariance: ParameterCovariance,
@@ -198,7 +220,7 @@ fn concluded(gathered: &Gathered, first: &FirstCamera, measured: Measured, run: 
     let rig = records(&fit, hand_eye, &quality, gathered);
     let together = together(&fit, hand_eye, contents(&rig));
     let page = page(&fit, &quality, &weights);
-    Ok(JointResult { rig, together, quality, page, fit })
+    Ok(JointResult { rig, together, quality, page, fit, separate: separately_found })
 }
 
 /// Depth of the middle of a board's features, mm.
