@@ -11,6 +11,8 @@ mod arm;
 mod auto;
 #[path = "joint/choice.rs"]
 mod choice;
+#[path = "joint/derivatives.rs"]
+mod derivatives;
 #[path = "joint/recordings.rs"]
 mod recordings;
 #[path = "joint/stations.rs"]

@@ -4,8 +4,10 @@
 
 use super::stations::{Cell, LOUD, Levels, QUIET, calibrate, data_sheet, errors, rig, stops};
 use super::{rms, seeds};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 use sheetlight::calibrate::joint::options::JointOptions;
+use sheetlight::calibrate::joint::volume::{expected, places, weights};
 
 /// Error of scanned points and what was expected, for stations of a rig.
 fn of(name: &str, levels: &Levels, count: usize, short: u64) -> Vec<[f64; 2]> {
@@ -29,7 +31,7 @@ fn points_are_as_good_as_the_solve_says() {
         ("telephoto", QUIET, 0.04),
     ];
     for (name, levels, bar) in cases {
-        let each = of(name, &levels, 40, 2);
+        let each = of(name, &levels, 40, 1);
         let n = each.len() as f64;
         let (off, ratio) = (rms(each.iter().map(|e| e[0])), rms(each.iter().map(|e| e[0] / e[1])));
         println!("{name}, robot {} mm: points off {off:.4} mm rms, over sigma {ratio:.2}", levels.robot_mm);
@@ -59,6 +61,26 @@ fn every_source_gets_the_weight_that_its_residuals_show() {
         assert!(fit.left_out.is_empty(), "{:?}", fit.left_out);
     }
     assert!((data_sheet(&cell).fx - cell.station.camera.fx).abs() > 1.0);
+}
+
+/// What the records say one by one, added up as if they were independent, beside what they say together (docs/math.md, Joint
+/// calibration (12)).
+#[test]
+fn records_by_themselves_promise_no_more_than_together() {
+    for name in ["paper", "upright", "telephoto"] {
+        let cell = Cell::new(&rig(name), 6);
+        let fit = calibrate(&cell, &stops(&cell, 30, 40.0, &QUIET, 6), &JointOptions::default()).unwrap();
+        let lit = places(&fit.state, cell.working());
+        let m = weights(&fit.state, &fit.layout, &lit);
+        let l = &fit.layout;
+        let mut apart = DMatrix::zeros(l.shared(), l.shared());
+        for (at, n) in [(l.hand_eye(), 6), (l.plane(), 3)] {
+            apart.view_mut((at, at), (n, n)).copy_from(&fit.covariance.view((at, at), (n, n)));
+        }
+        let [blocks, whole] = [expected(&m, &apart), expected(&m, &fit.covariance)];
+        println!("{name}: hand-eye and sheet by themselves {blocks:.4} mm, all together {whole:.4} mm");
+        assert!(blocks > 0.9 * whole, "{name}: {blocks} {whole}");
+    }
 }
 
 /// What the order of the pictures must not change.

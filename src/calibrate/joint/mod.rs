@@ -4,6 +4,7 @@
 
 pub mod choose;
 pub mod limits;
+pub mod moved;
 pub mod noise;
 pub mod options;
 pub mod records;

@@ -157,7 +157,7 @@ pub fn judge(fit: &JointFit, weights: &DMatrix<f64>, beside: &Beside, limits: &L
     );
     if let Some([separate, apart]) = beside.separate {
         j.reasons.push(format!(
-            "separate calibrations of the same pictures: {separate:.4} mm; their points lie {apart:.4} mm from these (rms)"
+            "separate calibrations of the same pictures state {separate:.4} mm, added up as if they were independent; their points lie {apart:.4} mm from these (rms)"
         ));
     }
     let parts: Vec<String> = by_part(fit, weights)

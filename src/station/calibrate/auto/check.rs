@@ -6,6 +6,7 @@ use crate::calibrate::joint::shots::Shot;
 use crate::calibrate::joint::solve::JointFit;
 use crate::calibrate::joint::start::near_from_far;
 use crate::calibrate::joint::volume::scanned;
+use crate::geometry::Vec2;
 
 /// What stops that no solve saw say of a calibration.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -28,15 +29,22 @@ pub fn check(fit: &JointFit, shots: &[Shot], calibration_mm: f64) -> Option<Self
     for shot in shots {
         let Some(robot) = shot.robot else { continue };
         let board_from_near = place.inverse() * near_from_far(Mount::EyeInHand, &robot.pose).inverse();
-        let off = shot.stripe.iter().filter_map(|p| scanned(&fit.state, &p.pixel)).map(|p| {
-            // The flange's turn moves the point by its lever.
-            let lever = p.norm() * fit.noise.robot_rad;
-            (board_from_near.point(&p).z, lever)
-        });
+        let height = |pixel: &Vec2| Some(board_from_near.point(&scanned(&fit.state, pixel)?).z);
         let before = points;
-        for (z, lever) in off {
+        for p in &shot.stripe {
+            let Some([z, right, below]) = [Vec2::zeros(), Vec2::x(), Vec2::y()]
+                .map(|d| height(&(p.pixel + d)))
+                .into_iter()
+                .collect::<Option<Vec<f64>>>()
+                .and_then(|z| <[f64; 3]>::try_from(z).ok())
+            else {
+                continue;
+            };
+            let peak = (right - z).hypot(below - z) * p.sigma_px * fit.noise.stripe;
+            // The flange's turn moves the point by its lever.
+            let lever = scanned(&fit.state, &p.pixel).map_or(0.0, |p| p.norm()) * fit.noise.robot_rad;
             squares += z * z;
-            expected += calibration_mm.powi(2) / 3.0 + fit.noise.robot_mm.powi(2) + lever.powi(2);
+            expected += calibration_mm.powi(2) / 3.0 + fit.noise.robot_mm.powi(2) + lever.powi(2) + peak.powi(2);
             points += 1;
         }
         stops += usize::from(points > before);

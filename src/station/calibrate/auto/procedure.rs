@@ -10,6 +10,7 @@ use super::first;
 use super::notebook::Notebook;
 use crate::calibrate::hand_eye::options::Mount;
 use crate::calibrate::joint::choose::{Belief, Looks, candidates, next};
+use crate::calibrate::joint::moved::moved;
 use crate::calibrate::joint::options::{CameraPrior, JointOptions, Noise};
 use crate::calibrate::joint::shots::{Part, Shot};
 use crate::calibrate::joint::solve::{JointFit, solve};
@@ -203,6 +204,7 @@ impl<'a> Session<'a> {
         let mut shots = unjudged(&book.stops.iter().collect::<Vec<_>>(), &finders)?;
         let (state, _) = start(&mut shots, 1, &first.value, None, &options)?;
         let fit = solve(&shots, &state, Noise::usual(), &options)?;
+        still(&shots, &fit, &options)?;
         let depth = middle_depth(&state.boards, &run.board);
         let working = run.working.unwrap_or([0.8 * depth, 1.2 * depth]);
         Ok(Session { cell, run, book, first, options, shots, fit, working, tilt_deg: 14.0, tries: 0 })
@@ -289,6 +291,7 @@ impl<'a> Session<'a> {
         state.boards =
             self.shots.iter().map(|s| Ok(board(&state.camera, &s.seen)?.camera_from_board)).collect::<Result<_>>()?;
         self.fit = solve(&self.shots, &state, self.fit.noise, &self.options)?;
+        still(&self.shots, &self.fit, &self.options)?;
         let moved = self.fit.left_out.iter().filter(|l| l.part == Part::RobotPlace).count();
         if moved * 4 > self.shots.len() {
             return Err(Fault::input(format!(
@@ -313,6 +316,16 @@ impl<'a> Session<'a> {
         }
         let shots: Vec<Shot> = (before..self.book.stops.len()).map(|i| self.measured(i)).collect::<Result<_>>()?;
         Ok(check(&joint.fit, &shots, joint.expected_mm()))
+    }
+}
+
+/// Refuses stops before and after which the board was moved.
+fn still(shots: &[Shot], fit: &JointFit, o: &JointOptions) -> Result<()> {
+    match moved(shots, fit, o) {
+        None => Ok(()),
+        Some(m) => Err(Fault::input(format!("the board was moved by {:.1} mm before {}", m.mm, m.name))
+            .cause("it was pushed, or it slipped")
+            .next("fix it and begin again")),
     }
 }
 

@@ -6,8 +6,7 @@ use super::super::pointer::PointerRun;
 use super::gather::{Gathered, gather};
 use super::measure::{Finders, Measured, Separate, measure};
 use super::page::page;
-use crate::calibrate::camera::intrinsics::Observation;
-use crate::calibrate::camera::procedure::{CameraOptions, from_observations};
+use crate::calibrate::camera::intrinsics::{Observation, SolveOptions, solve as solve_camera};
 use crate::calibrate::hand_eye::closed::Near;
 use crate::calibrate::hand_eye::options::Mount;
 use crate::calibrate::joint::limits::systematic;
@@ -24,8 +23,8 @@ use crate::calibrate::measured_pose::intrinsic_covariance;
 use crate::calibrate::pointer::solve::PointerOptions;
 use crate::calibrate::pointer::spot::SpotOptions;
 use crate::calibrate::report::Page;
-use crate::camera::{Intrinsics, ParameterCovariance, named};
-use crate::fault::Result;
+use crate::camera::{Intrinsics, PARAMETERS, ParameterCovariance, named};
+use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Camera, Plane, Ray, Rigid, Vec3};
 use crate::recording::Recording;
 use crate::rig::{Calibration, HandEye, Kind, Quality, Rig, Verdict, Volume, sealed};
@@ -42,7 +41,7 @@ pub struct JointRun {
     /// Who carries the camera.
     pub mount: Mount,
     /// How the camera is solved that the joint solve starts from.
-    pub camera: CameraOptions,
+    pub camera: SolveOptions,
     /// How the stripe is found.
     pub line: LaserPlaneRun,
     /// How the spot is found.
@@ -58,7 +57,7 @@ impl JointRun {
         JointRun {
             poses: None,
             mount,
-            camera: CameraOptions::default(),
+            camera: SolveOptions::default(),
             line: LaserPlaneRun { solver, asked: asked.clone(), extraction, place },
             pointer: PointerRun {
                 spots: SpotOptions::default(),
@@ -149,10 +148,15 @@ pub(in crate::station) fn first_camera(
         features: Arc::new(s.board.features()),
         view: s.view.clone(),
     };
-    let seen = gathered.stops.iter().map(observe).collect();
-    let found = from_observations(seen, Vec::new(), size[0], size[1], &run.camera)?.calibration;
-    let covariance = intrinsic_covariance(&found.covariance);
-    Ok(FirstCamera { value: found.value, covariance, free: named(&covariance), prior: None })
+    let seen: Vec<Observation> = gathered.stops.iter().map(observe).collect();
+    let found = solve_camera(&seen, size[0], size[1], &run.camera)?;
+    let covariance = found.covariance.ok_or_else(|| {
+        Fault::refused("the camera is not determined by these pictures")
+            .cause("too few boards, or all of them alike in distance and tilt")
+            .next("add a recording of boards that are tilted by 20 to 40 degrees and reach into the picture's corners")
+    })?;
+    let free = (0..PARAMETERS).filter(|i| !found.held.contains(i)).collect();
+    Ok(FirstCamera { value: found.intrinsics, covariance, free, prior: None })
 }
 
 /// Solves for everything that the recordings show, in any order, as many as there are. `progress` is told (pictures done,
