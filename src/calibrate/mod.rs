@@ -10,6 +10,7 @@ pub mod hand_eye;
 pub mod homography;
 pub mod joint;
 pub mod laser_plane;
+pub mod latency;
 pub mod limits;
 pub mod measured_pose;
 pub mod pointer;

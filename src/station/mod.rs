@@ -24,6 +24,7 @@ pub use calibrate::hand_eye::{
 };
 pub use calibrate::joint::run::{JointResult, JointRun, calibrate_joint, store_joint};
 pub use calibrate::laser_plane::{LaserPlaneRun, calibrate_laser_plane};
+pub use calibrate::latency::{LatencyFound, calibrate_latency};
 pub use calibrate::pointer::{PointerRun, calibrate_pointer};
 pub use find::{Looked, SecondLook, find_part, find_part_in_all, second_look, teach_part};
 pub use guide::{GuideOptions, Guided, Step, guide};

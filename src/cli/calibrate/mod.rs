@@ -6,6 +6,7 @@ mod camera;
 mod hand_eye;
 mod joint;
 mod laser_plane;
+mod latency;
 mod pointer;
 mod profile_hand_eye;
 pub(in crate::cli) mod store;
@@ -20,6 +21,7 @@ pub enum Command {
     HandEye(hand_eye::Args),
     Joint(joint::Args),
     LaserPlane(laser_plane::Args),
+    Latency(latency::Args),
     Pointer(pointer::Args),
     ProfileHandEye(profile_hand_eye::Args),
 }
@@ -30,6 +32,7 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Camera(a) => camera::run(a, console),
         Command::HandEye(a) => hand_eye::run(a, console),
         Command::Joint(a) => joint::run(a, console),
+        Command::Latency(a) => latency::run(a, console),
         Command::LaserPlane(a) => laser_plane::run(a, console),
         Command::Pointer(a) => pointer::run(a, console),
         Command::ProfileHandEye(a) => profile_hand_eye::run(a, console),

@@ -8,6 +8,7 @@ pub(super) mod board_views;
 pub(super) mod hand_eye;
 pub(super) mod joint;
 pub(super) mod laser_plane;
+pub(super) mod latency;
 pub(super) mod pointer;
 mod room_light;
 mod straight;

@@ -322,11 +322,15 @@ fn contents(rig: &Rig) -> BTreeMap<Kind, String> {
 /// the page (`joint.html`).
 pub fn store_joint(station: &Path, result: &JointResult) -> Result<Vec<Kind>> {
     let stored = result.rig.store_all(station)?;
+    // A rotation comes back from its file orthonormal to the last digit: what a reader finds is named.
+    let stored_rig = Rig::load(station)?;
+    let of = contents(&stored_rig).into_iter().filter(|(kind, _)| stored.contains(kind)).collect();
+    let together = Together { of, ..result.together.clone() };
     let folder = station.join("calibration");
     let page = folder.join("joint.html");
     let html = result.page.html();
     crate::files::write_beside(
-        (&folder.join("joint.json"), sealed(&result.together).as_bytes()),
+        (&folder.join("joint.json"), sealed(&together).as_bytes()),
         &[(page.as_path(), html.as_bytes())],
     )?;
     Ok(stored)
