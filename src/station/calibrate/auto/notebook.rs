@@ -117,6 +117,7 @@ impl Notebook {
             motion: None,
             pose_file: Some("poses".into()),
             pose_files: Default::default(),
+            frames_file: None,
             part: None,
             model: None,
             target: None,
