@@ -6,7 +6,7 @@ CARGO ?= cargo
 VENV := .venv
 export XDG_RUNTIME_DIR ?= $(shell mktemp -d /tmp/sheetlight-run.XXXXXX)
 
-.PHONY: demo lint test bench bench-peers vulkan python build clean
+.PHONY: demo lint test bench bench-peers vulkan python cameras build clean
 
 demo: vulkan build
 	target/release/sheetlight demo --out demo
@@ -14,7 +14,7 @@ demo: vulkan build
 build:
 	$(CARGO) build --release --locked
 
-test: vulkan python lint
+test: vulkan python cameras lint
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(CARGO) test --locked -- --show-output
 
 # A toolchain without clippy says so and goes on.
@@ -38,6 +38,10 @@ bench-peers: vulkan build
 # Software Vulkan (Mesa lavapipe) is installed where we may; without it the CPU twins do the work.
 vulkan:
 	tools/vulkan.sh
+
+# Cameras that the tests talk to: ffmpeg, aravis' fake one.
+cameras:
+	tools/cameras.sh
 
 # The scorer of the reference data and the comparisons need numpy, scipy and libigl.
 python:

@@ -1,6 +1,7 @@
 //! In: the words of the command line. Out: the subcommand that was meant, run; its exit code.
 //! Frame and unit: none.
 
+use super::capture::{camera, record};
 use super::doctor::command as doctor;
 use super::find::{locate as find, model, program, second_look, teach};
 use super::insert::{guide, job};
@@ -42,6 +43,9 @@ enum Command {
     /// Calibrate a station's camera, laser plane, pointer or hand-eye from a recording
     #[command(subcommand)]
     Calibrate(calibrate::Command),
+    /// List, show and set cameras, take a picture, find the exposure
+    #[command(subcommand)]
+    Camera(camera::Command),
     /// A simulated robot cell
     #[command(subcommand)]
     Cell(cell::Command),
@@ -54,6 +58,7 @@ enum Command {
     Model(model::Args),
     Program(program::Args),
     Range(range::Args),
+    Record(record::Args),
     Scan(scan::Args),
     SecondLook(second_look::Args),
     ShiftScan(shift_scan::Args),
@@ -71,6 +76,7 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Bench(a) => bench::run(a, console),
         Command::Board(a) => board::run(a, console),
         Command::Calibrate(c) => calibrate::run(c, console),
+        Command::Camera(c) => camera::run(c, console),
         Command::Cell(c) => cell::run(c, console),
         Command::Demo(a) => demo::run(a, console),
         Command::Doctor(a) => doctor::run(a, console),
@@ -81,6 +87,7 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Model(a) => model::run(a, console),
         Command::Program(a) => program::run(a, console),
         Command::Range(a) => range::run(a, console),
+        Command::Record(a) => record::run(a, console),
         Command::Scan(a) => scan::run(a, console),
         Command::SecondLook(a) => second_look::run(a, console),
         Command::ShiftScan(a) => shift_scan::run(a, console),

@@ -4,7 +4,9 @@
 mod axis;
 mod camera;
 mod hand_eye;
+mod joint;
 mod laser_plane;
+mod latency;
 mod pointer;
 mod profile_hand_eye;
 pub(in crate::cli) mod store;
@@ -17,7 +19,9 @@ pub enum Command {
     Axis(axis::Args),
     Camera(camera::Args),
     HandEye(hand_eye::Args),
+    Joint(joint::Args),
     LaserPlane(laser_plane::Args),
+    Latency(latency::Args),
     Pointer(pointer::Args),
     ProfileHandEye(profile_hand_eye::Args),
 }
@@ -27,6 +31,8 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Axis(a) => axis::run(a, console),
         Command::Camera(a) => camera::run(a, console),
         Command::HandEye(a) => hand_eye::run(a, console),
+        Command::Joint(a) => joint::run(a, console),
+        Command::Latency(a) => latency::run(a, console),
         Command::LaserPlane(a) => laser_plane::run(a, console),
         Command::Pointer(a) => pointer::run(a, console),
         Command::ProfileHandEye(a) => profile_hand_eye::run(a, console),

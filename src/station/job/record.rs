@@ -40,6 +40,7 @@ impl Record {
             boards: vec![],
             ambient: None,
             frames: vec![],
+            frames_file: None,
             motion: None,
             pose_file: Some("poses".into()),
             pose_files: Default::default(),
