@@ -101,6 +101,7 @@ fn options(out: &Path) -> ScanOptions {
         skip_bad: false,
         resume: true,
         stop: Default::default(),
+        watch: Default::default(),
     }
 }
 

@@ -1,3 +1,23 @@
 //! In: a station's folder. Out: the operator's screen, served to browsers.
 //! One port; everything it does is a procedure of `station` that the command line has too.
 //! Frame and unit: as the procedures; texts show theirs.
+
+mod api;
+mod disk;
+mod event;
+mod guard;
+mod message;
+mod motion;
+mod pages;
+mod screen;
+mod serve;
+mod simulated;
+mod station;
+mod surface;
+mod work;
+
+pub use api::openapi;
+pub use guard::{hashed, random_hex};
+pub use message::{Mode, declarations};
+pub use serve::{Secured, ServeOptions, serve};
+pub use simulated::simulated;

@@ -206,6 +206,7 @@ fn options(out: &Path, stop: &Arc<AtomicBool>, resume: bool) -> ScanOptions {
         skip_bad: false,
         resume,
         stop: stop.clone(),
+        watch: Default::default(),
     }
 }
 

@@ -29,6 +29,7 @@ impl ScanOptions {
             skip_bad: false,
             resume: false,
             stop: Default::default(),
+            watch: Default::default(),
         }
     }
 }

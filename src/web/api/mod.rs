@@ -1,0 +1,14 @@
+//! In: requests under /api/v1. Out: their answers, JSON but for pictures, maps and points; faults with their four sentences.
+//! Frame and unit: as the messages.
+
+mod answer;
+mod jobs;
+mod motion;
+mod openapi;
+mod place;
+mod routes;
+mod session;
+mod surface;
+
+pub use openapi::openapi;
+pub use routes::router;
