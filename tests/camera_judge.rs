@@ -13,10 +13,9 @@ use sheetlight::calibrate::boards::{BoardPoint, BoardView};
 use sheetlight::calibrate::camera::intrinsics::{Observation, SolveOptions, solve};
 use sheetlight::calibrate::camera::lens::Lens;
 use sheetlight::calibrate::camera::procedure::{CameraOptions, from_observations};
-use sheetlight::calibrate::pose::point_by_step;
 use sheetlight::calibrate::projection::project;
 use sheetlight::camera::{Intrinsics, NAMES, ParameterCovariance};
-use sheetlight::geometry::{Board, Camera, Rigid, Vec2, Vec3, exp};
+use sheetlight::geometry::{Board, Camera, LeftStep, Rigid, Vec2, Vec3, exp};
 use sheetlight::recording::BoardSpec;
 use sheetlight::rig::Verdict;
 use std::sync::Arc;
@@ -114,7 +113,7 @@ fn bound(s: &Station) -> DMatrix<f64> {
         for x in s.features.iter() {
             let p = project(&s.camera, &pose.point(x)).unwrap();
             let jk = DMatrix::from_fn(2, FIVE, |r, c| p.by_intrinsics[(r, c)] / s.sigma_px);
-            let by_pose = p.by_point * point_by_step(&(pose.rotation * x)) / s.sigma_px;
+            let by_pose = p.by_point * LeftStep::lever(&(pose.rotation * x)) / s.sigma_px;
             let jp = DMatrix::from_fn(2, 6, |r, c| by_pose[(r, c)]);
             h += jk.transpose() * &jk;
             kp += jk.transpose() * &jp;

@@ -17,7 +17,7 @@ const MAY: &[(&str, &[&str])] = &[
     ("camera", &["geometry"]),
     ("robot", &["geometry"]),
     ("recording", &["geometry", "raster", "robot"]),
-    ("arm", &["bcap", "geometry", "robot"]),
+    ("arm", &["bcap", "geometry", "robot", "recording"]),
     ("rig", &["geometry", "camera"]),
     ("simulate", &["geometry", "raster", "solve", "camera", "robot", "recording", "rig"]),
     ("calibrate", &["geometry", "raster", "solve", "camera", "robot", "recording", "rig"]),

@@ -1,3 +1,15 @@
 //! In: where a robot's controller is (a URI). Out: its state, its pose with the time it was read, moves that were allowed.
-//! One trait for all links.
-//! Frame and unit: poses base_from_flange; mm, radians.
+//! One trait for all links; a link that only reads is never armed.
+//! Frame and unit: poses base_from_flange; mm, radians; speeds mm/s.
+
+mod denso;
+mod file;
+mod link;
+mod motion;
+mod state;
+mod uri;
+
+pub use link::{Arm, Halt, PoseSource};
+pub use motion::{Allowed, Motion, Way};
+pub use state::{ControllerError, Mode, Reach, State, TimedPose};
+pub use uri::{RobotUri, open};

@@ -7,10 +7,10 @@ use super::pose::board_pose;
 use super::projection::project;
 use crate::camera::{Intrinsics, NAMES, PARAMETERS, ParameterCovariance, Parameters};
 use crate::fault::{Fault, Result};
-use crate::geometry::{Board, Camera, Mat3, Rigid, Vec2, Vec3, exp, log, skew};
+use crate::geometry::{Board, Camera, Mat3, Rigid, Twist, Vec2, Vec3, skew};
 use crate::recording::BoardSpec;
 use crate::solve::{LmOptions, Loss, Problem, Residuals, Stop, lm};
-use nalgebra::{Matrix6, SMatrix, Vector6};
+use nalgebra::{Matrix6, SMatrix};
 
 /// Change of six pose numbers by the camera's parameters, in the order of [`crate::camera::NAMES`].
 pub type ByIntrinsics = SMatrix<f64, 6, PARAMETERS>;
@@ -34,10 +34,6 @@ impl AboutCamera {
 
 /// The features of a picture may fit their board this many times worse than those of the others.
 pub const MISFIT: f64 = 3.0;
-
-/// A small motion in the camera frame: translation (mm) then rotation vector (rad);
-/// a point P goes to exp(w) P + v.
-pub type Step = Vector6<f64>;
 
 /// The features of one picture: the same index is the same feature.
 #[derive(Clone, Debug)]
@@ -155,20 +151,6 @@ impl MeasuredPose {
     }
 }
 
-/// The step that leads from `from` to `to`.
-pub fn step_between(from: &Rigid<Camera, Board>, to: &Rigid<Camera, Board>) -> Step {
-    let rotation = to.rotation * from.rotation.transpose();
-    let v = to.translation - rotation * from.translation;
-    let w = log(&rotation);
-    Step::new(v.x, v.y, v.z, w.x, w.y, w.z)
-}
-
-/// A pose after a step.
-pub fn moved(pose: &Rigid<Camera, Board>, s: &[f64]) -> Rigid<Camera, Board> {
-    let e = exp(&Vec3::new(s[3], s[4], s[5]));
-    Rigid::new(e * pose.rotation, e * pose.translation + Vec3::new(s[0], s[1], s[2]))
-}
-
 struct PoseProblem<'a> {
     seen: &'a SeenBoard,
     camera: &'a Intrinsics,
@@ -180,26 +162,18 @@ impl Problem for PoseProblem<'_> {
         6
     }
     fn moved(&self, state: &Self::State, step: &[f64]) -> Self::State {
-        moved(state, step)
+        Twist::new(step).moved(state)
     }
     fn residuals(&self, state: &Self::State, out: &mut Residuals) -> Option<()> {
         for ((point, pixel), sigma) in self.seen.points.iter().zip(&self.seen.pixels).zip(&self.seen.sigmas_px) {
             let p = state.point(point);
             let at = project(self.camera, &p)?;
             let r = (at.pixel - pixel) / *sigma;
-            let j = at.by_point * point_by_step(&p) / *sigma;
+            let j = at.by_point * Twist::lever(&p) / *sigma;
             out.group(r.as_slice(), &[0, 1, 2, 3, 4, 5], j.transpose().as_slice());
         }
         Some(())
     }
-}
-
-/// d(point)/d(step).
-pub fn point_by_step(p: &Vec3) -> SMatrix<f64, 3, 6> {
-    let mut j = SMatrix::<f64, 3, 6>::zeros();
-    j.fixed_view_mut::<3, 3>(0, 0).copy_from(&Mat3::identity());
-    j.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew(p));
-    j
 }
 
 /// Refines a board's pose by its pixels and measures how well it is known.
@@ -229,7 +203,7 @@ pub fn measure(seen: &SeenBoard, camera: &Intrinsics, start: &Rigid<Camera, Boar
     for (i, weight) in found.weights.iter().enumerate() {
         let p = pose.point(&seen.points[i]);
         let at = project(camera, &p).expect("in front of the camera at the solution");
-        let j = at.by_point * point_by_step(&p);
+        let j = at.by_point * Twist::lever(&p);
         let by_camera = at.by_intrinsics;
         let w = weight / (seen.sigmas_px[i] * seen.sigmas_px[i]);
         let r = at.pixel - seen.pixels[i];

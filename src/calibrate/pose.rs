@@ -6,18 +6,17 @@ use super::homography::homography;
 use super::projection::project;
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
-use crate::geometry::{Board, Camera, Mat3, Rigid, Vec2, Vec3, exp, orthonormalise, skew};
+use crate::geometry::{Board, Camera, LeftStep, Mat3, Rigid, Vec2, Vec3, orthonormalise};
 use crate::recording::BoardSpec;
 use crate::solve::{LmOptions, Loss, Problem, Residuals, Solution, Stop, lm};
-use nalgebra::{Matrix3x6, Matrix6};
+use nalgebra::Matrix6;
 
 /// A board's pose from one picture.
 #[derive(Clone, Debug)]
 pub struct BoardPose {
     /// The pose that fits the features best, mm.
     pub camera_from_board: Rigid<Camera, Board>,
-    /// Of a step (tx ty tz rx ry rz): t = t̂ + d, R = exp(r) R̂ (rotation about camera axes through
-    /// the board's origin); mm and rad. The corners' common sigma is estimated from the residuals
+    /// Of a [`LeftStep`], mm and rad. The corners' common sigma is estimated from the residuals
     /// where they are larger than the corners' own sigmas.
     pub covariance: Matrix6<f64>,
     /// Reprojection error, px.
@@ -34,36 +33,20 @@ struct OneBoard<'a> {
     points: Vec<(Vec3, Vec2, f64)>,
 }
 
-/// A pose moved by a step (tx ty tz rx ry rz).
-pub fn moved(pose: &Rigid<Camera, Board>, step: &[f64]) -> Rigid<Camera, Board> {
-    Rigid::new(
-        exp(&Vec3::new(step[3], step[4], step[5])) * pose.rotation,
-        pose.translation + Vec3::new(step[0], step[1], step[2]),
-    )
-}
-
-/// d(point in camera)/d(step) for the point `rotated` = R·X.
-pub fn point_by_step(rotated: &Vec3) -> Matrix3x6<f64> {
-    let mut j = Matrix3x6::zeros();
-    j.fixed_view_mut::<3, 3>(0, 0).copy_from(&Mat3::identity());
-    j.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew(rotated));
-    j
-}
-
 impl Problem for OneBoard<'_> {
     type State = Rigid<Camera, Board>;
     fn width(&self) -> usize {
         6
     }
     fn moved(&self, pose: &Self::State, step: &[f64]) -> Self::State {
-        moved(pose, step)
+        LeftStep::new(step).moved(pose)
     }
     fn residuals(&self, pose: &Self::State, out: &mut Residuals) -> Option<()> {
         for (x, pixel, sigma) in &self.points {
             let rotated = pose.rotation * x;
             let p = project(self.intrinsics, &(rotated + pose.translation))?;
             let r = (p.pixel - pixel) / *sigma;
-            let j = p.by_point * point_by_step(&rotated) / *sigma;
+            let j = p.by_point * LeftStep::lever(&rotated) / *sigma;
             let rows: [f64; 12] = std::array::from_fn(|k| j[(k / 6, k % 6)]);
             out.group(&[r.x, r.y], &[0, 1, 2, 3, 4, 5], &rows);
         }

@@ -2,8 +2,7 @@
 //! how an error of each parameter moves it.
 //! Frame and unit: camera, axis (the part's side at count 0), mm, rad; docs/math.md, Axis.
 
-use super::{Board, Camera, Mat3, Ride, Rigid, Vec3, exp, log, skew};
-use nalgebra::SMatrix;
+use super::{Board, Camera, Mat3, Ride, Rigid, Twist, Vec3, exp, log};
 
 /// What moves the part past the light, or the light past the part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -54,15 +53,6 @@ impl CountUnit {
             CountUnit::Deg => Some(1f64.to_radians()),
         }
     }
-}
-
-/// A motion by small amounts: a point P goes to P + v + w x P.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Twist {
-    /// mm.
-    pub v: Vec3,
-    /// rad.
-    pub w: Vec3,
 }
 
 /// A linear axis or turntable as a fixed camera sees it. Where the axis carries the sensor it is the same: the part moves against
@@ -181,20 +171,6 @@ impl Axis {
         };
         let back = self.camera_from_axis.rotation.transpose();
         in_camera.into_iter().map(|t| Twist { v: back * (t.v + t.w.cross(&p)), w: back * t.w }).collect()
-    }
-}
-
-impl Twist {
-    /// By which a point is moved.
-    pub fn at(&self, p: &Vec3) -> Vec3 {
-        self.v + self.w.cross(p)
-    }
-    /// d(point) over (v, w).
-    pub fn lever(p: &Vec3) -> SMatrix<f64, 3, 6> {
-        let mut j = SMatrix::<f64, 3, 6>::zeros();
-        j.fixed_view_mut::<3, 3>(0, 0).copy_from(&Mat3::identity());
-        j.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew(p));
-        j
     }
 }
 

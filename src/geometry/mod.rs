@@ -7,14 +7,16 @@ mod frame;
 mod plane;
 mod rigid;
 mod rotation;
+mod step;
 
-pub use axis::{Axis, AxisKind, CountUnit, Riding, Twist};
+pub use axis::{Axis, AxisKind, CountUnit, Riding};
 pub use frame::{Base, Board, Camera, Flange, Frame, Grid, Part, Ride, Sensor, Tool};
 pub use plane::{Plane, Ray, fit_plane};
 pub use rigid::Rigid;
 pub use rotation::{
     ORTHONORMAL_REFUSE, ORTHONORMAL_WARN, Repaired, angle_between, exp, log, orthonormalise, repair, skew,
 };
+pub use step::{LeftStep, Twist};
 
 /// A pixel (u, v), px, or a point or direction in a plane.
 pub type Vec2 = nalgebra::Vector2<f64>;

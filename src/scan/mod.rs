@@ -15,6 +15,7 @@ mod scanner;
 mod shift;
 mod source;
 
+pub use crate::capture::{Format, RawFormat, RawFrames};
 pub use ambient::Ambient;
 pub use carrier::{Carrier, Place, parts_for};
 pub use cloud::{CloudFile, CloudPoint, CloudWriter, PointSource, read_cloud, write_cloud};
@@ -31,4 +32,4 @@ pub use processor::{Processor, Where, Why};
 pub use scanner::{Profile, Scanner, camera_for};
 pub use shift::plateau::Plateau;
 pub use shift::scan::{ShiftReport, ShiftRig, Side, shift_scan};
-pub use source::{BadShot, Format, RawFormat, RawFrames, RawSource, RecordingSource, Shot, Source};
+pub use source::{BadShot, RawSource, RecordingSource, Shot, Source};

@@ -2,6 +2,7 @@
 //! ahead on other threads, a bounded number of them in memory.
 //! Frame and unit: robot poses are base_from_flange, mm, an axis stands at counts; pictures in grey levels of the sensor's depth.
 
+use crate::capture::{Format, RawFormat, RawFrames};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid};
 use crate::raster::Image;
@@ -35,17 +36,6 @@ pub struct BadShot {
     pub fault: Fault,
     /// The source has ended with it: there is no next shot, and leaving this one out mends nothing.
     pub last: bool,
-}
-
-/// Size and depth of every shot of a source.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub struct Format {
-    /// Columns, px.
-    pub width: u32,
-    /// Rows, px.
-    pub height: u32,
-    /// Bits of a grey level, 8 to 16.
-    pub bits: u8,
 }
 
 /// Where shots come from: a folder, a pipe, a camera.
@@ -185,83 +175,6 @@ impl Source for RecordingSource {
     }
 }
 
-/// Pixel layouts of `ffmpeg -f rawvideo` that carry one grey channel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct RawFormat {
-    /// Size and depth of a frame; levels of more than 8 bits come as two bytes, little endian.
-    pub format: Format,
-}
-
-impl std::str::FromStr for RawFormat {
-    type Err = String;
-    /// `4096x3072:gray8`, `gray10le`, `gray12le` or `gray16le`.
-    fn from_str(s: &str) -> std::result::Result<RawFormat, String> {
-        let help = || format!("'{s}' is not like 4096x3072:gray8 (or gray10le, gray12le, gray16le)");
-        let (size, layout) = s.split_once(':').ok_or_else(help)?;
-        let (w, h) = size.split_once('x').ok_or_else(help)?;
-        let (width, height) = (w.parse::<u32>().map_err(|_| help())?, h.parse::<u32>().map_err(|_| help())?);
-        let bits = match layout {
-            "gray8" | "gray" => 8,
-            "gray10le" => 10,
-            "gray12le" => 12,
-            "gray16le" => 16,
-            _ => return Err(help()),
-        };
-        if !(1..=65535).contains(&width) || !(1..=65535).contains(&height) {
-            return Err(format!("{width}x{height} is outside 1x1..65535x65535"));
-        }
-        Ok(RawFormat { format: Format { width, height, bits } })
-    }
-}
-
-/// Raw frames from a reader, as they come.
-pub struct RawFrames<R: Read> {
-    format: Format,
-    reader: R,
-}
-
-impl<R: Read> RawFrames<R> {
-    /// Takes frames of this size and depth from `reader`.
-    pub fn new(raw: RawFormat, reader: R) -> RawFrames<R> {
-        RawFrames { format: raw.format, reader }
-    }
-
-    /// Reads one frame: `Ok(None)` at a clean end, an error where the pipe ends inside a frame.
-    pub fn read(&mut self) -> Result<Option<Image>> {
-        let Format { width, height, bits } = self.format;
-        let pixels = width as usize * height as usize;
-        let mut bytes = vec![0u8; pixels * if bits > 8 { 2 } else { 1 }];
-        let mut have = 0;
-        while have < bytes.len() {
-            match self.reader.read(&mut bytes[have..]) {
-                Ok(0) if have == 0 => return Ok(None),
-                Ok(0) => {
-                    return Err(Fault::input(format!(
-                        "the pipe ended after {have} of {} bytes of a frame",
-                        bytes.len()
-                    ))
-                    .cause("another frame size or pixel layout than the one given, or the sender stopped")
-                    .next("compare --raw with the sender's size and pixel format"));
-                }
-                Ok(n) => have += n,
-                Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
-                Err(e) => return Err(Fault::input(format!("the pipe failed: {e}")).next("start the sender again")),
-            }
-        }
-        if bits == 8 {
-            return Ok(Some(Image::from_u8(width, height, bytes)));
-        }
-        let levels: Vec<u16> = bytes.chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]])).collect();
-        let (largest, limit) = (levels.iter().copied().max().unwrap_or(0), ((1u32 << bits) - 1) as u16);
-        if largest > limit {
-            return Err(Fault::input(format!("a frame holds the level {largest}, above {limit} of {bits} bits"))
-                .cause("big-endian data, or another depth")
-                .next("compare --raw with the sender's pixel format"));
-        }
-        Ok(Some(Image::from_u16(width, height, bits, levels)))
-    }
-}
-
 /// Raw frames from a reader, each with its pose: as many frames as poses, those that are `missing` counted.
 pub struct RawSource<R: Read> {
     frames: RawFrames<R>,
@@ -303,7 +216,7 @@ impl<R: Read> RawSource<R> {
 
 impl<R: Read> Source for RawSource<R> {
     fn format(&self) -> Format {
-        self.frames.format
+        self.frames.format()
     }
     fn remaining(&self) -> Option<usize> {
         Some((self.next..self.poses.len()).filter(|i| !self.missing.contains(i)).count())
@@ -353,17 +266,6 @@ mod tests {
 
     fn poses(n: usize) -> Vec<Rigid<Base, Flange>> {
         vec![Rigid::identity(); n]
-    }
-
-    #[test]
-    fn raw_formats_are_read_and_refused() {
-        assert_eq!(
-            "641x479:gray12le".parse::<RawFormat>().unwrap().format,
-            Format { width: 641, height: 479, bits: 12 }
-        );
-        for wrong in ["641x479", "641:gray8", "0x4:gray8", "4x4:rgb24", "4x70000:gray8"] {
-            assert!(wrong.parse::<RawFormat>().is_err(), "{wrong}");
-        }
     }
 
     fn raw<'a>(format: &str, bytes: &'a [u8], n: usize, missing: &[usize]) -> RawSource<&'a [u8]> {

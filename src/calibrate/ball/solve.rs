@@ -7,7 +7,7 @@ use super::options::{BallOptions, Side};
 use super::profile::Profile;
 use crate::calibrate::components::Components;
 use crate::fault::{Fault, Result};
-use crate::geometry::{Base, Flange, Mat3, Rigid, Sensor, Vec3, exp, orthonormalise, skew};
+use crate::geometry::{Base, Flange, LeftStep, Mat3, Rigid, Sensor, Vec3, orthonormalise, skew};
 use crate::solve::{LmOptions, Loss, Problem, Residuals, Stop, lm};
 use nalgebra::{DMatrix, DVector, SMatrix};
 
@@ -102,7 +102,7 @@ impl Problem for Fit<'_> {
     }
     fn moved(&self, s: &State, d: &[f64]) -> State {
         let v = |i: usize| Vec3::new(d[i], d[i + 1], d[i + 2]);
-        State { x: Rigid::new(exp(&v(3)) * s.x.rotation, s.x.translation + v(0)), ball: s.ball + v(6) }
+        State { x: LeftStep::new(d).moved(&s.x), ball: s.ball + v(6) }
     }
     fn residuals(&self, s: &State, out: &mut Residuals) -> Option<()> {
         for (item, w) in self.items.iter().zip(&self.whiteners) {

@@ -1,10 +1,9 @@
 //! In: boards' features in pictures. Out: the least-squares problem of camera and boards' poses, and its solution.
 //! Frame and unit: camera_from_board, mm, rad; px (docs/math.md, Camera calibration).
 
-use crate::calibrate::pose::{moved, point_by_step};
 use crate::calibrate::projection::project;
 use crate::camera::{Intrinsics, PARAMETERS, ParameterCovariance, Parameters};
-use crate::geometry::{Board, Camera, Rigid, Vec2, Vec3};
+use crate::geometry::{Board, Camera, LeftStep, Rigid, Vec2, Vec3};
 use crate::solve::{Blocks, LmOptions, Loss, Problem, Residuals, Solution, lm};
 use nalgebra::DMatrix;
 use nalgebra::Matrix2x6;
@@ -32,7 +31,7 @@ impl Bundle<'_> {
         let (x, pixel, sigma) = corner;
         let rotated = pose.rotation * x;
         let q = project(camera, &(rotated + pose.translation))?;
-        let by_pose: Matrix2x6<f64> = q.by_point * point_by_step(&rotated);
+        let by_pose: Matrix2x6<f64> = q.by_point * LeftStep::lever(&rotated);
         let of = |r: usize| {
             let own = self.free.iter().map(|&i| q.by_intrinsics[(r, i)] / sigma);
             own.chain(by_pose.row(r).iter().map(|d| d / sigma)).collect()
@@ -51,7 +50,8 @@ impl Problem for Bundle<'_> {
     }
     fn moved(&self, (k, poses): &State, step: &[f64]) -> State {
         let k = k + Parameters::from_column_slice(&step[..PARAMETERS]);
-        let poses = poses.iter().zip(step[PARAMETERS..].chunks_exact(6)).map(|(p, s)| moved(p, s)).collect();
+        let poses =
+            poses.iter().zip(step[PARAMETERS..].chunks_exact(6)).map(|(p, s)| LeftStep::new(s).moved(p)).collect();
         (k, poses)
     }
     fn residuals(&self, (k, poses): &State, out: &mut Residuals) -> Option<()> {

@@ -5,10 +5,9 @@
 use super::intrinsics::{Observation, SolveOptions, Solved, solve};
 use super::ray_error::expected_ray_error;
 use crate::calibrate::boards::BoardView;
-use crate::calibrate::pose::point_by_step;
 use crate::calibrate::projection::project;
 use crate::camera::{Intrinsics, PARAMETERS, ParameterCovariance};
-use crate::geometry::{Board, Camera, Rigid, Vec2, Vec3, exp};
+use crate::geometry::{Board, Camera, LeftStep, Rigid, Vec2, Vec3, exp};
 use nalgebra::{DMatrix, Matrix2, Matrix6, SMatrix};
 
 /// Largest angle between two boards' normals, degrees.
@@ -153,7 +152,7 @@ fn picture_information(
             continue;
         }
         inside += 1;
-        let (jk, jp) = (p.by_intrinsics / sigma_px, p.by_point * point_by_step(&rotated) / sigma_px);
+        let (jk, jp) = (p.by_intrinsics / sigma_px, p.by_point * LeftStep::lever(&rotated) / sigma_px);
         kk += jk.transpose() * jk;
         kp += jk.transpose() * jp;
         pp += jp.transpose() * jp;

@@ -9,9 +9,10 @@ use super::fit::{HandEyeFit, PairResidual};
 use super::noise::{Fitted, fit};
 use super::options::{HandEyeOptions, Mount, Noise};
 use super::terms::{Refined, UNKNOWNS, refine, step_covariance, with_camera};
-use crate::calibrate::measured_pose::{moved, pooled_factor};
+use crate::calibrate::measured_pose::pooled_factor;
 use crate::camera::{Intrinsics, PARAMETERS, ParameterCovariance};
 use crate::fault::{Fault, Result};
+use crate::geometry::Twist;
 use nalgebra::{DMatrix, Matrix6, SMatrix};
 
 fn undetermined() -> Fault {
@@ -120,7 +121,7 @@ fn residual(
         // The board as that camera sees it: px and mm are then free of what the cameras differ by.
         let change = belief.mean + belief.root * r.z;
         let mut seen = pair.seen.clone();
-        seen.camera_from_board = moved(&seen.camera_from_board, (seen.by_intrinsics * change).as_slice());
+        seen.camera_from_board = Twist::new((seen.by_intrinsics * change).as_slice()).moved(&seen.camera_from_board);
         let expected = r.chain.expected(&pair.near_from_far);
         (seen.displacement_px(&expected, &model.changed(&change)), seen.displacement(&expected))
     };

@@ -5,16 +5,15 @@
 use super::camera_belief::CameraBelief;
 use super::closed::{Chain, Pair};
 use super::options::{Mount, Noise};
-use crate::calibrate::measured_pose::step_between;
 use crate::camera::{PARAMETERS, Parameters};
-use crate::geometry::{Mat3, Rigid, Vec3, exp, skew};
+use crate::geometry::{LeftStep, Mat3, Twist, Vec3, skew};
 use crate::solve::{LmOptions, Problem, Residuals, Stop, lm};
 use nalgebra::{Matrix6, SMatrix, Vector6};
 
 /// Steps of one pair by the 12 unknowns, at the present chain.
 pub(in crate::calibrate) fn jacobian(chain: &Chain, pair: &Pair) -> (SMatrix<f64, 6, 1>, SMatrix<f64, 6, 12>) {
     let expected = chain.expected(&pair.near_from_far);
-    let e = step_between(&pair.seen.camera_from_board, &expected);
+    let e = Twist::between(&pair.seen.camera_from_board, &expected).vector();
     let camera_from_near = chain.near_from_camera.rotation.transpose();
     let camera_from_far = camera_from_near * pair.near_from_far.rotation;
     let shift = skew(&Vec3::new(e[0], e[1], e[2]));
@@ -95,13 +94,9 @@ impl Problem for Refinement<'_> {
         UNKNOWNS
     }
     fn moved(&self, (c, z): &Self::State, s: &[f64]) -> Self::State {
-        let v = |i: usize| Vec3::new(s[i], s[i + 1], s[i + 2]);
         let chain = Chain {
-            near_from_camera: Rigid::new(
-                exp(&v(3)) * c.near_from_camera.rotation,
-                c.near_from_camera.translation + v(0),
-            ),
-            far_from_board: Rigid::new(exp(&v(9)) * c.far_from_board.rotation, c.far_from_board.translation + v(6)),
+            near_from_camera: LeftStep::new(s).moved(&c.near_from_camera),
+            far_from_board: LeftStep::new(&s[6..]).moved(&c.far_from_board),
         };
         (chain, z + Parameters::from_column_slice(&s[12..]))
     }

@@ -3,9 +3,8 @@
 //! Frame and unit: camera frame, mm; peaks in px (docs/math.md, Laser plane (1) to (5)).
 
 use super::views::{StripePeak, StripeView};
-use crate::calibrate::measured_pose::{moved, step_between};
 use crate::camera::{Intrinsics, PARAMETERS, Parameters, difference_step};
-use crate::geometry::{Board, Camera, Plane, Rigid, Vec2, Vec3};
+use crate::geometry::{Board, Camera, Plane, Rigid, Twist, Vec2, Vec3};
 use crate::solve::{LmOptions, Loss, Problem, Residuals, Solution, lm};
 use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix6, SMatrix};
 
@@ -96,7 +95,7 @@ impl Problem for Fit<'_> {
         let normal = (s.plane.normal + a * step[0] + b * step[1]).normalize();
         State {
             plane: Plane::new(normal, s.plane.offset + step[2]).expect("a normal of length one"),
-            poses: s.poses.iter().enumerate().map(|(i, p)| moved(p, &step[3 + 6 * i..9 + 6 * i])).collect(),
+            poses: s.poses.iter().enumerate().map(|(i, p)| Twist::new(&step[3 + 6 * i..]).moved(p)).collect(),
         }
     }
     fn residuals(&self, s: &State, out: &mut Residuals) -> Option<()> {
@@ -106,7 +105,7 @@ impl Problem for Fit<'_> {
             out.group(&[r], &[0, 1, 2, at, at + 1, at + 2, at + 3, at + 4, at + 5], &j);
         }
         for (i, (measured, root)) in self.measured.iter().zip(self.roots).enumerate() {
-            let e = root * step_between(measured, &s.poses[i]);
+            let e = root * Twist::between(measured, &s.poses[i]).vector();
             let columns: [usize; 6] = std::array::from_fn(|k| 3 + 6 * i + k);
             out.prior(e.as_slice(), &columns, root.transpose().as_slice());
         }
@@ -203,7 +202,7 @@ pub(in crate::calibrate) fn says(data: &Data, state: &State, view: usize, factor
     let root = &data.roots[view];
     let prior = root.transpose() * root;
     let local = h.fixed_view::<6, 6>(2, 2) + prior;
-    let rest = g.fixed_view::<6, 1>(2, 0) + prior * step_between(&data.measured[view], pose);
+    let rest = g.fixed_view::<6, 1>(2, 0) + prior * Twist::between(&data.measured[view], pose).vector();
     let mixed = h.fixed_view::<2, 6>(0, 2) * local.try_inverse()?;
     let [a, b] = tangents(&plane.normal);
     let row = |p: &Vec3| [a.dot(p), b.dot(p), -1.0];
@@ -251,7 +250,7 @@ pub(in crate::calibrate) fn by_camera(
             d[k] = sign * h;
             let other = camera.changed(&d);
             let peaks = data.peaks.iter().map(|p| look(&other, p.view, p.index, &views[p.view].peaks[p.index]));
-            let follow = |(v, p): (&StripeView, _)| moved(p, (v.pose.by_intrinsics * d).as_slice());
+            let follow = |(v, p): (&StripeView, _)| Twist::new((v.pose.by_intrinsics * d).as_slice()).moved(p);
             let changed = Data {
                 peaks: peaks.collect::<Option<_>>()?,
                 measured: views.iter().zip(&data.measured).map(follow).collect(),

@@ -2,11 +2,11 @@
 //! by maximum likelihood, the boards' poses free within their own uncertainty.
 //! Frame and unit: camera frame, mm; spots in px (docs/math.md, Pointer (3) to (5)).
 
-use crate::calibrate::measured_pose::{MeasuredPose, moved, step_between};
+use crate::calibrate::measured_pose::MeasuredPose;
 use crate::calibrate::scatter::{beside, inflation};
 use crate::camera::{Intrinsics, PARAMETERS, ParameterCovariance, Parameters, difference_step, named};
 use crate::fault::{Fault, Result};
-use crate::geometry::{Board, Camera, Plane, Ray, Rigid, Vec2, Vec3};
+use crate::geometry::{Board, Camera, Plane, Ray, Rigid, Twist, Vec2, Vec3};
 use crate::solve::{LmOptions, Problem, Residuals, Stop, lm};
 use nalgebra::{DMatrix, Matrix2, Matrix6, SMatrix};
 
@@ -155,7 +155,7 @@ impl Problem for Fit<'_> {
     fn moved(&self, s: &State, d: &[f64]) -> State {
         State {
             beam: moved_beam(&s.beam, d),
-            poses: s.poses.iter().enumerate().map(|(i, p)| moved(p, &d[4 + 6 * i..10 + 6 * i])).collect(),
+            poses: s.poses.iter().enumerate().map(|(i, p)| Twist::new(&d[4 + 6 * i..]).moved(p)).collect(),
         }
     }
     fn residuals(&self, s: &State, out: &mut Residuals) -> Option<()> {
@@ -168,7 +168,7 @@ impl Problem for Fit<'_> {
                 let at = |sign: f64| {
                     let mut d = [0.0; 10];
                     d[c] = sign * h;
-                    self.residual(&moved_beam(&s.beam, &d[..4]), &moved(&s.poses[i], &d[4..]), i)
+                    self.residual(&moved_beam(&s.beam, &d[..4]), &Twist::new(&d[4..]).moved(&s.poses[i]), i)
                 };
                 let slope = (at(1.0)? - at(-1.0)?) / (2.0 * h);
                 (j[c], j[10 + c]) = (slope.x, slope.y);
@@ -176,7 +176,7 @@ impl Problem for Fit<'_> {
             let at = 4 + 6 * i;
             let columns: [usize; 10] = std::array::from_fn(|c| if c < 4 { c } else { at + c - 4 });
             out.group(r.as_slice(), &columns, &j);
-            let e = self.roots[i] * step_between(&self.measured[i], &s.poses[i]);
+            let e = self.roots[i] * Twist::between(&self.measured[i], &s.poses[i]).vector();
             out.prior(e.as_slice(), &columns[4..], self.roots[i].transpose().as_slice());
         }
         Some(())
@@ -212,8 +212,10 @@ fn fit(
         .map(|v| Some((v.pose.information / v.pose.factor_among(factor).powi(2)).cholesky()?.l().transpose()))
         .collect::<Option<Vec<_>>>()?;
     let whiteners = views.iter().map(|v| v.covariance.cholesky()?.l().try_inverse()).collect::<Option<Vec<_>>>()?;
-    let measured: Vec<_> =
-        views.iter().map(|v| moved(&v.pose.camera_from_board, (v.pose.by_intrinsics * shift).as_slice())).collect();
+    let measured: Vec<_> = views
+        .iter()
+        .map(|v| Twist::new((v.pose.by_intrinsics * shift).as_slice()).moved(&v.pose.camera_from_board))
+        .collect();
     let problem = Fit { camera, views, measured: measured.clone(), roots, whiteners };
     let found = lm(&problem, State { beam: *start, poses: measured }, &LmOptions::default());
     if found.stop == Stop::BadStart {
@@ -377,7 +379,7 @@ fn distance2(view: &SpotView, camera: &Intrinsics, s: &Solved, used: bool, facto
         let at = |sign: f64| {
             let mut d = [0.0; 10];
             d[c] = sign * h;
-            spot(camera, &moved_beam(&state.beam, &d[..4]), &moved(pose, &d[4..])).map(|s| s.1)
+            spot(camera, &moved_beam(&state.beam, &d[..4]), &Twist::new(&d[4..]).moved(pose)).map(|s| s.1)
         };
         let (Some(a), Some(b)) = (at(1.0), at(-1.0)) else { return f64::INFINITY };
         j.set_column(c, &((a - b) / (2.0 * h)));

@@ -1,0 +1,170 @@
+//! In: the address of a Denso controller (RC8). Out: its arm as a link that reads, moves, switches and halts.
+//! Frame and unit: mm and degrees on the wire, base_from_flange in mm here; tool 0 and work 0, or nothing is read.
+
+mod halt;
+mod session;
+mod words;
+
+use super::{Allowed, Arm, Halt, Mode, PoseSource, Reach, State, TimedPose, Way};
+use crate::bcap::{Call, Network, Variant};
+use crate::fault::{Fault, Result};
+use crate::geometry::{Base, Flange, Rigid};
+use crate::robot::Convention;
+use halt::DensoHalt;
+use session::Session;
+use std::sync::Arc;
+
+/// Speed of the flange when all joints go at 100 %, mm/s: an upper bound for the VS-060 (joint 1 at 213.75 degrees a second,
+/// 0.92 m out).
+const JOINTS_FULL_MM_S: f64 = 3500.0;
+/// Slowest speed in per cent that is sent; below it controllers round to none.
+const LEAST_PERCENT: f64 = 0.1;
+
+/// A Denso arm: one connection for reading and moving, one that only halts.
+pub(super) struct Denso {
+    name: String,
+    address: String,
+    network: Network,
+    full_mm_s: f64,
+    session: Session,
+    halt: Arc<DensoHalt>,
+    taken: bool,
+}
+
+impl Denso {
+    pub fn open(name: &str, address: &str, network: Network, full_mm_s: f64) -> Result<Denso> {
+        let session = Session::open(address, network)?;
+        let halt = Arc::new(DensoHalt::open(address)?);
+        let (name, address) = (name.to_owned(), address.to_owned());
+        Ok(Denso { name, address, network, full_mm_s, session, halt, taken: false })
+    }
+
+    fn robot_variable(&mut self, name: &str) -> Result<Variant> {
+        self.session.client.read(Call::RobotGetVariable, self.session.robot, name)
+    }
+    fn controller_variable(&mut self, name: &str) -> Result<Variant> {
+        self.session.client.read(Call::ControllerGetVariable, self.session.controller, name)
+    }
+
+    /// Share of the full speed, %.
+    fn percent(&self, way: Way, speed_mm_s: f64) -> f64 {
+        let full = if way == Way::Straight { self.full_mm_s } else { JOINTS_FULL_MM_S.max(self.full_mm_s) };
+        (100.0 * speed_mm_s / full).clamp(LEAST_PERCENT, 100.0)
+    }
+}
+
+impl PoseSource for Denso {
+    fn pose(&mut self) -> Result<TimedPose> {
+        self.session.pose()
+    }
+}
+
+impl Arm for Denso {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn state(&mut self) -> Result<State> {
+        let flag = |v: Variant| v.as_f64().map(|x| x != 0.0);
+        let mode = match self.controller_variable("@MODE")?.as_f64() {
+            Some(1.0) => Mode::Manual,
+            Some(2.0) => Mode::Teach,
+            Some(3.0) => Mode::Automatic,
+            _ => Mode::Unknown,
+        };
+        let model = match self.robot_variable("@TYPE_NAME")? {
+            Variant::Text(name) => words::plain(&name),
+            other => format!("{other:?}"),
+        };
+        Ok(State {
+            model,
+            mode,
+            motor: flag(self.robot_variable("@SERVO_ON")?),
+            busy: flag(self.robot_variable("@BUSY_STATUS")?),
+            emergency_stop: flag(self.controller_variable("@EMERGENCY_STOP")?),
+            errors: self.session.errors()?,
+            tool: self.session.number("CurTool")?,
+            work: self.session.number("CurWork")?,
+        })
+    }
+
+    fn watch(&self) -> Result<Box<dyn PoseSource>> {
+        Ok(Box::new(Session::open(&self.address, self.network)?))
+    }
+
+    fn stop(&self) -> Result<Arc<dyn Halt>> {
+        Ok(self.halt.clone())
+    }
+
+    fn reach(&mut self, to: &Rigid<Base, Flange>) -> Result<Reach> {
+        let pose = Variant::Variants(vec![words::position(to), Variant::Text("P".into())]);
+        let asked = Variant::Variants(vec![pose.clone(), Variant::I32(-1), Variant::I32(-1)]);
+        if let Some(range) = self.session.try_execute("OutRange", asked)? {
+            let code = range.as_f64().map_or(i64::MIN, |x| x as i64);
+            if code != 0 {
+                return Ok(Reach::Refused(words::out_of_range(code)));
+            }
+        }
+        Ok(match self.session.try_execute("CheckVirtualFence", pose)?.and_then(|v| v.as_f64()) {
+            Some(0.0) => Reach::Free,
+            Some(fence) => Reach::Refused(format!("it lies in the controller's virtual fence {fence}, limit 0")),
+            None => Reach::Unasked,
+        })
+    }
+
+    fn take(&mut self) -> Result<()> {
+        if !self.taken {
+            self.session.execute("TakeArm", Variant::I32s(vec![0, 0]))?;
+            self.taken = true;
+        }
+        Ok(())
+    }
+
+    fn give(&mut self) -> Result<()> {
+        if std::mem::take(&mut self.taken) {
+            self.session.execute("GiveArm", Variant::Empty)?;
+        }
+        Ok(())
+    }
+
+    fn make(&mut self, allowed: Allowed) -> Result<()> {
+        let motion = allowed.motion();
+        let percent = self.percent(motion.way, motion.speed_mm_s) as f32;
+        // Acceleration of a motion grows with the square of its speed, as the controller does it itself.
+        self.session.execute("ExtSpeed", Variant::F32s(vec![percent, -2.0, -2.0]))?;
+        let way = Variant::I32(if motion.way == Way::Straight { 2 } else { 1 });
+        let pose = vec![words::position(&motion.to), Variant::Text("P".into()), Variant::Text("@E".into())];
+        let robot = self.session.robot.into();
+        self.session
+            .client
+            .ask(Call::RobotMove, vec![robot, way, Variant::Variants(pose), Variant::Text(String::new())])
+            .map(|_| ())
+            .map_err(|e| self.session.in_its_words(e))
+    }
+
+    fn put_output(&mut self, number: u16, on: bool) -> Result<()> {
+        let (controller, name) = (self.session.controller, format!("IO{number}"));
+        self.session.client.write(Call::ControllerGetVariable, controller, &name, Variant::Bool(on))
+    }
+
+    fn signal(&mut self, number: u16) -> Result<bool> {
+        let value = self.controller_variable(&format!("IO{number}"))?;
+        value.as_f64().map(|x| x != 0.0).ok_or_else(|| {
+            Fault::device(format!("{}: IO{number} is {value:?}, true or false was expected", self.name))
+                .next("use the number of a digital input or output")
+        })
+    }
+}
+
+impl Drop for Denso {
+    fn drop(&mut self) {
+        // Whoever held the arm lets others have it; the controller does the same when the connection ends.
+        let _ = self.give();
+    }
+}
+
+/// The seven numbers of a position and its figure.
+fn read_position(numbers: &[f64]) -> Result<(Rigid<Base, Flange>, Option<i32>)> {
+    let pose = Convention::Denso.read(numbers.get(..6).unwrap_or(numbers))?;
+    Ok((pose, numbers.get(6).map(|f| *f as i32)))
+}

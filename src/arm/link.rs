@@ -1,0 +1,72 @@
+//! In: questions and allowed motions. Out: what every link to a robot answers.
+//! Frame and unit: base_from_flange, mm; times of this machine's monotonic clock.
+
+use super::{Allowed, Reach, State, TimedPose};
+use crate::fault::{Fault, Result};
+use crate::geometry::{Base, Flange, Rigid};
+use std::sync::Arc;
+
+/// Something that says where a flange is. Each has a connection of its own, so that one can be read while the arm moves.
+pub trait PoseSource: Send {
+    /// The pose now; for poses from a file the next one.
+    fn pose(&mut self) -> Result<TimedPose>;
+}
+
+/// Stops the arm, from any thread, while a motion is under way on the link that it came from.
+pub trait Halt: Send + Sync {
+    /// Returns when the controller has taken the order. Errors: it could not be told; look at the robot.
+    fn halt(&self) -> Result<()>;
+}
+
+/// A robot on a wire. Reading is always possible; what changes the world is refused by links that only read.
+pub trait Arm: PoseSource {
+    /// The URI that it was opened with.
+    fn name(&self) -> &str;
+
+    /// Mode, motor, errors, frames.
+    fn state(&mut self) -> Result<State>;
+
+    /// A second reader of poses over a connection of its own.
+    fn watch(&self) -> Result<Box<dyn PoseSource>>;
+
+    /// What stops it, over a connection that no motion blocks. Errors: a link that cannot move anything.
+    fn stop(&self) -> Result<Arc<dyn Halt>> {
+        Err(reads_only(self.name()))
+    }
+
+    /// Whether the controller would go there: reach and virtual fence.
+    fn reach(&mut self, _to: &Rigid<Base, Flange>) -> Result<Reach> {
+        Ok(Reach::Unasked)
+    }
+
+    /// Takes the arm, so that no other program moves it; tool and work frame are 0 from then on.
+    fn take(&mut self) -> Result<()> {
+        Err(reads_only(self.name()))
+    }
+
+    /// Gives the arm back.
+    fn give(&mut self) -> Result<()> {
+        Ok(())
+    }
+
+    /// Makes one motion and returns when it has ended. Errors: it was not begun, or was stopped; the pose has to be read again.
+    fn make(&mut self, _allowed: Allowed) -> Result<()> {
+        Err(reads_only(self.name()))
+    }
+
+    /// Switches an output of the controller (a laser, a lamp, a gripper).
+    fn put_output(&mut self, _number: u16, _on: bool) -> Result<()> {
+        Err(reads_only(self.name()))
+    }
+
+    /// Reads an input or an output of the controller.
+    fn signal(&mut self, _number: u16) -> Result<bool> {
+        Err(reads_only(self.name()))
+    }
+}
+
+pub(super) fn reads_only(name: &str) -> Fault {
+    Fault::refused(format!("{name}: this link only reads poses"))
+        .cause("nothing can be moved or switched over it")
+        .next("use a link that can, for example bcap://HOST:5007")
+}

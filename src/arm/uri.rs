@@ -1,0 +1,120 @@
+//! In: a URI that names a robot's controller. Out: the link.
+//! Frame and unit: none.
+
+use super::{Arm, denso, file};
+use crate::bcap::Network;
+use crate::fault::{Fault, Result};
+use std::path::PathBuf;
+
+/// Where a robot is.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RobotUri {
+    /// `bcap://HOST[:PORT][?network=udp][&full=MM_S]`: a Denso controller; `full` is the speed of straight motions at 100 %.
+    Bcap {
+        /// HOST:PORT.
+        address: String,
+        /// How motions and reading travel. Halt goes over TCP in any case.
+        network: Network,
+        /// Speed of the flange at 100 %, mm/s.
+        full_mm_s: f64,
+    },
+    /// `file:PATH`: poses from a pose file, one for each reading.
+    File(PathBuf),
+}
+
+/// The port that b-CAP has on every controller.
+const BCAP_PORT: u16 = 5007;
+/// Straight motions at 100 %, mm/s. What the VS-060 does is to be measured; a motion that is faster than asked is halted.
+const FULL_MM_S: f64 = 1000.0;
+
+impl std::str::FromStr for RobotUri {
+    type Err = Fault;
+
+    fn from_str(uri: &str) -> Result<RobotUri> {
+        let bad = |what: String| {
+            Fault::usage(format!("'{uri}': {what}")).next("write bcap://HOST:5007 or file:POSES.json (docs/robots.md)")
+        };
+        if let Some(path) = uri.strip_prefix("file:") {
+            let path = path.strip_prefix("//").unwrap_or(path);
+            return if path.is_empty() { Err(bad("names no file".into())) } else { Ok(RobotUri::File(path.into())) };
+        }
+        let Some((scheme, rest)) = uri.split_once("://") else {
+            return Err(bad("is no robot's address".into()));
+        };
+        let (host, query) = rest.split_once('?').unwrap_or((rest, ""));
+        let host = host.strip_suffix('/').unwrap_or(host);
+        if host.is_empty() || host.contains(['/', ' ', '@']) {
+            return Err(bad("names no host".into()));
+        }
+        match scheme {
+            "bcap" => {
+                let (mut network, mut full_mm_s) = (Network::Tcp, FULL_MM_S);
+                for (key, value) in
+                    query.split('&').filter(|p| !p.is_empty()).map(|p| p.split_once('=').unwrap_or((p, "")))
+                {
+                    match (key, value) {
+                        ("network", "tcp") => network = Network::Tcp,
+                        ("network", "udp") => network = Network::Udp,
+                        ("full", v) => {
+                            let full = v.parse().ok().filter(|x| (50.0..=20_000.0).contains(x));
+                            full_mm_s = full.ok_or_else(|| bad(format!("full={v}, wanted 50 to 20000 mm/s")))?;
+                        }
+                        _ => {
+                            return Err(bad(format!(
+                                "knows no {key}={value}; there are network=tcp, network=udp, full=MM_S"
+                            )));
+                        }
+                    }
+                }
+                Ok(RobotUri::Bcap { address: with_port(host, BCAP_PORT).map_err(bad)?, network, full_mm_s })
+            }
+            other => Err(bad(format!("'{other}' is no kind of link"))),
+        }
+    }
+}
+
+/// HOST:PORT, the port added where it is missing. IPv6 addresses stand in brackets.
+fn with_port(host: &str, port: u16) -> std::result::Result<String, String> {
+    let name = host.rsplit_once(']').map_or(host, |(_, after)| after);
+    match name.rsplit_once(':') {
+        None => Ok(format!("{host}:{port}")),
+        Some((_, p)) if p.parse::<u16>().is_ok_and(|p| p > 0) => Ok(host.to_owned()),
+        Some((_, p)) => Err(format!("'{p}' is no port, 1 to 65535 are")),
+    }
+}
+
+/// Opens the link that a URI names. Errors: a URI that says nothing, a controller that does not answer.
+pub fn open(uri: &str) -> Result<Box<dyn Arm>> {
+    Ok(match uri.parse()? {
+        RobotUri::Bcap { address, network, full_mm_s } => {
+            Box::new(denso::Denso::open(uri, &address, network, full_mm_s)?)
+        }
+        RobotUri::File(path) => Box::new(file::PosesOfFile::open(uri, &path)?),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_are_read_and_slips_are_named() {
+        let read = |s: &str| s.parse::<RobotUri>();
+        let bcap = |address: &str, network, full_mm_s| RobotUri::Bcap { address: address.into(), network, full_mm_s };
+        assert_eq!(read("bcap://10.0.0.2").unwrap(), bcap("10.0.0.2:5007", Network::Tcp, 1000.0));
+        assert_eq!(read("bcap://rc8:6000/?network=udp&full=1500").unwrap(), bcap("rc8:6000", Network::Udp, 1500.0));
+        assert_eq!(read("bcap://[::1]").unwrap(), bcap("[::1]:5007", Network::Tcp, 1000.0));
+        assert_eq!(read("file:a/poses.json").unwrap(), RobotUri::File("a/poses.json".into()));
+        for (uri, says) in [
+            ("10.0.0.2", "no robot's address"),
+            ("http://rc8", "no kind of link"),
+            ("bcap://", "no host"),
+            ("bcap://rc8:70000", "no port"),
+            ("bcap://rc8?speed=3", "speed=3"),
+            ("bcap://rc8?full=nan", "full=nan"),
+            ("file:", "no file"),
+        ] {
+            assert!(read(uri).unwrap_err().what.contains(says), "{uri}");
+        }
+    }
+}

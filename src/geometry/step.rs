@@ -1,0 +1,112 @@
+//! In: six small numbers. Out: a pose moved by them, the six that lead from one pose to another, and how a point follows.
+//! Two ways to read six numbers are two types, so that a covariance of one is not taken for the other's.
+//! Frame and unit: the frame that the pose leads to; mm, rad (docs/math.md, Board pose).
+
+use super::{Frame, Mat3, Rigid, Vec3, exp, log, skew};
+use nalgebra::{Matrix3x6, Vector6};
+
+/// A motion of the whole body: a point P goes to exp(w) P + v, a pose to (exp(w), v) * pose. Small, that is P + v + w x P.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Twist {
+    /// mm.
+    pub v: Vec3,
+    /// rad, about the frame's origin.
+    pub w: Vec3,
+}
+
+impl Twist {
+    /// From (v, w); panics where there are fewer than six numbers.
+    pub fn new(s: &[f64]) -> Twist {
+        Twist { v: Vec3::new(s[0], s[1], s[2]), w: Vec3::new(s[3], s[4], s[5]) }
+    }
+    /// The one that leads from `from` to `to`.
+    pub fn between<To: Frame, From: Frame>(from: &Rigid<To, From>, to: &Rigid<To, From>) -> Twist {
+        let rotation = to.rotation * from.rotation.transpose();
+        Twist { v: to.translation - rotation * from.translation, w: log(&rotation) }
+    }
+    /// (v, w).
+    pub fn vector(&self) -> Vector6<f64> {
+        Vector6::new(self.v.x, self.v.y, self.v.z, self.w.x, self.w.y, self.w.z)
+    }
+    /// The pose moved by it.
+    pub fn moved<To: Frame, From: Frame>(&self, pose: &Rigid<To, From>) -> Rigid<To, From> {
+        let e = exp(&self.w);
+        Rigid::new(e * pose.rotation, e * pose.translation + self.v)
+    }
+    /// By which a point is moved, to first order.
+    pub fn at(&self, p: &Vec3) -> Vec3 {
+        self.v + self.w.cross(p)
+    }
+    /// d(point) over (v, w) at the point `p`.
+    pub fn lever(p: &Vec3) -> Matrix3x6<f64> {
+        translation_and_turn(p)
+    }
+}
+
+/// A pose's two halves moved by themselves: t = t̂ + d, R = exp(r) R̂; the turn is about axes of the frame through the origin of
+/// what is posed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LeftStep {
+    /// mm.
+    pub d: Vec3,
+    /// rad.
+    pub r: Vec3,
+}
+
+impl LeftStep {
+    /// From (d, r); panics where there are fewer than six numbers.
+    pub fn new(s: &[f64]) -> LeftStep {
+        LeftStep { d: Vec3::new(s[0], s[1], s[2]), r: Vec3::new(s[3], s[4], s[5]) }
+    }
+    /// The pose moved by it.
+    pub fn moved<To: Frame, From: Frame>(&self, pose: &Rigid<To, From>) -> Rigid<To, From> {
+        Rigid::new(exp(&self.r) * pose.rotation, pose.translation + self.d)
+    }
+    /// d(point) over (d, r), for the point that the rotation alone takes to `rotated` = R X.
+    pub fn lever(rotated: &Vec3) -> Matrix3x6<f64> {
+        translation_and_turn(rotated)
+    }
+}
+
+/// [1 | -p x].
+fn translation_and_turn(p: &Vec3) -> Matrix3x6<f64> {
+    let mut j = Matrix3x6::zeros();
+    j.fixed_view_mut::<3, 3>(0, 0).copy_from(&Mat3::identity());
+    j.fixed_view_mut::<3, 3>(0, 3).copy_from(&-skew(p));
+    j
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Board, Camera};
+
+    /// Levers against differences, for a pose far from the origin, where the two readings differ most.
+    #[test]
+    fn points_follow_their_levers() {
+        let pose: Rigid<Camera, Board> = Rigid::from_vectors(&Vec3::new(0.4, -0.9, 1.3), Vec3::new(30.0, -40.0, 300.0));
+        let (x, h) = (Vec3::new(12.0, 34.0, 0.0), 1e-5);
+        let (twist, left) = (Twist::lever(&pose.point(&x)), LeftStep::lever(&(pose.rotation * x)));
+        for k in 0..6 {
+            let by = |sign: f64| {
+                let mut s = [0.0; 6];
+                s[k] = sign * h;
+                (Twist::new(&s).moved(&pose).point(&x), LeftStep::new(&s).moved(&pose).point(&x))
+            };
+            let (up, down) = (by(1.0), by(-1.0));
+            assert!(((up.0 - down.0) / (2.0 * h) - twist.column(k)).norm() < 1e-5, "twist {k}");
+            assert!(((up.1 - down.1) / (2.0 * h) - left.column(k)).norm() < 1e-5, "step {k}");
+        }
+        assert!((twist.column(4) - left.column(4)).norm() > 100.0, "two readings, two types");
+    }
+
+    #[test]
+    fn the_twist_between_two_poses_leads_from_one_to_the_other() {
+        let pose = |k: f64| -> Rigid<Camera, Board> {
+            Rigid::from_vectors(&Vec3::new(0.4 * k, -0.9, 1.3), Vec3::new(30.0, -40.0 * k, 300.0))
+        };
+        let there = Twist::between(&pose(1.0), &pose(1.5)).moved(&pose(1.0));
+        assert!((there.translation - pose(1.5).translation).norm() < 1e-10);
+        assert!((there.rotation - pose(1.5).rotation).norm() < 1e-12);
+    }
+}
