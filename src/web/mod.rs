@@ -9,6 +9,7 @@ mod guard;
 mod message;
 mod motion;
 mod pages;
+mod robot;
 mod screen;
 mod serve;
 mod simulated;

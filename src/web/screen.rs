@@ -3,8 +3,9 @@
 
 use super::event::Hub;
 use super::guard::{Leases, Sessions};
-use super::message::{Bar, CalibrationAge, Event, JobState, RobotState};
+use super::message::{Bar, CalibrationAge, Event, JobState};
 use super::motion::Grants;
+use super::robot::Robot;
 use super::work::{Jobs, Place, scan_of};
 use super::{disk, station};
 use crate::fault::Result;
@@ -40,6 +41,8 @@ pub struct Screen {
     pub password: Option<String>,
     /// Name of the cookie.
     pub cookie: String,
+    /// The robot, where one was named.
+    pub robot: Option<Robot>,
     /// When the program started.
     pub started: Instant,
     adapter: OnceLock<(String, bool)>,
@@ -59,7 +62,13 @@ struct Read {
 
 impl Screen {
     /// Nothing is read from the disk yet.
-    pub fn new(jobs: Arc<Jobs>, sessions: Arc<Sessions>, cookie: String, password: Option<String>) -> Screen {
+    pub fn new(
+        jobs: Arc<Jobs>,
+        sessions: Arc<Sessions>,
+        cookie: String,
+        password: Option<String>,
+        robot: Option<Robot>,
+    ) -> Screen {
         Screen {
             place: jobs.place.clone(),
             hub: jobs.hub.clone(),
@@ -69,6 +78,7 @@ impl Screen {
             grants: Grants::default(),
             password,
             cookie,
+            robot,
             started: Instant::now(),
             adapter: OnceLock::new(),
             read: Mutex::default(),
@@ -116,6 +126,8 @@ impl Screen {
         if read.left_gb.is_some_and(|gb| gb < LITTLE_DISK) {
             alarms.push(format!("{:.1} GB of disk left", read.left_gb.unwrap_or(0.0)));
         }
+        let robot = self.robot.as_ref().map(Robot::seen).unwrap_or_default();
+        alarms.extend(robot.wrong.clone());
         let cut = self.jobs.list(JOBS).iter().filter(|j| j.state == JobState::CutOff).count();
         if cut > 0 {
             alarms.push(format!("{cut} jobs were cut off: resume them or take them away"));
@@ -123,7 +135,7 @@ impl Screen {
         Bar {
             mode: self.place.mode,
             station: read.name,
-            robot: RobotState::NoLink,
+            robot: robot.bar(),
             laser: None,
             frames: self.jobs.frames.lock().unwrap_or_else(|e| e.into_inner()).clone(),
             delay_ms: None,

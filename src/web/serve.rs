@@ -5,6 +5,7 @@ use super::api::router;
 use super::event::Hub;
 use super::guard::{Door, Doorway, Sessions, door, tls, verify};
 use super::message::Event;
+use super::robot::Robot;
 use super::screen::Screen;
 use super::work::{Jobs, Place, Worker};
 use crate::fault::{Fault, Result};
@@ -46,6 +47,8 @@ pub struct ServeOptions {
     pub port: u16,
     /// The next free port is taken where this one is in use.
     pub next_free: bool,
+    /// A robot's URI; it is looked at, never moved.
+    pub robot: Option<String>,
     /// Password and TLS.
     pub secured: Option<Secured>,
     /// Ends the server when it is set.
@@ -113,8 +116,9 @@ async fn run(
     let scheme = if acceptor.is_some() { "https" } else { "http" };
     let guard =
         Arc::new(Door { hosts: hosts(options, address), scheme, sessions: sessions.clone(), cookie: cookie.clone() });
+    let robot = options.robot.as_deref().map(Robot::watch).transpose()?;
     let password = options.secured.as_ref().map(|s| s.password.clone());
-    let screen = Arc::new(Screen::new(jobs, sessions, cookie, password));
+    let screen = Arc::new(Screen::new(jobs, sessions, cookie, password, robot));
     let app = router(screen.clone()).layer(from_fn_with_state(guard, door));
     let doorway = Doorway::new(listener, acceptor).map_err(|e| Fault::device(e.to_string()))?;
     let first = screen.clone();

@@ -37,6 +37,9 @@ pub struct Serve {
     /// Recordings to simulate, separated by commas: scan, surface, intrinsics, handeye, laserplane, pointer_cal, pointer, all
     #[arg(long = "set", value_delimiter = ',', default_value = "all", requires = "simulate")]
     sets: Vec<String>,
+    /// The robot's controller, e.g. bcap://10.0.0.2: its state and pose are shown
+    #[arg(long)]
+    robot: Option<String>,
     /// Port; the next free one where it is taken, 0 for any [default: 8620, or the next free one]
     #[arg(long)]
     port: Option<u16>,
@@ -94,6 +97,7 @@ pub fn run(args: &Serve, console: &Console) -> Result<()> {
         address: args.listen,
         port: args.port.unwrap_or(PORT),
         next_free: true,
+        robot: args.robot.clone(),
         secured,
         stop: interrupt::asked_for(),
     };

@@ -42,9 +42,9 @@ pub async fn go(State(screen): Shared, Extension(tab): Extension<Tab>, bytes: By
         s.grants.redeem(&ask.grant, &tab, &ask.what)?;
         shown(s, &ask.what)?;
         Err::<Value, _>(
-            Fault::refused("no link to a robot: nothing was moved")
-                .cause("the station was served without --robot")
-                .next("take the numbers over by hand, or start sheetlight station serve with --robot"),
+            Fault::refused("this screen moves no robot: nothing was moved")
+                .cause("it reads the controller's state at most")
+                .next("take the numbers over to the controller"),
         )
     })
     .await

@@ -25,8 +25,6 @@ pub enum RobotState {
     NoLink,
     /// Its state is read, it is never moved.
     ReadOnly,
-    /// The next confirmation moves it.
-    Armed,
     /// It moves.
     Moving,
 }
