@@ -2,8 +2,8 @@
 //! Frame and unit: seconds; poses are named by their hash.
 
 use super::guard::{Tab, random_hex};
+use super::message::Confirmed;
 use crate::fault::{Fault, Result};
-use serde::Deserialize;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
@@ -11,30 +11,6 @@ use std::time::{Duration, Instant};
 pub const HELD: Duration = Duration::from_millis(800);
 /// A right that was not used for so long is gone.
 const LONGEST: Duration = Duration::from_secs(5);
-
-/// Which of a position's poses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Goal {
-    /// Above the insertion.
-    Approach,
-    /// The tool at its place.
-    Insertion,
-    /// Above it, on the way back.
-    Retract,
-}
-
-/// What a person confirms by holding the button.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Confirmed {
-    /// The job that found the pose.
-    pub job: String,
-    /// Which pose.
-    pub goal: Goal,
-    /// [`super::message::RobotPoses::hash`] of what was shown.
-    pub hash: String,
-}
 
 struct Grant {
     name: String,
@@ -93,6 +69,7 @@ impl Grants {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::web::message::Goal;
 
     #[test]
     fn a_right_is_for_one_pose_one_tab_and_one_time() {

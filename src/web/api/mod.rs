@@ -6,9 +6,10 @@ mod jobs;
 mod motion;
 mod openapi;
 mod place;
+mod router;
 mod routes;
 mod session;
 mod surface;
 
 pub use openapi::openapi;
-pub use routes::router;
+pub use router::router;

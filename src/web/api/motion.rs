@@ -4,34 +4,25 @@
 use super::answer::{Answer, body, json, operates};
 use crate::fault::{Fault, Result};
 use crate::web::guard::Tab;
-use crate::web::message::{Job, JobState, Outcome, RobotPoses};
-use crate::web::motion::Confirmed;
+use crate::web::message::{Confirmed, Grant, Job, JobState, Outcome, Redeem, RobotPoses};
 use crate::web::screen::Screen;
 use axum::body::Bytes;
 use axum::extract::State;
 use axum::{Extension, Json};
-use serde::Deserialize;
 use serde_json::{Value, json as object};
 use std::sync::Arc;
 
 type Shared = State<Arc<Screen>>;
 
 /// POST /motion/press: the button goes down. Answers the name under which it can be redeemed once.
-pub async fn press(State(screen): Shared, Extension(tab): Extension<Tab>, bytes: Bytes) -> Answer<Json<Value>> {
+pub async fn press(State(screen): Shared, Extension(tab): Extension<Tab>, bytes: Bytes) -> Answer<Json<Grant>> {
     operates(&screen, &tab)?;
     let what: Confirmed = body(&bytes)?;
     json(screen, move |s| {
         shown(s, &what)?;
-        Ok(object!({ "grant": s.grants.give(&tab, what) }))
+        Ok(Grant { grant: s.grants.give(&tab, what) })
     })
     .await
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Redeem {
-    grant: String,
-    what: Confirmed,
 }
 
 /// POST /motion/go: it was held long enough.

@@ -2,11 +2,7 @@
 //! Frame and unit: none.
 
 use super::{jobs, motion, place, session, surface};
-use crate::web::guard::MOST_BODY;
-use crate::web::pages::page;
 use crate::web::screen::Screen;
-use axum::Router;
-use axum::extract::DefaultBodyLimit;
 use axum::routing::{MethodRouter, delete, get, post, put};
 use std::sync::Arc;
 
@@ -153,18 +149,4 @@ pub fn routes() -> Vec<Route> {
             get(place::support),
         ),
     ]
-}
-
-/// The server's routes: the API, and the pages.
-pub fn router(screen: Arc<Screen>) -> Router {
-    let mut api = Router::new();
-    for route in routes() {
-        api = api.route(route.path, route.handler);
-    }
-    let description = get(|| async { axum::Json(super::openapi()) });
-    Router::new()
-        .nest(ROOT, api.route("/openapi.json", description))
-        .fallback(get(page))
-        .layer(DefaultBodyLimit::max(MOST_BODY))
-        .with_state(screen)
 }

@@ -5,29 +5,19 @@ use super::answer::{Answer, Refusal, body, json, operates};
 use crate::fault::{Fault, Result};
 use crate::web::event::stream;
 use crate::web::guard::{Tab, verify};
-use crate::web::message::{Event, Lease};
+use crate::web::message::{Event, Knock, Lease, Session, TakeLease};
 use crate::web::screen::Screen;
 use axum::body::Bytes;
 use axum::extract::{State, WebSocketUpgrade};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
-use serde::Deserialize;
 use std::sync::Arc;
 use std::time::Duration;
 
 /// Passwords are tried one at a time, and no faster than this.
 const SLOWLY: Duration = Duration::from_millis(700);
 static TRYING: tokio::sync::Mutex<()> = tokio::sync::Mutex::const_new(());
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Knock {
-    #[serde(default)]
-    token: Option<String>,
-    #[serde(default)]
-    password: Option<String>,
-}
 
 /// POST /session: `{"token"}` or `{"password"}`; sets the cookie.
 pub async fn open(State(screen): State<Arc<Screen>>, bytes: Bytes) -> Answer<Response> {
@@ -56,14 +46,8 @@ pub async fn open(State(screen): State<Arc<Screen>>, bytes: Bytes) -> Answer<Res
 }
 
 /// GET /session: whether there is one, and whether a password opens one.
-pub async fn state(State(_): State<Arc<Screen>>, Extension(tab): Extension<Tab>) -> Json<serde_json::Value> {
-    Json(serde_json::json!({ "tab": tab.short() }))
-}
-
-#[derive(Default, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-struct TakeLease {
-    firmly: bool,
+pub async fn state(State(_): State<Arc<Screen>>, Extension(tab): Extension<Tab>) -> Json<Session> {
+    Json(Session { tab: tab.short() })
 }
 
 /// POST /lease: operate from this tab, or go on doing so.

@@ -2,6 +2,7 @@
 //! Frame and unit: lengths in mm, angles in degrees, times in UTC, RFC 3339; each name shows another unit.
 
 mod bar;
+mod door;
 mod job;
 mod order;
 mod outcome;
@@ -10,6 +11,7 @@ mod surface;
 mod typescript;
 
 pub use bar::{Bar, CalibrationAge, Frames, Lease, Mode, RobotState};
+pub use door::{Confirmed, Goal, Grant, Knock, Redeem, Session, TakeLease};
 pub use job::{Event, Job, JobState, Problem};
 pub use order::{CalibrateOrder, FindOrder, Order, Plain, ScanOrder, Target, TeachOrder, TouchOrder};
 pub use outcome::{

@@ -18,6 +18,7 @@ async function page() {
   const [name, query] = location.hash.replace(/^#\/?/, "").split("?");
   const known = PAGES.includes(name) ? name : "station";
   const mine = ++turn;
+  delete document.getElementById("main").dataset.ready;
   leave();
   leave = () => {};
   nav(known);
@@ -37,9 +38,15 @@ async function page() {
   }
 }
 
+/** Built once: a link that has the focus keeps it. */
 function nav(current) {
-  fill(document.getElementById("nav"), PAGES.map((p, i) =>
-    h("a", { href: `#/${p}`, "aria-current": p === current ? "page" : null, title: `Alt+${(i + 1) % 10}` }, t(NAMES[p]))));
+  const place = document.getElementById("nav");
+  if (!place.children.length) fill(place, PAGES.map((p, i) => h("a", { href: `#/${p}`, title: `Alt+${(i + 1) % 10}` })));
+  PAGES.forEach((p, i) => {
+    const link = place.children[i];
+    if (link.textContent !== t(NAMES[p])) link.textContent = t(NAMES[p]);
+    p === current ? link.setAttribute("aria-current", "page") : link.removeAttribute("aria-current");
+  });
 }
 
 function keys(e) {

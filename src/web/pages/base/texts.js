@@ -171,6 +171,7 @@ export const TABLE = {
   "Tool": ["Werkzeug", "工具", "ツール"],
   "Tools": ["Werkzeuge", "工具", "ツール"],
   "Touch": ["Antasten", "触测", "タッチ"],
+  "Turn": ["Drehung", "转角", "回転"],
   "Two points": ["Zwei Punkte", "两点", "二点間"],
   "Undo": ["Rückgängig", "撤销", "元に戻す"],
   "Value": ["Wert", "值", "値"],

@@ -33,13 +33,14 @@ export async function show(place) {
       peaks[x] = Math.max(peaks[x], v);
     }
     dark = peaks.filter((v) => v < 16).length / width;
-    view.show({ width, height, cell_mm: 1 }, levels, { range: [0, 255], unit: "", digits: 0, colours: "grey", reads: (p) => `u ${Math.floor(p[0])}  v ${height - 1 - Math.floor(p[1])}  ${num(levels[view.index(p)], 0)}` });
+    view.show({ width, height, cell_mm: 1, bare: true }, levels, { range: [0, 255], unit: "", digits: 0, colours: "grey", reads: (p) => `u ${Math.floor(p[0])}  v ${height - 1 - Math.floor(p[1])}  ${num(levels[view.index(p)], 0)}` });
     const share = saturated / (width * height);
     fill(figs, figures([`${width}×${height}`, t("pixels")], [String(brightest), t("brightest of 255"), brightest > 217 || brightest < 120 ? "poor-ink" : ""], [num(100 * share, 3, "%"), t("saturated"), share > 0.005 ? "bad-ink" : ""], [num(100 * dark, 1, "%"), t("columns without light")]));
     const most = Math.log1p(Math.max(...counts));
     fill(hist, svg("svg", { class: "plot", viewBox: "0 0 64 100", preserveAspectRatio: "none", role: "img", "aria-label": t("Histogram") }, counts.map((n, i) => svg("rect", { class: "bar", x: i, y: 100 - (95 * Math.log1p(n)) / most, width: 0.9, height: (95 * Math.log1p(n)) / most }))));
     fill(along, svg("svg", { class: "plot", viewBox: `0 0 ${width} 255`, preserveAspectRatio: "none", role: "img", "aria-label": t("Brightest level in each column") }, svg("polyline", { class: "curve", "vector-effect": "non-scaling-stroke", points: peaks.map((v, x) => `${x},${255 - v}`).join(" ") })));
   }
+  place.classList.add("fit");
   fill(place, head, h("div", { class: "split" }, h("section", { class: "panel fill" }, box), h("div", { class: "stack" }, panel(t("Levels"), figs), panel(t("Histogram (logarithmic)"), hist), panel(t("Brightest level in each column"), along))));
   heads();
   await load();

@@ -29,6 +29,7 @@ export async function show(place, query) {
   }, problem);
   const choose = (r) => { chosen = r.name; sessionStorage.setItem("recording", chosen); fill(pick, gallery(list, chosen, choose)); };
   fill(pick, list.length ? gallery(list, chosen, choose) : h("p", { class: "quiet" }, t("There is no recording of the line below the recordings' folder.")));
+  place.classList.add("fit");
   fill(place,
     h("div", { class: "head" }, h("h1", {}, t("Scan")), h("span", { class: "grow" }), cell, choice(t("On"), [["auto", t("auto")], ["gpu", "GPU"], ["cpu", "CPU"]], on_, (v) => (on_ = v)),
       h("button", { class: "main", id: "start", disabled: !list.length, onclick: start }, t("Start"))),
@@ -41,7 +42,7 @@ export async function show(place, query) {
     const g = store.growing;
     if (!g) return;
     const seen = g.heights.subarray(0, g.columns * g.done);
-    view.show({ width: g.columns, height: g.total, cell_mm: 1 }, g.heights, { range: span(seen), digits: 1, reads: (p) => `${t("shot")} ${Math.floor(p[1])}` });
+    view.show({ width: g.columns, height: g.total, cell_mm: 1, bare: true }, g.heights, { range: span(seen), digits: 1, reads: (p) => `${t("shot")} ${Math.floor(p[1])}` });
     const b = store.bar?.frames;
     if (b) fill(figures, `${thousands(g.done)} / ${thousands(g.total)} ${t("rows")} · ${b.measured} ${t("measured")} · ${Object.entries(b.dropped).map(([k, n]) => `${k}: ${n}`).join(", ") || t("nothing dropped")}`);
   };

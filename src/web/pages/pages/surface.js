@@ -20,6 +20,7 @@ export async function show(place, query) {
   let view3 = null;
   const flat = h("button", { "aria-pressed": "true", onclick: () => mode(false) }, t("Map"));
   const deep = h("button", { id: "three", "aria-pressed": "false", onclick: () => mode(true) }, "3-D");
+  place.classList.add("fit");
   fill(place,
     h("div", { class: "head" }, h("h1", {}, t("Surface")), choose, h("span", { class: "grow" }), flat, deep),
     problem,

@@ -2,7 +2,7 @@
 // the wheel; a click gives the point's coordinates and sigma. Points come spread over the scan, so that the first share of them
 // shows all of it coarsely: while it turns, as many are drawn as the machine draws fluently, and that number is said.
 
-import { bytes } from "../base/api.js";
+import { bytes, get } from "../base/api.js";
 import { fill, h, num, thousands } from "../base/dom.js";
 import { t } from "../base/text.js";
 import { span } from "./colour.js";
@@ -41,13 +41,14 @@ export async function cloud(place, id) {
     return { end() {} };
   }
   let data = await load(id, FIRST);
+  const g = (await get(`/scans/${id}/map`)).base_from_grid, up = [g[2], g[6], g[10]];
   const c = { yaw: 0.6, pitch: 0.9, far: 0, at: [0, 0, 0], by: 0, picked: null, budget: data.n, moving: false };
   const program = link(gl), buffer = gl.createBuffer();
   const where = Object.fromEntries(["view", "up", "range", "size", "by"].map((n) => [n, gl.getUniformLocation(program, n)]));
   gl.useProgram(program);
   gl.enable(gl.DEPTH_TEST);
   gl.clearColor(0.043, 0.051, 0.067, 1);
-  const ranges = () => [0, 1, 2].map((by) => { const v = new Float32Array(data.n); for (let i = 0; i < data.n; i++) v[i] = data.f[5 * i + [2, 3, 4][by]]; const r = span(v); return by ? [0, r[1]] : r; });
+  const ranges = () => [0, 1, 2].map((by) => { const v = new Float32Array(data.n); for (let i = 0; i < data.n; i++) v[i] = by ? data.f[5 * i + 2 + by] : up[0] * data.f[5 * i] + up[1] * data.f[5 * i + 1] + up[2] * data.f[5 * i + 2]; const r = span(v); return by ? [0, r[1]] : r; });
   let range = ranges();
   const size = (() => { const x = new Float32Array(data.n).map((_, i) => data.f[5 * i]), y = new Float32Array(data.n).map((_, i) => data.f[5 * i + 1]); const a = span(x), b = span(y); return Math.max(a[1] - a[0], b[1] - b[0], 1); })();
   c.far = 1.35 * size;
@@ -87,7 +88,7 @@ export async function cloud(place, id) {
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.uniformMatrix4fv(where.view, false, matrix());
-    gl.uniform3f(where.up, 0, 0, 1);
+    gl.uniform3f(where.up, ...up);
     gl.uniform2f(where.range, ...range[c.by]);
     gl.uniform1i(where.by, c.by);
     gl.uniform1f(where.size, Math.max(1.5, Math.min(5, (canvas.height / Math.sqrt(n)) * 1.6 * (1.35 * size / c.far))));

@@ -40,6 +40,7 @@ export function map(place, label) {
     for (const mark of m.marks) stroke(mark);
     if (m.from && m.to && m.tool) stroke({ kind: m.tool.shape, points: [m.from, m.to], colour: "#ffd33d" });
     if (m.cross) cross(m.cross);
+    length.hidden = m.head.bare === true;
     const mm = nice((120 * ratio()) / m.view.s);
     length.style.width = `${(mm * m.view.s) / ratio()}px`;
     length.textContent = `${mm} mm`;
@@ -185,7 +186,7 @@ export function map(place, label) {
 }
 
 function legend(place, [low, high], unit, digits, colours) {
-  const strip = h("canvas", { width: 1, height: 128 }), g = strip.getContext("2d"), image = g.createImageData(1, 128), table = SCALES[colours];
+  const strip = h("canvas", { width: 1, height: 128, "aria-hidden": "true" }), g = strip.getContext("2d"), image = g.createImageData(1, 128), table = SCALES[colours];
   for (let y = 0; y < 128; y++) { const k = 3 * (255 - 2 * y); image.data.set([table[k], table[k + 1], table[k + 2], 255], 4 * y); }
   g.putImageData(image, 0, 0);
   fill(place, strip, h("div", {}, [1, 0.75, 0.5, 0.25, 0].map((f) => h("span", {}, num(low + f * (high - low), digits), f === 1 ? ` ${unit}` : ""))));

@@ -27,8 +27,8 @@ export function choice(name, list, current, changed) {
   return h("label", { for: id }, h("span", { class: "small quiet" }, name), select);
 }
 export function field(name, props, unit = "") {
-  const id = `field${++counter}`;
-  return h("label", { for: id }, h("span", { class: "small quiet" }, name), h("input", { id, ...props }), unit && h("span", { class: "small quiet" }, unit));
+  const id = props.id ?? `field${++counter}`;
+  return h("label", { for: id }, h("span", { class: "small quiet" }, name), h("input", { ...props, id }), unit && h("span", { class: "small quiet" }, unit));
 }
 
 /** Finished scans, newest first; the one that the address names, else the newest. */

@@ -69,6 +69,6 @@ function ticks(low, high, most) {
 /** Bars beside each other: [name, value] each. */
 export function bars(list, unit, digits = 2) {
   const most = Math.max(...list.map(([, v]) => v), 1e-9);
-  return h("div", {}, list.map(([name, v]) => h("div", { class: "axisbar" }, h("span", { title: name }, name),
-    svg("svg", { viewBox: "0 0 100 10", preserveAspectRatio: "none", "aria-hidden": "true" }, svg("rect", { x: 0, y: 0, width: (100 * v) / most, height: 10, fill: "var(--accent)" })), h("span", {}, num(v, digits, unit)))));
+  return h("div", {}, list.map(([name, v]) => h("div", { class: "axisbar named" }, h("span", { title: name }, name),
+    svg("svg", { viewBox: "0 0 100 10", preserveAspectRatio: "none", "aria-hidden": "true" }, svg("rect", { x: 0, y: 0, width: (100 * v) / most, height: 10, class: "bar" })), h("span", {}, num(v, digits, unit)))));
 }
