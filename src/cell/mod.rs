@@ -1,3 +1,24 @@
 //! In: a scene and a seed. Out: a robot cell that exists only here: arm, controller, camera, lasers, gripper, at the level of
 //! their wires; and its judge.
-//! Frame and unit: base frame; mm, radians.
+//! Frame and unit: base frame; mm, radians; s of the cell's own time.
+
+mod camera;
+#[allow(clippy::module_inception, reason = "the room's one thing")]
+mod cell;
+mod clock;
+mod component;
+pub mod controller;
+mod judge;
+mod kinematics;
+mod log;
+mod options;
+mod serve;
+mod trajectory;
+mod world;
+
+pub use cell::Cell;
+pub use clock::Clock;
+pub use kinematics::{ArmError, Joints, Unreachable, Vs060};
+pub use log::{Entry, Event, Insertion};
+pub use options::{CellOptions, Outputs};
+pub use serve::{Faults, Served};

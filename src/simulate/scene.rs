@@ -353,6 +353,35 @@ impl Scene {
         self.bodies.iter().map(|b| b.body.distance(&b.to_body(p))).fold(f64::INFINITY, f64::min).abs()
     }
 
+    /// Distance of a scene-frame point from the nearest surface, mm; negative inside a solid.
+    pub fn clearance(&self, p: &Vec3) -> f64 {
+        self.bodies.iter().map(|b| b.body.distance(&b.to_body(p))).fold(f64::INFINITY, f64::min)
+    }
+
+    /// The same with a calibration board that lies in it: `rotation` and `at` take the board's coordinates to the scene's.
+    ///
+    /// # Errors
+    /// As [`Scene::of_board`].
+    pub fn with_board(
+        mut self,
+        board: &BoardSpec,
+        rotation: &crate::geometry::Mat3,
+        at: &Vec3,
+        white: f64,
+        black: f64,
+    ) -> Result<Scene> {
+        // The board's own scene has its z out of the board.
+        let out_of_board = crate::geometry::Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0));
+        for mut placed in Scene::of_board(board, white, black)?.bodies {
+            placed.rotation = rotation * out_of_board * placed.rotation;
+            for place in [&mut placed.at, &mut placed.centre] {
+                *place = rotation * (out_of_board * *place) + at;
+            }
+            self.bodies.push(placed);
+        }
+        Ok(self)
+    }
+
     /// The part that a scene-frame point is nearest to, when it is nearer than to anything else.
     pub fn part_near(&self, p: &Vec3) -> Option<usize> {
         let key = |b: &&Placed| b.body.distance(&b.to_body(p)).abs();

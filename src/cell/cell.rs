@@ -1,0 +1,260 @@
+//! In: options. Out: a robot cell that exists only here: time, arm, outputs, camera, truth. Everything else talks to it.
+//! Frame and unit: base frame, mm; s of the cell.
+
+use super::camera::{self, Lit};
+use super::clock::Clock;
+use super::component::Component;
+use super::kinematics::{ArmError, Vs060};
+use super::log::{Entry, Event, Insertion};
+use super::options::CellOptions;
+use super::world::{Places, World};
+use crate::fault::{Fault, Result};
+use crate::geometry::{Base, Board, Flange, Mat3, Part, Rigid, Tool, Vec3, exp};
+use crate::raster::Image;
+use crate::simulate::{InScene, Scene, SceneSpec, Station, hot_pixels, part_pose};
+use rand::Rng;
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// The gripper on the flange: beside the sensor, pointing where the flange points, mm.
+const GRIPPER_AT_MM: [f64; 3] = [72.0, 0.0, 160.0];
+/// The calibration board lies so far beside the scene's middle, mm.
+const BOARD_BESIDE_MM: [f64; 3] = [0.0, 170.0, 0.0];
+/// Greys of a printed board.
+const PRINT: [f64; 2] = [0.85, 0.06];
+
+/// A cell. Cheap to clone: all clones are one cell.
+#[derive(Clone)]
+pub struct Cell(Arc<Inside>);
+
+struct Inside {
+    options: CellOptions,
+    clock: Clock,
+    station: Station,
+    gripper: Station,
+    hot: Vec<(usize, f32)>,
+    scene: Mutex<Arc<Scene>>,
+    base_from_board: Option<Rigid<Base, Board>>,
+    arm_error: ArmError,
+    world: Mutex<World>,
+    pictures: AtomicU64,
+    dark: AtomicBool,
+}
+
+impl Cell {
+    /// Builds the cell; its time runs from now on.
+    ///
+    /// # Errors
+    /// Options out of range, a scene that holds nothing, no part for the component that is named.
+    pub fn new(options: CellOptions) -> Result<Cell> {
+        options.check()?;
+        let station = Station::of(&options.rig, options.seed);
+        let base_from_scene = place(&station, options.tilt_deg);
+        let (scene, base_from_board) = with_board(&options, Scene::new(options.scene.clone())?, &base_from_scene)?;
+        let held = held(&options.scene, options.holds.as_deref())?;
+        let flange_from_tool = gripper(&station);
+        let places = Places {
+            parts: parts(&options.scene, &base_from_scene),
+            scene: scene.clone(),
+            base_from_scene,
+            flange_from_tool,
+        };
+        let arm_error = arm_error(&station, options.arm_error_mm, options.arm_error_deg);
+        let world = World::new(&options, Vs060::built(&arm_error), places, held, station.rng("repeatability", 0));
+        let gripper = camera::gripper_station(&station, &flange_from_tool);
+        let pixels = station.camera.width as usize * station.camera.height as usize;
+        Ok(Cell(Arc::new(Inside {
+            clock: Clock::new(options.speed),
+            hot: hot_pixels(&station.sensor, pixels, &mut station.rng("hot", 0)),
+            gripper,
+            scene: Mutex::new(Arc::new(scene)),
+            base_from_board,
+            arm_error,
+            world: Mutex::new(world),
+            pictures: AtomicU64::new(0),
+            dark: AtomicBool::new(false),
+            station,
+            options,
+        })))
+    }
+
+    /// What it was made with.
+    pub fn options(&self) -> &CellOptions {
+        &self.0.options
+    }
+    /// Its time.
+    pub fn clock(&self) -> &Clock {
+        &self.0.clock
+    }
+    pub(super) fn world(&self) -> MutexGuard<'_, World> {
+        self.0.world.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+    pub(super) fn scene(&self) -> Arc<Scene> {
+        self.0.scene.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+    pub(super) fn hot(&self) -> &[(usize, f32)] {
+        &self.0.hot
+    }
+
+    /// The picture of a moment that has come: what was lit then, seen from where the flange truly was.
+    pub fn picture(&self, t: f64) -> Image {
+        let (lit, scene_from_camera) = self.seen(t, &self.0.station);
+        camera::picture(self, &self.0.station, scene_from_camera, lit, self.0.pictures.fetch_add(1, Ordering::Relaxed))
+    }
+
+    /// The picture of the small camera in the gripper, in room light.
+    pub fn gripper_picture(&self, t: f64) -> Image {
+        let (lit, scene_from_camera) = self.seen(t, &self.0.gripper);
+        let lit = Lit { line: false, pointer: false, ..lit };
+        // Its hot pixels are its own: none.
+        let view = crate::simulate::View { station: &self.0.gripper, scene: &self.scene(), scene_from_camera };
+        let (w, h) = (self.0.gripper.camera.width, self.0.gripper.camera.height);
+        let (room, sensor) = (view.ambient(1), &self.0.gripper.sensor);
+        let gain = if lit.room { sensor.ambient_white } else { sensor.ambient_leak };
+        let mut rng = self.0.gripper.rng("gripper picture", self.0.pictures.fetch_add(1, Ordering::Relaxed));
+        crate::simulate::expose(sensor, &crate::simulate::Canvas::new(w, h), &room, gain as f32, &[], &mut rng)
+    }
+
+    /// Width and height of the gripper's pictures, px.
+    pub fn gripper_format(&self) -> [u32; 2] {
+        [self.0.gripper.camera.width, self.0.gripper.camera.height]
+    }
+
+    fn seen(&self, t: f64, station: &Station) -> (Lit, Rigid<InScene, crate::geometry::Camera>) {
+        let world = self.world();
+        let dark = self.0.dark.load(Ordering::Relaxed);
+        let on = |number: u16| world.output(number, t) && !dark;
+        let outputs = self.0.options.outputs;
+        let lit = Lit { line: on(outputs.line), pointer: on(outputs.pointer), room: on(outputs.room) };
+        (lit, world.places().base_from_scene.inverse() * world.true_flange(t) * station.flange_from_camera)
+    }
+
+    /// No laser and no lamp follows its output any more: a fuse is out.
+    pub fn set_dark(&self, dark: bool) {
+        self.0.dark.store(dark, Ordering::Relaxed);
+    }
+
+    /// What happened so far.
+    pub fn log(&self) -> Vec<Entry> {
+        self.world().log.clone()
+    }
+
+    /// How the component was let go; `None` while it is held.
+    pub fn insertion(&self) -> Option<Insertion> {
+        self.world().log.iter().rev().find_map(|e| match e.event {
+            Event::Released(insertion) => Some(insertion),
+            _ => None,
+        })
+    }
+
+    /// Collisions so far.
+    pub fn collisions(&self) -> usize {
+        self.world().log.iter().filter(|e| matches!(e.event, Event::Collision { .. })).count()
+    }
+
+    /// Motions that were begun.
+    pub fn moves(&self) -> usize {
+        self.world().log.iter().filter(|e| matches!(e.event, Event::Move { .. })).count()
+    }
+
+    /// Lays something else before the robot, at the same place; the gripper gets the component that belongs to it.
+    pub fn lay(&self, spec: &SceneSpec, holds: Option<&str>) -> Result<()> {
+        let held = held(spec, holds)?;
+        let base_from_scene = self.world().places().base_from_scene;
+        let (scene, _) = with_board(&self.0.options, Scene::new(spec.clone())?, &base_from_scene)?;
+        let flange_from_tool = self.flange_from_tool();
+        *self.0.scene.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(scene.clone());
+        let parts = parts(spec, &base_from_scene);
+        self.world().replace(Places { scene, base_from_scene, parts, flange_from_tool }, held);
+        let gripper = self.0.options.outputs.gripper;
+        let now = self.0.clock.now();
+        self.world().switch(now, gripper, true);
+        Ok(())
+    }
+
+    // What only tests may know.
+
+    /// The specimen on the flange.
+    pub fn station(&self) -> &Station {
+        &self.0.station
+    }
+    /// Where the scene is.
+    pub fn base_from_scene(&self) -> Rigid<Base, InScene> {
+        self.world().places().base_from_scene
+    }
+    /// Where the calibration board is.
+    pub fn base_from_board(&self) -> Option<Rigid<Base, Board>> {
+        self.0.base_from_board
+    }
+    /// Where a part is.
+    pub fn base_from_part(&self, name: &str) -> Option<Rigid<Base, Part>> {
+        self.world().places().parts.get(name).copied()
+    }
+    /// Where the gripper is on the flange.
+    pub fn flange_from_tool(&self) -> Rigid<Flange, Tool> {
+        self.world().places().flange_from_tool
+    }
+    /// How the arm differs from its drawing.
+    pub fn arm_error(&self) -> ArmError {
+        self.0.arm_error
+    }
+    /// Where the flange truly was.
+    pub fn true_flange(&self, t: f64) -> Rigid<Base, Flange> {
+        self.world().true_flange(t)
+    }
+}
+
+/// Where the scene lies: before the arm, below the sensor, turned and tilted a little, another way for each seed.
+fn place(station: &Station, tilt_deg: f64) -> Rigid<Base, InScene> {
+    let mut rng = station.rng("cell place", 0);
+    let mut within = |by: f64| if station.seed == 0 { 0.0 } else { rng.random_range(-by..=by) };
+    let turn = exp(&(Vec3::z() * within(0.26)));
+    let azimuth = within(std::f64::consts::PI);
+    let tilt = exp(&(Vec3::new(azimuth.cos(), azimuth.sin(), 0.0) * within(tilt_deg.to_radians())));
+    Rigid::new(tilt * turn, Vec3::new(330.0 + within(25.0), within(25.0), 180.0 + within(20.0)))
+}
+
+fn gripper(station: &Station) -> Rigid<Flange, Tool> {
+    let mut rng = station.rng("cell gripper", 0);
+    let mut within = |by: f64| if station.seed == 0 { 0.0 } else { rng.random_range(-by..=by) };
+    let off = Vec3::new(within(1.0), within(1.0), within(1.0));
+    let turn = exp(&(Vec3::z() * within(0.02)));
+    Rigid::new(turn * Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0)), Vec3::from(GRIPPER_AT_MM) + off)
+}
+
+fn arm_error(station: &Station, mm: f64, deg: f64) -> ArmError {
+    let mut rng = station.rng("arm error", 0);
+    let mut within = |by: f64| rng.random_range(-1.0..=1.0) * by;
+    let lengths_mm = std::array::from_fn(|_| within(mm));
+    ArmError { lengths_mm, zeros_deg: std::array::from_fn(|_| within(deg)) }
+}
+
+fn parts(spec: &SceneSpec, base_from_scene: &Rigid<Base, InScene>) -> BTreeMap<String, Rigid<Base, Part>> {
+    spec.part.iter().map(|p| (p.name.clone(), *base_from_scene * part_pose::<InScene>(p))).collect()
+}
+
+fn with_board(
+    options: &CellOptions,
+    scene: Scene,
+    base_from_scene: &Rigid<Base, InScene>,
+) -> Result<(Scene, Option<Rigid<Base, Board>>)> {
+    let Some(board) = &options.board else { return Ok((scene, None)) };
+    // Its z goes into the board, its middle beside the scene's.
+    let down = Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0));
+    let [x0, y0, x1, y1] = board.outline();
+    let at = Vec3::from(BOARD_BESIDE_MM) - down * Vec3::new((x0 + x1) / 2.0, (y0 + y1) / 2.0, 0.0);
+    let scene_from_board: Rigid<InScene, Board> = Rigid::new(down, at);
+    Ok((scene.with_board(board, &down, &at, PRINT[0], PRINT[1])?, Some(*base_from_scene * scene_from_board)))
+}
+
+fn held(spec: &SceneSpec, name: Option<&str>) -> Result<Option<Component>> {
+    let Some(name) = name else {
+        return Ok(spec.part.iter().find_map(|p| Component::of(p).ok()));
+    };
+    let part = spec.part.iter().find(|p| p.name == name).ok_or_else(|| {
+        let names: Vec<&str> = spec.part.iter().map(|p| p.name.as_str()).collect();
+        Fault::usage(format!("the scene has no part '{name}'")).next(format!("name one of: {}", names.join(", ")))
+    })?;
+    Component::of(part).map(Some)
+}

@@ -1,0 +1,77 @@
+//! In: a part of the scene with holes. Out: the component that goes into it, and the gripper that holds it, as boxes and pins.
+//! Frame and unit: tool frame: origin where the component's underside meets the socket's top, z against the insertion; mm.
+
+use crate::fault::{Fault, Result};
+use crate::geometry::Vec3;
+use crate::simulate::{PartSpec, ShapeSpec};
+
+/// Pins reach so far below the component, mm.
+pub const PIN_MM: f64 = 2.0;
+/// Height of the component, and of the gripper above it, mm.
+const BODY_MM: f64 = 6.0;
+const FINGERS_MM: [f64; 3] = [16.0, 10.0, 50.0];
+
+/// What the gripper holds.
+#[derive(Clone, Debug)]
+pub struct Component {
+    /// Name of the part that it belongs to.
+    pub part: String,
+    /// Places of the pins, at the underside.
+    pub pins: Vec<Vec3>,
+    /// Places on the surfaces of component and gripper that must not be inside anything.
+    pub hull: Vec<Vec3>,
+    /// The middle of the pins and the middle of the socket's holes in the part's frame coincide: part from tool, mm.
+    pub seat: Vec3,
+}
+
+/// A grid of places on a box's sides.
+fn on_box(x: [f64; 2], y: [f64; 2], z: [f64; 2], out: &mut Vec<Vec3>) {
+    const N: usize = 4;
+    let at = |r: [f64; 2], k: usize| r[0] + (r[1] - r[0]) * k as f64 / N as f64;
+    for i in 0..=N {
+        for j in 0..=N {
+            for k in 0..=N {
+                let side = [i, j, k].iter().any(|n| *n == 0 || *n == N);
+                if side {
+                    out.push(Vec3::new(at(x, i), at(y, j), at(z, k)));
+                }
+            }
+        }
+    }
+}
+
+impl Component {
+    /// The component that belongs to a part: a pin for each hole that is there four times or more.
+    pub fn of(part: &PartSpec) -> Result<Component> {
+        let holes = part.solid.iter().flat_map(|s| s.cut.iter().map(move |c| (s, c)));
+        let mut pins = Vec::new();
+        for (solid, cut) in
+            holes.filter(|(_, c)| c.repeat[0] * c.repeat[1] >= 4 && !matches!(c.shape, ShapeSpec::Ball { .. }))
+        {
+            for j in 0..cut.repeat[1] {
+                for i in 0..cut.repeat[0] {
+                    let along = |k: u32, axis: usize| {
+                        (f64::from(k) - f64::from(cut.repeat[axis] - 1) / 2.0) * cut.pitch_mm[axis]
+                    };
+                    pins.push(
+                        Vec3::from(solid.at_mm) + Vec3::from(cut.at_mm) + Vec3::new(along(i, 0), along(j, 1), 0.0),
+                    );
+                }
+            }
+        }
+        if pins.is_empty() {
+            return Err(Fault::input(format!("the part '{}' has no holes that pins could go into", part.name))
+                .cause("a part without cut-outs that repeat four times or more")
+                .next("name another part"));
+        }
+        let seat = pins.iter().sum::<Vec3>() / pins.len() as f64;
+        let pins: Vec<Vec3> = pins.iter().map(|p| p - seat).collect();
+        let far = |axis: usize| pins.iter().map(|p| p[axis].abs()).fold(0.0, f64::max) + 1.0;
+        let (x, y) = (far(0), far(1));
+        let mut hull = Vec::new();
+        on_box([-x, x], [-y, y], [0.0, BODY_MM], &mut hull);
+        let [fx, fy, fz] = FINGERS_MM;
+        on_box([-fx / 2.0, fx / 2.0], [-fy / 2.0, fy / 2.0], [BODY_MM, BODY_MM + fz], &mut hull);
+        Ok(Component { part: part.name.clone(), pins, hull, seat })
+    }
+}

@@ -1,0 +1,97 @@
+//! In: what a person chooses of a simulated cell. Out: the same, checked.
+//! Frame and unit: mm, degrees; each field says.
+
+use crate::fault::{Fault, Result};
+use crate::recording::BoardSpec;
+use crate::simulate::{RigSpec, SceneSpec};
+
+/// Numbers of the controller's outputs and what hangs on them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Outputs {
+    /// The line laser.
+    pub line: u16,
+    /// The laser pointer.
+    pub pointer: u16,
+    /// The room's lamp.
+    pub room: u16,
+    /// The gripper: on is closed.
+    pub gripper: u16,
+}
+
+impl Default for Outputs {
+    /// The first user outputs of an RC8.
+    fn default() -> Outputs {
+        Outputs { line: 24, pointer: 25, room: 26, gripper: 27 }
+    }
+}
+
+/// What stands in the cell and how well it is made.
+#[derive(Clone, Debug)]
+pub struct CellOptions {
+    /// What lies before the robot.
+    pub scene: SceneSpec,
+    /// A calibration board beside it.
+    pub board: Option<BoardSpec>,
+    /// The design of the sensor on the flange.
+    pub rig: RigSpec,
+    /// Specimen, places and noise; 0 is the design itself.
+    pub seed: u64,
+    /// Seconds of the cell in one of ours, 0.1 to 1000.
+    pub speed: f64,
+    /// Repeatability: how far the arm truly stands from what it reports, 1 sigma an axis, mm, 0 to 1 ...
+    pub noise_mm: f64,
+    /// ... and degrees, 0 to 1.
+    pub noise_deg: f64,
+    /// Largest error of each length of the arm, mm, 0 to 2 ...
+    pub arm_error_mm: f64,
+    /// ... and of each joint's zero, degrees, 0 to 1.
+    pub arm_error_deg: f64,
+    /// Largest tilt of the scene against the base, degrees, 0 to 15.
+    pub tilt_deg: f64,
+    /// Name of the part of the scene that the component in the gripper belongs to; `None`: the first that has holes.
+    pub holds: Option<String>,
+    /// Pictures that the camera takes in a second of the cell, 1 to 2000.
+    pub fps: f64,
+    /// Where lasers, lamp and gripper hang.
+    pub outputs: Outputs,
+}
+
+impl CellOptions {
+    /// A cell with a scene, all else as a good arm has it.
+    pub fn of(scene: SceneSpec, seed: u64) -> CellOptions {
+        CellOptions {
+            scene,
+            board: None,
+            rig: RigSpec::paper(),
+            seed,
+            speed: 1.0,
+            noise_mm: 0.02,
+            noise_deg: 0.004,
+            arm_error_mm: 0.0,
+            arm_error_deg: 0.0,
+            tilt_deg: 2.0,
+            holds: None,
+            fps: 100.0,
+            outputs: Outputs::default(),
+        }
+    }
+
+    /// Refuses numbers out of the ranges that the fields state.
+    pub fn check(&self) -> Result<()> {
+        let limits = [
+            ("speed", self.speed, 0.1, 1000.0),
+            ("noise in mm", self.noise_mm, 0.0, 1.0),
+            ("noise in degrees", self.noise_deg, 0.0, 1.0),
+            ("arm error in mm", self.arm_error_mm, 0.0, 2.0),
+            ("arm error in degrees", self.arm_error_deg, 0.0, 1.0),
+            ("tilt in degrees", self.tilt_deg, 0.0, 15.0),
+            ("fps", self.fps, 1.0, 2000.0),
+        ];
+        match limits.iter().find(|(_, v, low, high)| !(*low..=*high).contains(v)) {
+            Some((name, v, low, high)) => {
+                Err(Fault::usage(format!("{name} is {v}, allowed {low}..={high}")).next("correct the option"))
+            }
+            None => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,160 @@
+//! In: lines of text from whoever looks at a camera of the cell. Out: its pictures and answers (capture::wire has the protocol).
+//! Frame and unit: grey levels; ns of the cell's clock.
+
+use super::Faults;
+use crate::capture::wire::{Message, Sent, write};
+use crate::cell::cell::Cell;
+use std::io::{BufRead, BufReader, Write};
+use std::net::{TcpListener, TcpStream};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+const LOOK: Duration = Duration::from_millis(5);
+/// Exposure that is stated, s; a picture shows its beginning.
+const EXPOSURE_S: f64 = 1e-3;
+
+/// What one client has asked for, and what it was sent.
+struct Viewer {
+    cell: Cell,
+    in_gripper: bool,
+    stream: Mutex<TcpStream>,
+    /// Pictures a second; none while it is stopped.
+    rate: Mutex<Option<f64>>,
+    taken: Mutex<[u64; 2]>,
+}
+
+pub(super) fn serve(
+    listener: &TcpListener,
+    cell: &Cell,
+    in_gripper: bool,
+    faults: &Arc<Faults>,
+    over: &Arc<AtomicBool>,
+) {
+    if listener.set_nonblocking(true).is_err() {
+        return;
+    }
+    while !over.load(Ordering::Relaxed) {
+        let Ok((stream, _)) = listener.accept() else {
+            std::thread::sleep(LOOK);
+            continue;
+        };
+        if Faults::on(&faults.camera_gone) || stream.set_nonblocking(false).is_err() {
+            continue;
+        }
+        let Ok(lines) = stream.try_clone() else { continue };
+        let _ = stream.set_nodelay(true);
+        let _ = stream.set_write_timeout(Some(Duration::from_secs(5)));
+        let viewer = Arc::new(Viewer {
+            cell: cell.clone(),
+            in_gripper,
+            stream: Mutex::new(stream),
+            rate: Mutex::new(None),
+            taken: Mutex::new([0; 2]),
+        });
+        let (v, o, f) = (viewer.clone(), over.clone(), faults.clone());
+        let _ = std::thread::Builder::new().name("camera lines".into()).spawn(move || v.listen(lines, &o, &f));
+        let (o, f) = (over.clone(), faults.clone());
+        let _ = std::thread::Builder::new().name("camera pictures".into()).spawn(move || viewer.run(&o, &f));
+    }
+}
+
+impl Viewer {
+    fn send(&self, message: &Message) -> std::io::Result<()> {
+        self.stream.lock().unwrap_or_else(PoisonError::into_inner).write_all(&write(message))
+    }
+
+    /// The picture of a moment; time stands still while it is made.
+    fn picture(&self, t: f64) -> std::io::Result<()> {
+        let held = self.cell.clock().hold();
+        let image = if self.in_gripper { self.cell.gripper_picture(t) } else { self.cell.picture(t) };
+        let mut taken = self.taken.lock().unwrap_or_else(PoisonError::into_inner);
+        let [id, sent] = *taken;
+        *taken = [id + 1, sent + 1];
+        let device_ns = (t * 1e9) as u64;
+        let sent = Sent { image, id, device_ns, exposure_ns: (EXPOSURE_S * 1e9) as u64, count: None, sent: sent + 1 };
+        drop(held);
+        self.send(&Message::Picture(Box::new(sent)))
+    }
+
+    fn listen(&self, lines: TcpStream, over: &AtomicBool, faults: &Faults) {
+        for line in BufReader::new(lines).lines() {
+            let Ok(line) = line else { break };
+            if over.load(Ordering::Relaxed) || Faults::on(&faults.camera_gone) {
+                break;
+            }
+            let said = self.answer(line.trim());
+            let snapped = line.trim() == "snap";
+            if self.send(&Message::Text(said)).is_err() || (snapped && self.picture(self.cell.clock().now()).is_err()) {
+                break;
+            }
+        }
+        let _ = self.stream.lock().unwrap_or_else(PoisonError::into_inner).shutdown(std::net::Shutdown::Both);
+    }
+
+    fn answer(&self, line: &str) -> String {
+        let station = self.cell.station();
+        let mut rate = self.rate.lock().unwrap_or_else(PoisonError::into_inner);
+        match line.split_once(' ').unwrap_or((line, "")) {
+            ("start", fps) => match fps.trim().parse::<f64>() {
+                Ok(0.0) => {
+                    *rate = Some(self.cell.options().fps);
+                    "ok".into()
+                }
+                Ok(fps) if (0.01..=2000.0).contains(&fps) => {
+                    *rate = Some(fps);
+                    "ok".into()
+                }
+                _ => format!("error '{fps}' is no rate, 0.01 to 2000 pictures a second are"),
+            },
+            ("stop", _) => {
+                *rate = None;
+                "ok".into()
+            }
+            ("snap", _) => "ok".into(),
+            ("time", _) => format!("ok {}", (self.cell.clock().now() * 1e9) as u64),
+            ("format", _) => {
+                let camera = if self.in_gripper {
+                    self.cell.gripper_format()
+                } else {
+                    [station.camera.width, station.camera.height]
+                };
+                format!("ok {} {} {}", camera[0], camera[1], station.sensor.bits)
+            }
+            ("features", _) => {
+                format!("ok\nAcquisitionFrameRate\t{}\tHz\t0.01\t2000", rate.unwrap_or(self.cell.options().fps))
+            }
+            ("set", words) => match words.split_once(' ').map(|(k, v)| (k, v.trim().parse::<f64>())) {
+                Some(("AcquisitionFrameRate", Ok(fps))) if (0.01..=2000.0).contains(&fps) => {
+                    *rate = rate.map(|_| fps);
+                    "ok".into()
+                }
+                _ => format!("error '{words}' cannot be set; AcquisitionFrameRate 0.01 to 2000 can"),
+            },
+            _ => "error unknown; start FPS, stop, snap, time, format, features, set NAME VALUE are known".into(),
+        }
+    }
+
+    /// Takes pictures at the rate that was asked for, at even moments of the cell's time.
+    fn run(&self, over: &AtomicBool, faults: &Faults) {
+        let mut next = None::<f64>;
+        while !over.load(Ordering::Relaxed) && !Faults::on(&faults.camera_gone) {
+            let rate = *self.rate.lock().unwrap_or_else(PoisonError::into_inner);
+            let Some(fps) = rate else {
+                next = None;
+                std::thread::sleep(LOOK);
+                continue;
+            };
+            let at = next.unwrap_or_else(|| self.cell.clock().now());
+            if !self.cell.clock().wait(at, LOOK) {
+                next = Some(at);
+                continue;
+            }
+            if self.picture(at).is_err() {
+                break;
+            }
+            next = Some(at + 1.0 / fps);
+        }
+        let _ = self.stream.lock().unwrap_or_else(PoisonError::into_inner).shutdown(std::net::Shutdown::Both);
+    }
+}

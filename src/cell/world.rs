@@ -1,0 +1,219 @@
+//! In: motions and switches as the controller makes them, the cell's time. Out: where everything truly is at any moment that is
+//! not too long ago, what the controller believes, and what happened.
+//! Frame and unit: base frame, mm; joints rad; s of the cell.
+
+use super::component::Component;
+use super::judge;
+use super::kinematics::{Joints, Vs060};
+use super::log::{Entry, Event};
+use super::options::{CellOptions, Outputs};
+use super::trajectory::Trajectory;
+use crate::geometry::{Base, Flange, Part, Rigid, Tool, Vec3, exp};
+use crate::simulate::{InScene, Scene};
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64;
+use std::collections::{BTreeMap, VecDeque};
+
+/// Where the arm stands when the cell is started, degrees: the tool points straight down.
+pub const START_DEG: Joints = [0.0, 0.0, 90.0, 0.0, 90.0, 0.0];
+/// Motions and switches that are remembered, for pictures of moments that have passed.
+const REMEMBERED: usize = 64;
+/// Places along a motion at which collisions are looked for, a mm.
+const LOOKS_PER_MM: f64 = 1.0;
+
+/// A motion and when it began; how far the arm is truly off before and after it: mm and rad.
+struct Segment {
+    start: f64,
+    trajectory: Trajectory,
+    off: [[f64; 6]; 2],
+    straight: bool,
+}
+
+/// What stands where.
+pub struct Places {
+    /// What lies before the robot.
+    pub scene: Scene,
+    /// Where that is.
+    pub base_from_scene: Rigid<Base, InScene>,
+    /// The sockets in it by name.
+    pub parts: BTreeMap<String, Rigid<Base, Part>>,
+    /// The gripper on the flange.
+    pub flange_from_tool: Rigid<Flange, Tool>,
+}
+
+/// Everything that changes.
+pub struct World {
+    drawn: Vs060,
+    built: Vs060,
+    segments: VecDeque<Segment>,
+    rest: (Joints, [f64; 6]),
+    /// Since when which outputs are on.
+    switched: VecDeque<(f64, BTreeMap<u16, bool>)>,
+    outputs: Outputs,
+    noise: [f64; 2],
+    rng: Pcg64,
+    places: Places,
+    /// What the gripper holds.
+    pub held: Option<Component>,
+    hull: Vec<Vec3>,
+    /// What happened, in order.
+    pub log: Vec<Entry>,
+}
+
+impl World {
+    pub fn new(options: &CellOptions, built: Vs060, places: Places, held: Option<Component>, rng: Pcg64) -> World {
+        let rest = (START_DEG.map(f64::to_radians), [0.0; 6]);
+        let hull = held.as_ref().map_or(Vec::new(), |c| c.hull.clone());
+        let mut switched = VecDeque::new();
+        switched.push_back((0.0, BTreeMap::from([(options.outputs.room, true), (options.outputs.gripper, true)])));
+        World {
+            drawn: Vs060::drawn(),
+            built,
+            segments: VecDeque::new(),
+            rest,
+            switched,
+            outputs: options.outputs,
+            noise: [options.noise_mm, options.noise_deg.to_radians()],
+            rng,
+            places,
+            held,
+            hull,
+            log: Vec::new(),
+        }
+    }
+
+    /// Arm as its controller computes it.
+    pub fn drawn(&self) -> &Vs060 {
+        &self.drawn
+    }
+
+    /// Adds to the log.
+    pub fn note(&mut self, t: f64, event: Event) {
+        self.log.push(Entry { t_s: t, event });
+    }
+
+    fn at(&self, t: f64) -> (Joints, [f64; 6]) {
+        let Some(s) = self.segments.iter().rev().find(|s| s.start <= t) else {
+            return self.segments.front().map_or(self.rest, |s| (s.trajectory.joints(0.0), s.off[0]));
+        };
+        let (dt, u) = (t - s.start, s.trajectory.done(t - s.start));
+        (s.trajectory.joints(dt), std::array::from_fn(|k| s.off[0][k] + u * (s.off[1][k] - s.off[0][k])))
+    }
+
+    /// The joints as the encoders read them.
+    pub fn joints(&self, t: f64) -> Joints {
+        self.at(t).0
+    }
+
+    /// The flange as the controller reports it.
+    pub fn reported(&self, t: f64) -> Rigid<Base, Flange> {
+        self.drawn.forward(&self.joints(t))
+    }
+
+    /// Where the flange truly is.
+    pub fn true_flange(&self, t: f64) -> Rigid<Base, Flange> {
+        let (joints, off) = self.at(t);
+        let pose = self.built.forward(&joints);
+        let turn = exp(&Vec3::new(off[3], off[4], off[5]));
+        Rigid::new(turn * pose.rotation, pose.translation + Vec3::new(off[0], off[1], off[2]))
+    }
+
+    /// Where the gripper's tool truly is.
+    pub fn true_tool(&self, t: f64) -> Rigid<Base, Tool> {
+        self.true_flange(t) * self.places.flange_from_tool
+    }
+
+    /// Until when the arm moves, s; none where it stands.
+    pub fn moving_until(&self, t: f64) -> Option<f64> {
+        let end = self.segments.back().map(|s| s.start + s.trajectory.duration())?;
+        (end > t).then_some(end)
+    }
+
+    /// Begins a motion from where the arm stands; returns its number.
+    pub fn begin(&mut self, t: f64, trajectory: Trajectory, straight: bool, connection: u64) -> usize {
+        let (_, off) = self.at(t);
+        let [mm, rad] = self.noise;
+        let mut normal = |sigma: f64| sigma * Distribution::<f64>::sample(&StandardNormal, &mut self.rng);
+        let next = std::array::from_fn(|k| normal(if k < 3 { mm } else { rad }));
+        let (to, lasts_s) = (self.drawn.forward(&trajectory.joints(trajectory.duration())), trajectory.duration());
+        self.segments.push_back(Segment { start: t, trajectory, off: [off, next], straight });
+        if self.segments.len() > REMEMBERED {
+            self.segments.pop_front();
+        }
+        self.note(t, Event::Move { connection, to, straight, lasts_s });
+        self.log.len()
+    }
+
+    /// Stops whatever moves; says whether something did.
+    pub fn halt(&mut self, t: f64, connection: Option<u64>) -> bool {
+        let moving = self.moving_until(t).is_some();
+        if let Some(s) = self.segments.back_mut().filter(|_| moving) {
+            s.trajectory.halt(t - s.start);
+        }
+        self.note(t, Event::Halt { connection, moving });
+        moving
+    }
+
+    /// The motion that was begun last has ended: what it hit on its way is noted.
+    pub fn arrived(&mut self, t: f64) {
+        let Some(s) = self.segments.back() else { return };
+        let (start, end) = (s.start, s.start + s.trajectory.duration());
+        let (from, to) = (self.true_tool(start), self.true_tool(end));
+        let looks =
+            ((from.difference(&to).1 * LOOKS_PER_MM).ceil() as usize).clamp(1, if s.straight { 400 } else { 200 });
+        let near = |pose: &Rigid<Base, Tool>| {
+            judge::collision(self.held.as_ref(), &self.hull, pose, &self.places.scene, &self.places.base_from_scene)
+        };
+        let times = (1..=looks).map(|k| start + (end - start) * k as f64 / looks as f64);
+        let hit = times.filter_map(|at| near(&self.true_tool(at)).map(|event| (at, event))).next();
+        self.note(t, Event::Arrived);
+        if let Some((at, event)) = hit {
+            self.note(at, event);
+        }
+    }
+
+    /// Which outputs were on.
+    pub fn outputs(&self, t: f64) -> &BTreeMap<u16, bool> {
+        let then = self.switched.iter().rev().find(|(since, _)| *since <= t).or(self.switched.front());
+        &then.expect("starts with one").1
+    }
+
+    /// Whether an output was on.
+    pub fn output(&self, number: u16, t: f64) -> bool {
+        self.outputs(t).get(&number).copied().unwrap_or(false)
+    }
+
+    /// Switches an output; a gripper that opens lets its component go.
+    pub fn switch(&mut self, t: f64, number: u16, on: bool) {
+        let before = self.output(number, t);
+        let mut all = self.outputs(t).clone();
+        all.insert(number, on);
+        self.switched.push_back((t, all));
+        if self.switched.len() > REMEMBERED {
+            self.switched.pop_front();
+        }
+        self.note(t, Event::Output { number, on });
+        if number == self.outputs.gripper && before && !on {
+            self.release(t);
+        }
+    }
+
+    fn release(&mut self, t: f64) {
+        let Some(component) = self.held.take() else { return };
+        let tool = self.true_tool(t);
+        let Some(socket) = self.places.parts.get(&component.part) else { return };
+        let insertion = judge::insertion(&component, &tool, socket);
+        self.note(t, Event::Released(insertion));
+    }
+
+    /// What stands where.
+    pub fn places(&self) -> &Places {
+        &self.places
+    }
+
+    /// Other things lie before the robot now.
+    pub fn replace(&mut self, places: Places, held: Option<Component>) {
+        self.hull = held.as_ref().map_or(Vec::new(), |c| c.hull.clone());
+        (self.places, self.held) = (places, held);
+    }
+}

@@ -1,0 +1,19 @@
+//! In: a simulated cell on its wires. Out: whether controller, camera, motion rules and job behave as they must; judged by the
+//! controller's own log and by the truth of the cell.
+//! Frame and unit: base frame, mm, degrees; times in ms.
+
+mod common;
+
+#[path = "cell/golden.rs"]
+mod golden;
+#[path = "cell/wire.rs"]
+mod wire;
+
+use sheetlight::cell::{Cell, CellOptions, Served};
+use sheetlight::simulate::SceneSpec;
+
+/// A cell with the circuit board that ships with the program, `speed` times as fast as ours.
+fn cell(seed: u64, speed: f64) -> Served {
+    let scene = SceneSpec::parse(sheetlight::simulate::DEFAULT_SCENE).unwrap();
+    Served::here(Cell::new(CellOptions { speed, ..CellOptions::of(scene, seed) }).unwrap()).unwrap()
+}

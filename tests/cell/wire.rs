@@ -1,0 +1,139 @@
+//! In: the robot link and the camera's client of the product, against the cell. Out: one motion for one order whatever the wire
+//! does, halts in time, pictures of where the arm stands.
+//! Frame and unit: mm, degrees; ms.
+
+use super::cell;
+use sheetlight::arm::{Mode, Reach};
+use sheetlight::bcap::{Call, Client, ClientOptions, Network, Variant};
+use sheetlight::capture::{CameraUri, Event};
+use sheetlight::cell::Event as Happened;
+use sheetlight::geometry::{Rigid, Vec3};
+use std::sync::atomic::Ordering::SeqCst;
+use std::time::{Duration, Instant};
+
+fn moved(served: &sheetlight::cell::Served) -> usize {
+    served.cell.moves()
+}
+
+/// A client that may move the arm, and the handle of the robot.
+fn mover(at: &str, network: Network) -> (Client, sheetlight::bcap::Handle) {
+    let options = ClientOptions { network, patience: Duration::from_secs(3), ..ClientOptions::default() };
+    let mut client = Client::connect(at, options).unwrap();
+    let controller = client.controller().unwrap();
+    let robot = client.robot(controller).unwrap();
+    client.execute(robot, "TakeArm", Variant::I32s(vec![0, 0])).unwrap();
+    client.execute(robot, "Motor", Variant::I32s(vec![1, 0])).unwrap();
+    (client, robot)
+}
+
+fn order(x: f64, option: &str) -> Vec<Variant> {
+    let pose = Variant::F64s(vec![x, 0.0, 560.0, 180.0, 0.0, 180.0, -1.0]);
+    let text = |s: &str| Variant::Text(s.into());
+    vec![Variant::I32(2), Variant::Variants(vec![pose, text("P"), text("@E")]), text(option)]
+}
+
+#[test]
+fn a_lost_answer_over_udp_is_one_motion() {
+    let served = cell(3, 20.0);
+    let (mut client, robot) = mover(&served.robot.to_string(), Network::Udp);
+    for (k, lost) in [0, 1, 3].into_iter().enumerate() {
+        served.faults.lose.store(lost, SeqCst);
+        let arguments = [vec![robot.into()], order(310.0 + 10.0 * k as f64, "")].concat();
+        client.call(Call::RobotMove, arguments).unwrap().unwrap();
+        assert_eq!(moved(&served), k + 1, "{lost} answers lost");
+    }
+    served.faults.foreign.store(true, SeqCst);
+    client.execute(robot, "CurPos", Variant::Empty).unwrap();
+}
+
+#[test]
+fn the_link_reads_asks_and_gets_through_what_a_wire_does() {
+    let served = cell(3, 20.0);
+    let mut arm = sheetlight::arm::open(&served.robot_uri()).unwrap();
+    let whole = arm.pose().unwrap();
+    assert!((whole.base_from_flange.translation - Vec3::new(300.0, 0.0, 590.0)).norm() < 1e-6);
+    let state = arm.state().unwrap();
+    assert_eq!((state.mode, state.motor, state.tool, state.work), (Mode::Automatic, Some(false), Some(0), Some(0)));
+    let at = |x: f64| Rigid::new(whole.base_from_flange.rotation, Vec3::new(x, 0.0, 500.0));
+    assert_eq!(arm.reach(&at(350.0)).unwrap(), Reach::Free);
+    assert!(matches!(arm.reach(&at(1400.0)).unwrap(), Reach::Refused(why) if why.contains("reach")));
+    served.controller.set_fence(Some([Vec3::new(340.0, -50.0, 400.0), Vec3::new(360.0, 50.0, 600.0)]));
+    assert!(matches!(arm.reach(&at(350.0)).unwrap(), Reach::Refused(why) if why.contains("fence")));
+    arm.put_output(24, true).unwrap();
+    assert!(arm.signal(24).unwrap() && !arm.signal(25).unwrap());
+    // Interim replies, foreign serials, pieces of one byte, two answers at once, delay.
+    let faults = &served.faults;
+    let wires: [fn(&sheetlight::cell::Faults); 5] = [
+        |f| f.piece.store(1, SeqCst),
+        |f| f.foreign.store(true, SeqCst),
+        |f| f.interim.store(3, SeqCst),
+        |f| f.merge.store(true, SeqCst),
+        |f| f.delay_ms.store(60, SeqCst),
+    ];
+    for set in wires {
+        faults.clear();
+        set(faults);
+        assert_eq!(arm.pose().unwrap().base_from_flange, whole.base_from_flange);
+    }
+    faults.clear();
+    served.controller.set_japanese(true);
+    served.controller.fail(0x8320_4072);
+    let refused = arm.take().unwrap_err().what;
+    assert!(refused.contains("81501025") && refused.contains("未定義"), "{refused}");
+    assert_eq!(arm.state().unwrap().errors[0].code, 0x8320_4072);
+}
+
+#[test]
+fn a_halt_is_at_the_controller_within_50_ms_and_stops_the_arm() {
+    let served = cell(1, 1.0);
+    let uri = served.robot_uri();
+    let arm = sheetlight::arm::open(&uri).unwrap();
+    let stop = arm.stop().unwrap();
+    let (mut client, robot) = mover(&served.robot.to_string(), Network::Tcp);
+    let moving = std::thread::spawn(move || {
+        let arguments = [vec![robot.into()], order(380.0, "SPEED=4")].concat();
+        client.call(Call::RobotMove, arguments).unwrap()
+    });
+    while moved(&served) == 0 {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    std::thread::sleep(Duration::from_millis(300));
+    let begun = Instant::now();
+    let asked = served.cell.clock().now();
+    stop.halt().unwrap();
+    let took = begun.elapsed();
+    assert!(moving.join().unwrap().is_err(), "a halted motion is not done");
+    let log = served.cell.log();
+    let halted = log.iter().find(|e| matches!(e.event, Happened::Halt { moving: true, .. })).unwrap();
+    assert!(halted.t_s - asked < 0.05, "{} ms", (halted.t_s - asked) * 1e3);
+    println!("halt at the controller after {:.1} ms, answered after {took:?}", (halted.t_s - asked) * 1e3);
+    let stands = served.cell.true_flange(served.cell.clock().now()).translation.x;
+    assert!(stands < 340.0, "{stands}");
+}
+
+#[test]
+fn the_camera_sees_what_is_lit_from_where_the_arm_stands() {
+    let served = cell(2, 20.0);
+    let uri = format!("{}?rate=-1", served.camera_uri());
+    let (mut arm, mut camera) = (
+        sheetlight::arm::open(&served.robot_uri()).unwrap(),
+        sheetlight::capture::source::cell::CellCamera::open(&served.camera.to_string(), -1.0).unwrap(),
+    );
+    let _: CameraUri = uri.parse().unwrap();
+    let mut mean = |line: bool, pointer: bool, room: bool| {
+        for (number, on) in [(24, line), (25, pointer), (26, room)] {
+            arm.put_output(number, on).unwrap();
+        }
+        camera.snap().unwrap();
+        use sheetlight::capture::PictureSource;
+        let Event::Picture(p) = camera.next(Duration::from_secs(20)) else { panic!("no picture") };
+        let grey = p.image.to_f32();
+        (grey.iter().sum::<f32>() / grey.len() as f32, grey.iter().copied().fold(0.0, f32::max))
+    };
+    let (room, dark) = (mean(false, false, true), mean(false, false, false));
+    assert!(room.0 > 10.0 * dark.0, "{room:?} {dark:?}");
+    let line = mean(true, false, false);
+    assert!(line.1 > 60.0 && line.0 < 0.3 * room.0, "{line:?}");
+    served.cell.set_dark(true);
+    assert!(mean(true, true, true).0 < 2.0 * dark.0 + 1.0);
+}
