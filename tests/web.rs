@@ -87,6 +87,12 @@ fn a_program_drives_a_scan_as_the_documents_show() {
     );
 }
 
+#[test]
+fn a_live_picture_is_the_newest_with_its_peaks_and_all_others_are_counted() {
+    let dir = copy();
+    python("tests/web/live.py", &[PROGRAM, dir.path().to_str().unwrap()]);
+}
+
 /// Compares a document with what the program says of itself; writes it under `SHEETLIGHT_WRITE`.
 fn same(name: &str, is: &str) {
     let path = source(name);

@@ -3,6 +3,7 @@
 //! Frame and unit: as the procedures; texts show theirs.
 
 mod api;
+mod camera;
 mod disk;
 mod event;
 mod guard;

@@ -1,6 +1,7 @@
 //! In: a station. Out: everything that its screen knows, in one place that all requests share.
 //! Frame and unit: seconds, GB.
 
+use super::camera::Camera;
 use super::event::Hub;
 use super::guard::{Leases, Sessions};
 use super::message::{Bar, CalibrationAge, Event, JobState};
@@ -41,6 +42,8 @@ pub struct Screen {
     pub password: Option<String>,
     /// Name of the cookie.
     pub cookie: String,
+    /// The camera, where one was named.
+    pub camera: Option<Camera>,
     /// The robot, where one was named.
     pub robot: Option<Robot>,
     /// When the program started.
@@ -48,6 +51,17 @@ pub struct Screen {
     adapter: OnceLock<(String, bool)>,
     read: Mutex<Option<Read>>,
     map: Mutex<Option<(String, Arc<HeightMap>)>>,
+}
+
+/// What a screen has beside its station.
+#[derive(Default)]
+pub struct Linked {
+    /// Argon2 hash, where others than this machine may ask.
+    pub password: Option<String>,
+    /// A camera that runs.
+    pub camera: Option<Camera>,
+    /// A robot's controller.
+    pub robot: Option<Robot>,
 }
 
 /// What the bar shows of the disk.
@@ -62,13 +76,7 @@ struct Read {
 
 impl Screen {
     /// Nothing is read from the disk yet.
-    pub fn new(
-        jobs: Arc<Jobs>,
-        sessions: Arc<Sessions>,
-        cookie: String,
-        password: Option<String>,
-        robot: Option<Robot>,
-    ) -> Screen {
+    pub fn new(jobs: Arc<Jobs>, sessions: Arc<Sessions>, cookie: String, linked: Linked) -> Screen {
         Screen {
             place: jobs.place.clone(),
             hub: jobs.hub.clone(),
@@ -76,9 +84,10 @@ impl Screen {
             sessions,
             leases: Leases::default(),
             grants: Grants::default(),
-            password,
+            password: linked.password,
             cookie,
-            robot,
+            camera: linked.camera,
+            robot: linked.robot,
             started: Instant::now(),
             adapter: OnceLock::new(),
             read: Mutex::default(),
@@ -126,19 +135,23 @@ impl Screen {
         if read.left_gb.is_some_and(|gb| gb < LITTLE_DISK) {
             alarms.push(format!("{:.1} GB of disk left", read.left_gb.unwrap_or(0.0)));
         }
+        let camera = self.camera.as_ref().map(Camera::seen);
+        alarms.extend(camera.as_ref().and_then(|c| c.2.clone()));
         let robot = self.robot.as_ref().map(Robot::seen).unwrap_or_default();
         alarms.extend(robot.wrong.clone());
         let cut = self.jobs.list(JOBS).iter().filter(|j| j.state == JobState::CutOff).count();
         if cut > 0 {
             alarms.push(format!("{cut} jobs were cut off: resume them or take them away"));
         }
+        let of_scan = || self.jobs.frames.lock().unwrap_or_else(|e| e.into_inner()).clone();
+        let (frames, delay_ms) = camera.map_or_else(|| (of_scan(), None), |c| (c.0, c.1));
         Bar {
             mode: self.place.mode,
             station: read.name,
             robot: robot.bar(),
             laser: None,
-            frames: self.jobs.frames.lock().unwrap_or_else(|e| e.into_inner()).clone(),
-            delay_ms: None,
+            frames,
+            delay_ms,
             adapter,
             adapter_is_software: software,
             calibration: read.calibration,

@@ -2,12 +2,14 @@
 //! Frame and unit: none.
 
 use super::api::router;
+use super::camera::Camera;
 use super::event::Hub;
 use super::guard::{Door, Doorway, Sessions, door, tls, verify};
 use super::message::Event;
 use super::robot::Robot;
-use super::screen::Screen;
+use super::screen::{Linked, Screen};
 use super::work::{Jobs, Place, Worker};
+use crate::capture::RawFormat;
 use crate::fault::{Fault, Result};
 use crate::files::Lock;
 use crate::web::message::Mode;
@@ -47,6 +49,8 @@ pub struct ServeOptions {
     pub port: u16,
     /// The next free port is taken where this one is in use.
     pub next_free: bool,
+    /// A camera's URI, and what frames on standard input are like.
+    pub camera: Option<(String, Option<RawFormat>)>,
     /// A robot's URI; it is looked at, never moved.
     pub robot: Option<String>,
     /// Password and TLS.
@@ -117,8 +121,10 @@ async fn run(
     let guard =
         Arc::new(Door { hosts: hosts(options, address), scheme, sessions: sessions.clone(), cookie: cookie.clone() });
     let robot = options.robot.as_deref().map(Robot::watch).transpose()?;
+    let camera = options.camera.as_ref();
+    let camera = camera.map(|(uri, raw)| Camera::watch(uri, *raw, &options.station)).transpose()?;
     let password = options.secured.as_ref().map(|s| s.password.clone());
-    let screen = Arc::new(Screen::new(jobs, sessions, cookie, password, robot));
+    let screen = Arc::new(Screen::new(jobs, sessions, cookie, Linked { password, camera, robot }));
     let app = router(screen.clone()).layer(from_fn_with_state(guard, door));
     let doorway = Doorway::new(listener, acceptor).map_err(|e| Fault::device(e.to_string()))?;
     let first = screen.clone();

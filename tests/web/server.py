@@ -15,14 +15,14 @@ import time
 class Server:
     """`sheetlight station serve` on any free port."""
 
-    def __init__(self, program, folder, *more):
+    def __init__(self, program, folder, *more, stdin=None):
         command = [program, "--json", "station", "serve", "--station", os.path.join(folder, "station"), "--port", "0", *more]
-        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.process = subprocess.Popen(command, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         self.said = []
-        threading.Thread(target=lambda: self.said.extend(self.process.stderr), daemon=True).start()
+        threading.Thread(target=lambda: self.said.extend(line.decode() for line in self.process.stderr), daemon=True).start()
         text = ""
         while text.count("{") != text.count("}") or not text:
-            line = self.process.stdout.readline()
+            line = self.process.stdout.readline().decode()
             assert line, f"the server ended: {''.join(self.said)}"
             text += line
         assert "url" in json.loads(text), text

@@ -4,6 +4,7 @@
 use crate::cli::terminal::console::Console;
 use crate::cli::terminal::interrupt;
 use crate::fault::{Fault, Result};
+use crate::scan::RawFormat;
 use crate::simulate::Set;
 use crate::web::{Mode, Secured, ServeOptions, hashed, random_hex, serve, simulated};
 use std::io::{BufRead, IsTerminal};
@@ -37,6 +38,12 @@ pub struct Serve {
     /// Recordings to simulate, separated by commas: scan, surface, intrinsics, handeye, laserplane, pointer_cal, pointer, all
     #[arg(long = "set", value_delimiter = ',', default_value = "all", requires = "simulate")]
     sets: Vec<String>,
+    /// The camera, e.g. cell://HOST:PORT, or - with --raw: its newest picture is shown with its peaks (docs/live.md)
+    #[arg(long, conflicts_with = "simulate")]
+    camera: Option<String>,
+    /// Raw frames on standard input: WIDTHxHEIGHT:gray8, gray10le, gray12le or gray16le
+    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<RawFormat>, requires = "camera")]
+    raw: Option<RawFormat>,
     /// The robot's controller, e.g. bcap://10.0.0.2: its state and pose are shown
     #[arg(long)]
     robot: Option<String>,
@@ -93,10 +100,11 @@ pub fn run(args: &Serve, console: &Console) -> Result<()> {
     let options = ServeOptions {
         station,
         recordings,
-        mode,
+        mode: if args.camera.is_some() { Mode::Live } else { mode },
         address: args.listen,
         port: args.port.unwrap_or(PORT),
         next_free: true,
+        camera: args.camera.clone().map(|uri| (uri, args.raw)),
         robot: args.robot.clone(),
         secured,
         stop: interrupt::asked_for(),

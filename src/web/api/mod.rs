@@ -2,6 +2,7 @@
 //! Frame and unit: as the messages.
 
 mod answer;
+mod camera;
 mod jobs;
 mod motion;
 mod openapi;

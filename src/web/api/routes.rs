@@ -1,7 +1,7 @@
 //! In: nothing. Out: every route of the API, in one table: the server, its description and the tests read it.
 //! Frame and unit: none.
 
-use super::{jobs, motion, place, session, surface};
+use super::{camera, jobs, motion, place, session, surface};
 use crate::web::screen::Screen;
 use axum::routing::{MethodRouter, delete, get, post, put};
 use std::sync::Arc;
@@ -75,6 +75,12 @@ pub fn routes() -> Vec<Route> {
             get(place::recordings),
         ),
         route(("GET", "/picture"), "A picture of a recording", ("?PictureRef", "image/png"), get(place::picture)),
+        route(
+            ("GET", "/camera/newest"),
+            "The camera's newest picture other than the one of number after=, with its peaks; 204: none yet",
+            ("", BYTES),
+            get(camera::newest),
+        ),
         route(
             ("GET", "/recipes"),
             "Recipes, shipped ones and the station's",

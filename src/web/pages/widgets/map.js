@@ -48,6 +48,12 @@ export function map(place, label) {
   }
 
   function stroke({ kind, points, colour = "#fff", label: text, wide = 2 }) {
+    if (kind === "dots") {
+      g.fillStyle = colour;
+      const r = Math.max(1.5 * ratio(), Math.min(3 * ratio(), m.view.s / 3));
+      for (const p of points) { const [x, y] = toView(p); g.fillRect(x - r / 2, y - r / 2, r, r); }
+      return;
+    }
     const line = (list) => { g.beginPath(); list.forEach((p, i) => (i ? g.lineTo(...toView(p)) : g.moveTo(...toView(p)))); };
     g.lineJoin = "round";
     for (const [c, w] of [["#000a", wide + 2.5], [colour, wide]]) {
