@@ -7,7 +7,7 @@ CARGO ?= cargo
 VENV := .venv
 export XDG_RUNTIME_DIR ?= $(shell mktemp -d /tmp/sheetlight-run.XXXXXX)
 
-.PHONY: station browser demo lint test bench bench-peers vulkan python build clean
+.PHONY: station browser demo lint test bench bench-peers vulkan python cameras build clean
 
 demo: vulkan build
 	target/release/sheetlight demo --out demo
@@ -19,7 +19,7 @@ station: vulkan build
 build:
 	$(CARGO) build --release --locked
 
-test: vulkan python browser lint
+test: vulkan python cameras browser lint
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(CARGO) test --locked -- --show-output
 
 # A toolchain without clippy says so and goes on.
@@ -47,6 +47,10 @@ vulkan:
 # The screen's pages are tested in a real browser.
 browser:
 	tools/browser.sh
+
+# Cameras that the tests talk to: ffmpeg, aravis' fake one.
+cameras:
+	tools/cameras.sh
 
 # The scorer of the reference data and the comparisons need numpy, scipy and libigl.
 python:

@@ -183,6 +183,7 @@ fn scan(part: &'static str, seed: u64) -> Scanned {
                 name: String::new(),
                 image,
                 stand: sheetlight::recording::Stand::Robot(base_from_flange),
+                slip: None,
             })
             .unwrap();
         cloud.extend(scanner.ready().unwrap().into_iter().flat_map(|p| p.points));

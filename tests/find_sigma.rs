@@ -135,6 +135,7 @@ fn trial(seed: u64) -> Option<Trial> {
                 name: String::new(),
                 image,
                 stand: sheetlight::recording::Stand::Robot(base_from_flange),
+                slip: None,
             })
             .unwrap();
         cloud.extend(scanner.ready().unwrap().into_iter().flat_map(|p| p.points));

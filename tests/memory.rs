@@ -36,6 +36,7 @@ impl Source for Repeating {
                 name: format!("{i}"),
                 image,
                 stand: sheetlight::recording::Stand::Robot(base_from_flange),
+                slip: None,
             })
         })
     }
@@ -88,6 +89,7 @@ fn a_long_scan_needs_no_more_memory_than_a_short_one() {
     let pictures: Vec<Image> = (0..8).map(picture).collect();
     let scan = |processor: &Processor, shots: usize| {
         let options = ScanOptions {
+            latency: None,
             out: dir.path().join("out"),
             place: Where::Auto,
             extraction: Extraction::default(),

@@ -90,6 +90,7 @@ impl Source for Losing {
 
 fn options(out: &Path) -> ScanOptions {
     ScanOptions {
+        latency: None,
         out: out.to_owned(),
         place: Where::Gpu,
         extraction: Extraction::default(),

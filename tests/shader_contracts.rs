@@ -67,6 +67,7 @@ fn every_loop_ends() {
         ("lengthen", "while t <= last", "t grows by one a turn, last is set to less than t at most"),
         ("peak", "while left > 0u", "left shrinks by one a turn, or is set to zero"),
         ("skeleton", "while bits != 0u && at < frame.capacity", "a bit is cleared a turn"),
+        ("spacing", "while bits != 0u", "a bit is cleared a turn"),
         ("support", "for (var left = end - i; left > 0u;)", "left is halved a turn"),
         ("support", "for (; i < end; i++)", "i counts to end"),
         ("tiles", "while left != 0u", "at least the lowest bit is cleared a turn"),

@@ -21,6 +21,7 @@ fn scanned(out: &Path, options: &SimulateOptions) -> Judged {
     let recording = Recording::open(&out.join("scan")).unwrap();
     let rig = Rig::load(&out.join("station")).unwrap();
     let scan = ScanOptions {
+        latency: None,
         out: out.join("result"),
         place: Where::Cpu,
         extraction: Extraction::default(),

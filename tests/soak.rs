@@ -41,6 +41,7 @@ fn held() -> Held {
 
 fn options(out: &Path, place: Where) -> ScanOptions {
     ScanOptions {
+        latency: None,
         out: out.to_owned(),
         place,
         extraction: Extraction::default(),

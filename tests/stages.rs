@@ -6,7 +6,7 @@ mod common;
 use sheetlight::fault::Result;
 use sheetlight::gpu::Device;
 use sheetlight::stages;
-use sheetlight::stages::stripe::{skeleton, thin, threshold};
+use sheetlight::stages::stripe::{skeleton, spacing, thin, threshold};
 use sheetlight::stages::{Entry, Frame, ThresholdParams, Verdict, cases};
 
 #[test]
@@ -75,12 +75,13 @@ fn the_chain_of_twins_is_the_plain_definition() {
                 "{}, shot {i}: mask",
                 scene.name
             );
-            // The list is that of the lines carried on.
+            // The list is that of the lines carried on, or of what is chosen of them.
             let long = walk.frame.unpack_mask(&walk.buffers["long"], i as u32);
             let mut kept = thinned.clone();
             kept.intersect(&long);
             assert!(kept == thinned, "{}, shot {i}: carrying on takes nothing away", scene.name);
-            let list = skeleton::twin(&long);
+            let chosen = if scene.spacing == 0 { long } else { spacing::twin(&long, scene.spacing) };
+            let list = skeleton::twin(&chosen);
             let header = &walk.buffers["header"];
             let (from, to) = (header[skeleton::HEADER + i] as usize, header[skeleton::HEADER + 1 + i] as usize);
             let points = &walk.buffers["points"][2 * from..2 * to];

@@ -9,6 +9,7 @@ pub mod components;
 pub mod hand_eye;
 pub mod homography;
 pub mod laser_plane;
+pub mod latency;
 pub mod limits;
 pub mod measured_pose;
 pub mod pointer;

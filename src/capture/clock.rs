@@ -1,7 +1,8 @@
 //! In: the system's clock. Out: the host's time, which runs evenly while the program runs; what another clock said between two
-//! of its moments.
+//! of its moments; how one clock runs against the other.
 //! Frame and unit: ns; the host's time counts from the Unix epoch.
 
+use std::collections::VecDeque;
 use std::sync::OnceLock;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
@@ -16,6 +17,15 @@ pub fn now_ns() -> u64 {
     epoch + began.elapsed().as_nanos() as u64
 }
 
+/// A moment of the steady clock as the host's time, ns since the Unix epoch.
+pub fn ns_of(moment: Instant) -> u64 {
+    let (now, now_ns) = (Instant::now(), now_ns());
+    match moment.checked_duration_since(now) {
+        Some(ahead) => now_ns + ahead.as_nanos() as u64,
+        None => now_ns - now.duration_since(moment).as_nanos() as u64,
+    }
+}
+
 /// Another clock was read between two moments of the host's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RoundTrip {
@@ -25,4 +35,168 @@ pub struct RoundTrip {
     pub there_ns: u64,
     /// Host, ns: the answer was here.
     pub after_ns: u64,
+}
+
+/// Best readings are kept for each stretch of this length, ns, and so many of them.
+const STRETCH: u64 = 2_000_000_000;
+const STRETCHES: usize = 32;
+/// What two quartz clocks differ by at most before anything was measured.
+const DRIFT: f64 = 100e-6;
+/// From this span on, ns, a difference in rate is measured rather than feared.
+const SPAN: f64 = 4e9;
+
+/// A moment of the host's time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment {
+    /// ns since the Unix epoch.
+    pub ns: f64,
+    /// 1 sigma, ns.
+    pub sigma_ns: f64,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Reading {
+    there: f64,
+    /// Host's time minus the other clock's, ns.
+    offset: f64,
+    /// The truth lies within so much of it; of a one-way reading the excess over the best one is not known: infinite.
+    half: f64,
+}
+
+/// How another clock runs against the host's: by the shortest round trips, or, where it cannot be asked, by the earliest arrivals
+/// (then the shortest delay of the way is part of the offset).
+#[derive(Clone, Debug, Default)]
+pub struct ClockMap {
+    best: VecDeque<Reading>,
+    /// Scatter of late arrivals is no error; that of the earliest is.
+    one_way: bool,
+    /// There, the first reading: times are told from here, so that f64 holds them.
+    origin: Option<(u64, u64)>,
+    last_there: u64,
+    jumps: u32,
+}
+
+impl ClockMap {
+    /// Takes in a reading with both ends.
+    pub fn round_trip(&mut self, trip: RoundTrip) {
+        let here = trip.before_ns + (trip.after_ns - trip.before_ns) / 2;
+        self.add(trip.there_ns, here, 0.5 * (trip.after_ns - trip.before_ns) as f64);
+    }
+
+    /// Takes in that something that was told at `there_ns` arrived at `here_ns`.
+    pub fn one_way(&mut self, there_ns: u64, here_ns: u64) {
+        self.one_way = true;
+        self.add(there_ns, here_ns, f64::INFINITY);
+    }
+
+    fn add(&mut self, there_ns: u64, here_ns: u64, half: f64) {
+        let (there0, here0) = *self.origin.get_or_insert((there_ns, here_ns));
+        let (there, here) = (there_ns as f64 - there0 as f64, here_ns as f64 - here0 as f64);
+        let reading = Reading { there, offset: here - there, half };
+        // A clock that was set, or that began anew: what was known of it is of no use.
+        let jumped = self.best.back().is_some_and(|b| {
+            let behind = there + 1.0 < b.there - STRETCH as f64;
+            behind || (reading.offset - b.offset).abs() > 0.5e9 + DRIFT * (there - b.there).abs()
+        });
+        if jumped {
+            self.jumps += 1;
+            (self.best, self.origin) = (VecDeque::new(), None);
+            return self.add(there_ns, here_ns, half);
+        }
+        self.last_there = there_ns;
+        let same = |b: &Reading| (b.there / STRETCH as f64).floor() == (there / STRETCH as f64).floor();
+        match self.best.back_mut().filter(|b| same(b)) {
+            Some(b) => {
+                let better = if self.one_way { reading.offset < b.offset } else { reading.half < b.half };
+                if better {
+                    *b = reading;
+                }
+            }
+            None => self.best.push_back(reading),
+        }
+        if self.best.len() > STRETCHES {
+            self.best.pop_front();
+        }
+    }
+
+    /// How often the other clock jumped or began anew.
+    pub fn jumps(&self) -> u32 {
+        self.jumps
+    }
+
+    /// When the other clock said this, by the host's; none before anything was read.
+    pub fn host(&self, there_ns: u64) -> Option<Moment> {
+        let (there0, here0) = self.origin?;
+        let there = there_ns as f64 - there0 as f64;
+        let (offset, sigma_ns) = self.offset(there)?;
+        Some(Moment { ns: here0 as f64 + there + offset, sigma_ns })
+    }
+
+    /// Offset at a time of the other clock, and its sigma.
+    fn offset(&self, there: f64) -> Option<(f64, f64)> {
+        let (first, last) = (self.best.front()?, self.best.back()?);
+        // Half of a round trip bounds the error: evenly spread within it.
+        let sigma = |r: &Reading| if r.half.is_finite() { (r.half / 3f64.sqrt()).max(100.0) } else { 1e5 };
+        let nearest = self.best.iter().min_by(|a, b| {
+            let cost = |r: &Reading| sigma(r) + DRIFT * (r.there - there).abs();
+            cost(a).total_cmp(&cost(b))
+        })?;
+        if last.there - first.there < SPAN || self.best.len() < 3 {
+            return Some((nearest.offset, sigma(nearest) + DRIFT * (nearest.there - there).abs()));
+        }
+        let weights = self.best.iter().map(|r| 1.0 / sigma(r).powi(2));
+        let (mut w, mut wx, mut wy, mut wxx, mut wxy) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for (r, k) in self.best.iter().zip(weights) {
+            (w, wx, wy) = (w + k, wx + k * r.there, wy + k * r.offset);
+            (wxx, wxy) = (wxx + k * r.there * r.there, wxy + k * r.there * r.offset);
+        }
+        let (mx, my) = (wx / w, wy / w);
+        let spread = wxx / w - mx * mx;
+        let rate = (wxy / w - mx * my) / spread;
+        let at = |x: f64| my + rate * (x - mx);
+        let n = self.best.len() as f64;
+        let residual = (self.best.iter().map(|r| (r.offset - at(r.there)).powi(2)).sum::<f64>() / (n - 2.0)).sqrt();
+        let stated = (1.0 / w).sqrt() * n.sqrt();
+        // Asymmetric ways err all in one direction: the mean is no better than one of them.
+        let sigma = residual.max(if self.one_way { 0.0 } else { stated });
+        Some((at(there), sigma * (1.0 + (there - mx).powi(2) / spread / n).sqrt()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_drifting_clock_is_told_by_its_shortest_round_trips() {
+        // 50 ppm fast, 1e15 ns off; ways of 0.1 to 5 ms, one direction slower than the other.
+        let there = |here: u64| 1_000_000_000_000_000 + here + here / 20_000;
+        let mut map = ClockMap::default();
+        let mut state = 1u64;
+        for k in 0..400u64 {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            let (out, back) = (50_000 + (state >> 33) % 2_000_000, 50_000 + (state >> 13) % 3_000_000);
+            let before_ns = k * 100_000_000;
+            map.round_trip(RoundTrip { before_ns, there_ns: there(before_ns + out), after_ns: before_ns + out + back });
+        }
+        for here in [20_000_000_000u64, 39_900_000_000] {
+            let told = map.host(there(here)).unwrap();
+            let error = told.ns - here as f64;
+            assert!(error.abs() < 4.0 * told.sigma_ns && error.abs() < 1.5e5, "{error} {told:?}");
+        }
+        assert_eq!(map.jumps(), 0);
+        map.round_trip(RoundTrip { before_ns: 41_000_000_000, there_ns: 5, after_ns: 41_000_100_000 });
+        assert_eq!(map.jumps(), 1);
+        assert!((map.host(5).unwrap().ns - 41_000_050_000.0).abs() < 1.0);
+    }
+
+    #[test]
+    fn arrivals_alone_leave_the_shortest_way_in_the_offset() {
+        let mut map = ClockMap::default();
+        for k in 0..1000u64 {
+            map.one_way(k * 20_000_000, 7_000_000_000 + k * 20_000_000 + 900_000 + (k * 7919 % 13) * 100_000);
+        }
+        let told = map.host(10_000_000_000).unwrap();
+        assert!((told.ns - 17_000_900_000.0).abs() < 1e4, "{told:?}");
+    }
 }

@@ -2,16 +2,28 @@
 //! accounted for; recordings.
 //! Frame and unit: times in ns; poses base_from_flange, mm.
 
+mod account;
 mod clock;
 mod feature;
+mod feed;
 mod format;
+mod latency;
+mod look;
+pub mod pair;
 mod picture;
+pub mod record;
 pub mod source;
+mod stream;
 mod uri;
 pub mod wire;
 
-pub use clock::{RoundTrip, now_ns};
+pub use account::{Account, Ledger, Order};
+pub use clock::{ClockMap, Moment, RoundTrip, now_ns};
 pub use feature::{Feature, Range, Value};
+pub use feed::{Fate, Fed, Feed, FeedOptions, Mode};
 pub use format::{Format, RawFormat, RawFrames};
+pub use latency::Latency;
+pub use look::{Look, StripeLook, Tuned, fresh, look, tune};
 pub use picture::{Event, Picture, PictureSource};
+pub use stream::{Stream, Streamed};
 pub use uri::CameraUri;

@@ -76,6 +76,16 @@ pub trait PictureSource: Send {
         Ok(None)
     }
 
+    /// Whether its pictures wait where nobody asks for them (a pipe, a file): then nobody has to drop any.
+    fn waits(&self) -> bool {
+        false
+    }
+
+    /// Whether [`PictureSource::reopen`] can bring it back at all.
+    fn reopens(&self) -> bool {
+        false
+    }
+
     /// Opens it again after [`Event::Lost`]; its numbers and its clock may begin anew.
     ///
     /// # Errors

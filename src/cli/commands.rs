@@ -1,6 +1,7 @@
 //! In: the words of the command line. Out: the subcommand that was meant, run; its exit code.
 //! Frame and unit: none.
 
+use super::capture::{camera, record};
 use super::doctor::command as doctor;
 use super::find::{locate as find, model, second_look, teach};
 use super::terminal::console::Console;
@@ -41,6 +42,9 @@ enum Command {
     /// Calibrate a station's camera, laser plane, pointer or hand-eye from a recording
     #[command(subcommand)]
     Calibrate(calibrate::Command),
+    /// List, show and set cameras, take a picture, find the exposure
+    #[command(subcommand)]
+    Camera(camera::Command),
     Demo(demo::Args),
     Doctor(doctor::Args),
     Find(find::Args),
@@ -48,6 +52,7 @@ enum Command {
     Live(live::Args),
     Model(model::Args),
     Range(range::Args),
+    Record(record::Args),
     Scan(scan::Args),
     SecondLook(second_look::Args),
     ShiftScan(shift_scan::Args),
@@ -65,6 +70,7 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Bench(a) => bench::run(a, console),
         Command::Board(a) => board::run(a, console),
         Command::Calibrate(c) => calibrate::run(c, console),
+        Command::Camera(c) => camera::run(c, console),
         Command::Demo(a) => demo::run(a, console),
         Command::Doctor(a) => doctor::run(a, console),
         Command::Find(a) => find::run(a, console),
@@ -72,6 +78,7 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Live(a) => live::run(a, console),
         Command::Model(a) => model::run(a, console),
         Command::Range(a) => range::run(a, console),
+        Command::Record(a) => record::run(a, console),
         Command::Scan(a) => scan::run(a, console),
         Command::SecondLook(a) => second_look::run(a, console),
         Command::ShiftScan(a) => shift_scan::run(a, console),

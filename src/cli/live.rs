@@ -1,31 +1,36 @@
-//! In: raw frames on standard input, a station. Out: one line a measured frame: its points, how long it took, how many
-//! frames were passed over meanwhile. Frame and unit: camera frame, mm; milliseconds.
+//! In: a running camera, a station. Out: one line a measured picture: its points, how long it took, how many were passed over meanwhile; the
+//! account. Frame and unit: camera frame, mm; milliseconds.
 
+use super::capture::options::Running;
 use super::terminal::console::Console;
+use crate::capture::{CameraUri, Fate, Fed, Format, Mode, RawFormat, now_ns};
 use crate::fault::{Fault, Result};
 use crate::raster::Light;
 use crate::rig::Rig;
-use crate::scan::{Live, Newest, RawFormat, RawFrames, Where};
+use crate::scan::{Live, Where};
 use crate::stages::stripe::point::Point;
 use crate::station::Settings;
+use std::collections::VecDeque;
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::time::Instant;
+use std::time::Duration;
 
 /// Measure the stripe in the newest picture of a running camera, with the least delay
 ///
-/// Frames that arrive while one is measured are passed over, but for the newest, and counted. Prints one JSON object a
-/// line and frame on stdout; a summary when the pipe ends. For recordings use scan, which measures every shot.
+/// Pictures that arrive while one is measured are passed over, but for the newest, and counted. Prints one JSON object a
+/// line and picture on stdout; rate, delay and drops on a line of the terminal; a summary at the end. For recordings use scan, which
+/// measures every shot.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  ffmpeg -f v4l2 -i /dev/video0 -f rawvideo -pix_fmt gray - | \\
-      sheetlight live --raw 640x480:gray8 --station cell3
+  sheetlight live --camera gige://first --station cell3
+  sheetlight live --camera ffmpeg:/dev/video0 --station cell3 --points > profiles.jsonl
   camera-tool --raw | \\
       sheetlight live --raw 4096x3072:gray12le --station cell3 --points > profiles.jsonl")]
 pub struct Args {
+    #[command(flatten)]
+    running: Running,
     /// Frames on standard input: WIDTHxHEIGHT:gray8, gray10le, gray12le or gray16le
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<RawFormat>)]
-    raw: RawFormat,
+    raw: Option<RawFormat>,
     /// Station folder with the calibration of camera and laser plane
     #[arg(long)]
     station: PathBuf,
@@ -40,7 +45,7 @@ pub struct Args {
 /// One measured frame.
 #[derive(serde::Serialize)]
 struct Line {
-    frame: u32,
+    frame: u64,
     /// From the frame's last byte to its points.
     latency_ms: f64,
     points: usize,
@@ -50,66 +55,87 @@ struct Line {
     xyz_sigma_mm: Option<Vec<[f32; 4]>>,
 }
 
+/// Delays that percentiles are taken of.
+const RECENT: usize = 100_000;
+const GLANCE: Duration = Duration::from_millis(200);
+
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let (settings, rig) = (Settings::load(&args.station)?, Rig::load(&args.station)?);
     let volume = crate::station::volume::believed(&settings, &rig);
-    let mut live = Live::new(&rig, args.raw.format, &settings.extraction, volume.as_ref(), args.on)?;
-    let newest = Arc::new(Newest::default());
-    let (raw, filled) = (args.raw, newest.clone());
-    // Not joined where measuring fails: it may wait for a camera that sends nothing.
-    let reader = std::thread::Builder::new().name("frames".into()).spawn(move || {
-        let mut frames = RawFrames::new(raw, std::io::stdin().lock());
-        let mut n = 0u32;
-        let end = loop {
-            match frames.read() {
-                Ok(Some(image)) => filled.put((n, image, Instant::now())),
-                Ok(None) => break Ok(n),
-                Err(fault) => break Err(fault),
-            }
-            n += 1;
+    let mut running = args.running.clone();
+    if args.raw.is_some() {
+        running.camera.get_or_insert(CameraUri::Input);
+    }
+    let begin = |format: Format| Live::new(&rig, format, &settings.extraction, volume.as_ref(), args.on);
+    // A stated format is judged, and the GPU opened, before pictures come.
+    let early = args.raw.map(|raw| begin(raw.format)).transpose()?;
+    let feed = running.open(args.raw, Mode::Newest)?;
+    let mut live = early.map_or_else(|| begin(feed.format()), Ok)?;
+    let (mut teller, bar) = (running.teller(), console.bar("live", 0));
+    let (mut waits, mut measured_count) = (VecDeque::new(), 0usize);
+    let (mut without_stripe, mut unlit) = (0, None);
+    let ended = loop {
+        feed.news().into_iter().for_each(|n| console.warn(n));
+        let picture = match feed.next(GLANCE) {
+            Fed::Picture(picture) => picture,
+            Fed::Quiet => continue,
+            Fed::Ended(fault) => break fault,
         };
-        filled.close();
-        end
-    });
-    let reader = reader.map_err(|e| Fault::threads(&e))?;
-    let (mut waits, mut without_stripe, mut unlit) = (Vec::new(), 0, None);
-    while let Some((frame, image, arrived)) = newest.take() {
         // Looked at only while nothing was seen: it takes as long as a stage.
-        let light = waits.is_empty().then(|| Light::of(&image));
-        let Some(measured) = live.measure(frame, image)? else {
+        let light = waits.is_empty().then(|| Light::of(&picture.image));
+        let frame = picture.id;
+        let measured = live.measure(frame as u32, picture.image)?;
+        feed.fate(Fate::Used);
+        let Some(measured) = measured else {
             without_stripe += 1;
             unlit = light.or(unlit);
             continue;
         };
-        let latency_ms = 1e3 * arrived.elapsed().as_secs_f64();
-        waits.push(latency_ms);
+        let latency_ms = now_ns().saturating_sub(picture.host_ns) as f64 * 1e-6;
+        measured_count += 1;
+        waits.push_back(latency_ms);
+        if waits.len() > RECENT {
+            waits.pop_front();
+        }
         let there = measured.points.iter().filter(|p| p.sigma_mm.is_finite());
         let list = |p: &Point| [p.position[0], p.position[1], p.position[2], p.sigma_mm];
         let line = Line {
             frame,
             latency_ms,
             points: there.clone().count(),
-            passed_over: newest.passed_over(),
+            passed_over: feed.account().dropped_processing,
             xyz_sigma_mm: args.points.then(|| there.map(list).collect()),
         };
         if !console.line(&line) {
             return Ok(());
         }
-    }
-    let frames = reader.join().expect("reading does not panic")?;
-    waits.sort_by(f64::total_cmp);
-    let percentile = |p: f64| waits.get((waits.len().saturating_sub(1) as f64 * p).round() as usize);
-    let ms = |p: f64| percentile(p).map_or("none".into(), |v| format!("{v:.1} ms"));
+        teller.watch(&feed, || format!("{} ", delays(&waits)));
+        teller.tell(console, &bar);
+    };
+    bar.finish_and_clear();
+    teller.last_word(&feed);
+    let a = feed.account();
     console.say(format!(
-        "{frames} frames: {} measured, {} passed over, {without_stripe} without a stripe; latency {} (median), {} (99 %); {}",
-        waits.len(),
-        newest.passed_over(),
-        ms(0.5),
-        ms(0.99),
+        "{} frames: {measured_count} measured, {} passed over, {without_stripe} without a stripe; latency {}; {}",
+        a.complete,
+        a.dropped_processing,
+        delays(&waits),
         live.ran_on()
     ));
+    if a.sent != a.complete {
+        console.say(format!("the camera: {a}"));
+    }
     if let Some(light) = unlit.filter(|_| waits.is_empty()) {
         console.warn(format!("no frame showed a stripe; the last one: {light}"));
     }
-    Ok(())
+    ended.map_or(Ok(()), Err::<(), Fault>)
+}
+
+/// Median and 99th percentile.
+fn delays(waits: &VecDeque<f64>) -> String {
+    let mut sorted: Vec<f64> = waits.iter().copied().collect();
+    sorted.sort_by(f64::total_cmp);
+    let percentile = |p: f64| sorted.get((sorted.len().saturating_sub(1) as f64 * p).round() as usize);
+    let ms = |p: f64| percentile(p).map_or("none".into(), |v| format!("{v:.1} ms"));
+    format!("{} (median), {} (99 %)", ms(0.5), ms(0.99))
 }

@@ -4,6 +4,7 @@
 mod bench;
 mod board;
 mod calibrate;
+mod capture;
 mod commands;
 mod demo;
 mod doctor;

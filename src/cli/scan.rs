@@ -2,6 +2,8 @@
 //! map, overlays, figures, page.
 //! Frame and unit: base frame, mm.
 
+use super::capture::options::Capture;
+use super::capture::scanning::scan_camera;
 use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
 use crate::raster::{Channel, Image, Light, load_sized};
@@ -26,9 +28,12 @@ use std::path::{Path, PathBuf};
   sheetlight calibrate axis recordings/axis --station belt1       # then, from the same belt:
   sheetlight scan recordings/parcel4 --station belt1 --out scans/parcel4
   ffmpeg -i shots.mkv -f rawvideo -pix_fmt gray - | sheetlight scan --raw 4096x3072:gray8 \\
-      --poses poses.csv --station cell3 --out scans/live")]
+      --poses poses.csv --station cell3 --out scans/live
+  sheetlight scan --camera gige://first --pair clock --pose-stream bcap://10.0.0.2 \\
+      --record recordings/board9 --station cell3 --out scans/board9")]
 pub struct Args {
-    /// Recording folder with meta.json; leave out with --raw
+    /// Recording folder with meta.json; leave out with --raw or --camera
+    #[arg(conflicts_with = "camera")]
     recording: Option<PathBuf>,
     /// Station folder with the calibration
     #[arg(long)]
@@ -41,8 +46,13 @@ pub struct Args {
     #[arg(long)]
     poses: Option<String>,
     /// Raw frames on standard input: WIDTHxHEIGHT:gray8, gray10le, gray12le or gray16le
-    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<RawFormat>, conflicts_with = "recording", requires = "poses")]
+    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<RawFormat>, conflicts_with = "recording")]
     raw: Option<RawFormat>,
+    #[command(flatten)]
+    capture: Capture,
+    /// With --camera: keep its pictures as a recording in this folder; what cannot be scanned in time waits there
+    #[arg(long, value_name = "FOLDER", requires = "camera")]
+    record: Option<PathBuf>,
     /// Part of a colour picture to use: red, green, blue or luma
     #[arg(long, default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
     channel: Channel,
@@ -83,6 +93,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         grid: GridOptions { cell: args.cell_mm, ..GridOptions::default() },
         overlays: args.overlays,
         skip_bad: args.skip_bad,
+        latency: crate::capture::Latency::load(&args.station)?,
         resume: args.resume,
         stop: crate::cli::terminal::interrupt::asked_for(),
         ..ScanOptions::for_station(&settings, &rig, &args.out)
@@ -97,6 +108,14 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         bar.set_position(done as u64);
     };
     let report = match (&args.recording, args.raw) {
+        _ if args.capture.running.camera.is_some() => {
+            let (poses, keep) = (args.poses.as_deref().map(Path::new), args.record.as_deref());
+            if let (Some(path), Some(raw)) = (&args.ambient, args.raw) {
+                let f = raw.format;
+                options.ambient = Some(ambient(path, args.channel, f.bits, [f.width, f.height])?);
+            }
+            scan_camera(&args.capture, args.raw, poses, &args.station, keep, &rig, &options, console, &bar)?
+        }
         (Some(folder), None) => {
             let mut recording = Recording::open(folder)?;
             recording.channel = args.channel;
@@ -116,7 +135,10 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
             scan_recording(&recording, args.poses.as_deref(), &rig, &options, progress)?
         }
         (None, Some(raw)) => {
-            let file = load_poses(Path::new(args.poses.as_deref().expect("required by --raw")))?;
+            let poses = args.poses.as_deref().ok_or_else(|| {
+                Fault::usage("frames on standard input, and no poses").next("give their poses in order: --poses FILE")
+            })?;
+            let file = load_poses(Path::new(poses))?;
             file.warnings.iter().for_each(|w| console.warn(w));
             if args.resume {
                 return Err(

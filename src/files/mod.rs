@@ -2,6 +2,7 @@
 //! their names together, folders that one process at a time writes into, names in the order people count in, bytes and text within limits, slips of the hand in them.
 //! Frame and unit: none; bytes and paths.
 
+mod append;
 mod atomic;
 mod folder;
 mod inputs;
@@ -12,6 +13,7 @@ mod read;
 mod slip;
 mod together;
 
+pub use append::Append;
 pub use atomic::{Aside, keep_all, write, write_aside, write_beside, write_unsynced};
 pub use folder::{make_folder, remove};
 pub use inputs::{not_over, not_over_any};

@@ -1,6 +1,8 @@
 //! In: one entry of `frames` in meta.json. Out: which pictures were taken then, and what they belong to.
 //! Frame and unit: indices; counts in the unit of the recording's motion.
 
+use super::taken::Taken;
+
 /// One moment of the recording: pictures taken without moving.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -23,4 +25,7 @@ pub struct FrameRef {
     /// Number of the pulse that triggered the camera, from 0.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trigger: Option<u64>,
+    /// How it came, of a recorder.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub taken: Option<Taken>,
 }

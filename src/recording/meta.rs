@@ -32,8 +32,12 @@ pub struct Meta {
     /// The one picture with the laser off, where a scan has one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ambient: Option<AmbientRef>,
-    /// The moments, one or more.
+    /// The moments, one or more; here or in [`Meta::frames_file`].
+    #[serde(default)]
     pub frames: Vec<FrameRef>,
+    /// Name of a file with one frame a line (JSON), which a recorder appends to.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frames_file: Option<String>,
     /// What moved between the frames; the robot with the sensor where nothing is said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<Motion>,
@@ -103,7 +107,8 @@ impl Meta {
         Meta::parse(&text).map_err(|e| e.at(path.display()))
     }
 
-    /// Parses and checks; refuses unknown keys, units, formats and pixel conventions.
+    /// Parses and checks; refuses unknown keys, units, formats and pixel conventions. What a frames_file holds is read and checked
+    /// by [`super::Recording::open`].
     pub fn parse(text: &str) -> Result<Meta> {
         // A mark of the byte order says nothing in UTF-8.
         let meta: Meta = serde_json::from_str(text.trim_start_matches('\u{feff}')).map_err(|e| {
@@ -115,11 +120,18 @@ impl Meta {
                 ))
                 .next("compare it with docs/file-formats.md")
         })?;
-        meta.check()?;
+        if meta.frames_file.is_none() {
+            meta.check()?;
+        } else if !meta.frames.is_empty() {
+            return Err(Fault::input("frames are in meta.json and in a frames_file")
+                .cause("meta.json was edited, or put together of two")
+                .next("leave one of them out"));
+        }
         Ok(meta)
     }
 
-    fn check(&self) -> Result<()> {
+    /// [`Meta::parse`]'s, of frames that were read from their own file.
+    pub(super) fn check(&self) -> Result<()> {
         let refuse = |what: String, next: &str| {
             Err(Fault::input(what).cause("written by another program or by hand").next(next))
         };

@@ -5,19 +5,26 @@ mod board;
 mod board_poses;
 mod counts;
 mod frame;
+mod frames;
 mod markers;
 mod meta;
 mod motion;
 mod pose_csv;
 mod poses;
+mod raw;
+mod stand;
+mod taken;
 
 pub use board::BoardSpec;
 pub use board_poses::load_board_poses;
 pub use frame::FrameRef;
 pub use markers::Markers;
 pub use meta::{AmbientRef, Beam, ImageSpec, Meta};
-pub use motion::{Carries, Motion, MotionKind, Stand};
+pub use motion::{Carries, Motion, MotionKind};
 pub use poses::{PoseFile, load_poses, save_poses};
+pub use raw::raw_name;
+pub use stand::Stand;
+pub use taken::{Pairing, Slip, Taken};
 
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid};
@@ -63,7 +70,31 @@ impl Recording {
                 .next("write meta.json as docs/file-formats.md shows: the picture's size, the board, the frames"));
         }
         let meta = Meta::load(&path)?;
-        Ok(Recording { folder: folder.to_owned(), meta, channel: Channel::default(), outside: false })
+        let mut recording = Recording { folder: folder.to_owned(), meta, channel: Channel::default(), outside: false };
+        recording
+            .read_frames()
+            .map_err(|e| if e.what.contains(&*folder.to_string_lossy()) { e } else { e.at(path.display()) })?;
+        Ok(recording)
+    }
+
+    /// The frames of a recorder's own file, their poses numbered.
+    fn read_frames(&mut self) -> Result<()> {
+        let Some(name) = &self.meta.frames_file else { return Ok(()) };
+        let mut frames = frames::load(&self.inside(name)?)?;
+        let mut poses = 0;
+        for frame in &mut frames {
+            if frame.taken.as_ref().is_some_and(|t| t.base_from_flange.is_some()) {
+                frame.pose = Some(poses);
+                poses += 1;
+            }
+        }
+        self.meta.frames = frames;
+        self.meta.check()
+    }
+
+    /// The poses that frames carry themselves, in order.
+    fn carried(&self) -> Vec<Rigid<Base, Flange>> {
+        self.meta.frames.iter().filter_map(|f| f.taken.as_ref()?.base_from_flange).collect()
     }
 
     /// Refuses a recording of the other beam, where meta.json says which one it shows.
@@ -89,6 +120,7 @@ impl Recording {
 
     /// Where one of the recording's own files lies; refuses what leads out of the folder.
     pub fn inside(&self, name: &str) -> Result<PathBuf> {
+        let name = raw::place(name).map_or(name, |(file, _)| file);
         let path = self.folder.join(name);
         let plain = Path::new(name).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
         let within = || match (path.canonicalize(), self.folder.canonicalize()) {
@@ -114,7 +146,10 @@ impl Recording {
 
     /// Reads one of the recording's pictures and checks its size against `meta.json`.
     pub fn picture(&self, name: &str) -> Result<Image> {
-        self.load(&self.inside(name)?)
+        let path = self.inside(name)?;
+        let Some((_, number)) = raw::place(name) else { return self.load(&path) };
+        let spec = &self.meta.image;
+        Ok(spec.response.linear(raw::load(&path, number, [spec.width, spec.height], spec.bits)?))
     }
 
     /// Which of `poses` the robot stood at in frame `index`. Frames that do not say are paired in order, and then there must
@@ -145,6 +180,12 @@ impl Recording {
 
     /// The poses in file `name` (without extension), or in the file that meta.json names, and what a person should know of them.
     pub fn pose_file(&self, name: Option<&str>) -> Result<PoseFile> {
+        if name.is_none() && self.meta.pose_file.is_none() {
+            let poses = self.carried();
+            if !poses.is_empty() {
+                return Ok(PoseFile { poses, warnings: Vec::new() });
+            }
+        }
         let name = match (name, &self.meta.pose_file) {
             (Some(n), _) => n,
             (None, Some(n)) => self.inside(n).map(|_| n.as_str())?,

@@ -3,7 +3,7 @@
 
 use super::frame::FrameRef;
 use crate::fault::{Fault, Result};
-use crate::geometry::{AxisKind, Base, CountUnit, Flange, Rigid};
+use crate::geometry::{AxisKind, CountUnit};
 
 /// What brings part and light past each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -49,15 +49,6 @@ pub struct Motion {
     /// Name of a file of counts (CSV).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub counts_file: Option<String>,
-}
-
-/// Where what moves stood at a frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Stand {
-    /// The robot's flange.
-    Robot(Rigid<Base, Flange>),
-    /// An axis, from the motion's zero.
-    Count(f64),
 }
 
 /// For an axis whose counts nobody wrote down.

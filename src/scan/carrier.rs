@@ -4,7 +4,7 @@
 
 use crate::fault::{Fault, Result};
 use crate::geometry::{Axis, AxisKind, Base, Camera, Ride, Rigid, Twist, Vec3};
-use crate::recording::{Carries, Motion, Stand};
+use crate::recording::{Carries, Motion, Slip, Stand};
 use crate::rig::{HandEye, Rig, axis_sigma};
 use nalgebra::{DMatrix, Matrix3, Matrix6};
 
@@ -13,8 +13,8 @@ use nalgebra::{DMatrix, Matrix3, Matrix6};
 pub struct Place {
     /// Camera frame to the cloud's frame, for which `Base` stands whatever moved; mm.
     pub from_camera: Rigid<Base, Camera>,
-    /// Of a motion (v, w) of the cloud's points, mm and rad. `None`: the robot's share and the hand-eye's are in the budget of
-    /// what is found, where all points of a part share them.
+    /// Of a motion (v, w) of the cloud's points, mm and rad: the axis', and speed times what is not known of the time. `None`: the
+    /// robot's share and the hand-eye's are in the budget of what is found, where all points of a part share them.
     pub covariance: Option<Matrix6<f64>>,
 }
 
@@ -89,8 +89,42 @@ impl Carrier {
         matches!(&self.way, Way::Axis(on) if on.axis.kind == AxisKind::Turntable)
     }
 
-    /// `anchor`: where the light meets the part, camera frame, mm; an axis' turns from stop to stop are about it.
-    pub fn place(&self, stand: &Stand, anchor: &Vec3) -> Result<Place> {
+    /// `slip`: how far the stand may be off; `anchor`: where the light meets the part, camera frame, mm; an axis' turns from stop to
+    /// stop are about it.
+    pub fn place(&self, stand: &Stand, slip: Option<&Slip>, anchor: &Vec3) -> Result<Place> {
+        let mut place = self.stood(stand, anchor)?;
+        if let Some(Twist { v, w }) = slip.and_then(|s| self.moved(stand, s)) {
+            let moved = nalgebra::Vector6::new(v.x, v.y, v.z, w.x, w.y, w.z);
+            place.covariance = Some(place.covariance.unwrap_or_else(Matrix6::zeros) + moved * moved.transpose());
+        }
+        Ok(place)
+    }
+
+    /// The motion of the cloud's points, in its frame, that a slip is.
+    fn moved(&self, stand: &Stand, slip: &Slip) -> Option<Twist> {
+        match (&self.way, stand, slip) {
+            (Way::Sensor(_), _, Slip::Flange([x, y, z, a, b, c])) => {
+                Some(Twist { v: Vec3::new(*x, *y, *z), w: Vec3::new(*a, *b, *c) })
+            }
+            // Seen from the flange the world moves the other way.
+            (Way::Part(_), Stand::Robot(base_from_flange), Slip::Flange([x, y, z, a, b, c])) => {
+                let (v, w) = (Vec3::new(*x, *y, *z), Vec3::new(*a, *b, *c));
+                let at_flange = v + w.cross(&base_from_flange.translation);
+                let into = base_from_flange.rotation.transpose();
+                Some(Twist { v: -(into * at_flange), w: -(into * w) })
+            }
+            (Way::Axis(on), _, Slip::Count(counts)) => {
+                let by = on.axis.pitch * counts;
+                Some(match on.axis.kind {
+                    AxisKind::Linear => Twist { v: Vec3::x() * by, w: Vec3::zeros() },
+                    AxisKind::Turntable => Twist { v: Vec3::zeros(), w: Vec3::z() * by },
+                })
+            }
+            _ => None,
+        }
+    }
+
+    fn stood(&self, stand: &Stand, anchor: &Vec3) -> Result<Place> {
         match (&self.way, stand) {
             (Way::Sensor(flange_from_camera), Stand::Robot(base_from_flange)) => {
                 Ok(Place { from_camera: *base_from_flange * *flange_from_camera, covariance: None })
@@ -190,13 +224,14 @@ mod tests {
     fn a_points_variance_is_the_pitchs_and_the_axis_own() {
         let anchor = Vec3::new(0.0, 0.0, 300.0);
         let linear = Carrier::new(&rig(AxisKind::Linear, 0.03), &motion(MotionKind::Linear)).unwrap();
-        let at =
-            |n: f64| linear.place(&Stand::Count(n), &anchor).unwrap().variance_at(&Vec3::new(1.0, 2.0, 3.0)).sqrt();
+        let at = |n: f64| {
+            linear.place(&Stand::Count(n), None, &anchor).unwrap().variance_at(&Vec3::new(1.0, 2.0, 3.0)).sqrt()
+        };
         assert!((at(0.0) - 0.03).abs() < 1e-12);
         assert!((at(50_000.0) - 0.03f64.hypot(0.05)).abs() < 1e-9, "{}", at(50_000.0));
         // 50 mm from a turntable's axis 1e-6 rad a count.
         let table = Carrier::new(&rig(AxisKind::Turntable, 0.0), &motion(MotionKind::Turntable)).unwrap();
-        let place = table.place(&Stand::Count(300.0), &anchor).unwrap();
+        let place = table.place(&Stand::Count(300.0), None, &anchor).unwrap();
         assert!((place.variance_at(&Vec3::new(30.0, 40.0, 9.0)).sqrt() - 50.0 * 300.0 * 1e-6).abs() < 1e-9);
         assert!(place.variance_at(&Vec3::new(0.0, 0.0, 9.0)).sqrt() < 1e-9);
     }
@@ -209,8 +244,8 @@ mod tests {
         assert!(Carrier::new(&rig, &Motion::default()).unwrap_err().next.contains("calibrate hand-eye"));
         assert!(Carrier::new(&rig, &motion(MotionKind::Turntable)).unwrap_err().next.contains("calibrate axis"));
         let carrier = Carrier::new(&rig, &motion(MotionKind::Linear)).unwrap();
-        assert!(carrier.place(&Stand::Robot(Rigid::identity()), &Vec3::zeros()).is_err());
-        let far = carrier.place(&Stand::Count(1e9), &Vec3::zeros()).unwrap_err();
+        assert!(carrier.place(&Stand::Robot(Rigid::identity()), None, &Vec3::zeros()).is_err());
+        let far = carrier.place(&Stand::Count(1e9), None, &Vec3::zeros()).unwrap_err();
         assert!(far.next.contains("zero"), "{far}");
     }
 
@@ -230,9 +265,20 @@ mod tests {
         let rig = Rig { base_camera, ..Rig::default() };
         let motion = Motion { carries: Carries::Part, ..Motion::default() };
         assert_eq!(motion.frame(), "flange");
-        let place = Carrier::new(&rig, &motion).unwrap().place(&Stand::Robot(flange), &Vec3::zeros()).unwrap();
+        let carrier = Carrier::new(&rig, &motion).unwrap();
+        let place = carrier.place(&Stand::Robot(flange), None, &Vec3::zeros()).unwrap();
         let on_part = Vec3::new(3.0, 4.0, 5.0);
         let seen = base_from_camera.inverse().point(&flange.point(&on_part));
         assert!((place.from_camera.point(&seen) - on_part).norm() < 1e-9);
+        // A robot that stood a little farther on its way: the point lies elsewhere on the part by what its sigma says.
+        let (v, w) = (Vec3::new(0.03, 0.0, 0.02), Vec3::new(0.0, 4e-4, 1e-4));
+        let slip = Slip::Flange([v.x, v.y, v.z, w.x, w.y, w.z]);
+        let place = carrier.place(&Stand::Robot(flange), Some(&slip), &Vec3::zeros()).unwrap();
+        let moved: Rigid<crate::geometry::Base, crate::geometry::Base> = Rigid::from_vectors(&w, v);
+        let turned = moved.rotation * flange.rotation;
+        let farther = Rigid::new(turned, moved.point(&flange.translation));
+        let there = carrier.place(&Stand::Robot(farther), None, &Vec3::zeros()).unwrap().from_camera.point(&seen);
+        let (is, want) = (place.variance_at(&on_part).sqrt(), (there - on_part).norm());
+        assert!((is / want - 1.0).abs() < 0.01, "{is} {want}");
     }
 }

@@ -10,6 +10,7 @@ use crate::stages::peak::params::PeakParams;
 use crate::stages::stripe::choose_params::ChooseParams;
 use crate::stages::stripe::lengthen::LengthenParams;
 use crate::stages::stripe::point::Optics;
+use crate::stages::stripe::spacing;
 use crate::stages::support::params::SupportParams;
 use crate::stages::{Thinning, ThresholdParams};
 
@@ -51,6 +52,9 @@ pub struct Extraction {
     pub thinning: Rule,
     /// How far the ends of lines are carried on.
     pub lengthen: LengthenParams,
+    /// Least distance of two fits that the skeleton asks for across the stripe, in stripe widths (sigma), 0..=6; 0 fits every
+    /// pixel of the skeleton. Matters where the stripe is wider than 2 px: its pixels across the stripe find the same centre.
+    pub spacing: f32,
     /// The sub-pixel fit across the stripe.
     pub peak: PeakParams,
     /// What a peak must be to be believed.
@@ -67,6 +71,7 @@ impl Default for Extraction {
             threshold: ThresholdParams { minimum: 8, ..ThresholdParams::default() },
             thinning: Rule::default(),
             lengthen: LengthenParams::default(),
+            spacing: 1.5,
             peak: PeakParams::default(),
             choose: ChooseParams::default(),
             support: SupportParams::default(),
@@ -119,6 +124,7 @@ impl Extraction {
             threshold,
             thinning: self.thinning.thinning(optics.across()),
             lengthen: self.lengthen.word(width_px),
+            spacing: spacing::word(self.spacing, width_px, optics.across()),
             measure: Some(Measure { peak: self.peak, choose: self.choose, optics }),
             ..ChainConfig::new(format.width, format.height, format.bits)
         }
@@ -135,6 +141,10 @@ impl Extraction {
             .next("give them in 8-bit levels; deeper pictures scale them"));
         }
         self.lengthen.check()?;
+        if !(0.0..=6.0).contains(&self.spacing) {
+            return Err(Fault::usage(format!("spacing is {}; it must be in 0..=6 stripe widths", self.spacing))
+                .next("correct [extraction] in station.toml"));
+        }
         self.peak.check()?;
         self.choose.check()?;
         self.support.check()

@@ -1,5 +1,5 @@
-//! In: pictures as a camera delivers them. Out: the points of the newest one; those that came while it was worked on are
-//! passed over and counted. Frame and unit: camera frame, mm.
+//! In: pictures as a camera delivers them, one at a time. Out: the points of each, with the least delay.
+//! Frame and unit: camera frame, mm.
 
 use super::engine::{Engine, Measured, Optical};
 use super::{Extraction, Format, Processor, Where, camera_for};
@@ -8,58 +8,6 @@ use crate::geometry::{Camera, Rigid};
 use crate::raster::Image;
 use crate::rig::{Rig, Volume};
 use crate::stages::stripe::point::pose_words;
-use std::sync::{Condvar, Mutex, PoisonError};
-
-/// Holds the newest of what one thread puts in until another takes it out.
-pub struct Newest<T> {
-    state: Mutex<State<T>>,
-    filled: Condvar,
-}
-
-struct State<T> {
-    value: Option<T>,
-    passed_over: u64,
-    closed: bool,
-}
-
-impl<T> Default for Newest<T> {
-    fn default() -> Self {
-        Newest { state: Mutex::new(State { value: None, passed_over: 0, closed: false }), filled: Condvar::new() }
-    }
-}
-
-impl<T> Newest<T> {
-    /// Replaces what was not taken yet.
-    pub fn put(&self, value: T) {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        if state.value.replace(value).is_some() {
-            state.passed_over += 1;
-        }
-        self.filled.notify_one();
-    }
-    /// Nothing will be put in any more.
-    pub fn close(&self) {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner).closed = true;
-        self.filled.notify_all();
-    }
-    /// Waits for a value; `None` when it is closed and empty.
-    pub fn take(&self) -> Option<T> {
-        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        loop {
-            if let Some(value) = state.value.take() {
-                return Some(value);
-            }
-            if state.closed {
-                return None;
-            }
-            state = self.filled.wait(state).unwrap_or_else(PoisonError::into_inner);
-        }
-    }
-    /// Values that were replaced before anyone took them.
-    pub fn passed_over(&self) -> u64 {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner).passed_over
-    }
-}
 
 /// The stripe chain for one picture at a time.
 pub struct Live {
@@ -100,20 +48,5 @@ impl Live {
         }
         self.engine.submit(frame, image, pose_words(&Rigid::<Camera, Camera>::identity()))?;
         Ok(self.engine.collect(true)?.pop())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_newest_is_taken_and_the_others_are_counted() {
-        let box_ = Newest::default();
-        (0..3).for_each(|i| box_.put(i));
-        assert_eq!((box_.take(), box_.passed_over()), (Some(2), 2));
-        box_.put(7);
-        box_.close();
-        assert_eq!((box_.take(), box_.take(), box_.passed_over()), (Some(7), None, 2));
     }
 }

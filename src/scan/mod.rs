@@ -2,6 +2,7 @@
 //! Frame and unit: clouds in the frame of what is measured ([`crate::recording::Motion::frame`], mostly the robot's base), height maps in a grid frame of their own; mm.
 
 mod ambient;
+mod captured;
 mod carrier;
 mod cloud;
 mod engine;
@@ -17,11 +18,12 @@ mod source;
 
 pub use crate::capture::{Format, RawFormat, RawFrames};
 pub use ambient::Ambient;
+pub use captured::{RecordedSource, Say, StreamSource};
 pub use carrier::{Carrier, Place, parts_for};
 pub use cloud::{CloudFile, CloudPoint, CloudWriter, PointSource, read_cloud, write_cloud};
 pub use engine::{Engine, Measured, Optical};
 pub use extraction::Extraction;
-pub use live::{Live, Newest};
+pub use live::Live;
 pub use map::files::{MAP_FILES, MapScale};
 pub use map::grid::{grid, grid_on};
 pub use map::heightmap::HeightMap;

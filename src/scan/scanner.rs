@@ -105,7 +105,7 @@ impl Scanner {
     /// Takes the next shot. Profiles become ready some shots later.
     pub fn push(&mut self, shot: Shot) -> Result<()> {
         if self.first.is_none() {
-            self.first = Some(self.carrier.place(&shot.stand, &self.anchor)?.from_camera);
+            self.first = Some(self.carrier.place(&shot.stand, shot.slip.as_ref(), &self.anchor)?.from_camera);
         }
         self.waiting.push(shot);
         if self.stripe.is_some() || self.waiting.len() >= MEASURED_SHOTS || !self.extraction.measure_stripe {
@@ -180,7 +180,7 @@ impl Scanner {
             self.support = Some(Support::new(self.extraction.support, stripe.width_px, field, &axis, device)?);
         }
         for shot in std::mem::take(&mut self.waiting) {
-            let place = self.carrier.place(&shot.stand, &self.anchor)?;
+            let place = self.carrier.place(&shot.stand, shot.slip.as_ref(), &self.anchor)?;
             self.places.push_back((shot.index, place));
             self.engine.submit(shot.index, shot.image, point::pose_words(&place.from_camera))?;
         }

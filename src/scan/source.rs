@@ -2,11 +2,11 @@
 //! ahead on other threads, a bounded number of them in memory.
 //! Frame and unit: robot poses are base_from_flange, mm, an axis stands at counts; pictures in grey levels of the sensor's depth.
 
-use crate::capture::{Format, RawFormat, RawFrames};
+use crate::capture::{Account, Format, Latency, RawFormat, RawFrames};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid};
 use crate::raster::Image;
-use crate::recording::{Recording, Stand};
+use crate::recording::{FrameRef, Recording, Slip, Stand};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::io::Read;
@@ -23,6 +23,8 @@ pub struct Shot {
     pub image: Image,
     /// Where the robot's flange or the axis stood at it.
     pub stand: Stand,
+    /// How far that may be off, where the time between the two is uncertain.
+    pub slip: Option<Slip>,
 }
 
 /// A shot that could not be had, with the reason; the next one may be fine.
@@ -50,6 +52,10 @@ pub trait Source {
     fn resumable(&self) -> bool {
         true
     }
+    /// What became of every picture that its camera sent, where it has one.
+    fn account(&self) -> Option<Account> {
+        None
+    }
     /// What the scan's report must say of it.
     fn remarks(&self) -> Vec<String> {
         Vec::new()
@@ -72,12 +78,32 @@ impl RecordingSource {
     /// Starts decoding at shot `first`. `poses` names the pose file where meta.json does not.
     /// Refused: no laser pictures, a pose index outside the pose file.
     pub fn open(recording: &Recording, poses: Option<&str>, first: usize) -> Result<RecordingSource> {
+        RecordingSource::late(recording, poses, first, None)
+    }
+
+    /// [`RecordingSource::open`] where the pictures' times are known to be late against the poses': of pictures that were paired by
+    /// clock.
+    pub fn late(
+        recording: &Recording,
+        poses: Option<&str>,
+        first: usize,
+        latency: Option<&Latency>,
+    ) -> Result<RecordingSource> {
         let meta = &recording.meta;
-        let stands = if meta.motion().axis().is_some() { counted(recording)? } else { posed(recording, poses)? };
+        let mut stands = if meta.motion().axis().is_some() { counted(recording)? } else { posed(recording, poses)? };
+        if let Some(latency) = latency {
+            let taken = meta.frames.iter().filter(|f| f.laser.is_some()).map(|f| f.taken.as_ref());
+            for ((_, stand, slip), taken) in stands.iter_mut().zip(taken) {
+                if let (Ok(at), Some(taken)) = (&stand, taken) {
+                    let (moved, within) = taken.delayed(at, 1e6 * latency.delay_ms, 1e6 * latency.sigma_ms);
+                    (*stand, *slip) = (Ok(moved), within);
+                }
+            }
+        }
         let mut jobs = Vec::new();
-        for (name, stand) in stands {
+        for (name, stand, slip) in stands {
             recording.inside(&name)?;
-            jobs.push((jobs.len() as u32, name, stand));
+            jobs.push((jobs.len() as u32, name, stand, slip));
         }
         if jobs.is_empty() {
             return Err(Fault::input(format!("{}: has no picture with the laser on", recording.folder.display()))
@@ -94,11 +120,11 @@ impl RecordingSource {
             for chunk in jobs.chunks((ahead / 2).max(rayon::current_num_threads())) {
                 let decoded: Vec<_> = chunk
                     .par_iter()
-                    .map(|(index, name, stand)| {
-                        let (index, name) = (*index, name.clone());
+                    .map(|(index, name, stand, slip)| {
+                        let (index, name, slip) = (*index, name.clone(), *slip);
                         let shot = stand.clone().and_then(|s| Ok((s, recording.picture(&name)?)));
                         match shot {
-                            Ok((stand, image)) => Ok(Shot { index, name, image, stand }),
+                            Ok((stand, image)) => Ok(Shot { index, name, image, stand, slip }),
                             Err(fault) => Err(BadShot { index, name, fault, last: false }),
                         }
                     })
@@ -117,8 +143,12 @@ impl RecordingSource {
     }
 }
 
-/// A picture's name, and where what moves stood when it was taken.
-type Stood = (String, Result<Stand>);
+/// A picture's name, where what moves stood when it was taken, and how far that may be off.
+type Stood = (String, Result<Stand>, Option<Slip>);
+
+fn slip_of(frame: &FrameRef) -> Option<Slip> {
+    frame.taken.as_ref()?.slip()
+}
 
 /// Pictures with the laser on and their robot poses.
 fn posed(recording: &Recording, poses: Option<&str>) -> Result<Vec<Stood>> {
@@ -138,7 +168,7 @@ fn posed(recording: &Recording, poses: Option<&str>) -> Result<Vec<Stood>> {
             .cause("the pose file was cut short, or belongs to another recording")
             .next("record the poses again, or leave the frames without poses out of meta.json"));
         };
-        Ok((name.clone(), Ok(Stand::Robot(*base_from_flange))))
+        Ok((name.clone(), Ok(Stand::Robot(*base_from_flange)), slip_of(&recording.meta.frames[i])))
     };
     frames.filter_map(|(i, f)| Some((i, f.laser.as_ref()?, f.pose))).map(stand).collect()
 }
@@ -153,7 +183,7 @@ fn counted(recording: &Recording) -> Result<Vec<Stood>> {
                 .cause("the encoder's reading was lost")
                 .next("add its count to the recording, or leave the shot out with --skip-bad")
         };
-        (name.clone(), count.map(Stand::Count).ok_or_else(unknown))
+        (name.clone(), count.map(Stand::Count).ok_or_else(unknown), slip_of(&recording.meta.frames[i]))
     };
     Ok(frames.filter_map(|(i, (f, count))| Some((i, (f.laser.as_ref()?, count)))).map(stand).collect())
 }
@@ -256,7 +286,7 @@ impl<R: Read> Source for RawSource<R> {
             return bad(self.uneven(format!("more than {came} frames")));
         };
         self.next += 1;
-        Some(Ok(Shot { index, name, image, stand: Stand::Robot(base_from_flange) }))
+        Some(Ok(Shot { index, name, image, stand: Stand::Robot(base_from_flange), slip: None }))
     }
 }
 

@@ -458,6 +458,7 @@ impl Plan {
             boards: if single { vec![] } else { self.boards.clone() },
             ambient: None,
             frames: vec![],
+            frames_file: None,
             motion: self.motion.clone(),
             pose_file: None,
             pose_files: Default::default(),

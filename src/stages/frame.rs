@@ -41,6 +41,8 @@ pub struct Frame {
     pub full_scale: u32,
     /// Most pixels added to an end of a line, and from bit 16 on the share of brightness in 4096ths; 0 is off.
     pub lengthen: u32,
+    /// Pixels from one of a run across the stripe to the next ([`crate::stages::stripe::spacing::word`]); 0 keeps all.
+    pub spacing: u32,
 }
 
 /// `Frame::flags`: list every tile, the plain path.
@@ -63,7 +65,7 @@ pub(crate) use uniform_fields;
 
 /// WGSL name, members and bytes of [`Frame`], for the contract tests.
 pub const UNIFORM: (&str, &[Field], usize) = uniform_fields!(Frame: width, height, pitch, shot_words, tiles_x,
-    tiles_y, shots, size, offset, minimum, flags, step, capacity, full_scale, lengthen);
+    tiles_y, shots, size, offset, minimum, flags, step, capacity, full_scale, lengthen, spacing);
 
 pub(crate) const SHARED: &str = include_str!("../../shaders/shared/frame.wgsl");
 pub(crate) const COLUMNS: &str = include_str!("../../shaders/shared/columns.wgsl");
@@ -116,6 +118,7 @@ impl Frame {
             capacity: (width * height / 20).max((width * height).min(32768)) * shots,
             full_scale: (1 << bits) - 1,
             lengthen: 0,
+            spacing: 0,
         })
     }
     /// Tiles of all pictures of a batch.

@@ -20,6 +20,7 @@ pub use calibrate::hand_eye::{
     Calibrated, HandEyeResult, HandEyeRun, PosePairs, calibrate_hand_eye, calibrate_hand_eye_from_poses,
 };
 pub use calibrate::laser_plane::{LaserPlaneRun, calibrate_laser_plane};
+pub use calibrate::latency::{LatencyFound, calibrate_latency};
 pub use calibrate::pointer::{PointerRun, calibrate_pointer};
 pub use find::{Looked, SecondLook, find_part, find_part_in_all, second_look, teach_part};
 pub use guide::{GuideOptions, Guided, Step, guide};

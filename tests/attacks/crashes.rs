@@ -195,6 +195,7 @@ fn full_disks() {
 
 fn options(out: &Path, stop: &Arc<AtomicBool>, resume: bool) -> ScanOptions {
     ScanOptions {
+        latency: None,
         out: out.to_owned(),
         place: Where::Cpu,
         extraction: Extraction::default(),

@@ -252,17 +252,9 @@ fn edge(d: f64, w: f64, s: f64) -> (f64, f64, f64) {
     (blurred, (ea - eb) / w, k / w * 0.5 * (ga - gb))
 }
 
-/// erf(x) and its derivative, to 1.5e-7 [abramowitz64, 7.1.26].
+/// erf(x) and its derivative.
 pub(super) fn erf(x: f64) -> (f64, f64) {
-    let a = x.abs();
-    if a > 4.0 {
-        return (x.signum(), 0.0);
-    }
-    let e = (-a * a).exp();
-    let t = 1.0 / (1.0 + 0.327_591_1 * a);
-    let poly =
-        t * (0.254_829_592 + t * (-0.284_496_736 + t * (1.421_413_741 + t * (-1.453_152_027 + t * 1.061_405_429))));
-    ((1.0 - poly * e).copysign(x), 2.0 / std::f64::consts::PI.sqrt() * e)
+    (libm::erf(x), std::f64::consts::FRAC_2_SQRT_PI * (-x * x).exp())
 }
 
 #[cfg(test)]

@@ -187,6 +187,10 @@ impl PictureSource for CellCamera {
         Ok(Some(RoundTrip { before_ns, there_ns, after_ns }))
     }
 
+    fn reopens(&self) -> bool {
+        true
+    }
+
     fn reopen(&mut self) -> Result<()> {
         self.link = Link::connect(&self.address)?;
         self.sent = 0;

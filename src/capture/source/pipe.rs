@@ -77,6 +77,10 @@ impl PictureSource for Pipe {
         Some(self.came)
     }
 
+    fn waits(&self) -> bool {
+        true
+    }
+
     fn name(&self) -> String {
         self.name.clone()
     }

@@ -5,6 +5,7 @@ mod axis;
 mod camera;
 mod hand_eye;
 mod laser_plane;
+mod latency;
 mod pointer;
 mod profile_hand_eye;
 pub(in crate::cli) mod store;
@@ -18,6 +19,7 @@ pub enum Command {
     Camera(camera::Args),
     HandEye(hand_eye::Args),
     LaserPlane(laser_plane::Args),
+    Latency(latency::Args),
     Pointer(pointer::Args),
     ProfileHandEye(profile_hand_eye::Args),
 }
@@ -27,6 +29,7 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Axis(a) => axis::run(a, console),
         Command::Camera(a) => camera::run(a, console),
         Command::HandEye(a) => hand_eye::run(a, console),
+        Command::Latency(a) => latency::run(a, console),
         Command::LaserPlane(a) => laser_plane::run(a, console),
         Command::Pointer(a) => pointer::run(a, console),
         Command::ProfileHandEye(a) => profile_hand_eye::run(a, console),

@@ -96,6 +96,7 @@ fn straight(sigma: f64, angle_deg: f64, bits: u8) -> Scene {
         params: ThresholdParams { size: window, offset: 8 << (bits - 8), minimum: 0, ..Default::default() },
         thinning: Thinning::ZhangSuen,
         flags: 0,
+        spacing: 0,
         ambient: None,
     }
 }

@@ -21,6 +21,8 @@ pub struct Scene {
     pub thinning: Thinning,
     /// Bits to set in [`frame::Frame::flags`] beside those of the settings.
     pub flags: u32,
+    /// [`frame::Frame::spacing`].
+    pub spacing: u32,
     /// Picture of the ambient light, of the same size and depth; `None` subtracts nothing.
     pub ambient: Option<Image>,
 }
@@ -91,6 +93,7 @@ pub fn scenes() -> Vec<Scene> {
         params: ThresholdParams::default(),
         thinning: Thinning::ZhangSuen,
         flags: 0,
+        spacing: 0,
         ambient: None,
     };
     let p = |size, offset, minimum| ThresholdParams { size, offset, minimum, ..Default::default() };
@@ -100,6 +103,7 @@ pub fn scenes() -> Vec<Scene> {
         Scene {
             name: "two stripes of 641 x 479",
             shots: vec![stripe(641, 479, 8, 2.5, 3, 1), stripe(641, 479, 8, 4.0, 0, 2)],
+            spacing: 3,
             ..base.clone()
         },
         Scene {
@@ -107,6 +111,7 @@ pub fn scenes() -> Vec<Scene> {
             shots: vec![stripe(203, 150, 12, 3.0, 2, 3)],
             params: p(25, 120, 300),
             thinning: Thinning::GuoHall,
+            spacing: 2 | 1 << 16,
             ambient: Some(drawn(203, 150, 12, |x, y| (x * 7 + y * 13) % 160)),
             ..base.clone()
         },
@@ -119,6 +124,7 @@ pub fn scenes() -> Vec<Scene> {
         Scene {
             name: "noise, every tile",
             shots: vec![drawn(97, 69, 8, |_, _| noise.next() % 256)],
+            spacing: 2,
             params: p(3, 0, 0),
             flags: frame::ALL_TILES,
             ..base.clone()
@@ -138,6 +144,7 @@ pub fn scenes() -> Vec<Scene> {
         Scene {
             name: "stripes on tile borders, region of interest",
             shots: vec![drawn(256, 128, 8, |x, y| if x % 32 < 2 || y % 8 == 7 { 220 } else { 20 })],
+            spacing: 5,
             params: p(31, 20, 40),
             flags: frame::HAS_ROI,
             ..base.clone()
@@ -151,6 +158,7 @@ pub fn scenes() -> Vec<Scene> {
         Scene {
             name: "deep specks, window 9, region of interest",
             shots: vec![specks(170, 99, 12)],
+            spacing: 3 | 1 << 16,
             params: p(9, 124, 160),
             flags: frame::HAS_ROI,
             ..base.clone()

@@ -34,6 +34,7 @@ impl<'a> Walk<'a> {
             .expect("scenes are valid");
         f.flags |= scene.flags;
         f.lengthen = lengthen::LengthenParams::default().word(3.0);
+        f.spacing = scene.spacing;
         let pack = |images: &[Image]| {
             let mut bytes = vec![0u8; f.image_bytes() * images.len()];
             for (image, out) in images.iter().zip(bytes.chunks_exact_mut(f.image_bytes())) {

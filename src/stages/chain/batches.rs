@@ -106,6 +106,7 @@ impl Chain {
         let mut frame = Frame::new(config.width, config.height, config.bits, config.shots, &config.threshold)?;
         frame.flags |= if config.prune { 0 } else { ALL_TILES };
         frame.lengthen = config.lengthen;
+        frame.spacing = config.spacing;
         frame.flags |= if config.region.is_some() { HAS_ROI } else { 0 };
         let recorded = Recorded::new(device, &frame, config)?;
         let measuring = match &config.measure {

@@ -31,6 +31,8 @@ pub struct ChainConfig {
     pub ambient: Option<Image>,
     /// How far the ends of lines are carried on ([`crate::stages::stripe::lengthen::LengthenParams::word`]); 0 is not at all.
     pub lengthen: u32,
+    /// One fit a crossing of a wide stripe ([`crate::stages::stripe::spacing::word`]); 0 is one for every skeleton pixel.
+    pub spacing: u32,
     /// Peaks, their choice and points for every skeleton pixel; `None` ends with the pixels.
     pub measure: Option<Measure>,
     /// Take GPU timestamps of every stage.
@@ -52,6 +54,7 @@ impl ChainConfig {
             region: None,
             ambient: None,
             lengthen: 0,
+            spacing: 0,
             measure: None,
             timed: false,
         }

@@ -6,7 +6,7 @@ use crate::stages::Thinning;
 use crate::stages::frame::{Frame, GAUSSIAN, HAS_ROI, PX_LOG2, px_log2};
 use crate::stages::listing::{self, HEADER_WORDS};
 use crate::stages::step::{Groups, Step};
-use crate::stages::stripe::{ambient, lengthen, skeleton, specks, stats, thin, threshold, tiles};
+use crate::stages::stripe::{ambient, lengthen, skeleton, spacing, specks, stats, thin, threshold, tiles};
 
 /// The uniform block, another one each sub-iteration of thinning.
 pub const FRAME: &str = "frame";
@@ -38,6 +38,7 @@ pub const BUFFERS: &[(&str, fn(&Frame) -> u32)] = &[
     ("other mask", Frame::mask_words),
     ("lit", Frame::mask_words),
     ("long", Frame::mask_words),
+    ("spaced", |f| if f.spacing != 0 { f.mask_words() } else { 4 }),
     ("stamps", Frame::tiles),
     ("counts", Frame::tiles),
     ("starts", Frame::tiles),
@@ -113,6 +114,7 @@ pub const STEPS: &[Step] = &[
     listing::REBASING,
     lengthen::COPYING,
     lengthen::STEP,
+    spacing::STEP,
     skeleton::COUNTING,
     skeleton::SCANNING_ROWS,
     skeleton::SCANNING_SHOTS,
@@ -168,12 +170,21 @@ pub fn back(f: &Frame) -> Vec<Placed> {
     if f.lengthen != 0 {
         steps.extend([lengthen::COPYING.into(), lengthen::STEP.into()]);
     }
+    if f.spacing != 0 {
+        steps.push(spacing::STEP.into());
+    }
     let rest =
         [skeleton::COUNTING, skeleton::SCANNING_ROWS, skeleton::SCANNING_SHOTS, skeleton::HEADING, skeleton::STEP];
     steps.extend(rest.map(Placed::from));
-    // The same stages read the mask whose lines were carried on, or the thinned one.
-    let mask = if f.lengthen != 0 { "long" } else { "mask" };
-    for s in steps.iter_mut().filter(|s| [skeleton::COUNT.name, skeleton::STAGE.name].contains(&s.step.stage.name)) {
+    // The same stages read the thinned mask, or the one whose lines were carried on, or what was chosen of it.
+    let long = if f.lengthen != 0 { "long" } else { "mask" };
+    let last = if f.spacing != 0 { "spaced" } else { long };
+    for s in &mut steps {
+        let mask = match s.step.stage.name {
+            name if name == spacing::STAGE.name => long,
+            name if [skeleton::COUNT.name, skeleton::STAGE.name].contains(&name) => last,
+            _ => continue,
+        };
         s.binds.iter_mut().filter(|b| **b == "long").for_each(|b| *b = mask);
     }
     steps

@@ -10,7 +10,7 @@ use super::peak::found::Peak;
 use super::peak::{self, PeakFrame};
 use super::stripe::choose::Lines;
 use super::stripe::point::Point;
-use super::stripe::{ambient, choose, lengthen, point, skeleton, threshold};
+use super::stripe::{ambient, choose, lengthen, point, skeleton, spacing, threshold};
 use super::{Thinning, ThresholdParams};
 use crate::fault::Result;
 use crate::raster::{Image, Mask, Pixels};
@@ -63,6 +63,8 @@ struct Work {
     list: Vec<u32>,
     worn: Worn,
     added: Vec<(i32, i32)>,
+    /// What is kept of the skeleton, in the order of the list.
+    kept: Vec<Tile>,
 }
 
 impl Host {
@@ -72,6 +74,7 @@ impl Host {
         frame.flags |= if config.prune { 0 } else { ALL_TILES };
         frame.flags |= if config.region.is_some() { HAS_ROI } else { 0 };
         frame.lengthen = config.lengthen;
+        frame.spacing = config.spacing;
         let tiles = |region: &Mask| {
             let words = frame.pack_mask(region);
             words.chunks_exact(8).map(|t| t.try_into().expect("eight words")).collect()
@@ -159,8 +162,39 @@ impl Host {
             work.thin.words[at as usize] = work.lit.words[at as usize];
         }
         thinning::thin(&mut work.thin, &work.list, (f.width, f.height), self.thinning, &mut work.worn);
-        if ends && f.lengthen != 0 {
+        if !ends {
+            return;
+        }
+        if f.lengthen != 0 {
             self.lengthen(px, work);
+        }
+        if f.spacing != 0 {
+            self.space(work);
+        }
+    }
+
+    /// Keeps one pixel a crossing of a wide stripe.
+    fn space(&self, work: &mut Work) {
+        let (w, h) = (self.frame.width as i32, self.frame.height as i32);
+        let (thin, kept) = (&work.thin, &mut work.kept);
+        let get = |x: i32, y: i32| (0..w).contains(&x) && (0..h).contains(&y) && thin.get(x, y);
+        kept.clear();
+        kept.extend(work.list.iter().map(|&at| -> Tile {
+            let (tx, ty) = thin.tile(at);
+            std::array::from_fn(|r| {
+                let (mut left, mut some) = (thin.words[at as usize][r], 0);
+                while left != 0 {
+                    let bit = left.trailing_zeros();
+                    left &= left - 1;
+                    if spacing::kept((32 * tx + bit) as i32, 8 * ty as i32 + r as i32, self.frame.spacing, get) {
+                        some |= 1 << bit;
+                    }
+                }
+                some
+            })
+        }));
+        for (&at, tile) in work.list.iter().zip(&work.kept) {
+            work.thin.words[at as usize] = *tile;
         }
     }
 

@@ -8,7 +8,7 @@ use crate::stages::cases::{self, drawn, stripe};
 use crate::stages::frame::HAS_ROI;
 use crate::stages::noise::Noise;
 use crate::stages::stripe::lengthen::LengthenParams;
-use crate::stages::stripe::{lengthen, point, thin};
+use crate::stages::stripe::{lengthen, point, spacing, thin};
 
 /// The plain way, every pixel: lit, thinned, and the list after the ends were carried on.
 fn plain(image: &Image, c: &ChainConfig) -> (Mask, Mask, Vec<u32>) {
@@ -18,8 +18,14 @@ fn plain(image: &Image, c: &ChainConfig) -> (Mask, Mask, Vec<u32>) {
         lit.intersect(region);
     }
     let thinned = thin::twin(&lit, c.thinning);
-    let long = lengthen::twin(&image, &lit, &thinned, WIDTH_PX, &LengthenParams::default());
-    let pixels = skeleton::twin(if c.lengthen == 0 { &thinned } else { &long });
+    let mut long = thinned.clone();
+    if c.lengthen != 0 {
+        long = lengthen::twin(&image, &lit, &thinned, WIDTH_PX, &LengthenParams::default());
+    }
+    if c.spacing != 0 {
+        long = spacing::twin(&long, c.spacing);
+    }
+    let pixels = skeleton::twin(&long);
     (lit, thinned, pixels)
 }
 
@@ -43,7 +49,9 @@ fn masks_and_skeletons_of_the_scenes_are_those_of_the_twins() {
         let first = &scene.shots[0];
         let (w, h) = (first.width, first.height);
         let region = Mask::from_fn(w, h, |x, y| x % 32 > 3 && x % 32 < 24 && y % 5 < 3);
-        for (prune, ends) in [(true, 0), (true, LengthenParams::default().word(WIDTH_PX)), (false, 0)] {
+        for (prune, ends, apart) in
+            [(true, 0, 0), (true, LengthenParams::default().word(WIDTH_PX), 0), (false, 0, scene.spacing)]
+        {
             let config = ChainConfig {
                 threshold: scene.params,
                 thinning: scene.thinning,
@@ -51,6 +59,7 @@ fn masks_and_skeletons_of_the_scenes_are_those_of_the_twins() {
                 region: (scene.flags & HAS_ROI != 0).then(|| region.clone()),
                 ambient: scene.ambient.clone(),
                 lengthen: ends,
+                spacing: apart,
                 ..ChainConfig::new(w, h, first.bits)
             };
             let host = Host::new(&config).unwrap();
@@ -111,6 +120,7 @@ fn masks_and_skeletons_of_random_pictures_are_those_of_the_twins() {
             thinning: if next(2) == 0 { Thinning::ZhangSuen } else { Thinning::GuoHall },
             region: roi.then(|| Mask::from_fn(w, h, |x, y| x + 2 * y > cut && x % 40 != 7)),
             lengthen: if next(2) == 0 { 0 } else { LengthenParams::default().word(WIDTH_PX) },
+            spacing: [0, 0, 2, 3, 7, 2 | 1 << 16, 4 | 1 << 16][next(7) as usize],
             ambient: dim.then(|| drawn(w, h, bits, |x, y| ((x * 3 + y * 5) % 60) << (bits - 8))),
             ..ChainConfig::new(w, h, bits)
         };

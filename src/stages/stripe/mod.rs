@@ -10,6 +10,7 @@ pub mod hough;
 pub mod lengthen;
 pub mod point;
 pub mod skeleton;
+pub mod spacing;
 pub(in crate::stages) mod specks;
 pub mod stats;
 pub mod thin;

@@ -6,6 +6,7 @@ pub(super) mod ball;
 pub(super) mod board_views;
 pub(super) mod hand_eye;
 pub(super) mod laser_plane;
+pub(super) mod latency;
 pub(super) mod pointer;
 mod room_light;
 mod straight;

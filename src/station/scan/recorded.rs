@@ -27,6 +27,7 @@ impl ScanOptions {
             ambient: None,
             overlays: 0,
             skip_bad: false,
+            latency: None,
             resume: false,
             stop: Default::default(),
             watch: Default::default(),
@@ -48,14 +49,18 @@ pub fn scan_recording(
 ) -> Result<ScanReport> {
     let options = &ScanOptions { motion: recording.meta.motion(), ..options.clone() };
     let id = identity(recording, poses, options.ambient.as_ref())?;
-    let open = |first| Ok(Box::new(RecordingSource::open(recording, poses, first)?) as Box<_>);
+    let open =
+        |first| Ok(Box::new(RecordingSource::late(recording, poses, first, options.latency.as_ref())?) as Box<_>);
     scan(&id, &recording.folder.display().to_string(), open, rig, options, progress)
 }
 
 /// What a resumed scan must have in common with the interrupted one: a hash of meta.json, of the poses or counts, of the channel
 /// and of the ambient picture.
 fn identity(recording: &Recording, poses: Option<&str>, ambient: Option<&Image>) -> Result<String> {
-    let meta = hash_file(&recording.folder.join("meta.json"))?;
+    let mut meta = hash_file(&recording.folder.join("meta.json"))?;
+    if let Some(name) = &recording.meta.frames_file {
+        meta += &hash_file(&recording.inside(name)?)?;
+    }
     let ambient = ambient.map(|image| match &image.pixels {
         Pixels::U8(px) => hash_text(px),
         Pixels::U16(px) => hash_text(bytemuck::cast_slice(px)),

@@ -3,6 +3,7 @@
 
 use super::scan_folder::settle;
 use super::seen::Seen;
+use crate::capture::Account;
 use crate::fault::{Fault, Result};
 use crate::recording::Motion;
 use crate::rig::{Volume, hash_file};
@@ -47,6 +48,9 @@ pub struct ScanReport {
     pub peaks: BTreeMap<String, u64>,
     /// Shots without a single kept peak.
     pub dark_shots: Vec<u32>,
+    /// What became of every picture that the camera sent, where one did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<Account>,
     /// Shots left out, with the reason.
     pub skipped: Vec<(String, String)>,
     /// Median over the points of the standard deviation that each carries, mm; none without points.

@@ -8,6 +8,7 @@ use super::report::{FORMAT, ScanReport, Spent};
 use super::scan_folder::{self, FORMER_PROGRESS};
 use super::seen::Seen;
 use super::watch::Watch;
+use crate::capture::Latency;
 use crate::fault::{Fault, Result};
 use crate::files::Lock;
 use crate::raster::Image;
@@ -44,6 +45,8 @@ pub struct ScanOptions {
     pub overlays: usize,
     /// Leave out shots that cannot be read instead of stopping; they are listed in scan.json.
     pub skip_bad: bool,
+    /// By how much pictures are late against poses, of those that were paired by clock.
+    pub latency: Option<Latency>,
     /// Continue an interrupted scan of the same recording with the same rig and settings.
     pub resume: bool,
     /// Set by somebody who wants the scan to end: it keeps what is done and says how to go on.
@@ -173,6 +176,7 @@ pub fn scan_on(
         seen,
         peaks: state.peaks,
         dark_shots: state.dark,
+        camera: source.account(),
         skipped: state.skipped,
         seconds,
         shots_per_second: (state.shots - first) as f64 / seconds.max(1e-9),
@@ -191,7 +195,8 @@ pub fn scan_on(
 
 /// Where the scan begins: at nothing, or where an interrupted one of the same identity stands.
 fn state(id: &str, rig: &Rig, options: &ScanOptions, part: &Path) -> Result<Checkpoint> {
-    let settings = serde_json::to_string(&(&options.extraction, &options.volume, &options.motion)).expect("plain data");
+    let settings = serde_json::to_string(&(&options.extraction, &options.volume, &options.motion, &options.latency))
+        .expect("plain data");
     let identity = crate::rig::hash_text(format!("{id} {} {settings}", rig.fingerprint()).as_bytes());
     let former = if options.resume { Checkpoint::load(part)? } else { None };
     match former {

@@ -1,0 +1,330 @@
+//! In: points of a part that was passed to and fro, each with the way it went a second. Out: by how much the pictures' times are late against
+//! the poses', so that both passes show one part.
+//! Frame and unit: the cloud's frame, mm; seconds.
+
+use crate::fault::{Fault, Result};
+use crate::geometry::Vec3;
+use nalgebra::Matrix3;
+
+/// A point, and how it moves in the cloud if its shot's pose is of a second later.
+#[derive(Clone, Copy, Debug)]
+pub struct Passing {
+    /// mm.
+    pub at: Vec3,
+    /// mm/s.
+    pub velocity: Vec3,
+}
+
+/// What was found.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Delay {
+    /// The pictures' times are late by so much, s, beyond what was taken for it.
+    pub seconds: f64,
+    /// 1 sigma.
+    pub sigma_s: f64,
+    /// How far the passes' heights are apart without it and with it, mm (robust rms).
+    pub apart_mm: [f64; 2],
+    /// Speeds of the passes, mm/s: forth is positive.
+    pub speeds: Vec<f64>,
+}
+
+/// Strips along the motion that are compared by themselves, and parts of them that tell the error.
+const STRIPS: usize = 96;
+const PARTS: usize = 12;
+/// Heights that differ by more than this say little of how much, mm: shadows, reflections.
+const SCALE: f64 = 0.5;
+/// ... and where the passes nearly agree, no less than this.
+const FINEST: f64 = 0.02;
+const ROUNDS: usize = 8;
+/// A delay is looked for up to this, s.
+const FARTHEST: f64 = 0.15;
+/// A shot slower than this share of the fastest is at a turning point.
+const CRUISE: f64 = 0.5;
+
+/// Along, across, height of a point, and its speed along.
+#[derive(Clone, Copy)]
+struct Place {
+    u: f64,
+    h: f64,
+    speed: f64,
+}
+
+/// One pass: of each strip its places in order.
+struct Pass {
+    forth: bool,
+    strips: Vec<Vec<Place>>,
+    speed: f64,
+}
+
+/// Finds the delay. `shots`: in order, the points of each.
+///
+/// # Errors
+/// No motion, or one in one direction only; too few points; a part without slopes or edges across the motion.
+pub fn delay(shots: &[Vec<Passing>], up: &Vec3) -> Result<Delay> {
+    let (along, fastest) = main_way(shots)?;
+    let across = up.cross(&along).normalize();
+    let height = along.cross(&across);
+    let passes = split(shots, &along, &across, &height, fastest);
+    let pairs: Vec<(&Pass, &Pass)> =
+        passes.iter().flat_map(|a| passes.iter().map(move |b| (a, b))).filter(|(a, b)| a.forth && !b.forth).collect();
+    if pairs.is_empty() {
+        return Err(Fault::refused(format!("{} passes, all in one direction", passes.len()))
+            .cause("a delay shifts the part along the motion; only the way back shows by how much")
+            .next("record the same part to and fro"));
+    }
+    let spacing = spacing(&passes);
+    // A step that shifts both passes by a quarter of the way between two shots.
+    let step = 0.25 * spacing / (2.0 * fastest);
+    let steps = (FARTHEST / step).ceil() as i64;
+    let coarse = costs(&pairs, spacing, SCALE, (-steps..=steps).map(|k| k as f64 * step));
+    let total = |c: &Cost| c.all().unwrap_or(f64::INFINITY);
+    let best = (0..coarse.len()).min_by(|&a, &b| total(&coarse[a].1).total_cmp(&total(&coarse[b].1))).expect("some");
+    let mut seconds = coarse[best].0;
+    // Where the passes nearly agree their scatter is known: what differs by much more, edges and shadows, says nothing of a part of a step.
+    let scale = (3.0 * scatter(&pairs, spacing, seconds)).clamp(FINEST, SCALE);
+    let mut fine = Vec::new();
+    for _ in 0..ROUNDS {
+        fine = costs(&pairs, spacing, scale, (-8..=8).map(|k| seconds + f64::from(k) * 0.25 * step));
+        let next = lowest(&fine, None).filter(|s| s.abs() < FARTHEST).ok_or_else(|| flat(f64::INFINITY))?;
+        let moved = (next - seconds).clamp(-2.0 * step, 2.0 * step);
+        seconds += moved;
+        if moved.abs() < 0.02 * step {
+            break;
+        }
+    }
+    let parts: Vec<f64> = (0..PARTS).filter_map(|p| lowest(&fine, Some(p))).collect();
+    let n = parts.len() as f64;
+    if parts.len() < PARTS / 2 {
+        return Err(flat(f64::INFINITY));
+    }
+    let mean = parts.iter().sum::<f64>() / n;
+    // Jackknife: each with one part left out.
+    let sigma_s = ((n - 1.0) / n * parts.iter().map(|d| (d - mean).powi(2)).sum::<f64>()).sqrt();
+    let at = |s: f64| costs(&pairs, spacing, SCALE, std::iter::once(s))[0].1.all().unwrap_or(f64::NAN).sqrt();
+    let apart_mm = [at(0.0), at(seconds)];
+    let speeds = passes.iter().map(|p| if p.forth { p.speed } else { -p.speed }).collect();
+    Ok(Delay { seconds, sigma_s, apart_mm, speeds })
+}
+
+fn flat(sigma_s: f64) -> Fault {
+    Fault::refused(format!("the passes show no delay: sigma {:.1} ms", 1e3 * sigma_s))
+        .cause("a flat part looks the same wherever it is, or the passes do not overlap")
+        .next("pass over a part with slopes, or with edges that lie slanted to the stripe")
+}
+
+/// Direction of the motion and its largest speed.
+fn main_way(shots: &[Vec<Passing>]) -> Result<(Vec3, f64)> {
+    let of = |shot: &Vec<Passing>| shot.get(shot.len() / 2).map(|p| p.velocity);
+    let ways: Vec<Vec3> = shots.iter().filter_map(of).collect();
+    let fastest = ways.iter().map(|v| v.norm()).fold(0.0, f64::max);
+    if fastest < 1e-3 {
+        return Err(Fault::refused(format!(
+            "nothing moves: {fastest:.4} mm/s at most, of {} shots with points",
+            ways.len()
+        ))
+        .cause("a recording that was paired standing still, or without poses")
+        .next("record with --pair clock while the part is passed to and fro"));
+    }
+    let spread: Matrix3<f64> = ways.iter().map(|v| v * v.transpose()).sum();
+    let eigen = spread.symmetric_eigen();
+    Ok((eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned(), fastest))
+}
+
+fn split(shots: &[Vec<Passing>], along: &Vec3, across: &Vec3, height: &Vec3, fastest: f64) -> Vec<Pass> {
+    let all = || shots.iter().flatten().map(|p| p.at.dot(across));
+    let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), w| (l.min(w), h.max(w)));
+    let width = ((high - low) / STRIPS as f64).max(1e-9);
+    let mut passes: Vec<Pass> = Vec::new();
+    for shot in shots {
+        let Some(middle) = shot.get(shot.len() / 2) else { continue };
+        let speed = middle.velocity.dot(along);
+        if speed.abs() < CRUISE * fastest {
+            continue;
+        }
+        let forth = speed > 0.0;
+        if passes.last().is_none_or(|p| p.forth != forth) {
+            passes.push(Pass { forth, strips: vec![Vec::new(); STRIPS], speed: speed.abs() });
+        }
+        let pass = passes.last_mut().expect("pushed above");
+        let mut sums = vec![[0.0; 4]; STRIPS];
+        for p in shot {
+            let strip = (((p.at.dot(across) - low) / width) as usize).min(STRIPS - 1);
+            let row = [p.at.dot(along), p.at.dot(height), p.velocity.dot(along), 1.0];
+            sums[strip].iter_mut().zip(row).for_each(|(s, v)| *s += v);
+        }
+        for (strip, [u, h, v, n]) in pass.strips.iter_mut().zip(sums) {
+            if n > 0.0 {
+                strip.push(Place { u: u / n, h: h / n, speed: v / n });
+            }
+        }
+    }
+    for strip in passes.iter_mut().flat_map(|p| &mut p.strips) {
+        strip.sort_by(|a, b| a.u.total_cmp(&b.u));
+    }
+    passes
+}
+
+/// Usual way between two shots, mm.
+fn spacing(passes: &[Pass]) -> f64 {
+    let steps = passes.iter().flat_map(|p| &p.strips).flat_map(|s| s.windows(2).map(|w| w[1].u - w[0].u));
+    let mut steps: Vec<f64> = steps.collect();
+    steps.sort_by(f64::total_cmp);
+    steps.get(steps.len() / 2).copied().unwrap_or(1.0).max(1e-6)
+}
+
+/// Squared difference of heights, and how many, by part.
+struct Cost(Vec<[f64; 2]>);
+
+impl Cost {
+    /// Mean of all; none where too little overlaps.
+    fn all(&self) -> Option<f64> {
+        self.without(usize::MAX)
+    }
+    fn without(&self, part: usize) -> Option<f64> {
+        let kept = self.0.iter().enumerate().filter(|(p, _)| *p != part).map(|(_, c)| c);
+        let [sum, n] = kept.fold([0.0; 2], |[s, n], c| [s + c[0], n + c[1]]);
+        (n >= 100.0).then(|| sum / n)
+    }
+}
+
+fn costs(pairs: &[(&Pass, &Pass)], spacing: f64, scale: f64, delays: impl Iterator<Item = f64>) -> Vec<(f64, Cost)> {
+    let at = |delay: f64| {
+        let mut cost = vec![[0.0; 2]; PARTS];
+        for (a, b) in pairs {
+            for (k, (sa, sb)) in a.strips.iter().zip(&b.strips).enumerate() {
+                let [sum, n] = &mut cost[k * PARTS / STRIPS];
+                compare(sa, sb, delay, spacing, |r| {
+                    *sum += r * r / (1.0 + r * r / (scale * scale));
+                    *n += 1.0;
+                });
+            }
+        }
+        (delay, Cost(cost))
+    };
+    delays.map(at).collect()
+}
+
+/// What heights of two passes usually differ by, 1 sigma.
+fn scatter(pairs: &[(&Pass, &Pass)], spacing: f64, delay: f64) -> f64 {
+    let mut all = Vec::new();
+    for (a, b) in pairs {
+        a.strips.iter().zip(&b.strips).for_each(|(a, b)| compare(a, b, delay, spacing, |r| all.push(r.abs())));
+    }
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).map_or(SCALE, |m| 1.4826 * m)
+}
+
+/// Differences of height of two passes over one strip, on places four times as dense as the shots.
+fn compare(a: &[Place], b: &[Place], delay: f64, spacing: f64, mut take: impl FnMut(f64)) {
+    let (mut a, mut b) = (Walk::new(a, delay, spacing), Walk::new(b, delay, spacing));
+    let (Some(first), Some(last)) = (a.first().zip(b.first()), a.last().zip(b.last())) else { return };
+    let (from, to) = (first.0.max(first.1), last.0.min(last.1));
+    let step = 0.25 * spacing;
+    // Places of the part, not of the passes: a grid of its own.
+    let mut k = (from / step).ceil();
+    while k * step <= to {
+        if let (Some(ha), Some(hb)) = (a.height(k * step), b.height(k * step)) {
+            take(ha - hb);
+        }
+        k += 1.0;
+    }
+}
+
+/// Goes along a strip whose places are shifted by a delay.
+struct Walk<'a> {
+    places: &'a [Place],
+    delay: f64,
+    gap: f64,
+    at: usize,
+}
+
+impl<'a> Walk<'a> {
+    fn new(places: &'a [Place], delay: f64, spacing: f64) -> Walk<'a> {
+        Walk { places, delay, gap: 2.5 * spacing, at: 0 }
+    }
+    fn u(&self, p: &Place) -> f64 {
+        p.u - p.speed * self.delay
+    }
+    fn first(&self) -> Option<f64> {
+        self.places.first().map(|p| self.u(p))
+    }
+    fn last(&self) -> Option<f64> {
+        self.places.last().map(|p| self.u(p))
+    }
+    /// Height at a place not before the last one asked for; none in a gap.
+    fn height(&mut self, u: f64) -> Option<f64> {
+        while self.at + 2 < self.places.len() && self.u(&self.places[self.at + 1]) < u {
+            self.at += 1;
+        }
+        let (a, b) = (self.places.get(self.at)?, self.places.get(self.at + 1)?);
+        let (ua, ub) = (self.u(a), self.u(b));
+        let inside = ua <= u && u <= ub && ub - ua < self.gap && ub > ua;
+        inside.then(|| a.h + (b.h - a.h) * (u - ua) / (ub - ua))
+    }
+}
+
+/// Bottom of the parabola through the costs, with a part left out.
+fn lowest(costs: &[(f64, Cost)], without: Option<usize>) -> Option<f64> {
+    let points: Option<Vec<(f64, f64)>> =
+        costs.iter().map(|(d, c)| Some((*d, c.without(without.unwrap_or(usize::MAX))?))).collect();
+    let points = points?;
+    let centre = points[points.len() / 2].0;
+    let width = points.last()?.0 - centre;
+    let mut normal = Matrix3::zeros();
+    let mut right = Vec3::zeros();
+    for (d, c) in &points {
+        let x = (d - centre) / width;
+        let row = Vec3::new(1.0, x, x * x);
+        normal += row * row.transpose();
+        right += row * *c;
+    }
+    let p = normal.try_inverse()? * right;
+    (p.z > 0.0).then(|| centre - 0.5 * p.y / p.z * width)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A wave passed to and fro at 20 mm/s, seen `late` seconds late, 0.3 mm between shots, heights with 0.02 mm noise.
+    fn passed(late: f64, wave: f64) -> Vec<Vec<Passing>> {
+        let mut state = 7u64;
+        let mut noise = move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 11) as f64 / (1u64 << 53) as f64 - 0.5) * 0.02 * 12f64.sqrt()
+        };
+        let surface = |x: f64, w: f64| wave * ((x + 0.2 * w) / 4.0).sin();
+        let mut shots = Vec::new();
+        for (speed, from) in [(20.0, 0.0), (-20.0, 40.0)] {
+            for k in 0..130 {
+                let x = from + speed * f64::from(k) * 0.015;
+                let velocity = Vec3::new(speed, 0.0, 0.0);
+                let point = |j: u32| {
+                    let w = 0.25 * f64::from(j);
+                    // The world as it was when the picture was taken, at the pose of `late` afterwards.
+                    Passing { at: Vec3::new(x + speed * late, w, surface(x, w) + noise()), velocity }
+                };
+                shots.push((0..120).map(point).collect());
+            }
+        }
+        shots
+    }
+
+    #[test]
+    fn a_delay_is_found_by_what_went_to_and_fro() {
+        for late in [0.0, 3.7e-3, -0.02] {
+            let found = delay(&passed(late, 1.0), &Vec3::z()).unwrap();
+            let error = found.seconds - late;
+            assert!(error.abs() < 1e-4 && error.abs() < 4.0 * found.sigma_s + 2e-5, "{late}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn what_shows_no_delay_is_refused() {
+        let one_way: Vec<_> = passed(0.0, 1.0).into_iter().take(100).collect();
+        assert!(delay(&one_way, &Vec3::z()).unwrap_err().what.contains("one direction"));
+        assert!(delay(&[], &Vec3::z()).unwrap_err().what.contains("nothing moves"));
+        let flat = delay(&passed(0.0, 0.0), &Vec3::z());
+        assert!(flat.is_err() || flat.unwrap().sigma_s > 1e-3);
+    }
+}

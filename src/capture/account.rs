@@ -1,0 +1,236 @@
+//! In: the numbers of pictures as they come, incomplete ones, outages. Out: an account in which every picture that the camera sent
+//! stands under its own name.
+//! Frame and unit: pictures.
+
+use super::clock::now_ns;
+
+/// What became of every picture that the camera says it sent.
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub struct Account {
+    /// What the camera says it sent, or took: by its own counter, or by its numbers. With what an outage is reckoned to have cost.
+    pub sent: u64,
+    /// Came whole and in order.
+    pub complete: u64,
+    /// Came in part: packets were lost and did not come again. No picture.
+    pub incomplete: u64,
+    /// Never came: the camera, the cable or the network lost them.
+    pub missed: u64,
+    /// Came whole after a later one: order is kept, they are left out.
+    pub late: u64,
+    /// Packets that were asked for again and came; no pictures.
+    pub resent: u64,
+    /// Complete, and the memory for waiting pictures was full.
+    pub dropped_queue: u64,
+    /// Complete, and the disk was full or too slow.
+    pub dropped_disk: u64,
+    /// Complete, and passed over for a newer one or because processing was too slow.
+    pub dropped_processing: u64,
+    /// Complete, and nobody knows where what moves stood: left out and listed.
+    pub unpaired: u64,
+    /// Complete, and handed on: recorded, scanned or shown.
+    pub used: u64,
+    /// How often the camera was gone and came back.
+    pub outages: u64,
+}
+
+impl Account {
+    /// Pictures of which nobody says what became of them: 0, or the program is wrong.
+    pub fn unexplained(&self) -> i64 {
+        let [sent, arrived] = [self.sent, self.complete + self.incomplete + self.missed + self.late].map(|n| n as i64);
+        let after = self.dropped_queue + self.dropped_disk + self.dropped_processing + self.unpaired + self.used;
+        (sent - arrived).abs() + (self.complete as i64 - after as i64).abs()
+    }
+
+    /// All pictures that were dropped after they had come.
+    pub fn dropped(&self) -> u64 {
+        self.dropped_queue + self.dropped_disk + self.dropped_processing
+    }
+
+    /// Names and numbers, in order.
+    fn rows(&self) -> [(&'static str, u64); 12] {
+        [
+            ("sent", self.sent),
+            ("complete", self.complete),
+            ("incomplete", self.incomplete),
+            ("missed", self.missed),
+            ("late", self.late),
+            ("resent", self.resent),
+            ("dropped_queue", self.dropped_queue),
+            ("dropped_disk", self.dropped_disk),
+            ("dropped_processing", self.dropped_processing),
+            ("unpaired", self.unpaired),
+            ("used", self.used),
+            ("outages", self.outages),
+        ]
+    }
+
+    /// As Prometheus reads it.
+    pub fn prometheus(&self, camera: &str) -> String {
+        let camera = camera.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n");
+        let mut out = String::from("# HELP sheetlight_frames_total Pictures of a camera by what became of them.\n");
+        out += "# TYPE sheetlight_frames_total counter\n";
+        for (name, n) in self.rows() {
+            out += &format!("sheetlight_frames_total{{camera=\"{camera}\",fate=\"{name}\"}} {n}\n");
+        }
+        out
+    }
+}
+
+impl std::fmt::Display for Account {
+    /// What is not 0, in one line.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let rows = self.rows();
+        let shown = rows.iter().filter(|(name, n)| *n > 0 || matches!(*name, "sent" | "used"));
+        let words: Vec<String> = shown.map(|(name, n)| format!("{n} {}", name.replace('_', " by "))).collect();
+        f.write_str(&words.join(", "))
+    }
+}
+
+/// Follows the numbers of a camera's pictures.
+#[derive(Debug, Default)]
+pub struct Ledger {
+    account: Account,
+    /// The number that the next picture should have; none before the first, and after an outage.
+    expected: Option<u64>,
+    /// Accounted for since the camera was opened.
+    since_open: u64,
+    /// Host time of the last picture, and the usual time between two, ns.
+    last_ns: Option<u64>,
+    period_ns: Option<f64>,
+    /// The camera was gone since the last picture.
+    gone: bool,
+}
+
+/// What the number of a picture says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// It is the next one, or some before it are missing.
+    Next,
+    /// A later one was here before.
+    Late,
+}
+
+impl Ledger {
+    /// A whole picture came.
+    pub fn came(&mut self, id: u64, host_ns: u64) -> Order {
+        self.back(host_ns);
+        self.follow(host_ns);
+        let order = self.step(id);
+        match order {
+            Order::Next => self.account.complete += 1,
+            Order::Late => self.account.late += 1,
+        }
+        order
+    }
+
+    /// Part of a picture came.
+    pub fn came_in_part(&mut self, id: u64) {
+        self.back(now_ns());
+        self.step(id);
+        self.account.incomplete += 1;
+    }
+
+    /// Counts the numbers that were left out before this one; one that was counted as missed is so no more.
+    fn step(&mut self, id: u64) -> Order {
+        let expected = self.expected.unwrap_or(id);
+        if id < expected {
+            if self.account.missed > 0 {
+                self.account.missed -= 1;
+            } else {
+                self.since_open += 1;
+                self.account.sent += 1;
+            }
+            return Order::Late;
+        }
+        let new = id - expected + 1;
+        self.account.missed += new - 1;
+        self.account.sent += new;
+        self.since_open += new;
+        self.expected = Some(id + 1);
+        Order::Next
+    }
+
+    /// The camera is gone; its numbers may begin anew when it is back.
+    pub fn gone(&mut self) {
+        self.gone = true;
+        self.expected = None;
+        self.since_open = 0;
+    }
+
+    /// What the time since the last picture cost, at the usual rate.
+    fn back(&mut self, host_ns: u64) {
+        if !std::mem::take(&mut self.gone) {
+            return;
+        }
+        self.account.outages += 1;
+        let (Some(last), Some(period)) = (self.last_ns, self.period_ns) else { return };
+        let missed = ((host_ns.saturating_sub(last) as f64 / period).round() as u64).saturating_sub(1);
+        self.account.missed += missed;
+        self.account.sent += missed;
+        self.last_ns = None;
+    }
+
+    fn follow(&mut self, host_ns: u64) {
+        if let Some(last) = self.last_ns {
+            let step = host_ns.saturating_sub(last) as f64;
+            let period = self.period_ns.get_or_insert(step);
+            // Pauses and bursts move it little: each picture a twentieth of the way, at most by half.
+            *period += 0.05 * (step - *period).clamp(-0.5 * *period, 0.5 * *period);
+        }
+        self.last_ns = Some(host_ns);
+    }
+
+    /// What the camera itself says it has sent since it was opened: those it sent and nobody saw are missed.
+    pub fn says(&mut self, sent: u64) {
+        let unseen = sent.saturating_sub(self.since_open);
+        self.account.missed += unseen;
+        self.account.sent += unseen;
+        self.since_open += unseen;
+    }
+
+    /// Pictures a second, as they came lately.
+    pub fn rate_hz(&self) -> Option<f64> {
+        self.period_ns.filter(|p| *p > 0.0).map(|p| 1e9 / p)
+    }
+
+    /// The account so far, to be read and added to.
+    pub fn account(&mut self) -> &mut Account {
+        &mut self.account
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_number_is_accounted_for() {
+        let mut ledger = Ledger::default();
+        let orders: Vec<Order> = [5, 6, 9, 8, 12].iter().map(|id| ledger.came(*id, 1000 * id)).collect();
+        assert_eq!(orders, [Order::Next, Order::Next, Order::Next, Order::Late, Order::Next]);
+        ledger.came_in_part(11);
+        ledger.came_in_part(13);
+        ledger.says(12);
+        let a = ledger.account();
+        a.used = a.complete;
+        // 5..=16: 5 6 9 12 whole, 8 late, 11 and 13 in part; 7, 10, 14, 15, 16 never came.
+        assert_eq!((a.sent, a.complete, a.late, a.incomplete, a.missed), (12, 4, 1, 2, 5));
+        assert_eq!(a.unexplained(), 0);
+        a.used -= 1;
+        assert_eq!(a.unexplained(), 1);
+    }
+
+    #[test]
+    fn an_outage_costs_what_the_time_was_worth() {
+        let mut ledger = Ledger::default();
+        let ms = 1_000_000;
+        (0..50).for_each(|i| assert_eq!(ledger.came(i, i * 20 * ms), Order::Next));
+        ledger.gone();
+        // 10 s at 50 a second, then its numbers begin at 1 again.
+        assert_eq!(ledger.came(1, 49 * 20 * ms + 10_000 * ms), Order::Next);
+        let a = ledger.account();
+        a.used = a.complete;
+        assert_eq!((a.complete, a.missed, a.outages, a.sent), (51, 499, 1, 550));
+        assert_eq!(a.unexplained(), 0);
+    }
+}

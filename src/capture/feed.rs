@@ -1,0 +1,353 @@
+//! In: a source, a mode. Out: its pictures through a bounded queue, while a thread of its own asks for them; an account of all of them; a camera
+//! that went away and came back.
+//! Frame and unit: pictures, bytes; times in ns.
+
+use super::account::{Account, Ledger, Order};
+use super::clock::{ClockMap, now_ns};
+use super::format::Format;
+use super::picture::{Event, Picture, PictureSource};
+use crate::fault::{Fault, Result};
+use std::collections::VecDeque;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+/// Which pictures matter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// Every one, in order: recording and scanning.
+    All,
+    /// The newest: looking. One that was not taken before the next came is dropped.
+    Newest,
+}
+
+/// How a source is fed.
+#[derive(Clone, Debug)]
+pub struct FeedOptions {
+    /// Which pictures matter.
+    pub mode: Mode,
+    /// Memory for pictures that wait, bytes.
+    pub memory: usize,
+    /// How long a camera that went away is waited for; zero: not at all.
+    pub patience: Duration,
+    /// Ends after so many complete pictures.
+    pub shots: Option<u64>,
+    /// Ends after this time.
+    pub seconds: Option<f64>,
+    /// Set by somebody who wants it to end.
+    pub stop: Arc<AtomicBool>,
+}
+
+impl Default for FeedOptions {
+    fn default() -> Self {
+        let (mode, patience) = (Mode::All, Duration::from_secs(60));
+        FeedOptions { mode, memory: 256 << 20, patience, shots: None, seconds: None, stop: Arc::default() }
+    }
+}
+
+/// What becomes of a picture after it came.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fate {
+    /// Recorded, scanned or shown.
+    Used,
+    /// The disk was full or too slow.
+    Disk,
+    /// Processing was too slow.
+    Processing,
+    /// Nobody knows where what moves stood.
+    Unpaired,
+}
+
+/// What comes of waiting for a feed.
+#[derive(Debug)]
+pub enum Fed {
+    /// The next picture, or the newest.
+    Picture(Box<Picture>),
+    /// The time is over, nothing came.
+    Quiet,
+    /// Nothing will come any more, and why where it is nobody's wish.
+    Ended(Option<Fault>),
+}
+
+/// How often a wish to stop is looked for.
+const GLANCE: Duration = Duration::from_millis(100);
+/// From one attempt to bring a camera back to the next.
+const RETRY: Duration = Duration::from_millis(500);
+/// From one reading of the device's clock to the next, and how many at the beginning.
+const CLOCK: Duration = Duration::from_secs(1);
+const CLOCK_FIRST: usize = 8;
+
+#[derive(Default)]
+struct State {
+    pictures: VecDeque<Box<Picture>>,
+    bytes: usize,
+    ledger: Ledger,
+    clock: ClockMap,
+    resent: u64,
+    ended: bool,
+    fault: Option<Fault>,
+    /// What a person should hear of: the camera went, the camera is back.
+    said: Vec<String>,
+}
+
+#[derive(Default)]
+struct Shared {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// A source that is being read.
+pub struct Feed {
+    shared: Arc<Shared>,
+    format: Format,
+    name: String,
+    stop: Arc<AtomicBool>,
+    thread: Option<std::thread::JoinHandle<()>>,
+}
+
+impl Feed {
+    /// Starts asking.
+    ///
+    /// # Errors
+    /// No thread can be started.
+    pub fn start(source: Box<dyn PictureSource>, options: FeedOptions) -> Result<Feed> {
+        let (format, name) = (source.format(), source.name());
+        let shared = Arc::new(Shared::default());
+        let (theirs, stop) = (shared.clone(), Arc::new(AtomicBool::new(false)));
+        let reader =
+            Reader { source, shared: theirs, options, ours: stop.clone(), begun: Instant::now(), asked: None, came: 0 };
+        let thread = std::thread::Builder::new().name("camera".into()).spawn(move || reader.run());
+        let thread = Some(thread.map_err(|e| Fault::threads(&e))?);
+        Ok(Feed { shared, format, name, stop, thread })
+    }
+
+    /// Size and depth of all its pictures.
+    pub fn format(&self) -> Format {
+        self.format
+    }
+
+    /// What it is and where.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The next picture, waited for at most this long.
+    pub fn next(&self, within: Duration) -> Fed {
+        let until = Instant::now() + within;
+        let mut state = self.shared.lock();
+        loop {
+            if let Some(picture) = state.pictures.pop_front() {
+                state.bytes -= weight(&picture);
+                self.shared.changed.notify_all();
+                return Fed::Picture(picture);
+            }
+            if state.ended {
+                return Fed::Ended(state.fault.take());
+            }
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Fed::Quiet;
+            }
+            let waited = self.shared.changed.wait_timeout(state, left);
+            state = waited.unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    /// Notes what became of a picture that [`Feed::next`] gave.
+    pub fn fate(&self, fate: Fate) {
+        let mut state = self.shared.lock();
+        let a = state.ledger.account();
+        *match fate {
+            Fate::Used => &mut a.used,
+            Fate::Disk => &mut a.dropped_disk,
+            Fate::Processing => &mut a.dropped_processing,
+            Fate::Unpaired => &mut a.unpaired,
+        } += 1;
+    }
+
+    /// The account so far; pictures under way are complete and not yet anything more.
+    pub fn account(&self) -> Account {
+        let mut state = self.shared.lock();
+        let resent = state.resent;
+        Account { resent, ..state.ledger.account().clone() }
+    }
+
+    /// Pictures a second, as they came lately.
+    pub fn rate_hz(&self) -> Option<f64> {
+        self.shared.lock().ledger.rate_hz()
+    }
+
+    /// How the device's clock runs against the host's, as far as it is known.
+    pub fn clock(&self) -> ClockMap {
+        self.shared.lock().clock.clone()
+    }
+
+    /// Share of the memory for waiting pictures that is taken.
+    pub fn fill(&self) -> usize {
+        self.shared.lock().pictures.len()
+    }
+
+    /// What happened since it was asked last: the camera went, the camera is back.
+    pub fn news(&self) -> Vec<String> {
+        std::mem::take(&mut self.shared.lock().said)
+    }
+
+    /// Asks for no more; what waits can still be taken.
+    pub fn stop(&self) {
+        self.stop.store(true, Ordering::Relaxed);
+        self.shared.changed.notify_all();
+    }
+}
+
+impl Drop for Feed {
+    fn drop(&mut self) {
+        self.stop();
+        // A reader that waits inside a pipe is left alone: it ends with the pipe.
+        if let Some(thread) = self.thread.take().filter(|t| t.is_finished()) {
+            let _ = thread.join();
+        }
+    }
+}
+
+fn weight(picture: &Picture) -> usize {
+    Format::of(&picture.image).bytes() + std::mem::size_of::<Picture>()
+}
+
+/// The thread that asks.
+struct Reader {
+    source: Box<dyn PictureSource>,
+    shared: Arc<Shared>,
+    options: FeedOptions,
+    ours: Arc<AtomicBool>,
+    begun: Instant,
+    /// When the clock was read last.
+    asked: Option<Instant>,
+    came: u64,
+}
+
+impl Reader {
+    fn run(mut self) {
+        for _ in 0..CLOCK_FIRST {
+            self.read_clock();
+        }
+        let fault = loop {
+            if self.over() {
+                break None;
+            }
+            if self.asked.is_some_and(|a| a.elapsed() > CLOCK) {
+                self.read_clock();
+            }
+            match self.source.next(GLANCE) {
+                Event::Picture(picture) => self.take(picture),
+                Event::Incomplete { id, .. } => self.shared.lock().ledger.came_in_part(id),
+                Event::Quiet => {}
+                Event::Lost(fault) => {
+                    if let Err(fault) = self.bring_back(fault) {
+                        break fault;
+                    }
+                }
+                Event::Ended => {
+                    if let Some(sent) = self.source.sent() {
+                        self.shared.lock().ledger.says(sent);
+                    }
+                    break None;
+                }
+            }
+        };
+        let mut state = self.shared.lock();
+        (state.resent, state.ended, state.fault) = (self.source.resent(), true, fault);
+        self.shared.changed.notify_all();
+    }
+
+    fn stopped(&self) -> bool {
+        self.ours.load(Ordering::Relaxed) || self.options.stop.load(Ordering::Relaxed)
+    }
+
+    fn over(&self) -> bool {
+        let o = &self.options;
+        self.stopped()
+            || o.shots.is_some_and(|n| self.came >= n)
+            || o.seconds.is_some_and(|s| self.begun.elapsed().as_secs_f64() >= s)
+    }
+
+    fn read_clock(&mut self) {
+        // A device that does not answer is lost by its pictures, not by its clock.
+        if let Ok(Some(trip)) = self.source.clock() {
+            self.asked = Some(Instant::now());
+            self.shared.lock().clock.round_trip(trip);
+        }
+    }
+
+    fn take(&mut self, picture: Box<Picture>) {
+        let mut state = self.shared.lock();
+        state.resent = self.source.resent();
+        if let (Some(there), None) = (picture.device_ns, self.asked) {
+            state.clock.one_way(there + picture.exposure_ns.unwrap_or(0), picture.host_ns);
+        }
+        if state.ledger.came(picture.id, picture.host_ns) == Order::Late {
+            return;
+        }
+        self.came += 1;
+        let weight = weight(&picture);
+        match self.options.mode {
+            Mode::Newest => {
+                let passed = state.pictures.len() as u64;
+                state.ledger.account().dropped_processing += passed;
+                (state.bytes, _) = (0, state.pictures.drain(..).count());
+            }
+            Mode::All if self.source.waits() => {
+                while state.bytes + weight > self.options.memory && !state.pictures.is_empty() && !self.stopped() {
+                    let waited = self.shared.changed.wait_timeout(state, GLANCE);
+                    state = waited.unwrap_or_else(PoisonError::into_inner).0;
+                }
+            }
+            Mode::All => {
+                if state.bytes + weight > self.options.memory && !state.pictures.is_empty() {
+                    state.ledger.account().dropped_queue += 1;
+                    return;
+                }
+            }
+        }
+        state.bytes += weight;
+        state.pictures.push_back(picture);
+        self.shared.changed.notify_all();
+    }
+
+    /// Waits for a camera that went away. `Err` where it does not come back, with why unless somebody wanted the end.
+    fn bring_back(&mut self, fault: Fault) -> std::result::Result<(), Option<Fault>> {
+        if !self.source.reopens() || self.options.patience.is_zero() {
+            return Err(Some(fault));
+        }
+        let (since, gone) = (Instant::now(), now_ns());
+        {
+            let mut state = self.shared.lock();
+            if let Some(sent) = self.source.sent() {
+                state.ledger.says(sent);
+            }
+            state.ledger.gone();
+            state.clock = ClockMap::default();
+            state.said.push(format!("{}: gone: {}; waiting for it", self.source.name(), fault.what));
+        }
+        while since.elapsed() < self.options.patience {
+            if self.over() {
+                return Err(None);
+            }
+            if self.source.reopen().is_ok() {
+                let seconds = (now_ns() - gone) as f64 * 1e-9;
+                self.shared.lock().said.push(format!("{}: back after {seconds:.1} s", self.source.name()));
+                self.asked = None;
+                (0..CLOCK_FIRST).for_each(|_| self.read_clock());
+                return Ok(());
+            }
+            std::thread::sleep(RETRY);
+        }
+        let waited = self.options.patience.as_secs_f64();
+        Err(Some(Fault { what: format!("{}; not back within {waited:.0} s", fault.what), ..fault }))
+    }
+}

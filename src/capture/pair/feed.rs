@@ -1,0 +1,257 @@
+//! In: where poses come from. Out: a track of them that grows while a thread listens or asks.
+//! Frame and unit: base_from_flange, mm, or counts; the host's time in ns.
+
+use super::lines::{LONGEST, LineClock, Lines};
+use super::track::{Between, Sample, Track};
+use super::uri::PoseUri;
+use crate::capture::clock::{ClockMap, RoundTrip, now_ns, ns_of};
+use crate::capture::source::sim::{SimMotion, SimSpec};
+use crate::fault::{Fault, Result};
+use crate::recording::Stand;
+use std::io::{BufRead, BufReader, Read};
+use std::net::TcpStream;
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// From one question to a robot to the next: as often as most controllers answer.
+const ASK: Duration = Duration::from_millis(8);
+/// What a pose of the sender's own time may have been held up on its shortest way, 1 sigma, ns.
+const WAY: f64 = 2e5;
+/// From one attempt to reach a server again to the next.
+const RETRY: Duration = Duration::from_millis(500);
+
+#[derive(Default)]
+struct State {
+    track: Track,
+    fault: Option<Fault>,
+    said: Vec<String>,
+    came: u64,
+}
+
+/// Poses that come in.
+pub struct PoseFeed {
+    state: Arc<Mutex<State>>,
+    stop: Arc<AtomicBool>,
+}
+
+type Shared = (Arc<Mutex<State>>, Arc<AtomicBool>);
+
+fn lock(state: &Mutex<State>) -> MutexGuard<'_, State> {
+    state.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl PoseFeed {
+    /// Starts listening or asking. `sim` is what a simulated camera moves, where one is.
+    ///
+    /// # Errors
+    /// Nobody answers; no such file.
+    pub fn start(uri: &PoseUri, sim: Option<&SimSpec>) -> Result<PoseFeed> {
+        let shared: Shared = Default::default();
+        let theirs = (shared.0.clone(), shared.1.clone());
+        let thread = |work: Box<dyn FnOnce(Shared) + Send>| {
+            let name = std::thread::Builder::new().name("poses".into());
+            name.spawn(move || work(theirs)).map(|_| ()).map_err(|e| Fault::threads(&e))
+        };
+        match uri {
+            PoseUri::Tcp(address) => {
+                let (stream, address) = (connect(address)?, address.clone());
+                thread(Box::new(move |s| listen_again(stream, &address, &s)))?;
+            }
+            PoseUri::Lines(path) => {
+                let file = open(path)?;
+                // A named pipe is opened, and read, only when somebody writes into it.
+                let paced = !path.is_file();
+                thread(Box::new(move |s| {
+                    match file() {
+                        Ok(file) => drop(listen(file, &s, paced)),
+                        Err(fault) => lock(&s.0).fault = Some(fault),
+                    }
+                    lock(&s.0).track.end();
+                }))?;
+            }
+            PoseUri::Sim(word) => {
+                let spec = sim.ok_or_else(|| {
+                    Fault::usage(format!("{word}: poses of a simulated station, and the camera is another one"))
+                        .next("give the same word as --camera")
+                })?;
+                let motion = SimMotion::new(spec)?;
+                thread(Box::new(move |s| simulate(&motion, &s)))?;
+            }
+            PoseUri::Robot(uri) => {
+                let arm = crate::arm::open(uri)?;
+                let poses = arm.watch()?;
+                thread(Box::new(move |s| ask(poses, &s)))?;
+            }
+        }
+        Ok(PoseFeed { state: shared.0, stop: shared.1 })
+    }
+
+    /// Poses that somebody else puts in, for tests and for programs of their own.
+    pub fn of(samples: impl IntoIterator<Item = Sample>) -> PoseFeed {
+        let feed = PoseFeed { state: Arc::default(), stop: Arc::default() };
+        {
+            let mut state = lock(&feed.state);
+            samples.into_iter().for_each(|s| state.track.add(s));
+            state.track.end();
+        }
+        feed
+    }
+
+    /// Where it stood at a time of the host's; as [`Track::at`].
+    pub fn at(&self, ns: u64) -> Option<std::result::Result<Between, String>> {
+        lock(&self.state).track.at(ns)
+    }
+
+    /// Time of the last pose.
+    pub fn newest(&self) -> Option<u64> {
+        lock(&self.state).track.newest()
+    }
+
+    /// Why poses can be believed no more: the run ends with it.
+    pub fn fault(&self) -> Option<Fault> {
+        lock(&self.state).fault.clone()
+    }
+
+    /// What happened since it was asked last.
+    pub fn news(&self) -> Vec<String> {
+        std::mem::take(&mut lock(&self.state).said)
+    }
+
+    /// Poses that came.
+    pub fn came(&self) -> u64 {
+        lock(&self.state).came
+    }
+}
+
+impl Drop for PoseFeed {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+}
+
+fn add(shared: &Shared, sample: Sample) {
+    let mut state = lock(&shared.0);
+    state.track.add(sample);
+    state.came += 1;
+}
+
+fn connect(address: &str) -> Result<TcpStream> {
+    TcpStream::connect(address).map_err(|e| {
+        Fault::input(format!("{address}: nobody sends poses there: {e}"))
+            .cause("the sender is not running, or the port is another")
+            .next("start it first; it has to listen, and to write a line for each pose (docs/live.md)")
+    })
+}
+
+/// A file is looked at now, opened by the thread.
+fn open(path: &Path) -> Result<impl FnOnce() -> Result<std::fs::File> + Send + 'static> {
+    std::fs::metadata(path).map_err(|e| Fault::read(path, e))?;
+    let path = path.to_owned();
+    Ok(move || std::fs::File::open(&path).map_err(|e| Fault::read(&path, e)))
+}
+
+fn listen_again(stream: TcpStream, address: &str, shared: &Shared) {
+    let mut stream = Some(stream);
+    while !shared.1.load(Ordering::Relaxed) && lock(&shared.0).fault.is_none() {
+        if let Some(stream) = stream.take() {
+            let why = listen(stream, shared, true);
+            let mut state = lock(&shared.0);
+            state.track.cut();
+            state.said.push(format!("{address}: the stream of poses ended ({why}); asking again"));
+        }
+        std::thread::sleep(RETRY);
+        stream = connect(address).ok();
+    }
+}
+
+/// Reads lines to the end; says how it ended.
+fn listen(stream: impl Read, shared: &Shared, paced: bool) -> String {
+    let (mut reader, mut lines, mut clock) = (BufReader::new(stream), Lines::default(), ClockMap::default());
+    let mut line = Vec::new();
+    loop {
+        line.clear();
+        if shared.1.load(Ordering::Relaxed) {
+            return "stopped".into();
+        }
+        match (&mut reader).take(LONGEST as u64).read_until(b'\n', &mut line) {
+            Err(e) => return e.to_string(),
+            Ok(0) => return "closed".into(),
+            // Half a line is no pose: its last number may have lost digits.
+            Ok(n) if line.last() != Some(&b'\n') => {
+                let what = if n == LONGEST {
+                    "a line without an end"
+                } else {
+                    "closed in the middle of a line, which is left out"
+                };
+                return what.into();
+            }
+            Ok(_) => {}
+        }
+        let here = now_ns();
+        let told = match lines.read(&String::from_utf8_lossy(&line), here, paced) {
+            Ok(Some(told)) => told,
+            Ok(None) => continue,
+            Err(fault) => {
+                let said = fault.what.clone();
+                let mut state = lock(&shared.0);
+                state.fault = Some(fault);
+                state.track.end();
+                return said;
+            }
+        };
+        let (ns, sigma_ns) = match lines.clock() {
+            LineClock::Unix => (told.t_ns, 0.0),
+            LineClock::Own => {
+                let before = clock.jumps();
+                clock.one_way(told.t_ns, here);
+                if clock.jumps() > before {
+                    let mut state = lock(&shared.0);
+                    state.track.cut();
+                    state.said.push("the clock of the poses jumped: nothing is told across it".into());
+                }
+                let moment = clock.host(told.t_ns).expect("a reading was taken in");
+                (moment.ns as u64, moment.sigma_ns.max(WAY))
+            }
+        };
+        add(shared, Sample { ns, sigma_ns, stand: told.stand });
+    }
+}
+
+fn simulate(motion: &SimMotion, shared: &Shared) {
+    while !shared.1.load(Ordering::Relaxed) {
+        let ns = now_ns();
+        add(shared, Sample { ns, sigma_ns: 0.0, stand: motion.stand(ns) });
+        std::thread::sleep(ASK / 2);
+    }
+}
+
+fn ask(mut poses: Box<dyn crate::arm::PoseSource>, shared: &Shared) {
+    let mut clock = ClockMap::default();
+    while !shared.1.load(Ordering::Relaxed) {
+        match poses.pose() {
+            Ok(pose) => {
+                let (before_ns, after_ns) = (ns_of(pose.asked), ns_of(pose.here));
+                let plain =
+                    || (before_ns + (after_ns - before_ns) / 2, 0.5 * (after_ns - before_ns) as f64 / 3f64.sqrt());
+                let (ns, sigma_ns) = match pose.device.map(|d| d.as_nanos() as u64) {
+                    // The controller's own time: its resolution, often a millisecond, is what is left.
+                    Some(there_ns) => {
+                        clock.round_trip(RoundTrip { before_ns, there_ns, after_ns });
+                        clock.host(there_ns).map_or_else(plain, |m| (m.ns as u64, m.sigma_ns))
+                    }
+                    None => plain(),
+                };
+                add(shared, Sample { ns, sigma_ns, stand: Stand::Robot(pose.base_from_flange) });
+            }
+            Err(fault) => {
+                let mut state = lock(&shared.0);
+                state.said.push(fault.what.clone());
+                state.track.end();
+                return;
+            }
+        }
+        std::thread::sleep(ASK / 2);
+    }
+}

@@ -1,0 +1,19 @@
+//! In: pictures, and what tells where things stood: by stillness, by number, by time. Out: the two brought together, or the picture left
+//! out with the reason. Nothing is extrapolated.
+//! Frame and unit: base_from_flange, mm; counts; times in ns.
+
+mod feed;
+mod lines;
+mod pairer;
+mod step;
+mod table;
+mod track;
+mod uri;
+
+pub use feed::PoseFeed;
+pub use lines::{Lines, Told};
+pub use pairer::{LeftOut, Outcome, Paired, Pairer, Way};
+pub use step::Still;
+pub use table::Table;
+pub use track::{Between, Sample, Track};
+pub use uri::PoseUri;

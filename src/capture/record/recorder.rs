@@ -1,0 +1,260 @@
+//! In: pictures in order, what is known of each. Out: a recording folder: meta.json at once, then each picture before its line of frames.jsonl, so
+//! that whatever stops the program leaves a recording of all that was written.
+//! Frame and unit: docs/file-formats.md; raw frames as `RawFormat` has them.
+
+use super::super::format::{Format, raw_bytes};
+use super::super::pair::LeftOut;
+use crate::fault::{Fault, Result};
+use crate::files::{Append, Lock};
+use crate::raster::{Image, Response};
+use crate::recording::{Beam, FrameRef, ImageSpec, Meta, Motion, Stand, Taken, raw_name};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// What pictures are stored as.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Store {
+    /// PNG, and raw frames where PNG is too slow.
+    #[default]
+    Auto,
+    /// PNG.
+    Png,
+    /// One file of raw frames.
+    Raw,
+}
+
+impl std::str::FromStr for Store {
+    type Err = String;
+    fn from_str(s: &str) -> std::result::Result<Store, String> {
+        match s {
+            "auto" => Ok(Store::Auto),
+            "png" => Ok(Store::Png),
+            "raw" => Ok(Store::Raw),
+            _ => Err(format!("'{s}': auto, png or raw")),
+        }
+    }
+}
+
+/// What pictures show.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Shows {
+    /// The stripe.
+    #[default]
+    Line,
+    /// The pointer's spot.
+    Pointer,
+    /// A board in room light, the lasers off.
+    Room,
+}
+
+impl std::str::FromStr for Shows {
+    type Err = String;
+    fn from_str(s: &str) -> std::result::Result<Shows, String> {
+        match s {
+            "line" => Ok(Shows::Line),
+            "pointer" => Ok(Shows::Pointer),
+            "room" => Ok(Shows::Room),
+            _ => Err(format!("'{s}': line, pointer or room")),
+        }
+    }
+}
+
+/// How is recorded.
+#[derive(Clone, Debug, Default)]
+pub struct RecorderOptions {
+    /// Name for what is recorded.
+    pub set: String,
+    /// What moves; none where nothing does.
+    pub motion: Option<Motion>,
+    /// What pictures show.
+    pub shows: Shows,
+    /// What they are stored as.
+    pub store: Store,
+}
+
+/// From one wait for the disk to the next: what a power cut may cost.
+const SYNC: Duration = Duration::from_secs(1);
+/// Pictures wait: from so many on PNG is too slow.
+const HURRY: usize = 4;
+const FRAMES: &str = "frames.jsonl";
+const RAW: &str = "pictures.raw";
+
+/// Where a picture went.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Kept {
+    /// Name in the recording.
+    pub name: String,
+    /// Place in it, from 0.
+    pub index: usize,
+}
+
+/// A recording that is being written.
+pub struct Recorder {
+    folder: PathBuf,
+    format: Format,
+    options: RecorderOptions,
+    frames: Append,
+    raw: Option<Append>,
+    raws: u64,
+    count: usize,
+    bytes: u64,
+    synced: Instant,
+    _lock: Lock,
+}
+
+impl Recorder {
+    /// Makes the folder and its meta.json.
+    ///
+    /// # Errors
+    /// A folder that holds a recording, that another recorder writes into, or that cannot be written.
+    pub fn create(folder: &Path, format: Format, options: RecorderOptions) -> Result<Recorder> {
+        crate::files::make_folder(folder)?;
+        let lock = Lock::take(folder, "record", "recorder")?;
+        let meta_path = folder.join("meta.json");
+        if meta_path.exists() || folder.join(FRAMES).exists() {
+            return Err(Fault::output(format!("{}: holds a recording", folder.display()))
+                .cause("the same --out was given before")
+                .next("record into another folder"));
+        }
+        let meta = meta(format, &options);
+        let text = serde_json::to_string_pretty(&meta).expect("plain data");
+        let frames = Append::create(&folder.join(FRAMES))?;
+        crate::files::write(&meta_path, text.as_bytes())?;
+        let (raw, raws, count, bytes) = (None, 0, 0, 0);
+        let synced = Instant::now();
+        Ok(Recorder {
+            folder: folder.to_owned(),
+            format,
+            options,
+            frames,
+            raw,
+            raws,
+            count,
+            bytes,
+            synced,
+            _lock: lock,
+        })
+    }
+
+    /// Adds a picture; `waiting` says how many wait behind it. When this returns, other programs can read it.
+    ///
+    /// # Errors
+    /// The disk does not take it: it is no part of the recording, which is whole without it.
+    pub fn add(&mut self, image: &Image, stand: Option<&Stand>, taken: Taken, waiting: usize) -> Result<Kept> {
+        let raw = match self.options.store {
+            Store::Raw => true,
+            Store::Png => false,
+            Store::Auto => waiting >= HURRY,
+        };
+        let name = if raw { self.add_raw(image)? } else { self.add_png(image)? };
+        let (laser, ambient) =
+            if self.options.shows == Shows::Room { (None, Some(name.clone())) } else { (Some(name.clone()), None) };
+        let count = stand.and_then(|s| if let Stand::Count(c) = s { Some(*c) } else { None });
+        let frame = FrameRef { laser, ambient, count, taken: Some(taken), ..FrameRef::default() };
+        let mut line = serde_json::to_string(&frame).expect("plain data");
+        line.push('\n');
+        self.frames.add(line.as_bytes())?;
+        self.bytes += line.len() as u64;
+        self.count += 1;
+        if self.synced.elapsed() > SYNC {
+            self.sync()?;
+        }
+        Ok(Kept { name, index: self.count - 1 })
+    }
+
+    fn add_raw(&mut self, image: &Image) -> Result<String> {
+        if self.raw.is_none() {
+            self.raw = Some(Append::create(&self.folder.join(RAW))?);
+        }
+        let bytes = raw_bytes(image);
+        let raw = self.raw.as_mut().expect("made above");
+        raw.add(&bytes)?;
+        self.bytes += bytes.len() as u64;
+        self.raws += 1;
+        Ok(raw_name(RAW, self.raws - 1))
+    }
+
+    fn add_png(&mut self, image: &Image) -> Result<String> {
+        let kind = if self.options.shows == Shows::Room { "ambient" } else { "laser" };
+        let name = format!("{kind}_{:06}.png", self.count);
+        let path = self.folder.join(&name);
+        let bytes = crate::raster::png(image);
+        crate::files::write_unsynced(&path, &bytes)?;
+        self.bytes += bytes.len() as u64;
+        Ok(name)
+    }
+
+    fn sync(&mut self) -> Result<()> {
+        self.synced = Instant::now();
+        self.raw.as_ref().map_or(Ok(()), Append::sync)?;
+        self.frames.sync()
+    }
+
+    /// Pictures so far.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Bytes so far.
+    pub fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// Size and depth of its pictures.
+    pub fn format(&self) -> Format {
+        self.format
+    }
+
+    /// Where it writes.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// What its meta.json says.
+    pub fn meta(&self) -> Meta {
+        meta(self.format, &self.options)
+    }
+
+    /// Waits until all of it is on the disk, and lists what was left out.
+    ///
+    /// # Errors
+    /// The disk does not take it; what was there before stays.
+    pub fn finish(mut self, left_out: &[LeftOut]) -> Result<usize> {
+        self.sync()?;
+        if !left_out.is_empty() {
+            let text = serde_json::to_string_pretty(left_out).expect("plain data");
+            crate::files::write(&self.folder.join("left_out.json"), text.as_bytes())?;
+        }
+        Ok(self.count)
+    }
+}
+
+fn meta(format: Format, options: &RecorderOptions) -> Meta {
+    let beam = match options.shows {
+        Shows::Line => Some(Beam::Line),
+        Shows::Pointer => Some(Beam::Pointer),
+        Shows::Room => None,
+    };
+    let response = Response::Linear;
+    let pixel_centre = "integer coordinates".into();
+    let Format { width, height, bits } = format;
+    Meta {
+        format: 1,
+        set: options.set.clone(),
+        units: "mm".into(),
+        image: ImageSpec { width, height, bits, channels: 1, response, pixel_centre },
+        beam,
+        board: None,
+        boards: vec![],
+        ambient: None,
+        frames: vec![],
+        frames_file: Some(FRAMES.into()),
+        motion: options.motion.clone(),
+        pose_file: None,
+        pose_files: Default::default(),
+        part: None,
+        model: None,
+        target: None,
+        distance_definition: None,
+    }
+}

@@ -1,0 +1,178 @@
+//! In: a folder that another program fills with pictures. Out: each picture once it is complete: its size has settled and it decodes.
+//! Frame and unit: the host's time at which it was seen complete, ns.
+
+use crate::capture::clock::now_ns;
+use crate::capture::format::Format;
+use crate::capture::picture::{Event, Picture, PictureSource};
+use crate::fault::{Fault, Result};
+use crate::raster::{Channel, load};
+use notify::Watcher;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
+
+/// A picture whose size did not change for this long is complete, or spoilt.
+const SETTLED: Duration = Duration::from_millis(60);
+/// A picture that does not decode is given up after this time.
+const SPOILT: Duration = Duration::from_secs(2);
+const KINDS: [&str; 7] = ["png", "jpg", "jpeg", "tif", "tiff", "bmp", "pgm"];
+
+/// A folder as a camera.
+pub struct FolderCamera {
+    folder: PathBuf,
+    bits: u8,
+    format: Format,
+    _watcher: notify::RecommendedWatcher,
+    changes: Receiver<notify::Result<notify::Event>>,
+    /// Names that were there before, or were given.
+    done: BTreeSet<PathBuf>,
+    /// Size when looked at last, when it changed last, when it was first seen.
+    growing: BTreeMap<PathBuf, (u64, Instant, Instant)>,
+    next: u64,
+    looked: Instant,
+    /// The first picture, which told the format.
+    first: Option<Box<Picture>>,
+}
+
+impl FolderCamera {
+    /// Waits up to `patience` for the first new picture, which tells the format. `bits` is the sensor's depth of 16-bit files.
+    ///
+    /// # Errors
+    /// No folder, no picture within the time, one that is no grey level picture of that depth.
+    pub fn open(folder: &Path, bits: u8, patience: Duration) -> Result<FolderCamera> {
+        let (send, changes) = channel();
+        let cannot = |e: &dyn std::fmt::Display| {
+            Fault::input(format!("{}: cannot be watched: {e}", folder.display()))
+                .cause("the folder is not there, or the limit of watched folders is reached")
+                .next("make the folder before the other program fills it")
+        };
+        let mut watcher = notify::recommended_watcher(send).map_err(|e| cannot(&e))?;
+        watcher.watch(folder, notify::RecursiveMode::NonRecursive).map_err(|e| cannot(&e))?;
+        let done = pictures(folder)?.into_iter().collect();
+        let mut camera = FolderCamera {
+            folder: folder.to_owned(),
+            bits,
+            format: Format { width: 1, height: 1, bits },
+            _watcher: watcher,
+            changes,
+            done,
+            growing: BTreeMap::new(),
+            next: 0,
+            looked: Instant::now(),
+            first: None,
+        };
+        match camera.wait(patience) {
+            Event::Picture(first) => {
+                camera.format = Format::of(&first.image);
+                camera.first = Some(first);
+                Ok(camera)
+            }
+            Event::Incomplete { why, .. } => Err(Fault::input(why)
+                .cause("another depth than the one stated, or the other program writes no pictures")
+                .next("state the sensor's depth: folder:PATH?bits=12")),
+            _ => Err(Fault::input(format!("{}: no new picture within {} s", folder.display(), patience.as_secs()))
+                .cause("the other program writes elsewhere, or is not running")
+                .next("start it, or give the folder that it fills")),
+        }
+    }
+
+    /// The next complete picture by name, or one that is given up.
+    fn wait(&mut self, within: Duration) -> Event {
+        let until = Instant::now() + within;
+        loop {
+            if self.looked.elapsed() > SETTLED / 2 {
+                if let Some(event) = self.look() {
+                    return event;
+                }
+            }
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Event::Quiet;
+            }
+            // A change wakes; so does the time in which a size settles.
+            let _ = self.changes.recv_timeout(left.min(SETTLED / 2));
+            while self.changes.try_recv().is_ok() {}
+        }
+    }
+
+    fn look(&mut self) -> Option<Event> {
+        self.looked = Instant::now();
+        let names = match pictures(&self.folder) {
+            Ok(names) => names,
+            Err(fault) => return Some(Event::Lost(fault)),
+        };
+        for path in names.into_iter().filter(|p| !self.done.contains(p)) {
+            let size = std::fs::metadata(&path).map_or(0, |m| m.len());
+            let now = Instant::now();
+            let seen = self.growing.entry(path.clone()).or_insert((size, now, now));
+            if seen.0 != size {
+                (seen.0, seen.1) = (size, now);
+            }
+            // In order of the names: one that is being written holds back those after it.
+            if seen.1.elapsed() < SETTLED {
+                return None;
+            }
+            let given_up = seen.2.elapsed() > SPOILT;
+            match load(&path, Channel::default(), self.bits) {
+                Ok(image) if self.next == 0 || Format::of(&image) == self.format => {
+                    let host_ns = now_ns();
+                    let id = self.over(path);
+                    let picture =
+                        Picture { image, id, device_ns: None, host_ns, exposure_ns: None, count: None, stand: None };
+                    return Some(Event::Picture(Box::new(picture)));
+                }
+                Ok(image) => {
+                    let why =
+                        format!("{}: is {}, the first one was {}", path.display(), Format::of(&image), self.format);
+                    return Some(Event::Incomplete { id: self.over(path), why });
+                }
+                Err(fault) if given_up => return Some(Event::Incomplete { id: self.over(path), why: fault.what }),
+                Err(_) => return None,
+            }
+        }
+        None
+    }
+
+    fn over(&mut self, path: PathBuf) -> u64 {
+        self.growing.remove(&path);
+        self.done.insert(path);
+        self.next += 1;
+        self.next - 1
+    }
+}
+
+/// The pictures of a folder, in the order people count in; names that begin with a dot are being written.
+fn pictures(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder).map_err(|e| Fault::read(folder, e))?;
+    let kind = |p: &Path| p.extension().is_some_and(|e| KINDS.contains(&&*e.to_string_lossy().to_lowercase()));
+    let hidden = |p: &Path| p.file_name().is_some_and(|n| n.to_string_lossy().starts_with('.'));
+    let mut all: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(|p| kind(p) && !hidden(p)).collect();
+    all.sort_by_cached_key(|p| crate::files::natural(&p.to_string_lossy()));
+    Ok(all)
+}
+
+impl PictureSource for FolderCamera {
+    fn format(&self) -> Format {
+        self.format
+    }
+
+    fn next(&mut self, within: Duration) -> Event {
+        match self.first.take() {
+            Some(first) => Event::Picture(first),
+            None => self.wait(within),
+        }
+    }
+
+    fn sent(&self) -> Option<u64> {
+        Some(self.next)
+    }
+
+    fn waits(&self) -> bool {
+        true
+    }
+
+    fn name(&self) -> String {
+        format!("folder:{}", self.folder.display())
+    }
+}

@@ -1,0 +1,320 @@
+//! In: a GigE Vision camera. Out: its pictures, incomplete ones told; its features; its clock.
+//! Frame and unit: the camera's clock in ns.
+
+use super::find::find;
+use super::pixels::{depth, unpack};
+use crate::capture::clock::{RoundTrip, now_ns};
+use crate::capture::feature::{Feature, Range, Value};
+use crate::capture::format::Format;
+use crate::capture::picture::{Event, Picture, PictureSource};
+use crate::fault::{Fault, Result};
+use std::time::{Duration, Instant};
+use viva_genicam::genapi::FeatureValue;
+use viva_genicam::{Camera, ControlState, FrameStream, GenicamError, GigeRegisterIo, StreamOptions, blocking};
+
+/// Nothing came for this long: it is asked whether the camera is still there.
+const SILENCE: Duration = Duration::from_secs(1);
+/// Packets that fit every network that was not set up for more, bytes.
+const USUAL_PACKET: u32 = 1500;
+const LATCH: [&str; 3] = ["GevTimestampControlLatch", "TimestampControlLatch", "TimestampLatch"];
+const CLOCK: [&str; 3] = ["GevTimestampValue", "TimestampValue", "TimestampLatchValue"];
+const TICKS: [&str; 2] = ["GevTimestampTickFrequency", "TimestampTickFrequency"];
+const EXPOSURE: [&str; 2] = ["ExposureTime", "ExposureTimeAbs"];
+const FORMER: [(&str, &str); 5] = [
+    ("ExposureTime", "ExposureTimeAbs"),
+    ("Gain", "GainRaw"),
+    ("AcquisitionFrameRate", "AcquisitionFrameRateAbs"),
+    ("TriggerDelay", "TriggerDelayAbs"),
+    ("AcquisitionFrameRateEnable", "AcquisitionFrameRateEnabled"),
+];
+const CHUNKS: [&str; 4] = ["ChunkCounterValue", "ChunkEncoderValue", "ChunkLineStatusAll", "ChunkEncoderStatusValue"];
+
+/// A camera on the network.
+pub struct GigeCamera {
+    word: String,
+    packet: Option<u32>,
+    camera: Camera<GigeRegisterIo>,
+    stream: Option<FrameStream>,
+    format: Format,
+    pixel_format: String,
+    exposure_ns: Option<u64>,
+    /// ns a tick of its clock.
+    tick_ns: f64,
+    latch: Option<(&'static str, &'static str)>,
+    chunk: Option<&'static str>,
+    resent: u64,
+    heard: Instant,
+}
+
+fn said(what: &str, e: &GenicamError) -> Fault {
+    let text = e.to_string();
+    let denied = text.to_uppercase().contains("ACCESS_DENIED") || text.contains("access denied");
+    let fault = Fault::input(format!("{what}: {text}"));
+    if denied {
+        return fault
+            .cause("the camera is in use: another program has control of it")
+            .next("end the other program (a viewer, another sheetlight), or wait until its heartbeat runs out");
+    }
+    fault
+        .cause("the network, or a camera that does it in another way than the standard")
+        .next("see what it answers: sheetlight camera show")
+}
+
+impl GigeCamera {
+    /// Takes control of the camera; it sends nothing yet. `packet`: bytes of a packet; none: as large as the network carries.
+    ///
+    /// # Errors
+    /// No such camera, or one that is in use, or whose pixels are not grey.
+    pub fn open(word: &str, packet: Option<u32>) -> Result<GigeCamera> {
+        let device = find(word)?;
+        let camera = blocking::connect(&device).map_err(|e| said(&format!("gige://{word}"), &e))?;
+        // A packet of a loopback's size never comes through whole.
+        let packet = packet.or(device.ip.is_loopback().then_some(USUAL_PACKET));
+        let mut camera = GigeCamera {
+            word: word.into(),
+            packet,
+            camera,
+            stream: None,
+            format: Format { width: 1, height: 1, bits: 8 },
+            pixel_format: String::new(),
+            exposure_ns: None,
+            tick_ns: 1.0,
+            latch: None,
+            chunk: None,
+            resent: 0,
+            heard: Instant::now(),
+        };
+        camera.look()?;
+        Ok(camera)
+    }
+
+    /// Reads what pictures will be like.
+    fn look(&mut self) -> Result<()> {
+        let at = format!("gige://{}", self.word);
+        let read = |name: &str| self.camera.get_integer(name).map_err(|e| said(&format!("{at}: {name}"), &e));
+        let size = |v: i64| u32::try_from(v).ok().filter(|v| (1..=65_535).contains(v));
+        let (width, height) = (read("Width")?, read("Height")?);
+        let (Some(width), Some(height)) = (size(width), size(height)) else {
+            return Err(Fault::input(format!("{at}: says its pictures are {width}x{height}")).next("reset the camera"));
+        };
+        self.pixel_format = self.camera.get_enum("PixelFormat").map_err(|e| said(&format!("{at}: PixelFormat"), &e))?;
+        self.format = Format { width, height, bits: depth(&self.pixel_format).map_err(|e| e.at(&at))? };
+        let exposure = EXPOSURE.iter().find_map(|name| self.camera.get_float(name).ok());
+        self.exposure_ns = exposure.filter(|us| (0.0..1e9).contains(us)).map(|us| (1e3 * us) as u64);
+        let ticks = TICKS.iter().find_map(|name| self.camera.get_integer(name).ok()).filter(|hz| *hz > 0);
+        self.tick_ns = ticks.map_or(1.0, |hz| 1e9 / hz as f64);
+        let has = |name: &&&str| self.camera.nodemap().node(name).is_some();
+        let pair = (LATCH.iter().find(has), CLOCK.iter().find(has));
+        self.latch = if let (Some(latch), Some(clock)) = pair { Some((latch, clock)) } else { None };
+        self.chunk = CHUNKS.iter().find(has).copied();
+        Ok(())
+    }
+
+    /// Has the camera send.
+    fn start(&mut self) -> Result<()> {
+        let at = format!("gige://{}", self.word);
+        let options = StreamOptions::new();
+        let options = match self.packet {
+            Some(size) => options.packet_size(size),
+            None => options.auto_packet_size(),
+        };
+        let mut stream = self.camera.open_stream(options).map_err(|e| said(&at, &e))?;
+        stream.set_deliver_incomplete(true);
+        self.camera.acquisition_start().map_err(|e| said(&at, &e))?;
+        self.stream = Some(stream);
+        self.heard = Instant::now();
+        Ok(())
+    }
+
+    fn ns(&self, ticks: u64) -> u64 {
+        if self.tick_ns == 1.0 { ticks } else { (ticks as f64 * self.tick_ns) as u64 }
+    }
+
+    /// The encoder's or a counter's value that the picture brought along.
+    fn chunk_count(&mut self, frame: &viva_genicam::Frame) -> Option<i64> {
+        let name = self.chunk?;
+        frame.chunks.as_ref()?;
+        self.camera.with_chunks(frame, |camera| camera.get_integer(name).ok())
+    }
+
+    fn taken(&mut self, frame: viva_genicam::Frame) -> Event {
+        self.heard = Instant::now();
+        let (id, host_ns) = (frame.block_id, now_ns());
+        if !frame.is_complete() {
+            return Event::Incomplete { id, why: format!("{:?}", frame.status) };
+        }
+        let count = self.chunk_count(&frame);
+        let format = frame.pixel_format.name().unwrap_or(&self.pixel_format).to_owned();
+        let image = unpack(&format, frame.width, frame.height, usize::from(frame.padding_x), &frame.payload);
+        match image {
+            Ok(image) if Format::of(&image) == self.format => {
+                let device_ns = frame.ts_dev.map(|t| self.ns(t));
+                let exposure_ns = self.exposure_ns;
+                Event::Picture(Box::new(Picture { image, id, device_ns, host_ns, exposure_ns, count, stand: None }))
+            }
+            Ok(image) => {
+                Event::Incomplete { id, why: format!("is {}, the camera said {}", Format::of(&image), self.format) }
+            }
+            Err(fault) => Event::Incomplete { id, why: fault.what },
+        }
+    }
+}
+
+impl PictureSource for GigeCamera {
+    fn format(&self) -> Format {
+        self.format
+    }
+
+    fn next(&mut self, within: Duration) -> Event {
+        if self.stream.is_none() {
+            if let Err(fault) = self.start() {
+                return Event::Lost(fault);
+            }
+        }
+        let stream = self.stream.as_mut().expect("started above");
+        let got = stream.next_frame_blocking(within);
+        self.resent = stream.stats().resend_recovered;
+        let gone = |what: String| {
+            Event::Lost(
+                Fault::input(what)
+                    .cause("its cable or power is out, or another program took it")
+                    .next("plug it in; a running command goes on by itself"),
+            )
+        };
+        match got {
+            Ok(Some(frame)) => self.taken(frame),
+            Ok(None) => gone(format!("gige://{}: the stream ended", self.word)),
+            Err(GenicamError::Timeout(_)) => {
+                if self.heard.elapsed() < SILENCE {
+                    return Event::Quiet;
+                }
+                self.heard = Instant::now();
+                // A camera that waits for a trigger is silent and answers.
+                let there = self.camera.transport().control_state() == ControlState::Held;
+                self.camera.invalidate("Width");
+                match self.camera.get_integer("Width") {
+                    Ok(_) if there => Event::Quiet,
+                    Ok(_) => gone(format!("gige://{}: control of the camera was lost", self.word)),
+                    Err(e) => gone(format!("gige://{}: does not answer: {e}", self.word)),
+                }
+            }
+            Err(e) => gone(format!("gige://{}: {e}", self.word)),
+        }
+    }
+
+    fn resent(&self) -> u64 {
+        self.resent
+    }
+
+    fn clock(&mut self) -> Result<Option<RoundTrip>> {
+        let Some((latch, value)) = self.latch else { return Ok(None) };
+        let at = |e: GenicamError| said("the camera's clock", &e);
+        let before_ns = now_ns();
+        self.camera.execute_command(latch).map_err(at)?;
+        let after_ns = now_ns();
+        self.camera.invalidate(value);
+        let ticks = self.camera.get_integer(value).map_err(at)?;
+        Ok(Some(RoundTrip { before_ns, there_ns: self.ns(ticks.max(0) as u64), after_ns }))
+    }
+
+    fn reopens(&self) -> bool {
+        true
+    }
+
+    fn reopen(&mut self) -> Result<()> {
+        self.stream = None;
+        let device = find(&self.word)?;
+        self.camera = blocking::connect(&device).map_err(|e| said(&format!("gige://{}", self.word), &e))?;
+        let former = self.format;
+        self.look()?;
+        if self.format != former {
+            return Err(Fault::input(format!("the camera is {} now, was {former}", self.format)).next("start again"));
+        }
+        self.start()
+    }
+
+    fn features(&mut self) -> Result<Vec<Feature>> {
+        // What stands in a category is for people; the rest is how the camera's file reckons.
+        let listed = self.camera.nodemap().categories().into_iter().flat_map(|(_, names)| names.to_vec());
+        let mut names: Vec<String> = listed.collect();
+        names.sort();
+        names.dedup();
+        let all: Vec<Feature> = names.iter().filter_map(|name| self.feature(name)).collect();
+        Ok(all)
+    }
+
+    fn set(&mut self, name: &str, value: &str) -> Result<()> {
+        let name = self.own_name(name);
+        let Some(feature) = self.feature(name) else {
+            return Err(Fault::usage(format!("gige://{}: has no feature {name}", self.word))
+                .cause("a misspelt name, or a camera without it")
+                .next("see what it has: sheetlight camera show"));
+        };
+        let refuse = |why: String| {
+            Err(Fault::usage(format!("{name} cannot be set to {value}: {why}"))
+                .cause("the camera's limits, which may follow from other settings")
+                .next("see values, units and ranges: sheetlight camera show"))
+        };
+        match (&feature.range, value.parse::<f64>()) {
+            (Range::Between(low, high), Ok(v)) if !(*low..=*high).contains(&v) => {
+                return refuse(format!("allowed is {low} to {high} {}", feature.unit));
+            }
+            (Range::OneOf(words), _) if !words.iter().any(|w| w == value) => {
+                return refuse(format!("allowed are {}", words.join(", ")));
+            }
+            _ => {}
+        }
+        if !feature.writable {
+            return refuse("it can only be read now".into());
+        }
+        if feature.value == Some(Value::Command) {
+            return self.camera.execute_command(name).map_err(|e| said(name, &e));
+        }
+        self.camera.set(name, value).map_err(|e| said(&format!("{name} = {value}"), &e))?;
+        self.look()
+    }
+
+    fn name(&self) -> String {
+        format!("gige://{}", self.word)
+    }
+}
+
+impl GigeCamera {
+    /// What this camera calls a standard feature: cameras from before the standard's second version have names of their own.
+    fn own_name<'a>(&self, name: &'a str) -> &'a str {
+        let has = |n: &&str| self.camera.nodemap().node(n).is_some();
+        let former = FORMER.iter().filter(|(now, _)| *now == name).map(|(_, then)| *then);
+        std::iter::once(name).chain(former).find(has).unwrap_or(name)
+    }
+
+    /// A feature as it is now; none for what a person cannot set or read.
+    fn feature(&mut self, name: &str) -> Option<Feature> {
+        let state = self.camera.feature_state(name).ok()?;
+        if !state.is_implemented || !state.is_available || state.access.is_none() {
+            return None;
+        }
+        let value = match (state.kind, state.value) {
+            ("Command", _) => Some(Value::Command),
+            (_, FeatureValue::Integer(v)) => Some(Value::Integer(v)),
+            (_, FeatureValue::Float(v)) => Some(Value::Float(v)),
+            (_, FeatureValue::Boolean(v)) => Some(Value::Boolean(v)),
+            (_, FeatureValue::Enum(v) | FeatureValue::String(v)) => Some(Value::Word(v)),
+            _ => return None,
+        };
+        let range = match (state.enum_entries, state.range) {
+            (Some(words), _) => Range::OneOf(words),
+            (None, Some(r)) => Range::Between(r.min, r.max),
+            _ => Range::Any,
+        };
+        let writable = !matches!(state.access, Some(viva_genicam::genapi::AccessMode::RO));
+        Some(Feature { name: name.into(), value, unit: state.unit.unwrap_or_default(), range, writable })
+    }
+}
+
+impl Drop for GigeCamera {
+    fn drop(&mut self) {
+        if self.stream.take().is_some() {
+            let _ = self.camera.acquisition_stop();
+        }
+    }
+}

@@ -1,0 +1,10 @@
+//! In: a GigE Vision camera's serial number, address or name. Out: its pictures as a source, its features, what cameras there are.
+//! Frame and unit: the camera's clock in ns; features by the standard names (SFNC).
+
+mod camera;
+mod find;
+mod pixels;
+
+pub use camera::GigeCamera;
+pub use find::{Found, find, found};
+pub use pixels::{depth, unpack};

@@ -1,0 +1,288 @@
+//! In: a simulated station by its seed, what moves how fast. Out: the picture of where things stand right now, rendered; where they stood at
+//! any time, for the pairing by clock.
+//! Frame and unit: base_from_flange, mm, or counts; the device's clock is the host's plus the stated delay, ns.
+
+use crate::capture::clock::{RoundTrip, now_ns};
+use crate::capture::feature::{Feature, Range, Value};
+use crate::capture::format::Format;
+use crate::capture::picture::{Event, Picture, PictureSource};
+use crate::fault::{Fault, Result};
+use crate::geometry::{AxisKind, Camera, Rigid};
+use crate::raster::Image;
+use crate::recording::{BoardSpec, Motion, Stand};
+use crate::simulate::{
+    Canvas, DEFAULT_SCENE, InScene, Ride, Scene, SceneSpec, Station, View, base_from_scene, expose, flange, hot_pixels,
+    scan,
+};
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// What is simulated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SimSpec {
+    /// Which specimen; `sheetlight simulate --seed` makes the same.
+    pub seed: u64,
+    /// Pictures a second.
+    pub rate_hz: f64,
+    /// Of what moves, mm/s; degrees/s of a turntable.
+    pub speed: f64,
+    /// Columns and rows.
+    pub size: [u32; 2],
+    /// An axis; none: a robot moves the sensor.
+    pub axis: Option<AxisKind>,
+    /// A scene file; the built-in board with parts where none is named.
+    pub scene: Option<PathBuf>,
+    /// The pictures' times are late by so much, ms.
+    pub delay_ms: f64,
+    /// Exposure, us.
+    pub exposure_us: f64,
+}
+
+impl Default for SimSpec {
+    fn default() -> Self {
+        SimSpec {
+            seed: 1,
+            rate_hz: 10.0,
+            speed: 20.0,
+            size: [640, 480],
+            axis: None,
+            scene: None,
+            delay_ms: 0.0,
+            exposure_us: 1000.0,
+        }
+    }
+}
+
+/// Seconds in which the way's ends are left and reached.
+const RAMP: f64 = 0.1;
+/// Steps that a turn, or a way, of an axis is told in; only their ends are used.
+const STEPS: usize = 200;
+
+/// A simulated station whose parts or whose robot move: to and fro along a scan, or round and round.
+#[derive(Clone)]
+pub struct SimMotion {
+    /// The true station.
+    pub station: Arc<Station>,
+    scene: Arc<Scene>,
+    way: Way,
+    speed: f64,
+}
+
+#[derive(Clone)]
+enum Way {
+    /// The camera's first and last place over the scene.
+    Robot([Rigid<InScene, Camera>; 2]),
+    Axis(Arc<Ride>),
+}
+
+impl SimMotion {
+    /// # Errors
+    /// A scene that cannot be read; numbers out of range.
+    pub fn new(spec: &SimSpec) -> Result<SimMotion> {
+        let [w, h] = spec.size;
+        let sound = (64..=8192).contains(&w)
+            && (64..=8192).contains(&h)
+            && (0.0..=1000.0).contains(&spec.rate_hz)
+            && (1e-3..=1e4).contains(&spec.speed)
+            && spec.delay_ms.abs() <= 1e3
+            && (1.0..=1e6).contains(&spec.exposure_us);
+        if !sound {
+            return Err(Fault::usage(format!("a simulated camera of {spec:?}"))
+                .next("sizes of 64 to 8192 px, rates up to 1000, speeds of 0.001 to 10,000, delays up to 1000 ms, exposures of 1 to 1e6 us"));
+        }
+        let station = Station::random(spec.seed).with_size(w, h);
+        let scene = match &spec.scene {
+            Some(path) => SceneSpec::load(path)?,
+            None => SceneSpec::parse(DEFAULT_SCENE)?,
+        };
+        let scene = Scene::new(scene)?;
+        let way = match spec.axis {
+            None => {
+                let ends = scan(&station, &scene, 2);
+                Way::Robot([ends[0], ends[1]])
+            }
+            Some(kind) => {
+                let board = BoardSpec::Chessboard {
+                    inner_corners: [9, 6],
+                    square_mm: 6.0,
+                    border_mm: 5.0,
+                    first_square: "black".into(),
+                };
+                Way::Axis(Arc::new(Ride::new(kind, &station, &scene, &board, STEPS)))
+            }
+        };
+        Ok(SimMotion { station: station.into(), scene: scene.into(), way, speed: spec.speed })
+    }
+
+    /// What moves, as meta.json says it.
+    pub fn motion(&self) -> Motion {
+        match &self.way {
+            Way::Robot(_) => Motion::default(),
+            Way::Axis(ride) => ride.motion(),
+        }
+    }
+
+    /// Share of the way at a host's time: to and fro, each end left and reached within [`RAMP`].
+    fn share(&self, ns: u64, length: f64) -> f64 {
+        let ramp = RAMP.min(0.5 * length / self.speed);
+        let once = length / self.speed + ramp;
+        // Whole periods are taken off in whole ns: f64 does not hold a time of day.
+        let t = (ns % (2.0 * once * 1e9) as u64) as f64 * 1e-9;
+        let t = if t > once { 2.0 * once - t } else { t };
+        let from_end = |t: f64| 0.5 * self.speed / ramp * t * t;
+        let s = if t < ramp {
+            from_end(t)
+        } else if t > once - ramp {
+            length - from_end((once - t).max(0.0))
+        } else {
+            self.speed * (t - 0.5 * ramp)
+        };
+        s / length
+    }
+
+    /// Where the camera stood over the scene, and what a robot or an encoder would say.
+    fn at(&self, ns: u64) -> (Rigid<InScene, Camera>, Stand) {
+        match &self.way {
+            Way::Robot([from, to]) => {
+                let way = to.translation - from.translation;
+                let at = from.translation + way * self.share(ns, way.norm());
+                let scene_from_camera = Rigid::new(from.rotation, at);
+                let base_from_camera = base_from_scene(&self.station) * scene_from_camera;
+                (scene_from_camera, Stand::Robot(flange(&self.station, &base_from_camera)))
+            }
+            Way::Axis(ride) => {
+                let last = ride.counts.last().copied().unwrap_or(1.0);
+                let per_count = match ride.axis.kind {
+                    AxisKind::Linear => ride.axis.pitch,
+                    AxisKind::Turntable => ride.axis.pitch.to_degrees(),
+                };
+                let count = (last * self.share(ns, last * per_count.abs())).round();
+                (ride.scene_from_camera(count), Stand::Count(count))
+            }
+        }
+    }
+
+    /// What a robot or an encoder says at a host's time.
+    pub fn stand(&self, ns: u64) -> Stand {
+        self.at(ns).1
+    }
+}
+
+/// The simulated station's camera.
+pub struct SimCamera {
+    motion: SimMotion,
+    spec: SimSpec,
+    hot: Vec<(usize, f32)>,
+    start: u64,
+    next: u64,
+}
+
+impl SimCamera {
+    /// # Errors
+    /// Those of [`SimMotion::new`].
+    pub fn open(spec: &SimSpec) -> Result<SimCamera> {
+        let motion = SimMotion::new(spec)?;
+        let station = &motion.station;
+        let pixels = station.camera.width as usize * station.camera.height as usize;
+        let hot = hot_pixels(&station.sensor, pixels, &mut station.rng("hot", 0));
+        Ok(SimCamera { motion, spec: spec.clone(), hot, start: now_ns(), next: 0 })
+    }
+
+    fn render(&self, scene_from_camera: Rigid<InScene, Camera>) -> Image {
+        let station = &*self.motion.station;
+        let view = View { station, scene: &self.motion.scene, scene_from_camera };
+        let (w, h) = (station.camera.width, station.camera.height);
+        let mut light = Canvas::new(w, h);
+        view.sheet(&mut light);
+        let leak = station.sensor.ambient_leak;
+        let room = if leak > 0.0 { view.faint_ambient() } else { Canvas::new(w, h) };
+        // The sensor's figures are those of a millisecond.
+        let longer = (1e-3 * self.spec.exposure_us) as f32;
+        light.pixels.iter_mut().for_each(|p| *p *= longer);
+        expose(&station.sensor, &light, &room, leak as f32 * longer, &self.hot, &mut station.rng("sim", self.next))
+    }
+}
+
+impl PictureSource for SimCamera {
+    fn format(&self) -> Format {
+        let camera = &self.motion.station.camera;
+        Format { width: camera.width, height: camera.height, bits: self.motion.station.sensor.bits }
+    }
+
+    fn next(&mut self, within: Duration) -> Event {
+        let period = if self.spec.rate_hz > 0.0 { (1e9 / self.spec.rate_hz) as u64 } else { 0 };
+        let exposure = (1e3 * self.spec.exposure_us) as u64;
+        let now = now_ns();
+        if period > 0 {
+            let due = self.start + self.next * period;
+            if due + exposure > now {
+                std::thread::sleep(Duration::from_nanos(due + exposure - now).min(within));
+                if due + exposure > now_ns() {
+                    return Event::Quiet;
+                }
+            }
+            // A sensor exposes whether or not somebody asks: what was not asked for in time is lost.
+            self.next = self.next.max((now_ns() - exposure - self.start) / period);
+        }
+        let begun = if period > 0 { self.start + self.next * period } else { now };
+        let (scene_from_camera, stand) = self.motion.at(begun + exposure / 2);
+        let image = self.render(scene_from_camera);
+        let delay = (1e6 * self.spec.delay_ms) as i64;
+        let id = self.next;
+        self.next += 1;
+        let picture = Picture {
+            image,
+            id,
+            device_ns: Some(begun.saturating_add_signed(delay)),
+            host_ns: now_ns(),
+            exposure_ns: Some(exposure),
+            count: None,
+            stand: Some(stand),
+        };
+        Event::Picture(Box::new(picture))
+    }
+
+    fn sent(&self) -> Option<u64> {
+        Some(self.next)
+    }
+
+    fn clock(&mut self) -> Result<Option<RoundTrip>> {
+        let now = now_ns();
+        Ok(Some(RoundTrip { before_ns: now, there_ns: now, after_ns: now }))
+    }
+
+    fn features(&mut self) -> Result<Vec<Feature>> {
+        let feature = |name: &str, value, unit: &str, low, high| Feature {
+            name: name.into(),
+            value: Some(Value::Float(value)),
+            unit: unit.into(),
+            range: Range::Between(low, high),
+            writable: true,
+        };
+        let rate = feature("AcquisitionFrameRate", self.spec.rate_hz, "Hz", 0.1, 1000.0);
+        Ok(vec![rate, feature("ExposureTime", self.spec.exposure_us, "us", 1.0, 1e6)])
+    }
+
+    fn set(&mut self, name: &str, value: &str) -> Result<()> {
+        let found = self.features()?.into_iter().find(|f| f.name == name);
+        let wanted = value.parse::<f64>().ok();
+        let (Some(Range::Between(low, high)), Some(v)) = (found.map(|f| f.range), wanted) else {
+            return Err(Fault::usage(format!("{name} = {value}: the simulated camera has no such feature or value"))
+                .next("set ExposureTime (us) or AcquisitionFrameRate (Hz) to a number"));
+        };
+        if !(low..=high).contains(&v) {
+            return Err(Fault::usage(format!("{name} = {value}: allowed is {low} to {high}")).next("set it within"));
+        }
+        if name == "ExposureTime" {
+            self.spec.exposure_us = v;
+        } else {
+            (self.spec.rate_hz, self.start, self.next) = (v, now_ns(), 0);
+        }
+        Ok(())
+    }
+
+    fn name(&self) -> String {
+        format!("sim:{}", self.spec.seed)
+    }
+}

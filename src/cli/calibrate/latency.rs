@@ -1,0 +1,64 @@
+//! In: a recording of a part that was passed to and fro, paired by clock. Out: by how much pictures are late against poses, stored in the station.
+//! Frame and unit: ms.
+
+use crate::cli::terminal::console::Console;
+use crate::fault::Result;
+use crate::recording::Recording;
+use crate::rig::Rig;
+use crate::scan::Where;
+use crate::station::{Settings, calibrate_latency};
+use std::path::PathBuf;
+
+/// Find by how much the camera's times are late against the poses'
+///
+/// A part with slopes, or with edges that lie slanted to the stripe, is passed to and fro at a steady speed and recorded with --pair clock. A
+/// delay shifts it one way on the way there and the other way on the way back; what brings both together is the delay. It is kept as
+/// calibration/latency.json of the station, and record and scan apply it to what is paired by clock.
+#[derive(clap::Args)]
+#[command(after_help = "Example:
+  sheetlight record --camera gige://first --pair clock --pose-stream bcap://10.0.0.2 \\
+      --out recordings/to-and-fro
+  sheetlight calibrate latency recordings/to-and-fro --station cell3")]
+pub struct Args {
+    /// Recording folder
+    recording: PathBuf,
+    /// Station folder
+    #[arg(long)]
+    station: PathBuf,
+    /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
+    #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
+    on: Where,
+    /// Say what is found, keep nothing
+    #[arg(long)]
+    dry_run: bool,
+}
+
+pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let recording = Recording::open(&args.recording)?;
+    let (settings, rig) = (Settings::load(&args.station)?, Rig::load(&args.station)?);
+    let bar = console.bar("shots", 0);
+    let found = calibrate_latency(&recording, &rig, &settings, args.on, |done, of| {
+        bar.set_length(of.unwrap_or(done) as u64);
+        bar.set_position(done as u64);
+    })?;
+    bar.finish_and_clear();
+    if !args.dry_run {
+        found.latency.store(&args.station)?;
+    }
+    let (l, b) = (&found.latency, &found.beyond);
+    let speeds: Vec<String> = b.speeds.iter().map(|v| format!("{v:.1}")).collect();
+    let text = format!(
+        "pictures are {:.3} ms late, sigma {:.3} ms ({:.3} ms beyond what was taken for it)\n\
+         {} shots in {} passes at {} mm/s; their heights were {:.4} mm apart, are {:.4} mm",
+        l.delay_ms,
+        l.sigma_ms,
+        1e3 * b.seconds,
+        found.shots,
+        b.speeds.len(),
+        speeds.join(", "),
+        b.apart_mm[0],
+        b.apart_mm[1]
+    );
+    console.result(&found, &text);
+    Ok(())
+}

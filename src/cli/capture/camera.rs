@@ -1,0 +1,161 @@
+//! In: a camera. Out: what cameras there are, what one can be set to, one picture with what it shows, the exposure that suits the stripe.
+//! Frame and unit: features by the standard names (SFNC); px, us.
+
+use crate::capture::{CameraUri, PictureSource, RawFormat, Value, fresh, look, tune};
+use crate::cli::terminal::arguments::parse;
+use crate::cli::terminal::console::Console;
+use crate::fault::{Fault, Result};
+use crate::raster::Image;
+use crate::rig::Rig;
+use crate::scan::{Live, Where, overlay};
+use crate::station::Settings;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+#[derive(clap::Subcommand)]
+pub enum Command {
+    /// List the cameras that answer
+    List,
+    /// Show a camera's features with values, units and ranges
+    #[command(after_help = "Example:
+  sheetlight camera show --camera gige://first")]
+    Show(Named),
+    /// Set a feature of a camera
+    #[command(after_help = "Examples:
+  sheetlight camera set ExposureTime 800 --camera gige://first
+  sheetlight camera set PixelFormat Mono12 --camera gige://first")]
+    Set {
+        /// Name by the standard: ExposureTime (us), Gain, Width, PixelFormat, AcquisitionFrameRate, TriggerMode ...
+        key: String,
+        /// What it is to be
+        value: String,
+        #[command(flatten)]
+        named: Named,
+    },
+    /// Take one picture and say what it shows
+    #[command(after_help = "Example:
+  sheetlight camera snap now.png --camera gige://first --station cell3")]
+    Snap {
+        /// PNG file
+        out: PathBuf,
+        #[command(flatten)]
+        named: Named,
+        /// Station folder: the stripe as it is found is drawn beside, OUT_stripe.png
+        #[arg(long)]
+        station: Option<PathBuf>,
+    },
+    /// Find the exposure at which the stripe's peaks stand at 70 to 85 % of full scale, and leave it set
+    #[command(after_help = "Example:
+  sheetlight camera tune --camera gige://first")]
+    Tune(Named),
+}
+
+/// The camera that is meant.
+#[derive(clap::Args)]
+pub struct Named {
+    /// Which camera: gige://first, ffmpeg:/dev/video0, cell://HOST:PORT, sim:SEED, ... (docs/live.md)
+    #[arg(long, value_name = "URI", value_parser = parse::<CameraUri>)]
+    camera: CameraUri,
+    /// Frames on standard input, with --camera -: WIDTHxHEIGHT:gray8, gray10le, gray12le or gray16le
+    #[arg(long, value_parser = parse::<RawFormat>)]
+    raw: Option<RawFormat>,
+}
+
+const PATIENCE: Duration = Duration::from_secs(10);
+
+impl Named {
+    fn open(&self) -> Result<Box<dyn PictureSource>> {
+        self.camera.open(self.raw)
+    }
+}
+
+pub fn run(command: &Command, console: &Console) -> Result<()> {
+    match command {
+        Command::List => list(console),
+        Command::Show(named) => show(named, console),
+        Command::Set { key, value, named } => set(key, value, named, console),
+        Command::Snap { out, named, station } => snap(out, named, station.as_deref(), console),
+        Command::Tune(named) => {
+            let mut source = named.open()?;
+            let tuned = tune(source.as_mut(), |us, seen| console.say(format!("{us:.0} us: {seen}")))?;
+            console.result(&tuned, &format!("ExposureTime is {:.0} us\n{}", tuned.exposure_us, tuned.look));
+            Ok(())
+        }
+    }
+}
+
+fn list(console: &Console) -> Result<()> {
+    let found = crate::capture::source::gige::found()?;
+    let mut text = String::new();
+    for c in &found {
+        let name = if c.serial.is_empty() { &c.ip } else { &c.serial };
+        text += &format!(
+            "gige://{name}  {} {} at {} (heard on {}) {}\n",
+            c.manufacturer, c.model, c.ip, c.interface, c.name
+        );
+    }
+    let videos: Vec<String> = (0..16).map(|k| format!("/dev/video{k}")).filter(|p| Path::new(p).exists()).collect();
+    videos.iter().for_each(|v| text += &format!("ffmpeg:-f v4l2 -i {v}  a video device\n"));
+    if text.is_empty() {
+        text = "no camera answered: asked were all interfaces by GigE Vision's broadcast (UDP 3956), and /dev/video*; \
+                a firewall that drops UDP hides cameras\n"
+            .into();
+    }
+    console.result(&serde_json::json!({ "gige": found, "video": videos }), &text);
+    Ok(())
+}
+
+fn show(named: &Named, console: &Console) -> Result<()> {
+    let mut source = named.open()?;
+    let features = source.features()?;
+    let mut text = format!("{}: {}\n", source.name(), source.format());
+    for f in &features {
+        let value = f.value.as_ref().map_or(String::new(), Value::to_string);
+        let fixed = if f.writable { "" } else { "  (fixed now)" };
+        text += &format!("{:32} {value} {}  [{}]{fixed}\n", f.name, f.unit, f.range);
+    }
+    console.result(&features, &text);
+    Ok(())
+}
+
+fn set(key: &str, value: &str, named: &Named, console: &Console) -> Result<()> {
+    let mut source = named.open()?;
+    source.set(key, value)?;
+    let now = source.features()?.into_iter().find(|f| f.name == key);
+    let shown = now.as_ref().and_then(|f| f.value.as_ref()).map_or(String::new(), Value::to_string);
+    console.result(&now, &format!("{key} is {shown}"));
+    Ok(())
+}
+
+fn snap(out: &Path, named: &Named, station: Option<&Path>, console: &Console) -> Result<()> {
+    let mut source = named.open()?;
+    let image = fresh(source.as_mut(), PATIENCE)?;
+    drop(source);
+    let seen = look(&image);
+    crate::files::write(out, &crate::raster::png(&image))?;
+    let mut text = format!("{}\n{seen}", out.display());
+    if let Some(station) = station {
+        text += &stripe(out, image, station)?;
+    }
+    console.result(&seen, &text);
+    Ok(())
+}
+
+/// Draws the stripe as it is found.
+fn stripe(out: &Path, image: Image, station: &Path) -> Result<String> {
+    let (settings, rig) = (Settings::load(station)?, Rig::load(station)?);
+    let format = crate::capture::Format::of(&image);
+    let volume = crate::station::volume::believed(&settings, &rig);
+    let mut live = Live::new(&rig, format, &settings.extraction, volume.as_ref(), Where::default())?;
+    let Some(found) = live.measure(0, image.clone())? else { return Ok("\nno stripe is found".into()) };
+    let stem = out.file_stem().ok_or_else(|| Fault::usage("the picture has no name").next("give a PNG file"))?;
+    let beside = out.with_file_name(format!("{}_stripe.png", stem.to_string_lossy()));
+    overlay::draw(&image, &found.peaks).save_png(&beside)?;
+    let there = found.points.iter().filter(|p| p.sigma_mm.is_finite());
+    let depths: Vec<f32> = there.map(|p| p.position[2]).collect();
+    let (near, far) = depths.iter().fold((f32::MAX, f32::MIN), |(n, f), z| (n.min(*z), f.max(*z)));
+    Ok(match depths.len() {
+        0 => format!("\n0 points, {}", beside.display()),
+        n => format!("\n{n} points at depths of {near:.1} to {far:.1} mm, {}", beside.display()),
+    })
+}

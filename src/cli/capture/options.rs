@@ -1,0 +1,298 @@
+//! In: --camera, --pair and what belongs to them. Out: a stream of shots; what a person should hear of it meanwhile.
+//! Frame and unit: mm, degrees, counts; s.
+
+use crate::capture::pair::{PoseFeed, PoseUri, Still, Table, Way};
+use crate::capture::{CameraUri, Feed, FeedOptions, Mode, RawFormat, Stream};
+use crate::cli::terminal::arguments::parse;
+use crate::cli::terminal::console::Console;
+use crate::fault::{Fault, Result};
+use crate::geometry::CountUnit;
+use crate::recording::{Carries, Motion, MotionKind, Stand, load_poses};
+use indicatif::ProgressBar;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// How pictures and what moves are brought together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pair {
+    None,
+    Given,
+    Step,
+    Count,
+    Clock,
+}
+
+impl std::str::FromStr for Pair {
+    type Err = String;
+    fn from_str(s: &str) -> std::result::Result<Pair, String> {
+        Ok(match s {
+            "none" => Pair::None,
+            "given" => Pair::Given,
+            "step" => Pair::Step,
+            "count" => Pair::Count,
+            "clock" => Pair::Clock,
+            _ => return Err(format!("'{s}': none, given, step, count or clock")),
+        })
+    }
+}
+
+/// What moves, as typed: `robot`, `robot:part`, `linear:count`, `turntable:deg:sensor`.
+#[derive(Clone, Debug)]
+pub struct Moves(Motion);
+
+impl std::str::FromStr for Moves {
+    type Err = String;
+    fn from_str(s: &str) -> std::result::Result<Moves, String> {
+        let help = || {
+            format!("'{s}' is not like robot, robot:part, linear:count, linear:mm, turntable:count or turntable:deg")
+        };
+        let mut words = s.split(':');
+        let kind = match words.next() {
+            Some("robot") => MotionKind::Robot,
+            Some("linear") => MotionKind::Linear,
+            Some("turntable") => MotionKind::Turntable,
+            _ => return Err(help()),
+        };
+        let robot = kind == MotionKind::Robot;
+        let mut motion =
+            Motion { kind, carries: if robot { Carries::Sensor } else { Carries::Part }, ..Motion::default() };
+        for word in words {
+            match word {
+                "sensor" => motion.carries = Carries::Sensor,
+                "part" => motion.carries = Carries::Part,
+                "count" if !robot => motion.unit = Some(CountUnit::Count),
+                "mm" if kind == MotionKind::Linear => motion.unit = Some(CountUnit::Mm),
+                "deg" if kind == MotionKind::Turntable => motion.unit = Some(CountUnit::Deg),
+                _ => return Err(help()),
+            }
+        }
+        if !robot && motion.unit.is_none() {
+            return Err(help());
+        }
+        Ok(Moves(motion))
+    }
+}
+
+/// A running camera.
+#[derive(Clone, clap::Args)]
+pub struct Running {
+    /// Where pictures come from: gige://first, ffmpeg:/dev/video0, folder:PATH, cell://HOST:PORT, sim:SEED, play:RECORDING, or -
+    /// (raw frames on standard input, with --raw); docs/live.md has them all
+    #[arg(long, value_name = "URI", value_parser = parse::<CameraUri>)]
+    pub camera: Option<CameraUri>,
+    /// End after so many pictures
+    #[arg(long, requires = "camera")]
+    shots: Option<u64>,
+    /// End after this time, s
+    #[arg(long, requires = "camera")]
+    seconds: Option<f64>,
+    /// How long a camera that went away is waited for, s
+    #[arg(long, default_value_t = 60.0)]
+    patience: f64,
+    /// Memory for pictures that wait, MB
+    #[arg(long, default_value_t = 256)]
+    memory: usize,
+    /// Write the counters into this file every second, as Prometheus' node exporter reads it
+    #[arg(long, value_name = "FILE", requires = "camera")]
+    metrics: Option<PathBuf>,
+}
+
+/// A running camera and what moves.
+#[derive(clap::Args)]
+pub struct Capture {
+    #[command(flatten)]
+    pub running: Running,
+    /// With --camera: how pictures are paired with what moves: none, given (the source says), step (everything stands still), count (by
+    /// number) or clock (by time)
+    #[arg(long, value_parser = parse::<Pair>, requires = "camera")]
+    pub pair: Option<Pair>,
+    /// With --camera: what moves: robot, robot:part, linear:count, linear:mm, turntable:count or turntable:deg
+    #[arg(long, default_value = "robot", value_parser = parse::<Moves>)]
+    motion: Moves,
+    /// With --pair step or clock: where poses or counts come from: bcap://HOST and other robots, tcp://HOST:PORT or lines:PATH (lines of
+    /// t_ns and a pose), sim:SEED
+    #[arg(long, value_name = "URI", value_parser = parse::<PoseUri>, requires = "camera")]
+    pose_stream: Option<PoseUri>,
+    /// With --pair count: counts from one trigger pulse to the next
+    #[arg(long, requires = "camera")]
+    counts_per_shot: Option<f64>,
+}
+
+impl Running {
+    /// Opens the camera.
+    pub fn open(&self, raw: Option<RawFormat>, mode: Mode) -> Result<Feed> {
+        let options = FeedOptions {
+            mode,
+            memory: self.memory.clamp(1, 1 << 20) << 20,
+            patience: seconds("--patience", self.patience)?,
+            shots: self.shots,
+            seconds: self.seconds.map(|s| seconds("--seconds", s)).transpose()?.map(|d| d.as_secs_f64()),
+            stop: crate::cli::terminal::interrupt::asked_for(),
+        };
+        Feed::start(self.named()?.open(raw)?, options)
+    }
+
+    /// The camera that is named.
+    pub fn named(&self) -> Result<&CameraUri> {
+        self.camera.as_ref().ok_or_else(|| {
+            Fault::usage("no camera is named")
+                .next("name one: --camera URI (docs/live.md), or look for one: sheetlight camera list")
+        })
+    }
+
+    /// Who tells a person, and the metrics' file, what happens.
+    pub fn teller(&self) -> Teller {
+        Teller { news: Arc::default(), metrics: self.metrics.clone(), last: Instant::now(), line: Arc::default() }
+    }
+}
+
+fn seconds(option: &str, value: f64) -> Result<Duration> {
+    Duration::try_from_secs_f64(value)
+        .map_err(|_| Fault::usage(format!("{option} is {value}")).next("give seconds, 0 or more"))
+}
+
+impl Capture {
+    /// What moves; none where pictures are paired with nothing.
+    pub fn motion(&self) -> Option<Motion> {
+        let mut motion = self.motion.0.clone();
+        if self.pair() == Pair::None {
+            return None;
+        }
+        // What a played recording or a simulated station says of itself.
+        match (&self.running.camera, self.pair()) {
+            (Some(CameraUri::Play { path, .. }), Pair::Given) => {
+                motion = crate::recording::Recording::open(path).ok()?.meta.motion();
+                (motion.counts_per_shot, motion.counts_file, motion.zero) = (None, None, None);
+            }
+            (Some(CameraUri::Sim(spec)), _) => {
+                if let Some(kind) = spec.axis {
+                    let kind = match kind {
+                        crate::geometry::AxisKind::Linear => MotionKind::Linear,
+                        crate::geometry::AxisKind::Turntable => MotionKind::Turntable,
+                    };
+                    motion = Motion { kind, carries: Carries::Part, unit: Some(CountUnit::Count), ..Motion::default() };
+                }
+            }
+            _ => {}
+        }
+        Some(motion)
+    }
+
+    fn pair(&self) -> Pair {
+        self.pair.unwrap_or(Pair::None)
+    }
+
+    /// Opens camera and poses. `poses` is a pose file, by number; `station` knows the latency.
+    pub fn open(
+        &self,
+        raw: Option<RawFormat>,
+        poses: Option<&Path>,
+        station: Option<&Path>,
+        mode: Mode,
+    ) -> Result<Stream> {
+        let way = self.way(self.running.named()?, poses, station)?;
+        Ok(Stream::new(self.running.open(raw, mode)?, way))
+    }
+
+    fn way(&self, uri: &CameraUri, poses: Option<&Path>, station: Option<&Path>) -> Result<Way> {
+        let stream = || {
+            let uri_of = self.pose_stream.as_ref().ok_or_else(|| {
+                Fault::usage("--pair step and clock need to know where things stand while pictures are taken")
+                    .next("name it: --pose-stream bcap://HOST, tcp://HOST:PORT or lines:PATH")
+            })?;
+            let sim = if let CameraUri::Sim(spec) = uri { Some(spec) } else { None };
+            PoseFeed::start(uri_of, sim)
+        };
+        Ok(match self.pair() {
+            Pair::None => Way::Nothing,
+            Pair::Given => Way::Given,
+            Pair::Step => Way::Step(stream()?, Still::default()),
+            Pair::Clock => {
+                let latency = station.map(crate::capture::Latency::load).transpose()?.flatten().unwrap_or_default();
+                Way::Clock {
+                    poses: stream()?,
+                    delay_ns: 1e6 * latency.delay_ms,
+                    delay_sigma_ns: 1e6 * latency.sigma_ms,
+                }
+            }
+            Pair::Count => Way::Count(match (poses, self.counts_per_shot) {
+                (Some(path), None) => {
+                    Table::Rows(load_poses(path)?.poses.into_iter().map(|p| Some(Stand::Robot(p))).collect())
+                }
+                (None, Some(step)) if self.motion.0.axis().is_some() => Table::Pulses(step),
+                (None, None) if self.motion.0.axis().is_some() => Table::Chunk,
+                _ => {
+                    return Err(Fault::usage("--pair count needs one table of where things stood")
+                        .cause("a robot's poses by number, or an axis that triggers the camera or counts into its pictures")
+                        .next("give --poses FILE, or --motion linear:count with --counts-per-shot N or a camera that sends its count"));
+                }
+            }),
+        })
+    }
+}
+
+/// Gathers on any thread what is to be told; the thread that holds the console tells it.
+#[derive(Clone)]
+pub struct Teller {
+    news: Arc<Mutex<Vec<String>>>,
+    line: Arc<Mutex<String>>,
+    metrics: Option<PathBuf>,
+    last: Instant,
+}
+
+const EVERY: Duration = Duration::from_secs(1);
+
+impl Teller {
+    /// Takes in news, and the account once a second.
+    pub fn hear(&mut self, stream: &Stream, said: Option<String>) {
+        if let Some(said) = said {
+            self.news.lock().unwrap_or_else(PoisonError::into_inner).push(said);
+        }
+        if self.last.elapsed() < EVERY {
+            return;
+        }
+        self.last = Instant::now();
+        self.account(stream);
+    }
+
+    /// The account as it is now.
+    pub fn account(&mut self, stream: &Stream) {
+        self.show(stream.feed(), "");
+    }
+
+    /// The account of a feed once a second, `with` something before it.
+    pub fn watch(&mut self, feed: &Feed, with: impl FnOnce() -> String) {
+        if self.last.elapsed() >= EVERY {
+            self.last = Instant::now();
+            self.show(feed, &with());
+        }
+    }
+
+    /// The account of a feed that has ended.
+    pub fn last_word(&mut self, feed: &Feed) {
+        self.show(feed, "");
+    }
+
+    fn show(&mut self, feed: &Feed, with: &str) {
+        let account = feed.account();
+        let rate = feed.rate_hz().map_or(String::new(), |r| format!("{r:.1} a second; "));
+        *self.line.lock().unwrap_or_else(PoisonError::into_inner) = format!("{with}{rate}{account}");
+        if let Some(path) = &self.metrics {
+            if let Err(fault) = crate::files::write(path, account.prometheus(feed.name()).as_bytes()) {
+                self.news.lock().unwrap_or_else(PoisonError::into_inner).push(fault.what);
+                self.metrics = None;
+            }
+        }
+    }
+
+    /// Tells what was gathered.
+    pub fn tell(&self, console: &Console, bar: &ProgressBar) {
+        let news = std::mem::take(&mut *self.news.lock().unwrap_or_else(PoisonError::into_inner));
+        news.iter().for_each(|n| bar.suspend(|| console.warn(n)));
+        let line = std::mem::take(&mut *self.line.lock().unwrap_or_else(PoisonError::into_inner));
+        if !line.is_empty() {
+            bar.set_message(line);
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! In: a running camera, a station. Out: its scan, recorded beside or not.
+//! Frame and unit: as `sheetlight scan`.
+
+use super::options::{Capture, Teller};
+use crate::capture::record::{RecordReport, Recorder, RecorderOptions, handing_on, record};
+use crate::capture::{Mode, RawFormat};
+use crate::cli::terminal::console::Console;
+use crate::fault::{Fault, Result};
+use crate::recording::Motion;
+use crate::rig::Rig;
+use crate::scan::{RecordedSource, Source, StreamSource};
+use crate::station::{ScanOptions, ScanReport};
+use indicatif::ProgressBar;
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+
+/// Scans a camera while it runs. With `keep` it is recorded there, and what cannot be scanned in time waits on that disk.
+pub fn scan_camera(
+    capture: &Capture,
+    raw: Option<RawFormat>,
+    poses: Option<&Path>,
+    station: &Path,
+    keep: Option<&Path>,
+    rig: &Rig,
+    options: &ScanOptions,
+    console: &Console,
+    bar: &ProgressBar,
+) -> Result<ScanReport> {
+    let motion = capture.motion().ok_or_else(|| {
+        Fault::usage("a scan needs to know where things stood at each picture, and --pair says none")
+            .next("say how pictures are paired: --pair given, step, count or clock (docs/live.md)")
+    })?;
+    if options.resume {
+        return Err(Fault::usage("a camera cannot be resumed").next("record it (--record FOLDER): recordings can"));
+    }
+    // A camera's Ctrl-C ends the stream; the scan of what came goes on to its end.
+    let options = &ScanOptions { motion: motion.clone(), stop: Default::default(), ..options.clone() };
+    let mut stream = capture.open(raw, poses, Some(station), Mode::All)?;
+    let name = stream.feed().name().to_owned();
+    let teller = capture.running.teller();
+    let progress = |done: usize, _: Option<usize>| {
+        teller.tell(console, bar);
+        bar.set_position(done as u64);
+    };
+    let Some(keep) = keep else {
+        let mut hear = teller.clone();
+        let open = move |_| {
+            let say = Box::new(move |s: &crate::capture::Stream, said| hear.hear(s, said));
+            Ok(Box::new(StreamSource::new(stream, say)) as Box<dyn Source>)
+        };
+        return crate::station::scan("camera", &name, open, rig, options, progress);
+    };
+    let recorder = Recorder::create(keep, stream.format(), options_of(motion))?;
+    let meta = recorder.meta();
+    let (send, receive, backlog) = handing_on();
+    let report: Arc<Mutex<Option<Result<RecordReport>>>> = Arc::default();
+    let (theirs, handed, mut hear): (_, _, Teller) = (report.clone(), backlog.clone(), teller.clone());
+    let recording = move || {
+        let done = record(&mut stream, recorder, Some((send.clone(), handed)), |s, said| hear.hear(s, said));
+        hear.account(&stream);
+        *theirs.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(done);
+        drop(send);
+    };
+    let thread = std::thread::Builder::new().name("recorder".into()).spawn(recording);
+    let thread = thread.map_err(|e| Fault::threads(&e))?;
+    let source = RecordedSource::new(keep.to_owned(), meta, receive, backlog, report.clone());
+    let scanned =
+        crate::station::scan("camera", &name, |_| Ok(Box::new(source) as Box<dyn Source>), rig, options, progress);
+    // Where the scan failed, recording goes on until the stream ends: pictures cannot be taken again.
+    thread.join().map_err(|_| Fault::device("the recorder ended in a panic").next("report it as a bug"))?;
+    teller.tell(console, bar);
+    let recorded = report.lock().unwrap_or_else(std::sync::PoisonError::into_inner).take();
+    let scanned = scanned?;
+    recorded.expect("the recorder has ended")?;
+    Ok(scanned)
+}
+
+fn options_of(motion: Motion) -> RecorderOptions {
+    RecorderOptions { set: "scan".into(), motion: Some(motion), ..RecorderOptions::default() }
+}

@@ -1,0 +1,174 @@
+//! In: a running camera's pictures, paired with what moves; straight, or as a recorder hands them on. Out: a source of shots.
+//! Frame and unit: as [`super::Shot`].
+
+use super::source::{BadShot, Shot, Source};
+use crate::capture::record::{Backlog, RecordReport, Recorded};
+use crate::capture::{Account, Fate, Format, Stream, Streamed};
+use crate::fault::{Fault, Result};
+use crate::raster::Image;
+use crate::recording::{Recording, Stand};
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+/// Who is told what happens while a source is read: the stream, and what a person should hear.
+pub type Say = Box<dyn FnMut(&Stream, Option<String>)>;
+
+const GLANCE: Duration = Duration::from_millis(200);
+
+/// A stream as a source. Nothing of it is kept.
+pub struct StreamSource {
+    stream: Stream,
+    say: Say,
+    next: u32,
+    ended: bool,
+}
+
+impl StreamSource {
+    /// Scans what a stream gives.
+    pub fn new(stream: Stream, say: Say) -> StreamSource {
+        StreamSource { stream, say, next: 0, ended: false }
+    }
+}
+
+fn without_stand(index: u32, name: &str) -> BadShot {
+    let fault = Fault::usage("a picture comes without where things stood")
+        .cause("nothing is said to move")
+        .next("say how pictures are paired with what moves: --pair count, step or clock, or given");
+    BadShot { index, name: name.into(), fault, last: true }
+}
+
+impl Source for StreamSource {
+    fn format(&self) -> Format {
+        self.stream.format()
+    }
+
+    fn remaining(&self) -> Option<usize> {
+        None
+    }
+
+    fn resumable(&self) -> bool {
+        false
+    }
+
+    fn next(&mut self) -> Option<std::result::Result<Shot, BadShot>> {
+        while !self.ended {
+            let news = self.stream.news();
+            news.into_iter().for_each(|s| (self.say)(&self.stream, Some(s)));
+            (self.say)(&self.stream, None);
+            match self.stream.next(GLANCE) {
+                Streamed::Quiet => {}
+                Streamed::Ended(fault) => {
+                    self.ended = true;
+                    let (index, name) = (self.next, self.stream.feed().name().to_owned());
+                    return fault.map(|fault| Err(BadShot { index, name, fault, last: true }));
+                }
+                Streamed::Shot(shot) => {
+                    let (index, name) = (self.next, format!("picture {}", shot.picture.id));
+                    let Some(stand) = shot.stand else { return Some(Err(without_stand(index, &name))) };
+                    self.next += 1;
+                    self.stream.fate(Fate::Used);
+                    return Some(Ok(Shot { index, name, image: shot.picture.image, stand, slip: shot.taken.slip() }));
+                }
+            }
+        }
+        None
+    }
+
+    fn account(&self) -> Option<Account> {
+        Some(self.stream.account())
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        let left = self.stream.left_out();
+        let Some(first) = left.first() else { return Vec::new() };
+        vec![format!("{} pictures left out, the first ({}): {}", self.stream.account().unpaired, first.id, first.why)]
+    }
+}
+
+/// What a recorder on another thread hands on, scanned while it goes on recording. Pictures that have to wait are read from its disk again.
+pub struct RecordedSource {
+    format: Format,
+    recording: Recording,
+    shots: Receiver<Recorded>,
+    backlog: Backlog,
+    /// What the recording came to, once it has ended.
+    report: Arc<Mutex<Option<Result<RecordReport>>>>,
+}
+
+impl RecordedSource {
+    /// `meta` is what the recorder writes into `folder`; `report` is filled before the channel closes.
+    pub fn new(
+        folder: PathBuf,
+        meta: crate::recording::Meta,
+        shots: Receiver<Recorded>,
+        backlog: Backlog,
+        report: Arc<Mutex<Option<Result<RecordReport>>>>,
+    ) -> RecordedSource {
+        let format = Format { width: meta.image.width, height: meta.image.height, bits: meta.image.bits };
+        let recording = Recording { folder, meta, channel: Default::default(), outside: false };
+        RecordedSource { format, recording, shots, backlog, report }
+    }
+
+    fn image(&self, shot: &mut Recorded) -> Result<Image> {
+        match shot.image.take() {
+            Some(image) => {
+                self.backlog.taken();
+                Ok(image)
+            }
+            None => self.recording.picture(&shot.kept.name),
+        }
+    }
+}
+
+impl Source for RecordedSource {
+    fn format(&self) -> Format {
+        self.format
+    }
+
+    fn remaining(&self) -> Option<usize> {
+        None
+    }
+
+    fn resumable(&self) -> bool {
+        false
+    }
+
+    fn next(&mut self) -> Option<std::result::Result<Shot, BadShot>> {
+        let mut shot = loop {
+            match self.shots.recv_timeout(GLANCE) {
+                Ok(shot) => break shot,
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return None,
+            }
+        };
+        let (index, name) = (shot.kept.index as u32, shot.kept.name.clone());
+        let Some(stand): Option<Stand> = shot.stand else { return Some(Err(without_stand(index, &name))) };
+        Some(match self.image(&mut shot) {
+            Ok(image) => Ok(Shot { index, name, image, stand, slip: shot.slip }),
+            Err(fault) => Err(BadShot { index, name, fault, last: false }),
+        })
+    }
+
+    fn account(&self) -> Option<Account> {
+        let report = self.report.lock().unwrap_or_else(PoisonError::into_inner);
+        report.as_ref().and_then(|r| r.as_ref().ok()).map(|r| r.account.clone())
+    }
+
+    fn remarks(&self) -> Vec<String> {
+        let report = self.report.lock().unwrap_or_else(PoisonError::into_inner);
+        match report.as_ref() {
+            Some(Err(fault)) => vec![fault.what.clone()],
+            Some(Ok(r)) if !r.left_out.is_empty() => {
+                vec![format!(
+                    "{} pictures left out, the first ({}): {}",
+                    r.left_out.len(),
+                    r.left_out[0].id,
+                    r.left_out[0].why
+                )]
+            }
+            _ => Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,152 @@
+//! In: the skeleton. Out: of each run of its pixels across the stripe the one in the middle, and every so many from it. A run's
+//! pixels follow one another within that distance.
+//! Frame and unit: pixels; the distance follows from the stripe's width.
+
+use crate::gpu::Access::*;
+use crate::gpu::{Binding, Stage};
+use crate::raster::Mask;
+use crate::stages::frame;
+use crate::stages::frame::{PX_LOG2, SHARED, frame_of, tile_unpack};
+use crate::stages::listing::mask_index;
+use crate::stages::same::Same;
+use crate::stages::step::{Groups, Step};
+
+/// A run that goes on for longer has no middle that can be found from here: its pixels are counted from the picture's border.
+const FAR: i32 = 32;
+
+/// Up to here a skeleton hardly winds: 1.00 to 1.02 points a column.
+const NARROW_PX: f32 = 2.0;
+
+/// The setting as the stage takes it: pixels from one to the next, and from bit 16 on whether runs are sought along rows; 0 is
+/// off.
+///
+/// Speckle makes the skeleton of a wide stripe wind and branch. Its pixels across the stripe see the same light, so their fits
+/// find the same centre once more (at 4 px of sigma 1.9 points a column; every 1.5 widths leaves 1.1). A stripe narrower than
+/// [`NARROW_PX`] keeps every pixel. `across`: unit image direction of depth.
+pub fn word(widths: f32, width_px: f32, across: [f32; 2]) -> u32 {
+    let step = (widths * width_px).floor();
+    let rows = across[1].abs() < across[0].abs();
+    if width_px < NARROW_PX || step < 2.0 { 0 } else { step.min(65535.0) as u32 | u32::from(rows) << 16 }
+}
+
+/// Whether a pixel of the skeleton is kept. `skeleton` tells pixels, beyond the picture none is lit.
+pub(in crate::stages) fn kept(x: i32, y: i32, setting: u32, skeleton: impl Fn(i32, i32) -> bool) -> bool {
+    let (step, rows) = ((setting & 0xffff) as i32, (setting >> 16) as i32);
+    // Pixels of the run on one side; it ends where none follows within `step`.
+    let beyond = |du: i32, dv: i32| {
+        let (mut found, mut last) = (0, 0);
+        for k in 1..=FAR {
+            if k > last + step {
+                return found;
+            }
+            if skeleton(x + k * du, y + k * dv) {
+                (found, last) = (found + 1, k);
+            }
+        }
+        FAR
+    };
+    let (before, after) = (beyond(-rows, rows - 1), beyond(rows, 1 - rows));
+    let place = match before.max(after) {
+        FAR => [y, x][rows as usize],
+        _ => before - (before + after + 1) / 2,
+    };
+    place % step == 0
+}
+
+/// CPU twin.
+pub fn twin(skeleton: &Mask, setting: u32) -> Mask {
+    let (w, h) = (skeleton.width as i32, skeleton.height as i32);
+    let get = |x: i32, y: i32| (0..w).contains(&x) && (0..h).contains(&y) && skeleton.get(x as u32, y as u32);
+    Mask::from_fn(skeleton.width, skeleton.height, |x, y| skeleton.get(x, y) && kept(x as i32, y as i32, setting, get))
+}
+
+/// Lines that were carried on count: the end of a branch is carried on across the stripe.
+pub const STAGE: Stage = Stage {
+    name: "spacing",
+    wgsl: include_str!("../../../shaders/spacing.wgsl"),
+    shared: &[SHARED],
+    workgroup: [64, 1, 1],
+    bindings: &[
+        Binding { name: "frame", access: Uniform },
+        Binding { name: "listing", access: Read },
+        Binding { name: "list", access: Texels },
+        Binding { name: "lit", access: Texels },
+        Binding { name: "mask", access: Texels },
+        Binding { name: "spaced", access: ReadWrite },
+    ],
+    uniform: frame::UNIFORM,
+    overrides: &[PX_LOG2],
+};
+
+/// One fit a crossing of a wide stripe.
+pub const STEP: Step = Step {
+    stage: &STAGE,
+    twin: stage_twin,
+    binds: &["frame", "lit header", "lit list", "lit", "long", "spaced"],
+    groups: Groups::Listed("lit header"),
+    same: Same::Words,
+};
+
+pub(crate) fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
+    let f = frame_of(b);
+    let [_, listing, list, lit, mask, spaced] = b else { unreachable!() };
+    for &tile in &list[..listing[3] as usize] {
+        let (tx, ty, shot) = tile_unpack(tile);
+        let get = |x: i32, y: i32| {
+            let inside = (0..f.width as i32).contains(&x) && (0..f.height as i32).contains(&y);
+            let word = |m: &[u32]| m[f.mask_word(shot, x as u32, y as u32)];
+            inside && (word(mask) & word(lit)) >> (x & 31) & 1 == 1
+        };
+        for row in 0..8 {
+            let (mut bits, mut some) = (mask[mask_index(&f, tile, row)], 0);
+            while bits != 0 {
+                let bit = bits.trailing_zeros();
+                bits &= bits - 1;
+                if kept((32 * tx + bit) as i32, (8 * ty + row) as i32, f.spacing, get) {
+                    some |= 1 << bit;
+                }
+            }
+            spaced[mask_index(&f, tile, row)] = some;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stages::stripe::skeleton::twin as skeletons;
+
+    /// Row and column of what is kept of a column of lit rows.
+    fn of_column(rows: std::ops::Range<u32>, step: u32) -> Vec<u32> {
+        let (line, setting) = (rows, word(1.0, step as f32, [0.0, 1.0]));
+        let kept = twin(&Mask::from_fn(9, 200, |x, y| x == 4 && line.contains(&y)), setting);
+        // Upright it is the same.
+        let upright = Mask::from_fn(200, 9, |x, y| y == 4 && line.contains(&x));
+        assert_eq!(setting | 1 << 16, word(1.0, step as f32, [-1.0, 0.1]));
+        let turned = twin(&upright, setting | 1 << 16);
+        assert!((0..200).all(|i| kept.get(4, i) == turned.get(i, 4)), "rows and columns differ");
+        (0..200).filter(|&y| kept.get(4, y)).collect()
+    }
+
+    #[test]
+    fn a_short_run_leaves_its_middle_and_a_long_one_its_detail() {
+        assert_eq!(of_column(50..51, 4), [50]);
+        assert_eq!(of_column(50..55, 4), [52]);
+        assert_eq!(of_column(0..4, 4), [2]);
+        assert_eq!(of_column(50..70, 4), [52, 56, 60, 64, 68]);
+        // Two branches of one stripe, and two stripes.
+        let two = |apart: u32| twin(&Mask::from_fn(9, 60, |_, y| y == 20 || y == 20 + apart), 4);
+        assert_eq!((4, 9), (word(1.0, 4.0, [0.0, 1.0]), skeletons(&two(4)).len()));
+        assert_eq!(18, skeletons(&two(5)).len());
+        // A run with no end in sight, as of a steep face, is sampled as finely.
+        assert!(of_column(20..180, 3).windows(2).filter(|w| w[1] - w[0] == 3).count() >= 50);
+    }
+
+    #[test]
+    fn what_lies_along_the_stripe_is_kept() {
+        let setting = word(1.0, 4.0, [0.0, 1.0]);
+        let slanted = Mask::from_fn(120, 60, |x, y| y == 10 + x / 3);
+        assert!(twin(&slanted, setting) == slanted);
+        assert_eq!(word(1.0, 1.9, [0.0, 1.0]), 0, "a narrow stripe keeps every pixel");
+    }
+}

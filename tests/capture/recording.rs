@@ -1,0 +1,170 @@
+//! In: a recording that is played as a camera. Out: the same pictures and the same cloud after recording, scanning while recording and
+//! scanning alone; what a crash, a second recorder and a full disk leave.
+//! Frame and unit: bytes, pictures.
+
+use super::{cloud_of, json, scan_folder, station, text};
+use crate::common::{sheetlight, sheetlight_fails};
+use sheetlight::capture::Account;
+use sheetlight::recording::Recording;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Every picture equals the original's, every pose too.
+fn same_pictures(recorded: &Path, original: &Path) -> usize {
+    let (a, b) = (Recording::open(recorded).unwrap(), Recording::open(original).unwrap());
+    let (pa, pb) = (a.poses(None).unwrap(), b.poses(None).unwrap());
+    let pairs = a.meta.frames.iter().zip(&b.meta.frames);
+    for (fa, fb) in pairs {
+        let (na, nb) = (fa.laser.as_ref().unwrap(), fb.laser.as_ref().unwrap());
+        assert_eq!(a.picture(na).unwrap(), b.picture(nb).unwrap(), "{na}");
+        assert_eq!(pa[fa.pose.unwrap()], pb[fb.pose.unwrap()], "{na}");
+    }
+    a.meta.frames.len()
+}
+
+fn account(value: &serde_json::Value) -> Account {
+    serde_json::from_value(value.clone()).unwrap()
+}
+
+#[test]
+fn what_is_recorded_is_what_was_sent_and_scans_to_the_same_bytes() {
+    let dir = tempfile::tempdir().unwrap();
+    let want = cloud_of(&scan_folder(), &dir.path().join("file"));
+    let camera = format!("play:{}?rate=60", text(&scan_folder()));
+    for store in ["png", "raw", "auto"] {
+        let out = dir.path().join(store);
+        let to = text(&out);
+        let args = ["record", "--camera", &camera, "--pair", "given", "--out", &to, "--store", store, "--json"];
+        let report: serde_json::Value = serde_json::from_str(&sheetlight(&args)).unwrap();
+        let a = account(&report["account"]);
+        assert_eq!((a.sent, a.used, a.unexplained()), (24, 24, 0), "{a}");
+        assert_eq!(same_pictures(&out, &scan_folder()), 24);
+        assert_eq!(
+            out.join("pictures.raw").exists(),
+            store == "raw" || a.used > 0 && out.join("pictures.raw").exists()
+        );
+        assert!(cloud_of(&out, &dir.path().join(format!("{store} scan"))) == want, "{store}: another cloud");
+    }
+    // While it runs: alone, and recorded beside.
+    for (name, more) in [("alone", vec![]), ("beside", vec!["--record".to_owned(), text(&dir.path().join("kept"))])] {
+        let out = dir.path().join(name);
+        let (to, station) = (text(&out), station());
+        let mut args = vec!["scan", "--camera", &camera, "--pair", "given", "--station", &station, "--out", &to];
+        args.extend(["--on", "cpu", "--overlays", "0", "--quiet"]);
+        args.extend(more.iter().map(String::as_str));
+        sheetlight(&args);
+        assert!(std::fs::read(out.join("cloud.ply")).unwrap() == want, "{name}: another cloud");
+        let a = account(&json(&out.join("scan.json"))["camera"]);
+        assert_eq!((a.sent, a.used, a.unexplained()), (24, 24, 0), "{name}: {a}");
+    }
+    assert_eq!(same_pictures(&dir.path().join("kept"), &scan_folder()), 24);
+}
+
+#[test]
+fn a_recorder_that_is_killed_leaves_all_but_the_last_second() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("cut");
+    let camera = format!("play:{}?rate=40&loops=1000", text(&scan_folder()));
+    let mut child = Command::new(env!("CARGO_BIN_EXE_sheetlight"))
+        .args(["record", "--camera", &camera, "--pair", "given", "--out", &text(&out), "--quiet"])
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let begun = Instant::now();
+    while !out.join("frames.jsonl").exists() {
+        assert!(begun.elapsed() < Duration::from_secs(20), "it does not begin");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let begun = Instant::now();
+    // It can be opened while it runs.
+    std::thread::sleep(Duration::from_millis(900));
+    assert!(Recording::open(&out).unwrap().meta.frames.len() > 10);
+    let said = sheetlight_fails(&["record", "--camera", &camera, "--out", &text(&out)]).1;
+    assert!(said.contains("another recorder"), "{said}");
+    let ran = begun.elapsed().as_secs_f64();
+    child.kill().unwrap();
+    child.wait().unwrap();
+    // As if it had been cut inside its last line and its last raw frame.
+    let frames = std::fs::read(out.join("frames.jsonl")).unwrap();
+    std::fs::write(out.join("frames.jsonl"), &frames[..frames.len() - 7]).unwrap();
+    let recording = Recording::open(&out).unwrap();
+    let n = recording.meta.frames.len();
+    assert!(n as f64 > 40.0 * (ran - 1.0), "{n} pictures of {ran:.1} s at 40 a second");
+    recording.meta.frames.iter().for_each(|f| drop(recording.picture(f.laser.as_ref().unwrap()).unwrap()));
+    assert!(!cloud_of(&out, &dir.path().join("scan")).is_empty());
+    // What is there stays: nobody records over it.
+    let said = sheetlight_fails(&["record", "--camera", &camera, "--out", &text(&out)]).1;
+    assert!(said.contains("holds a recording") && said.contains("another folder"), "{said}");
+}
+
+#[test]
+fn a_full_disk_ends_a_recording_that_stays_whole() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("full");
+    let camera = format!("play:{}?rate=100", text(&scan_folder()));
+    let run = Command::new(env!("CARGO_BIN_EXE_sheetlight"))
+        .args(["record", "--camera", &camera, "--pair", "given", "--out", &text(&out), "--store", "raw"])
+        .env("SHEETLIGHT_FULL_AT", "25")
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&run.stderr);
+    assert!(!run.status.success() && said.contains("the disk is full") && said.contains("shots, whole"), "{said}");
+    let recording = Recording::open(&out).unwrap();
+    let n = recording.meta.frames.len();
+    assert!((1..24).contains(&n), "{n}");
+    recording.meta.frames.iter().for_each(|f| drop(recording.picture(f.laser.as_ref().unwrap()).unwrap()));
+    assert!(said.contains("dropped by disk"), "{said}");
+}
+
+/// Memory that a process holds, kB.
+fn held(pid: u32) -> Option<u64> {
+    let status = std::fs::read_to_string(format!("/proc/{pid}/status")).ok()?;
+    status.lines().find_map(|l| l.strip_prefix("VmRSS:"))?.trim().trim_end_matches(" kB").parse().ok()
+}
+
+/// Short: 320x240, four seconds. `SHEETLIGHT_LONG`: 640x480 for 60 s, memory flat within 5 MB after 10 s.
+#[test]
+fn two_hundred_a_second_are_recorded_and_scanned_at_once_or_counted() {
+    let long = std::env::var("SHEETLIGHT_LONG").is_ok();
+    let dir = tempfile::tempdir().unwrap();
+    let (played, seconds) = if long {
+        let out = text(&dir.path().join("sim"));
+        sheetlight(&["simulate", "--out", &out, "--shots", "60", "--quiet"]);
+        (dir.path().join("sim/scan"), 60)
+    } else {
+        (scan_folder(), 4)
+    };
+    let station = if long { text(&dir.path().join("sim/station")) } else { station() };
+    let (kept, out) = (dir.path().join("kept"), dir.path().join("scan"));
+    let camera = format!("play:{}?rate=200&loops=1000000", text(&played));
+    let mut child = Command::new(env!("CARGO_BIN_EXE_sheetlight"))
+        .args(["scan", "--camera", &camera, "--pair", "given", "--seconds", &seconds.to_string(), "--quiet"])
+        .args(["--record", &text(&kept), "--station", &station, "--out", &text(&out), "--overlays", "0"])
+        .args(["--on", "cpu", "--memory", "32"])
+        .spawn()
+        .unwrap();
+    let begun = Instant::now();
+    let mut memory: Vec<(f64, u64)> = Vec::new();
+    let status = loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            break status;
+        }
+        memory.extend(held(child.id()).map(|kb| (begun.elapsed().as_secs_f64(), kb)));
+        std::thread::sleep(Duration::from_millis(100));
+    };
+    assert!(status.success());
+    let a = account(&json(&out.join("scan.json"))["camera"]);
+    let recorded = Recording::open(&kept).unwrap().meta.frames.len() as u64;
+    // Until the scan's own products are made.
+    let while_it_ran = memory.iter().filter(|(t, _)| (10.0..=f64::from(seconds)).contains(t)).map(|(_, kb)| *kb);
+    let (least, most) = while_it_ran.fold((u64::MAX, 0), |(l, m), kb| (l.min(kb), m.max(kb)));
+    println!("200 a second for {seconds} s: {a}; memory after 10 s {least} to {most} kB");
+    assert_eq!((a.unexplained(), a.used), (0, recorded), "{a}");
+    assert!(a.sent >= 190 * (seconds as u64 - 1), "{a}");
+    assert_eq!(json(&out.join("scan.json"))["shots"].as_u64(), Some(recorded), "what is recorded is scanned");
+    if long {
+        assert!(most - least < 5 * 1024, "{least} to {most} kB");
+    }
+}
