@@ -3,11 +3,10 @@
 //! Frame and unit: px of the picture, grey levels of 8 bits, ms.
 
 use super::message::Frames;
-use crate::capture::{CameraUri, Event, Format, Picture, PictureSource, RawFormat, now_ns};
+use crate::capture::{Account, CameraUri, Fate, Fed, Feed, FeedOptions, Format, Mode, RawFormat, now_ns};
 use crate::fault::{Fault, Result};
-use crate::raster::Image;
 use crate::rig::Rig;
-use crate::scan::{Live, Newest, Where};
+use crate::scan::{Live, Where};
 use crate::station::{Settings, volume};
 use std::collections::VecDeque;
 use std::path::Path;
@@ -17,7 +16,7 @@ use std::time::Duration;
 
 /// Waited for a picture at most so long before is looked whether to end.
 const WITHIN: Duration = Duration::from_millis(200);
-/// A camera that was lost is opened again after so long.
+/// A camera that is not there is looked for again after so long.
 const AGAIN: Duration = Duration::from_secs(1);
 /// Delays that p50 and p99 are of.
 const DELAYS: usize = 512;
@@ -41,64 +40,71 @@ pub struct Looked {
 #[derive(Default)]
 struct State {
     newest: Option<Arc<Looked>>,
-    frames: Frames,
+    account: Account,
+    measured: u64,
+    without_stripe: u64,
     delays: VecDeque<f64>,
     wrong: Option<String>,
 }
 
 /// A camera that is looked at.
 pub struct Camera {
-    state: Arc<Shared>,
+    state: Arc<Mutex<State>>,
     ended: Arc<AtomicBool>,
 }
 
-#[derive(Default)]
-struct Shared(Mutex<State>);
-
-impl Shared {
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.0.lock().unwrap_or_else(|e| e.into_inner())
-    }
-    fn drop_one(&self, why: &str) {
-        *self.lock().frames.dropped.entry(why.into()).or_default() += 1;
-    }
+fn lock(state: &Mutex<State>) -> MutexGuard<'_, State> {
+    state.lock().unwrap_or_else(|e| e.into_inner())
 }
 
 impl Camera {
-    /// Begins to look. `raw` states what frames on standard input are like. Errors: a URI that names no camera, no threads.
+    /// Begins to look; the camera need not be there yet. `raw` states what frames on standard input are like. Errors: a URI that
+    /// names no camera, no threads.
     pub fn watch(uri: &str, raw: Option<RawFormat>, station: &Path) -> Result<Camera> {
         let parsed: CameraUri =
             uri.parse().map_err(|e: String| Fault::usage(e).next("name a camera as docs/live.md shows"))?;
-        let (state, ended) = (Arc::new(Shared::default()), Arc::new(AtomicBool::new(false)));
-        let newest: Arc<Newest<Picture>> = Arc::default();
-        let (tell, fill, end) = (state.clone(), newest.clone(), ended.clone());
-        let reader = move || {
-            read(&parsed, raw, &tell, &fill, &end);
-            fill.close();
+        let (state, ended) = (Arc::new(Mutex::new(State::default())), Arc::new(AtomicBool::new(false)));
+        let (tell, end, station) = (state.clone(), ended.clone(), station.to_owned());
+        let body = move || {
+            while !end.load(Ordering::Relaxed) {
+                let why = look(&parsed, raw, &station, &tell, &end);
+                lock(&tell).wrong =
+                    Some(why.map_or_else(|fault| fault.what, |()| "the camera's pictures have ended".into()));
+                if parsed == CameraUri::Input {
+                    // What was read from a pipe cannot be had again.
+                    return;
+                }
+                std::thread::sleep(AGAIN);
+            }
         };
-        let (tell, station) = (state.clone(), station.to_owned());
-        let measurer = move || measure(&station, &tell, &newest);
-        let spawn = |name: &str, body: Box<dyn FnOnce() + Send>| {
-            std::thread::Builder::new().name(name.into()).spawn(body).map_err(|e| Fault::threads(&e))
-        };
-        spawn("camera", Box::new(reader))?;
-        spawn("look", Box::new(measurer))?;
+        std::thread::Builder::new().name("look".into()).spawn(body).map_err(|e| Fault::threads(&e))?;
         Ok(Camera { state, ended })
     }
 
     /// The newest picture, if it is not the one of this number.
     pub fn other_than(&self, number: u64) -> Option<Arc<Looked>> {
-        self.state.lock().newest.as_ref().filter(|l| l.number != number).cloned()
+        lock(&self.state).newest.as_ref().filter(|l| l.number != number).cloned()
     }
 
     /// Frames by what became of them, delays p50 and p99 in ms, what is wrong.
     pub fn seen(&self) -> (Frames, Option<[f64; 2]>, Option<String>) {
-        let state = self.state.lock();
+        let state = lock(&self.state);
+        let a = &state.account;
+        let dropped = [
+            ("passed over: a newer one came", a.dropped_processing),
+            ("no stripe", state.without_stripe),
+            ("incomplete", a.incomplete),
+            ("missed by the camera", a.missed),
+            ("late", a.late),
+            ("no room", a.dropped_queue),
+        ];
+        let dropped = dropped.into_iter().filter(|(_, n)| *n > 0).map(|(why, n)| (why.to_owned(), n)).collect();
+        let frames = Frames { seen: a.sent.max(a.complete), measured: state.measured, dropped };
         let mut delays: Vec<f64> = state.delays.iter().copied().collect();
         delays.sort_by(f64::total_cmp);
         let at = |q: f64| delays[((delays.len() - 1) as f64 * q).round() as usize];
         let both = (!delays.is_empty()).then(|| [at(0.5), at(0.99)]);
-        (state.frames.clone(), both, state.wrong.clone())
+        (frames, both, state.wrong.clone())
     }
 }
 
@@ -108,89 +114,51 @@ impl Drop for Camera {
     }
 }
 
-/// Takes pictures as they come; a camera that is lost is opened again.
-fn read(uri: &CameraUri, raw: Option<RawFormat>, tell: &Shared, fill: &Newest<Picture>, end: &AtomicBool) {
-    let wrong = |what: String| tell.lock().wrong = Some(what);
-    let mut source: Option<Box<dyn PictureSource>> = None;
-    let mut passed_over = 0;
-    while !end.load(Ordering::Relaxed) {
-        let Some(open) = &mut source else {
-            match uri.open(raw) {
-                Ok(opened) => source = Some(opened),
-                Err(fault) => {
-                    wrong(fault.what);
-                    std::thread::sleep(AGAIN);
-                }
-            }
-            continue;
-        };
-        match open.next(WITHIN) {
-            Event::Picture(picture) => {
-                let mut state = tell.lock();
-                state.wrong = None;
-                state.frames.seen += 1;
-                drop(state);
-                fill.put(*picture);
-                let over = fill.passed_over();
-                (passed_over..over).for_each(|_| tell.drop_one("passed over: a newer one came"));
-                passed_over = over;
-            }
-            Event::Incomplete { .. } => tell.drop_one("incomplete"),
-            Event::Quiet => {}
-            Event::Lost(fault) => {
-                wrong(fault.what);
-                if open.reopen().is_err() {
-                    std::thread::sleep(AGAIN);
-                    source = None;
-                }
-            }
-            Event::Ended => return wrong("the camera's pictures have ended".into()),
-        }
+/// Measures the newest picture, and the next newest, until the source ends.
+fn look(uri: &CameraUri, raw: Option<RawFormat>, station: &Path, tell: &Mutex<State>, end: &AtomicBool) -> Result<()> {
+    let feed = Feed::start(uri.open(raw)?, FeedOptions { mode: Mode::Newest, ..FeedOptions::default() })?;
+    let mut live = begin(station, feed.format());
+    if let Err(fault) = &live {
+        lock(tell).wrong = Some(fault.what.clone());
     }
-}
-
-/// Measures the newest picture, and the next newest.
-fn measure(station: &Path, tell: &Shared, newest: &Newest<Picture>) {
-    let mut live: Option<Live> = None;
-    let mut number = 0;
-    while let Some(picture) = newest.take() {
+    let mut number = lock(tell).newest.as_ref().map_or(0, |l| l.number);
+    while !end.load(Ordering::Relaxed) {
+        let picture = match feed.next(WITHIN) {
+            Fed::Picture(picture) => picture,
+            Fed::Quiet => continue,
+            Fed::Ended(fault) => {
+                lock(tell).account = feed.account();
+                return fault.map_or(Ok(()), Err);
+            }
+        };
         number += 1;
-        if live.is_none() {
-            live = match begin(station, &picture.image) {
-                Ok(live) => Some(live),
-                Err(fault) => {
-                    tell.lock().wrong = Some(fault.what);
-                    None
-                }
-            };
-        }
-        let image = picture.image;
+        let (image, came_ns) = (picture.image, picture.host_ns);
         let (width, height, grey) = (image.width, image.height, image.to_u8());
-        let peaks = live.as_mut().and_then(|l| l.measure(number as u32, image).ok().flatten());
-        let peaks = peaks.map(|m| m.peaks.iter().map(|p| (p.u, p.v, p.flags & 0xff)).collect::<Vec<_>>());
-        let delay_ms = (now_ns().saturating_sub(picture.host_ns)) as f64 * 1e-6;
-        let lit = peaks.as_ref().is_some_and(|p| !p.is_empty());
-        let looked =
-            Looked { number, width, height, grey, peaks: peaks.unwrap_or_default(), delay_ms: delay_ms as f32 };
-        let mut state = tell.lock();
-        state.newest = Some(Arc::new(looked));
+        let measured = live.as_mut().ok().map(|l| l.measure(number as u32, image)).transpose()?.flatten();
+        feed.fate(Fate::Used);
+        let peaks: Vec<_> = measured.iter().flat_map(|m| &m.peaks).map(|p| (p.u, p.v, p.flags & 0xff)).collect();
+        let delay_ms = now_ns().saturating_sub(came_ns) as f64 * 1e-6;
+        let mut state = lock(tell);
+        if peaks.is_empty() {
+            state.without_stripe += 1;
+        } else {
+            state.measured += 1;
+        }
+        state.newest = Some(Arc::new(Looked { number, width, height, grey, peaks, delay_ms: delay_ms as f32 }));
         state.delays.push_back(delay_ms);
         if state.delays.len() > DELAYS {
             state.delays.pop_front();
         }
-        if lit {
-            state.frames.measured += 1;
-        }
-        drop(state);
-        if !lit {
-            tell.drop_one("no stripe");
+        state.account = feed.account();
+        if live.is_ok() {
+            state.wrong = feed.news().pop();
         }
     }
+    Ok(())
 }
 
-/// The chain for pictures like this one.
-fn begin(station: &Path, image: &Image) -> Result<Live> {
+/// The chain for pictures like these.
+fn begin(station: &Path, format: Format) -> Result<Live> {
     let (settings, rig) = (Settings::load(station)?, Rig::load(station)?);
-    let format = Format { width: image.width, height: image.height, bits: image.bits };
     Live::new(&rig, format, &settings.extraction, volume::believed(&settings, &rig).as_ref(), Where::default())
 }
