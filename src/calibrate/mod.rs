@@ -8,6 +8,7 @@ pub mod camera;
 pub mod components;
 pub mod hand_eye;
 pub mod homography;
+pub mod joint;
 pub mod laser_plane;
 pub mod latency;
 pub mod limits;

@@ -13,12 +13,16 @@ mod values;
 mod verify;
 pub mod volume;
 
+pub use calibrate::auto::cell::{Cell, Light};
+pub use calibrate::auto::check::SelfCheck;
+pub use calibrate::auto::procedure::{AutoResult, AutoRun, Ended, calibrate_auto};
 pub use calibrate::axis::{AxisRun, calibrate_axis};
 pub use calibrate::ball::{calibrate_profile_hand_eye, evaluate_profile_hand_eye};
 pub use calibrate::board_views::{Boards, FrameBoard, boards};
 pub use calibrate::hand_eye::{
     Calibrated, HandEyeResult, HandEyeRun, PosePairs, calibrate_hand_eye, calibrate_hand_eye_from_poses,
 };
+pub use calibrate::joint::run::{JointResult, JointRun, calibrate_joint, store_joint};
 pub use calibrate::laser_plane::{LaserPlaneRun, calibrate_laser_plane};
 pub use calibrate::latency::{LatencyFound, calibrate_latency};
 pub use calibrate::pointer::{PointerRun, calibrate_pointer};

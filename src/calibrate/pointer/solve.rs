@@ -117,7 +117,7 @@ struct Fit<'a> {
 }
 
 /// Two directions across the beam.
-fn across(direction: &Vec3) -> [Vec3; 2] {
+pub(in crate::calibrate) fn across(direction: &Vec3) -> [Vec3; 2] {
     let axis = if direction.x.abs() < 0.7 { Vec3::x() } else { Vec3::y() };
     let a = direction.cross(&axis).normalize();
     [a, direction.cross(&a)]
@@ -340,7 +340,7 @@ pub fn solve(
 }
 
 /// The line through two of the points that most others are near to, refined on those.
-fn robust_line(points: &[Vec3], gates: &[f64]) -> Option<Ray<Camera>> {
+pub(in crate::calibrate) fn robust_line(points: &[Vec3], gates: &[f64]) -> Option<Ray<Camera>> {
     let mut best: Option<(f64, Ray<Camera>)> = None;
     for (i, a) in points.iter().enumerate() {
         for b in &points[..i] {
@@ -396,7 +396,7 @@ fn distance2(view: &SpotView, camera: &Intrinsics, s: &Solved, used: bool, facto
 }
 
 /// d(ox oy oz dx dy dz)/d(step of the beam).
-fn basis(beam: &Ray<Camera>) -> DMatrix<f64> {
+pub(in crate::calibrate) fn basis(beam: &Ray<Camera>) -> DMatrix<f64> {
     let [a, b] = across(&beam.direction);
     let mut j = DMatrix::zeros(6, 4);
     for i in 0..3 {

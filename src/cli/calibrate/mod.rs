@@ -4,6 +4,7 @@
 mod axis;
 mod camera;
 mod hand_eye;
+mod joint;
 mod laser_plane;
 mod latency;
 mod pointer;
@@ -18,6 +19,7 @@ pub enum Command {
     Axis(axis::Args),
     Camera(camera::Args),
     HandEye(hand_eye::Args),
+    Joint(joint::Args),
     LaserPlane(laser_plane::Args),
     Latency(latency::Args),
     Pointer(pointer::Args),
@@ -29,6 +31,7 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Axis(a) => axis::run(a, console),
         Command::Camera(a) => camera::run(a, console),
         Command::HandEye(a) => hand_eye::run(a, console),
+        Command::Joint(a) => joint::run(a, console),
         Command::Latency(a) => latency::run(a, console),
         Command::LaserPlane(a) => laser_plane::run(a, console),
         Command::Pointer(a) => pointer::run(a, console),

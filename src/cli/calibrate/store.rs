@@ -16,6 +16,13 @@ pub struct Keep {
     keep_badly_determined: bool,
 }
 
+impl Keep {
+    /// Whether such a result is stored too.
+    pub fn badly_determined(&self) -> bool {
+        self.keep_badly_determined
+    }
+}
+
 /// Stores a calibration and its page beside it, and says what it came to. A badly determined one is refused:
 /// the station keeps its former calibration, the page says what was found.
 pub fn finish<T: Serialize + Measured>(

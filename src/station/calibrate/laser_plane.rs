@@ -12,7 +12,7 @@ use crate::calibrate::laser_plane::solve::{LaserPlaneFit, solve};
 use crate::calibrate::laser_plane::views::{StripePeak, StripeView};
 use crate::calibrate::limits::Asked;
 use crate::calibrate::measured_pose::{intrinsic_covariance, pooled_factor};
-use crate::camera::Intrinsics;
+use crate::camera::{Intrinsics, ParameterCovariance};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Camera, Plane, Rigid, Vec2, Vec3};
 use crate::raster::Image;
@@ -54,8 +54,7 @@ pub fn calibrate_laser_plane(
         match &recording.meta.frames[b.frame].laser {
             Some(name) => {
                 let (laser, ambient) = (recording.picture(name)?, recording.picture(&b.pose.name)?);
-                let share = room_light::share(&laser, &ambient, &b.board, &b.pose.camera_from_board, &camera.value);
-                images.push(if share > 0.0 { room_light::without(&laser, &ambient, share) } else { laser });
+                images.push(room_light::alone(laser, &ambient, &b, &camera.value));
                 names.push(name.clone());
                 seen.push(b);
             }
@@ -68,35 +67,8 @@ pub fn calibrate_laser_plane(
             .next("record an ambient and a laser picture of each board pose"));
     }
     let c = intrinsic_covariance(&camera.covariance);
-    let factor = pooled_factor(seen.iter().map(|s| &s.pose)).unwrap_or(f64::NAN);
-    let processor = run.place.open()?;
-    let device = match &processor {
-        Processor::Gpu(device) => Some(device),
-        Processor::Host(_) => None,
-    };
-    let fit_with = |laser: &Plane<Camera>, depth_mm: [f64; 2]| -> Result<(Vec<StripeView>, LaserPlaneFit)> {
-        let peaks = stripes(&images, &camera.value, laser, depth_mm, run, &processor)?;
-        let mut views: Vec<StripeView> = seen
-            .iter()
-            .zip(peaks)
-            .map(|(s, peaks)| StripeView { pose: s.pose.clone(), board: s.board.clone(), peaks })
-            .collect();
-        keep_straight(&mut views, &camera.value, device)?;
-        let fit = solve(&views, &camera.value, &c, factor, &run.solver)?;
-        Ok((views, fit))
-    };
-    // Nothing is known of the plane yet: whole pictures, the stripe taken to run along rows and then
-    // along columns. With the plane that comes out better the stages run again as in a scan.
-    let everywhere = [0.0, f64::INFINITY];
-    let unknown = |across: Vec3| Plane::new(across * 1e-3 + Vec3::z(), 1000.0).expect("not zero");
-    let guesses = [fit_with(&unknown(Vec3::y()), everywhere), fit_with(&unknown(Vec3::x()), everywhere)];
-    let used = |r: &Result<(Vec<StripeView>, LaserPlaneFit)>| {
-        r.as_ref().map_or(0, |(_, f)| f.views.iter().map(|v| v.peaks_used).sum::<usize>())
-    };
-    let best = if used(&guesses[0]) >= used(&guesses[1]) { 0 } else { 1 };
-    let guess = guesses.into_iter().nth(best).expect("two guesses");
-    let guess = guess.map_err(|fault| lit(recording, &names[names.len() / 2], fault))?.1.plane;
-    let (views, fit) = fit_with(&guess, everywhere)?;
+    let (views, fit) = sheet_on_boards(&seen, &images, &camera.value, &c, run)
+        .map_err(|fault| lit(recording, &names[names.len() / 2], fault))?;
     let lit = Volume::new(fit.reach[0], fit.reach[1], "where the boards were lit");
     let limits = run.asked.limits(&lit, |z| camera.value.view_mm(z));
     let mut quality = judge(&fit, &views, &camera.value, &limits);
@@ -111,6 +83,45 @@ pub fn calibrate_laser_plane(
         }
     }
     Ok(Calibrated { calibration, page, missing })
+}
+
+/// The stripe in pictures of boards, and the sheet that it shows: nothing needs to be known of it. `images` hold the laser's
+/// light alone.
+pub(super) fn sheet_on_boards(
+    seen: &[FrameBoard],
+    images: &[Image],
+    camera: &Intrinsics,
+    c: &ParameterCovariance,
+    run: &LaserPlaneRun,
+) -> Result<(Vec<StripeView>, LaserPlaneFit)> {
+    let factor = pooled_factor(seen.iter().map(|s| &s.pose)).unwrap_or(f64::NAN);
+    let processor = run.place.open()?;
+    let device = match &processor {
+        Processor::Gpu(device) => Some(device),
+        Processor::Host(_) => None,
+    };
+    let fit_with = |laser: &Plane<Camera>, depth_mm: [f64; 2]| -> Result<(Vec<StripeView>, LaserPlaneFit)> {
+        let peaks = stripes(images, camera, laser, depth_mm, run, &processor)?;
+        let mut views: Vec<StripeView> = seen
+            .iter()
+            .zip(peaks)
+            .map(|(s, peaks)| StripeView { pose: s.pose.clone(), board: s.board.clone(), peaks })
+            .collect();
+        keep_straight(&mut views, camera, device)?;
+        let fit = solve(&views, camera, c, factor, &run.solver)?;
+        Ok((views, fit))
+    };
+    // Nothing is known of the plane yet: whole pictures, the stripe taken to run along rows and then
+    // along columns. With the plane that comes out better the stages run again as in a scan.
+    let everywhere = [0.0, f64::INFINITY];
+    let unknown = |across: Vec3| Plane::new(across * 1e-3 + Vec3::z(), 1000.0).expect("not zero");
+    let guesses = [fit_with(&unknown(Vec3::y()), everywhere), fit_with(&unknown(Vec3::x()), everywhere)];
+    let used = |r: &Result<(Vec<StripeView>, LaserPlaneFit)>| {
+        r.as_ref().map_or(0, |(_, f)| f.views.iter().map(|v| v.peaks_used).sum::<usize>())
+    };
+    let best = if used(&guesses[0]) >= used(&guesses[1]) { 0 } else { 1 };
+    let guess = guesses.into_iter().nth(best).expect("two guesses")?.1.plane;
+    fit_with(&guess, everywhere)
 }
 
 /// The stripe's peaks in each picture, by the stages that a scan uses.

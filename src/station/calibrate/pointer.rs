@@ -44,8 +44,7 @@ pub fn calibrate_pointer(
         match &recording.meta.frames[b.frame].laser {
             Some(name) => {
                 let (laser, ambient) = (recording.picture(name)?, recording.picture(&b.pose.name)?);
-                let share = room_light::share(&laser, &ambient, &b.board, &b.pose.camera_from_board, &camera.value);
-                let laser = if share > 0.0 { room_light::without(&laser, &ambient, share) } else { laser };
+                let laser = room_light::alone(laser, &ambient, &b, &camera.value);
                 pictures.push((b, name.clone(), laser, ambient));
             }
             None => missing.push((b.pose.name.clone(), "its frame has no laser picture".into())),

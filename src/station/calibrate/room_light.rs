@@ -2,6 +2,7 @@
 //! alone, where the second picture holds room light too.
 //! Frame and unit: grey levels of the pictures' depth.
 
+use super::board_views::FrameBoard;
 use crate::calibrate::boards::extent::inside;
 use crate::camera::Intrinsics;
 use crate::fault::Fault;
@@ -68,6 +69,12 @@ pub fn without(laser: &Image, ambient: &Image, share: f32) -> Image {
         8 => Image::from_u8(w, h, left.map(|g| g as u8).collect()),
         bits => Image::from_u16(w, h, bits, left.map(|g| g as u16).collect()),
     }
+}
+
+/// The laser's picture of a board without the room's light, where there is any in it.
+pub fn alone(laser: Image, ambient: &Image, b: &FrameBoard, camera: &Intrinsics) -> Image {
+    let share = share(&laser, ambient, &b.board, &b.pose.camera_from_board, camera);
+    if share > 0.0 { without(&laser, ambient, share) } else { laser }
 }
 
 /// Adds to a fault what one of the laser's pictures shows, as it was taken.

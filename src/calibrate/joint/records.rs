@@ -1,0 +1,211 @@
+//! In: a joint solve. Out: the covariances of its records, that of all of them together, and the verdict.
+//! Frame and unit: as in calibration files: mm, rad, px.
+
+use super::limits::{Systematic, by_part};
+use super::shots::Part;
+use super::solve::JointFit;
+use super::unknowns::Layout;
+use super::volume::expected;
+use crate::calibrate::hand_eye::report::HAND_EYE_NAMES;
+use crate::calibrate::laser_plane::report::PLANE_NAMES;
+use crate::calibrate::laser_plane::terms::basis as plane_basis;
+use crate::calibrate::limits::Limits;
+use crate::calibrate::pointer::solve::{BEAM_NAMES, basis as beam_basis};
+use crate::camera::{ALWAYS_NAMED, NAMES, PARAMETERS, ParameterCovariance};
+use crate::geometry::{Camera, Plane};
+use crate::rig::{Covariance, Kind, Quality, Verdict};
+use nalgebra::DMatrix;
+use std::collections::BTreeMap;
+
+/// Errors of all records together: which parameter of which record, and their covariance.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Together {
+    /// Version of the file's format: 1.
+    pub format: u32,
+    /// What the records hold, as [`crate::rig::Calibration::content`] has it: the covariance is of these and no others.
+    pub of: BTreeMap<Kind, String>,
+    /// `record.parameter`, in the order of the matrix.
+    pub parameters: Vec<String>,
+    /// Square and symmetric, row by row.
+    pub matrix: Vec<Vec<f64>>,
+}
+
+/// How the numbers of one record follow the shared unknowns: names and derivatives.
+struct Follows {
+    kind: Kind,
+    names: Vec<&'static str>,
+    by: DMatrix<f64>,
+}
+
+fn camera(l: &Layout) -> Follows {
+    let kept: Vec<usize> = (0..PARAMETERS).filter(|i| *i < ALWAYS_NAMED || l.camera.contains(i)).collect();
+    let by = DMatrix::from_fn(kept.len(), l.shared(), |i, j| f64::from(u8::from(l.camera.get(j) == Some(&kept[i]))));
+    Follows { kind: Kind::Camera, names: kept.iter().map(|&i| NAMES[i]).collect(), by }
+}
+
+fn part(kind: Kind, names: &[&'static str], l: &Layout, at: usize, basis: &DMatrix<f64>) -> Follows {
+    let mut by = DMatrix::zeros(names.len(), l.shared());
+    by.view_mut((0, at), basis.shape()).copy_from(basis);
+    Follows { kind, names: names.to_vec(), by }
+}
+
+/// The records that the data speaks of, the hand-eye as this kind.
+fn follows(fit: &JointFit, hand_eye: Kind) -> Vec<Follows> {
+    let l = &fit.layout;
+    let mut all = vec![camera(l)];
+    if fit.has(Part::Stripe) {
+        all.push(part(Kind::LaserPlane, &PLANE_NAMES, l, l.plane(), &plane_basis(&fit.state.plane)));
+    }
+    if fit.has(Part::Spot) {
+        all.push(part(Kind::Pointer, &BEAM_NAMES, l, l.beam(), &beam_basis(&fit.state.beam)));
+    }
+    if fit.has(Part::RobotPlace) {
+        all.push(part(hand_eye, &HAND_EYE_NAMES, l, l.hand_eye(), &DMatrix::identity(6, 6)));
+    }
+    all
+}
+
+/// The covariance of each record. A pointer's holds the camera's too, as its file does.
+pub fn covariances(fit: &JointFit, hand_eye: Kind) -> BTreeMap<Kind, Covariance> {
+    let all = follows(fit, hand_eye);
+    let of = |f: &Follows| {
+        let (names, by) = match f.kind {
+            Kind::Pointer => {
+                let camera = &all[0];
+                let mut by = DMatrix::zeros(f.names.len() + camera.names.len(), fit.layout.shared());
+                by.rows_mut(0, f.names.len()).copy_from(&f.by);
+                by.rows_mut(f.names.len(), camera.names.len()).copy_from(&camera.by);
+                ([f.names.clone(), camera.names.clone()].concat(), by)
+            }
+            _ => (f.names.clone(), f.by.clone()),
+        };
+        (f.kind, Covariance::new(&names, &symmetric(&by * &fit.covariance * by.transpose())))
+    };
+    all.iter().map(of).collect()
+}
+
+fn symmetric(m: DMatrix<f64>) -> DMatrix<f64> {
+    (&m + m.transpose()) * 0.5
+}
+
+/// All records' covariance in one; `of` names what each holds.
+pub fn together(fit: &JointFit, hand_eye: Kind, of: BTreeMap<Kind, String>) -> Together {
+    let all = follows(fit, hand_eye);
+    let rows: usize = all.iter().map(|f| f.names.len()).sum();
+    let mut by = DMatrix::zeros(rows, fit.layout.shared());
+    let (mut parameters, mut at) = (Vec::new(), 0);
+    for f in &all {
+        by.rows_mut(at, f.names.len()).copy_from(&f.by);
+        at += f.names.len();
+        parameters.extend(f.names.iter().map(|n| format!("{}.{n}", f.kind.name())));
+    }
+    let c = symmetric(&by * &fit.covariance * by.transpose());
+    let matrix = c.row_iter().map(|r| r.iter().copied().collect()).collect();
+    Together { format: 1, of, parameters, matrix }
+}
+
+/// The covariance of the shared unknowns as separate calibrations state it: each for itself, nothing between them.
+pub fn separately(
+    l: &Layout,
+    camera: &ParameterCovariance,
+    hand_eye: Option<&DMatrix<f64>>,
+    plane: Option<(&Plane<Camera>, &DMatrix<f64>)>,
+) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(l.shared(), l.shared());
+    for (i, &a) in l.camera.iter().enumerate() {
+        for (j, &b) in l.camera.iter().enumerate() {
+            out[(i, j)] = camera[(a, b)];
+        }
+    }
+    if let Some(c) = hand_eye {
+        out.view_mut((l.hand_eye(), l.hand_eye()), (6, 6)).copy_from(&c.view((0, 0), (6, 6)));
+    }
+    if let Some((plane, c)) = plane {
+        // The basis' columns are orthonormal.
+        let basis = plane_basis(plane);
+        out.view_mut((l.plane(), l.plane()), (3, 3)).copy_from(&(basis.transpose() * c * basis));
+    }
+    out
+}
+
+/// What is to be said beside the fit itself.
+pub struct Beside {
+    /// Expected error of a scanned point by separate calibrations of the same pictures, mm rms; and how far their points lie
+    /// from the joint ones, mm rms.
+    pub separate: Option<[f64; 2]>,
+    /// Whether the arm's misfits follow its pose.
+    pub systematic: Option<Systematic>,
+    /// Depths between which boards were lit, mm.
+    pub lit: [f64; 2],
+    /// What was left out before the solve.
+    pub missing: Vec<(String, String)>,
+}
+
+/// Judges a solve by the error of a scanned point in the working volume; `weights` as in [`super::volume::weights`].
+pub fn judge(fit: &JointFit, weights: &DMatrix<f64>, beside: &Beside, limits: &Limits) -> Quality {
+    let mm = expected(weights, &fit.covariance);
+    let robot = fit.has(Part::RobotPlace);
+    let frame = if robot { "in the robot's frame" } else { "in the camera's frame" };
+    let mut j = limits.by_error(
+        mm,
+        format!(
+            "a scanned point between {} is placed {frame} to {mm:.4} mm (1 sigma, three axes together); depths: {}",
+            limits.working.words(),
+            limits.working.from
+        ),
+    );
+    if let Some([separate, apart]) = beside.separate {
+        j.reasons.push(format!(
+            "separate calibrations of the same pictures state {separate:.4} mm, added up as if they were independent; their points lie {apart:.4} mm from these (rms)"
+        ));
+    }
+    let parts: Vec<String> = by_part(fit, weights)
+        .iter()
+        .filter(|(_, e)| *e > 0.05 * mm)
+        .map(|(p, e)| format!("{} {e:.4} mm", p.words()))
+        .collect();
+    j.reasons.push(format!("what makes it: {}", parts.join(", ")));
+    let (robot_mm, robot_deg) = (fit.noise.robot_mm, fit.noise.robot_rad.to_degrees());
+    if robot {
+        j.reasons.push(format!("the robot's poses scatter by {robot_mm:.4} mm and {robot_deg:.4} degrees per axis"));
+    }
+    if let Some(s) = beside.systematic.filter(Systematic::found) {
+        j.at_best(Verdict::Usable, true, || {
+            format!(
+                "the arm itself limits this: {:.0} % of its misfit at a pose left out is predicted by the other poses (chance: {:.0} %): its links \
+                 or joint zeros are not what its controller believes",
+                100.0 * s.predicted,
+                100.0 * s.by_chance.max(0.0)
+            )
+        });
+        j.advise(true, || {
+            "have the arm calibrated by its maker, or calibrate in the volume in which it works: points are good there only".into()
+        });
+    }
+    let names = |shots: usize| format!("{shots} pictures of boards");
+    j.at_best(Verdict::Usable, fit.shots.len() < 8, || format!("{}, 8 are needed to be good", names(fit.shots.len())));
+    j.at_best(Verdict::BadlyDetermined, robot && fit.freedom[3] < 6.0, || {
+        format!("{:.0} numbers tell the robot's scatter, 6 are needed", fit.freedom[3])
+    });
+    for l in &fit.left_out {
+        j.at_best(Verdict::Usable, true, || format!("{}: {} was left out: {}", l.name, l.part.words(), l.why));
+    }
+    j.reasons.extend(beside.missing.iter().map(|(name, why)| format!("{name} was not used: {why}")));
+    let mut figures: BTreeMap<String, f64> = [
+        ("expected_error_mm", mm),
+        ("separate_expected_error_mm", beside.separate.map_or(f64::NAN, |s| s[0])),
+        ("apart_from_separate_mm", beside.separate.map_or(f64::NAN, |s| s[1])),
+        ("board_rms_px", fit.features_rms_px),
+        ("stops", fit.shots.len() as f64),
+        ("nearest_board_mm", beside.lit[0]),
+        ("farthest_board_mm", beside.lit[1]),
+    ]
+    .map(|(k, v)| (k.to_owned(), v))
+    .into();
+    if robot {
+        figures.insert(crate::rig::ROBOT_SIGMA_MM.into(), robot_mm);
+        figures.insert(crate::rig::ROBOT_SIGMA_DEG.into(), robot_deg);
+    }
+    Quality { verdict: j.verdict, reasons: j.reasons, advice: j.advice, figures, per_picture: Vec::new() }
+}

@@ -1,0 +1,197 @@
+//! In: stops, a start. Out: everything that they share by maximum likelihood, with joint covariance and the noise of every
+//! source; what was left out and why.
+//! Frame and unit: see `unknowns`; mm, rad, px (docs/math.md, Joint calibration).
+
+use super::noise::{Leavings, leavings};
+use super::options::{JointOptions, Noise};
+use super::shots::{LeftOut, Part, Shot};
+use super::terms::{Terms, prior};
+use super::unknowns::{Layout, State};
+use crate::fault::{Fault, Result};
+use crate::solve::{LmOptions, Loss, Stop, lm};
+use nalgebra::DMatrix;
+
+/// What a joint solve found.
+pub struct JointFit {
+    /// Everything that was solved for.
+    pub state: State,
+    /// Where the unknowns stand in the covariance.
+    pub layout: Layout,
+    /// Of the shared unknowns; zero where nothing in the data speaks of one (no robot, no stripe, no spot).
+    pub covariance: DMatrix<f64>,
+    /// The covariance's part that each source makes, in the order of [`Part::ALL`].
+    pub shares: Vec<DMatrix<f64>>,
+    /// What each source scatters by.
+    pub noise: Noise,
+    /// Degrees of freedom that tell it, in the order of [`Part::ALL`].
+    pub freedom: [f64; 5],
+    /// The stops that count, without the parts that were left out.
+    pub shots: Vec<Shot>,
+    /// What does not count.
+    pub left_out: Vec<LeftOut>,
+    /// Corners' distance from where they are expected, rms per coordinate, px.
+    pub features_rms_px: f64,
+}
+
+impl JointFit {
+    /// Whether anything in the data speaks of a part.
+    pub fn has(&self, part: Part) -> bool {
+        has(&self.shots, part)
+    }
+}
+
+fn has(shots: &[Shot], part: Part) -> bool {
+    shots.iter().any(|s| match part {
+        Part::Features => true,
+        Part::Stripe => !s.stripe.is_empty(),
+        Part::Spot => s.spot.is_some(),
+        Part::RobotPlace | Part::RobotTurn => s.robot.is_some(),
+    })
+}
+
+/// Unknowns that nothing speaks of.
+fn held(shots: &[Shot], l: &Layout) -> Vec<usize> {
+    let mut hold = Vec::new();
+    if !has(shots, Part::RobotPlace) {
+        hold.extend(l.hand_eye()..l.hand_eye() + 6);
+    }
+    for place in 0..l.places {
+        if !shots.iter().any(|s| s.robot.is_some_and(|r| r.place == place)) {
+            hold.extend(l.place(place)..l.place(place) + 6);
+        }
+    }
+    if !has(shots, Part::Stripe) {
+        hold.extend(l.plane()..l.plane() + 3);
+    }
+    if !has(shots, Part::Spot) {
+        hold.extend(l.beam()..l.beam() + 4);
+    }
+    hold
+}
+
+fn undetermined(shots: &[Shot]) -> Fault {
+    let with = |f: fn(&Shot) -> bool| shots.iter().filter(|s| f(s)).count();
+    Fault::refused(format!(
+        "camera, hand-eye, laser plane and pointer are not determined together: {} pictures of boards, {} with a robot's pose, {} with \
+         the stripe, {} with the pointer's spot",
+        shots.len(),
+        with(|s| s.robot.is_some()),
+        with(|s| !s.stripe.is_empty()),
+        with(|s| s.spot.is_some())
+    ))
+    .cause("too few pictures of some kind, or all from alike directions and distances")
+    .next("add recordings: eight poses tilted about two axes, the stripe and the spot at three distances or more")
+}
+
+struct Round {
+    state: State,
+    leavings: Leavings,
+    noise: Noise,
+    covariance: DMatrix<f64>,
+}
+
+/// Fits and learns the noise until both stand still.
+fn settle(shots: &[Shot], start: &State, noise: Noise, layout: &Layout, o: &JointOptions) -> Result<Round> {
+    let prior = o.camera_prior.as_ref().and_then(|p| prior(p, &o.camera_free));
+    let mut terms = Terms { shots, mount: o.mount, layout, noise, peak_sigma_mm: Vec::new(), prior };
+    let options = LmOptions {
+        loss: Loss::Huber(o.huber),
+        hold: held(shots, layout),
+        max_iterations: 40,
+        tolerance: 1e-9,
+        ..LmOptions::default()
+    };
+    let mut state = start.clone();
+    for round in 0..60 {
+        terms.settle(&state);
+        let found = lm(&terms, state, &options);
+        if found.stop == Stop::BadStart {
+            return Err(undetermined(shots));
+        }
+        state = found.state;
+        let covariance = found.covariance.ok_or_else(|| undetermined(shots))?;
+        let left = leavings(&terms, &state, &covariance, o.huber).ok_or_else(|| undetermined(shots))?;
+        let next = left.noise(&terms.noise);
+        let settled = next.factors().iter().zip(terms.noise.factors()).all(|(a, b)| (a / b - 1.0).abs() < 2e-3);
+        if settled && round > 0 {
+            return Ok(Round { state, leavings: left, noise: terms.noise, covariance });
+        }
+        if round == 59 {
+            return Ok(Round { state, leavings: left, noise: terms.noise, covariance });
+        }
+        terms.noise = next;
+    }
+    unreachable!("the last round returns")
+}
+
+/// What may be left out as one, and at most which share of the stops.
+const GROUPS: [&[Part]; 4] = [&[Part::Features], &[Part::Stripe], &[Part::Spot], &[Part::RobotPlace, Part::RobotTurn]];
+const CONTRADICTING: f64 = 1.0 / 3.0;
+
+/// Solves for everything that the stops share. `start` has a board's pose for each stop and a place for each index in
+/// [`super::shots::Reported::place`]; `noise` is where the search for each source's scatter begins.
+///
+/// # Errors
+/// Fewer than three stops; what is not determined.
+pub fn solve(shots: &[Shot], start: &State, noise: Noise, o: &JointOptions) -> Result<JointFit> {
+    o.check()?;
+    if shots.len() < 3 {
+        return Err(undetermined(shots));
+    }
+    let (mut shots, mut state, mut noise) = (shots.to_vec(), start.clone(), noise);
+    let (whole, mut left_out) = (shots.len(), Vec::new());
+    loop {
+        let layout = Layout { camera: o.camera_free.clone(), places: state.far_from_board.len(), shots: shots.len() };
+        let round = settle(&shots, &state, noise, &layout, o)?;
+        (state, noise) = (round.state.clone(), round.noise);
+        if left_out.len() as f64 <= CONTRADICTING * whole as f64
+            && let Some((i, group, ratio)) = worst(&round.leavings, shots.len()).filter(|w| w.2 > o.gate)
+        {
+            let why = format!("{:.1} times as far off as the others", ratio.sqrt());
+            left_out.push(LeftOut { name: shots[i].seen.name.clone(), part: group[0], why });
+            match group[0] {
+                Part::Features => {
+                    shots.remove(i);
+                    state.boards.remove(i);
+                }
+                Part::Stripe => shots[i].stripe.clear(),
+                Part::Spot => shots[i].spot = None,
+                Part::RobotPlace | Part::RobotTurn => shots[i].robot = None,
+            }
+            continue;
+        }
+        let shared = layout.shared();
+        let features = &round.leavings.parts[0];
+        let sigma2 = shots.iter().flat_map(|s| &s.seen.sigmas_px).map(|s| s * s).sum::<f64>()
+            / shots.iter().map(|s| s.seen.sigmas_px.len()).sum::<usize>().max(1) as f64;
+        return Ok(JointFit {
+            covariance: round.covariance.view((0, 0), (shared, shared)).into_owned(),
+            features_rms_px: noise.feature * (sigma2 * features.squares / features.count.max(1.0)).sqrt(),
+            freedom: round.leavings.parts.map(|p| p.freedom),
+            shares: round.leavings.shares,
+            state,
+            layout,
+            noise,
+            shots,
+            left_out,
+        });
+    }
+}
+
+/// The stop and group of parts that stand out most, beside what is usual of that group: index, parts, squared ratio.
+fn worst(left: &Leavings, shots: usize) -> Option<(usize, &'static [Part], f64)> {
+    let mut out: Option<(usize, &'static [Part], f64)> = None;
+    for group in GROUPS {
+        let ratios: Vec<f64> = (0..shots).map(|i| left.stands_out(i, group)).collect();
+        let mut known: Vec<f64> = ratios.iter().copied().filter(|r| *r > 0.0).collect();
+        known.sort_by(f64::total_cmp);
+        // One bad stop among few raises the noise of all: the middle one says what is usual.
+        let usual = known.get(known.len() / 2).copied().unwrap_or(1.0).clamp(1e-6, 1.0);
+        for (i, r) in ratios.iter().enumerate() {
+            if out.as_ref().is_none_or(|o| r / usual > o.2) {
+                out = Some((i, group, r / usual));
+            }
+        }
+    }
+    out
+}

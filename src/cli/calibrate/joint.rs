@@ -1,0 +1,94 @@
+//! In: recordings of boards and a station. Out: the station's whole rig from one solve, stored together.
+//! Frame and unit: mm, degrees.
+
+use super::store::{Keep, figures, stale};
+use crate::calibrate::hand_eye::options::Mount;
+use crate::cli::terminal::console::Console;
+use crate::fault::{Fault, Result};
+use crate::raster::Channel;
+use crate::recording::Recording;
+use crate::rig::{Rig, Verdict};
+use crate::scan::Where;
+use crate::station::volume::asked;
+use crate::station::{JointResult, JointRun, Settings, calibrate_joint, store_joint};
+use std::path::{Path, PathBuf};
+
+/// Calibrate camera, hand-eye, laser plane and pointer together from any recordings of boards
+///
+/// Recordings come in any order, as many as there are: boards in room light, with robot poses where the board stood still
+/// before the robot (or was carried by it), with the stripe or the pointer's spot where meta.json says so ('beam'). What they
+/// share is solved for at once; how much corners, stripe, spots and the robot scatter is learnt from what is left over, so that
+/// each weighs by what it is good for. The verdict is the expected error of a scanned point in the working volume, beside what
+/// separate calibrations of the same pictures would give, and says what makes it. A camera that was calibrated from other
+/// pictures before is held against these.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sheetlight calibrate joint recordings/intrinsics recordings/handeye recordings/laserplane recordings/pointer --poses poses --station cell3
+  sheetlight calibrate joint recordings/* --station cell3")]
+pub struct Args {
+    /// Recording folders with meta.json
+    #[arg(required = true)]
+    recordings: Vec<PathBuf>,
+    /// Station folder that gets the calibrations
+    #[arg(long)]
+    station: PathBuf,
+    /// Pose file of the recordings with robot poses, without extension [default: the one meta.json names]
+    #[arg(long)]
+    poses: Option<String>,
+    /// The camera stands still and the flange carries the board
+    #[arg(long)]
+    eye_to_hand: bool,
+    /// Depths at which the expected error is stated: nearest and farthest, mm [default: station.toml's working volume, else
+    /// where boards were lit]
+    #[arg(long, num_args = 2, value_names = ["NEAR", "FAR"])]
+    working_mm: Option<Vec<f64>>,
+    /// Part of a colour picture to use: red, green, blue or luma
+    #[arg(long, default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
+    channel: Channel,
+    /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
+    #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
+    on: Where,
+    #[command(flatten)]
+    keep: Keep,
+}
+
+pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let (settings, rig) = (Settings::load(&args.station)?, Rig::load_camera(&args.station)?);
+    let mut recordings = args.recordings.iter().map(|r| Recording::open(r)).collect::<Result<Vec<_>>>()?;
+    recordings.iter_mut().for_each(|r| r.channel = args.channel);
+    let asked = asked(&settings, args.working_mm.as_ref().map(|w| [w[0], w[1]]));
+    let mount = if args.eye_to_hand { Mount::EyeToHand } else { Mount::EyeInHand };
+    let run = JointRun { poses: args.poses.clone(), ..JointRun::new(mount, asked, &settings.extraction, args.on) };
+    let bar = console.bar("boards", 0);
+    let progress = |done: usize, all: usize| {
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+    };
+    let result = calibrate_joint(&recordings, &rig, &run, &progress)?;
+    bar.finish_and_clear();
+    finish(&args.station, &result, &args.keep, console)?;
+    stale(&args.station, console);
+    Ok(())
+}
+
+/// Stores all records, or none where they are badly determined.
+pub(super) fn finish(station: &Path, result: &JointResult, keep: &Keep, console: &Console) -> Result<()> {
+    let q = &result.quality;
+    if q.verdict >= Verdict::BadlyDetermined && !keep.badly_determined() {
+        let html = station.join("calibration").join("joint.refused.html");
+        crate::files::make_folder(&station.join("calibration"))?;
+        result.page.save(&html)?;
+        console.say(format!("{}not stored; {}: what was found", figures(q), html.display()));
+        let what = format!("the joint calibration is {}: {}", q.verdict.words(), q.reasons.join("; "));
+        return Err(Fault::refused(what)
+            .cause("too few, too similar or contradicting pictures; the station keeps its former calibration")
+            .next(q.advice.first().map_or("take more pictures", String::as_str)));
+    }
+    let stored = store_joint(station, result)?;
+    let mut text = format!("verdict: {}\n", q.verdict.words());
+    q.reasons.iter().for_each(|r| text += &format!("  {r}\n"));
+    q.advice.iter().for_each(|a| text += &format!("  next: {a}\n"));
+    text += &format!("stored {}", stored.iter().map(|k| k.words()).collect::<Vec<_>>().join(", "));
+    console.result(q, &text);
+    Ok(())
+}

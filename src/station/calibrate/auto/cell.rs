@@ -1,0 +1,29 @@
+//! In: nothing. Out: what a calibration that drives itself asks of the cell that it drives.
+//! Frame and unit: base_from_flange, mm.
+
+use crate::fault::Result;
+use crate::geometry::{Base, Flange, Rigid};
+use crate::raster::Image;
+
+/// What is on while a picture is taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Light {
+    /// The room's light alone.
+    Room,
+    /// The line laser.
+    Line,
+    /// The laser pointer.
+    Pointer,
+}
+
+/// A robot with the sensor on its flange. Who implements it keeps the motion rules: a move that they do not allow is not made.
+pub trait Cell {
+    /// Where the robot says that it stands.
+    fn pose(&mut self) -> Result<Rigid<Base, Flange>>;
+    /// Whether it may and can go there: reach, box, keep-outs. Nothing moves.
+    fn may(&mut self, to: &Rigid<Base, Flange>) -> Result<bool>;
+    /// Goes there, waits until it stands still, and says where it stands then.
+    fn go(&mut self, to: &Rigid<Base, Flange>) -> Result<Rigid<Base, Flange>>;
+    /// Takes one picture where it stands.
+    fn picture(&mut self, light: Light) -> Result<Image>;
+}

@@ -1,0 +1,114 @@
+//! In: a robot that sees a board. Out: small moves that keep it in view, and a first camera with its hand-eye transform from
+//! what the robot says of them.
+//! Frame and unit: flange, mm, degrees; px.
+
+use super::cell::Cell;
+use super::notebook::Notebook;
+use crate::calibrate::hand_eye::closed::{Pair, agree};
+use crate::calibrate::hand_eye::options::Mount;
+use crate::calibrate::joint::start::{board, near_from_far};
+use crate::calibrate::measured_pose::SeenBoard;
+use crate::camera::{Distortion, Intrinsics, ParameterCovariance};
+use crate::fault::{Fault, Result};
+use crate::geometry::{Base, Flange, Rigid, Vec3};
+use crate::station::calibrate::joint::gather::Stop;
+
+/// First moves: turns about the flange's axes with shifts along them, in units of [`TURN_DEG`] and [`SHIFT_MM`].
+const MOVES: [[f64; 6]; 9] = [
+    [1.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+    [-1.0, 0.0, 0.0, 0.0, 0.0, -1.0],
+    [0.0, 1.0, 0.0, 0.0, 0.0, -1.0],
+    [0.0, -1.0, 0.0, 0.0, 0.0, 1.0],
+    [0.0, 0.0, 1.5, 1.0, 0.0, 0.0],
+    [0.0, 0.0, -1.5, 0.0, 1.0, 0.0],
+    [0.7, 0.7, 0.0, -1.0, 0.0, 0.0],
+    [-0.7, 0.7, 1.0, 0.0, -1.0, 0.0],
+    [0.0, 0.0, 0.0, 0.0, 0.0, 1.5],
+];
+const TURN_DEG: f64 = 6.0;
+const SHIFT_MM: f64 = 12.0;
+/// A move after which the board is not in view is tried again half as far, so often.
+const HALVINGS: usize = 3;
+/// Fewest stops of the first moves; the camera's focal length and the hand-eye transform come from these.
+const FEWEST: usize = 7;
+
+/// Moves about `home` and takes pictures; returns to it in the end.
+pub fn moves(cell: &mut dyn Cell, home: &Rigid<Base, Flange>, book: &mut Notebook) -> Result<()> {
+    let mut why = String::new();
+    for m in MOVES {
+        for halved in 0..=HALVINGS {
+            let share = 0.5f64.powi(halved as i32);
+            let turn = Vec3::new(m[0], m[1], m[2]) * (TURN_DEG.to_radians() * share);
+            let step: Rigid<Flange, Flange> =
+                Rigid::from_vectors(&turn, Vec3::new(m[3], m[4], m[5]) * (SHIFT_MM * share));
+            let to = *home * step;
+            if !cell.may(&to)? {
+                continue;
+            }
+            let reported = cell.go(&to)?;
+            let (found, reason) = book.stop(cell, &reported)?;
+            if found.is_some() {
+                break;
+            }
+            why = reason;
+        }
+    }
+    cell.go(home)?;
+    if book.stops.len() < FEWEST {
+        return Err(Fault::refused(format!(
+            "the board was found after {} of {} small moves, {FEWEST} are needed{}",
+            book.stops.len() - 1,
+            MOVES.len(),
+            if why.is_empty() { String::new() } else { format!("; {why}") }
+        ))
+        .cause("the board lies at the edge of the view, or the moves are not allowed there")
+        .next(
+            "jog the robot until the board is in the middle of the picture and fills half of it, well inside the box",
+        ));
+    }
+    Ok(())
+}
+
+/// Focal lengths that are tried, as shares of the picture's longer side, each 8 % longer than the one before.
+const SHORTEST: f64 = 0.5;
+const STEPS: i32 = 45;
+
+/// The pinhole camera with which the robot's moves and the board's agree best. A focal length that is wrong puts the board at
+/// a wrong distance, and the robot's shifts say so.
+pub fn camera(stops: &[Stop], size: [u32; 2]) -> Result<Intrinsics> {
+    let [width, height] = size;
+    let long = f64::from(width.max(height));
+    let (cx, cy) = (f64::from(width - 1) / 2.0, f64::from(height - 1) / 2.0);
+    let pinhole =
+        |f: f64| Intrinsics { fx: f, fy: f, cx, cy, skew: 0.0, distortion: Distortion::default(), width, height };
+    let misfit = |k: &Intrinsics| {
+        let pair = |s: &Stop| {
+            let seen = board(k, &SeenBoard::from_view(&s.name, &s.board, &s.view)).ok()?;
+            Some(Pair { near_from_far: near_from_far(Mount::EyeInHand, &s.robot?.pose), seen })
+        };
+        let pairs: Vec<Pair> = stops.iter().filter_map(pair).collect();
+        // In px: a camera that puts the board far away must not be preferred for its millimetres.
+        let depth = pairs.iter().map(|p| p.seen.centre().z).sum::<f64>() / pairs.len().max(1) as f64;
+        agree(&pairs, 1).filter(|a| a.agreeing.len() * 3 >= pairs.len() * 2).map(|a| a.spread * k.fx / depth)
+    };
+    (0..STEPS)
+        .map(|i| pinhole(SHORTEST * long * 1.08f64.powi(i)))
+        .filter_map(|k| Some((misfit(&k)?, k)))
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, k)| k)
+        .ok_or_else(|| {
+            Fault::input("no camera explains how the board moved with the robot")
+                .cause("the board moved, the robot's poses are of another tool or in another unit, or the camera is not on the flange")
+                .next("check tool and work number of the controller (0), and that the board lies still")
+        })
+}
+
+/// What is known of any camera beforehand, so that few pictures do not run away: a principal point near the middle, a lens
+/// that bends moderately.
+pub fn usual(k: &Intrinsics) -> ParameterCovariance {
+    let mut c = ParameterCovariance::zeros();
+    let (w, h) = (f64::from(k.width), f64::from(k.height));
+    let sigmas = [0.2 * k.fx, 0.2 * k.fx, 0.05 * w, 0.05 * h, 0.3, 0.5, 0.005, 0.005, 0.5];
+    sigmas.iter().enumerate().for_each(|(i, s)| c[(i, i)] = s * s);
+    c
+}

@@ -1,0 +1,362 @@
+//! In: a cell, a board below its robot, a target. Out: the rig, calibrated by moves of the program's own choice, checked on
+//! poses that no solve saw.
+//! Frame and unit: mm, rad, px (docs/math.md, Joint calibration (9), (10)).
+
+use super::super::joint::measure::{Finders, unjudged};
+use super::super::joint::run::{FirstCamera, JointResult, JointRun, calibrate_joint};
+use super::cell::Cell;
+use super::check::{SelfCheck, check};
+use super::first;
+use super::notebook::Notebook;
+use crate::calibrate::hand_eye::options::Mount;
+use crate::calibrate::joint::choose::{Belief, Looks, candidates, next};
+use crate::calibrate::joint::moved::moved;
+use crate::calibrate::joint::options::{CameraPrior, JointOptions, Noise};
+use crate::calibrate::joint::shots::{Part, Shot};
+use crate::calibrate::joint::solve::{JointFit, solve};
+use crate::calibrate::joint::start::{board, start};
+use crate::calibrate::joint::terms::flange;
+use crate::calibrate::joint::volume::places;
+use crate::calibrate::measured_pose::intrinsic_covariance;
+use crate::camera::{ALWAYS_NAMED, named};
+use crate::fault::{Fault, Result};
+use crate::geometry::{Base, Board, Camera, Flange, Rigid};
+use crate::recording::BoardSpec;
+use crate::rig::{Rig, Verdict};
+use std::path::PathBuf;
+
+/// How [`calibrate_auto`] is run.
+#[derive(Clone, Debug)]
+pub struct AutoRun {
+    /// How pictures are measured and the result is judged.
+    pub joint: JointRun,
+    /// The board below the robot.
+    pub board: BoardSpec,
+    /// Where the recordings go: a folder that is new or empty.
+    pub out: PathBuf,
+    /// Expected error of a scanned point at which it is enough, mm rms; above 0.
+    pub target_mm: f64,
+    /// Stops at most, those of the check included; 20..=200.
+    pub most: usize,
+    /// Depths between which points will be scanned, mm; where nobody states them a fifth to both sides of the board as it is
+    /// first seen.
+    pub working: Option<[f64; 2]>,
+    /// Poses among which each next one is chosen; 20..=2000.
+    pub candidates: usize,
+    /// Same seed, same poses.
+    pub seed: u64,
+}
+
+/// Stops that no solve sees.
+const CHECKS: usize = 5;
+/// Fewest stops that are believed, whatever they promise: as few tell the robot's scatter badly.
+const FEWEST: usize = 14;
+/// It does not fall any more where so many stops have gained less than 2 %.
+const STALLED: usize = 8;
+
+/// Why no further stop was made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Ended {
+    /// The expected error is below the target.
+    Target,
+    /// The expected error does not fall any more.
+    Stalled,
+    /// As many stops as are allowed.
+    Most,
+    /// No pose from which the board can be seen may be gone to.
+    NoPose,
+}
+
+/// What [`calibrate_auto`] made.
+pub struct AutoResult {
+    /// The rig.
+    pub joint: JointResult,
+    /// Expected error of a scanned point after each stop of the solve, mm rms; the first is after the small moves.
+    pub expected_mm: Vec<f64>,
+    /// Stops that went into the solve.
+    pub stops: usize,
+    /// Why it ended.
+    pub ended: Ended,
+    /// On poses that no solve saw; `None` where none could be gone to.
+    pub check: Option<SelfCheck>,
+}
+
+/// The state between two stops.
+struct Session<'a> {
+    cell: &'a mut dyn Cell,
+    run: &'a AutoRun,
+    book: Notebook,
+    first: FirstCamera,
+    options: JointOptions,
+    shots: Vec<Shot>,
+    fit: JointFit,
+    working: [f64; 2],
+    /// Largest tilt that is asked for, degrees: it grows while the predictions come true.
+    tilt_deg: f64,
+    tries: u64,
+}
+
+impl AutoRun {
+    /// Refuses values out of the ranges that the fields state.
+    pub fn check(&self) -> Result<()> {
+        self.joint.asked.check()?;
+        let ranges = [
+            ("target_mm", self.target_mm, 1e-6, 1e3),
+            ("most", self.most as f64, 20.0, 200.0),
+            ("candidates", self.candidates as f64, 20.0, 2000.0),
+        ];
+        match ranges.iter().find(|(_, v, low, high)| !(low..=high).contains(&v)) {
+            Some((name, v, low, high)) => {
+                Err(Fault::usage(format!("{name} is {v}, {low} to {high} is allowed"))
+                    .next("choose a value in that range"))
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+/// Calibrates camera, hand-eye, laser plane and pointer by itself. `told` hears of every stop: how many, and the error that is
+/// expected then.
+///
+/// # Errors
+/// The board is not in the first picture, leaves the view with small moves, or moves; nothing explains what was seen; a move
+/// or a picture fails.
+pub fn calibrate_auto(cell: &mut dyn Cell, rig: &Rig, run: &AutoRun, told: &dyn Fn(usize, f64)) -> Result<AutoResult> {
+    run.check()?;
+    let mut session = Session::begin(cell, rig, run)?;
+    let mut expected = Vec::new();
+    let ended = loop {
+        let belief = session.belief()?;
+        expected.push(belief.expected_mm());
+        told(session.shots.len(), belief.expected_mm());
+        if let Some(ended) = session.over(&expected) {
+            break ended;
+        }
+        if !session.next_stop(&belief)? {
+            break Ended::NoPose;
+        }
+    };
+    let stops = session.shots.len();
+    let joint = calibrate_joint(&session.book.recordings(), rig, &run.joint, &|_, _| {})?;
+    let check = session.check(&joint)?;
+    let mut result = AutoResult { joint, expected_mm: expected, stops, ended, check };
+    result.judge(run);
+    Ok(result)
+}
+
+impl AutoResult {
+    /// What the check and the end say goes into every record.
+    fn judge(&mut self, run: &AutoRun) {
+        let mut reasons = Vec::new();
+        let mut worst = Verdict::Good;
+        let last = self.expected_mm.last().copied().unwrap_or(f64::INFINITY);
+        if last > run.target_mm {
+            let why = match self.ended {
+                Ended::Stalled => "more stops lower it no further",
+                Ended::NoPose => "no other pose from which the board is seen may be gone to",
+                _ => "no more stops are allowed",
+            };
+            reasons.push(format!("the target of {} mm is not reached ({last:.4} mm): {why}", run.target_mm));
+            worst = Verdict::Usable;
+        }
+        match &self.check {
+            Some(c) => {
+                reasons.push(format!(
+                    "{} poses that no solve saw: points lie {:.4} mm from the board (rms), {:.4} mm were expected",
+                    c.stops, c.off_mm, c.expected_mm
+                ));
+                if c.off_mm > 2.0 * c.expected_mm {
+                    worst = Verdict::Usable;
+                    reasons.push("that is more than twice what was expected: something is not in the model".into());
+                }
+            }
+            None => {
+                worst = Verdict::Usable;
+                reasons.push("it is not checked: no further pose may be gone to".into());
+            }
+        }
+        self.joint.remark(worst, &reasons);
+    }
+}
+
+impl<'a> Session<'a> {
+    /// The picture where it stands, the small moves, a first solve.
+    fn begin(cell: &'a mut dyn Cell, rig: &Rig, run: &'a AutoRun) -> Result<Session<'a>> {
+        let mut book = Notebook::new(&run.out, &run.board)?;
+        let home = cell.pose()?;
+        if let (None, why) = book.stop(cell, &home)? {
+            return Err(Fault::input(format!("the board is not in the first picture: {why}"))
+                .cause("it is out of view or cut off, badly lit, or another board than the one that was named")
+                .next("jog the robot until the whole board is in the picture, and compare it with its description"));
+        }
+        first::moves(cell, &home, &mut book)?;
+        let recordings = book.recordings();
+        let size = [recordings[0].meta.image.width, recordings[0].meta.image.height];
+        let first = first_camera(&book, size, rig)?;
+        let options = JointOptions {
+            mount: Mount::EyeInHand,
+            camera_free: first.free.clone(),
+            camera_prior: first.prior.clone(),
+            ..JointOptions::default()
+        };
+        let finders = run.joint.finders(&recordings, &first);
+        let mut shots = unjudged(&book.stops.iter().collect::<Vec<_>>(), &finders)?;
+        let (state, _) = start(&mut shots, 1, &first.value, None, &options)?;
+        let fit = solve(&shots, &state, Noise::usual(), &options)?;
+        still(&shots, &fit, &options)?;
+        let depth = middle_depth(&state.boards, &run.board);
+        let working = run.working.unwrap_or([0.8 * depth, 1.2 * depth]);
+        Ok(Session { cell, run, book, first, options, shots, fit, working, tilt_deg: 14.0, tries: 0 })
+    }
+
+    fn belief(&self) -> Result<Belief> {
+        Belief::after(&self.fit, &places(&self.fit.state, self.working), &self.options).ok_or_else(|| {
+            Fault::refused("camera, hand-eye and laser plane are not determined by the stops so far")
+                .cause("the stripe or the spot was not seen on the board")
+                .next("check that line and pointer fall on the board, and begin again")
+        })
+    }
+
+    fn over(&self, expected: &[f64]) -> Option<Ended> {
+        let (n, now) = (self.shots.len(), *expected.last()?);
+        if n >= FEWEST && now <= self.run.target_mm {
+            return Some(Ended::Target);
+        }
+        if n + CHECKS >= self.run.most || self.tries as usize > 3 * self.run.most {
+            return Some(Ended::Most);
+        }
+        let before = expected.len().checked_sub(STALLED + 1).map(|i| expected[i]);
+        (n >= FEWEST && self.tilt_deg >= LARGEST_TILT && before.is_some_and(|b| now > 0.98 * b))
+            .then_some(Ended::Stalled)
+    }
+
+    /// Boards as they could be seen next, from poses that may be gone to.
+    fn candidates(&mut self) -> Result<Vec<(Rigid<Camera, Board>, Rigid<Base, Flange>)>> {
+        self.tries += 1;
+        let state = &self.fit.state;
+        let length = self.working[1] - self.working[0];
+        let looks = Looks {
+            depths: [self.working[0] - 0.1 * length, self.working[1] + 0.1 * length],
+            tilt_deg: self.tilt_deg,
+            turn_deg: (4.0 * self.tilt_deg).min(180.0),
+            margin_px: 0.02 * f64::from(state.camera.width),
+            upright: upright(&state.boards),
+        };
+        let seed = self.run.seed.wrapping_mul(1_000_003).wrapping_add(self.tries);
+        let mut out = Vec::new();
+        for seen in candidates(state, &self.run.board, &looks, self.run.candidates, seed) {
+            let to = flange(Mount::EyeInHand, &state.near_from_camera, &state.far_from_board[0], &seen);
+            if self.cell.may(&to)? {
+                out.push((seen, to));
+            }
+        }
+        Ok(out)
+    }
+
+    /// Goes to the best of the poses and takes it in. False where there is none.
+    fn next_stop(&mut self, belief: &Belief) -> Result<bool> {
+        let all = self.candidates()?;
+        let boards: Vec<Rigid<Camera, Board>> = all.iter().map(|c| c.0).collect();
+        let Some(choice) = next(belief, &self.run.board, &boards, 0) else { return Ok(false) };
+        let Some(i) = self.visit(&all[choice.index].1)? else {
+            // The prediction was wrong: nearer to what is known.
+            self.tilt_deg = (0.7 * self.tilt_deg).max(8.0);
+            return Ok(true);
+        };
+        self.tilt_deg = (1.3 * self.tilt_deg).min(LARGEST_TILT);
+        self.shots.push(self.measured(i)?);
+        self.solve()?;
+        Ok(true)
+    }
+
+    fn visit(&mut self, to: &Rigid<Base, Flange>) -> Result<Option<usize>> {
+        let reported = self.cell.go(to)?;
+        Ok(self.book.stop(self.cell, &reported)?.0)
+    }
+
+    /// A stop's features, its stripe told from reflections by the sheet of some stops before.
+    fn measured(&self, i: usize) -> Result<Shot> {
+        let recordings = self.book.recordings();
+        let with = FirstCamera { value: self.fit.state.camera, ..self.first.clone() };
+        let finders: Finders<'_> = self.run.joint.finders(&recordings, &with);
+        let step = (i / 4).max(1);
+        let mut some: Vec<_> = (0..i).step_by(step).map(|k| &self.book.stops[k]).collect();
+        some.push(&self.book.stops[i]);
+        unjudged(&some, &finders).map(|mut shots| shots.pop().expect("one a stop"))
+    }
+
+    fn solve(&mut self) -> Result<()> {
+        let mut state = self.fit.state.clone();
+        state.boards =
+            self.shots.iter().map(|s| Ok(board(&state.camera, &s.seen)?.camera_from_board)).collect::<Result<_>>()?;
+        self.fit = solve(&self.shots, &state, self.fit.noise, &self.options)?;
+        still(&self.shots, &self.fit, &self.options)?;
+        let moved = self.fit.left_out.iter().filter(|l| l.part == Part::RobotPlace).count();
+        if moved * 4 > self.shots.len() {
+            return Err(Fault::input(format!(
+                "the board does not stand still: at {moved} of {} stops it is not where the others say",
+                self.shots.len()
+            ))
+            .cause("it was moved or slips, or the robot's poses are of another tool or work frame")
+            .next("fix the board, check tool and work number of the controller (0), and begin again"));
+        }
+        Ok(())
+    }
+
+    /// Goes to poses that were not in the solve.
+    fn check(&mut self, joint: &JointResult) -> Result<Option<SelfCheck>> {
+        let all = self.candidates()?;
+        let before = self.book.stops.len();
+        for (_, to) in all.iter().take(2 * CHECKS) {
+            if self.book.stops.len() == before + CHECKS {
+                break;
+            }
+            self.visit(to)?;
+        }
+        let shots: Vec<Shot> = (before..self.book.stops.len()).map(|i| self.measured(i)).collect::<Result<_>>()?;
+        Ok(check(&joint.fit, &shots, joint.expected_mm()))
+    }
+}
+
+/// Refuses stops before and after which the board was moved.
+fn still(shots: &[Shot], fit: &JointFit, o: &JointOptions) -> Result<()> {
+    match moved(shots, fit, o) {
+        None => Ok(()),
+        Some(m) => Err(Fault::input(format!("the board was moved by {:.1} mm before {}", m.mm, m.name))
+            .cause("it was pushed, or it slipped")
+            .next("fix it and begin again")),
+    }
+}
+
+/// Tilt of the board against the picture that is asked for at most, degrees.
+const LARGEST_TILT: f64 = 45.0;
+
+/// How the board lay in the first picture: turn about the optical axis, rad.
+fn upright(boards: &[Rigid<Camera, Board>]) -> f64 {
+    boards.first().map_or(0.0, |b| b.rotation[(1, 0)].atan2(b.rotation[(0, 0)]))
+}
+
+fn middle_depth(boards: &[Rigid<Camera, Board>], spec: &BoardSpec) -> f64 {
+    let features = spec.features();
+    let centre = features.iter().sum::<crate::geometry::Vec3>() / features.len() as f64;
+    boards.iter().map(|b| b.point(&centre).z).sum::<f64>() / boards.len().max(1) as f64
+}
+
+/// The station's camera where it has one, else one that the small moves tell.
+fn first_camera(book: &Notebook, size: [u32; 2], rig: &Rig) -> Result<FirstCamera> {
+    let known = rig.camera.as_ref().filter(|c| [c.value.width, c.value.height] == size);
+    let (value, covariance) = match known {
+        Some(c) if !named(&intrinsic_covariance(&c.covariance)).is_empty() => {
+            (c.value, intrinsic_covariance(&c.covariance))
+        }
+        _ => {
+            let value = first::camera(&book.stops, size)?;
+            (value, first::usual(&value))
+        }
+    };
+    let free: Vec<usize> =
+        (0..ALWAYS_NAMED).chain(named(&covariance).into_iter().filter(|i| *i >= ALWAYS_NAMED)).collect();
+    let prior = Some(CameraPrior { mean: value.parameters(), covariance });
+    Ok(FirstCamera { value, covariance, free, prior })
+}

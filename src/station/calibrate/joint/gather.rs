@@ -1,0 +1,198 @@
+//! In: recordings. Out: the stops that they show: a board in room light, which laser pictures belong to it, where the robot
+//! stood; pictures that come twice count once.
+//! Frame and unit: px; base_from_flange in mm.
+
+use crate::calibrate::boards::{BoardView, FindOptions, find};
+use crate::calibrate::joint::shots::Reported;
+use crate::fault::{Fault, Kind, Result};
+use crate::recording::{Beam, BoardSpec, Recording};
+use crate::rig::hash_file;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+
+/// A picture of one of the recordings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Picture {
+    /// Index into the recordings.
+    pub recording: usize,
+    /// Its file name there.
+    pub file: String,
+}
+
+/// Pictures taken without moving.
+#[derive(Clone, Debug)]
+pub struct Stop {
+    /// As messages name it: the picture in room light, its recording before it where there are several.
+    pub name: String,
+    /// As meta.json describes it.
+    pub board: BoardSpec,
+    /// Its features in room light.
+    pub view: BoardView,
+    /// Where the robot said that it stood, and which of the boards' places it saw.
+    pub robot: Option<Reported>,
+    /// In room light.
+    pub room: Picture,
+    /// With the line laser on.
+    pub line: Option<Picture>,
+    /// With the pointer on.
+    pub pointer: Option<Picture>,
+}
+
+/// All that the recordings show.
+#[derive(Clone, Debug, Default)]
+pub struct Gathered {
+    /// In the recordings' order.
+    pub stops: Vec<Stop>,
+    /// Pictures that could not be used, with the reason.
+    pub missing: Vec<(String, String)>,
+    /// Name to SHA-256 of everything that went in.
+    pub inputs: BTreeMap<String, String>,
+    /// How many places boards stood at.
+    pub places: usize,
+}
+
+/// A frame with its board's picture.
+struct Frame<'a> {
+    recording: usize,
+    index: usize,
+    name: String,
+    file: &'a str,
+}
+
+fn label(recordings: &[Recording], i: usize) -> String {
+    if recordings.len() == 1 {
+        return String::new();
+    }
+    let short = |r: &Recording| r.folder.file_name().map(|n| n.to_string_lossy().into_owned());
+    let alike = recordings.iter().filter(|o| short(o) == short(&recordings[i])).count();
+    let name = short(&recordings[i]).filter(|_| alike == 1);
+    format!("{}/", name.unwrap_or_else(|| recordings[i].folder.display().to_string()))
+}
+
+fn same_size(recordings: &[Recording]) -> Result<()> {
+    let size = |r: &Recording| (r.meta.image.width, r.meta.image.height);
+    let Some(first) = recordings.first() else {
+        return Err(Fault::usage("no recording was given").next("give one or more"));
+    };
+    match recordings.iter().find(|r| size(r) != size(first)) {
+        None => Ok(()),
+        Some(other) => Err(Fault::input(format!(
+            "{} holds pictures of {}x{}, {} of {}x{}: they are not of one rig",
+            first.folder.display(),
+            size(first).0,
+            size(first).1,
+            other.folder.display(),
+            size(other).0,
+            size(other).1
+        ))
+        .cause("recordings of two cameras, or of one at two resolutions")
+        .next("give the recordings of one rig")),
+    }
+}
+
+/// Finds the boards of all recordings. `poses` names the pose file of those that have several. A stop of two recordings (the
+/// same picture in room light) has the laser pictures of both.
+pub fn gather(
+    recordings: &[Recording],
+    poses: Option<&str>,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Gathered> {
+    same_size(recordings)?;
+    let mut out = Gathered::default();
+    let mut frames = Vec::new();
+    let mut robots = Vec::new();
+    for (i, r) in recordings.iter().enumerate() {
+        let label = label(recordings, i);
+        out.inputs.insert(format!("{label}meta.json"), hash_file(&r.folder.join("meta.json"))?);
+        let has_poses = r.meta.pose_file.is_some() || !r.meta.pose_files.is_empty();
+        let several = poses.filter(|_| r.meta.pose_file.is_none());
+        robots.push(if has_poses { Some(r.poses(several)?) } else { None });
+        for (index, frame) in r.meta.frames.iter().enumerate() {
+            if let Some(file) = frame.ambient.as_deref() {
+                frames.push(Frame { recording: i, index, name: format!("{label}{file}"), file });
+            }
+        }
+    }
+    if frames.is_empty() {
+        return Err(Fault::input("no frame of the recordings has an 'ambient' picture")
+            .cause("boards are found in pictures taken in room light, the lasers off")
+            .next("record an ambient picture with each frame"));
+    }
+    let done = std::sync::atomic::AtomicUsize::new(0);
+    let seen: Vec<(String, Result<BoardView>)> = frames
+        .par_iter()
+        .map(|f| {
+            let r = &recordings[f.recording];
+            let hash = hash_file(&r.inside(f.file)?)?;
+            let view = (|| {
+                let board = r.meta.board_of(&r.meta.frames[f.index]).ok_or_else(|| {
+                    Fault::input(format!("{}: meta.json describes no board for it", f.name))
+                        .next("describe the board under 'board' or 'boards'")
+                })?;
+                find(&r.picture(f.file)?, board, &FindOptions::default())
+            })();
+            progress(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1, frames.len());
+            Ok((hash, view))
+        })
+        .collect::<Result<_>>()?;
+    let mut places: Vec<(usize, usize)> = Vec::new();
+    let mut known: BTreeMap<String, usize> = BTreeMap::new();
+    for (f, (hash, view)) in frames.iter().zip(seen) {
+        let r = &recordings[f.recording];
+        let frame = &r.meta.frames[f.index];
+        let view = match view {
+            Ok(view) => view,
+            // Missing files and misdescribed boards are the recording's fault, not one picture's.
+            Err(fault) if fault.kind != Kind::Refused => return Err(fault),
+            Err(fault) => {
+                out.missing.push((f.name.clone(), format!("{} ({})", fault.what, fault.cause)));
+                continue;
+            }
+        };
+        let at = *known.entry(hash.clone()).or_insert_with(|| {
+            out.stops.push(Stop {
+                name: f.name.clone(),
+                board: r.meta.board_of(frame).expect("it was found").clone(),
+                view,
+                robot: None,
+                room: Picture { recording: f.recording, file: f.file.into() },
+                line: None,
+                pointer: None,
+            });
+            out.stops.len() - 1
+        });
+        out.inputs.insert(f.name.clone(), hash);
+        let stop = &mut out.stops[at];
+        if let (Some(poses), None) = (&robots[f.recording], &stop.robot) {
+            let key = (f.recording, frame.board.unwrap_or(0));
+            let place = places.iter().position(|p| *p == key).unwrap_or_else(|| {
+                places.push(key);
+                places.len() - 1
+            });
+            stop.robot = Some(Reported { pose: *r.pose_of(f.index, poses)?, place });
+        }
+        if let Some(file) = &frame.laser {
+            let picture = Picture { recording: f.recording, file: file.clone() };
+            out.inputs.insert(format!("{}{file}", label(recordings, f.recording)), hash_file(&r.inside(file)?)?);
+            match r.meta.beam {
+                Some(Beam::Line) => stop.line = Some(picture),
+                Some(Beam::Pointer) => stop.pointer = Some(picture),
+                None => return Err(nameless(r)),
+            }
+        }
+    }
+    if out.stops.is_empty() {
+        let (name, why) = &out.missing[out.missing.len() / 2];
+        return Err(Fault::refused(format!("no board was found in any of {} pictures; {name}: {why}", frames.len()))
+            .cause("the board is out of view, or another one than meta.json describes")
+            .next("compare meta.json's board with the real one, and look at the pictures"));
+    }
+    out.places = places.len();
+    Ok(out)
+}
+
+fn nameless(r: &Recording) -> Fault {
+    Fault::input(format!("{}: meta.json does not say which laser its pictures show", r.folder.display()))
+        .cause("'beam' is missing")
+        .next("write \"beam\": \"line\" or \"beam\": \"pointer\" into it")
+}
