@@ -1,3 +1,4 @@
+# make station  build, serve the operator's screen on a simulated station in ./demo-cell
 # make demo   build, simulate a station, scan it, leave ./demo/index.html
 # make test   everything, on software Vulkan where it can be had
 # make bench  figures of this machine;  make bench-peers  side by side with OpenCV and numba
@@ -6,15 +7,19 @@ CARGO ?= cargo
 VENV := .venv
 export XDG_RUNTIME_DIR ?= $(shell mktemp -d /tmp/sheetlight-run.XXXXXX)
 
-.PHONY: demo lint test bench bench-peers vulkan python cameras build clean
+.PHONY: station browser demo lint test bench bench-peers vulkan python cameras build clean
 
 demo: vulkan build
 	target/release/sheetlight demo --out demo
 
+# Prints the address to open in a browser; Ctrl-C ends it.
+station: vulkan build
+	target/release/sheetlight station serve --simulate --station demo-cell
+
 build:
 	$(CARGO) build --release --locked
 
-test: vulkan python cameras lint
+test: vulkan python cameras browser lint
 	PATH="$(CURDIR)/$(VENV)/bin:$$PATH" $(CARGO) test --locked -- --show-output
 
 # A toolchain without clippy says so and goes on.
@@ -39,6 +44,10 @@ bench-peers: vulkan build
 vulkan:
 	tools/vulkan.sh
 
+# The screen's pages are tested in a real browser.
+browser:
+	tools/browser.sh
+
 # Cameras that the tests talk to: ffmpeg, aravis' fake one.
 cameras:
 	tools/cameras.sh
@@ -49,4 +58,4 @@ python:
 
 clean:
 	$(CARGO) clean
-	rm -rf demo $(VENV)
+	rm -rf demo demo-cell $(VENV)

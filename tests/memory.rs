@@ -102,6 +102,7 @@ fn a_long_scan_needs_no_more_memory_than_a_short_one() {
             skip_bad: false,
             resume: false,
             stop: Default::default(),
+            watch: Default::default(),
         };
         let open = |_| Ok(Box::new(Repeating { pictures: pictures.clone(), next: 0, shots }) as Box<dyn Source>);
         let report = scan_on(|| Ok(processor.clone()), "id", "test", open, &rig, &options, |_, _| {}).unwrap();

@@ -102,6 +102,7 @@ fn options(out: &Path) -> ScanOptions {
         skip_bad: false,
         resume: true,
         stop: Default::default(),
+        watch: Default::default(),
     }
 }
 

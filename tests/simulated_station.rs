@@ -33,6 +33,7 @@ fn scanned(out: &Path, options: &SimulateOptions) -> Judged {
         skip_bad: false,
         resume: false,
         stop: Default::default(),
+        watch: Default::default(),
     };
     let open = |first| Ok(Box::new(RecordingSource::open(&recording, None, first)?) as Box<_>);
     sheetlight::station::scan("test", "test", open, &rig, &scan, |_, _| {}).unwrap();

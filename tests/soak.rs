@@ -53,6 +53,7 @@ fn options(out: &Path, place: Where) -> ScanOptions {
         motion: sheetlight::recording::Motion::default(),
         resume: false,
         stop: Default::default(),
+        watch: Default::default(),
     }
 }
 

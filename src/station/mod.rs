@@ -39,6 +39,8 @@ pub use scan::report::{HeightMapFigures, ScanReport, Spent, cloud_of, load_repor
 pub use scan::run::{ScanOptions, scan, scan_on};
 pub use scan::scan_folder::of_a_scan;
 pub use scan::seen::Seen;
+pub use scan::watch::Watch;
 pub use settings::{Settings, ToolSpec, WorkingVolume};
+pub use settings::{Settings, WorkingVolume};
 pub use values::Values;
 pub use verify::{CalibrationCheck, VerifyReport, VerifyRun, verify};

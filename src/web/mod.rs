@@ -1,3 +1,25 @@
 //! In: a station's folder. Out: the operator's screen, served to browsers.
 //! One port; everything it does is a procedure of `station` that the command line has too.
 //! Frame and unit: as the procedures; texts show theirs.
+
+mod api;
+mod camera;
+mod disk;
+mod event;
+mod guard;
+mod message;
+mod motion;
+mod pages;
+mod robot;
+mod screen;
+mod serve;
+mod simulated;
+mod station;
+mod surface;
+mod work;
+
+pub use api::openapi;
+pub use guard::{hashed, random_hex};
+pub use message::{Mode, declarations};
+pub use serve::{Secured, ServeOptions, serve};
+pub use simulated::simulated;

@@ -207,6 +207,7 @@ fn options(out: &Path, stop: &Arc<AtomicBool>, resume: bool) -> ScanOptions {
         skip_bad: false,
         resume,
         stop: stop.clone(),
+        watch: Default::default(),
     }
 }
 

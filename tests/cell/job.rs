@@ -77,7 +77,9 @@ fn set(mut spec: SceneSpec, seed: u64, tilt_deg: f64) -> Set {
     served.cell.station().store(&station).unwrap();
     let workspace = Space { from_mm: [150.0, -300.0, 250.0], to_mm: [600.0, 300.0, 700.0] };
     let tool = Some(ToolSpec { flange_from_tool: served.cell.flange_from_tool() });
-    Settings { motion: Some(Limits::within(workspace)), tool, ..Settings::default() }.store(&station).unwrap();
+    // Two busy cores may keep the link's threads waiting for long; that a silent link halts is shown by the rules' own test.
+    let motion = Limits { max_silence_ms: 3000.0, ..Limits::within(workspace) };
+    Settings { motion: Some(motion), tool, ..Settings::default() }.store(&station).unwrap();
     Set { served, station, _dir: dir }
 }
 

@@ -9,3 +9,4 @@ pub(super) mod report;
 pub(super) mod run;
 pub(super) mod scan_folder;
 pub(super) mod seen;
+pub(super) mod watch;

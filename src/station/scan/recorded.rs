@@ -30,6 +30,7 @@ impl ScanOptions {
             latency: None,
             resume: false,
             stop: Default::default(),
+            watch: Default::default(),
         }
     }
 }

@@ -7,6 +7,7 @@ use super::progress::{Checkpoint, fingerprint_of};
 use super::report::{FORMAT, ScanReport, Spent};
 use super::scan_folder::{self, FORMER_PROGRESS};
 use super::seen::Seen;
+use super::watch::Watch;
 use crate::capture::Latency;
 use crate::fault::{Fault, Result};
 use crate::files::Lock;
@@ -50,6 +51,8 @@ pub struct ScanOptions {
     pub resume: bool,
     /// Set by somebody who wants the scan to end: it keeps what is done and says how to go on.
     pub stop: Arc<AtomicBool>,
+    /// Who looks on while it runs.
+    pub watch: Watch,
 }
 
 /// Shots between two checkpoints: what a crash can cost beside those under way.
@@ -283,6 +286,7 @@ impl Work<'_> {
             }
             let from = Instant::now();
             self.take(&ready)?;
+            ready.iter().for_each(|p| options.watch.show(p, &self.scanner.up_in_base()));
             self.spent.writing_s += from.elapsed().as_secs_f64();
             progress(self.state.shots);
         }

@@ -1,11 +1,12 @@
 //! In: a station folder. Out: a new one, a summary of one, or values moved in and out of it.
 //! Frame and unit: camera and flange frames, mm.
 
-use super::calibrate::store::stale;
-use super::terminal::console::Console;
-use super::terminal::outputs;
-use super::terminal::outputs::Inputs;
+use super::serve;
 use crate::camera::{Intrinsics, LENS, NAMES};
+use crate::cli::calibrate::store::stale;
+use crate::cli::terminal::console::Console;
+use crate::cli::terminal::outputs;
+use crate::cli::terminal::outputs::Inputs;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Axis, AxisKind, Base, Camera, Plane, Ray, Rigid};
 use crate::rig::{Calibration, HandEye, Kind, Rig};
@@ -24,6 +25,8 @@ pub enum Command {
     Import(Import),
     /// Write a station's values as one JSON file, in the keys that import reads
     Export(Export),
+    Serve(serve::Serve),
+    Password(serve::Password),
     /// Vouch for a calibration file that is refused: one of a former version, edited, or of another camera
     ///
     /// The file gets a new seal and your reason in it, and every report made with it shows that. What is no calibration at all
@@ -96,6 +99,8 @@ pub struct Export {
 
 pub fn run(command: &Command, console: &Console) -> Result<()> {
     match command {
+        Command::Serve(a) => return serve::run(a, console),
+        Command::Password(a) => return serve::password(a, console),
         Command::New(a) => {
             if a.station.join("station.toml").exists() {
                 let what = format!("{}: is a station already", a.station.display());

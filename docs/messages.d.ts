@@ -1,0 +1,989 @@
+// Made from src/web/message by the test `messages`; SHEETLIGHT_WRITE=1 makes it again.
+
+export type Mode = "live" | "replay" | "simulated";
+
+export type RobotState = "no_link" | "read_only" | "moving";
+
+export type Frames = { 
+/**
+ * Handed to the stages.
+ */
+seen: number, 
+/**
+ * With at least one point.
+ */
+measured: number, 
+/**
+ * Left out, by cause.
+ */
+dropped: Record<string, number>, };
+
+export type CalibrationAge = { 
+/**
+ * Days since the oldest of camera, laser plane and hand-eye was measured.
+ */
+days: number, 
+/**
+ * The worst verdict of them.
+ */
+verdict: string, 
+/**
+ * Root of the sum of squares of what each expects at the working distance, mm; null where one does not say.
+ */
+expected_mm: number | null, };
+
+export type Lease = { 
+/**
+ * A short name of the tab that holds it; null: nobody.
+ */
+holder: string | null, 
+/**
+ * Seconds until it falls free.
+ */
+seconds_left: number, };
+
+export type Bar = { 
+/**
+ * Where pictures come from.
+ */
+mode: Mode, 
+/**
+ * Name of the station.
+ */
+station: string, 
+/**
+ * What the robot may do.
+ */
+robot: RobotState, 
+/**
+ * Whether the line is on; null where nobody switches it from here.
+ */
+laser: boolean | null, 
+/**
+ * Of the running scan.
+ */
+frames: Frames, 
+/**
+ * From a picture to its points, p50 and p99, ms; null where none was measured yet.
+ */
+delay_ms: [number, number] | null, 
+/**
+ * What the stages run on.
+ */
+adapter: string, 
+/**
+ * It is software on this machine's cores.
+ */
+adapter_is_software: boolean, 
+/**
+ * Null without camera, laser plane or what carries them.
+ */
+calibration: CalibrationAge | null, 
+/**
+ * On the disk that holds the jobs, GB; null where the system does not say.
+ */
+disk_left_gb: number | null, 
+/**
+ * What an operator must know now, one sentence each.
+ */
+alarms: Array<string>, 
+/**
+ * Who operates.
+ */
+lease: Lease, 
+/**
+ * The job that runs.
+ */
+running: string | null, 
+/**
+ * Browsers that look on.
+ */
+viewers: number, };
+
+export type JobState = "queued" | "running" | "done" | "failed" | "stopped" | "cut_off";
+
+export type Problem = { 
+/**
+ * usage, input, refused, output or device.
+ */
+kind: string, 
+/**
+ * What happened, with its number and limit.
+ */
+what: string, 
+/**
+ * Likely cause; may be empty.
+ */
+cause: string, 
+/**
+ * Next step; may be empty.
+ */
+next: string, };
+
+export type Target = "camera" | "hand_eye" | "laser_plane" | "pointer";
+
+export type TeachOrder = { 
+/**
+ * The job that scanned it.
+ */
+scan: string, 
+/**
+ * What the recipe is called.
+ */
+name: string, 
+/**
+ * Corners of the body before it is turned: x0 y0 x1 y1, mm in the grid.
+ */
+outline: [number, number, number, number], 
+/**
+ * Its turn about its centre, degrees.
+ */
+angle_deg: number, 
+/**
+ * Windows in the body, corners as above.
+ */
+windows: Array<[number, number, number, number]>, 
+/**
+ * Round holes: x, y, radius.
+ */
+holes: Array<[number, number, number]>, 
+/**
+ * What the insertion bears in the plane, mm.
+ */
+tolerance_mm: number, 
+/**
+ * What it bears as a turn, degrees.
+ */
+tolerance_deg: number, 
+/**
+ * The tool's way above the insertion pose before and after, mm.
+ */
+approach_mm: number, };
+
+export type Plain = Record<string, never>;
+
+export type ScanOrder = { 
+/**
+ * Which one.
+ */
+recording: string, 
+/**
+ * Edge of a cell, mm; null: what the points bear.
+ */
+cell_mm?: number | null, 
+/**
+ * auto, gpu or cpu; null: auto.
+ */
+on?: string | null, 
+/**
+ * Leave out shots that cannot be read.
+ */
+skip_bad: boolean, 
+/**
+ * Settings other than the station's: keys of [extraction] in station.toml, with dots, and their values.
+ */
+settings: Record<string, unknown>, };
+
+export type FindOrder = { 
+/**
+ * Jobs that scanned.
+ */
+scans: Array<string>, 
+/**
+ * Name of the recipe.
+ */
+recipe: string, };
+
+export type TouchOrder = { 
+/**
+ * Which recording of the pointer.
+ */
+recording: string, };
+
+export type CalibrateOrder = { 
+/**
+ * What.
+ */
+target: Target, 
+/**
+ * From which recording.
+ */
+recording: string, 
+/**
+ * Frames to leave out, from 0.
+ */
+leave_out: Array<number>, };
+
+export type Order = { "procedure": "check" } & Plain | { "procedure": "scan" } & ScanOrder | { "procedure": "find" } & FindOrder | { "procedure": "teach" } & TeachOrder | { "procedure": "touch" } & TouchOrder | { "procedure": "calibrate" } & CalibrateOrder | { "procedure": "benchmark" } & Plain;
+
+export type CheckLine = { 
+/**
+ * station, camera, robot, gpu, disk or clock.
+ */
+group: string, 
+/**
+ * What was looked at.
+ */
+name: string, 
+/**
+ * good, poor (works, but read it), bad or absent.
+ */
+state: string, 
+/**
+ * What was seen, with its number and limit.
+ */
+says: string, };
+
+export type ScanFigures = { 
+/**
+ * Shots done, those left out included.
+ */
+shots: number, 
+/**
+ * Points of the cloud.
+ */
+points: number, 
+/**
+ * Size of the pictures, px.
+ */
+width: number, 
+/**
+ * Rows, px.
+ */
+height: number, 
+/**
+ * Frame of the cloud: base, axis or flange.
+ */
+frame: string, 
+/**
+ * Median of the points' own standard deviations, mm.
+ */
+median_sigma_mm: number | null, 
+/**
+ * Share of the map's cells that were measured.
+ */
+coverage: number | null, 
+/**
+ * Edge of a cell, mm.
+ */
+cell_mm: number | null, 
+/**
+ * Heights between which 98 % of the map lies, mm.
+ */
+z_mm: [number, number] | null, 
+/**
+ * Peaks by fate.
+ */
+peaks: Record<string, number>, 
+/**
+ * Shots without a point.
+ */
+dark_shots: number, 
+/**
+ * Shots left out: name and reason.
+ */
+skipped: Array<[string, string]>, 
+/**
+ * From the first shot to the closed cloud, s.
+ */
+seconds: number, 
+/**
+ * Shots a second of this run.
+ */
+shots_per_second: number, 
+/**
+ * Adapter, or this machine's processor and why.
+ */
+ran_on: string, 
+/**
+ * Seconds by what the main thread did.
+ */
+spent: Record<string, number>, 
+/**
+ * What a reader must know.
+ */
+remarks: Array<string>, };
+
+export type Notation = { 
+/**
+ * Name of the convention.
+ */
+name: string, 
+/**
+ * One a number, with its unit.
+ */
+labels: Array<string>, 
+/**
+ * In the order of the labels.
+ */
+numbers: Array<number>, };
+
+export type RobotPoses = { 
+/**
+ * Changes with every number here: a confirmation names the poses that were shown by it.
+ */
+hash: string, 
+/**
+ * The station's own notation.
+ */
+convention: string, 
+/**
+ * One a number, with its unit.
+ */
+labels: Array<string>, 
+/**
+ * Above the insertion.
+ */
+approach: Array<number>, 
+/**
+ * The tool at its place.
+ */
+insertion: Array<number>, 
+/**
+ * Above it, on the way back.
+ */
+retract: Array<number>, 
+/**
+ * The insertion in every notation.
+ */
+notations: Array<Notation>, };
+
+export type Term = { 
+/**
+ * Its name.
+ */
+name: string, 
+/**
+ * Along x, y, z of the part, mm; null where it is not known.
+ */
+sigma_mm: [number, number, number] | null, 
+/**
+ * About them, degrees.
+ */
+sigma_deg: [number, number, number] | null, 
+/**
+ * What it is.
+ */
+note: string, };
+
+export type GateLight = { 
+/**
+ * What is judged, with its unit.
+ */
+name: string, 
+/**
+ * What was seen.
+ */
+value: number, 
+/**
+ * What it is held against.
+ */
+limit: number, 
+/**
+ * Kept.
+ */
+passed: boolean, };
+
+export type Position = { 
+/**
+ * Name of the recipe.
+ */
+recipe: string, 
+/**
+ * Frame of the poses.
+ */
+frame: string, 
+/**
+ * Every gate was passed.
+ */
+passed: boolean, 
+/**
+ * Which were not, in words.
+ */
+reasons: Array<string>, 
+/**
+ * Null where a gate was missed.
+ */
+poses: RobotPoses | null, 
+/**
+ * One standard deviation along x, y, z of the part, mm.
+ */
+sigma_mm: [number, number, number], 
+/**
+ * One standard deviation of the turns about them, degrees.
+ */
+sigma_deg: [number, number, number], 
+/**
+ * What the insertion bears in the plane, mm.
+ */
+tolerance_mm: number, 
+/**
+ * What it bears as a turn, degrees.
+ */
+tolerance_deg: number, 
+/**
+ * 3 sigma within both.
+ */
+within_tolerance: boolean, 
+/**
+ * Where the sigma comes from.
+ */
+terms: Array<Term>, 
+/**
+ * False: a term is unknown, the sum is a lower bound.
+ */
+complete: boolean, 
+/**
+ * Each gate with its number and limit.
+ */
+gates: Array<GateLight>, 
+/**
+ * Score of the match, and of the next best.
+ */
+score: number, 
+/**
+ * Of the next best pose.
+ */
+second_score: number, 
+/**
+ * The part in the scan's frame: row-major 4x4, mm.
+ */
+part: [number, number, number, number, number, number, number, number, number, number, number, number, number, number, number, number], 
+/**
+ * The drawing's outlines in the height map's grid, mm.
+ */
+outline: Array<Array<[number, number]>>, 
+/**
+ * What else a reader must know.
+ */
+notes: Array<string>, };
+
+export type SurfaceTouched = { 
+/**
+ * Unit length, towards the camera; base frame.
+ */
+normal: [number, number, number], 
+/**
+ * Middle of the spots, base frame, mm.
+ */
+centre_mm: [number, number, number], 
+/**
+ * Standard deviation of its tilt: worst direction, and across it, degrees.
+ */
+tilt_sigma_deg: [number, number], 
+/**
+ * How far the spots lie off it, rms, mm.
+ */
+rms_mm: number, 
+/**
+ * Angle between it and the base's z, degrees.
+ */
+tilt_deg: number, 
+/**
+ * A spot that does not lie on the plane of the others.
+ */
+left_out: string | null, };
+
+export type Touched = { 
+/**
+ * Picture, distance from the camera along its axis and its standard deviation, mm.
+ */
+spots: Array<[string, number, number]>, 
+/**
+ * The plane through them.
+ */
+surface: SurfaceTouched | null, 
+/**
+ * Pictures without a distance: name and reason.
+ */
+missing: Array<[string, string]>, 
+/**
+ * What a reader must know.
+ */
+remarks: Array<string>, };
+
+export type CalibrationFigures = { 
+/**
+ * What was calibrated, as files call it.
+ */
+kind: string, 
+/**
+ * good, usable, badly determined or refused.
+ */
+verdict: string, 
+/**
+ * Why.
+ */
+reasons: Array<string>, 
+/**
+ * The next best picture.
+ */
+advice: Array<string>, 
+/**
+ * Named figures, unit in the name.
+ */
+figures: Record<string, number>, 
+/**
+ * The same of the station's present one; empty without.
+ */
+former: Record<string, number>, 
+/**
+ * Residual a picture; unit in the heading of the page.
+ */
+per_picture: Array<[string, number]>, 
+/**
+ * Pictures that were not used: name and reason.
+ */
+left_out: Array<[string, string]>, 
+/**
+ * It was stored in the station.
+ */
+accepted: boolean, };
+
+export type BenchRow = { 
+/**
+ * What it ran on.
+ */
+on: string, 
+/**
+ * Columns, px.
+ */
+width: number, 
+/**
+ * Rows, px.
+ */
+height: number, 
+/**
+ * Of the whole chain, ms.
+ */
+ms_per_shot: number, };
+
+export type Outcome = { "procedure": "check", 
+/**
+ * In the order in which they were made.
+ */
+lines: Array<CheckLine>, } | { "procedure": "scan" } & ScanFigures | { "procedure": "find" } & Position | { "procedure": "teach", 
+/**
+ * Name of the recipe.
+ */
+recipe: string, 
+/**
+ * Found on its own scan.
+ */
+proof: Position, } | { "procedure": "touch" } & Touched | { "procedure": "calibrate" } & CalibrationFigures | { "procedure": "benchmark", 
+/**
+ * One a size and processor.
+ */
+rows: Array<BenchRow>, };
+
+export type Job = { 
+/**
+ * Version of job.json: 1.
+ */
+format: number, 
+/**
+ * Name of its folder, e.g. `0007-scan`.
+ */
+id: string, 
+/**
+ * What was ordered.
+ */
+order: Order, 
+/**
+ * What became of it.
+ */
+state: JobState, 
+/**
+ * Steps done (shots, pictures, checks).
+ */
+done: number, 
+/**
+ * Steps in all; null while nobody knows.
+ */
+of: number | null, 
+/**
+ * When it was ordered.
+ */
+created: string, 
+/**
+ * Seconds that it ran.
+ */
+seconds: number, 
+/**
+ * Why it failed.
+ */
+problem: Problem | null, 
+/**
+ * What came of it.
+ */
+outcome: Outcome | null, 
+/**
+ * Steps of an interrupted run are kept: resuming goes on there.
+ */
+resumable: boolean, };
+
+export type Event = { "event": "state", "data": { 
+/**
+ * The bar.
+ */
+bar: Bar, 
+/**
+ * Newest first, at most 200.
+ */
+jobs: Array<Job>, } } | { "event": "bar", "data": Bar } | { "event": "job", "data": Job } | { "event": "gone", "data": string };
+
+export type Knock = { 
+/**
+ * Of this start of the program.
+ */
+token: string | null, 
+/**
+ * Where the screen is served to other machines.
+ */
+password: string | null, };
+
+export type Session = { 
+/**
+ * A short name of the tab that asks.
+ */
+tab: string, };
+
+export type TakeLease = { 
+/**
+ * Also where another one operates.
+ */
+firmly: boolean, };
+
+export type Goal = "approach" | "insertion" | "retract";
+
+export type Confirmed = { 
+/**
+ * The job that found the pose.
+ */
+job: string, 
+/**
+ * Which pose.
+ */
+goal: Goal, 
+/**
+ * `hash` of the poses that were shown.
+ */
+hash: string, };
+
+export type Grant = { 
+/**
+ * The name under which it is redeemed, once.
+ */
+grant: string, };
+
+export type Redeem = { 
+/**
+ * What pressing it gave.
+ */
+grant: string, 
+/**
+ * What is confirmed, again.
+ */
+what: Confirmed, };
+
+export type CalibrationState = { 
+/**
+ * As files call it.
+ */
+kind: string, 
+/**
+ * For people.
+ */
+words: string, 
+/**
+ * good, usable, badly determined or refused.
+ */
+verdict: string, 
+/**
+ * When it was measured.
+ */
+created: string, 
+/**
+ * How long ago, days.
+ */
+days: number, 
+/**
+ * Expected error of a point at the working distance, mm.
+ */
+expected_mm: number | null, };
+
+export type StationInfo = { 
+/**
+ * Its name.
+ */
+name: string, 
+/**
+ * Where pictures come from.
+ */
+mode: Mode, 
+/**
+ * Name and version of the program.
+ */
+program: string, 
+/**
+ * How its robot writes poses; null: as matrices.
+ */
+robot: string | null, 
+/**
+ * What the work tolerates, mm.
+ */
+tolerance_mm: number | null, 
+/**
+ * Camera depths at which points are believed, mm.
+ */
+volume_mm: [number, number] | null, 
+/**
+ * One a calibration that there is.
+ */
+calibrations: Array<CalibrationState>, 
+/**
+ * What is wrong with it; null: nothing.
+ */
+problem: Problem | null, 
+/**
+ * Names of all settings of the extraction, with dots, and the station's values.
+ */
+extraction: Record<string, unknown>, };
+
+export type RecordingInfo = { 
+/**
+ * Path below the recordings' folder.
+ */
+name: string, 
+/**
+ * What it calls itself.
+ */
+set: string, 
+/**
+ * Moments in it.
+ */
+frames: number, 
+/**
+ * Size of its pictures, px.
+ */
+width: number, 
+/**
+ * Rows, px.
+ */
+height: number, 
+/**
+ * line, pointer; null where no laser is on.
+ */
+beam: string | null, 
+/**
+ * It shows a board.
+ */
+board: boolean, 
+/**
+ * robot, linear or turntable.
+ */
+motion: string, 
+/**
+ * Why it cannot be used; null: it can.
+ */
+problem: Problem | null, };
+
+export type PictureRef = { 
+/**
+ * The recording.
+ */
+recording: string, 
+/**
+ * Its frame, from 0.
+ */
+frame: number, 
+/**
+ * laser or ambient; without: whichever there is.
+ */
+light: string | null, 
+/**
+ * Columns of the answer, 16 to 4096; without: the picture's own.
+ */
+width: number | null, };
+
+export type RecipeText = { 
+/**
+ * Name of the file, without extension.
+ */
+name: string, 
+/**
+ * What people call the part; read from the text.
+ */
+title: string, 
+/**
+ * Ships with the program; it is copied when it is changed.
+ */
+shipped: boolean, 
+/**
+ * TOML.
+ */
+text: string, };
+
+export type MapHead = { 
+/**
+ * Columns.
+ */
+width: number, 
+/**
+ * Rows.
+ */
+height: number, 
+/**
+ * Edge of a cell, mm; the centre of cell (i, j) is at ((i + 0.5) cell, (j + 0.5) cell).
+ */
+cell_mm: number, 
+/**
+ * Grid in the cloud's frame: row-major 4x4, mm.
+ */
+base_from_grid: [number, number, number, number, number, number, number, number, number, number, number, number, number, number, number, number], 
+/**
+ * Heights between which 99 % lies, mm.
+ */
+z_mm: [number, number], 
+/**
+ * The same of the standard deviation, mm.
+ */
+sigma_mm: [number, number], 
+/**
+ * The same of the stripe's amplitude, grey levels.
+ */
+intensity: [number, number], };
+
+export type SectionAsk = { 
+/**
+ * Where it begins, mm.
+ */
+from: [number, number], 
+/**
+ * Where it ends, mm.
+ */
+to: [number, number], 
+/**
+ * Pieces of it to which lines are fitted: from and to along the section, mm; at most two.
+ */
+fits: Array<[number, number]>, };
+
+export type SectionPoint = { 
+/**
+ * Along the section, mm.
+ */
+s: number, 
+/**
+ * Height; null where nothing was measured.
+ */
+z: number | null, 
+/**
+ * Its standard deviation, mm.
+ */
+sigma: number | null, };
+
+export type Distance = { 
+/**
+ * mm, or degrees where it is an angle.
+ */
+value: number, 
+/**
+ * One standard deviation, in the same unit.
+ */
+sigma: number, };
+
+export type Fit = { 
+/**
+ * Where it begins and ends along the section, mm.
+ */
+piece: [number, number], 
+/**
+ * Height at its middle, mm.
+ */
+height_mm: number, 
+/**
+ * Standard deviation of that, mm.
+ */
+height_sigma_mm: number, 
+/**
+ * Its angle against the grid's plane, degrees.
+ */
+angle_deg: number, 
+/**
+ * Standard deviation of that, degrees.
+ */
+angle_sigma_deg: number, 
+/**
+ * How far the places lie off it, rms, mm.
+ */
+rms_mm: number, 
+/**
+ * Places that it was fitted to.
+ */
+places: number, };
+
+export type Section = { 
+/**
+ * Its length, mm.
+ */
+length_mm: number, 
+/**
+ * A place each half cell.
+ */
+points: Array<SectionPoint>, 
+/**
+ * One a piece.
+ */
+fits: Array<Fit>, 
+/**
+ * Height of the second piece's middle over the first one's line, mm; with two pieces.
+ */
+step: Distance | null, 
+/**
+ * Angle between the two lines, degrees.
+ */
+angle: Distance | null, };
+
+export type PointsAsk = { 
+/**
+ * mm in the grid.
+ */
+a: [number, number], 
+/**
+ * mm in the grid.
+ */
+b: [number, number], };
+
+export type PlaneAsk = { 
+/**
+ * mm in the grid.
+ */
+point: [number, number], 
+/**
+ * Corners of the box that holds the plane: x0 y0 x1 y1, mm in the grid.
+ */
+plane: [number, number, number, number], };
+
+export type Measure = { "measure": "two_points" } & PointsAsk | { "measure": "point_to_plane" } & PlaneAsk;
+
+export type MeasureAnswer = { 
+/**
+ * The distance, mm; of a point above its plane positive.
+ */
+distance: Distance, 
+/**
+ * Along x, y, z of the grid, mm; of two points.
+ */
+along: [number, number, number] | null, 
+/**
+ * Of the plane against the grid, degrees.
+ */
+tilt: Distance | null, 
+/**
+ * How far the plane's cells lie off it, rms, mm.
+ */
+rms_mm: number | null, 
+/**
+ * Cells that went in.
+ */
+cells: number, };

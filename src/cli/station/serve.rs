@@ -1,0 +1,149 @@
+//! In: a station folder, an address. Out: the operator's screen, served until Ctrl-C; a password's hash for other machines.
+//! Frame and unit: as the screen's procedures.
+
+use crate::cli::terminal::console::Console;
+use crate::cli::terminal::interrupt;
+use crate::fault::{Fault, Result};
+use crate::scan::RawFormat;
+use crate::simulate::Set;
+use crate::web::{Mode, Secured, ServeOptions, hashed, random_hex, serve, simulated};
+use std::io::{BufRead, IsTerminal};
+use std::net::{IpAddr, Ipv4Addr};
+use std::path::{Path, PathBuf};
+
+/// Serve the operator's screen to a browser
+///
+/// Prints the address to open: it holds a token of this start, so nobody else on the machine gets in. Scan, surface, part,
+/// position, calibration, replay and health are pages of it; everything it does is a procedure that the command line has too.
+/// Jobs are kept in the station's folder: a restart loses none.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sheetlight station serve --station demo-cell --simulate
+  sheetlight station serve --station cell3 --recordings recordings
+  sheetlight station serve --station cell3 --listen 0.0.0.0 --name cell3.plant --password-file pw \\
+      --tls-cert cert.pem --tls-key key.pem")]
+pub struct Serve {
+    /// Station folder; with --simulate the folder in which a simulated station and its recordings are made
+    #[arg(long)]
+    station: PathBuf,
+    /// Folder below which recordings lie [default: the folder that holds the station]
+    #[arg(long)]
+    recordings: Option<PathBuf>,
+    /// Look around without camera and robot: makes a simulated station in STATION/station and recordings beside it, once
+    #[arg(long, conflicts_with = "recordings")]
+    simulate: bool,
+    /// Shots of the simulated scan
+    #[arg(long, default_value_t = 200, requires = "simulate")]
+    shots: usize,
+    /// Recordings to simulate, separated by commas: scan, surface, intrinsics, handeye, laserplane, pointer_cal, pointer, all
+    #[arg(long = "set", value_delimiter = ',', default_value = "all", requires = "simulate")]
+    sets: Vec<String>,
+    /// The camera, e.g. cell://HOST:PORT, or - with --raw: its newest picture is shown with its peaks (docs/live.md)
+    #[arg(long, conflicts_with = "simulate")]
+    camera: Option<String>,
+    /// Raw frames on standard input: WIDTHxHEIGHT:gray8, gray10le, gray12le or gray16le
+    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<RawFormat>, requires = "camera")]
+    raw: Option<RawFormat>,
+    /// The robot's controller, e.g. bcap://10.0.0.2: its state and pose are shown
+    #[arg(long)]
+    robot: Option<String>,
+    /// Port; the next free one where it is taken, 0 for any [default: 8620, or the next free one]
+    #[arg(long)]
+    port: Option<u16>,
+    /// Address to listen on; others than this machine's own need a password and TLS
+    #[arg(long, default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), requires_ifs = [("0.0.0.0", "password_file")])]
+    listen: IpAddr,
+    /// File with the password's hash, as sheetlight station password writes it
+    #[arg(long, requires_all = ["tls_cert", "tls_key"])]
+    password_file: Option<PathBuf>,
+    /// The certificate's chain, PEM
+    #[arg(long, requires_all = ["password_file", "tls_key"])]
+    tls_cert: Option<PathBuf>,
+    /// Its private key, PEM
+    #[arg(long, requires_all = ["password_file", "tls_cert"])]
+    tls_key: Option<PathBuf>,
+    /// Name by which browsers call this machine, several times
+    #[arg(long = "name", requires = "password_file")]
+    names: Vec<String>,
+}
+
+/// Hash a password for sheetlight station serve --password-file
+#[derive(clap::Args)]
+#[command(after_help = "Example:
+  sheetlight station password --out cell3/screen.password")]
+pub struct Password {
+    /// File for the hash; the password is asked for, or read from standard input
+    #[arg(long)]
+    out: PathBuf,
+}
+
+/// Where the screen is when nobody asks otherwise.
+const PORT: u16 = 8620;
+
+pub fn run(args: &Serve, console: &Console) -> Result<()> {
+    let (station, mode) =
+        if args.simulate { (make(args, console)?, Mode::Simulated) } else { (args.station.clone(), Mode::Replay) };
+    let holder = || match station.canonicalize() {
+        Ok(real) => real.parent().unwrap_or(Path::new("/")).to_owned(),
+        Err(_) => station.clone(),
+    };
+    let recordings = args.recordings.clone().unwrap_or_else(holder);
+    let secured = match (&args.password_file, &args.tls_cert, &args.tls_key) {
+        (Some(password), Some(certificates), Some(key)) => Some(Secured {
+            password: crate::files::read_text(password)?,
+            certificates: certificates.clone(),
+            key: key.clone(),
+            names: args.names.clone(),
+        }),
+        _ => None,
+    };
+    let options = ServeOptions {
+        station,
+        recordings,
+        mode: if args.camera.is_some() { Mode::Live } else { mode },
+        address: args.listen,
+        port: args.port.unwrap_or(PORT),
+        next_free: true,
+        camera: args.camera.clone().map(|uri| (uri, args.raw)),
+        robot: args.robot.clone(),
+        secured,
+        stop: interrupt::asked_for(),
+    };
+    serve(&options, &random_hex(), |url| {
+        let said =
+            format!("open {url}\nthe address holds the token of this start; Ctrl-C ends the screen, jobs are kept");
+        console.result(&serde_json::json!({ "url": url }), &said);
+        console.finish()
+    })
+}
+
+fn make(args: &Serve, console: &Console) -> Result<PathBuf> {
+    let mut sets = Vec::new();
+    for name in &args.sets {
+        match name.as_str() {
+            "all" => sets.extend(Set::ALL),
+            name => sets.push(name.parse().map_err(|e: String| Fault::usage(e).next("name a set"))?),
+        }
+    }
+    let bar = console.bar("simulating a station", 0);
+    let station = simulated(&args.station, args.shots, &sets, &|n, of| {
+        bar.set_length(of as u64);
+        bar.set_position(n as u64);
+    })?;
+    bar.finish_and_clear();
+    Ok(station)
+}
+
+pub fn password(args: &Password, console: &Console) -> Result<()> {
+    if std::io::stdin().is_terminal() {
+        console.ask("password (it is shown while you type): ");
+    }
+    let mut line = String::new();
+    std::io::stdin().lock().read_line(&mut line).map_err(|e| {
+        Fault::input(format!("the password cannot be read: {e}")).next("type it, or send it to standard input")
+    })?;
+    let hash = hashed(line.trim_end_matches(['\r', '\n']))?;
+    crate::files::write(&args.out, format!("{hash}\n").as_bytes())?;
+    console.result(&serde_json::json!({ "written": args.out }), &format!("{}: written", args.out.display()));
+    Ok(())
+}

@@ -1,0 +1,33 @@
+//! In: finished profiles of a running scan. Out: the same to somebody who looks on, e.g. a screen; never slower than the looker.
+//! Frame and unit: points in the cloud's frame, mm; `up` is a unit vector in it.
+
+use crate::geometry::Vec3;
+use crate::scan::Profile;
+use std::fmt;
+use std::sync::Arc;
+
+/// Who looks on.
+type Look = dyn Fn(&Profile, &Vec3) + Send + Sync;
+
+/// Looks on while a scan runs; by default nobody. What it does is waited for, so it has to be short.
+#[derive(Clone, Default)]
+pub struct Watch(Option<Arc<Look>>);
+
+impl Watch {
+    /// `look` is shown each profile that reached the cloud, with the direction towards the camera.
+    pub fn new(look: impl Fn(&Profile, &Vec3) + Send + Sync + 'static) -> Watch {
+        Watch(Some(Arc::new(look)))
+    }
+
+    pub(super) fn show(&self, profile: &Profile, up: &Vec3) {
+        if let Some(look) = &self.0 {
+            look(profile, up);
+        }
+    }
+}
+
+impl fmt::Debug for Watch {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(if self.0.is_some() { "watched" } else { "unwatched" })
+    }
+}

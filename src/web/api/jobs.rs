@@ -1,0 +1,108 @@
+//! In: orders and questions about jobs. Out: jobs, and the files that they left.
+//! Frame and unit: bytes.
+
+use super::answer::{Answer, beside, body, json, operates};
+use crate::fault::{Fault, Result};
+use crate::web::guard::{Tab, resolve};
+use crate::web::message::{Job, Order};
+use crate::web::screen::{JOBS, Screen};
+use crate::web::work;
+use axum::body::Bytes;
+use axum::extract::{Path as UrlPath, State};
+use axum::http::{StatusCode, header};
+use axum::response::IntoResponse;
+use axum::{Extension, Json};
+use std::sync::Arc;
+
+type Shared = State<Arc<Screen>>;
+
+/// GET /jobs
+pub async fn list(State(screen): Shared) -> Json<Vec<Job>> {
+    Json(screen.jobs.list(JOBS))
+}
+
+/// GET /jobs/{id}
+pub async fn get(State(screen): Shared, UrlPath(id): UrlPath<String>) -> Answer<Json<Job>> {
+    Ok(Json(screen.jobs.get(&id)?))
+}
+
+/// POST /jobs
+pub async fn order(
+    State(screen): Shared,
+    Extension(tab): Extension<Tab>,
+    bytes: Bytes,
+) -> Answer<(StatusCode, Json<Job>)> {
+    operates(&screen, &tab)?;
+    let order: Order = body(&bytes)?;
+    let job = json(screen, move |s| s.jobs.order(order)).await?;
+    Ok((StatusCode::ACCEPTED, job))
+}
+
+/// POST /jobs/{id}/stop, /resume, /accept
+pub async fn act(
+    State(screen): Shared,
+    Extension(tab): Extension<Tab>,
+    UrlPath((id, what)): UrlPath<(String, String)>,
+) -> Answer<Json<Job>> {
+    // Everybody may stop: it moves nothing.
+    if what != "stop" {
+        operates(&screen, &tab)?;
+    }
+    json(screen, move |s| match what.as_str() {
+        "stop" => s.jobs.stop(&id),
+        "resume" => s.jobs.resume(&id),
+        "accept" => {
+            let job = work::accept(&s.jobs, &s.jobs.get(&id)?)?;
+            s.forget();
+            Ok(job)
+        }
+        other => {
+            Err(Fault::usage(format!("{other:?}: nothing of that name is done with a job"))
+                .next("stop, resume or accept"))
+        }
+    })
+    .await
+}
+
+/// DELETE /jobs/{id}
+pub async fn remove(
+    State(screen): Shared,
+    Extension(tab): Extension<Tab>,
+    UrlPath(id): UrlPath<String>,
+) -> Answer<Json<serde_json::Value>> {
+    operates(&screen, &tab)?;
+    json(screen, move |s| s.jobs.remove(&id).map(|()| serde_json::json!({}))).await
+}
+
+/// Files of a job that may be had, with what they are.
+const KINDS: [(&str, &str); 8] = [
+    ("png", "image/png"),
+    ("ply", "application/octet-stream"),
+    ("pcd", "application/octet-stream"),
+    ("tif", "image/tiff"),
+    ("json", "application/json"),
+    ("toml", "text/plain; charset=utf-8"),
+    ("csv", "text/csv; charset=utf-8"),
+    // A report is shown as text: its scripts and styles are none of this page's.
+    ("html", "text/plain; charset=utf-8"),
+];
+
+/// Bytes of a file that is given out; a longer cloud is copied from the disk itself.
+const MOST_FILE: u64 = 512 << 20;
+
+/// GET /jobs/{id}/files/{name}
+pub async fn file(State(screen): Shared, UrlPath((id, name)): UrlPath<(String, String)>) -> Answer<impl IntoResponse> {
+    let (bytes, kind) = beside(screen, move |s| read(s, &id, &name)).await?;
+    let shown = if kind == "image/png" { "inline" } else { "attachment" };
+    Ok(([(header::CONTENT_TYPE, kind), (header::CONTENT_DISPOSITION, shown)], bytes))
+}
+
+fn read(screen: &Screen, id: &str, name: &str) -> Result<(Vec<u8>, &'static str)> {
+    let job = screen.jobs.get(id)?;
+    let path = resolve(&screen.place.jobs(), &format!("{}/{name}", job.id))?;
+    let ending = path.extension().unwrap_or_default().to_string_lossy().into_owned();
+    let kind = KINDS.iter().find(|(e, _)| *e == ending).map(|(_, kind)| *kind);
+    let kind = kind
+        .ok_or_else(|| Fault::usage(format!("{name}: files of that kind are not given out")).next("choose another"))?;
+    Ok((crate::files::read(&path, MOST_FILE)?, kind))
+}

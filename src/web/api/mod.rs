@@ -1,0 +1,16 @@
+//! In: requests under /api/v1. Out: their answers, JSON but for pictures, maps and points; faults with their four sentences.
+//! Frame and unit: as the messages.
+
+mod answer;
+mod camera;
+mod jobs;
+mod motion;
+mod openapi;
+mod place;
+mod router;
+mod routes;
+mod session;
+mod surface;
+
+pub use openapi::openapi;
+pub use router::router;

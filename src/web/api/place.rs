@@ -1,0 +1,202 @@
+//! In: questions about the station, its recordings and recipes. Out: lists, pictures, texts.
+//! Frame and unit: px.
+
+use super::answer::{Answer, beside, body, json, operates};
+use crate::fault::{Fault, Result};
+use crate::raster::{Image, png};
+use crate::recording::{Beam, MotionKind, Recording};
+use crate::web::guard::{Tab, resolve};
+use crate::web::message::{Bar, PictureRef, Problem, RecipeText, RecordingInfo, StationInfo};
+use crate::web::screen::Screen;
+use crate::web::{station, work};
+use axum::body::Bytes;
+use axum::extract::{Path as UrlPath, Query, State};
+use axum::http::header;
+use axum::response::IntoResponse;
+use axum::{Extension, Json};
+use std::path::Path;
+use std::sync::Arc;
+
+/// Folders below the recordings' root that are looked into.
+const DEEPEST: usize = 3;
+/// Recordings that are listed.
+const MOST: usize = 500;
+
+/// GET /station
+pub async fn station(State(screen): State<Arc<Screen>>) -> Answer<Json<StationInfo>> {
+    json(screen, |s| Ok(station::info(&s.place))).await
+}
+
+/// GET /bar
+pub async fn bar(State(screen): State<Arc<Screen>>) -> Answer<Json<Bar>> {
+    json(screen, |s| Ok(s.bar())).await
+}
+
+/// GET /recordings
+pub async fn recordings(State(screen): State<Arc<Screen>>) -> Answer<Json<Vec<RecordingInfo>>> {
+    json(screen, |s| {
+        let mut found = Vec::new();
+        list(&s.place.recordings, "", DEEPEST, &mut found)?;
+        found.sort_by_key(|r: &RecordingInfo| crate::files::natural(&r.name));
+        Ok(found)
+    })
+    .await
+}
+
+fn list(folder: &Path, name: &str, depth: usize, out: &mut Vec<RecordingInfo>) -> Result<()> {
+    if folder.join("meta.json").is_file() {
+        out.push(info(folder, name));
+        return Ok(());
+    }
+    let entries = std::fs::read_dir(folder).map_err(|e| Fault::read(folder, e))?;
+    for entry in entries.flatten().filter(|_| depth > 0) {
+        let word = entry.file_name().to_string_lossy().into_owned();
+        // Links are not followed: they may lead anywhere, or in a circle.
+        if crate::web::guard::plain(&word) && entry.file_type().is_ok_and(|t| t.is_dir()) && out.len() < MOST {
+            let below = if name.is_empty() { word } else { format!("{name}/{word}") };
+            // A folder that cannot be read hides itself alone.
+            let _ = list(&entry.path(), &below, depth - 1, out);
+        }
+    }
+    Ok(())
+}
+
+fn info(folder: &Path, name: &str) -> RecordingInfo {
+    match Recording::open(folder) {
+        Ok(r) => RecordingInfo {
+            name: name.into(),
+            set: r.meta.set.clone(),
+            frames: r.meta.frames.len(),
+            width: r.meta.image.width,
+            height: r.meta.image.height,
+            beam: r.meta.beam.map(|b| if b == Beam::Line { "line" } else { "pointer" }.to_owned()),
+            board: r.meta.board.is_some() || !r.meta.boards.is_empty(),
+            motion: match r.meta.motion().kind {
+                MotionKind::Robot => "robot",
+                MotionKind::Linear => "linear",
+                MotionKind::Turntable => "turntable",
+            }
+            .into(),
+            problem: None,
+        },
+        Err(fault) => RecordingInfo {
+            name: name.into(),
+            set: String::new(),
+            frames: 0,
+            width: 0,
+            height: 0,
+            beam: None,
+            board: false,
+            motion: String::new(),
+            problem: Some(Problem::from(&fault)),
+        },
+    }
+}
+
+/// GET /picture?recording=&frame=&light=&width=
+pub async fn picture(State(screen): State<Arc<Screen>>, Query(ask): Query<PictureRef>) -> Answer<impl IntoResponse> {
+    let bytes = beside(screen, move |s| {
+        let recording = Recording::open(&resolve(&s.place.recordings, &ask.recording)?)?;
+        let frame = recording.meta.frames.get(ask.frame).ok_or_else(|| {
+            Fault::input(format!("frame {} of {} was asked for", ask.frame, recording.meta.frames.len()))
+                .next("reload the page")
+        })?;
+        let name = match ask.light.as_deref() {
+            Some("ambient") => frame.ambient.as_ref(),
+            Some("laser") => frame.laser.as_ref(),
+            _ => frame.laser.as_ref().or(frame.ambient.as_ref()),
+        };
+        let name = name
+            .ok_or_else(|| Fault::input(format!("frame {} has no such picture", ask.frame)).next("choose another"))?;
+        let image = recording.picture(name)?;
+        Ok(png(&smaller(&image, ask.width)))
+    })
+    .await?;
+    Ok(([(header::CONTENT_TYPE, "image/png"), (header::CACHE_CONTROL, "private, max-age=300")], bytes))
+}
+
+/// 8 bits, each pixel the brightest of those that it stands for: a stripe is thinner than a thumbnail's pixel.
+fn smaller(image: &Image, width: Option<u32>) -> Image {
+    let by = width.map_or(1, |w| image.width.div_ceil(w.clamp(16, 4096))).max(1);
+    let (w, h) = (image.width.div_ceil(by), image.height.div_ceil(by));
+    let levels = image.to_u8();
+    let mut out = vec![0u8; w as usize * h as usize];
+    for (y, row) in levels.chunks(image.width as usize).enumerate() {
+        for (x, level) in row.iter().enumerate() {
+            let cell = &mut out[y / by as usize * w as usize + x / by as usize];
+            *cell = (*cell).max(*level);
+        }
+    }
+    Image::from_u8(w, h, out)
+}
+
+/// GET /recipes
+pub async fn recipes(State(screen): State<Arc<Screen>>) -> Answer<Json<Vec<RecipeText>>> {
+    json(screen, |s| work::recipes(&s.place)).await
+}
+
+/// PUT /recipes/{name}
+pub async fn save_recipe(
+    State(screen): State<Arc<Screen>>,
+    Extension(tab): Extension<Tab>,
+    UrlPath(name): UrlPath<String>,
+    bytes: Bytes,
+) -> Answer<Json<RecipeText>> {
+    operates(&screen, &tab)?;
+    let recipe = RecipeText { name, ..body::<RecipeText>(&bytes)? };
+    json(screen, move |s| work::save_recipe(&s.place, &recipe).map(|()| recipe)).await
+}
+
+/// DELETE /recipes/{name}
+pub async fn remove_recipe(
+    State(screen): State<Arc<Screen>>,
+    Extension(tab): Extension<Tab>,
+    UrlPath(name): UrlPath<String>,
+) -> Answer<Json<serde_json::Value>> {
+    operates(&screen, &tab)?;
+    json(screen, move |s| {
+        let path = work::recipe_path(&s.place, &name)?;
+        if !path.is_file() {
+            return Err(Fault::input(format!("{name}: is no recipe of this station's own"))
+                .cause("shipped recipes stay")
+                .next("choose another"));
+        }
+        crate::files::remove(&path).map_err(|e| Fault::write(&path, e))?;
+        Ok(serde_json::json!({}))
+    })
+    .await
+}
+
+/// GET /support: what somebody who helps needs to see; no pictures, no secrets.
+pub async fn support(State(screen): State<Arc<Screen>>) -> Answer<impl IntoResponse> {
+    let text = beside(screen, |s| {
+        let report = serde_json::json!({
+            "station": station::info(&s.place),
+            "bar": s.bar(),
+            "jobs": s.jobs.list(crate::web::screen::JOBS),
+            "adapters": crate::gpu::adapters(),
+            "threads": rayon::current_num_threads(),
+            "system": [std::env::consts::OS, std::env::consts::ARCH],
+            "seconds": s.started.elapsed().as_secs_f64(),
+        });
+        Ok(serde_json::to_string_pretty(&report).expect("plain data"))
+    })
+    .await?;
+    let name = "attachment; filename=\"sheetlight-support.json\"";
+    Ok(([(header::CONTENT_TYPE, "application/json"), (header::CONTENT_DISPOSITION, name)], text))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_thin_stripe_stays_in_a_thumbnail() {
+        let mut levels = vec![3u8; 640 * 480];
+        levels[240 * 640..241 * 640].fill(200);
+        let small = smaller(&Image::from_u8(640, 480, levels), Some(64));
+        assert_eq!((small.width, small.height), (64, 48));
+        assert!((0..64).all(|x| small.get(x, 24) == 200 && small.get(x, 23) == 3));
+        assert_eq!(smaller(&Image::from_u8(7, 3, vec![1; 21]), None).width, 7);
+    }
+}

@@ -1,0 +1,158 @@
+//! In: nothing. Out: every route of the API, in one table: the server, its description and the tests read it.
+//! Frame and unit: none.
+
+use super::{camera, jobs, motion, place, session, surface};
+use crate::web::screen::Screen;
+use axum::routing::{MethodRouter, delete, get, post, put};
+use std::sync::Arc;
+
+/// Before every path of the table.
+pub const ROOT: &str = "/api/v1";
+
+/// A route.
+pub struct Route {
+    /// GET, POST, PUT or DELETE.
+    pub method: &'static str,
+    /// Below [`ROOT`].
+    pub path: &'static str,
+    /// One sentence.
+    pub does: &'static str,
+    /// Name of the message in the body; empty: none.
+    pub takes: &'static str,
+    /// Name of the message in the answer, `[]` behind it for a list; a media type where it is no JSON.
+    pub gives: &'static str,
+    /// Only the tab that operates.
+    pub lease: bool,
+    pub(super) handler: MethodRouter<Arc<Screen>>,
+}
+
+fn route(
+    (method, path): (&'static str, &'static str),
+    does: &'static str,
+    (takes, gives): (&'static str, &'static str),
+    handler: MethodRouter<Arc<Screen>>,
+) -> Route {
+    Route { method, path, does, takes, gives, lease: false, handler }
+}
+
+impl Route {
+    fn leased(self) -> Route {
+        Route { lease: true, ..self }
+    }
+}
+
+const BYTES: &str = "application/octet-stream";
+
+/// All of them.
+pub fn routes() -> Vec<Route> {
+    vec![
+        route(
+            ("POST", "/session"),
+            "Open a session with the token of this start, or with the password",
+            ("Knock", ""),
+            post(session::open),
+        ),
+        route(("GET", "/session"), "Whether there is a session", ("", "Session"), get(session::state)),
+        route(
+            ("POST", "/lease"),
+            "Operate from this tab, or go on operating",
+            ("TakeLease", "Lease"),
+            post(session::take),
+        ),
+        route(("POST", "/lease/release"), "Let another tab operate", ("", "Lease"), post(session::release)).leased(),
+        route(
+            ("GET", "/events"),
+            "WebSocket: the state, then events, and rows of the growing height map",
+            ("", "Event"),
+            get(session::events),
+        ),
+        route(("GET", "/station"), "Settings and calibrations", ("", "StationInfo"), get(place::station)),
+        route(("GET", "/bar"), "What the bar shows", ("", "Bar"), get(place::bar)),
+        route(
+            ("GET", "/recordings"),
+            "Recordings below the recordings' folder",
+            ("", "RecordingInfo[]"),
+            get(place::recordings),
+        ),
+        route(("GET", "/picture"), "A picture of a recording", ("?PictureRef", "image/png"), get(place::picture)),
+        route(
+            ("GET", "/camera/newest"),
+            "The camera's newest picture other than the one of number after=, with its peaks; 204: none yet",
+            ("", BYTES),
+            get(camera::newest),
+        ),
+        route(
+            ("GET", "/recipes"),
+            "Recipes, shipped ones and the station's",
+            ("", "RecipeText[]"),
+            get(place::recipes),
+        ),
+        route(
+            ("PUT", "/recipes/{name}"),
+            "Check and store a recipe",
+            ("RecipeText", "RecipeText"),
+            put(place::save_recipe),
+        )
+        .leased(),
+        route(
+            ("DELETE", "/recipes/{name}"),
+            "Take a recipe of the station away",
+            ("", ""),
+            delete(place::remove_recipe),
+        )
+        .leased(),
+        route(("GET", "/jobs"), "Jobs, newest first", ("", "Job[]"), get(jobs::list)),
+        route(("POST", "/jobs"), "Order a procedure", ("Order", "Job"), post(jobs::order)).leased(),
+        route(("GET", "/jobs/{id}"), "One job", ("", "Job"), get(jobs::get)),
+        route(("DELETE", "/jobs/{id}"), "Take a job and its files away", ("", ""), delete(jobs::remove)).leased(),
+        route(
+            ("POST", "/jobs/{id}/{what}"),
+            "stop, resume or accept a job; stop needs no lease",
+            ("", "Job"),
+            post(jobs::act),
+        )
+        .leased(),
+        route(("GET", "/jobs/{id}/files/{*name}"), "A file that a job left", ("", BYTES), get(jobs::file)),
+        route(
+            ("GET", "/scans/{id}/map"),
+            "What the numbers of a scan's height map mean",
+            ("", "MapHead"),
+            get(surface::head),
+        ),
+        route(
+            ("GET", "/scans/{id}/map/{layer}"),
+            "height, sigma or intensity of each cell",
+            ("", BYTES),
+            get(surface::layer),
+        ),
+        route(
+            ("POST", "/scans/{id}/section"),
+            "Heights along a line, and lines through pieces of it",
+            ("SectionAsk", "Section"),
+            post(surface::along),
+        ),
+        route(
+            ("POST", "/scans/{id}/measure"),
+            "Between two places, or from a plane",
+            ("Measure", "MeasureAnswer"),
+            post(surface::measured),
+        ),
+        route(("GET", "/scans/{id}/points"), "Points to look at (most=)", ("", BYTES), get(surface::points)),
+        route(
+            ("POST", "/motion/press"),
+            "The button over a pose goes down",
+            ("Confirmed", "Grant"),
+            post(motion::press),
+        )
+        .leased(),
+        route(("POST", "/motion/go"), "It was held: move to that pose, once", ("Redeem", ""), post(motion::go))
+            .leased(),
+        route(("POST", "/motion/release"), "It was let go", ("", ""), post(motion::release)).leased(),
+        route(
+            ("GET", "/support"),
+            "Settings, jobs and machine for somebody who helps",
+            ("", "application/json"),
+            get(place::support),
+        ),
+    ]
+}

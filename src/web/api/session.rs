@@ -1,0 +1,100 @@
+//! In: the token of this start or a password; tabs that want to operate. Out: a session's cookie; the lease.
+//! Frame and unit: seconds.
+
+use super::answer::{Answer, Refusal, body, json, operates};
+use crate::fault::{Fault, Result};
+use crate::web::event::stream;
+use crate::web::guard::{Tab, verify};
+use crate::web::message::{Event, Knock, Lease, Session, TakeLease};
+use crate::web::screen::Screen;
+use axum::body::Bytes;
+use axum::extract::{State, WebSocketUpgrade};
+use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use axum::{Extension, Json};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Passwords are tried one at a time, and no faster than this.
+const SLOWLY: Duration = Duration::from_millis(700);
+static TRYING: tokio::sync::Mutex<()> = tokio::sync::Mutex::const_new(());
+
+/// POST /session: `{"token"}` or `{"password"}`; sets the cookie.
+pub async fn open(State(screen): State<Arc<Screen>>, bytes: Bytes) -> Answer<Response> {
+    let knock: Knock = body(&bytes)?;
+    let known = match (knock.token, knock.password, screen.password.clone()) {
+        (Some(token), None, _) => screen.sessions.is_token(&token),
+        (None, Some(password), Some(hash)) => {
+            let _one = TRYING.lock().await;
+            tokio::time::sleep(SLOWLY).await;
+            let tried = tokio::task::spawn_blocking(move || verify(&password, &hash)).await;
+            tried.unwrap_or_else(|e| Err(Fault::device(e.to_string())))?
+        }
+        _ => false,
+    };
+    if !known {
+        let fault = Fault::refused("this is not the token of this start, nor the password")
+            .cause("the program was started again since, or a slip of the hand")
+            .next("open the address that the program printed when it was started");
+        return Err(Refusal(StatusCode::UNAUTHORIZED, fault));
+    }
+    let secure = if screen.password.is_some() { "; Secure" } else { "" };
+    let cookie = format!("{}={}; Path=/; HttpOnly; SameSite=Strict{secure}", screen.cookie, screen.sessions.open());
+    let mut headers = HeaderMap::new();
+    headers.insert(header::SET_COOKIE, HeaderValue::from_str(&cookie).expect("hexadecimal digits"));
+    Ok((headers, Json(serde_json::json!({}))).into_response())
+}
+
+/// GET /session: whether there is one, and whether a password opens one.
+pub async fn state(State(_): State<Arc<Screen>>, Extension(tab): Extension<Tab>) -> Json<Session> {
+    Json(Session { tab: tab.short() })
+}
+
+/// POST /lease: operate from this tab, or go on doing so.
+pub async fn take(
+    State(screen): State<Arc<Screen>>,
+    Extension(tab): Extension<Tab>,
+    bytes: Bytes,
+) -> Answer<Json<Lease>> {
+    let ask: TakeLease = if bytes.is_empty() { TakeLease::default() } else { body(&bytes)? };
+    if tab.tab == "none" {
+        return Err(Fault::usage("the request names no tab")
+            .next("send the header X-Sheetlight-Tab with a name of your own")
+            .into());
+    }
+    json(screen, move |screen| -> Result<Lease> {
+        let before = screen.leases.state().holder;
+        screen.leases.take(&tab, ask.firmly)?;
+        let lease = screen.leases.state();
+        if before != lease.holder {
+            screen.grants.drop_all();
+            screen.hub.tell(&Event::Bar(screen.bar()));
+        }
+        Ok(lease)
+    })
+    .await
+}
+
+/// POST /lease/release: let go.
+pub async fn release(State(screen): State<Arc<Screen>>, Extension(tab): Extension<Tab>) -> Answer<Json<Lease>> {
+    operates(&screen, &tab)?;
+    json(screen, move |screen| {
+        screen.leases.release(&tab);
+        screen.grants.drop_all();
+        screen.hub.tell(&Event::Bar(screen.bar()));
+        Ok(screen.leases.state())
+    })
+    .await
+}
+
+/// GET /events: the WebSocket.
+pub async fn events(State(screen): State<Arc<Screen>>, upgrade: WebSocketUpgrade) -> Answer<Response> {
+    let Some(seat) = screen.hub.sit() else {
+        let fault = Fault::refused("64 browsers look on already").next("close one of them");
+        return Err(Refusal(StatusCode::SERVICE_UNAVAILABLE, fault));
+    };
+    let hub = screen.hub.clone();
+    // What viewers send is short: they have nothing to say.
+    let upgrade = upgrade.max_message_size(1024).max_write_buffer_size(8 << 20);
+    Ok(upgrade.on_upgrade(move |socket| stream(socket, hub, seat, move || screen.state())))
+}

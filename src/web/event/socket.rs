@@ -1,0 +1,66 @@
+//! In: a viewer's WebSocket. Out: the state, then events and rows of the growing map as fast as the viewer takes them.
+//! Frame and unit: seconds, bytes.
+
+use super::Hub;
+use super::hub::Seat;
+use crate::web::message::Event;
+use axum::extract::ws::{Message, WebSocket};
+use std::sync::Arc;
+use std::time::Duration;
+use tokio::sync::broadcast::{Receiver, error::RecvError};
+use tokio::time::{MissedTickBehavior, interval, timeout};
+
+/// A viewer that takes nothing for so long is let go.
+const PATIENCE: Duration = Duration::from_secs(20);
+/// Rows of the growing map are sent this often at most.
+const PICTURE: Duration = Duration::from_millis(100);
+
+/// Serves one viewer until it goes. `state` is asked for at first and whenever events were missed.
+pub async fn stream(
+    mut socket: WebSocket,
+    hub: Arc<Hub>,
+    (_seat, mut events): (Seat, Receiver<Arc<str>>),
+    state: impl Fn() -> Event + Send,
+) {
+    let mut pictures = interval(PICTURE);
+    pictures.set_missed_tick_behavior(MissedTickBehavior::Delay);
+    let mut shown = (0, 0);
+    let mut next = Some(Message::text(text(&state())));
+    loop {
+        if let Some(message) = next.take() {
+            match timeout(PATIENCE, socket.send(message)).await {
+                Ok(Ok(())) => {}
+                _ => return,
+            }
+        }
+        tokio::select! {
+            event = events.recv() => next = match event {
+                Ok(event) => Some(Message::text(event.to_string())),
+                Err(RecvError::Lagged(_)) => Some(Message::text(text(&state()))),
+                Err(RecvError::Closed) => return,
+            },
+            _ = pictures.tick() => next = rows(&hub, &mut shown),
+            heard = socket.recv() => match heard {
+                // Viewers have nothing to say here; what they order goes through the API.
+                Some(Ok(Message::Close(_))) | Some(Err(_)) | None => return,
+                Some(Ok(_)) => {}
+            },
+        }
+    }
+}
+
+fn text(event: &Event) -> String {
+    serde_json::to_string(event).expect("plain data")
+}
+
+/// What this viewer has not seen of the growing map.
+fn rows(hub: &Hub, shown: &mut (u32, usize)) -> Option<Message> {
+    let (job, done) = hub.growing.at();
+    // The last row of what was sent may have got more shots since.
+    let from = if job == shown.0 { shown.1.saturating_sub(1) } else { 0 };
+    if job == shown.0 && done == shown.1 {
+        return None;
+    }
+    *shown = (job, done);
+    hub.growing.message(from).map(|bytes| Message::binary(bytes))
+}

@@ -1,0 +1,122 @@
+//! In: every request. Out: refused where host, origin, length or session are wrong; headers on every answer that keep a
+//! page to itself.
+//! Frame and unit: bytes.
+
+use super::{Sessions, Tab};
+use axum::body::Body;
+use axum::extract::{Request, State};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Response};
+use std::sync::Arc;
+
+/// Bytes of a request's body: recipes and outlines are far shorter.
+pub const MOST_BODY: usize = 1 << 20;
+
+/// What the door knows.
+pub struct Door {
+    /// Hosts that this server is called by, with port, lower case.
+    pub hosts: Vec<String>,
+    /// https where certificates were given.
+    pub scheme: &'static str,
+    /// Who is let in.
+    pub sessions: Arc<Sessions>,
+    /// Name of the cookie: of the port too, because cookies do not know ports.
+    pub cookie: String,
+}
+
+/// Scripts, styles, pictures and connections from here alone, no frames, no plugins, no inline code.
+const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self'; \
+                      font-src 'self'; manifest-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
+
+const HEADERS: [(HeaderName, &str); 6] = [
+    (header::CONTENT_SECURITY_POLICY, POLICY),
+    (header::X_CONTENT_TYPE_OPTIONS, "nosniff"),
+    (header::REFERRER_POLICY, "no-referrer"),
+    (header::X_FRAME_OPTIONS, "DENY"),
+    (HeaderName::from_static("cross-origin-opener-policy"), "same-origin"),
+    (HeaderName::from_static("cross-origin-resource-policy"), "same-origin"),
+];
+
+/// The middleware.
+pub async fn door(State(door): State<Arc<Door>>, mut request: Request<Body>, next: Next) -> Response {
+    let mut response = match door.refuses(&request) {
+        Some((status, why)) => refusal(status, why),
+        None => {
+            let open = is_open(request.method(), request.uri().path());
+            match door.tab(request.headers()) {
+                Some(tab) => {
+                    request.extensions_mut().insert(tab);
+                    next.run(request).await
+                }
+                None if open => next.run(request).await,
+                None => refusal(
+                    StatusCode::UNAUTHORIZED,
+                    "no session: open the address that the program printed when it was started; one of a former start is no good",
+                ),
+            }
+        }
+    };
+    let headers = response.headers_mut();
+    for (name, value) in HEADERS {
+        headers.insert(name, HeaderValue::from_static(value));
+    }
+    // Pages and answers change with the station; a browser that keeps them shows what was.
+    headers.entry(header::CACHE_CONTROL).or_insert(HeaderValue::from_static("no-store"));
+    response
+}
+
+fn refusal(status: StatusCode, why: &str) -> Response {
+    let body = serde_json::json!({ "error": { "kind": "usage", "what": why, "cause": "", "next": "" } });
+    (status, axum::Json(body)).into_response()
+}
+
+/// What may be had without a session: pages, which hold no secrets, and the way to get one.
+fn is_open(method: &Method, path: &str) -> bool {
+    let page = !path.starts_with("/api/") && (method == Method::GET || method == Method::HEAD);
+    page || (method == Method::POST && path == "/api/v1/session")
+}
+
+impl Door {
+    fn refuses(&self, request: &Request<Body>) -> Option<(StatusCode, &'static str)> {
+        let headers = request.headers();
+        let text = |name: HeaderName| headers.get(name).and_then(|v| v.to_str().ok()).map(str::to_ascii_lowercase);
+        // A page of another name that leads here (DNS rebinding) is not ours.
+        if !text(header::HOST).is_some_and(|h| self.hosts.contains(&h)) {
+            return Some((StatusCode::MISDIRECTED_REQUEST, "another host's name: open the address that was printed"));
+        }
+        let ours = |origin: &String| self.hosts.iter().any(|h| *origin == format!("{}://{h}", self.scheme));
+        if text(header::ORIGIN).is_some_and(|o| !ours(&o)) {
+            return Some((StatusCode::FORBIDDEN, "a page of another origin asks"));
+        }
+        if text(HeaderName::from_static("sec-fetch-site")).is_some_and(|s| s == "cross-site" || s == "same-site")
+            && request.uri().path().starts_with("/api/")
+        {
+            return Some((StatusCode::FORBIDDEN, "a page of another site asks"));
+        }
+        let length = text(header::CONTENT_LENGTH).map(|l| l.parse::<u64>().unwrap_or(u64::MAX));
+        if length.is_some_and(|l| l > MOST_BODY as u64) {
+            return Some((StatusCode::PAYLOAD_TOO_LARGE, "the body is longer than 1 MiB"));
+        }
+        None
+    }
+
+    /// Who asks: by cookie, or by the token itself in `Authorization: Bearer`.
+    fn tab(&self, headers: &HeaderMap) -> Option<Tab> {
+        let tab = headers.get("x-sheetlight-tab").and_then(|v| v.to_str().ok()).unwrap_or("none");
+        let tab: String = tab.chars().filter(char::is_ascii_alphanumeric).take(32).collect();
+        let bearer =
+            headers.get(header::AUTHORIZATION).and_then(|v| v.to_str().ok()).and_then(|v| v.strip_prefix("Bearer "));
+        if bearer.is_some_and(|token| self.sessions.is_token(token)) {
+            return Some(Tab { session: "token".into(), tab });
+        }
+        let session = cookie(headers, &self.cookie)?;
+        self.sessions.knows(session).then(|| Tab { session: session.to_owned(), tab })
+    }
+}
+
+fn cookie<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
+    let all = headers.get_all(header::COOKIE).into_iter().filter_map(|v| v.to_str().ok());
+    let mut pairs = all.flat_map(|line| line.split(';')).filter_map(|pair| pair.trim().split_once('='));
+    pairs.find(|(n, _)| *n == name).map(|(_, v)| v)
+}

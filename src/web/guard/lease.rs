@@ -1,0 +1,113 @@
+//! In: tabs that want to operate. Out: one of them does; the others watch until it is idle for a minute or lets go.
+//! Frame and unit: seconds.
+
+use crate::fault::{Fault, Result};
+use crate::web::message::Lease;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+/// A tab that does nothing for so long does not operate any more.
+pub const IDLE: Duration = Duration::from_secs(60);
+
+/// Who asks: a browser's tab or a program, within a session.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Tab {
+    /// The session's name, or that of the token.
+    pub session: String,
+    /// The tab's own, from its header.
+    pub tab: String,
+}
+
+impl Tab {
+    /// A few characters by which people tell tabs apart; no secret.
+    pub fn short(&self) -> String {
+        self.tab.chars().take(4).collect()
+    }
+}
+
+struct Held {
+    tab: Tab,
+    used: Instant,
+}
+
+/// The one lease.
+#[derive(Default)]
+pub struct Leases(Mutex<Option<Held>>);
+
+impl Leases {
+    /// Takes it, or renews it. Refused while another tab holds it, unless `firmly`: a person at the machine may take it over.
+    pub fn take(&self, tab: &Tab, firmly: bool) -> Result<()> {
+        let mut held = self.0.lock().unwrap_or_else(|e| e.into_inner());
+        match &*held {
+            Some(h) if h.tab != *tab && h.used.elapsed() < IDLE && !firmly => Err(Fault::refused(format!(
+                "screen {} operates, for {:.0} s more without a touch",
+                h.tab.short(),
+                (IDLE - h.used.elapsed()).as_secs_f64()
+            ))
+            .cause("one operates, the others watch")
+            .next("ask there, wait, or take over")),
+            _ => {
+                *held = Some(Held { tab: tab.clone(), used: Instant::now() });
+                Ok(())
+            }
+        }
+    }
+
+    /// Refuses a tab that does not hold it; holding it is renewed by this.
+    pub fn need(&self, tab: &Tab) -> Result<()> {
+        let mut held = self.0.lock().unwrap_or_else(|e| e.into_inner());
+        match &mut *held {
+            Some(h) if h.tab == *tab && h.used.elapsed() < IDLE => {
+                h.used = Instant::now();
+                Ok(())
+            }
+            _ => Err(Fault::refused("this screen only watches")
+                .cause("another one operates, or this one was idle for 60 s")
+                .next("press Operate")),
+        }
+    }
+
+    /// Lets go.
+    pub fn release(&self, tab: &Tab) {
+        let mut held = self.0.lock().unwrap_or_else(|e| e.into_inner());
+        if held.as_ref().is_some_and(|h| h.tab == *tab) {
+            *held = None;
+        }
+    }
+
+    /// Who holds it, as everybody may know.
+    pub fn state(&self) -> Lease {
+        let held = self.0.lock().unwrap_or_else(|e| e.into_inner());
+        match held.as_ref().filter(|h| h.used.elapsed() < IDLE) {
+            Some(h) => {
+                Lease { holder: Some(h.tab.short()), seconds_left: (IDLE - h.used.elapsed()).as_secs_f64().round() }
+            }
+            None => Lease::default(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_operates() {
+        let tab = |t: &str| Tab { session: "s".into(), tab: t.into() };
+        let leases = Leases::default();
+        assert!(leases.need(&tab("a")).is_err());
+        leases.take(&tab("a"), false).unwrap();
+        leases.need(&tab("a")).unwrap();
+        assert!(leases.need(&tab("b")).is_err() && leases.take(&tab("b"), false).is_err());
+        leases.release(&tab("b"));
+        assert_eq!(leases.state().holder.as_deref(), Some("a"));
+        leases.take(&tab("b"), true).unwrap();
+        assert!(leases.need(&tab("a")).is_err());
+        // Of another session, a tab of the same name is another tab.
+        assert!(leases.need(&Tab { session: "t".into(), tab: "b".into() }).is_err());
+        // Idle for longer than a minute.
+        leases.0.lock().unwrap().as_mut().unwrap().used -= IDLE;
+        assert!(leases.need(&tab("b")).is_err() && leases.state().holder.is_none());
+        leases.take(&tab("a"), false).unwrap();
+    }
+}

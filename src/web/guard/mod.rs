@@ -1,0 +1,17 @@
+//! In: requests from browsers and programs. Out: only those that may be answered: known host and origin, a session, one
+//! operator, names that stay under their root.
+//! Frame and unit: none; bytes, seconds.
+
+mod door;
+mod lease;
+mod names;
+mod password;
+mod session;
+mod tls;
+
+pub use door::{Door, MOST_BODY, door};
+pub use lease::{Leases, Tab};
+pub use names::{plain, resolve};
+pub use password::{hashed, verify};
+pub use session::{Sessions, random_hex};
+pub use tls::{Doorway, tls};

@@ -1,0 +1,98 @@
+//! In: nothing. Out: a job as pages and disk know it, and what is told of it while it runs.
+//! Frame and unit: times in UTC, RFC 3339.
+
+use super::{Bar, Order, Outcome};
+use crate::fault::{Fault, Kind};
+use serde::{Deserialize, Serialize};
+use ts_rs::TS;
+
+/// What became of a job.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, TS)]
+#[serde(rename_all = "snake_case")]
+pub enum JobState {
+    /// Waits for the one before it.
+    Queued,
+    /// Runs now.
+    Running,
+    /// Ended with a result.
+    Done,
+    /// Ended with a fault.
+    Failed,
+    /// Ended by the operator; what was done is kept.
+    Stopped,
+    /// The program ended while it ran; it can be resumed or given up.
+    CutOff,
+}
+
+/// A fault as pages show it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, TS)]
+pub struct Problem {
+    /// usage, input, refused, output or device.
+    pub kind: String,
+    /// What happened, with its number and limit.
+    pub what: String,
+    /// Likely cause; may be empty.
+    pub cause: String,
+    /// Next step; may be empty.
+    pub next: String,
+}
+
+impl From<&Fault> for Problem {
+    fn from(f: &Fault) -> Problem {
+        let kind = match f.kind {
+            Kind::Usage => "usage",
+            Kind::Input => "input",
+            Kind::Refused => "refused",
+            Kind::Output => "output",
+            Kind::Device => "device",
+        };
+        Problem { kind: kind.into(), what: f.what.clone(), cause: f.cause.clone(), next: f.next.clone() }
+    }
+}
+
+/// One run of a procedure; `job.json` in its folder holds it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[serde(deny_unknown_fields)]
+pub struct Job {
+    /// Version of job.json: 1.
+    pub format: u32,
+    /// Name of its folder, e.g. `0007-scan`.
+    pub id: String,
+    /// What was ordered.
+    pub order: Order,
+    /// What became of it.
+    pub state: JobState,
+    /// Steps done (shots, pictures, checks).
+    pub done: usize,
+    /// Steps in all; null while nobody knows.
+    pub of: Option<usize>,
+    /// When it was ordered.
+    pub created: String,
+    /// Seconds that it ran.
+    pub seconds: f64,
+    /// Why it failed.
+    pub problem: Option<Problem>,
+    /// What came of it.
+    pub outcome: Option<Outcome>,
+    /// Steps of an interrupted run are kept: resuming goes on there.
+    pub resumable: bool,
+}
+
+/// What a page hears over its WebSocket.
+#[derive(Clone, Debug, Serialize, TS)]
+#[serde(tag = "event", content = "data", rename_all = "snake_case")]
+pub enum Event {
+    /// First, and again after events were missed: everything as it stands.
+    State {
+        /// The bar.
+        bar: Bar,
+        /// Newest first, at most 200.
+        jobs: Vec<Job>,
+    },
+    /// Once a second, and when something in it changes.
+    Bar(Bar),
+    /// A job began, went on or ended.
+    Job(Box<Job>),
+    /// A job was taken away.
+    Gone(String),
+}

@@ -1,0 +1,103 @@
+//! In: nothing. Out: the station, its recordings and its recipes as pages list them.
+//! Frame and unit: px, mm, days.
+
+use super::{Mode, Problem};
+use serde::{Deserialize, Serialize};
+use ts_rs::TS;
+
+/// The station.
+#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+pub struct StationInfo {
+    /// Its name.
+    pub name: String,
+    /// Where pictures come from.
+    pub mode: Mode,
+    /// Name and version of the program.
+    pub program: String,
+    /// How its robot writes poses; null: as matrices.
+    pub robot: Option<String>,
+    /// What the work tolerates, mm.
+    pub tolerance_mm: Option<f64>,
+    /// Camera depths at which points are believed, mm.
+    pub volume_mm: Option<[f64; 2]>,
+    /// One a calibration that there is.
+    pub calibrations: Vec<CalibrationState>,
+    /// What is wrong with it; null: nothing.
+    pub problem: Option<Problem>,
+    /// Names of all settings of the extraction, with dots, and the station's values.
+    #[ts(type = "Record<string, unknown>")]
+    pub extraction: std::collections::BTreeMap<String, serde_json::Value>,
+}
+
+/// A calibration of the station.
+#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+pub struct CalibrationState {
+    /// As files call it.
+    pub kind: String,
+    /// For people.
+    pub words: String,
+    /// good, usable, badly determined or refused.
+    pub verdict: String,
+    /// When it was measured.
+    pub created: String,
+    /// How long ago, days.
+    pub days: f64,
+    /// Expected error of a point at the working distance, mm.
+    pub expected_mm: Option<f64>,
+}
+
+/// A recording.
+#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+pub struct RecordingInfo {
+    /// Path below the recordings' folder.
+    pub name: String,
+    /// What it calls itself.
+    pub set: String,
+    /// Moments in it.
+    pub frames: usize,
+    /// Size of its pictures, px.
+    pub width: u32,
+    /// Rows, px.
+    pub height: u32,
+    /// line, pointer; null where no laser is on.
+    pub beam: Option<String>,
+    /// It shows a board.
+    pub board: bool,
+    /// robot, linear or turntable.
+    pub motion: String,
+    /// Why it cannot be used; null: it can.
+    pub problem: Option<Problem>,
+}
+
+/// Which picture of a recording.
+#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[serde(deny_unknown_fields)]
+pub struct PictureRef {
+    /// The recording.
+    pub recording: String,
+    /// Its frame, from 0.
+    pub frame: usize,
+    /// laser or ambient; without: whichever there is.
+    #[serde(default)]
+    pub light: Option<String>,
+    /// Columns of the answer, 16 to 4096; without: the picture's own.
+    #[serde(default)]
+    pub width: Option<u32>,
+}
+
+/// A recipe as text.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[serde(deny_unknown_fields)]
+pub struct RecipeText {
+    /// Name of the file, without extension.
+    pub name: String,
+    /// What people call the part; read from the text.
+    #[serde(default)]
+    pub title: String,
+    /// Ships with the program; it is copied when it is changed.
+    #[serde(default)]
+    pub shipped: bool,
+    /// TOML.
+    #[serde(default)]
+    pub text: String,
+}

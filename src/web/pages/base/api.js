@@ -1,0 +1,70 @@
+// In: paths and messages (docs/messages.d.ts). Out: answers; faults as errors with their four sentences. One place that talks
+// to the server.
+
+const ROOT = "/api/v1";
+
+/** This tab's name: it operates or watches by it, also after a reload. */
+export const tab = (() => {
+  let name = sessionStorage.getItem("tab");
+  if (!name) {
+    name = Array.from(crypto.getRandomValues(new Uint8Array(8)), (b) => b.toString(16).padStart(2, "0")).join("");
+    sessionStorage.setItem("tab", name);
+  }
+  return name;
+})();
+
+/** A fault of the server. */
+export class Problem extends Error {
+  constructor(status, problem) {
+    super(problem.what);
+    this.status = status;
+    this.problem = problem;
+  }
+}
+
+async function send(method, path, body) {
+  const headers = { "X-Sheetlight-Tab": tab };
+  if (body !== undefined) headers["Content-Type"] = "application/json";
+  let answer;
+  try {
+    answer = await fetch(ROOT + path, { method, headers, body: body === undefined ? undefined : JSON.stringify(body), cache: "no-store" });
+  } catch {
+    throw new Problem(0, { kind: "output", what: "the program does not answer", cause: "it was ended, or the network is down", next: "start it again; jobs are kept" });
+  }
+  if (answer.ok) return answer;
+  const said = await answer.json().catch(() => null);
+  throw new Problem(answer.status, said?.error ?? { kind: "input", what: `the server said ${answer.status}`, cause: "", next: "" });
+}
+
+export const get = async (path) => (await send("GET", path)).json();
+export const post = async (path, body) => (await send("POST", path, body ?? {})).json();
+export const put = async (path, body) => (await send("PUT", path, body)).json();
+export const remove = async (path) => (await send("DELETE", path)).json();
+export const bytes = async (path) => (await send("GET", path)).arrayBuffer();
+
+/** Address of a picture or a file. */
+export const url = (path) => ROOT + path;
+export const picture = (recording, frame, width, light) =>
+  url(`/picture?recording=${encodeURIComponent(recording)}&frame=${frame}${width ? `&width=${width}` : ""}${light ? `&light=${light}` : ""}`);
+
+/** Listens to the server for as long as the page is open; opens the socket again where it breaks. */
+export function listen({ event, rows, lost }) {
+  let wait = 300;
+  const open = () => {
+    const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}${ROOT}/events`);
+    socket.binaryType = "arraybuffer";
+    socket.onopen = () => { wait = 300; lost(false); };
+    socket.onmessage = (m) => (typeof m.data === "string" ? event(JSON.parse(m.data)) : rows(m.data));
+    socket.onclose = async () => {
+      lost(true);
+      try {
+        await get("/session");
+      } catch (e) {
+        // Another start of the program: the address of this one is no good any more.
+        if (e.status === 401) return lost("over");
+      }
+      setTimeout(open, (wait = Math.min(wait * 1.6, 5000)));
+    };
+  };
+  open();
+}

@@ -1,0 +1,66 @@
+// In: events of the server. Out: bar, jobs and growing map as they stand, and word of each change to whoever asked for it.
+
+/** @typedef {import("../../../../docs/messages").Bar} Bar */
+/** @typedef {import("../../../../docs/messages").Job} Job */
+
+export const store = {
+  /** @type {Bar | null} */ bar: null,
+  /** @type {Map<string, Job>} */ jobs: new Map(),
+  /** The scan that grows: { job, columns, total, done, heights }. */ growing: null,
+  /** false, true, or "over" where the session ended. */ lost: false,
+};
+
+const ears = new Map();
+
+/** Calls `hear` at each `what` (bar, jobs, rows, lost). Returns what ends it. */
+export function on(what, hear) {
+  if (!ears.has(what)) ears.set(what, new Set());
+  ears.get(what).add(hear);
+  return () => ears.get(what).delete(hear);
+}
+
+export function tell(what, value) {
+  for (const hear of [...(ears.get(what) ?? [])]) hear(value);
+}
+
+/** Newest first; those that `keep` wants. */
+export function jobs(keep = () => true) {
+  return [...store.jobs.values()].filter(keep).sort((a, b) => (a.id < b.id ? 1 : -1));
+}
+export const done = (procedure) => jobs((j) => j.order.procedure === procedure && j.state === "done");
+export const busy = () => jobs((j) => j.state === "running" || j.state === "queued").length > 0;
+
+export function take(event) {
+  const { data } = event;
+  switch (event.event) {
+    case "state":
+      store.bar = data.bar;
+      store.jobs = new Map(data.jobs.map((j) => [j.id, j]));
+      tell("bar");
+      tell("jobs", null);
+      break;
+    case "bar":
+      store.bar = data;
+      tell("bar");
+      break;
+    case "job":
+      store.jobs.set(data.id, data);
+      tell("jobs", data);
+      break;
+    case "gone":
+      store.jobs.delete(data);
+      tell("jobs", null);
+      break;
+  }
+}
+
+/** Rows of a growing map (src/web/event/growing.rs). */
+export function takeRows(buffer) {
+  const [, job, columns, total, from, rows] = new Uint32Array(buffer, 0, 6);
+  if (!store.growing || store.growing.job !== job || from === 0) {
+    store.growing = { job, columns, total, done: 0, heights: new Float32Array(columns * total).fill(NaN) };
+  }
+  store.growing.heights.set(new Float32Array(buffer, 24, rows * columns), from * columns);
+  store.growing.done = Math.max(store.growing.done, from + rows);
+  tell("rows");
+}

@@ -1,0 +1,109 @@
+// Part: choose or teach a recipe, find it in a scan, see where it lies.
+
+import { put, remove, url } from "../base/api.js";
+import { get } from "../base/api.js";
+import { fill, h, num } from "../base/dom.js";
+import { jobs, store } from "../base/store.js";
+import { t } from "../base/text.js";
+import { attempt, fault } from "../widgets/problem.js";
+import { choice, field, figures, follow, nothing, order, panel, scanChoice } from "../widgets/parts.js";
+import { operate, operating } from "../widgets/bar.js";
+import { scanMap } from "../widgets/scanmap.js";
+
+export async function show(place, query) {
+  const [choose, scan] = scanChoice(query, (id) => (location.hash = `#/part?job=${id}`));
+  if (!scan) return void fill(place, h("h1", {}, t("Part")), nothing(t("Nothing was scanned yet."), "scan", t("Scan")));
+  let recipes = await get("/recipes");
+  let name = sessionStorage.getItem("recipe") ?? recipes[0]?.name;
+  if (!recipes.some((r) => r.name === name)) name = recipes[0]?.name;
+  const problem = h("div"), progress = h("div"), picture = h("div", { class: "stack grow" }), found = h("div"), chooser = h("span"), tools = h("div", { class: "tools" }), side = h("div", { class: "stack" });
+  let follows = () => {};
+  const run = (what, ended) => attempt(async () => {
+    const job = await order(what);
+    follows();
+    follows = follow(progress, job.id, ended);
+  }, problem);
+  const find = () => run({ procedure: "find", scans: [scan.id], recipe: name }, (j) => shown(j, j.outcome));
+  const recipeChoice = () => fill(chooser, choice(t("Recipe"), recipes.map((r) => [r.name, `${r.name}${r.title ? ` · ${r.title}` : ""}${r.shipped ? "" : ` (${t("own")})`}`]), name, (v) => { name = v; sessionStorage.setItem("recipe", v); editor(); }));
+  place.classList.add("fit");
+  fill(place,
+    h("div", { class: "head" }, h("h1", {}, t("Part")), choose, chooser, h("span", { class: "grow" }), h("button", { class: "main", id: "find", onclick: find }, t("Find"))),
+    problem, progress,
+    h("div", { class: "split" }, h("section", { class: "panel fill stack" }, tools, picture), h("div", { class: "stack" }, panel(t("Found"), found), side)));
+  recipeChoice();
+  fill(found, h("p", { class: "quiet small" }, t("Choose a recipe and press Find, or teach a new part on the map.")));
+  const view = await scanMap(picture, scan.id);
+
+  let last = [];
+  function shown(j, p) {
+    const colour = p.passed ? "#ffffff" : "#ff5ac8";
+    last = p.outline.map((points) => ({ kind: "line", points, colour, wide: 1.5 }));
+    marks();
+    fill(found, h("p", {}, h("span", { class: `dot ${p.passed ? "good" : "bad"}`, role: "img", "aria-label": "" }), " ", h("b", {}, `${p.recipe}: ${t(p.passed ? "found" : "refused")}`)),
+      figures([num(p.score, 3), t("score")], [num(p.second_score, 3), t("next best")], [num(Math.max(...p.sigma_mm.slice(0, 2)), 4, "mm"), t("σ in the plane")], [num(p.sigma_deg[2], 4, "°"), t("σ of the turn")]),
+      p.reasons.map((r) => h("p", { class: "note small" }, r)),
+      h("div", { class: "row" }, h("a", { href: `#/position?job=${j.id}`, id: "to-position" }, t("Position")), h("a", { href: url(`/jobs/${j.id}/files/found.png`), target: "_blank" }, t("Picture"))));
+  }
+  // Teaching: an outline, windows and holes drawn on the map.
+  const part = { outline: null, windows: [], holes: [] };
+  const marks = () => view.marks([...last,
+    ...(part.outline ? [{ kind: "line", points: turned(part.outline, angle()), colour: "#ffd33d" }] : []),
+    ...part.windows.map((w) => ({ kind: "line", points: turned(w, angle()), colour: "#5ad1ff" })),
+    ...part.holes.map(([x, y, r]) => ({ kind: "circle", points: [[x, y], [x + r, y]], colour: "#5ad1ff" }))]);
+  const corners = (a, b) => [Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.max(a[0], b[0]), Math.max(a[1], b[1])];
+  const angle = () => Number(turn.querySelector("input").value) || 0;
+  const kinds = {
+    outline: ["Outline", { shape: "box", says: t("Draw a box around the body"), done: (a, b) => { part.outline = corners(a, b); drawn(); } }],
+    window: ["Window", { shape: "box", says: t("Draw a box around a window"), done: (a, b) => { part.windows.push(corners(a, b)); drawn(); } }],
+    hole: ["Hole", { shape: "circle", says: t("From a hole's middle to its rim"), done: (a, b) => { part.holes.push([a[0], a[1], Math.hypot(b[0] - a[0], b[1] - a[1])]); drawn(); } }],
+  };
+  const select = (kind) => {
+    for (const b of tools.querySelectorAll("[data-tool]")) b.setAttribute("aria-pressed", String(b.dataset.tool === kind));
+    view.tool(kind ? kinds[kind][1] : null);
+  };
+  const undo = () => { if (part.holes.length) part.holes.pop(); else if (part.windows.length) part.windows.pop(); else part.outline = null; drawn(); };
+  fill(tools, h("span", { class: "quiet small" }, t("Teach")), Object.entries(kinds).map(([k, [words]]) => h("button", { "data-tool": k, "aria-pressed": "false", onclick: () => select(k) }, t(words))), h("button", { onclick: undo }, t("Undo")), h("button", { onclick: () => select(null) }, t("Move the map")));
+  const turn = field(t("Turn"), { type: "number", value: "0", step: "0.5", min: "-180", max: "180", id: "turn", oninput: () => marks() }, "°");
+  const title = field(t("Name"), { type: "text", value: "part", maxlength: "60" });
+  const bears = field(t("Bears"), { type: "number", value: "0.2", step: "0.05", min: "0.01" }, "mm"), turns = field("", { type: "number", value: "1", step: "0.1", min: "0.01", "aria-label": t("Bears, degrees") }, "°"), above = field(t("Approach"), { type: "number", value: "20", step: "1", min: "0" }, "mm");
+  const value = (f) => f.querySelector("input").value;
+  const teach = () => run({ procedure: "teach", scan: scan.id, name: value(title).trim(), ...part, angle_deg: angle(), tolerance_mm: Number(value(bears)), tolerance_deg: Number(value(turns)), approach_mm: Number(value(above)) },
+    async (j) => { recipes = await get("/recipes"); name = j.outcome.recipe; sessionStorage.setItem("recipe", name); Object.assign(part, { outline: null, windows: [], holes: [] }); select(null); drawn(); recipeChoice(); shown(j, j.outcome.proof); });
+  function drawn() {
+    marks();
+    editor();
+  }
+  function editor() {
+    const r = recipes.find((x) => x.name === name);
+    if (part.outline) {
+      const [x0, y0, x1, y1] = part.outline;
+      fill(side, panel(t("Teach"), h("p", { class: "small" }, `${num(x1 - x0, 2)} × ${num(y1 - y0, 2, "mm")}, ${part.windows.length} ${t("windows")}, ${part.holes.length} ${t("holes")}`), h("div", { class: "stack" }, turn, title, h("div", { class: "row" }, bears, turns), above, h("button", { class: "main", id: "teach", onclick: teach }, t("Teach")))));
+      return;
+    }
+    if (!r) return void fill(side);
+    const text = h("textarea", { rows: 14, spellcheck: "false", "aria-label": t("Recipe as text") });
+    text.value = r.text;
+    const said = h("div"), as = field(t("Save as"), { type: "text", value: r.name, maxlength: "60" });
+    const save = () => attempt(async () => {
+      if (!operating()) await operate(false);
+      const new_ = value(as).trim();
+      await put(`/recipes/${encodeURIComponent(new_)}`, { name: new_, text: text.value });
+      recipes = await get("/recipes");
+      name = new_;
+      recipeChoice();
+      fill(said, h("p", { class: "good-ink" }, t("Saved.")));
+    }, said);
+    const away = () => attempt(async () => { await remove(`/recipes/${encodeURIComponent(name)}`); recipes = await get("/recipes"); name = recipes[0].name; recipeChoice(); editor(); }, said);
+    fill(side, panel(t("Recipe"), text, said, h("div", { class: "row" }, as, h("button", { onclick: save }, t("Check and save")), !r.shipped && h("button", { onclick: away }, t("Take away")))));
+  }
+  const former = jobs((j) => j.state === "done" && (j.order.procedure === "find" ? j.order.scans[0] === scan.id : j.order.procedure === "teach" && j.order.scan === scan.id))[0];
+  if (former) shown(former, former.outcome.proof ?? former.outcome);
+  editor();
+  return () => { follows(); view.end(); };
+}
+
+/** Corners of a box that is turned about its middle, degrees from x towards y. */
+function turned([x0, y0, x1, y1], degrees) {
+  const [cx, cy] = [(x0 + x1) / 2, (y0 + y1) / 2], c = Math.cos((degrees * Math.PI) / 180), s = Math.sin((degrees * Math.PI) / 180);
+  return [[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]].map(([x, y]) => [cx + c * (x - cx) - s * (y - cy), cy + s * (x - cx) + c * (y - cy)]);
+}

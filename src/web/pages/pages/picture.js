@@ -1,0 +1,79 @@
+// Picture: the camera's newest picture with its peaks by fate, or a recording's, to the pixel; levels and how much of them is
+// saturated; the light along the stripe.
+
+import { bytes, picture } from "../base/api.js";
+import { fill, h, num, svg } from "../base/dom.js";
+import { store } from "../base/store.js";
+import { t } from "../base/text.js";
+import { map } from "../widgets/map.js";
+import { choice, figures, panel, recordings } from "../widgets/parts.js";
+
+/** Fates of peaks by number (src/stages/peak/found.rs): word and colour. */
+const FATES = [["kept", "#3ddc84"], ["outside the working volume", "#5aa9ff"], ["faint", "#b0b0b0"], ["narrow", "#ff5ac8"], ["wide", "#ffb02e"], ["uncertain", "#c78bff"], ["steep", "#ff8a5a"], ["echo", "#ff5252"], ["without neighbour", "#ffe14d"], ["no point", "#7fd6d6"]];
+
+export async function show(place) {
+  const list = await recordings(() => true);
+  const camera = store.bar?.mode === "live";
+  if (!list.length && !camera) return void fill(place, h("h1", {}, t("Picture")), h("p", { class: "quiet" }, t("There is no recording.")));
+  let r = camera ? null : list.find((x) => x.name === sessionStorage.getItem("recording")) ?? list[0], frame = r ? Math.floor(r.frames / 2) : 0, turn = 0;
+  const box = h("div"), figs = h("div"), fates = h("div"), hist = h("div"), along = h("div"), head = h("div", { class: "head" });
+  const view = map(box, t("Picture"));
+  const slider = h("input", { type: "range", min: "0", "aria-label": t("Frame"), class: "grow", oninput: () => { frame = Number(slider.value); load(); } });
+  const choices = [...(camera ? [["", t("Camera")]] : []), ...list.map((x) => [x.name, x.name])];
+  const choose = (v) => { r = list.find((x) => x.name === v) ?? null; frame = r ? Math.floor(r.frames / 2) : 0; view.marks([]); fill(fates); heads(); r ? load() : live(); };
+  const heads = () => { slider.max = String((r?.frames ?? 1) - 1); slider.value = String(frame); slider.hidden = !r; fill(head, h("h1", {}, t("Picture")), choice(t("Recording"), choices, r?.name ?? "", choose), slider); };
+  async function load() {
+    const mine = ++turn, image = new Image();
+    image.src = picture(r.name, frame);
+    await image.decode();
+    if (mine !== turn) return;
+    const { width, height } = image, c = new OffscreenCanvas(width, height), g = c.getContext("2d", { willReadFrequently: true });
+    g.drawImage(image, 0, 0);
+    const px = g.getImageData(0, 0, width, height).data, grey = new Uint8Array(width * height);
+    for (let i = 0; i < grey.length; i++) grey[i] = px[4 * i];
+    show_(grey, width, height);
+  }
+  /** The newest picture, again and again; one that is slow gets fewer. */
+  async function live() {
+    const mine = ++turn;
+    let number = 0;
+    while (mine === turn) {
+      const b = await bytes(`/camera/newest?after=${number}`).catch(() => null);
+      if (mine !== turn) return;
+      if (!b || b.byteLength < 20) { await new Promise((go) => setTimeout(go, b ? 0 : 1000)); continue; }
+      const [n, width, height, many] = new Uint32Array(b, 0, 4), delay = new Float32Array(b, 16, 1)[0], words = new DataView(b, 20, 12 * many), peaks = {};
+      number = n;
+      for (let i = 0; i < many; i++) (peaks[words.getUint32(12 * i + 8, true)] ??= []).push([words.getFloat32(12 * i, true) + 0.5, height - 0.5 - words.getFloat32(12 * i + 4, true)]);
+      show_(new Uint8Array(b, 20 + 12 * many), width, height);
+      view.marks(Object.entries(peaks).map(([fate, points]) => ({ kind: "dots", points, colour: FATES[fate][1] })));
+      box.dataset.number = String(n);
+      fill(fates, h("p", { class: "small quiet" }, `${t("picture")} ${n} · ${num(delay, 1, "ms")}`), figures(...Object.entries(peaks).map(([fate, points]) => [String(points.length), t(FATES[fate][0]), fate === "0" ? "good-ink" : ""])));
+      await new Promise(requestAnimationFrame);
+    }
+  }
+  function show_(grey, width, height) {
+    const levels = new Float32Array(width * height), counts = new Array(64).fill(0);
+    let saturated = 0, brightest = 0, dark = 0;
+    const peaks = new Array(width).fill(0);
+    for (let y = 0; y < height; y++) for (let x = 0; x < width; x++) {
+      const v = grey[y * width + x];
+      levels[(height - 1 - y) * width + x] = v;
+      counts[v >> 2]++;
+      saturated += v === 255;
+      brightest = Math.max(brightest, v);
+      peaks[x] = Math.max(peaks[x], v);
+    }
+    dark = peaks.filter((v) => v < 16).length / width;
+    view.show({ width, height, cell_mm: 1, bare: true }, levels, { range: [0, 255], unit: "", digits: 0, colours: "grey", reads: (p) => `u ${Math.floor(p[0])}  v ${height - 1 - Math.floor(p[1])}  ${num(levels[view.index(p)], 0)}` });
+    const share = saturated / (width * height);
+    fill(figs, figures([`${width}×${height}`, t("pixels")], [String(brightest), t("brightest of 255"), brightest > 217 || brightest < 120 ? "poor-ink" : ""], [num(100 * share, 3, "%"), t("saturated"), share > 0.005 ? "bad-ink" : ""], [num(100 * dark, 1, "%"), t("columns without light")]));
+    const most = Math.log1p(Math.max(...counts));
+    fill(hist, svg("svg", { class: "plot", viewBox: "0 0 64 100", preserveAspectRatio: "none", role: "img", "aria-label": t("Histogram") }, counts.map((n, i) => svg("rect", { class: "bar", x: i, y: 100 - (95 * Math.log1p(n)) / most, width: 0.9, height: (95 * Math.log1p(n)) / most }))));
+    fill(along, svg("svg", { class: "plot", viewBox: `0 0 ${width} 255`, preserveAspectRatio: "none", role: "img", "aria-label": t("Brightest level in each column") }, svg("polyline", { class: "curve", "vector-effect": "non-scaling-stroke", points: peaks.map((v, x) => `${x},${255 - v}`).join(" ") })));
+  }
+  place.classList.add("fit");
+  fill(place, head, h("div", { class: "split" }, h("section", { class: "panel fill" }, box), h("div", { class: "stack" }, panel(t("Levels"), figs), fates, panel(t("Histogram (logarithmic)"), hist), panel(t("Brightest level in each column"), along))));
+  heads();
+  r ? await load() : live();
+  return () => { turn++; view.end(); };
+}

@@ -1,0 +1,88 @@
+//! In: a robot's URI. Out: what its controller says, read over and over on a thread of its own; a link that breaks is opened again.
+//! Frame and unit: poses base_from_flange, mm.
+
+use super::message::RobotState;
+use crate::arm::{Mode, State, open};
+use crate::fault::{Fault, Result};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+/// The state is read so often.
+const READ: Duration = Duration::from_millis(500);
+/// A link that broke is opened again after so long.
+const AGAIN: Duration = Duration::from_secs(2);
+
+/// What is known of the robot.
+#[derive(Clone, Debug, Default)]
+pub struct Seen {
+    /// None: no link.
+    pub state: Option<State>,
+    /// Why there is none, or what stands on the controller.
+    pub wrong: Option<String>,
+}
+
+/// A robot that is looked at. It is never moved from here.
+pub struct Robot {
+    seen: Arc<Mutex<Seen>>,
+    ended: Arc<AtomicBool>,
+}
+
+impl Robot {
+    /// Begins to look. The robot need not be there yet.
+    pub fn watch(uri: &str) -> Result<Robot> {
+        uri.parse::<crate::arm::RobotUri>()?;
+        let (seen, ended) = (Arc::new(Mutex::new(Seen::default())), Arc::new(AtomicBool::new(false)));
+        let (uri, tell, end) = (uri.to_owned(), seen.clone(), ended.clone());
+        let body = move || {
+            while !end.load(Ordering::Relaxed) {
+                let Err(fault) = look(&uri, &tell, &end) else { return };
+                *tell.lock().unwrap_or_else(|e| e.into_inner()) = Seen { state: None, wrong: Some(fault.what) };
+                std::thread::sleep(AGAIN);
+            }
+        };
+        std::thread::Builder::new().name("robot".into()).spawn(body).map_err(|e| Fault::threads(&e))?;
+        Ok(Robot { seen, ended })
+    }
+
+    /// What was seen last.
+    pub fn seen(&self) -> Seen {
+        self.seen.lock().unwrap_or_else(|e| e.into_inner()).clone()
+    }
+}
+
+impl Drop for Robot {
+    fn drop(&mut self) {
+        self.ended.store(true, Ordering::Relaxed);
+    }
+}
+
+fn look(uri: &str, tell: &Mutex<Seen>, end: &AtomicBool) -> Result<()> {
+    let mut arm = open(uri)?;
+    while !end.load(Ordering::Relaxed) {
+        let state = arm.state()?;
+        let mut wrong: Vec<String> =
+            state.errors.iter().map(|e| format!("controller error {:X}: {}", e.code, e.text)).collect();
+        if state.emergency_stop == Some(true) {
+            wrong.push("emergency stop is pressed".into());
+        }
+        if matches!(state.mode, Mode::Manual | Mode::Teach) {
+            wrong.push("the controller is not in automatic mode".into());
+        }
+        let wrong = (!wrong.is_empty()).then(|| wrong.join("; "));
+        *tell.lock().unwrap_or_else(|e| e.into_inner()) = Seen { state: Some(state), wrong };
+        std::thread::sleep(READ);
+    }
+    Ok(())
+}
+
+impl Seen {
+    /// As the bar shows it.
+    pub fn bar(&self) -> RobotState {
+        match &self.state {
+            Some(s) if s.busy == Some(true) => RobotState::Moving,
+            Some(_) => RobotState::ReadOnly,
+            None => RobotState::NoLink,
+        }
+    }
+}

@@ -1,0 +1,185 @@
+//! In: a station. Out: everything that its screen knows, in one place that all requests share.
+//! Frame and unit: seconds, GB.
+
+use super::camera::Camera;
+use super::event::Hub;
+use super::guard::{Leases, Sessions};
+use super::message::{Bar, CalibrationAge, Event, JobState};
+use super::motion::Grants;
+use super::robot::Robot;
+use super::work::{Jobs, Place, scan_of};
+use super::{disk, station};
+use crate::fault::Result;
+use crate::gpu::adapters;
+use crate::rig::Rig;
+use crate::scan::HeightMap;
+use crate::station::{Settings, load_report};
+use std::sync::{Arc, Mutex, OnceLock};
+use std::time::{Duration, Instant};
+
+/// Jobs that a page gets to see at once.
+pub const JOBS: usize = 200;
+/// What is read from the disk for the bar is read again after so long.
+const READ_AGAIN: Duration = Duration::from_secs(10);
+/// Below this the bar alarms, GB.
+const LITTLE_DISK: f64 = 2.0;
+
+/// What all requests share.
+pub struct Screen {
+    /// Where things lie.
+    pub place: Place,
+    /// What runs, and what ran.
+    pub jobs: Arc<Jobs>,
+    /// Who looks on.
+    pub hub: Arc<Hub>,
+    /// Who is let in.
+    pub sessions: Arc<Sessions>,
+    /// Who operates.
+    pub leases: Leases,
+    /// Confirmed motions that were not made yet.
+    pub grants: Grants,
+    /// Argon2 hash, where others than this machine may ask.
+    pub password: Option<String>,
+    /// Name of the cookie.
+    pub cookie: String,
+    /// The camera, where one was named.
+    pub camera: Option<Camera>,
+    /// The robot, where one was named.
+    pub robot: Option<Robot>,
+    /// When the program started.
+    pub started: Instant,
+    adapter: OnceLock<(String, bool)>,
+    read: Mutex<Option<Read>>,
+    map: Mutex<Option<(String, Arc<HeightMap>)>>,
+}
+
+/// What a screen has beside its station.
+#[derive(Default)]
+pub struct Linked {
+    /// Argon2 hash, where others than this machine may ask.
+    pub password: Option<String>,
+    /// A camera that runs.
+    pub camera: Option<Camera>,
+    /// A robot's controller.
+    pub robot: Option<Robot>,
+}
+
+/// What the bar shows of the disk.
+#[derive(Clone)]
+struct Read {
+    at: Instant,
+    name: String,
+    calibration: Option<CalibrationAge>,
+    left_gb: Option<f64>,
+    wrong: Vec<String>,
+}
+
+impl Screen {
+    /// Nothing is read from the disk yet.
+    pub fn new(jobs: Arc<Jobs>, sessions: Arc<Sessions>, cookie: String, linked: Linked) -> Screen {
+        Screen {
+            place: jobs.place.clone(),
+            hub: jobs.hub.clone(),
+            jobs,
+            sessions,
+            leases: Leases::default(),
+            grants: Grants::default(),
+            password: linked.password,
+            cookie,
+            camera: linked.camera,
+            robot: linked.robot,
+            started: Instant::now(),
+            adapter: OnceLock::new(),
+            read: Mutex::default(),
+            map: Mutex::default(),
+        }
+    }
+
+    /// Asks the system for its adapters, once; the first time takes a moment.
+    pub fn adapter(&self) -> &(String, bool) {
+        self.adapter.get_or_init(|| match adapters().first() {
+            Some(a) if a.kind == "CPU" => (format!("{} cores", rayon::current_num_threads()), true),
+            Some(a) => (a.name.clone(), false),
+            None => (format!("{} cores", rayon::current_num_threads()), true),
+        })
+    }
+
+    fn read(&self) -> Read {
+        let mut held = self.read.lock().unwrap_or_else(|e| e.into_inner());
+        if let Some(read) = held.as_ref().filter(|r| r.at.elapsed() < READ_AGAIN) {
+            return read.clone();
+        }
+        let (settings, rig) = (Settings::load(&self.place.station), Rig::load(&self.place.station));
+        let faults = [settings.as_ref().err(), rig.as_ref().err()];
+        let read = Read {
+            at: Instant::now(),
+            name: settings.as_ref().map(|s| s.name.clone()).unwrap_or_default(),
+            calibration: rig.as_ref().ok().and_then(station::age),
+            left_gb: disk::left_gb(&self.place.station),
+            wrong: faults.into_iter().flatten().map(|f| f.what.clone()).collect(),
+        };
+        *held = Some(read.clone());
+        read
+    }
+
+    /// What was read of the station is read again: something was stored.
+    pub fn forget(&self) {
+        *self.read.lock().unwrap_or_else(|e| e.into_inner()) = None;
+    }
+
+    /// The bar as it stands.
+    pub fn bar(&self) -> Bar {
+        let read = self.read();
+        let (adapter, software) = self.adapter().clone();
+        let mut alarms = read.wrong;
+        if read.left_gb.is_some_and(|gb| gb < LITTLE_DISK) {
+            alarms.push(format!("{:.1} GB of disk left", read.left_gb.unwrap_or(0.0)));
+        }
+        let camera = self.camera.as_ref().map(Camera::seen);
+        alarms.extend(camera.as_ref().and_then(|c| c.2.clone()));
+        let robot = self.robot.as_ref().map(Robot::seen).unwrap_or_default();
+        alarms.extend(robot.wrong.clone());
+        let cut = self.jobs.list(JOBS).iter().filter(|j| j.state == JobState::CutOff).count();
+        if cut > 0 {
+            alarms.push(format!("{cut} jobs were cut off: resume them or take them away"));
+        }
+        let of_scan = || self.jobs.frames.lock().unwrap_or_else(|e| e.into_inner()).clone();
+        let (frames, delay_ms) = camera.map_or_else(|| (of_scan(), None), |c| (c.0, c.1));
+        Bar {
+            mode: self.place.mode,
+            station: read.name,
+            robot: robot.bar(),
+            laser: None,
+            frames,
+            delay_ms,
+            adapter,
+            adapter_is_software: software,
+            calibration: read.calibration,
+            disk_left_gb: read.left_gb,
+            alarms,
+            lease: self.leases.state(),
+            running: self.jobs.running(),
+            viewers: self.hub.viewers(),
+        }
+    }
+
+    /// Everything that a viewer starts from.
+    pub fn state(&self) -> Event {
+        Event::State { bar: self.bar(), jobs: self.jobs.list(JOBS) }
+    }
+
+    /// The height map of a scan; the last one that was asked for is kept in memory.
+    pub fn map(&self, id: &str) -> Result<Arc<HeightMap>> {
+        if let Some((name, map)) = &*self.map.lock().unwrap_or_else(|e| e.into_inner())
+            && name == id
+        {
+            return Ok(map.clone());
+        }
+        let folder = scan_of(&self.place.jobs(), &self.jobs.get(id)?)?;
+        // Ends what a stopped process has begun in it, before files are read.
+        load_report(&folder)?;
+        let map = Arc::new(HeightMap::load(&folder)?);
+        *self.map.lock().unwrap_or_else(|e| e.into_inner()) = Some((id.to_owned(), map.clone()));
+        Ok(map)
+    }
+}

@@ -1,0 +1,159 @@
+//! In: a recording of boards, frames to leave out. Out: a calibration with its figures beside the station's present one; stored
+//! in the station when it is accepted.
+//! Frame and unit: as the calibrations; px, mm, degrees.
+
+use super::jobs::Jobs;
+use super::run::Run;
+use crate::calibrate::camera::procedure::{CameraOptions, calibrate as camera};
+use crate::calibrate::camera::report::page;
+use crate::calibrate::hand_eye::options::Mount;
+use crate::calibrate::laser_plane::options::LaserPlaneOptions;
+use crate::calibrate::report::Page;
+use crate::fault::{Fault, Result};
+use crate::recording::Recording;
+use crate::rig::{Calibration, Kind, Measured, Quality, Rig, Verdict};
+use crate::scan::Where;
+use crate::station::volume::asked;
+use crate::station::{
+    HandEyeResult, HandEyeRun, LaserPlaneRun, PointerRun, Settings, calibrate_hand_eye, calibrate_laser_plane,
+    calibrate_pointer,
+};
+use crate::web::guard::resolve;
+use crate::web::message::{CalibrationFigures, Job, JobState, Order, Outcome, Target};
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// The result that waits to be accepted, in the job's folder.
+const RESULT: &str = "calibration.json";
+const PAGE: &str = "calibration.html";
+
+pub(super) fn calibrate(this: &Run, target: Target, name: &str, leave_out: &[usize]) -> Result<Outcome> {
+    let place = &this.jobs.place;
+    let recording = without(Recording::open(&resolve(&place.recordings, name)?)?, leave_out)?;
+    let settings = Settings::load(&place.station)?;
+    let progress = |done: usize, of: usize| this.progress(done, Some(of));
+    if target == Target::Camera {
+        let options =
+            CameraOptions { working_distance_mm: settings.volume().map(|v| v.middle()), ..CameraOptions::default() };
+        let result = camera(&[recording], &options, &|done, of| this.progress(done, Some(of)))?;
+        let page = page(&result, &format!("Camera calibration of {}", settings.name));
+        return keep(this, &result.calibration, &page, result.left_out);
+    }
+    let rig = Rig::load_to_calibrate(&place.station)?;
+    match target {
+        Target::LaserPlane => {
+            let run = LaserPlaneRun {
+                solver: LaserPlaneOptions::default(),
+                asked: asked(&settings, None),
+                extraction: settings.extraction.clone(),
+                place: Where::default(),
+            };
+            let c = calibrate_laser_plane(&recording, &rig, &run, &progress)?;
+            keep(this, &c.calibration, &c.page, c.missing)
+        }
+        Target::Pointer => {
+            let run =
+                PointerRun { spots: Default::default(), solver: Default::default(), asked: asked(&settings, None) };
+            let c = calibrate_pointer(&recording, &rig, &run, &progress)?;
+            keep(this, &c.calibration, &c.page, c.missing)
+        }
+        Target::Camera | Target::HandEye => {
+            let run = HandEyeRun {
+                poses: None,
+                mount: Mount::EyeInHand,
+                solver: Default::default(),
+                asked: asked(&settings, None),
+            };
+            match calibrate_hand_eye(&recording, &rig, &run, &progress)? {
+                HandEyeResult::OnFlange(c) => keep(this, &c.calibration, &c.page, c.missing),
+                HandEyeResult::InBase(c) => keep(this, &c.calibration, &c.page, c.missing),
+            }
+        }
+    }
+}
+
+/// The recording less some of its frames; those that stay keep their poses.
+fn without(mut recording: Recording, leave_out: &[usize]) -> Result<Recording> {
+    let all = recording.meta.frames.len();
+    if let Some(strange) = leave_out.iter().find(|i| **i >= all) {
+        return Err(
+            Fault::usage(format!("frame {strange} is to be left out, there are {all}")).next("choose one of them")
+        );
+    }
+    for (i, frame) in recording.meta.frames.iter_mut().enumerate() {
+        frame.pose.get_or_insert(i);
+    }
+    let mut index = 0;
+    recording.meta.frames.retain(|_| {
+        index += 1;
+        !leave_out.contains(&(index - 1))
+    });
+    Ok(recording)
+}
+
+fn keep<T: Serialize>(this: &Run, c: &Calibration<T>, page: &Page, left_out: Vec<(String, String)>) -> Result<Outcome> {
+    let text = serde_json::to_string_pretty(c).expect("plain data");
+    let (result, html) = (this.folder.join(RESULT), this.folder.join(PAGE));
+    crate::files::write_beside((&result, text.as_bytes()), &[(&html, page.html().as_bytes())])?;
+    let q = &c.quality;
+    Ok(Outcome::Calibrate(Box::new(CalibrationFigures {
+        kind: c.kind.name().into(),
+        verdict: q.verdict.words().into(),
+        reasons: q.reasons.clone(),
+        advice: q.advice.clone(),
+        figures: q.figures.clone(),
+        former: former(&this.jobs.place.station, c.kind),
+        per_picture: q.per_picture.clone(),
+        left_out,
+        accepted: false,
+    })))
+}
+
+/// Figures of the station's present calibration; none where there is none that can be read.
+fn former(station: &Path, kind: Kind) -> BTreeMap<String, f64> {
+    #[derive(serde::Deserialize)]
+    struct Told {
+        quality: Quality,
+    }
+    let path = station.join("calibration").join(format!("{}.json", kind.name()));
+    let text = crate::files::read_text(&path).ok();
+    let told = text.and_then(|t| serde_json::from_str::<Told>(&t).ok());
+    told.map(|t| t.quality.figures).unwrap_or_default()
+}
+
+/// Stores a finished calibration in the station. Errors: another job, a verdict that is not good enough, accepted before.
+pub fn accept(jobs: &Jobs, job: &Job) -> Result<Job> {
+    let refuse = |what: String| Err(Fault::usage(what).next("calibrate again"));
+    let (Order::Calibrate(ask), JobState::Done) = (&job.order, job.state) else {
+        return refuse(format!("{}: is no finished calibration", job.id));
+    };
+    let mut job = job.clone();
+    match &mut job.outcome {
+        Some(Outcome::Calibrate(f)) if !f.accepted => f.accepted = true,
+        _ => return refuse(format!("{}: was accepted already", job.id)),
+    }
+    let (folder, station) = (jobs.folder(&job), &jobs.place.station);
+    match ask.target {
+        Target::Camera => store::<crate::camera::Intrinsics>(&folder, station)?,
+        Target::HandEye => store::<crate::rig::HandEye>(&folder, station)?,
+        Target::LaserPlane => store::<crate::geometry::Plane<crate::geometry::Camera>>(&folder, station)?,
+        Target::Pointer => store::<crate::geometry::Ray<crate::geometry::Camera>>(&folder, station)?,
+    }
+    jobs.put(&job)?;
+    Ok(job)
+}
+
+fn store<T: Serialize + DeserializeOwned + Measured>(folder: &Path, station: &Path) -> Result<()> {
+    let path = folder.join(RESULT);
+    let c: Calibration<T> = serde_json::from_str(&crate::files::read_text(&path)?)
+        .map_err(|e| Fault::input(format!("{}: {e}", path.display())).next("calibrate again"))?;
+    if c.quality.verdict >= Verdict::BadlyDetermined {
+        return Err(Fault::refused(format!("the {} is {}", c.kind.words(), c.quality.verdict.words()))
+            .cause(c.quality.reasons.join("; "))
+            .next(c.quality.advice.first().map_or("take more pictures", String::as_str)));
+    }
+    let page = crate::files::read_text(&folder.join(PAGE))?;
+    Rig::store(station, &c, Some(&page)).map(|_| ())
+}

@@ -1,0 +1,21 @@
+//! In: orders of an operator. Out: jobs that run one after the other on a thread of their own, kept on disk with their state.
+//! Frame and unit: as the procedures; mm, degrees.
+
+mod calibrate;
+mod check;
+mod find;
+mod jobs;
+mod place;
+mod procedures;
+mod recipes;
+mod run;
+mod scan;
+mod store;
+mod worker;
+
+pub use calibrate::accept;
+pub use jobs::Jobs;
+pub use place::Place;
+pub use recipes::{recipe_path, recipes, save_recipe};
+pub use store::scan_of;
+pub use worker::Worker;

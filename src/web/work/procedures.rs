@@ -1,0 +1,52 @@
+//! In: an order. Out: the procedure of `station` that carries it out, and what it came to.
+//! Frame and unit: as the procedures.
+
+use super::run::Run;
+use super::{calibrate, check, find, scan};
+use crate::bench::way_times;
+use crate::fault::Result;
+use crate::geometry::Vec3;
+use crate::gpu::Device;
+use crate::recording::Recording;
+use crate::rig::Rig;
+use crate::station::{RangeRun, measure_range};
+use crate::web::guard::resolve;
+use crate::web::message::{BenchRow, Order, Outcome, SurfaceTouched, Touched};
+
+/// Carries an order out.
+pub(super) fn run(this: &Run, order: &Order) -> Result<Outcome> {
+    match order {
+        Order::Check(_) => check::check(this),
+        Order::Scan(ask) => scan::scan(this, ask),
+        Order::Find(ask) => find::find(this, &ask.scans, &ask.recipe),
+        Order::Teach(ask) => find::teach(this, ask),
+        Order::Touch(ask) => touch(this, &ask.recording),
+        Order::Calibrate(ask) => calibrate::calibrate(this, ask.target, &ask.recording, &ask.leave_out),
+        Order::Benchmark(_) => benchmark(),
+    }
+}
+
+fn touch(this: &Run, recording: &str) -> Result<Outcome> {
+    let place = &this.jobs.place;
+    let recording = Recording::open(&resolve(&place.recordings, recording)?)?;
+    let run = RangeRun { one_surface: true, ..RangeRun::default() };
+    let report = measure_range(&recording, &Rig::load(&place.station)?, &run)?;
+    let surface = report.surface.map(|s| SurfaceTouched {
+        normal: s.normal,
+        centre_mm: s.centre_mm,
+        tilt_sigma_deg: s.tilt_sigma_deg,
+        rms_mm: s.rms_mm,
+        tilt_deg: Vec3::from(s.normal).angle(&Vec3::z()).to_degrees(),
+        left_out: s.left_out,
+    });
+    let spots = report.distances.into_iter().map(|d| (d.picture, d.along_axis_mm, d.along_axis_sigma_mm)).collect();
+    Ok(Outcome::Touch(Box::new(Touched { spots, surface, missing: report.missing, remarks: report.remarks })))
+}
+
+fn benchmark() -> Result<Outcome> {
+    let device = Device::open().ok();
+    let rows = way_times(device.as_ref())?;
+    let rows =
+        rows.into_iter().map(|w| BenchRow { on: w.on, width: w.width, height: w.height, ms_per_shot: w.ms_per_shot });
+    Ok(Outcome::Benchmark { rows: rows.collect() })
+}

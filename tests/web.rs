@@ -1,0 +1,129 @@
+//! In: the program and a simulated station. Out: failure where its screen lets somebody in, loses a job, cannot be operated
+//! through its real pages, or is described otherwise than it is.
+//! Frame and unit: mm, degrees, px.
+
+mod common;
+
+use common::sheetlight;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+fn source(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(name)
+}
+
+/// A station that scanned a part of the board that is simulated by default; all of it where pictures for the documents are made.
+fn station(whole: bool) -> tempfile::TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().to_str().unwrap();
+    let scene = dir.path().join("scene.toml");
+    let text = std::fs::read_to_string(source("data/scenes/board.toml")).unwrap();
+    let small = text.replace("region_mm = [-52, -38, 52, 38]", "region_mm = [-52, 0, 4, 28]");
+    assert_ne!(text, small, "the scene is another one");
+    std::fs::write(&scene, if whole { text } else { small }).unwrap();
+    let (shots, sets) = if whole { ("200", "scan,surface,intrinsics,laserplane") } else { ("70", "scan,surface") };
+    let scene = scene.to_str().unwrap();
+    sheetlight(&[
+        "--quiet", "simulate", "--out", out, "--set", sets, "--seed", "3", "--shots", shots, "--scene", scene,
+    ]);
+    std::fs::write(dir.path().join("station/station.toml"), "name = \"cell 3\"\nrobot = \"denso\"\n").unwrap();
+    dir
+}
+
+/// A copy for each test: each has its own jobs.
+fn copy() -> tempfile::TempDir {
+    static MADE: OnceLock<tempfile::TempDir> = OnceLock::new();
+    let made = MADE.get_or_init(|| station(false));
+    let dir = tempfile::tempdir().unwrap();
+    let done = Command::new("cp").arg("-r").arg(made.path().join(".")).arg(dir.path()).status().unwrap();
+    assert!(done.success());
+    dir
+}
+
+/// Runs a script of tests/web or examples with the program and a folder; false where what it needs is not here.
+fn python(script: &str, args: &[&str]) -> bool {
+    let run = Command::new("python3").arg(source(script)).args(args).env("PYTHONDONTWRITEBYTECODE", "1").output();
+    let why = match run {
+        Ok(done) if done.status.success() => {
+            print!("{}", String::from_utf8_lossy(&done.stdout));
+            return true;
+        }
+        Ok(done) if done.status.code() == Some(77) => String::from_utf8_lossy(&done.stdout).into_owned(),
+        Ok(done) => {
+            panic!("{script}\n{}{}", String::from_utf8_lossy(&done.stdout), String::from_utf8_lossy(&done.stderr))
+        }
+        Err(e) => format!("python3: {e}"),
+    };
+    assert!(std::env::var("CI").as_deref() != Ok("true"), "{script} did not run: {why}");
+    eprintln!("\n*** SKIPPED: {script} needs python3, chromium and chromedriver (tools/browser.sh): {why} ***\n");
+    false
+}
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_sheetlight");
+
+#[test]
+fn nobody_gets_in_and_no_job_is_lost() {
+    let dir = copy();
+    python("tests/web/doors.py", &[PROGRAM, dir.path().to_str().unwrap()]);
+}
+
+#[test]
+fn an_operator_goes_from_scan_to_position_through_the_pages() {
+    let pictures = std::env::var_os("SHEETLIGHT_WRITE").is_some();
+    let dir = if pictures { station(true) } else { copy() };
+    let (folder, images) = (dir.path().to_str().unwrap(), source("docs/images"));
+    let mut args = vec![PROGRAM, folder];
+    args.extend(images.to_str().filter(|_| pictures));
+    python("tests/web/pages.py", &args);
+}
+
+#[test]
+fn a_program_drives_a_scan_as_the_documents_show() {
+    let dir = copy();
+    python(
+        "tests/web/example.py",
+        &[PROGRAM, dir.path().to_str().unwrap(), source("examples/scan_by_api.py").to_str().unwrap()],
+    );
+}
+
+#[test]
+fn a_live_picture_is_the_newest_with_its_peaks_and_all_others_are_counted() {
+    let dir = copy();
+    python("tests/web/live.py", &[PROGRAM, dir.path().to_str().unwrap()]);
+}
+
+/// Compares a document with what the program says of itself; writes it under `SHEETLIGHT_WRITE`.
+fn same(name: &str, is: &str) {
+    let path = source(name);
+    if std::env::var_os("SHEETLIGHT_WRITE").is_some() {
+        std::fs::write(&path, is).unwrap();
+    }
+    let written = std::fs::read_to_string(&path).unwrap_or_default();
+    assert!(written == is, "{name} is not what the program says; SHEETLIGHT_WRITE=1 cargo test --test web writes it");
+}
+
+#[test]
+fn messages_and_routes_are_described_as_they_are() {
+    let messages = sheetlight::web::declarations();
+    same("docs/messages.d.ts", &messages);
+    let api = sheetlight::web::openapi();
+    same("docs/openapi.json", &format!("{}\n", serde_json::to_string_pretty(&api).unwrap()));
+    // Every message that a route names is declared.
+    let mut named = Vec::new();
+    fn walk(value: &serde_json::Value, out: &mut Vec<String>) {
+        match value {
+            serde_json::Value::Object(map) => map.iter().for_each(|(k, v)| match v {
+                serde_json::Value::String(name) if k == "x-message" => out.push(name.clone()),
+                v => walk(v, out),
+            }),
+            serde_json::Value::Array(list) => list.iter().for_each(|v| walk(v, out)),
+            _ => {}
+        }
+    }
+    walk(&api, &mut named);
+    assert!(named.len() > 20, "{named:?}");
+    for name in named {
+        assert!(messages.contains(&format!("export type {name} =")), "{name} is not declared");
+    }
+}

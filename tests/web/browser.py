@@ -1,0 +1,178 @@
+"""In: chromedriver and chromium on this machine. Out: a browser that is driven as a person drives one: clicks, keys, what it
+shows, its pictures, its console. The WebDriver protocol over plain HTTP; nothing but Python's own library.
+Frame and unit: CSS pixels, seconds."""
+
+import base64
+import json
+import shutil
+import socket
+import subprocess
+import time
+import urllib.error
+import urllib.request
+import zlib
+import struct
+
+ELEMENT = "element-6066-11e4-a52e-4f735466cecf"
+
+
+class Browser:
+    """One chromium of 1280x800; `clicks` counts what an operator would have pressed."""
+
+    @staticmethod
+    def there():
+        return shutil.which("chromedriver") and (shutil.which("chromium") or shutil.which("google-chrome"))
+
+    def __init__(self, folder, width=1280, height=800):
+        with socket.socket() as s:
+            s.bind(("127.0.0.1", 0))
+            port = s.getsockname()[1]
+        self.driver = subprocess.Popen(["chromedriver", f"--port={port}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.root = f"http://127.0.0.1:{port}"
+        self.clicks, self.session = 0, ""
+        arguments = [
+            "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", f"--window-size={width},{height}", "--hide-scrollbars",
+            f"--user-data-dir={folder}", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--lang=en",
+            "--force-device-scale-factor=1", "--force-prefers-reduced-motion",
+        ]
+        wanted = {"alwaysMatch": {"browserName": "chrome", "goog:loggingPrefs": {"browser": "ALL"}, "goog:chromeOptions": {"args": arguments}}}
+        until = time.time() + 30
+        while True:
+            try:
+                self.session = "/session/" + self.ask("POST", "/session", {"capabilities": wanted})["sessionId"]
+                break
+            except (urllib.error.URLError, ConnectionError):
+                if time.time() > until:
+                    raise
+                time.sleep(0.1)
+        # The window's own frame is not the page's.
+        inner = self.run("return [innerWidth, innerHeight]")
+        self.ask("POST", "/window/rect", {"width": 2 * width - inner[0], "height": 2 * height - inner[1]})
+
+    def ask(self, method, path, body=None):
+        data = None if method == "GET" else json.dumps(body or {}).encode()
+        request = urllib.request.Request(self.root + self.session + path, data, {"Content-Type": "application/json"}, method=method)
+        try:
+            with urllib.request.urlopen(request, timeout=120) as answer:
+                return json.load(answer)["value"]
+        except urllib.error.HTTPError as e:
+            raise AssertionError(f"{method} {path}: {json.load(e)['value']['message']}") from None
+
+    def open(self, url):
+        self.ask("POST", "/url", {"url": url})
+
+    def run(self, script, *args):
+        return self.ask("POST", "/execute/sync", {"script": script, "args": list(args)})
+
+    def until(self, what, script, seconds=30, *args):
+        """Waits until a script gives something true, and gives it."""
+        end = time.time() + seconds
+        while time.time() < end:
+            value = self.run(script, *args)
+            if value:
+                return value
+            time.sleep(0.05)
+        raise AssertionError(f"{what}: not within {seconds} s; the page says: {self.run('return document.body.innerText')[:1500]}")
+
+    def find(self, css):
+        return self.until(css, "return document.querySelector(arguments[0])", 20, css)[ELEMENT]
+
+    def click(self, css):
+        self.until(f"{css} can be pressed", "const e = document.querySelector(arguments[0]); return e && !e.disabled && !e.closest('[hidden]')", 20, css)
+        self.ask("POST", f"/element/{self.find(css)}/click")
+        self.clicks += 1
+
+    def page(self, name):
+        """Presses a page's name at the left and waits until it stands."""
+        self.click(f"#nav a[href='#/{name}']")
+        self.ready(name)
+
+    def ready(self, name):
+        self.until(f"page {name}", "return document.getElementById('main').dataset.ready === arguments[0]", 20, name)
+
+    def drag(self, css, a, b, hold=0.0):
+        """Presses at a, moves to b, lets go; shares of the element's width and height."""
+        r = self.run("const r = document.querySelector(arguments[0]).getBoundingClientRect(); return [r.left, r.top, r.width, r.height]", css)
+        at = lambda p: {"x": round(r[0] + p[0] * r[2]), "y": round(r[1] + p[1] * r[3])}
+        steps = [
+            {"type": "pointerMove", "duration": 0, **at(a)}, {"type": "pointerDown", "button": 0},
+            *([{"type": "pause", "duration": int(1000 * hold)}] if hold else []),
+            {"type": "pointerMove", "duration": 60, **at(((a[0] + b[0]) / 2, (a[1] + b[1]) / 2))},
+            {"type": "pointerMove", "duration": 60, **at(b)}, {"type": "pointerUp", "button": 0},
+        ]
+        self.ask("POST", "/actions", {"actions": [{"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": steps}]})
+        self.clicks += 1
+
+    def keys(self, *keys):
+        steps = [x for k in keys for x in ({"type": "keyDown", "value": k}, {"type": "keyUp", "value": k})]
+        self.ask("POST", "/actions", {"actions": [{"type": "key", "id": "keys", "actions": steps}]})
+
+    def text(self, css="body"):
+        return self.run("return document.querySelector(arguments[0])?.innerText ?? ''", css)
+
+    def picture(self):
+        return base64.b64decode(self.ask("GET", "/screenshot"))
+
+    def console(self):
+        """What scripts complained of since it was asked last."""
+        return [f"{e['level']}: {e['message']}" for e in self.ask("POST", "/se/log", {"type": "browser"}) if e["level"] in ("SEVERE", "WARNING")]
+
+    def close(self):
+        try:
+            self.ask("DELETE", "")
+        finally:
+            self.driver.terminate()
+            self.driver.wait(10)
+
+
+def levels(png, shades=48):
+    """A picture with fewer shades, so that its file stays small: PNG of 8 bits a channel in, the same out."""
+    place, header, data = 8, None, b""
+    while place < len(png):
+        length, kind = struct.unpack(">I4s", png[place:place + 8])
+        if kind == b"IHDR":
+            header = png[place + 8:place + 8 + length]
+        elif kind == b"IDAT":
+            data += png[place + 8:place + 8 + length]
+        place += 12 + length
+    width, height, bits, colour = struct.unpack(">IIBB", header[:10])
+    assert bits == 8 and colour in (2, 6), (bits, colour)
+    n = 4 if colour == 6 else 3
+    raw, rows, before = zlib.decompress(data), [], bytearray(width * n)
+    for y in range(height):
+        at = y * (width * n + 1)
+        row = unfilter(raw[at], bytearray(raw[at + 1:at + 1 + width * n]), before, n)
+        rows.append(row)
+        before = row
+    step = 256 // shades
+    table = bytes(min(255, (v // step) * step + step // 2) if 8 < v < 248 else v for v in range(256))
+    out = bytearray()
+    for row in rows:
+        rgb = bytearray(3 * width)
+        for c in range(3):
+            rgb[c::3] = row[c::n].translate(table)
+        # Each byte less its left neighbour: areas become zeros.
+        less = bytearray(rgb[:3]) + bytearray((a - b) & 255 for a, b in zip(rgb[3:], rgb[:-3]))
+        out += b"\x01" + less
+    chunk = lambda kind, body: struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+    head = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(bytes(out), 9)) + chunk(b"IEND", b"")
+
+
+def unfilter(kind, row, before, n):
+    if kind == 0:
+        return row
+    if kind == 2:
+        return bytearray((a + b) & 255 for a, b in zip(row, before))
+    for i in range(len(row)):
+        a, b, c = (row[i - n] if i >= n else 0), before[i], (before[i - n] if i >= n else 0)
+        if kind == 1:
+            p = a
+        elif kind == 3:
+            p = (a + b) // 2
+        else:
+            q = a + b - c
+            pa, pb, pc = abs(q - a), abs(q - b), abs(q - c)
+            p = a if pa <= pb and pa <= pc else b if pb <= pc else c
+        row[i] = (row[i] + p) & 255
+    return row

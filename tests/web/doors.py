@@ -1,0 +1,227 @@
+"""In: the program, a simulated station. Out: failure where a request gets in that must not, where a viewer holds the server up,
+or where a killed server loses or invents a job.
+Frame and unit: bytes, seconds, MB."""
+
+import json
+import os
+import socket
+import sys
+import time
+
+from server import Server, frame
+
+program, folder = sys.argv[1:3]
+
+
+def refused(what, status):
+    assert 400 <= status < 500, f"{what}: {status}, a 4xx was wanted"
+
+
+def who_gets_in(s):
+    ok, head, _ = s.ask("GET", "/", token=False)
+    assert ok == 200 and "default-src 'none'" in head["content-security-policy"], (ok, head)
+    for needed in ("x-content-type-options", "referrer-policy", "x-frame-options", "cross-origin-resource-policy"):
+        assert needed in head, needed
+    assert s.ask("GET", "/api/v1/bar")[0] == 200
+    port = s.host.rsplit(":", 1)[1]
+    assert s.ask("GET", "/api/v1/bar", host=f"localhost:{port}")[0] == 200
+    for host in ("evil.example", f"evil.example:{port}", "127.0.0.1", f"127.0.0.1:{int(port) - 1}", ""):
+        refused(f"host {host!r}", s.ask("GET", "/api/v1/bar", host=host or " ")[0])
+        refused(f"page for host {host!r}", s.ask("GET", "/", host=host or " ")[0])
+    for origin in ("http://evil.example", "null", f"https://{s.host}", f"http://127.0.0.1:{int(port) + 1}", f"http://{s.host}.evil.example"):
+        refused(f"origin {origin}", s.ask("POST", "/api/v1/lease", {}, Origin=origin)[0])
+        refused(f"socket of origin {origin}", s.socket(Origin=origin)[0])
+    assert s.ask("POST", "/api/v1/lease", {}, Origin=f"http://{s.host}")[0] == 200
+    refused("another site's fetch", s.ask("GET", "/api/v1/bar", Sec_Fetch_Site="cross-site")[0])
+    for token in (False, "", "0" * 32, s.token[:-1], s.token + "0", s.token.upper() + "x"):
+        refused(f"token {token!r}", s.ask("GET", "/api/v1/bar", token=token)[0])
+        refused(f"socket with token {token!r}", s.socket(token=token)[0])
+    refused("a wrong knock", s.ask("POST", "/api/v1/session", {"token": "0" * 32}, token=False)[0])
+    refused("a password where there is none", s.ask("POST", "/api/v1/session", {"password": ""}, token=False)[0])
+    status, head, _ = s.ask("POST", "/api/v1/session", {"token": s.token}, token=False)
+    cookie = head["set-cookie"]
+    assert status == 200 and "HttpOnly" in cookie and "SameSite=Strict" in cookie, cookie
+    assert s.ask("GET", "/api/v1/bar", token=False, Cookie=cookie.split(";")[0])[0] == 200
+    refused("a cookie of another value", s.ask("GET", "/api/v1/bar", token=False, Cookie=cookie.split(";")[0][:-4] + "0000")[0])
+    return cookie.split(";")[0]
+
+
+def names(s, job):
+    tricks = [
+        "..", "../station.toml", "%2e%2e/%2e%2e/station.toml", "..%2f..%2fstation.toml", "/etc/passwd", "%2fetc%2fpasswd", "scan/../../job.json",
+        "scan%00.png", "scan/cloud.ply%00", "link.json", "up/station.toml", ".hidden.json", "scan\\..\\job.json", "~/x.json", "scan.lock", "%c0%ae%c0%ae/x.json",
+    ]
+    jobs = os.path.join(folder, "station", "jobs")
+    os.symlink("/etc/passwd", os.path.join(jobs, job, "link.json"))
+    os.symlink(folder, os.path.join(jobs, job, "up"))
+    for trick in tricks:
+        status, _, body = s.ask("GET", f"/api/v1/jobs/{job}/files/{trick}")
+        refused(f"file {trick}", status)
+        assert b"root:" not in body and b"extraction" not in body, trick
+        refused(f"recording {trick}", s.ask("GET", f"/api/v1/picture?recording={trick}&frame=0")[0])
+        refused(f"page {trick}", s.ask("GET", f"/{trick}", token=False)[0])
+        refused(f"recipe {trick}", s.ask("PUT", f"/api/v1/recipes/{trick}", {"name": "x", "text": ""})[0])
+    for name in ("../x", "0001-scan/..", "0001", "../../etc", "0001-scan%00", "9999-scan", "%2e%2e"):
+        refused(f"job {name}", s.ask("GET", f"/api/v1/jobs/{name}")[0])
+        refused(f"map of {name}", s.ask("GET", f"/api/v1/scans/{name}/map")[0])
+    for recording in ("../station", "/etc", "scan/..", "scan\0", "nothing"):
+        ended = s.job({"procedure": "scan", "recording": recording})
+        assert ended["state"] == "failed", ended
+    os.unlink(os.path.join(jobs, job, "link.json"))
+    os.unlink(os.path.join(jobs, job, "up"))
+
+
+def bodies(s):
+    refused("a body of 1 GB by its length", s.ask("POST", "/api/v1/jobs", b"{", Content_Length=str(1 << 30))[0])
+    name, port = s.host.rsplit(":", 1)
+    # The same without saying so: in chunks, until the server has enough of it.
+    with socket.create_connection((name, int(port)), timeout=20) as c:
+        c.sendall(f"POST /api/v1/jobs HTTP/1.1\r\nHost: {s.host}\r\nAuthorization: Bearer {s.token}\r\nX-Sheetlight-Tab: tests\r\nTransfer-Encoding: chunked\r\n\r\n".encode())
+        sent, answer = 0, b""
+        try:
+            while sent < 1 << 30:
+                c.sendall(b"10000\r\n" + b"x" * 65536 + b"\r\n")
+                sent += 65536
+                c.settimeout(0.0001)
+                try:
+                    answer = c.recv(4096)
+                    break
+                except (TimeoutError, BlockingIOError):
+                    c.settimeout(20)
+        except (BrokenPipeError, ConnectionResetError):
+            pass
+        assert sent < 64 << 20, f"{sent} bytes were taken"
+        assert not answer or answer.split()[1].startswith(b"4"), answer[:80]
+    for body in (b"", b"[]", b"null", b"{\"procedure\":\"scan\"}", b"{\"procedure\":\"dance\"}", b"[" * 5000, b"{\"procedure\":\"check\",\"x\":1}", b"\xff\xfe"):
+        refused(f"order {body[:30]}", s.ask("POST", "/api/v1/jobs", body)[0])
+    for method in ("DELETE", "PUT", "PATCH", "TRACE", "OPTIONS"):
+        refused(f"{method} of the bar", s.ask(method, "/api/v1/bar", b"")[0])
+
+
+def lease_and_motion(s, cookie, found):
+    """Whoever does not operate orders nothing, and nothing is confirmed twice, too early, for another pose, from another tab."""
+    other = {"tab": "other"}
+    s.json("POST", "/lease")
+    refused("an order without the lease", s.ask("POST", "/api/v1/jobs", {"procedure": "check"}, **other)[0])
+    refused("the lease while another has it", s.ask("POST", "/api/v1/lease", {}, **other)[0])
+    refused("the same tab's name in another session", s.ask("POST", "/api/v1/jobs", {"procedure": "check"}, token=False, Cookie=cookie)[0])
+    refused("a tab without a name", s.ask("POST", "/api/v1/lease", {"firmly": True}, tab=None)[0])
+    pose = {"job": found["id"], "goal": "approach", "hash": found["outcome"]["poses"]["hash"]}
+    press = lambda what=pose, **more: s.ask("POST", "/api/v1/motion/press", what, **more)
+    go = lambda grant, what=pose, **more: s.ask("POST", "/api/v1/motion/go", {"grant": grant, "what": what}, **more)
+    refused("motion without the lease", press(**other)[0])
+    refused("motion of a pose that is none", press({**pose, "hash": "0" * 16})[0])
+    refused("motion of a job that is none", press({**pose, "job": "0099-find"})[0])
+    refused("motion that nobody confirmed", go("0" * 32)[0])
+    grant = lambda: json.loads(press()[2])["grant"]
+    early = grant()
+    refused("too early", go(early)[0])
+    name = grant()
+    time.sleep(0.9)
+    refused("for another goal", go(name, {**pose, "goal": "insertion"})[0])
+    refused("after a wrong try", go(name)[0])
+    name = grant()
+    time.sleep(0.9)
+    s.json("POST", "/lease", {"firmly": True}, tab="other")
+    refused("after another took over", go(name)[0])
+    refused("by the other", go(name, tab="other")[0])
+    s.json("POST", "/lease", {"firmly": True})
+    name = grant()
+    time.sleep(0.9)
+    status, _, body = go(name)
+    # There is no robot here: the refusal says that, and is used up as a motion would be.
+    assert status == 409 and b"no robot" in body, (status, body)
+    status, _, body = go(name)
+    assert status == 409 and b"used already" in body, (status, body)
+    # Everybody may stop.
+    refused("stopping what does not run", s.ask("POST", f"/api/v1/jobs/{found['id']}/stop", {}, **other)[0])
+
+
+def viewers(s):
+    """Fifty look on, one of them reads nothing: the scan goes on and memory stays."""
+    before, sockets = s.memory_mb(), []
+    for _ in range(50):
+        status, c = s.socket()
+        assert status == 101, status
+        sockets.append(c)
+    first = [frame(c) for c in sockets[1:]]
+    assert all(json.loads(data)["event"] == "state" for _, data in first)
+    begun = time.time()
+    s.json("POST", "/lease")
+    job = s.json("POST", "/jobs", {"procedure": "scan", "recording": "scan"})
+    seen, rows = set(), 0
+    sockets[1].settimeout(30)
+    while True:
+        kind, data = frame(sockets[1])
+        if kind == 2:
+            assert data[:4] == b"GROW"
+            rows = int.from_bytes(data[16:20], "little") + int.from_bytes(data[20:24], "little")
+        elif kind == 1:
+            event = json.loads(data)
+            seen.add(event["event"])
+            if event["event"] == "job" and event["data"]["id"] == job["id"] and event["data"]["state"] == "done":
+                break
+    took, more = time.time() - begun, s.memory_mb() - before
+    print(f"50 viewers: scan in {took:.1f} s, {more:.0f} MB more (the scan's own are in it)")
+    assert rows > 20 and "bar" in seen, (rows, seen)
+    for c in sockets:
+        c.close()
+
+
+def killed():
+    """Killed in a scan: the job is offered to be resumed, and comes to the same; a former start's token is no good."""
+    s = Server(program, folder, "--recordings", folder)
+    s.json("POST", "/lease")
+    job = s.json("POST", "/jobs", {"procedure": "scan", "recording": "scan"})["id"]
+    second = s.json("POST", "/jobs", {"procedure": "check"})["id"]
+    while s.json("GET", f"/jobs/{job}")["done"] < 5:
+        time.sleep(0.01)
+    s.kill()
+    again = Server(program, folder, "--recordings", folder)
+    refused("the token of a former start", again.ask("GET", "/api/v1/bar", token=s.token)[0])
+    cut = again.json("GET", f"/jobs/{job}")
+    assert cut["state"] == "cut_off" and cut["outcome"] is None and cut["resumable"], cut
+    assert again.json("GET", f"/jobs/{second}")["state"] == "cut_off"
+    refused("a scan that is half done", again.ask("GET", f"/api/v1/scans/{job}/map")[0])
+    assert any("cut off" in a for a in again.json("GET", "/bar")["alarms"])
+    # A second screen for the same station is refused, and says so.
+    try:
+        Server(program, folder, "--recordings", folder)
+        raise SystemExit("two screens for one station")
+    except AssertionError as e:
+        assert "another screen" in str(e), e
+    again.json("POST", "/lease")
+    again.json("POST", f"/jobs/{job}/resume")
+    whole = again.ended(job)
+    assert whole["state"] == "done", whole
+    again.json("DELETE", f"/jobs/{second}")
+    refused("a job that was taken away", again.ask("GET", f"/api/v1/jobs/{second}")[0])
+    # Ended while it works: the job is stopped and can go on.
+    third = again.json("POST", "/jobs", {"procedure": "scan", "recording": "scan"})["id"]
+    while again.json("GET", f"/jobs/{third}")["done"] < 5:
+        time.sleep(0.01)
+    assert again.end() == 0
+    with open(os.path.join(folder, "station", "jobs", third, "job.json")) as f:
+        assert json.load(f)["state"] == "stopped"
+    return whole
+
+
+def main():
+    s = Server(program, folder, "--recordings", folder)
+    cookie = who_gets_in(s)
+    scanned = s.job({"procedure": "scan", "recording": "scan"})
+    assert scanned["state"] == "done", scanned
+    found = s.job({"procedure": "find", "scans": [scanned["id"]], "recipe": "led"})
+    assert found["state"] == "done" and found["outcome"]["passed"], found
+    lease_and_motion(s, cookie, found)
+    names(s, scanned["id"])
+    bodies(s)
+    viewers(s)
+    assert s.token not in "".join(s.said), "the token is in what the program said"
+    assert s.end() == 0
+    whole = killed()
+    same = ("points", "median_sigma_mm", "peaks")
+    assert {k: whole["outcome"][k] for k in same} == {k: scanned["outcome"][k] for k in same}, "a resumed scan is another one"
+
+
+main()

@@ -1,0 +1,91 @@
+"""In: the program, a simulated station, its scan's pictures as raw frames on standard input at 25 a second. Out: failure where the
+newest picture is not shown with its peaks, where one that was passed over is not counted, or where two that look on slow it down.
+Frame and unit: px, ms, pictures a second."""
+
+import glob
+import os
+import struct
+import subprocess
+import sys
+import threading
+import time
+import zlib
+
+from browser import unfilter
+from server import Server
+
+program, folder = sys.argv[1:3]
+RATE, SECONDS = 25, 4
+
+
+def grey(path):
+    """A PNG of 8 bits as it comes from a sensor."""
+    with open(path, "rb") as f:
+        png = f.read()
+    width, height = struct.unpack(">II", png[16:24])
+    place, data = 8, b""
+    while place < len(png):
+        length, kind = struct.unpack(">I4s", png[place:place + 8])
+        data += png[place + 8:place + 8 + length] if kind == b"IDAT" else b""
+        place += 12 + length
+    raw, before, rows = zlib.decompress(data), bytearray(width), []
+    for y in range(height):
+        before = unfilter(raw[y * (width + 1)], bytearray(raw[y * (width + 1) + 1:(y + 1) * (width + 1)]), before, 1)
+        rows.append(bytes(before))
+    return b"".join(rows)
+
+
+names = sorted(glob.glob(os.path.join(folder, "scan", "laser_*.png")))[20:28]
+frames = [grey(n) for n in names]
+assert frames and len(frames[0]) == 640 * 480
+s = Server(program, folder, "--recordings", folder, "--camera", "-", "--raw", "640x480:gray8", stdin=subprocess.PIPE)
+sent = 0
+
+
+def feed():
+    global sent
+    begun = time.time()
+    while time.time() - begun < SECONDS:
+        s.process.stdin.write(frames[sent % len(frames)])
+        s.process.stdin.flush()
+        sent += 1
+        time.sleep(max(0.0, begun + sent / RATE - time.time()))
+    s.process.stdin.close()
+
+
+seen = {0: [], 1: []}
+
+
+def look(who):
+    """What a page does: the newest one after the one that it shows."""
+    number, end = 0, time.time() + SECONDS + 1
+    while time.time() < end:
+        status, _, b = s.ask("GET", f"/api/v1/camera/newest?after={number}", tab=f"look{who}")
+        if status == 204:
+            continue
+        assert status == 200, (status, b[:200])
+        number, width, height, peaks, delay = struct.unpack("<4If", b[:20])
+        assert (width, height) == (640, 480) and len(b) == 20 + 12 * peaks + 640 * 480
+        u, v, fate = struct.unpack("<ffI", b[20:32]) if peaks else (0, 0, 0)
+        assert 0 <= u < 640 and 0 <= v < 480 and fate < 10
+        assert b[20 + 12 * peaks:] in frames, "another picture than any that was sent"
+        seen[who].append((number, peaks, delay))
+
+
+threads = [threading.Thread(target=feed), *(threading.Thread(target=look, args=(k,)) for k in seen)]
+[t.start() for t in threads]
+[t.join() for t in threads]
+bar = s.json("GET", "/bar")
+assert bar["mode"] == "live", bar
+count = bar["frames"]
+for who in seen:
+    numbers = [n for n, _, _ in seen[who]]
+    assert len(numbers) > 10 and numbers == sorted(set(numbers)), f"{who}: {len(numbers)} pictures, newest first"
+    # The first pictures show the stage what the stripe is like.
+    assert all(p > 100 for _, p, _ in seen[who][3:]), [p for _, p, _ in seen[who]]
+over = count["dropped"].get("passed over: a newer one came", 0)
+assert count["seen"] == sent, (count, sent)
+assert abs(count["measured"] + sum(count["dropped"].values()) - sent) <= 1, (count, sent)
+print(f"{sent} pictures at {RATE}/s to two that look on: {[len(seen[k]) for k in seen]} shown, {over} passed over, delay p50/p99 {bar['delay_ms']} ms")
+assert any("ended" in a for a in bar["alarms"]), bar["alarms"]
+s.end()

@@ -1,0 +1,119 @@
+"""In: the program under test, a folder with a simulated station. Out: its screen as a process, and raw requests to it.
+Frame and unit: seconds."""
+
+import base64
+import http.client
+import json
+import os
+import socket
+import struct
+import subprocess
+import threading
+import time
+
+
+class Server:
+    """`sheetlight station serve` on any free port."""
+
+    def __init__(self, program, folder, *more, stdin=None):
+        command = [program, "--json", "station", "serve", "--station", os.path.join(folder, "station"), "--port", "0", *more]
+        self.process = subprocess.Popen(command, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        self.said = []
+        threading.Thread(target=lambda: self.said.extend(line.decode() for line in self.process.stderr), daemon=True).start()
+        text = ""
+        while text.count("{") != text.count("}") or not text:
+            line = self.process.stdout.readline().decode()
+            assert line, f"the server ended: {''.join(self.said)}"
+            text += line
+        assert "url" in json.loads(text), text
+        self.url = json.loads(text)["url"]
+        self.host = self.url.split("/")[2]
+        self.token = self.url.split("token=")[1]
+
+    def ask(self, method, path, body=None, host=None, token=True, tab="tests", **headers):
+        """Status, headers, body; nothing is added that was not asked for."""
+        name, port = self.host.rsplit(":", 1)
+        c = http.client.HTTPConnection(name, int(port), timeout=30)
+        head = {"Host": host or self.host, **{k.replace("_", "-"): v for k, v in headers.items()}}
+        if token:
+            head["Authorization"] = f"Bearer {self.token if token is True else token}"
+        if tab:
+            head["X-Sheetlight-Tab"] = tab
+        if body is not None and not isinstance(body, bytes):
+            body = json.dumps(body).encode()
+        c.putrequest(method, path, skip_host=True, skip_accept_encoding=True)
+        if body is not None:
+            head.setdefault("Content-Length", str(len(body)))
+        for k, v in head.items():
+            c.putheader(k, v)
+        c.endheaders(body)
+        answer = c.getresponse()
+        data = answer.read()
+        c.close()
+        return answer.status, dict((k.lower(), v) for k, v in answer.getheaders()), data
+
+    def json(self, method, path, body=None, **more):
+        status, _, data = self.ask(method, "/api/v1" + path, body, **more)
+        assert status < 300, f"{method} {path}: {status} {data[:600]}"
+        return json.loads(data)
+
+    def job(self, order, seconds=120):
+        """Orders a job and waits for its end."""
+        self.json("POST", "/lease")
+        job = self.json("POST", "/jobs", order)
+        return self.ended(job["id"], seconds)
+
+    def ended(self, name, seconds=120):
+        end = time.time() + seconds
+        while time.time() < end:
+            job = self.json("GET", f"/jobs/{name}")
+            if job["state"] not in ("queued", "running"):
+                return job
+            time.sleep(0.05)
+        raise AssertionError(f"{name} did not end in {seconds} s: {job}")
+
+    def socket(self, token=True, **headers):
+        """A WebSocket after its handshake: status and the socket."""
+        name, port = self.host.rsplit(":", 1)
+        s = socket.create_connection((name, int(port)), timeout=20)
+        head = {"Host": self.host, "Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": base64.b64encode(os.urandom(16)).decode(), **{k.replace("_", "-"): v for k, v in headers.items()}}
+        if token:
+            head["Authorization"] = f"Bearer {self.token if token is True else token}"
+        s.sendall(("GET /api/v1/events HTTP/1.1\r\n" + "".join(f"{k}: {v}\r\n" for k, v in head.items()) + "\r\n").encode())
+        said = b""
+        while b"\r\n\r\n" not in said:
+            more = s.recv(1)
+            if not more:
+                break
+            said += more
+        return int(said.split(b" ")[1]), s
+
+    def memory_mb(self):
+        with open(f"/proc/{self.process.pid}/status") as f:
+            return next(int(line.split()[1]) for line in f if line.startswith("VmRSS")) / 1024
+
+    def kill(self):
+        self.process.kill()
+        self.process.wait(10)
+
+    def end(self):
+        """Ends it as Ctrl-C does."""
+        self.process.terminate()
+        return self.process.wait(20)
+
+
+def frame(s):
+    """The next message of a WebSocket: its kind and its bytes."""
+    def exactly(n):
+        out = b""
+        while len(out) < n:
+            more = s.recv(n - len(out))
+            assert more, "the socket was closed"
+            out += more
+        return out
+    kind, length = exactly(2)
+    if length == 126:
+        length = struct.unpack(">H", exactly(2))[0]
+    elif length == 127:
+        length = struct.unpack(">Q", exactly(8))[0]
+    return kind & 15, exactly(length)
