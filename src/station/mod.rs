@@ -41,6 +41,5 @@ pub use scan::scan_folder::of_a_scan;
 pub use scan::seen::Seen;
 pub use scan::watch::Watch;
 pub use settings::{Settings, ToolSpec, WorkingVolume};
-pub use settings::{Settings, WorkingVolume};
 pub use values::Values;
 pub use verify::{CalibrationCheck, VerifyReport, VerifyRun, verify};
