@@ -4,6 +4,8 @@
 
 mod common;
 
+#[path = "capture/cell.rs"]
+mod cell;
 #[path = "capture/device.rs"]
 mod device;
 #[path = "capture/gige.rs"]

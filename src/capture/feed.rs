@@ -71,6 +71,8 @@ pub enum Fed {
 
 /// How often a wish to stop is looked for.
 const GLANCE: Duration = Duration::from_millis(100);
+/// How long a camera has to be given back.
+const GIVE_BACK: Duration = Duration::from_millis(1000);
 /// From one attempt to bring a camera back to the next.
 const RETRY: Duration = Duration::from_millis(500);
 /// From one reading of the device's clock to the next, and how many at the beginning.
@@ -208,7 +210,11 @@ impl Feed {
 impl Drop for Feed {
     fn drop(&mut self) {
         self.stop();
-        // A reader that waits inside a pipe is left alone: it ends with the pipe.
+        // A camera is given back; a reader that waits inside a pipe is left alone, and ends with the pipe.
+        let until = Instant::now() + GIVE_BACK;
+        while self.thread.as_ref().is_some_and(|t| !t.is_finished()) && Instant::now() < until {
+            std::thread::sleep(GLANCE / 10);
+        }
         if let Some(thread) = self.thread.take().filter(|t| t.is_finished()) {
             let _ = thread.join();
         }
@@ -260,9 +266,13 @@ impl Reader {
                 }
             }
         };
-        let mut state = self.shared.lock();
-        (state.resent, state.ended, state.fault) = (self.source.resent(), true, fault);
-        self.shared.changed.notify_all();
+        let Reader { source, shared, .. } = self;
+        let resent = source.resent();
+        // Whoever hears of the end can have the camera: it was given back.
+        drop(source);
+        let mut state = shared.lock();
+        (state.resent, state.ended, state.fault) = (resent, true, fault);
+        shared.changed.notify_all();
     }
 
     fn stopped(&self) -> bool {

@@ -7,13 +7,15 @@ use crate::capture::format::Format;
 use crate::capture::picture::{Event, Picture, PictureSource};
 use crate::capture::wire::{self, HEAD, Message, Sent};
 use crate::fault::{Fault, Result};
+use std::collections::VecDeque;
 use std::io::{Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// How long is waited for a connection and for an answer.
 const PATIENCE: Duration = Duration::from_secs(3);
+const GLANCE: Duration = Duration::from_millis(2);
 /// Pictures read ahead; more wait in the cell, which counts what it has to leave out.
 const AHEAD: usize = 2;
 
@@ -24,6 +26,8 @@ pub struct CellCamera {
     link: Link,
     format: Format,
     sent: u64,
+    /// Pictures that came before an answer that was waited for.
+    pending: VecDeque<(Box<Sent>, u64)>,
 }
 
 /// One connection: a thread reads, pictures and answers come through channels.
@@ -48,6 +52,7 @@ impl CellCamera {
             link: Link::connect(address)?,
             format: Format { width: 1, height: 1, bits: 8 },
             sent: 0,
+            pending: VecDeque::new(),
         };
         camera.begin()?;
         Ok(camera)
@@ -85,8 +90,16 @@ impl CellCamera {
         };
         let sent = self.link.stream.write_all(format!("{line}\n").as_bytes());
         sent.map_err(|e| lost(format!("cannot be written to: {e}")))?;
-        let answer = self.link.answers.recv_timeout(PATIENCE);
-        let answer = answer.map_err(|_| lost(format!("no answer to '{line}' in {} s", PATIENCE.as_secs())))?;
+        let until = Instant::now() + PATIENCE;
+        let answer = loop {
+            // An answer comes behind the pictures that were sent before it.
+            self.pending.extend(self.link.pictures.try_iter());
+            match self.link.answers.recv_timeout(GLANCE) {
+                Ok(answer) => break answer,
+                Err(RecvTimeoutError::Timeout) if Instant::now() < until => {}
+                Err(_) => return Err(lost(format!("no answer to '{line}' in {} s", PATIENCE.as_secs()))),
+            }
+        };
         if let Some(said) = answer.strip_prefix("ok") {
             return Ok(said.trim_start_matches(' ').into());
         }
@@ -109,7 +122,7 @@ impl Link {
         let _ = stream.set_nodelay(true);
         let mut reader = stream.try_clone().map_err(nobody)?;
         let (to_pictures, pictures) = sync_channel(AHEAD);
-        // Answers never wait behind pictures: one is asked for at a time.
+        // One is asked for at a time.
         let (to_answers, answers) = sync_channel(1);
         let (to_end, end) = sync_channel(1);
         let read = move || {
@@ -158,7 +171,8 @@ impl PictureSource for CellCamera {
     }
 
     fn next(&mut self, within: Duration) -> Event {
-        match self.link.pictures.recv_timeout(within) {
+        let next = self.pending.pop_front().map_or_else(|| self.link.pictures.recv_timeout(within), Ok);
+        match next {
             Ok((sent, host_ns)) => {
                 self.sent = sent.sent;
                 let Sent { image, id, device_ns, exposure_ns, count, .. } = *sent;
@@ -201,6 +215,7 @@ impl PictureSource for CellCamera {
     fn reopen(&mut self) -> Result<()> {
         self.link = Link::connect(&self.address)?;
         self.sent = 0;
+        self.pending.clear();
         self.begin()
     }
 

@@ -19,8 +19,8 @@ use std::path::PathBuf;
   sheetlight record --camera gige://first --out recordings/board7 --shots 400
   sheetlight record --camera gige://first --pair clock --pose-stream bcap://10.0.0.2 \\
       --station cell3 --out recordings/board8
-  sheetlight record --camera gige://first --motion linear:count --pair count --counts-per-shot 20 \\
-      --out recordings/parcel4
+  sheetlight record --camera gige://first --motion linear:count --pair count \\
+      --counts-per-shot 20 --out recordings/parcel4
   sheetlight record --camera ffmpeg:/dev/video0 --shows room --shots 20 --out recordings/intrinsics
   sheetlight record --camera sim:1?rate=10 --pair given --shots 50 --out try/scan")]
 pub struct Args {

@@ -8,6 +8,7 @@ use crate::capture::feature::{Feature, Range, Value};
 use crate::capture::format::Format;
 use crate::capture::picture::{Event, Picture, PictureSource};
 use crate::fault::{Fault, Result};
+use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 use viva_genicam::genapi::FeatureValue;
 use viva_genicam::{Camera, ControlState, FrameStream, GenicamError, GigeRegisterIo, StreamOptions, blocking};
@@ -44,6 +45,7 @@ pub struct GigeCamera {
     chunk: Option<&'static str>,
     resent: u64,
     heard: Instant,
+    order: Order,
 }
 
 fn said(what: &str, e: &GenicamError) -> Fault {
@@ -83,6 +85,7 @@ impl GigeCamera {
             chunk: None,
             resent: 0,
             heard: Instant::now(),
+            order: Order::default(),
         };
         camera.look()?;
         Ok(camera)
@@ -122,6 +125,7 @@ impl GigeCamera {
         stream.set_deliver_incomplete(true);
         self.camera.acquisition_start().map_err(|e| said(&at, &e))?;
         self.stream = Some(stream);
+        self.order = Order::default();
         self.heard = Instant::now();
         Ok(())
     }
@@ -160,46 +164,50 @@ impl GigeCamera {
     }
 }
 
+/// A picture that waits for packets is overtaken by those after it: so many, and so long, are held back for it.
+const OVERTAKING: usize = 4;
+const HELD: Duration = Duration::from_millis(150);
+
+/// Pictures in the order of their numbers again.
+#[derive(Default)]
+struct Order {
+    held: BTreeMap<u64, (Event, Instant)>,
+    next: Option<u64>,
+}
+
+impl Order {
+    fn put(&mut self, id: u64, event: Event) {
+        self.held.insert(id, (event, Instant::now()));
+    }
+
+    /// The next in order; one whose forerunner is missing once that has had its time.
+    fn take(&mut self) -> Option<Event> {
+        let (id, (_, since)) = self.held.first_key_value()?;
+        let id = *id;
+        let due = self.next.is_none_or(|next| id <= next);
+        if !due && self.held.len() <= OVERTAKING && since.elapsed() < HELD {
+            return None;
+        }
+        self.next = Some(self.next.unwrap_or(0).max(id + 1));
+        self.held.remove(&id).map(|(event, _)| event)
+    }
+}
+
 impl PictureSource for GigeCamera {
     fn format(&self) -> Format {
         self.format
     }
 
     fn next(&mut self, within: Duration) -> Event {
-        if self.stream.is_none() {
-            if let Err(fault) = self.start() {
-                return Event::Lost(fault);
-            }
+        if let Some(event) = self.order.take() {
+            return event;
         }
-        let stream = self.stream.as_mut().expect("started above");
-        let got = stream.next_frame_blocking(within);
-        self.resent = stream.stats().resend_recovered;
-        let gone = |what: String| {
-            Event::Lost(
-                Fault::input(what)
-                    .cause("its cable or power is out, or another program took it")
-                    .next("plug it in; a running command goes on by itself"),
-            )
-        };
-        match got {
-            Ok(Some(frame)) => self.taken(frame),
-            Ok(None) => gone(format!("gige://{}: the stream ended", self.word)),
-            Err(GenicamError::Timeout(_)) => {
-                if self.heard.elapsed() < SILENCE {
-                    return Event::Quiet;
-                }
-                self.heard = Instant::now();
-                // A camera that waits for a trigger is silent and answers.
-                let there = self.camera.transport().control_state() == ControlState::Held;
-                self.camera.invalidate("Width");
-                match self.camera.get_integer("Width") {
-                    Ok(_) if there => Event::Quiet,
-                    Ok(_) => gone(format!("gige://{}: control of the camera was lost", self.word)),
-                    Err(e) => gone(format!("gige://{}: does not answer: {e}", self.word)),
-                }
-            }
-            Err(e) => gone(format!("gige://{}: {e}", self.word)),
+        match self.receive(within) {
+            Event::Picture(picture) => self.order.put(picture.id, Event::Picture(picture)),
+            Event::Incomplete { id, why } => self.order.put(id, Event::Incomplete { id, why }),
+            other => return other,
         }
+        self.order.take().unwrap_or(Event::Quiet)
     }
 
     fn resent(&self) -> u64 {
@@ -280,6 +288,44 @@ impl PictureSource for GigeCamera {
 }
 
 impl GigeCamera {
+    /// What comes next from the network.
+    fn receive(&mut self, within: Duration) -> Event {
+        if self.stream.is_none() {
+            if let Err(fault) = self.start() {
+                return Event::Lost(fault);
+            }
+        }
+        let stream = self.stream.as_mut().expect("started above");
+        let got = stream.next_frame_blocking(within);
+        self.resent = stream.stats().resend_recovered;
+        let gone = |what: String| {
+            Event::Lost(
+                Fault::input(what)
+                    .cause("its cable or power is out, or another program took it")
+                    .next("plug it in; a running command goes on by itself"),
+            )
+        };
+        match got {
+            Ok(Some(frame)) => self.taken(frame),
+            Ok(None) => gone(format!("gige://{}: the stream ended", self.word)),
+            Err(GenicamError::Timeout(_)) => {
+                if self.heard.elapsed() < SILENCE {
+                    return Event::Quiet;
+                }
+                self.heard = Instant::now();
+                // A camera that waits for a trigger is silent and answers.
+                let there = self.camera.transport().control_state() == ControlState::Held;
+                self.camera.invalidate("Width");
+                match self.camera.get_integer("Width") {
+                    Ok(_) if there => Event::Quiet,
+                    Ok(_) => gone(format!("gige://{}: control of the camera was lost", self.word)),
+                    Err(e) => gone(format!("gige://{}: does not answer: {e}", self.word)),
+                }
+            }
+            Err(e) => gone(format!("gige://{}: {e}", self.word)),
+        }
+    }
+
     /// What this camera calls a standard feature: cameras from before the standard's second version have names of their own.
     fn own_name<'a>(&self, name: &'a str) -> &'a str {
         let has = |n: &&str| self.camera.nodemap().node(n).is_some();
@@ -316,5 +362,24 @@ impl Drop for GigeCamera {
         if self.stream.take().is_some() {
             let _ = self.camera.acquisition_stop();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_that_were_overtaken_come_in_order() {
+        let mut order = Order::default();
+        let mut out = Vec::new();
+        for id in [1, 2, 4, 5, 3, 6, 8, 9, 10, 11, 12] {
+            order.put(id, Event::Incomplete { id, why: String::new() });
+            while let Some(Event::Incomplete { id, .. }) = order.take() {
+                out.push(id);
+            }
+        }
+        // 7 never came: its followers wait until they are too many.
+        assert_eq!(out, [1, 2, 3, 4, 5, 6, 8, 9, 10, 11, 12]);
     }
 }
