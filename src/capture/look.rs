@@ -166,6 +166,8 @@ impl std::fmt::Display for Look {
 /// Pictures that were exposed before a setting took effect.
 const STALE: usize = 2;
 const TRIES: usize = 15;
+/// An exposure of seconds, and cameras that begin slowly.
+const PATIENCE: Duration = Duration::from_secs(30);
 
 /// The next picture that was taken after now.
 ///
@@ -216,7 +218,7 @@ pub fn tune(source: &mut dyn PictureSource, mut tried: impl FnMut(f64, &Look)) -
         _ => 1000.0,
     };
     for _ in 0..TRIES {
-        let look = look(&fresh(source, Duration::from_secs(10))?);
+        let look = look(&fresh(source, PATIENCE)?);
         tried(exposure_us, &look);
         if look.right() {
             return Ok(Tuned { exposure_us, look });

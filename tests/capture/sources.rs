@@ -200,7 +200,7 @@ fn words_that_name_nothing_are_answered() {
 #[test]
 fn an_exposure_is_found_at_which_the_stripe_stands_right() {
     for exposure in ["60", "20000"] {
-        let camera = format!("sim:2?rate=20&speed=0.01&size=64x64&exposure_us={exposure}");
+        let camera = format!("sim:2?rate=20&speed=0.01&size=160x120&exposure_us={exposure}");
         let tuned: serde_json::Value =
             serde_json::from_str(&sheetlight(&["camera", "tune", "--camera", &camera, "--json", "--quiet"])).unwrap();
         let stripe = &tuned["look"]["stripe"];

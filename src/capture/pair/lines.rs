@@ -243,7 +243,7 @@ mod tests {
             (denso, 50_000, pose, "microseconds"),
             (denso, 50_000_000, "0.4 0 0.3 180 0 90", "metres"),
             (denso, 50_000_000, "400 0 300 3.14 0 1.5", "radians"),
-            ("# convention: ur\n# clock: own", 50_000_000, "0.4 0 0.3 180 0 90", "degrees"),
+            ("# convention: ur\n# clock: own", 50_000_000, "0.4 0 0.3 40 0 20", "degrees"),
             (denso, 50_000_000, "400 0 300 180 0", "6 numbers"),
             (denso, 50_000_000, "400 0 300 180 0 x", "not numbers"),
             ("# convention: denso\n# clock: unix", 50_000_000, pose, "clock: own"),
