@@ -133,7 +133,7 @@ fn an_arm_that_errs_by_its_own_shape_is_named_as_what_limits() {
             let run = |arm: &Arm| -> JointFit {
                 let mut rng = Pcg64::seed_from_u64(seed + 70);
                 let exact = Levels { robot_mm: 0.0, robot_deg: 0.0, ..QUIET };
-                let stops = cell.views(48, 40.0, "arm").iter().enumerate().filter_map(|(i, view)| {
+                let stops = cell.views(64, 40.0, "arm").iter().enumerate().filter_map(|(i, view)| {
                     let (seen, asked) = sent(&cell, arm, view)?;
                     let mut shot: Shot = cell.shot(i, &seen, &exact, &mut rng);
                     let noisy = sheetlight::simulate::reported(&asked, QUIET.robot_mm, QUIET.robot_deg, &mut rng);
