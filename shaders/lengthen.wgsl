@@ -1,5 +1,5 @@
 // In: pictures, skeleton, lit pixels. Out: the skeleton with its ends carried on while the light lasts. Twin and reasons:
-// src/stages/lengthen.rs; here ends are found for 32 x 4 pixels at once. Frame and unit: pixels; brightness relative to the
+// src/stages/stripe/lines/lengthen.rs; here ends are found for 32 x 4 pixels at once. Frame and unit: pixels; brightness relative to the
 // end's own.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> image: array<u32>;

@@ -7,13 +7,14 @@ pub mod bound;
 pub mod choose;
 pub mod choose_params;
 pub mod hough;
-pub mod lengthen;
+pub mod lines;
 pub mod point;
 pub mod skeleton;
-pub mod spacing;
 pub(in crate::stages) mod specks;
 pub mod stats;
 pub mod thin;
 pub mod threshold;
 pub mod threshold_params;
 pub mod tiles;
+
+pub use lines::{lengthen, spacing};

@@ -63,7 +63,7 @@ pub fn twin(skeleton: &Mask, setting: u32) -> Mask {
 /// Lines that were carried on count: the end of a branch is carried on across the stripe.
 pub const STAGE: Stage = Stage {
     name: "spacing",
-    wgsl: include_str!("../../../shaders/spacing.wgsl"),
+    wgsl: include_str!("../../../../shaders/spacing.wgsl"),
     shared: &[SHARED],
     workgroup: [64, 1, 1],
     bindings: &[

@@ -132,7 +132,7 @@ fn outward(skeleton: impl Fn(i32, i32) -> bool, x: i32, y: i32) -> Option<(f32, 
 /// Copies the listed tiles of the skeleton, to be added to.
 pub const COPY: Stage = Stage {
     name: "skeleton_copy",
-    wgsl: include_str!("../../../shaders/skeleton_copy.wgsl"),
+    wgsl: include_str!("../../../../shaders/skeleton_copy.wgsl"),
     shared: &[SHARED],
     workgroup: [64, 1, 1],
     bindings: &[
@@ -158,7 +158,7 @@ pub const COPYING: Step = Step {
 /// Adds the ends. Only lit pixels are added, so they lie in listed tiles.
 pub const STAGE: Stage = Stage {
     name: "lengthen",
-    wgsl: include_str!("../../../shaders/lengthen.wgsl"),
+    wgsl: include_str!("../../../../shaders/lengthen.wgsl"),
     shared: &[SHARED, PIXELS],
     bindings: &[
         Binding { name: "frame", access: Uniform },
