@@ -97,8 +97,9 @@ pub struct Ledger {
     /// Host time of the last picture, and the usual time between two, ns.
     last_ns: Option<u64>,
     period_ns: Option<f64>,
-    /// The camera was gone since the last picture.
+    /// The camera was gone since the last picture; the number that was expected when it went.
     gone: bool,
+    before: Option<u64>,
 }
 
 /// What the number of a picture says.
@@ -113,7 +114,7 @@ pub enum Order {
 impl Ledger {
     /// A whole picture came.
     pub fn came(&mut self, id: u64, host_ns: u64) -> Order {
-        self.back(host_ns);
+        self.back(id, host_ns);
         self.follow(host_ns);
         let order = self.step(id);
         match order {
@@ -125,7 +126,7 @@ impl Ledger {
 
     /// Part of a picture came.
     pub fn came_in_part(&mut self, id: u64) {
-        self.back(now_ns());
+        self.back(id, now_ns());
         self.step(id);
         self.account.incomplete += 1;
     }
@@ -152,19 +153,27 @@ impl Ledger {
 
     /// The camera is gone; its numbers may begin anew when it is back.
     pub fn gone(&mut self) {
+        self.before = self.expected.take().or(self.before);
         self.gone = true;
-        self.expected = None;
         self.since_open = 0;
     }
 
-    /// What the time since the last picture cost, at the usual rate.
-    fn back(&mut self, host_ns: u64) {
+    /// What an outage cost: the numbers in between where the device counted on, else the time since the last picture at the
+    /// usual rate.
+    fn back(&mut self, id: u64, host_ns: u64) {
         if !std::mem::take(&mut self.gone) {
             return;
         }
         self.account.outages += 1;
-        let (Some(last), Some(period)) = (self.last_ns, self.period_ns) else { return };
-        let missed = ((host_ns.saturating_sub(last) as f64 / period).round() as u64).saturating_sub(1);
+        let (Some(last), Some(period), Some(before)) = (self.last_ns, self.period_ns, self.before.take()) else {
+            return;
+        };
+        let by_time = ((host_ns.saturating_sub(last) as f64 / period).round() as u64).saturating_sub(1);
+        // Numbers that began anew are smaller, or far from what the time says.
+        let missed = match id.checked_sub(before) {
+            Some(by_number) if by_number.abs_diff(by_time) <= 2 + by_time / 4 => by_number,
+            _ => by_time,
+        };
         self.account.missed += missed;
         self.account.sent += missed;
         self.last_ns = None;
@@ -232,5 +241,17 @@ mod tests {
         a.used = a.complete;
         assert_eq!((a.complete, a.missed, a.outages, a.sent), (51, 499, 1, 550));
         assert_eq!(a.unexplained(), 0);
+    }
+
+    /// Back so soon that the time says nothing was lost, while the numbers say that one was.
+    #[test]
+    fn a_device_that_counts_on_through_an_outage_is_believed() {
+        let mut ledger = Ledger::default();
+        (0..30).for_each(|i| assert_eq!(ledger.came(i, i * 10_000_000), Order::Next));
+        ledger.gone();
+        assert_eq!(ledger.came(31, 303_000_000), Order::Next);
+        let a = ledger.account();
+        a.used = a.complete;
+        assert_eq!((a.complete, a.missed, a.outages, a.sent, a.unexplained()), (31, 1, 1, 32, 0));
     }
 }

@@ -106,6 +106,12 @@ fn check(options: &ServeOptions) -> Result<()> {
     }
 }
 
+fn lost(e: std::io::Error) -> Fault {
+    Fault::device(format!("the server's port: {e}"))
+        .cause("the network was taken away, or this process may open no more files")
+        .next("start the server again; jobs that were cut off are offered to go on")
+}
+
 async fn run(
     options: &ServeOptions,
     token: &str,
@@ -113,7 +119,7 @@ async fn run(
     ready: impl FnOnce(&str) -> Result<()>,
 ) -> Result<()> {
     let listener = listen(options).await?;
-    let address = listener.local_addr().map_err(|e| Fault::device(e.to_string()))?;
+    let address = listener.local_addr().map_err(lost)?;
     let acceptor = options.secured.as_ref().map(|s| tls(&s.certificates, &s.key)).transpose()?;
     let sessions = Arc::new(Sessions::new(token));
     let cookie = format!("sheetlight_{}", address.port());
@@ -126,7 +132,7 @@ async fn run(
     let password = options.secured.as_ref().map(|s| s.password.clone());
     let screen = Arc::new(Screen::new(jobs, sessions, cookie, Linked { password, camera, robot }));
     let app = router(screen.clone()).layer(from_fn_with_state(guard, door));
-    let doorway = Doorway::new(listener, acceptor).map_err(|e| Fault::device(e.to_string()))?;
+    let doorway = Doorway::new(listener, acceptor).map_err(lost)?;
     let first = screen.clone();
     // Adapters are asked for before the first page needs them.
     tokio::task::spawn_blocking(move || first.bar());
@@ -139,7 +145,7 @@ async fn run(
         }
     };
     tokio::select! {
-        served = axum::serve(doorway, app).into_future() => served.map_err(|e| Fault::device(format!("the server ended: {e}"))),
+        served = axum::serve(doorway, app).into_future() => served.map_err(lost),
         () = asked => Ok(()),
     }
 }

@@ -237,8 +237,13 @@ impl Guard {
         let link = &mut *self.link;
         let poses = &mut *armed.poses;
         let made = std::thread::scope(|threads| {
-            threads.spawn(|| watch.guard());
-            threads.spawn(|| watch.follow(poses));
+            let named = |name: &str| std::thread::Builder::new().name(name.into());
+            let guarding = named("halt").spawn_scoped(threads, || watch.guard());
+            let following = named("poses").spawn_scoped(threads, || watch.follow(poses));
+            if let Err(e) = guarding.and(following) {
+                watch.end();
+                return Err(unwatched(e));
+            }
             let made = plan.legs.iter().enumerate().try_for_each(|(k, leg)| {
                 one(link, leg, &watch)?;
                 each(link, k)?;
@@ -250,10 +255,10 @@ impl Guard {
             watch.end();
             made
         });
-        match (made, watch.halted()) {
-            (Ok(()), None) => Ok(()),
-            (made, why) => {
-                let why = why.unwrap_or_default();
+        match watch.halted() {
+            // Every error but that of a watch that could not begin halts.
+            None => made,
+            Some(why) => {
                 self.unknown = Some(format!("the last motion was stopped: {why}"));
                 Err(made.err().filter(|e| e.what == why).unwrap_or_else(|| stopped(why)))
             }
@@ -300,6 +305,12 @@ fn one(link: &mut dyn Arm, leg: &Motion, watch: &Watch) -> Result<()> {
         }
         _ => Ok(()),
     }
+}
+
+fn unwatched(e: std::io::Error) -> Fault {
+    Fault::device(format!("no thread can be had that watches the motion: {e}"))
+        .cause("too many threads or too little memory; nothing was moved")
+        .next("end other programs, then try again")
 }
 
 fn stopped(why: String) -> Fault {

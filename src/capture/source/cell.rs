@@ -182,7 +182,11 @@ impl PictureSource for CellCamera {
             Err(RecvTimeoutError::Timeout) => Event::Quiet,
             Err(RecvTimeoutError::Disconnected) => {
                 let why = self.link.end.try_recv();
-                Event::Lost(why.unwrap_or_else(|_| Fault::input(format!("{}: is gone", self.address))))
+                let gone = |_| {
+                    Fault::input(format!("{}: is gone", self.address))
+                        .next("see whether the cell still runs; it is waited for")
+                };
+                Event::Lost(why.unwrap_or_else(gone))
             }
         }
     }

@@ -23,7 +23,8 @@ use std::path::{Path, PathBuf};
 /// pictures before is held against these.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  sheetlight calibrate joint recordings/intrinsics recordings/handeye recordings/laserplane recordings/pointer --poses poses --station cell3
+  sheetlight calibrate joint recordings/intrinsics recordings/handeye recordings/laserplane \\
+      recordings/pointer --poses poses --station cell3
   sheetlight calibrate joint recordings/* --station cell3")]
 pub struct Args {
     /// Recording folders with meta.json

@@ -28,7 +28,10 @@ pub async fn open(State(screen): State<Arc<Screen>>, bytes: Bytes) -> Answer<Res
             let _one = TRYING.lock().await;
             tokio::time::sleep(SLOWLY).await;
             let tried = tokio::task::spawn_blocking(move || verify(&password, &hash)).await;
-            tried.unwrap_or_else(|e| Err(Fault::device(e.to_string())))?
+            tried.unwrap_or_else(|e| {
+                Err(Fault::device(format!("the password could not be tried: {e}"))
+                    .next("try again; if it stays so, start the server again"))
+            })?
         }
         _ => false,
     };

@@ -19,7 +19,9 @@ pub fn hashed(password: &str) -> Result<String> {
     }
     let salt = SaltString::encode_b64(&rand::random::<[u8; 16]>()).expect("16 bytes are a salt");
     let hash = Argon2::default().hash_password(password.as_bytes(), &salt);
-    Ok(hash.map_err(|e| Fault::device(format!("the password could not be hashed: {e}")))?.to_string())
+    Ok(hash
+        .map_err(|e| Fault::device(format!("the password could not be hashed: {e}")).next("choose another one"))?
+        .to_string())
 }
 
 /// Whether `password` is that of the hash; errors where the hash is none.

@@ -43,8 +43,11 @@ pub fn section(map: &HeightMap, ask: &SectionAsk) -> Result<Section> {
     Ok(Section { length_mm: length, points, fits, step, angle })
 }
 
-/// Height and standard deviation of the cell that holds a place.
+/// Height and standard deviation of the cell that holds a place; none beside the map, and of what is no number.
 pub(super) fn cell_at(map: &HeightMap, x: f64, y: f64) -> Option<(f64, f64)> {
+    if !(x.is_finite() && y.is_finite()) {
+        return None;
+    }
     let (ix, iy) = ((x / map.cell).floor() as i64, (y / map.cell).floor() as i64);
     let z = map.get(ix, iy)?;
     Some((f64::from(z), f64::from(map.sigma[iy as usize * map.width as usize + ix as usize])))

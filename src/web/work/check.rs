@@ -80,14 +80,14 @@ fn gpu(this: &Run) -> Result<Vec<(String, &'static str, String)>> {
         stages: Vec<Stage>,
         verdict: String,
     }
-    let program = std::env::current_exe().map_err(|e| Fault::device(format!("this program is not found: {e}")))?;
+    let program = std::env::current_exe().map_err(no_check)?;
     let child = Command::new(program)
         .args(["doctor", "--json", "--no-rates"])
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
         .spawn()
-        .map_err(|e| Fault::device(format!("the check of the GPU cannot be started: {e}")))?;
+        .map_err(no_check)?;
     let text = finish(this, child)?;
     let Ok(found) = serde_json::from_str::<Findings>(&text) else {
         return Ok(vec![("stages".into(), "bad", "the check of the GPU ended without a word".into())]);
@@ -106,13 +106,20 @@ fn gpu(this: &Run) -> Result<Vec<(String, &'static str, String)>> {
     Ok(out)
 }
 
+fn no_check(e: std::io::Error) -> Fault {
+    Fault::device(format!("the check of the GPU cannot be started: {e}"))
+        .cause("the program's file was moved or replaced while it runs, or there is no memory")
+        .next("start the server again, or run `sheetlight doctor` in a terminal")
+}
+
 /// What a process prints; it is ended when the job is.
 fn finish(this: &Run, mut child: Child) -> Result<String> {
     let mut out = child.stdout.take().expect("piped");
-    let reader = std::thread::spawn(move || {
+    let read = move || {
         let mut text = String::new();
         out.read_to_string(&mut text).map(|_| text).unwrap_or_default()
-    });
+    };
+    let reader = std::thread::Builder::new().name("check".into()).spawn(read).map_err(no_check)?;
     loop {
         if this.stopped() {
             let _ = child.kill();

@@ -52,13 +52,13 @@ fn said(what: &str, e: &GenicamError) -> Fault {
     let text = e.to_string();
     // Some cameras answer the second program that asks for control, some are silent.
     let denied = text.to_uppercase().contains("ACCESS_DENIED") || text.contains("claim control");
-    let fault = Fault::input(format!("{what}: {text}"));
+    let what = format!("{what}: {text}");
     if denied {
-        return fault
+        return Fault::input(what)
             .cause("the camera is in use: another program has control of it")
             .next("end the other program (a viewer, another sheetlight), or wait until its heartbeat runs out");
     }
-    fault
+    Fault::input(what)
         .cause("the network, or a camera that does it in another way than the standard")
         .next("see what it answers: sheetlight camera show")
 }
