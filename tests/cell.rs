@@ -6,6 +6,12 @@ mod common;
 
 #[path = "cell/golden.rs"]
 mod golden;
+#[path = "cell/job.rs"]
+mod job;
+#[path = "cell/programs.rs"]
+mod programs;
+#[path = "cell/rules.rs"]
+mod rules;
 #[path = "cell/wire.rs"]
 mod wire;
 

@@ -6,10 +6,14 @@ mod denso;
 mod file;
 mod link;
 mod motion;
+mod outputs;
+pub mod rules;
 mod state;
+pub mod ur;
 mod uri;
 
 pub use link::{Arm, Halt, PoseSource};
 pub use motion::{Allowed, Motion, Way};
+pub use outputs::Outputs;
 pub use state::{ControllerError, Mode, Reach, State, TimedPose};
 pub use uri::{RobotUri, open};

@@ -31,8 +31,7 @@ pub struct Allowed {
 }
 
 impl Allowed {
-    #[allow(dead_code, reason = "the rules make it")]
-    pub(super) fn new(motion: Motion) -> Allowed {
+    pub(in crate::arm) fn new(motion: Motion) -> Allowed {
         Allowed { motion }
     }
     /// What may be done.

@@ -1,7 +1,7 @@
 //! In: a URI that names a robot's controller. Out: the link.
 //! Frame and unit: none.
 
-use super::{Arm, denso, file};
+use super::{Arm, denso, file, ur};
 use crate::bcap::Network;
 use crate::fault::{Fault, Result};
 use std::path::PathBuf;
@@ -18,12 +18,16 @@ pub enum RobotUri {
         /// Speed of the flange at 100 %, mm/s.
         full_mm_s: f64,
     },
+    /// `ur://HOST[:PORT]`: poses of a Universal Robots controller, read from its real-time interface: HOST:PORT.
+    Ur(String),
     /// `file:PATH`: poses from a pose file, one for each reading.
     File(PathBuf),
 }
 
 /// The port that b-CAP has on every controller.
 const BCAP_PORT: u16 = 5007;
+/// The port of Universal Robots' real-time interface.
+const UR_PORT: u16 = 30_003;
 /// Straight motions at 100 %, mm/s. What the VS-060 does is to be measured; a motion that is faster than asked is halted.
 const FULL_MM_S: f64 = 1000.0;
 
@@ -32,7 +36,8 @@ impl std::str::FromStr for RobotUri {
 
     fn from_str(uri: &str) -> Result<RobotUri> {
         let bad = |what: String| {
-            Fault::usage(format!("'{uri}': {what}")).next("write bcap://HOST:5007 or file:POSES.json (docs/robots.md)")
+            Fault::usage(format!("'{uri}': {what}"))
+                .next("write bcap://HOST:5007, ur://HOST or file:POSES.json (docs/robots.md)")
         };
         if let Some(path) = uri.strip_prefix("file:") {
             let path = path.strip_prefix("//").unwrap_or(path);
@@ -68,6 +73,7 @@ impl std::str::FromStr for RobotUri {
                 }
                 Ok(RobotUri::Bcap { address: with_port(host, BCAP_PORT).map_err(bad)?, network, full_mm_s })
             }
+            "ur" => Ok(RobotUri::Ur(with_port(host, UR_PORT).map_err(bad)?)),
             other => Err(bad(format!("'{other}' is no kind of link"))),
         }
     }
@@ -89,6 +95,7 @@ pub fn open(uri: &str) -> Result<Box<dyn Arm>> {
         RobotUri::Bcap { address, network, full_mm_s } => {
             Box::new(denso::Denso::open(uri, &address, network, full_mm_s)?)
         }
+        RobotUri::Ur(address) => Box::new(ur::UrPoses::open(uri, &address)?),
         RobotUri::File(path) => Box::new(file::PosesOfFile::open(uri, &path)?),
     })
 }

@@ -58,6 +58,14 @@ pub trait PictureSource: Send {
     /// The next picture, waited for at most this long.
     fn next(&mut self, within: Duration) -> Event;
 
+    /// Takes one picture now; it comes as the others do. False where the source runs by itself and cannot be asked.
+    ///
+    /// # Errors
+    /// The device does not answer.
+    fn trigger(&mut self) -> Result<bool> {
+        Ok(false)
+    }
+
     /// How many pictures the device says it has sent since it was opened; none where it does not say: then the ids tell.
     fn sent(&self) -> Option<u64> {
         None

@@ -7,7 +7,7 @@ use super::component::Component;
 use super::kinematics::{ArmError, Vs060};
 use super::log::{Entry, Event, Insertion};
 use super::options::CellOptions;
-use super::world::{Places, World};
+use super::world::{Places, START_DEG, World};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Board, Flange, Mat3, Part, Rigid, Tool, Vec3, exp};
 use crate::raster::Image;
@@ -205,22 +205,36 @@ impl Cell {
     }
 }
 
-/// Where the scene lies: before the arm, below the sensor, turned and tilted a little, another way for each seed.
+/// The scene's axes as the camera of the design has them where it looks straight down: x along the picture's rows, z up.
+fn scene_in(design: &Station) -> Mat3 {
+    design.flange_from_camera.rotation * Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0))
+}
+
+/// Where the scene lies: below the sensor as the arm starts, twice as far as it works, aside, turned and tilted a little,
+/// another way for each seed.
 fn place(station: &Station, tilt_deg: f64) -> Rigid<Base, InScene> {
     let mut rng = station.rng("cell place", 0);
     let mut within = |by: f64| if station.seed == 0 { 0.0 } else { rng.random_range(-by..=by) };
     let turn = exp(&(Vec3::z() * within(0.26)));
     let azimuth = within(std::f64::consts::PI);
     let tilt = exp(&(Vec3::new(azimuth.cos(), azimuth.sin(), 0.0) * within(tilt_deg.to_radians())));
-    Rigid::new(tilt * turn, Vec3::new(330.0 + within(25.0), within(25.0), 180.0 + within(20.0)))
+    let (start, design) = (Vs060::drawn().forward(&START_DEG.map(f64::to_radians)), Station::of(&station.rig, 0));
+    let (aside, up) = (0.06 * design.working_distance, 0.1 * design.working_distance);
+    let middle = start * design.flange_from_camera;
+    let below = middle.translation + middle.rotation.column(2) * (2.0 * design.working_distance);
+    Rigid::new(
+        tilt * turn * start.rotation * scene_in(&design),
+        below + Vec3::new(within(aside), within(aside), within(up)),
+    )
 }
 
+/// The gripper's axes lie as the scene's do while the sensor looks at it, so that little has to be turned.
 fn gripper(station: &Station) -> Rigid<Flange, Tool> {
     let mut rng = station.rng("cell gripper", 0);
     let mut within = |by: f64| if station.seed == 0 { 0.0 } else { rng.random_range(-by..=by) };
     let off = Vec3::new(within(1.0), within(1.0), within(1.0));
     let turn = exp(&(Vec3::z() * within(0.02)));
-    Rigid::new(turn * Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0)), Vec3::from(GRIPPER_AT_MM) + off)
+    Rigid::new(turn * scene_in(&Station::of(&station.rig, 0)), Vec3::from(GRIPPER_AT_MM) + off)
 }
 
 fn arm_error(station: &Station, mm: f64, deg: f64) -> ArmError {

@@ -40,6 +40,27 @@ fn on_box(x: [f64; 2], y: [f64; 2], z: [f64; 2], out: &mut Vec<Vec3>) {
     }
 }
 
+/// A slot is so many times as long as it is wide.
+const SLOT: f64 = 8.0;
+/// Places along a card's edge that stand for its contacts.
+const CONTACTS: usize = 12;
+
+/// The contacts of a card that goes into a slot; none where the part has no slot.
+fn blade(part: &PartSpec) -> Vec<Vec3> {
+    let cuts =
+        part.solid.iter().flat_map(|s| s.cut.iter().map(move |c| (Vec3::from(s.at_mm) + Vec3::from(c.at_mm), c)));
+    let slots = cuts.filter_map(|(at, c)| match c.shape {
+        ShapeSpec::Block { size_mm: [x, y, _] } if x > SLOT * y => Some((at, x)),
+        _ => None,
+    });
+    // A card is shorter than its slot.
+    let along = |(at, length): (Vec3, f64)| {
+        let place = move |k: usize| at + Vec3::x() * (0.95 * length * (k as f64 / (CONTACTS - 1) as f64 - 0.5));
+        (0..CONTACTS).map(place).collect()
+    };
+    slots.map(along).next().unwrap_or_default()
+}
+
 impl Component {
     /// The component that belongs to a part: a pin for each hole that is there four times or more.
     pub fn of(part: &PartSpec) -> Result<Component> {
@@ -58,6 +79,9 @@ impl Component {
                     );
                 }
             }
+        }
+        if pins.is_empty() {
+            pins = blade(part);
         }
         if pins.is_empty() {
             return Err(Fault::input(format!("the part '{}' has no holes that pins could go into", part.name))

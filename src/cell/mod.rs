@@ -20,5 +20,5 @@ pub use cell::Cell;
 pub use clock::Clock;
 pub use kinematics::{ArmError, Joints, Unreachable, Vs060};
 pub use log::{Entry, Event, Insertion};
-pub use options::{CellOptions, Outputs};
+pub use options::CellOptions;
 pub use serve::{Faults, Served};

@@ -1,29 +1,10 @@
 //! In: what a person chooses of a simulated cell. Out: the same, checked.
 //! Frame and unit: mm, degrees; each field says.
 
+use crate::arm::Outputs;
 use crate::fault::{Fault, Result};
 use crate::recording::BoardSpec;
 use crate::simulate::{RigSpec, SceneSpec};
-
-/// Numbers of the controller's outputs and what hangs on them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Outputs {
-    /// The line laser.
-    pub line: u16,
-    /// The laser pointer.
-    pub pointer: u16,
-    /// The room's lamp.
-    pub room: u16,
-    /// The gripper: on is closed.
-    pub gripper: u16,
-}
-
-impl Default for Outputs {
-    /// The first user outputs of an RC8.
-    fn default() -> Outputs {
-        Outputs { line: 24, pointer: 25, room: 26, gripper: 27 }
-    }
-}
 
 /// What stands in the cell and how well it is made.
 #[derive(Clone, Debug)]

@@ -3,10 +3,11 @@
 
 use super::capture::{camera, record};
 use super::doctor::command as doctor;
-use super::find::{locate as find, model, second_look, teach};
+use super::find::{locate as find, model, program, second_look, teach};
+use super::insert::{guide, job};
 use super::terminal::console::Console;
 use super::terminal::threads;
-use super::{bench, board, calibrate, demo, guide, live, range, scan, shift_scan, simulate, station, verify};
+use super::{bench, board, calibrate, cell, demo, live, range, scan, shift_scan, simulate, station, verify};
 use crate::fault::Result;
 use clap::{Parser, Subcommand};
 
@@ -45,12 +46,17 @@ enum Command {
     /// List, show and set cameras, take a picture, find the exposure
     #[command(subcommand)]
     Camera(camera::Command),
+    /// A simulated robot cell
+    #[command(subcommand)]
+    Cell(cell::Command),
     Demo(demo::Args),
     Doctor(doctor::Args),
     Find(find::Args),
     Guide(guide::Args),
+    Job(job::Args),
     Live(live::Args),
     Model(model::Args),
+    Program(program::Args),
     Range(range::Args),
     Record(record::Args),
     Scan(scan::Args),
@@ -71,12 +77,15 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Board(a) => board::run(a, console),
         Command::Calibrate(c) => calibrate::run(c, console),
         Command::Camera(c) => camera::run(c, console),
+        Command::Cell(c) => cell::run(c, console),
         Command::Demo(a) => demo::run(a, console),
         Command::Doctor(a) => doctor::run(a, console),
         Command::Find(a) => find::run(a, console),
         Command::Guide(a) => guide::run(a, console),
+        Command::Job(a) => job::run(a, console),
         Command::Live(a) => live::run(a, console),
         Command::Model(a) => model::run(a, console),
+        Command::Program(a) => program::run(a, console),
         Command::Range(a) => range::run(a, console),
         Command::Record(a) => record::run(a, console),
         Command::Scan(a) => scan::run(a, console),

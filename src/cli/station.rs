@@ -43,7 +43,7 @@ pub struct New {
     /// A name for pages and files [default: the folder's]
     #[arg(long)]
     name: Option<String>,
-    /// How the robot writes poses: denso, ur, kuka, fanuc, abb, yaskawa, ros, quaternion or matrix
+    /// How the robot writes poses: denso, ur, kuka, fanuc, abb, yaskawa, ros, quaternion, matrix, densot, gba or kawasaki
     /// [default: none; poses are then read and written as matrices]
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Convention>)]
     robot: Option<Convention>,

@@ -2,6 +2,9 @@
 //! Out: one error type with its four sentences (what, numbers, cause, next step) and the exit code.
 //! Frame and unit: none; numbers inside the text carry their own units.
 
+mod gate;
+
+pub use gate::Gate;
 use std::fmt;
 use std::path::Path;
 

@@ -3,6 +3,7 @@
 //! Frame and unit: whatever frames the caller names; each convention states its own units.
 
 pub mod fanuc_tp;
+pub mod program;
 
 use crate::fault::{Fault, Result};
 use crate::geometry::{Frame, Mat3, Rigid, Vec3, exp, log, repair};
@@ -29,11 +30,17 @@ pub enum Convention {
     Quaternion,
     /// 16 numbers, row-major 4x4, mm.
     Matrix,
+    /// X Y Z, orient vector (the y axis), approach vector (the z axis): Denso's type T without its figure; mm.
+    DensoT,
+    /// X Y Z rx ry rz: mm, degrees, R = Rx·Ry·Rz: Staubli, HALCON's `gba`.
+    Gba,
+    /// X Y Z O A T: mm, degrees, R = Rz(O)·Ry(A)·Rz(T).
+    Kawasaki,
 }
 
 impl Convention {
     /// All of them.
-    pub const ALL: [Convention; 9] = [
+    pub const ALL: [Convention; 12] = [
         Convention::Denso,
         Convention::Ur,
         Convention::Kuka,
@@ -43,6 +50,9 @@ impl Convention {
         Convention::Ros,
         Convention::Quaternion,
         Convention::Matrix,
+        Convention::DensoT,
+        Convention::Gba,
+        Convention::Kawasaki,
     ];
 
     /// As options and files write it.
@@ -57,6 +67,9 @@ impl Convention {
             Convention::Ros => "ros",
             Convention::Quaternion => "quaternion",
             Convention::Matrix => "matrix",
+            Convention::DensoT => "densot",
+            Convention::Gba => "gba",
+            Convention::Kawasaki => "kawasaki",
         }
     }
 
@@ -75,6 +88,9 @@ impl Convention {
                 "m00", "m01", "m02", "m03", "m10", "m11", "m12", "m13", "m20", "m21", "m22", "m23", "m30", "m31",
                 "m32", "m33",
             ],
+            Convention::DensoT => &["X mm", "Y mm", "Z mm", "Ox", "Oy", "Oz", "Ax", "Ay", "Az"],
+            Convention::Gba => &["X mm", "Y mm", "Z mm", "rx deg", "ry deg", "rz deg"],
+            Convention::Kawasaki => &["X mm", "Y mm", "Z mm", "O deg", "A deg", "T deg"],
         }
     }
 
@@ -82,8 +98,10 @@ impl Convention {
     pub fn angles(self) -> Option<(std::ops::Range<usize>, bool)> {
         match self {
             Convention::Denso | Convention::Kuka | Convention::Fanuc | Convention::Yaskawa => Some((3..6, true)),
+            Convention::Gba | Convention::Kawasaki => Some((3..6, true)),
             Convention::Ur => Some((3..6, false)),
             Convention::Abb | Convention::Ros | Convention::Quaternion | Convention::Matrix => None,
+            Convention::DensoT => None,
         }
     }
 
@@ -134,6 +152,13 @@ impl Convention {
             Convention::Ur => exp(&Vec3::new(r[0], r[1], r[2])),
             Convention::Abb | Convention::Quaternion => quaternion(r[0], r[1], r[2], r[3])?,
             Convention::Ros => quaternion(r[3], r[0], r[1], r[2])?,
+            Convention::DensoT => {
+                let (y, z) = (Vec3::new(r[0], r[1], r[2]), Vec3::new(r[3], r[4], r[5]));
+                repair(&Mat3::from_columns(&[y.cross(&z), y, z]))?.rotation
+            }
+            // The transpose of Rz·Ry·Rx of the opposite angles.
+            Convention::Gba => zyx_deg(-r[2], -r[1], -r[0]).transpose(),
+            Convention::Kawasaki => zyx_deg(r[0], r[1], 0.0) * zyx_deg(r[2], 0.0, 0.0),
             Convention::Matrix => unreachable!("returned above"),
         };
         Ok(Rigid::new(rotation, t))
@@ -159,6 +184,9 @@ impl Convention {
             Convention::Ur => log(&pose.rotation).iter().copied().collect(),
             Convention::Abb | Convention::Quaternion => vec![qw, qx, qy, qz],
             Convention::Ros => vec![qx, qy, qz, qw],
+            Convention::DensoT => pose.rotation.columns(1, 2).iter().copied().collect(),
+            Convention::Gba => zyx_of(&pose.rotation.transpose()).iter().rev().map(|a| -a).collect(),
+            Convention::Kawasaki => zyz_of(&pose.rotation).to_vec(),
             Convention::Matrix => unreachable!("returned above"),
         });
         out
@@ -198,6 +226,19 @@ pub fn zyx_of(r: &Mat3) -> [f64; 3] {
         ((-r[(0, 1)]).atan2(r[(1, 1)]), 0.0)
     };
     [z, y, x].map(f64::to_degrees)
+}
+
+/// O, A, T in degrees of Rz(O)·Ry(A)·Rz(T), A in 0..=180; where A is 0 or 180 the split is free and T is set to 0.
+fn zyz_of(r: &Mat3) -> [f64; 3] {
+    let a = r[(0, 2)].hypot(r[(1, 2)]).atan2(r[(2, 2)]);
+    let (o, t) = if a.sin() > 1e-9 {
+        (r[(1, 2)].atan2(r[(0, 2)]), r[(2, 1)].atan2(-r[(2, 0)]))
+    } else {
+        // At 180 degrees the x axis is mirrored.
+        let s = a.cos().signum();
+        ((s * r[(1, 0)]).atan2(s * r[(0, 0)]), 0.0)
+    };
+    [o, a, t].map(f64::to_degrees)
 }
 
 fn quaternion(w: f64, x: f64, y: f64, z: f64) -> Result<Mat3> {

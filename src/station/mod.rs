@@ -5,6 +5,7 @@ mod calibrate;
 mod find;
 mod guide;
 mod height_witness;
+pub mod job;
 mod judge;
 mod range;
 mod scan;
@@ -13,6 +14,7 @@ mod values;
 mod verify;
 pub mod volume;
 
+pub use calibrate::auto::arm::ArmCell;
 pub use calibrate::auto::cell::{Cell, Light};
 pub use calibrate::auto::check::SelfCheck;
 pub use calibrate::auto::procedure::{AutoResult, AutoRun, Ended, calibrate_auto};
@@ -38,6 +40,6 @@ pub use scan::report::{HeightMapFigures, ScanReport, Spent, cloud_of, load_repor
 pub use scan::run::{ScanOptions, scan, scan_on};
 pub use scan::scan_folder::of_a_scan;
 pub use scan::seen::Seen;
-pub use settings::{Settings, WorkingVolume};
+pub use settings::{Settings, ToolSpec, WorkingVolume};
 pub use values::Values;
 pub use verify::{CalibrationCheck, VerifyReport, VerifyRun, verify};

@@ -1,7 +1,9 @@
 //! In: `station.toml`, what a person chose. Out: names, working volume, extraction settings, limits.
 //! Frame and unit: camera frame for the working volume, mm; docs/file-formats.md lists every key.
 
+use crate::arm::{Outputs, rules::Limits};
 use crate::fault::{Fault, Result};
+use crate::geometry::{Flange, Rigid, Tool};
 use crate::rig::Volume;
 use crate::robot::Convention;
 use std::path::Path;
@@ -21,8 +23,25 @@ pub struct Settings {
     /// Without it the volume follows from where the boards of the laser plane's calibration stood.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub working_volume: Option<WorkingVolume>,
+    /// What every motion of the robot has to keep; without it nothing is moved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub motion: Option<Limits>,
+    /// What hangs on the controller's outputs.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub outputs: Option<Outputs>,
+    /// The gripper's tool on the flange.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tool: Option<ToolSpec>,
     /// How the stripe is found; docs/file-formats.md lists every key.
     pub extraction: crate::scan::Extraction,
+}
+
+/// Where the tool that inserts is.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ToolSpec {
+    /// Flange from tool, 16 numbers row by row, mm. The tool's origin is what goes to the part's, its z points against the insertion.
+    pub flange_from_tool: Rigid<Flange, Tool>,
 }
 
 /// Where parts can be: camera-frame depths between which the laser plane is believed.
@@ -108,6 +127,7 @@ impl Settings {
             .cause(format!("{unit} instead of millimetres"))
             .next("give what the work tolerates in millimetres, or leave the key out"));
         }
+        self.motion.as_ref().map_or(Ok(()), Limits::check)?;
         self.extraction.check()
     }
 

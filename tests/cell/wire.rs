@@ -112,14 +112,43 @@ fn a_halt_is_at_the_controller_within_50_ms_and_stops_the_arm() {
 }
 
 #[test]
+fn a_universal_robot_is_read_from_its_stream() {
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    // A packet as the real-time interface lays it out: length, time, ..., tool vector at byte 444; big-endian doubles.
+    std::thread::spawn(move || {
+        use std::io::Write;
+        let (mut stream, _) = listener.accept().unwrap();
+        for k in 0..3u32 {
+            let mut bytes = vec![0u8; 1108];
+            bytes[..4].copy_from_slice(&1108u32.to_be_bytes());
+            bytes[4..12].copy_from_slice(&(100.0 + 0.008 * f64::from(k)).to_be_bytes());
+            for (i, x) in [0.3, -0.02, 0.59, 0.0, 3.0, f64::from(k) * 0.1].into_iter().enumerate() {
+                bytes[444 + 8 * i..452 + 8 * i].copy_from_slice(&f64::to_be_bytes(x));
+            }
+            std::thread::sleep(Duration::from_millis(30));
+            stream.write_all(&bytes).unwrap();
+        }
+        stream.write_all(b"HTTP/1.1 400").unwrap();
+    });
+    let mut arm = sheetlight::arm::open(&format!("ur://{address}")).unwrap();
+    let pose = arm.pose().unwrap();
+    assert!((pose.base_from_flange.translation - Vec3::new(300.0, -20.0, 590.0)).norm() < 1e-9);
+    assert_eq!(pose.device, Some(Duration::from_secs_f64(100.0)));
+    assert!(arm.pose().unwrap().device > pose.device);
+    arm.pose().unwrap();
+    assert!(arm.pose().unwrap_err().what.contains("packet says"), "what is no packet is refused");
+    assert!(arm.take().unwrap_err().what.contains("only reads"));
+}
+
+#[test]
 fn the_camera_sees_what_is_lit_from_where_the_arm_stands() {
     let served = cell(2, 20.0);
-    let uri = format!("{}?rate=-1", served.camera_uri());
     let (mut arm, mut camera) = (
         sheetlight::arm::open(&served.robot_uri()).unwrap(),
         sheetlight::capture::source::cell::CellCamera::open(&served.camera.to_string(), -1.0).unwrap(),
     );
-    let _: CameraUri = uri.parse().unwrap();
+    assert!(matches!(served.camera_uri().parse(), Ok(CameraUri::Cell { rate_hz, .. }) if rate_hz < 0.0));
     let mut mean = |line: bool, pointer: bool, room: bool| {
         for (number, on) in [(24, line), (25, pointer), (26, room)] {
             arm.put_output(number, on).unwrap();

@@ -173,6 +173,13 @@ impl PictureSource for CellCamera {
         }
     }
 
+    fn trigger(&mut self) -> Result<bool> {
+        if self.rate_hz < 0.0 {
+            self.snap()?;
+        }
+        Ok(self.rate_hz < 0.0)
+    }
+
     fn sent(&self) -> Option<u64> {
         Some(self.sent)
     }

@@ -102,6 +102,10 @@ impl Controller {
         let text = text(code, panel.japanese);
         panel.errors.insert(0, (code, text));
     }
+    /// Clears the errors on the pendant.
+    pub fn clear_errors(&self) {
+        self.panel().errors.clear();
+    }
     /// Turns the mode switch: 1 manual, 2 teach check, 3 automatic.
     pub fn set_mode(&self, mode: i32) {
         self.panel().mode = mode;

@@ -80,7 +80,7 @@ impl Served {
     }
     /// The camera as a URI; pictures are taken one by one.
     pub fn camera_uri(&self) -> String {
-        format!("cell://{}", self.camera)
+        format!("cell://{}?rate=-1", self.camera)
     }
 }
 

@@ -44,7 +44,7 @@ pub struct Args {
     /// Station that scanned: its covariances enter the error budget, its calibration must be the scan's
     #[arg(long)]
     station: Option<PathBuf>,
-    /// Notation of the poses: denso, ur, kuka, fanuc, abb, yaskawa, ros, quaternion or matrix [default:
+    /// Notation of the poses: denso, ur, kuka, fanuc, abb, yaskawa, ros, quaternion, matrix, densot, gba or kawasaki [default:
     /// the station's robot, else matrix]
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Convention>)]
     robot: Option<Convention>,

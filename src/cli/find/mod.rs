@@ -3,5 +3,6 @@
 
 pub mod locate;
 pub mod model;
+pub mod program;
 pub mod second_look;
 pub mod teach;

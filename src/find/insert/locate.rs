@@ -3,9 +3,9 @@
 //! Frame and unit: base frame; mm, degrees; sigmas along the part's own axes.
 
 use super::budget::{Budget, budget};
-use super::gate::Gate;
 use super::recipe::{Gates, Recipe};
 use super::verdict::{Agreement, TurnVote, judge, vote};
+use crate::fault::Gate;
 use crate::fault::{Fault, Result};
 use crate::find::look::looks::{self, Agreed, Disagreement, Look, Witness};
 use crate::find::look::part_seen::towards_camera;

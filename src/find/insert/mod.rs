@@ -3,7 +3,6 @@
 
 pub mod budget;
 mod from_drawing;
-pub mod gate;
 pub mod locate;
 pub mod picture;
 pub mod recipe;

@@ -2,7 +2,7 @@
 //! how much of the part was seen, and which of its alike turns it is.
 //! Frame and unit: part frame, mm.
 
-use super::gate::Gate;
+use crate::fault::Gate;
 use crate::find::measure::options::MeasureOptions;
 use crate::find::measure::points::{Ordered, localise};
 use crate::find::measure::pose::Measured;

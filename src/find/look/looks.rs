@@ -4,9 +4,9 @@
 
 use super::explain::{Explanation, explanations};
 use super::stack::{Stack, Vector6, motion, singular};
+use crate::fault::Gate;
 use crate::fault::{Fault, Result};
 use crate::find::insert::budget::both;
-use crate::find::insert::gate::Gate;
 use crate::find::insert::recipe::Recipe;
 use crate::geometry::{Base, Mat3, Part, Rigid, Vec3, exp};
 use nalgebra::{DMatrix, Matrix6};

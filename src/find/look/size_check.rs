@@ -3,7 +3,7 @@
 //! Frame and unit: the scan's directions in the part's plane; percent, degrees. docs/math.md, Sizes.
 
 use super::levers::Lever;
-use crate::find::insert::gate::Gate;
+use crate::fault::Gate;
 use crate::find::insert::recipe::Gates;
 use crate::find::measure::shape::Shape;
 use nalgebra::{Matrix3, SMatrix, Vector2};

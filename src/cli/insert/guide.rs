@@ -40,7 +40,7 @@ pub struct Args {
     /// Folder for the scan, the picture and guide.json
     #[arg(long)]
     out: PathBuf,
-    /// Notation of the poses: denso, ur, kuka, fanuc, abb, yaskawa, ros, quaternion or matrix [default:
+    /// Notation of the poses: denso, ur, kuka, fanuc, abb, yaskawa, ros, quaternion, matrix, densot, gba or kawasaki [default:
     /// the station's robot, else matrix]
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Convention>)]
     robot: Option<Convention>,

@@ -1,4 +1,4 @@
-//! In: a number and its limit. Out: a gate of an insertion: passed or not, and what it means.
+//! In: a number and its limit. Out: a gate of an insertion or of a motion: passed or not, and what it means.
 //! Frame and unit: each gate names its own.
 
 /// One gate: what was seen against the limit.

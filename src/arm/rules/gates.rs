@@ -1,0 +1,122 @@
+//! In: a plan, the limits, the robot as it is now. Out: every gate with its number and its limit. Pure.
+//! Frame and unit: base frame; mm, mm/s, degrees, s; gates of yes and no have 1 and 0.
+
+use super::super::{Mode, Motion, State};
+use super::limits::{Limits, MOST_SPEED_MM_S};
+use super::plan::Plan;
+use crate::fault::Gate;
+use crate::geometry::{Base, Flange, Rigid, Vec3};
+
+/// The robot as it is now.
+#[derive(Clone, Debug)]
+pub struct Situation {
+    /// Mode, motor, errors, frames.
+    pub state: State,
+    /// Where it stands.
+    pub at: Rigid<Base, Flange>,
+    /// It may be moved: `--allow-motion` was given and it was armed.
+    pub armed: bool,
+    /// A motion was stopped and nobody has looked at the robot since.
+    pub unknown: bool,
+}
+
+/// Largest departure of a rotation from orthonormal that is believed.
+const ORTHONORMAL: f64 = 1e-6;
+
+/// How far a matrix is from a rotation; infinite where a number is.
+fn departure(pose: &Rigid<Base, Flange>) -> f64 {
+    let r = &pose.rotation;
+    let off = (r.transpose() * r - crate::geometry::Mat3::identity()).norm();
+    let finite = pose.to_rows().iter().all(|x| x.is_finite());
+    if finite && r.determinant() > 0.0 { off } else { f64::INFINITY }
+}
+
+/// Yes and no as a gate.
+fn must(name: &'static str, yes: bool) -> Gate {
+    Gate::least(name, f64::from(u8::from(yes)), 1.0)
+}
+
+/// All gates of a plan.
+pub fn gates(plan: &Plan, limits: &Limits, now: &Situation) -> Vec<Gate> {
+    let worst = |of: &dyn Fn(&Rigid<Base, Flange>, &Motion) -> f64| {
+        let mut from = now.at;
+        let mut most = 0f64;
+        for leg in &plan.legs {
+            let value = of(&from, leg);
+            // Not a number is the worst of all.
+            most = if value.is_nan() { f64::INFINITY } else { most.max(value) };
+            from = leg.to;
+        }
+        most
+    };
+    let mut out = vec![
+        must("armed", now.armed),
+        must("the arm's place is known", !now.unknown),
+        Gate::least("motions", plan.legs.len() as f64, 1.0),
+        Gate::most("departure from a rotation", worst(&|_, leg| departure(&leg.to)), ORTHONORMAL),
+        Gate::most("speed, mm/s", worst(&|_, leg| leg.speed_mm_s), limits.speed_mm_s.min(MOST_SPEED_MM_S)),
+        Gate::least("slowest speed, mm/s", slowest(plan), 0.1),
+        Gate::most("outside the workspace, mm", worst(&|_, leg| limits.workspace.outside(&leg.to.translation)), 0.0),
+        Gate::most("starts outside the workspace, mm", limits.workspace.outside(&now.at.translation), 0.0),
+        Gate::most("way through a keep-out, mm", worst(&|from, leg| kept_out(plan, limits, from, &leg.to)), 0.0),
+        Gate::most("step, mm", worst(&|from, leg| (leg.to.translation - from.translation).norm()), limits.max_step_mm),
+        Gate::most("turn, degrees", worst(&|from, leg| from.difference(&leg.to).0.to_degrees()), limits.max_turn_deg),
+    ];
+    out.extend(of_the_state(&now.state));
+    out.extend(of_the_evidence(plan, limits));
+    out
+}
+
+fn slowest(plan: &Plan) -> f64 {
+    let speeds = plan.legs.iter().map(|leg| if leg.speed_mm_s.is_nan() { f64::NEG_INFINITY } else { leg.speed_mm_s });
+    speeds.fold(f64::INFINITY, f64::min)
+}
+
+/// How much of the way of flange and tool lies in keep-outs. A tool's way is taken in small turns.
+fn kept_out(plan: &Plan, limits: &Limits, from: &Rigid<Base, Flange>, to: &Rigid<Base, Flange>) -> f64 {
+    let places: Vec<Vec3> = [Vec3::zeros()].into_iter().chain(plan.tool_at).collect();
+    let turn = crate::geometry::log(&(to.rotation * from.rotation.transpose()));
+    let pieces = (turn.norm() / 0.02).ceil().clamp(1.0, 200.0) as usize;
+    let at = |u: f64| {
+        let rotation = crate::geometry::exp(&(turn * u)) * from.rotation;
+        Rigid::<Base, Flange>::new(rotation, from.translation + (to.translation - from.translation) * u)
+    };
+    let piece = |k: usize, p: &Vec3| {
+        let ends = [k, k + 1].map(|k| at(k as f64 / pieces as f64).point(p));
+        limits.keep_out.iter().map(|s| s.inside_of(&ends[0], &ends[1])).sum::<f64>()
+    };
+    places.iter().map(|p| (0..pieces).map(|k| piece(k, p)).sum::<f64>()).fold(0.0, f64::max)
+}
+
+fn of_the_state(state: &State) -> Vec<Gate> {
+    let zero = |n: Option<i32>| n.map_or(f64::INFINITY, |n| f64::from(n.abs()));
+    vec![
+        must("automatic mode", state.mode == Mode::Automatic),
+        must("motor on", state.motor == Some(true)),
+        must("standing still", state.busy == Some(false)),
+        must("no emergency stop", state.emergency_stop == Some(false)),
+        Gate::most("errors on the controller", state.errors.len() as f64, 0.0),
+        Gate::most("number of the tool", zero(state.tool), 0.0),
+        Gate::most("number of the work frame", zero(state.work), 0.0),
+    ]
+}
+
+fn of_the_evidence(plan: &Plan, limits: &Limits) -> Vec<Gate> {
+    let mut out = Vec::new();
+    let evidence = &plan.evidence;
+    if let Some(normal) = &evidence.normal {
+        // The flange looks against the normal.
+        let tilt = |leg: &Motion| (-leg.to.rotation.column(2).dot(normal)).clamp(-1.0, 1.0).acos().to_degrees();
+        let worst = plan.legs.iter().map(|leg| if tilt(leg).is_nan() { f64::INFINITY } else { tilt(leg) });
+        out.push(Gate::most("tilt to the measured normal, degrees", worst.fold(0.0, f64::max), limits.max_tilt_deg));
+    }
+    if let Some((station, scan)) = &evidence.fingerprints {
+        out.push(must("scan of this calibration", station == scan));
+    }
+    if let Some(age) = evidence.scan_age_s {
+        // A scan of the future is as old as none.
+        out.push(Gate::most("age of the scan, s", if age >= 0.0 { age } else { f64::INFINITY }, limits.max_scan_age_s));
+    }
+    out.extend(evidence.measured.iter().cloned());
+    out
+}

@@ -1,0 +1,309 @@
+//! In: plans and confirmations. Out: motions, each allowed, watched and logged; after one that was stopped nothing moves until
+//! somebody has looked at the robot.
+//! Frame and unit: base_from_flange, mm, degrees, mm/s.
+
+use super::super::{Allowed, Arm, Halt, Motion, PoseSource, Reach, TimedPose, Way};
+use super::gates::{Situation, gates};
+use super::limits::Limits;
+use super::log::MotionLog;
+use super::plan::{Confirmation, Plan, Proposal, hash};
+use super::stop::StopButton;
+use super::watch::Watch;
+use crate::fault::{Fault, Result};
+use std::collections::BTreeSet;
+use std::sync::Arc;
+use std::time::Instant;
+
+/// The arm may have moved by so much since a plan was shown, mm and degrees: more, and it was moved by someone else.
+const MOVED: (f64, f64) = (0.2, 0.05);
+/// A motion has arrived within so much of its goal, mm and degrees.
+const ARRIVED: (f64, f64) = (0.2, 0.05);
+
+/// A robot behind its rules. Read-only until it is armed.
+pub struct Guard {
+    link: Box<dyn Arm>,
+    limits: Option<Limits>,
+    log: MotionLog,
+    armed: Option<Armed>,
+    /// Why nobody knows where the arm is.
+    unknown: Option<String>,
+    used: BTreeSet<String>,
+    proposed: u64,
+    stop: StopButton,
+}
+
+/// What an armed robot has: a way to stop it and a way to watch it, each over its own connection.
+struct Armed {
+    halt: Arc<dyn Halt>,
+    poses: Box<dyn PoseSource>,
+}
+
+impl Guard {
+    /// Read-only. Without limits it cannot be armed.
+    pub fn new(link: Box<dyn Arm>, limits: Option<Limits>, log: MotionLog) -> Guard {
+        Guard {
+            link,
+            limits,
+            log,
+            armed: None,
+            unknown: None,
+            used: BTreeSet::new(),
+            proposed: 0,
+            stop: StopButton::default(),
+        }
+    }
+
+    /// The link, for reading. It moves nothing by itself: a motion needs what only this guard makes.
+    pub fn link(&mut self) -> &mut dyn Arm {
+        &mut *self.link
+    }
+
+    /// What stops it from any thread.
+    pub fn stop_button(&self) -> StopButton {
+        self.stop.clone()
+    }
+
+    /// Whether motions may be proposed.
+    pub fn is_armed(&self) -> bool {
+        self.armed.is_some()
+    }
+
+    /// What every motion has to keep.
+    pub fn limits(&self) -> Option<&Limits> {
+        self.limits.as_ref()
+    }
+
+    /// Takes the arm for motions: opens the connections that stop it and watch it. `allowed` is the operator's --allow-motion.
+    ///
+    /// # Errors
+    /// It was not allowed, no limits are stated, the link only reads, another program has the arm.
+    pub fn arm(&mut self, allowed: bool) -> Result<()> {
+        if !allowed {
+            return Err(Fault::refused(format!("{}: read-only", self.link.name()))
+                .cause("motion was not allowed")
+                .next("give --allow-motion where the arm may move and somebody stands at the emergency stop"));
+        }
+        let Some(limits) = &self.limits else {
+            return Err(Fault::refused("no workspace is stated: nothing says where the arm may be")
+                .cause("station.toml has no [motion]")
+                .next("write [motion] with workspace = { from_mm = [...], to_mm = [...] } (docs/robots.md)"));
+        };
+        limits.check()?;
+        let (halt, poses) = (self.link.stop()?, self.link.watch()?);
+        self.link.take()?;
+        self.armed = Some(Armed { halt, poses });
+        Ok(())
+    }
+
+    /// Gives the arm back.
+    pub fn disarm(&mut self) -> Result<()> {
+        self.armed = None;
+        self.link.give()
+    }
+
+    /// Somebody has looked at the robot after a motion that was stopped; the pose is read anew.
+    pub fn looked(&mut self) -> Result<TimedPose> {
+        let pose = self.link.pose()?;
+        self.unknown = None;
+        Ok(pose)
+    }
+
+    /// Why nobody knows where the arm is; `None` where it is known.
+    pub fn unknown(&self) -> Option<&str> {
+        self.unknown.as_deref()
+    }
+
+    fn situation(&mut self) -> Result<Situation> {
+        let (state, at) = (self.link.state()?, self.link.pose()?.base_from_flange);
+        Ok(Situation { state, at, armed: self.armed.is_some(), unknown: self.unknown.is_some() })
+    }
+
+    /// Looks at a plan from where the arm stands now. The proposal shows every gate, met or not.
+    ///
+    /// # Errors
+    /// The robot cannot be asked, or no limits are stated.
+    pub fn propose(&mut self, plan: Plan) -> Result<Proposal> {
+        self.proposed += 1;
+        let number = self.proposed;
+        let now = self.situation()?;
+        let hash = hash(&plan, &now.at, number);
+        let mut proposal = Proposal { plan, from: now.at, gates: vec![], reasons: vec![], hash, shown: Instant::now() };
+        (proposal.gates, proposal.reasons) = self.judge(&proposal.plan, &now)?;
+        self.log.note("asked", &proposal, proposal.missed())?;
+        Ok(proposal)
+    }
+
+    fn judge(&mut self, plan: &Plan, now: &Situation) -> Result<(Vec<crate::fault::Gate>, Vec<String>)> {
+        let Some(limits) = &self.limits else {
+            return Err(
+                Fault::refused("no workspace is stated").next("write [motion] into station.toml (docs/robots.md)")
+            );
+        };
+        let gates = gates(plan, limits, now);
+        let mut reasons: Vec<String> =
+            now.state.errors.iter().map(|e| format!("on the controller stands {:08X} {}", e.code, e.text)).collect();
+        reasons.extend(self.unknown.clone());
+        reasons.extend(self.stop.why());
+        // A plan that cannot be a pose is not shown to the controller. Along straight legs its ends stand for the rest.
+        if gates.iter().all(|g| g.passed) {
+            for leg in ends(&plan.legs) {
+                if let Reach::Refused(why) = self.link.reach(&leg.to)? {
+                    reasons.push(why);
+                }
+            }
+        }
+        reasons.dedup();
+        Ok((gates, reasons))
+    }
+
+    /// Makes a plan that was confirmed, once. `each` is called after each leg, the arm standing still, with the leg's number; its
+    /// error ends the plan there.
+    ///
+    /// # Errors
+    /// A gate is not met (any more), the confirmation is of another proposal, was used or is too old, or the motion was stopped: then
+    /// the arm stands wherever it was stopped.
+    pub fn make(
+        &mut self,
+        proposal: &Proposal,
+        confirmation: Confirmation,
+        each: &mut dyn FnMut(&mut dyn Arm, usize) -> Result<()>,
+    ) -> Result<()> {
+        if let Err(fault) = self.may(proposal, &confirmation) {
+            self.log.note("refused", proposal, vec![fault.what.clone()])?;
+            return Err(fault);
+        }
+        self.used.insert(confirmation.hash);
+        // What is begun stands in the log before it begins.
+        self.log.note("begun", proposal, vec![])?;
+        let made = self.run(&proposal.plan, each);
+        match &made {
+            Ok(()) => self.log.note("done", proposal, vec![])?,
+            Err(e) => self.log.note("stopped", proposal, vec![e.what.clone()])?,
+        }
+        made
+    }
+
+    fn may(&mut self, proposal: &Proposal, confirmation: &Confirmation) -> Result<()> {
+        let refused = |what: String, cause: &str| {
+            Err(Fault::refused(what)
+                .cause(cause)
+                .next("look at the robot and at the pose, then confirm the pose that is shown"))
+        };
+        if confirmation.hash != proposal.hash {
+            let short = |h: &str| h.chars().take(12).collect::<String>();
+            let what = format!(
+                "the confirmation is of {}, this motion is {}",
+                short(&confirmation.hash),
+                short(&proposal.hash)
+            );
+            return refused(what, "another pose was shown when it was given");
+        }
+        if self.used.contains(&proposal.hash) {
+            return refused(
+                "this confirmation was used: 1 motion was made with it, limit 1".into(),
+                "it was given once and sent twice",
+            );
+        }
+        let (age, most) = (proposal.shown.elapsed().as_secs_f64(), self.limits.as_ref().map_or(0.0, |l| l.max_shown_s));
+        if age > most {
+            return refused(
+                format!("the pose was shown {age:.0} s ago, limit {most:.0} s"),
+                "the cell may have changed since",
+            );
+        }
+        let now = self.situation()?;
+        let (angle, mm) = proposal.from.difference(&now.at);
+        if !(mm <= MOVED.0 && angle.to_degrees() <= MOVED.1) {
+            let what = format!(
+                "the arm moved by {mm:.2} mm and {:.3} degrees since the pose was shown, limit {} and {}",
+                angle.to_degrees(),
+                MOVED.0,
+                MOVED.1
+            );
+            return refused(what, "somebody jogged it, or another program has it");
+        }
+        let (gates, reasons) = self.judge(&proposal.plan, &now)?;
+        let missed: Vec<String> = gates.iter().filter(|g| !g.passed).map(|g| g.words()).chain(reasons).collect();
+        if missed.is_empty() {
+            return Ok(());
+        }
+        refused(missed.join("; "), "what is named is not as it has to be")
+    }
+
+    fn run(&mut self, plan: &Plan, each: &mut dyn FnMut(&mut dyn Arm, usize) -> Result<()>) -> Result<()> {
+        let (Some(limits), Some(armed)) = (&self.limits, &mut self.armed) else { unreachable!("gates ask for both") };
+        let speed = plan.legs.iter().map(|leg| leg.speed_mm_s).fold(0.0, f64::max);
+        let watch = Watch::new(limits, &self.stop, &*armed.halt, speed);
+        let link = &mut *self.link;
+        let poses = &mut *armed.poses;
+        let made = std::thread::scope(|threads| {
+            threads.spawn(|| watch.guard());
+            threads.spawn(|| watch.follow(poses));
+            let made = plan.legs.iter().enumerate().try_for_each(|(k, leg)| {
+                one(link, leg, &watch)?;
+                each(link, k)?;
+                watch.halted().map_or(Ok(()), |why| Err(stopped(why)))
+            });
+            if let Err(e) = &made {
+                watch.halt(e.what.clone());
+            }
+            watch.end();
+            made
+        });
+        match (made, watch.halted()) {
+            (Ok(()), None) => Ok(()),
+            (made, why) => {
+                let why = why.unwrap_or_default();
+                self.unknown = Some(format!("the last motion was stopped: {why}"));
+                Err(made.err().filter(|e| e.what == why).unwrap_or_else(|| stopped(why)))
+            }
+        }
+    }
+}
+
+impl Drop for Guard {
+    fn drop(&mut self) {
+        let _ = self.disarm();
+    }
+}
+
+/// Where a plan's ways turn: the ends of its legs, those in the middle of a straight row left out.
+fn ends(legs: &[Motion]) -> impl Iterator<Item = &Motion> {
+    let stride = (legs.len() / 8).max(1);
+    legs.iter().enumerate().filter(move |(k, _)| k % stride == 0 || k + 1 == legs.len()).map(|(_, leg)| leg)
+}
+
+/// Makes one leg and looks where the arm has come to.
+fn one(link: &mut dyn Arm, leg: &Motion, watch: &Watch) -> Result<()> {
+    if let Some(why) = watch.stop.why().or_else(|| watch.halted()) {
+        return Err(stopped(why));
+    }
+    let before = link.pose()?;
+    link.make(Allowed::new(*leg))?;
+    let after = link.pose()?;
+    let (angle, mm) = after.base_from_flange.difference(&leg.to);
+    if !(mm <= ARRIVED.0 && angle.to_degrees() <= ARRIVED.1) {
+        return Err(Fault::device(format!(
+            "the arm stands {mm:.2} mm and {:.3} degrees from where it was sent, limit {} and {}",
+            angle.to_degrees(),
+            ARRIVED.0,
+            ARRIVED.1
+        ))
+        .cause("it was halted, or it moves with another tool or work frame")
+        .next("look at the robot"));
+    }
+    match (before.figure, after.figure) {
+        (Some(a), Some(b)) if a != b && leg.way == Way::Straight => {
+            Err(Fault::device(format!("the figure changed on the way, from {a} to {b}"))
+                .cause("the controller found another way for its joints")
+                .next("look at the robot, and approach from another side"))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn stopped(why: String) -> Fault {
+    Fault::device(why)
+        .cause("the motion was stopped; where the arm stands is not known")
+        .next("look at the robot, then go on")
+}

@@ -1,0 +1,55 @@
+//! In: what was asked of the arm and what became of it. Out: a line of JSON each, on the disk before anything moves.
+//! Frame and unit: base_from_flange as 16 numbers, mm; mm/s; times UTC.
+
+use super::plan::Proposal;
+use crate::fault::Result;
+use std::path::{Path, PathBuf};
+
+/// The log of a robot's motions; lines are only ever added.
+#[derive(Clone, Debug, Default)]
+pub struct MotionLog {
+    path: Option<PathBuf>,
+}
+
+#[derive(serde::Serialize)]
+struct Line<'a> {
+    at: String,
+    event: &'a str,
+    name: &'a str,
+    why: &'a str,
+    hash: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    to: Option<Vec<[f64; 16]>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    speed_mm_s: Option<f64>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    reasons: Vec<String>,
+}
+
+impl MotionLog {
+    /// In a file.
+    pub fn file(path: &Path) -> MotionLog {
+        MotionLog { path: Some(path.to_owned()) }
+    }
+
+    fn add(&self, line: &Line) -> Result<()> {
+        let Some(path) = &self.path else { return Ok(()) };
+        crate::files::append_line(path, &serde_json::to_string(line).expect("plain data"))
+    }
+
+    /// Something happened to a proposal: asked, refused, begun, done, halted.
+    pub fn note(&self, event: &str, of: &Proposal, reasons: Vec<String>) -> Result<()> {
+        let asked = event == "asked";
+        let plan = &of.plan;
+        self.add(&Line {
+            at: jiff::Timestamp::now().to_string(),
+            event,
+            name: &plan.name,
+            why: &plan.why,
+            hash: &of.hash,
+            to: asked.then(|| plan.legs.iter().map(|leg| leg.to.to_rows()).collect()),
+            speed_mm_s: asked.then(|| plan.legs.iter().map(|leg| leg.speed_mm_s).fold(0.0, f64::max)),
+            reasons,
+        })
+    }
+}

@@ -1,0 +1,68 @@
+//! In: a pressed button, a signal, a lease that ran out. Out: whether the arm has to stop, and why.
+//! Frame and unit: times of this machine.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+#[derive(Default)]
+struct Inside {
+    pressed: AtomicBool,
+    signals: Mutex<Vec<Arc<AtomicBool>>>,
+    lease: Mutex<Option<(Instant, Duration)>>,
+}
+
+/// What stops a motion from any thread. All clones are one button.
+#[derive(Clone, Default)]
+pub struct StopButton(Arc<Inside>);
+
+impl StopButton {
+    /// Stops what moves; nothing moves until [`StopButton::release`].
+    pub fn press(&self) {
+        self.0.pressed.store(true, Ordering::SeqCst);
+    }
+    /// Lets motions be proposed again.
+    pub fn release(&self) {
+        self.0.pressed.store(false, Ordering::SeqCst);
+    }
+    /// Counts a flag as pressed while it is up: Ctrl-C.
+    pub fn listen(&self, flag: Arc<AtomicBool>) {
+        self.0.signals.lock().unwrap_or_else(PoisonError::into_inner).push(flag);
+    }
+    /// From now on somebody has to say at least so often that he is still there.
+    pub fn lease(&self, every: Duration) {
+        *self.lock() = Some((Instant::now(), every));
+    }
+    /// He is still there.
+    pub fn renew(&self) {
+        if let Some((since, _)) = self.lock().as_mut() {
+            *since = Instant::now();
+        }
+    }
+    /// Nobody has to.
+    pub fn end_lease(&self) {
+        *self.lock() = None;
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, Option<(Instant, Duration)>> {
+        self.0.lease.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Why nothing may move; `None` where it may.
+    pub fn why(&self) -> Option<String> {
+        if self.0.pressed.load(Ordering::SeqCst) {
+            return Some("STOP was pressed".into());
+        }
+        let signals = self.0.signals.lock().unwrap_or_else(PoisonError::into_inner);
+        if signals.iter().any(|s| s.load(Ordering::SeqCst)) {
+            return Some("the program was told to end".into());
+        }
+        let lease = *self.lock();
+        let late = lease.filter(|(since, every)| since.elapsed() > *every)?;
+        Some(format!(
+            "the operator's lease ran out: nothing was heard for {:.1} s, limit {:.1} s",
+            late.0.elapsed().as_secs_f64(),
+            late.1.as_secs_f64()
+        ))
+    }
+}

@@ -1,0 +1,5 @@
+//! In: the command line's words about insertions. Out: the procedure on recordings, and the job with a robot.
+//! Frame and unit: base frame, mm.
+
+pub mod guide;
+pub mod job;

@@ -1,0 +1,477 @@
+//! In: a job's state, a robot behind its rules, a camera, a station, a recipe, a person. Out: the job done, or stopped where it says.
+//! A crash at any moment leaves a state from which it goes on or backs out.
+//! Frame and unit: base frame; mm, mm/s, degrees, s.
+
+use super::eye::Eye;
+use super::operator::{Ask, Operator};
+use super::places;
+use super::record::Record;
+use super::report::JobReport;
+use super::state::{JobState, Phase};
+use crate::arm::rules::{Evidence, Guard, Plan};
+use crate::arm::{Arm, Motion, Way};
+use crate::fault::{Fault, Gate, Result};
+use crate::find::insert::picture;
+use crate::find::{LocateOptions, Recipe, Report, locate};
+use crate::geometry::{Base, Flange, Mat3, Rigid, Vec3};
+use crate::recording::Beam;
+use crate::rig::Rig;
+use crate::robot::Convention;
+use crate::scan::Where;
+use crate::station::range::{RangeRun, measure_range};
+use crate::station::scan::recorded::scan_recording;
+use crate::station::scan::report::{cloud_of, load_report};
+use crate::station::scan::run::ScanOptions;
+use crate::station::settings::Settings;
+use crate::station::volume;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// What a job works on.
+#[derive(Clone, Debug)]
+pub struct JobOptions {
+    /// Folder of the station.
+    pub station: PathBuf,
+    /// File of the part's recipe.
+    pub recipe: PathBuf,
+    /// Folder of the job: its state, recordings, scan, report.
+    pub out: PathBuf,
+    /// Notation of the poses that are said.
+    pub robot: Convention,
+    /// Where the scan's stages run.
+    pub place: Where,
+    /// Speed of every motion, mm/s; `None`: the station's.
+    pub speed_mm_s: Option<f64>,
+    /// The line sweeps over so much about the picture's middle, mm, 5 to 1000; `None`: over the field's short side.
+    pub sweep_mm: Option<f64>,
+    /// Largest angle between the part's top and the touched board, degrees, 0.1 to 20.
+    pub max_tilt_deg: f64,
+}
+
+/// A job that is under way.
+pub struct Job<'a> {
+    options: &'a JobOptions,
+    settings: Settings,
+    rig: Rig,
+    recipe: Recipe,
+    guard: &'a mut Guard,
+    eye: Eye,
+    operator: &'a mut dyn Operator,
+    state: JobState,
+    found: Option<Report>,
+    since: Instant,
+}
+
+/// The arm stands still so long before a picture is taken, ms.
+const SETTLE: Duration = Duration::from_millis(5);
+/// A touched board whose points scatter more than this about their plane, as a share of the view's distance, is none.
+const FLAT: f64 = 0.01;
+
+impl<'a> Job<'a> {
+    /// Begins the job of a folder, or goes on with the one that stands there.
+    ///
+    /// # Errors
+    /// What is needed of the station is not there, or options are out of range.
+    pub fn open(
+        options: &'a JobOptions,
+        guard: &'a mut Guard,
+        camera: Box<dyn crate::capture::PictureSource>,
+        operator: &'a mut dyn Operator,
+    ) -> Result<Job<'a>> {
+        if !(0.1..=20.0).contains(&options.max_tilt_deg) {
+            return Err(Fault::usage(format!("max_tilt_deg is {}, wanted 0.1 to 20", options.max_tilt_deg))
+                .next("correct the option"));
+        }
+        if let Some(mm) = options.sweep_mm.filter(|mm| !(5.0..=1000.0).contains(mm)) {
+            return Err(Fault::usage(format!("the sweep is {mm} mm, wanted 5 to 1000")).next("correct the option"));
+        }
+        let (settings, rig, recipe) =
+            (Settings::load(&options.station)?, Rig::load(&options.station)?, Recipe::load(&options.recipe)?);
+        rig.belong_together()?;
+        rig.need_hand_eye()?;
+        rig.need_pointer()?;
+        let (format, camera_of) = (camera.format(), rig.need_camera()?.value);
+        if [format.width, format.height] != [camera_of.width, camera_of.height] {
+            return Err(Fault::input(format!(
+                "the camera sends {}x{}, the station was calibrated with {}x{}",
+                format.width, format.height, camera_of.width, camera_of.height
+            ))
+            .cause("another camera, or another region of it")
+            .next("set the camera as it was calibrated, or calibrate it anew"));
+        }
+        if settings.tool.is_none() {
+            return Err(Fault::usage("where the gripper's tool is on the flange is not known")
+                .cause("station.toml has no [tool]")
+                .next("write [tool] with flange_from_tool = [16 numbers] (docs/robots.md)"));
+        }
+        crate::files::make_folder(&options.out)?;
+        let state = match JobState::load(&options.out)? {
+            Some(state) => state,
+            None => JobState::new(guard.link().pose()?.base_from_flange),
+        };
+        let eye = Eye::new(camera, settings.outputs.unwrap_or_default());
+        Ok(Job { options, settings, rig, recipe, guard, eye, operator, state, found: None, since: Instant::now() })
+    }
+
+    /// Does what is left. Whatever stops it, the report says why; the arm stands still then.
+    ///
+    /// # Errors
+    /// The job's own files cannot be written.
+    pub fn run(mut self) -> Result<JobReport> {
+        self.pick_up()?;
+        while !matches!(self.state.phase, Phase::Done | Phase::Stopped) {
+            let (phase, step) = (self.state.phase, self.step());
+            match step {
+                Ok(next) => self.state.phase = next,
+                Err(fault) => {
+                    self.operator.tell(&format!("stopped: {}", fault.what));
+                    self.state.why = fault.what;
+                    // After the component was let go the tool only has to come back: that may be asked for again.
+                    let comes_back = phase == Phase::Retract && self.state.released;
+                    self.state.phase = if comes_back { Phase::Retract } else { Phase::Stopped };
+                    self.state.moving = self.guard.unknown().is_some();
+                    self.store()?;
+                    break;
+                }
+            }
+            self.store()?;
+        }
+        let report = JobReport::of(&self.state, self.found.take());
+        let text = serde_json::to_string_pretty(&report).expect("plain data");
+        crate::files::write(&self.options.out.join("report.json"), text.as_bytes())?;
+        // Lasers off, whatever happened; a controller that does not answer has said so already.
+        let _ = self.eye.light(self.guard.link(), None);
+        Ok(report)
+    }
+
+    /// After a crash: a scan that was not finished is made anew; after a motion that was cut off the tool backs out.
+    fn pick_up(&mut self) -> Result<()> {
+        if !self.state.moving {
+            return Ok(());
+        }
+        self.operator.tell("the last motion was cut off: where the arm is was not known, look at the robot");
+        self.guard.looked()?;
+        self.state.moving = false;
+        self.state.phase = match self.state.phase {
+            Phase::Touch | Phase::Scan | Phase::Find => Phase::Touch,
+            // Down at the part there is only one way that is known to be free: back up.
+            _ => Phase::Retract,
+        };
+        self.store()
+    }
+
+    fn store(&mut self) -> Result<()> {
+        self.state.seconds += std::mem::replace(&mut self.since, Instant::now()).elapsed().as_secs_f64();
+        self.state.store(&self.options.out)
+    }
+
+    fn step(&mut self) -> Result<Phase> {
+        match self.state.phase {
+            Phase::Touch => self.touch(),
+            Phase::Scan => self.scan(),
+            Phase::Find => self.find(),
+            Phase::Approach => self.approach(),
+            Phase::Insert => self.insert(),
+            Phase::Retract => self.retract(),
+            done => Ok(done),
+        }
+    }
+
+    fn speed(&self) -> f64 {
+        let of_station = self.guard.limits().map_or(50.0, |l| l.speed_mm_s);
+        self.options.speed_mm_s.unwrap_or(of_station)
+    }
+
+    fn leg(&self, to: Rigid<Base, Flange>) -> Motion {
+        Motion { to, way: Way::Straight, speed_mm_s: self.speed() }
+    }
+
+    /// Proposes, asks, writes down that something moves, moves, writes down that it has ended.
+    fn go(
+        &mut self,
+        step: &'static str,
+        says: Vec<String>,
+        question: &'static str,
+        plan: Plan,
+        each: &mut dyn FnMut(&mut Eye, &mut dyn Arm, usize) -> Result<()>,
+    ) -> Result<()> {
+        let proposal = self.guard.propose(plan)?;
+        if !proposal.passed() {
+            return Err(Fault::refused(format!("{step}: {}", proposal.missed().join("; ")))
+                .next("look at what is named, then begin again"));
+        }
+        let Some(yes) = self.operator.confirm(&Ask { step, says, question, proposal: &proposal })? else {
+            return Err(Fault::refused(format!("stopped at '{step}' by the operator"))
+                .next("begin again when the cell is ready"));
+        };
+        self.state.confirmations += 1;
+        self.state.moving = true;
+        self.store()?;
+        let eye = &mut self.eye;
+        self.guard.make(&proposal, yes, &mut |arm, k| each(eye, arm, k))?;
+        self.state.moving = false;
+        self.store()
+    }
+
+    fn plan(&self, name: &str, why: String, legs: Vec<Motion>, evidence: Evidence) -> Plan {
+        let tool_at = self.settings.tool.map(|t| t.flange_from_tool.translation);
+        Plan { name: name.into(), why, legs, tool_at, evidence }
+    }
+
+    /// The pointer on the board: once from where the arm stands, then from places around it.
+    fn touch(&mut self) -> Result<Phase> {
+        let hand_eye = self.rig.need_hand_eye()?.value;
+        let (first, at) = self.first_touch()?;
+        let then = volume::view(&self.settings, &self.rig)?.middle();
+        let camera = self.rig.need_camera()?.value;
+        let half = [f64::from(camera.width) / camera.fx, f64::from(camera.height) / camera.fy]
+            .map(|share| 0.28 * share * then);
+        let pointer = self.rig.need_pointer()?.value;
+        let poses = places::touches(&(at * hand_eye), &hand_eye, &pointer, [first, then], half);
+        let count = poses.len();
+        let legs = poses.into_iter().map(|p| self.leg(p)).collect();
+        let says = vec![format!(
+            "the board is {first:.1} mm from the camera; the pointer touches it at {count} places, from {then:.0} mm"
+        )];
+        let plan = self.plan("touch", format!("touch the board at {count} places"), legs, Evidence::default());
+        let folder = self.options.out.join("touch");
+        let mut record = Record::begin(&folder, "touch", Beam::Pointer, self.eye.format())?;
+        self.go("touch", says, "is the way free?", plan, &mut |eye, arm, _| {
+            shoot(eye, arm, &mut record, Some(Beam::Pointer))
+        })?;
+        let run = RangeRun { one_surface: true, ..RangeRun::default() };
+        let touched = measure_range(&record.end()?, &self.rig, &run)?;
+        let surface = touched.surface.as_ref().expect("asked for");
+        if !(surface.rms_mm <= FLAT * then) {
+            return Err(Fault::refused(format!(
+                "the touched points lie {:.2} mm about their plane, limit {:.2}",
+                surface.rms_mm,
+                FLAT * then
+            ))
+            .cause("the pointer met parts or the table instead of the board")
+            .next("jog the arm so that more of the bare board is in view, then begin again"));
+        }
+        let [normal, centre] = [surface.normal, surface.centre_mm].map(Vec3::from);
+        self.operator.tell(&format!(
+            "normal {:.4} {:.4} {:.4}, good to {:.3} degrees; points to {:.3} mm",
+            normal.x, normal.y, normal.z, surface.tilt_sigma_deg[0], surface.rms_mm
+        ));
+        self.state.surface = Some([centre, normal]);
+        Ok(Phase::Scan)
+    }
+
+    /// How far the board is, and where the flange stood; nothing moves.
+    fn first_touch(&mut self) -> Result<(f64, Rigid<Base, Flange>)> {
+        let mut record =
+            Record::begin(&self.options.out.join("first"), "first touch", Beam::Pointer, self.eye.format())?;
+        let link = self.guard.link();
+        shoot(&mut self.eye, link, &mut record, Some(Beam::Pointer))?;
+        let at = link.pose()?.base_from_flange;
+        let seen = measure_range(&record.end()?, &self.rig, &RangeRun::default());
+        let missing = |what: String| {
+            Fault::refused(format!("the pointer's spot is not in the first picture: {what}"))
+                .cause("the board is out of view or out of the pointer's range, or the pointer is not switched by its output")
+                .next("jog the arm until the board is in view, look whether the pointer is lit, then begin again")
+        };
+        let seen = seen.map_err(|e| missing(e.what))?;
+        let first = seen
+            .distances
+            .first()
+            .ok_or_else(|| missing(seen.missing.first().map_or_else(String::new, |m| m.1.clone())))?;
+        Ok((first.along_axis_mm, at))
+    }
+
+    /// Looks squarely at the board, and sweeps the line over it.
+    fn scan(&mut self) -> Result<Phase> {
+        let Some([centre, normal]) = self.state.surface else { return Ok(Phase::Touch) };
+        let hand_eye = self.rig.need_hand_eye()?.value;
+        let camera = self.rig.need_camera()?.value;
+        let depth = volume::view(&self.settings, &self.rig)?.middle();
+        let square = self.square(&normal, &centre, depth)?;
+        let field =
+            [f64::from(camera.width) / camera.fx, f64::from(camera.height) / camera.fy].map(|share| share * depth);
+        let length = self.options.sweep_mm.unwrap_or(field[0].min(field[1]));
+        // About two steps a cell of the recipe's map, and no finer than what a pixel sees.
+        let step = (0.6 * self.recipe.cell_mm).max(depth / camera.fx);
+        let path = places::sweep(&square, &hand_eye, &self.rig.need_laser_plane()?.value, depth, length, step);
+        let shots = path.len();
+        let legs = [square].into_iter().chain(path).map(|p| self.leg(p)).collect();
+        let says = vec![format!("the camera {depth:.0} mm above the board, then {shots} shots over {length:.0} mm")];
+        let evidence = Evidence { normal: Some(normal), ..Evidence::default() };
+        let plan = self.plan("scan", format!("look squarely, then {shots} shots over {length:.0} mm"), legs, evidence);
+        let mut record = Record::begin(&self.options.out.join("line"), "scan", Beam::Line, self.eye.format())?;
+        self.go("scan", says, "is the path free?", plan, &mut |eye, arm, k| match k {
+            0 => {
+                std::thread::sleep(SETTLE);
+                let at = arm.pose()?;
+                record.ambient(&eye.picture(arm, None)?, &at)
+            }
+            _ => shoot(eye, arm, &mut record, Some(Beam::Line)),
+        })?;
+        let recording = record.end()?;
+        let folder = self.options.out.join("scan");
+        let run =
+            ScanOptions { place: self.options.place, ..ScanOptions::for_station(&self.settings, &self.rig, &folder) };
+        let scanned = scan_recording(&recording, None, &self.rig, &run, |_, _| {})?;
+        self.operator.tell(&format!("{} points from {} shots", scanned.points, scanned.shots));
+        self.state.scanned_at = Some(now_s());
+        Ok(Phase::Find)
+    }
+
+    /// The flange pose from which the camera looks along the normal at the board, turned as it is now.
+    fn square(&mut self, normal: &Vec3, centre: &Vec3, depth: f64) -> Result<Rigid<Base, Flange>> {
+        let hand_eye = self.rig.need_hand_eye()?.value;
+        let start = self.state.start * hand_eye;
+        let x = start.rotation.column(0).into_owned();
+        let x = (x - normal * x.dot(normal)).normalize();
+        let z = -normal;
+        let rotation = Mat3::from_columns(&[x, z.cross(&x), z]);
+        // The foot of the axis stays where the operator has put it, on the plane that was touched.
+        let axis = start.rotation.column(2).into_owned();
+        let foot = start.translation + axis * ((centre - start.translation).dot(normal) / axis.dot(normal));
+        let camera: Rigid<Base, crate::geometry::Camera> = Rigid::new(rotation, foot + normal * depth);
+        Ok(camera * hand_eye.inverse())
+    }
+
+    fn find(&mut self) -> Result<Phase> {
+        let Some([_, normal]) = self.state.surface else { return Ok(Phase::Touch) };
+        let folder = self.options.out.join("scan");
+        let cloud = cloud_of(&folder)?;
+        let options = LocateOptions { up: Some(normal), robot: self.options.robot, accelerator: None, expected: None };
+        let report = locate(&cloud, &self.recipe, Some(&self.rig), &options)?;
+        picture::draw(&report, &self.recipe.drawing()).save_png(&self.options.out.join("found.png"))?;
+        let tilt = report.base_from_part.direction(&Vec3::z()).dot(&normal).clamp(-1.0, 1.0).acos().to_degrees();
+        let (poses, reasons) = (report.poses.clone(), report.reasons.join("; "));
+        self.operator.tell(&format!(
+            "'{}' with score {:.3}, {tilt:.2} degrees off the board",
+            report.recipe, report.found.score
+        ));
+        self.found = Some(report);
+        let Some(poses) = poses else {
+            return Err(Fault::refused(format!("no pose: {reasons}")).next("look at found.png"));
+        };
+        if tilt > self.options.max_tilt_deg {
+            return Err(Fault::refused(format!(
+                "the part's top is {tilt:.2} degrees off the touched board, limit {}",
+                self.options.max_tilt_deg
+            ))
+            .cause("the part is not fully seated, or it is another one")
+            .next("look at the board, then begin again"));
+        }
+        let tool = self.settings.tool.expect("asked for").flange_from_tool.inverse();
+        self.state.poses = Some([&poses.approach, &poses.insertion, &poses.retract].map(|p| p.base_from_tool * tool));
+        Ok(Phase::Approach)
+    }
+
+    /// What a motion towards the part rests on.
+    fn evidence(&self) -> Result<Evidence> {
+        let scan = load_report(&self.options.out.join("scan"))?;
+        let mut measured: Vec<Gate> = self.found.as_ref().map_or(Vec::new(), |f| f.gates.clone());
+        if let Some(f) = &self.found {
+            measured.push(Gate::most(
+                "3 sigma in the plane, mm",
+                3.0 * f.sigma_mm[0].max(f.sigma_mm[1]),
+                f.tolerance_mm,
+            ));
+        }
+        Ok(Evidence {
+            normal: self.state.surface.map(|s| s[1]),
+            fingerprints: Some((self.rig.fingerprint(), scan.rig_fingerprint)),
+            scan_age_s: Some(self.state.scanned_at.map_or(f64::NAN, |t| now_s() - t)),
+            measured,
+        })
+    }
+
+    fn approach(&mut self) -> Result<Phase> {
+        if self.found.is_none() {
+            // Taken up after a crash: what was found is found again, in the same scan.
+            self.find()?;
+        }
+        let [above, ..] = self.state.poses.expect("found");
+        // Sideways at the height where it stands, then down: nothing is crossed that was not seen.
+        let at = self.guard.link().pose()?.base_from_flange;
+        let normal = self.state.surface.map_or(Vec3::z(), |s| s[1]);
+        let higher = (at.translation - above.translation).dot(&normal).max(0.0);
+        let over = Rigid::new(above.rotation, above.translation + normal * higher);
+        let numbers = self.options.robot.write(&above);
+        let says = vec![format!("above the part: {}", written(&numbers))];
+        let plan = self.plan(
+            "approach",
+            "go above the part that was found".into(),
+            vec![self.leg(over), self.leg(above)],
+            self.evidence()?,
+        );
+        self.go("approach", says, "is the part where the picture shows it? go above it?", plan, &mut |_, _, _| Ok(()))?;
+        self.store()?;
+        self.state.seconds_to_position = Some(self.state.seconds);
+        self.state.confirmations_to_position = Some(self.state.confirmations);
+        Ok(Phase::Insert)
+    }
+
+    fn insert(&mut self) -> Result<Phase> {
+        if self.found.is_none() {
+            self.find()?;
+        }
+        let [_, down, _] = self.state.poses.expect("found");
+        let says = vec![format!("insertion: {}", written(&self.options.robot.write(&down)))];
+        let plan = self.plan("insert", "insert the component".into(), vec![self.leg(down)], self.evidence()?);
+        self.go("insert", says, "insert?", plan, &mut |_, _, _| Ok(()))?;
+        let gripper = self.settings.outputs.unwrap_or_default().gripper;
+        self.guard.link().put_output(gripper, false)?;
+        self.state.released = true;
+        Ok(Phase::Retract)
+    }
+
+    /// Up along the way down, also from a motion that was cut off.
+    fn retract(&mut self) -> Result<Phase> {
+        let at = self.guard.link().pose()?.base_from_flange;
+        let up = match (self.state.poses, self.state.surface) {
+            (Some([_, down, up]), _) => {
+                (up.translation - down.translation).normalize()
+                    * ((up.translation - at.translation).dot(&(up.translation - down.translation).normalize())).max(0.0)
+            }
+            (None, Some([_, normal])) => normal * 30.0,
+            (None, None) => Vec3::zeros(),
+        };
+        if up.norm() > 0.05 {
+            let to = Rigid::new(at.rotation, at.translation + up);
+            let plan = self.plan("retract", "back up the way it came".into(), vec![self.leg(to)], Evidence::default());
+            let question = if self.state.released { "is the component in? retract?" } else { "back out?" };
+            self.go("retract", vec![format!("{:.0} mm up", up.norm())], question, plan, &mut |_, _, _| Ok(()))?;
+        }
+        if !self.state.released {
+            return Err(
+                Fault::refused("backed out: nothing was inserted").next("look at the cell, then begin a new job")
+            );
+        }
+        Ok(Phase::Done)
+    }
+}
+
+/// A picture of a beam with the pose at which it was taken; the arm stood still before and after, or it is refused.
+fn shoot(eye: &mut Eye, arm: &mut dyn Arm, record: &mut Record, beam: Option<Beam>) -> Result<()> {
+    /// As far apart as two readings of an arm that stands may be, mm and rad.
+    const STILL: [f64; 2] = [0.01, 1e-4];
+    std::thread::sleep(SETTLE);
+    let before = arm.pose()?;
+    let picture = eye.picture(arm, beam)?;
+    let after = arm.pose()?;
+    let (angle, mm) = before.base_from_flange.difference(&after.base_from_flange);
+    if mm > STILL[0] || angle > STILL[1] {
+        return Err(Fault::refused(format!(
+            "the arm moved by {mm:.3} mm while the picture was taken, limit {}",
+            STILL[0]
+        ))
+        .cause("it still swings, or somebody jogs it")
+        .next("begin again"));
+    }
+    record.shot(&picture, &after)
+}
+
+fn written(numbers: &[f64]) -> String {
+    numbers.iter().map(|x| format!("{x:.3}")).collect::<Vec<_>>().join(" ")
+}
+
+fn now_s() -> f64 {
+    jiff::Timestamp::now().as_millisecond() as f64 * 1e-3
+}

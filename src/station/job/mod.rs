@@ -1,0 +1,17 @@
+//! In: a robot behind its rules, a camera, a station, a recipe, a person who confirms. Out: touch, square, scan, find, approach,
+//! insert, retract: one state machine with its state on disk. The command line, the screen and scripts run this one.
+//! Frame and unit: base frame; mm, degrees.
+
+pub(in crate::station) mod eye;
+mod machine;
+mod operator;
+mod places;
+mod record;
+mod report;
+mod state;
+
+pub use eye::Eye;
+pub use machine::{Job, JobOptions};
+pub use operator::{Ask, Operator};
+pub use report::{JobReport, Outcome};
+pub use state::{JobState, Phase};

@@ -1,0 +1,26 @@
+//! In: what a job is about to do. Out: a person's yes or no; what he is told.
+//! Frame and unit: none.
+
+use crate::arm::rules::{Confirmation, Proposal};
+use crate::fault::Result;
+
+/// What a person is asked.
+#[derive(Clone, Debug)]
+pub struct Ask<'a> {
+    /// One or two words, as the steps are called.
+    pub step: &'static str,
+    /// What was found, a sentence a line.
+    pub says: Vec<String>,
+    /// The question.
+    pub question: &'static str,
+    /// The motion, with its gates; all of them are met.
+    pub proposal: &'a Proposal,
+}
+
+/// A person, or what stands for one.
+pub trait Operator {
+    /// Shows a motion and asks. `None` is a no.
+    fn confirm(&mut self, ask: &Ask) -> Result<Option<Confirmation>>;
+    /// Says what happens.
+    fn tell(&mut self, line: &str);
+}

@@ -1,0 +1,86 @@
+//! In: where the camera stands, how far the board is, how the beams lie in the camera's frame. Out: flange poses from which the
+//! pointer touches the board around the picture's middle, and along which the line sweeps over it. Pure.
+//! Frame and unit: base_from_flange, mm.
+
+use crate::geometry::{Base, Camera, Flange, Plane, Ray, Rigid, Vec2, Vec3};
+
+/// Touches lie at these shares of the field around its middle: corners and the middles of the picture's long sides, where a long
+/// part along the stripe is not.
+const TOUCHES: [[f64; 2]; 6] = [[-1.0, -1.0], [0.0, -1.0], [1.0, -1.0], [1.0, 1.0], [0.0, 1.0], [-1.0, 1.0]];
+
+/// Flange poses from which the pointer's spots lie around the foot of the camera's axis, `half` mm to each side. The camera stands
+/// `now` from the board along its axis, and goes to `then`.
+pub fn touches(
+    base_from_camera: &Rigid<Base, Camera>,
+    flange_from_camera: &Rigid<Flange, Camera>,
+    pointer: &Ray<Camera>,
+    [now, then]: [f64; 2],
+    half: [f64; 2],
+) -> Vec<Rigid<Base, Flange>> {
+    let spot = pointer.at((then - pointer.origin.z) / pointer.direction.z);
+    let place = |[x, y]: &[f64; 2]| {
+        let shift = Vec3::new(x * half[0] - spot.x, y * half[1] - spot.y, now - then);
+        *base_from_camera * Rigid::<Camera, Camera>::from_vectors(&Vec3::zeros(), shift) * flange_from_camera.inverse()
+    };
+    TOUCHES.iter().map(place).collect()
+}
+
+/// Flange poses of a sweep: the camera looks as it does at `square`, `depth` from the board, and goes along the direction across
+/// its stripe so that the stripe passes over `length` mm about the foot of the axis, in steps.
+pub fn sweep(
+    square: &Rigid<Base, Flange>,
+    flange_from_camera: &Rigid<Flange, Camera>,
+    plane: &Plane<Camera>,
+    depth: f64,
+    length: f64,
+    step: f64,
+) -> Vec<Rigid<Base, Flange>> {
+    let across = Vec2::new(plane.normal.x, plane.normal.y);
+    let d = across / across.norm();
+    // Where the stripe is along that direction, at the board.
+    let stripe = (plane.offset - plane.normal.z * depth) / across.norm();
+    let shots = (length / step).ceil().max(1.0) as usize + 1;
+    (0..shots)
+        .map(|k| {
+            let along = -length / 2.0 + length * k as f64 / (shots - 1) as f64 - stripe;
+            let shift = Rigid::<Camera, Camera>::from_vectors(&Vec3::zeros(), Vec3::new(d.x, d.y, 0.0) * along);
+            *square * *flange_from_camera * shift * flange_from_camera.inverse()
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn spots_and_stripe_lie_where_they_are_wanted() {
+        let hand_eye: Rigid<Flange, Camera> =
+            Rigid::from_vectors(&Vec3::new(0.02, -0.01, -1.5), Vec3::new(-46.0, 1.4, 93.0));
+        let camera: Rigid<Base, Camera> = Rigid::new(
+            crate::geometry::Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0)),
+            Vec3::new(300.0, 20.0, 310.0),
+        );
+        let pointer = Ray::new(Vec3::new(41.0, 9.0, 12.0), Vec3::new(-41.0, -6.0, 178.0)).unwrap();
+        let floor = Plane::<Base>::new(Vec3::z(), 0.0).unwrap();
+        for (flange, [x, y]) in touches(&camera, &hand_eye, &pointer, [310.0, 155.0], [45.0, 34.0]).iter().zip(TOUCHES)
+        {
+            let at = *flange * hand_eye;
+            let spot =
+                Ray::new(at.point(&pointer.origin), at.direction(&pointer.direction)).unwrap().meet(&floor).unwrap();
+            assert!((spot - Vec3::new(300.0 + 45.0 * x, 20.0 - 34.0 * y, 0.0)).norm() < 1e-9, "{spot:?}");
+            assert!((at.translation.z - 155.0).abs() < 1e-9);
+        }
+        let plane = Plane::<Camera>::new(Vec3::new(0.05, 0.85, 0.5).normalize(), 60.0).unwrap();
+        let square = camera * hand_eye.inverse();
+        let path = sweep(&square, &hand_eye, &plane, 310.0, 50.0, 0.5);
+        assert_eq!(path.len(), 101);
+        // Where the sheet cuts the floor, nearest to the axis' foot: from -25 to 25 mm across the stripe.
+        let at = |flange: &Rigid<Base, Flange>| {
+            let sheet = (*flange * hand_eye).plane(&plane);
+            let n = Vec2::new(sheet.normal.x, sheet.normal.y);
+            (n.dot(&Vec2::new(300.0, 20.0)) - sheet.offset) / n.norm()
+        };
+        assert!((at(&path[0]) - at(&path[100])).abs() - 50.0 < 1e-9 && (at(&path[0]) + at(&path[100])).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,227 @@
+//! In: plans of which one thing is wrong, confirmations that do not belong, links and people that go while the arm moves. Out:
+//! no motion in the controller's log, or a Halt there in time.
+//! Frame and unit: base frame; mm, degrees; ms.
+
+use super::cell;
+use sheetlight::arm::rules::{Confirmation, Evidence, Guard, Limits, MotionLog, Plan, Space, StopButton};
+use sheetlight::arm::{Motion, Way};
+use sheetlight::cell::{Event, Served};
+use sheetlight::fault::Gate;
+use sheetlight::geometry::{Rigid, Vec3, exp};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
+use std::time::{Duration, Instant};
+
+const SPACE: Space = Space { from_mm: [150.0, -300.0, 200.0], to_mm: [500.0, 300.0, 700.0] };
+
+fn guard(served: &Served, change: impl FnOnce(&mut Limits)) -> Guard {
+    served.controller.set_motor(true);
+    let mut limits = Limits::within(SPACE);
+    change(&mut limits);
+    let mut guard = Guard::new(sheetlight::arm::open(&served.robot_uri()).unwrap(), Some(limits), MotionLog::default());
+    guard.arm(true).unwrap();
+    guard
+}
+
+/// A straight motion from the start pose by so much, at a speed.
+fn leg(guard: &mut Guard, by: [f64; 3], speed_mm_s: f64) -> Motion {
+    let at = guard.link().pose().unwrap().base_from_flange;
+    Motion { to: Rigid::new(at.rotation, at.translation + Vec3::from(by)), way: Way::Straight, speed_mm_s }
+}
+
+fn plan(legs: Vec<Motion>) -> Plan {
+    Plan { name: "test".into(), why: "a test".into(), legs, tool_at: None, evidence: Evidence::default() }
+}
+
+/// What making a plan says; its own hash confirms it.
+fn made(guard: &mut Guard, plan: Plan) -> Result<(), String> {
+    let proposal = guard.propose(plan).map_err(|e| e.to_string())?;
+    let yes = Confirmation::of(&*proposal.hash);
+    guard.make(&proposal, yes, &mut |_, _| Ok(())).map_err(|e| e.to_string())
+}
+
+#[test]
+fn each_gate_that_is_broken_by_itself_moves_nothing() {
+    let served = cell(4, 50.0);
+    let mut refusals = Vec::new();
+    let mut broken =
+        |says: &str, limits: &dyn Fn(&mut Limits), breaks: &dyn Fn(&mut Plan, &Served), mends: &dyn Fn(&Served)| {
+            let mut guard = guard(&served, |l| limits(l));
+            let good = leg(&mut guard, [10.0, 0.0, -20.0], 50.0);
+            let mut plan = plan(vec![good]);
+            let before = served.cell.moves();
+            breaks(&mut plan, &served);
+            let said = made(&mut guard, plan).expect_err(says);
+            mends(&served);
+            assert!(said.contains(says), "'{says}' is not in: {said}");
+            assert_eq!(served.cell.moves(), before, "{says}");
+            refusals.push(said.lines().next().unwrap_or("").to_owned());
+        };
+    let (none, nothing) = (|_: &mut Limits| {}, |_: &Served| {});
+    let up = |p: &mut Plan| p.evidence.normal = Some(Vec3::z());
+    let poses: [(&str, &dyn Fn(&mut Plan)); 11] = [
+        ("departure from a rotation", &|p| p.legs[0].to.rotation[(0, 0)] = f64::NAN),
+        ("departure from a rotation", &|p| p.legs[0].to.rotation *= 1.001),
+        ("speed, mm/s is 51.000, limit 50.000", &|p| p.legs[0].speed_mm_s = 51.0),
+        ("slowest speed", &|p| p.legs[0].speed_mm_s = 0.0),
+        ("slowest speed", &|p| p.legs[0].speed_mm_s = f64::NAN),
+        ("outside the workspace, mm is 20.000, limit 0.000", &|p| p.legs[0].to.translation.x = 520.0),
+        ("step, mm is 424.617, limit 400.000", &|p| p.legs[0].to.translation += Vec3::new(0.0, 290.0, -290.0)),
+        ("turn, degrees is 130.000, limit 120.000", &|p| {
+            p.legs[0].to.rotation *= exp(&Vec3::new(0.0, 0.0, 130f64.to_radians()))
+        }),
+        ("motions is 0", &|p| p.legs.clear()),
+        ("scan of this calibration", &|p| p.evidence.fingerprints = Some(("a".into(), "b".into()))),
+        ("age of the scan, s is 901.000, limit 900.000", &|p| p.evidence.scan_age_s = Some(901.0)),
+    ];
+    for (says, breaks) in poses {
+        broken(says, &none, &|p, _| breaks(p), &nothing);
+    }
+    broken(
+        "tilt to the measured normal, degrees is 30.000, limit 25.000",
+        &none,
+        &|p, _| {
+            up(p);
+            p.legs[0].to.rotation *= exp(&Vec3::new(30f64.to_radians(), 0.0, 0.0));
+        },
+        &nothing,
+    );
+    broken(
+        "score is 0.400, limit 0.500",
+        &none,
+        &|p, _| p.evidence.measured.push(Gate::least("score", 0.4, 0.5)),
+        &nothing,
+    );
+    let wall = |l: &mut Limits| l.keep_out.push(Space { from_mm: [280.0, -50.0, 560.0], to_mm: [400.0, 50.0, 575.0] });
+    broken("way through a keep-out", &wall, &|_, _| {}, &nothing);
+    broken(
+        "way through a keep-out",
+        &wall,
+        &|p, _| {
+            // The flange goes beside the box, the tool through it.
+            let at = p.legs[0].to.rotation;
+            p.legs[0].to = Rigid::new(at, Vec3::new(320.0, 0.0, 690.0));
+            p.tool_at = Some(Vec3::new(0.0, 0.0, 120.0));
+        },
+        &nothing,
+    );
+    broken("mode", &none, &|_, s| s.controller.set_mode(2), &|s| s.controller.set_mode(3));
+    broken("motor on", &none, &|_, s| s.controller.set_motor(false), &|s| s.controller.set_motor(true));
+    broken("number of the tool is 1.000, limit 0.000", &none, &|_, s| s.controller.set_frames(1, 0), &|s| {
+        s.controller.set_frames(0, 0)
+    });
+    broken("number of the work frame is 3", &none, &|_, s| s.controller.set_frames(0, 3), &|s| {
+        s.controller.set_frames(0, 0)
+    });
+    broken("83204072", &none, &|_, s| s.controller.fail(0x8320_4072), &|s| s.controller.clear_errors());
+    broken("emergency stop", &none, &|_, s| s.controller.emergency_stop(), &|s| {
+        s.controller.release_emergency_stop();
+        s.controller.clear_errors();
+        s.controller.set_motor(true);
+    });
+    broken(
+        "out of reach",
+        &|l| l.workspace.to_mm = [900.0; 3],
+        &|p, _| p.legs[0].to.translation += Vec3::new(300.0, 200.0, 0.0),
+        &nothing,
+    );
+    broken(
+        "fence",
+        &none,
+        &|_, s| s.controller.set_fence(Some([Vec3::new(305.0, -5.0, 560.0), Vec3::new(320.0, 5.0, 575.0)])),
+        &|s| s.controller.set_fence(None),
+    );
+    println!("{} gates broken, 0 moves:\n  {}", refusals.len(), refusals.join("\n  "));
+}
+
+#[test]
+fn one_confirmation_moves_once_and_only_what_was_shown() {
+    let served = cell(5, 50.0);
+    let mut guard = guard(&served, |_| {});
+    let (near, far) = (leg(&mut guard, [0.0, 0.0, -10.0], 50.0), leg(&mut guard, [0.0, 0.0, -40.0], 50.0));
+    let (shown, other) = (guard.propose(plan(vec![near])).unwrap(), guard.propose(plan(vec![far])).unwrap());
+    let same = guard.propose(plan(vec![near])).unwrap();
+    assert!(shown.passed() && shown.hash != same.hash, "each showing has its own hash");
+    let mut make = |p, hash: &str| guard.make(p, Confirmation::of(hash), &mut |_, _| Ok(())).map_err(|e| e.what);
+    assert!(make(&other, &shown.hash).unwrap_err().contains("the confirmation is of"));
+    assert!(make(&same, &shown.hash).is_err() && make(&shown, "").is_err());
+    assert_eq!(served.cell.moves(), 0);
+    make(&shown, &shown.hash).unwrap();
+    assert!(make(&shown, &shown.hash).unwrap_err().contains("was used"));
+    assert!(make(&other, &other.hash).unwrap_err().contains("the arm moved by 10.00 mm"), "it starts elsewhere now");
+    assert_eq!(served.cell.moves(), 1);
+}
+
+#[test]
+fn nothing_moves_unarmed_nor_while_another_has_the_arm() {
+    let served = cell(6, 50.0);
+    served.controller.set_motor(true);
+    let open = || sheetlight::arm::open(&served.robot_uri()).unwrap();
+    let mut reader = Guard::new(open(), Some(Limits::within(SPACE)), MotionLog::default());
+    let good = leg(&mut reader, [0.0, 0.0, -10.0], 50.0);
+    assert!(made(&mut reader, plan(vec![good])).unwrap_err().contains("armed"));
+    assert!(reader.arm(false).unwrap_err().next.contains("--allow-motion"));
+    assert!(Guard::new(open(), None, MotionLog::default()).arm(true).unwrap_err().cause.contains("[motion]"));
+    let _first = guard(&served, |_| {});
+    let said = reader.arm(true).unwrap_err().what;
+    assert!(said.contains("TakeArm") && said.contains("8320F001"), "{said}");
+    assert_eq!(served.cell.moves(), 0);
+}
+
+/// Stops a motion of 100 mm at 20 mm/s: how long after it was asked for the Halt was at the controller (ms of the cell, which
+/// runs in real time), and what the guard says.
+fn stopped(uri: &str, does: impl FnOnce(&Served, &StopButton, &AtomicBool)) -> (f64, String) {
+    let served = cell(7, 1.0);
+    served.controller.set_motor(true);
+    let link = sheetlight::arm::open(&format!("{}{uri}", served.robot_uri())).unwrap();
+    let limits = Limits { max_silence_ms: 200.0, ..Limits::within(SPACE) };
+    let mut guard = Guard::new(link, Some(limits), MotionLog::default());
+    guard.arm(true).unwrap();
+    let (button, signal) = (guard.stop_button(), Arc::new(AtomicBool::new(false)));
+    button.listen(signal.clone());
+    let long = leg(&mut guard, [60.0, 0.0, -80.0], 20.0);
+    let proposal = guard.propose(plan(vec![long])).unwrap();
+    let (said, done) = std::thread::scope(|threads| {
+        let moving = threads.spawn(|| {
+            let yes = Confirmation::of(&*proposal.hash);
+            let said = guard.make(&proposal, yes, &mut |_, _| Ok(())).unwrap_err();
+            assert!(guard.unknown().is_some(), "it must say that the place is unknown");
+            said.what
+        });
+        while served.cell.moves() == 0 {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        std::thread::sleep(Duration::from_millis(150));
+        let done = served.cell.clock().now();
+        does(&served, &button, &signal);
+        (moving.join().unwrap(), done)
+    });
+    let log = served.cell.log();
+    let halt = log.iter().find(|e| matches!(e.event, Event::Halt { moving: true, .. })).expect("a halt");
+    assert_eq!(served.cell.moves(), 1);
+    ((halt.t_s - done) * 1e3, said)
+}
+
+#[test]
+fn whoever_goes_while_the_arm_moves_halts_it_in_time() {
+    let (ms, said) = stopped("", |_, button, _| button.press());
+    assert!(ms < 50.0 && said.contains("STOP"), "{ms} ms: {said}");
+    let (signal, said) = stopped("", |_, _, signal| signal.store(true, SeqCst));
+    assert!(signal < 50.0 && said.contains("told to end"), "{signal} ms: {said}");
+    let (lease, said) = stopped("", |_, button, _| button.lease(Duration::from_millis(100)));
+    assert!(lease < 150.0 && said.contains("lease ran out"), "{lease} ms: {said}");
+    // One call of the link ends its connection: the one that reads poses.
+    let (cut, said) = stopped("", |served, _, _| served.faults.cut.store(1, SeqCst));
+    assert!(cut < 50.0 && said.contains("link was lost"), "{cut} ms: {said}");
+    // The controller's full speed is four times what the link was told.
+    let (fast, said) = stopped("?full=250", |_, _, _| {});
+    assert!(said.contains("mm/s, limit 35") && fast < 1500.0, "{fast} ms: {said}");
+    // Nothing is cut, but no pose comes any more.
+    let begun = Instant::now();
+    let (silent, said) = stopped("", |served, _, _| served.faults.lose.store(1, SeqCst));
+    assert!(silent < 250.0 && said.contains("no pose for"), "{silent} ms: {said}");
+    println!(
+        "halt at the controller after ms: STOP {ms:.1}, signal {signal:.1}, lease of 100 {lease:.1}, link cut {cut:.1}, silence of 200 {silent:.1}; {:?}",
+        begun.elapsed()
+    );
+}
