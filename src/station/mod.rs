@@ -14,6 +14,7 @@ mod values;
 mod verify;
 pub mod volume;
 
+pub use calibrate::auto::arm::ArmCell;
 pub use calibrate::auto::cell::{Cell, Light};
 pub use calibrate::auto::check::SelfCheck;
 pub use calibrate::auto::procedure::{AutoResult, AutoRun, Ended, calibrate_auto};

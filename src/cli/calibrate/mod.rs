@@ -1,6 +1,7 @@
 //! In: a recording and a station. Out: one calibration, stored in the station with its report.
 //! Frame and unit: mm, rad, px; each file names its frames.
 
+mod auto;
 mod axis;
 mod camera;
 mod hand_eye;
@@ -16,6 +17,7 @@ use crate::fault::Result;
 
 #[derive(clap::Subcommand)]
 pub enum Command {
+    Auto(auto::Args),
     Axis(axis::Args),
     Camera(camera::Args),
     HandEye(hand_eye::Args),
@@ -28,6 +30,7 @@ pub enum Command {
 
 pub fn run(command: &Command, console: &Console) -> Result<()> {
     match command {
+        Command::Auto(a) => auto::run(a, console),
         Command::Axis(a) => axis::run(a, console),
         Command::Camera(a) => camera::run(a, console),
         Command::HandEye(a) => hand_eye::run(a, console),

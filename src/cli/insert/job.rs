@@ -126,15 +126,16 @@ fn text(reports: &[JobReport]) -> String {
     reports.iter().map(one).collect::<Vec<_>>().join("\n")
 }
 
-fn on_this_machine(uri: &str) -> bool {
+pub(in crate::cli) fn on_this_machine(uri: &str) -> bool {
     let host = uri.split_once("://").map_or("", |(_, rest)| rest);
     ["127.0.0.1:", "localhost:", "[::1]:"].iter().any(|h| host.starts_with(h))
 }
 
 /// Whoever sits at the terminal.
-struct Person<'a> {
-    console: &'a Console,
-    yes: bool,
+pub(in crate::cli) struct Person<'a> {
+    pub console: &'a Console,
+    /// Every motion is confirmed without asking.
+    pub yes: bool,
 }
 
 impl Operator for Person<'_> {

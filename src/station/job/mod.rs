@@ -2,7 +2,7 @@
 //! insert, retract: one state machine with its state on disk. The command line, the screen and scripts run this one.
 //! Frame and unit: base frame; mm, degrees.
 
-mod eye;
+pub(in crate::station) mod eye;
 mod machine;
 mod operator;
 mod places;

@@ -2,6 +2,7 @@
 //! program chooses: small first ones, then each the one that lowers the expected error most.
 //! Frame and unit: mm, rad, px; each file names its frames.
 
+pub(in crate::station) mod arm;
 pub(in crate::station) mod cell;
 pub(in crate::station) mod check;
 mod first;

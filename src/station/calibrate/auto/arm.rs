@@ -1,0 +1,116 @@
+//! In: a robot behind its rules, a camera with its lights, somebody who confirms. Out: the cell that a calibration drives.
+//! Frame and unit: base_from_flange, mm, mm/s. Every move is shown and confirmed; what the rules do not allow is not made.
+
+use super::cell::{Cell, Light};
+use crate::arm::rules::{Guard, Limits, Plan};
+use crate::arm::{Motion, Outputs, Reach, Way};
+use crate::capture::PictureSource;
+use crate::fault::{Fault, Result};
+use crate::geometry::{Base, Flange, Rigid, exp, log};
+use crate::raster::Image;
+use crate::recording::Beam;
+use crate::station::job::eye::Eye;
+use crate::station::job::{Ask, Operator};
+use std::time::Duration;
+
+/// An arm and its camera swing for a moment after they have arrived.
+const SETTLE: Duration = Duration::from_millis(200);
+/// Legs stay a little below the rules' longest step and widest turn.
+const BELOW: f64 = 0.95;
+
+/// A real cell, or one that is simulated at its wires.
+pub struct ArmCell<'a> {
+    guard: &'a mut Guard,
+    eye: Eye,
+    operator: &'a mut dyn Operator,
+    speed_mm_s: Option<f64>,
+    stops: usize,
+}
+
+impl<'a> ArmCell<'a> {
+    /// `guard` is armed; `speed_mm_s` as asked for, the rules' own limit holds besides.
+    pub fn new(
+        guard: &'a mut Guard,
+        camera: Box<dyn PictureSource>,
+        outputs: Outputs,
+        operator: &'a mut dyn Operator,
+        speed_mm_s: Option<f64>,
+    ) -> ArmCell<'a> {
+        ArmCell { guard, eye: Eye::new(camera, outputs), operator, speed_mm_s, stops: 0 }
+    }
+
+    fn limits(&self) -> Result<Limits> {
+        self.guard.limits().cloned().ok_or_else(|| {
+            Fault::refused("no workspace is stated: nothing says where the arm may be")
+                .cause("station.toml has no [motion]")
+                .next("write [motion] with workspace = { from_mm = [...], to_mm = [...] } (docs/robots.md)")
+        })
+    }
+}
+
+/// A straight way in steps that keep the rules.
+fn legs(from: &Rigid<Base, Flange>, to: &Rigid<Base, Flange>, limits: &Limits, speed_mm_s: f64) -> Vec<Motion> {
+    let turn = log(&(to.rotation * from.rotation.transpose()));
+    let shift = to.translation - from.translation;
+    let steps = shift.norm() / (BELOW * limits.max_step_mm);
+    let turns = turn.norm().to_degrees() / (BELOW * limits.max_turn_deg);
+    let n = steps.max(turns).ceil().max(1.0) as usize;
+    let at = |u: f64| Rigid::new(exp(&(turn * u)) * from.rotation, from.translation + shift * u);
+    let leg = |k: usize| if k == n { *to } else { at(k as f64 / n as f64) };
+    (1..=n).map(|k| Motion { to: leg(k), way: Way::Straight, speed_mm_s }).collect()
+}
+
+impl Cell for ArmCell<'_> {
+    fn pose(&mut self) -> Result<Rigid<Base, Flange>> {
+        Ok(self.guard.link().pose()?.base_from_flange)
+    }
+
+    fn may(&mut self, to: &Rigid<Base, Flange>) -> Result<bool> {
+        let (limits, from) = (self.limits()?, self.pose()?.translation);
+        let free = limits.workspace.outside(&to.translation) <= 0.0
+            && limits.keep_out.iter().all(|k| k.inside_of(&from, &to.translation) <= 0.0);
+        Ok(free && !matches!(self.guard.link().reach(to)?, Reach::Refused(_)))
+    }
+
+    fn go(&mut self, to: &Rigid<Base, Flange>) -> Result<Rigid<Base, Flange>> {
+        let (limits, from) = (self.limits()?, self.pose()?);
+        let speed = self.speed_mm_s.map_or(limits.speed_mm_s, |s| s.min(limits.speed_mm_s));
+        let legs = legs(&from, to, &limits, speed);
+        let last = *legs.last().expect("one or more");
+        let plan = Plan { legs, ..Plan::single("calibrate", "the next picture of the board", last) };
+        let proposal = self.guard.propose(plan)?;
+        if !proposal.passed() {
+            return Err(Fault::refused(proposal.missed().join("; "))
+                .cause("what is named is not as it has to be")
+                .next("put it right and begin again; the arm stands still"));
+        }
+        self.stops += 1;
+        let t = to.translation;
+        let says = vec![format!("stop {}: flange to {:.1} {:.1} {:.1} mm", self.stops, t.x, t.y, t.z)];
+        let ask = Ask { step: "calibrate", says, question: "go there?", proposal: &proposal };
+        let Some(confirmation) = self.operator.confirm(&ask)? else {
+            return Err(Fault::refused("the move was not confirmed")
+                .cause("somebody said no")
+                .next("begin again where the arm may move"));
+        };
+        self.guard.make(&proposal, confirmation, &mut |_, _| Ok(()))?;
+        std::thread::sleep(SETTLE);
+        self.pose()
+    }
+
+    fn picture(&mut self, light: Light) -> Result<Image> {
+        let beam = match light {
+            Light::Room => None,
+            Light::Line => Some(Beam::Line),
+            Light::Pointer => Some(Beam::Pointer),
+        };
+        self.eye.picture(self.guard.link(), beam)
+    }
+}
+
+impl Drop for ArmCell<'_> {
+    /// No laser stays on, whatever ended it.
+    fn drop(&mut self) {
+        let _ = self.eye.light(self.guard.link(), None);
+    }
+}
