@@ -93,7 +93,7 @@ pub fn delay(shots: &[Vec<Passing>], up: &Vec3) -> Result<Delay> {
     let mut fine = Vec::new();
     for _ in 0..ROUNDS {
         fine = costs(&pairs, spacing, scale, (-8..=8).map(|k| seconds + f64::from(k) * 0.25 * step));
-        let next = lowest(&fine, None).filter(|s| s.abs() < FARTHEST).ok_or_else(|| flat())?;
+        let next = lowest(&fine, None).filter(|s| s.abs() < FARTHEST).ok_or_else(flat)?;
         let moved = (next - seconds).clamp(-2.0 * step, 2.0 * step);
         seconds += moved;
         if moved.abs() < 0.02 * step {

@@ -81,10 +81,10 @@ impl FolderCamera {
     fn wait(&mut self, within: Duration) -> Event {
         let until = Instant::now() + within;
         loop {
-            if self.looked.elapsed() > SETTLED / 2 {
-                if let Some(event) = self.look() {
-                    return event;
-                }
+            if self.looked.elapsed() > SETTLED / 2
+                && let Some(event) = self.look()
+            {
+                return event;
             }
             let left = until.saturating_duration_since(Instant::now());
             if left.is_zero() {
@@ -102,36 +102,33 @@ impl FolderCamera {
             Ok(names) => names,
             Err(fault) => return Some(Event::Lost(fault)),
         };
-        for path in names.into_iter().filter(|p| !self.done.contains(p)) {
-            let size = std::fs::metadata(&path).map_or(0, |m| m.len());
-            let now = Instant::now();
-            let seen = self.growing.entry(path.clone()).or_insert((size, now, now));
-            if seen.0 != size {
-                (seen.0, seen.1) = (size, now);
-            }
-            // In order of the names: one that is being written holds back those after it.
-            if seen.1.elapsed() < SETTLED {
-                return None;
-            }
-            let given_up = seen.2.elapsed() > SPOILT;
-            match load(&path, Channel::default(), self.bits) {
-                Ok(image) if self.next == 0 || Format::of(&image) == self.format => {
-                    let host_ns = now_ns();
-                    let id = self.over(path);
-                    let picture =
-                        Picture { image, id, device_ns: None, host_ns, exposure_ns: None, count: None, stand: None };
-                    return Some(Event::Picture(Box::new(picture)));
-                }
-                Ok(image) => {
-                    let why =
-                        format!("{}: is {}, the first one was {}", path.display(), Format::of(&image), self.format);
-                    return Some(Event::Incomplete { id: self.over(path), why });
-                }
-                Err(fault) if given_up => return Some(Event::Incomplete { id: self.over(path), why: fault.what }),
-                Err(_) => return None,
-            }
+        let path = names.into_iter().find(|p| !self.done.contains(p))?;
+        let size = std::fs::metadata(&path).map_or(0, |m| m.len());
+        let now = Instant::now();
+        let seen = self.growing.entry(path.clone()).or_insert((size, now, now));
+        if seen.0 != size {
+            (seen.0, seen.1) = (size, now);
         }
-        None
+        // In order of the names: one that is being written holds back those after it.
+        if seen.1.elapsed() < SETTLED {
+            return None;
+        }
+        let given_up = seen.2.elapsed() > SPOILT;
+        match load(&path, Channel::default(), self.bits) {
+            Ok(image) if self.next == 0 || Format::of(&image) == self.format => {
+                let host_ns = now_ns();
+                let id = self.over(path);
+                let picture =
+                    Picture { image, id, device_ns: None, host_ns, exposure_ns: None, count: None, stand: None };
+                Some(Event::Picture(Box::new(picture)))
+            }
+            Ok(image) => {
+                let why = format!("{}: is {}, the first one was {}", path.display(), Format::of(&image), self.format);
+                Some(Event::Incomplete { id: self.over(path), why })
+            }
+            Err(fault) if given_up => Some(Event::Incomplete { id: self.over(path), why: fault.what }),
+            Err(_) => None,
+        }
     }
 
     fn over(&mut self, path: PathBuf) -> u64 {

@@ -93,7 +93,7 @@ impl Connection {
     pub fn answer(&mut self, number: u32, arguments: &[Variant]) -> Answer {
         let Some(call) = Call::of(number) else { return Answer::Done(Outcome::NOT_IMPLEMENTED, None) };
         if call == Call::RobotMove {
-            return match self.started.then(|| self.begin_move(arguments)).unwrap_or(Err(Outcome::NOT_STARTED)) {
+            return match if self.started { self.begin_move(arguments) } else { Err(Outcome::NOT_STARTED) } {
                 Ok(answer) => answer,
                 Err(outcome) => {
                     let now = self.controller.cell.clock().now();

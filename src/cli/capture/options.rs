@@ -278,11 +278,11 @@ impl Teller {
         let account = feed.account();
         let rate = feed.rate_hz().map_or(String::new(), |r| format!("{r:.1} a second; "));
         *self.line.lock().unwrap_or_else(PoisonError::into_inner) = format!("{with}{rate}{account}");
-        if let Some(path) = &self.metrics {
-            if let Err(fault) = crate::files::write(path, account.prometheus(feed.name()).as_bytes()) {
-                self.news.lock().unwrap_or_else(PoisonError::into_inner).push(fault.what);
-                self.metrics = None;
-            }
+        if let Some(path) = &self.metrics
+            && let Err(fault) = crate::files::write(path, account.prometheus(feed.name()).as_bytes())
+        {
+            self.news.lock().unwrap_or_else(PoisonError::into_inner).push(fault.what);
+            self.metrics = None;
         }
     }
 

@@ -168,6 +168,6 @@ impl Operator for Person<'_> {
     }
 
     fn tell(&mut self, line: &str) {
-        self.console.say(line.to_owned());
+        self.console.say(line);
     }
 }

@@ -25,7 +25,7 @@ pub enum Command {
     Import(Import),
     /// Write a station's values as one JSON file, in the keys that import reads
     Export(Export),
-    Serve(serve::Serve),
+    Serve(Box<serve::Serve>),
     Password(serve::Password),
     /// Vouch for a calibration file that is refused: one of a former version, edited, or of another camera
     ///

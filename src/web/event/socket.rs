@@ -62,5 +62,5 @@ fn rows(hub: &Hub, shown: &mut (u32, usize)) -> Option<Message> {
         return None;
     }
     *shown = (job, done);
-    hub.growing.message(from).map(|bytes| Message::binary(bytes))
+    hub.growing.message(from).map(Message::binary)
 }

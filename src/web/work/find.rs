@@ -108,8 +108,8 @@ fn position(r: &Report, recipe: &Recipe, convention: Convention) -> Position {
             .iter()
             .map(|g| GateLight { name: g.name.into(), value: g.value, limit: g.limit, passed: g.passed })
             .collect(),
-        score: r.found.score.into(),
-        second_score: r.found.second_score.into(),
+        score: r.found.score,
+        second_score: r.found.second_score,
         part: r.base_from_part.to_rows(),
         outline: outline(r, recipe),
         notes: r.notes.clone(),

@@ -291,10 +291,10 @@ impl PictureSource for GigeCamera {
 impl GigeCamera {
     /// What comes next from the network.
     fn receive(&mut self, within: Duration) -> Event {
-        if self.stream.is_none() {
-            if let Err(fault) = self.start() {
-                return Event::Lost(fault);
-            }
+        if self.stream.is_none()
+            && let Err(fault) = self.start()
+        {
+            return Event::Lost(fault);
         }
         let stream = self.stream.as_mut().expect("started above");
         let got = stream.next_frame_blocking(within);

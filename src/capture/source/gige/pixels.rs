@@ -91,7 +91,7 @@ pub fn unpack(format: &str, width: u32, height: u32, padding: usize, bytes: &[u8
         _ => {
             let three = |i: usize| u16::from(bytes.get(x / 2 * 3 + i).copied().unwrap_or(0));
             let low = u16::from(bits - 8);
-            let (high, bits_of) = if x % 2 == 0 { (three(0), three(1)) } else { (three(2), three(1) >> 4) };
+            let (high, bits_of) = if x.is_multiple_of(2) { (three(0), three(1)) } else { (three(2), three(1) >> 4) };
             high << low | bits_of & ((1 << low) - 1)
         }
     };
