@@ -32,7 +32,7 @@ pub struct Leavings {
     pub shares: Vec<DMatrix<f64>>,
 }
 
-/// Redundancies [foerstner79] at a solution: of a residual r with derivatives J, 1 - J C Jᵀ is left.
+/// Redundancies \[foerstner79\] at a solution: of a residual r with derivatives J, 1 - J C Jᵀ is left.
 pub fn leavings(terms: &Terms<'_>, s: &State, covariance: &DMatrix<f64>, huber: f64) -> Option<Leavings> {
     let shared = terms.layout.shared();
     let mut out = Leavings {

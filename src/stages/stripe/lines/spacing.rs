@@ -22,7 +22,7 @@ const NARROW_PX: f32 = 2.0;
 ///
 /// Speckle makes the skeleton of a wide stripe wind and branch. Its pixels across the stripe see the same light, so their fits
 /// find the same centre once more (at 4 px of sigma 1.9 points a column; every 1.5 widths leaves 1.1). A stripe narrower than
-/// [`NARROW_PX`] keeps every pixel. `across`: unit image direction of depth.
+/// 2 px keeps every pixel. `across`: unit image direction of depth.
 pub fn word(widths: f32, width_px: f32, across: [f32; 2]) -> u32 {
     let step = (widths * width_px).floor();
     let rows = across[1].abs() < across[0].abs();
