@@ -4,7 +4,7 @@
 use super::camera::{self, Lit};
 use super::clock::Clock;
 use super::component::Component;
-use super::kinematics::{ArmError, Vs060};
+use super::kinematics::{ArmError, Joints, Vs060};
 use super::log::{Entry, Event, Insertion};
 use super::options::CellOptions;
 use super::world::{Places, START_DEG, World};
@@ -61,7 +61,8 @@ impl Cell {
             flange_from_tool,
         };
         let arm_error = arm_error(&station, options.arm_error_mm, options.arm_error_deg);
-        let world = World::new(&options, Vs060::built(&arm_error), places, held, station.rng("repeatability", 0));
+        let arm = (Vs060::built(&arm_error), start(&options, &base_from_scene)?);
+        let world = World::new(&options, arm, places, held, station.rng("repeatability", 0));
         let gripper = camera::gripper_station(&station, &flange_from_tool);
         let pixels = station.camera.width as usize * station.camera.height as usize;
         Ok(Cell(Arc::new(Inside {
@@ -224,6 +225,21 @@ fn place(station: &Station, tilt_deg: f64) -> Rigid<Base, InScene> {
         tilt * turn * start.rotation * scene_in(&design),
         below + Vec3::new(within(aside), within(aside), within(up)),
     )
+}
+
+/// The joints at the beginning: the sensor over the scene, or moved along with it over the board.
+fn start(options: &CellOptions, base_from_scene: &Rigid<Base, InScene>) -> Result<Joints> {
+    let (arm, over_scene) = (Vs060::drawn(), START_DEG.map(f64::to_radians));
+    if !options.over_board {
+        return Ok(over_scene);
+    }
+    let mut flange = arm.forward(&over_scene);
+    flange.translation += base_from_scene.rotation * Vec3::from(BOARD_BESIDE_MM);
+    arm.inverse(&flange, &over_scene).map_err(|_| {
+        Fault::refused("the arm cannot stand over the board")
+            .cause("the board lies beyond its reach")
+            .next("take another seed")
+    })
 }
 
 /// The gripper's axes lie as the scene's do while the sensor looks at it, so that little has to be turned.

@@ -13,6 +13,8 @@ pub struct CellOptions {
     pub scene: SceneSpec,
     /// A calibration board beside it.
     pub board: Option<BoardSpec>,
+    /// The arm begins over the board, as an operator jogs it there to calibrate; else over the scene.
+    pub over_board: bool,
     /// The design of the sensor on the flange.
     pub rig: RigSpec,
     /// Specimen, places and noise; 0 is the design itself.
@@ -43,6 +45,7 @@ impl CellOptions {
         CellOptions {
             scene,
             board: None,
+            over_board: false,
             rig: RigSpec::paper(),
             seed,
             speed: 1.0,
@@ -59,6 +62,10 @@ impl CellOptions {
 
     /// Refuses numbers out of the ranges that the fields state.
     pub fn check(&self) -> Result<()> {
+        if self.over_board && self.board.is_none() {
+            return Err(Fault::usage("the arm is to begin over the board, and there is no board")
+                .next("name one with --board (sheetlight board writes it)"));
+        }
         let limits = [
             ("speed", self.speed, 0.1, 1000.0),
             ("noise in mm", self.noise_mm, 0.0, 1.0),

@@ -62,8 +62,14 @@ pub struct World {
 }
 
 impl World {
-    pub fn new(options: &CellOptions, built: Vs060, places: Places, held: Option<Component>, rng: Pcg64) -> World {
-        let rest = (START_DEG.map(f64::to_radians), [0.0; 6]);
+    pub fn new(
+        options: &CellOptions,
+        (built, start): (Vs060, Joints),
+        places: Places,
+        held: Option<Component>,
+        rng: Pcg64,
+    ) -> World {
+        let rest = (start, [0.0; 6]);
         let hull = held.as_ref().map_or(Vec::new(), |c| c.hull.clone());
         let mut switched = VecDeque::new();
         switched.push_back((0.0, BTreeMap::from([(options.outputs.room, true), (options.outputs.gripper, true)])));

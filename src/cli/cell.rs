@@ -41,6 +41,9 @@ pub struct Args {
     /// A calibration board beside the scene (JSON as sheetlight board writes it)
     #[arg(long)]
     board: Option<PathBuf>,
+    /// The arm begins over the board, as an operator jogs it there for `calibrate auto`; else over the scene
+    #[arg(long, requires = "board")]
+    over_board: bool,
     /// Another specimen of sensor, gripper and places, other noise, for every seed; 0 is the design itself
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -93,6 +96,7 @@ fn simulate(args: &Args, console: &Console) -> Result<()> {
     let board = args.board.as_deref().map(BoardSpec::load).transpose()?;
     let options = CellOptions {
         board,
+        over_board: args.over_board,
         rig: args.rig.as_ref().map_or_else(|| Ok(RigSpec::paper()), |p| RigSpec::load(p))?,
         speed: args.speed,
         noise_mm: args.noise_mm,
