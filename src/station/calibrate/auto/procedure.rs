@@ -51,6 +51,8 @@ pub struct AutoRun {
 const CHECKS: usize = 5;
 /// Fewest stops that are believed, whatever they promise: as few tell the robot's scatter badly.
 const FEWEST: usize = 14;
+/// So many predictions in a row that are wrong are no accident.
+const LOST: usize = 8;
 /// It does not fall any more where so many stops have gained less than 2 %.
 const STALLED: usize = 8;
 
@@ -95,6 +97,8 @@ struct Session<'a> {
     /// Largest tilt that is asked for, degrees: it grows while the predictions come true.
     tilt_deg: f64,
     tries: u64,
+    /// Stops in a row at which the board was not found where it was predicted.
+    lost: usize,
 }
 
 impl AutoRun {
@@ -207,7 +211,7 @@ impl<'a> Session<'a> {
         still(&shots, &fit, &options)?;
         let depth = middle_depth(&state.boards, &run.board);
         let working = run.working.unwrap_or([0.8 * depth, 1.2 * depth]);
-        Ok(Session { cell, run, book, first, options, shots, fit, working, tilt_deg: 14.0, tries: 0 })
+        Ok(Session { cell, run, book, first, options, shots, fit, working, tilt_deg: 14.0, tries: 0, lost: 0 })
     }
 
     fn belief(&self) -> Result<Belief> {
@@ -259,20 +263,26 @@ impl<'a> Session<'a> {
         let all = self.candidates()?;
         let boards: Vec<Rigid<Camera, Board>> = all.iter().map(|c| c.0).collect();
         let Some(choice) = next(belief, &self.run.board, &boards, 0) else { return Ok(false) };
-        let Some(i) = self.visit(&all[choice.index].1)? else {
-            // The prediction was wrong: nearer to what is known.
-            self.tilt_deg = (0.7 * self.tilt_deg).max(8.0);
-            return Ok(true);
+        let i = match self.visit(&all[choice.index].1)? {
+            (Some(i), _) => i,
+            (None, why) => {
+                // The prediction was wrong: nearer to what is known.
+                self.tilt_deg = (0.7 * self.tilt_deg).max(8.0);
+                self.lost += 1;
+                return if self.lost < LOST { Ok(true) } else { Err(lost(&why)) };
+            }
         };
+        self.lost = 0;
         self.tilt_deg = (1.3 * self.tilt_deg).min(LARGEST_TILT);
         self.shots.push(self.measured(i)?);
         self.solve()?;
         Ok(true)
     }
 
-    fn visit(&mut self, to: &Rigid<Base, Flange>) -> Result<Option<usize>> {
+    /// Goes there. The stop's number, none where the board is not found, and why.
+    fn visit(&mut self, to: &Rigid<Base, Flange>) -> Result<(Option<usize>, String)> {
         let reported = self.cell.go(to)?;
-        Ok(self.book.stop(self.cell, &reported)?.0)
+        self.book.stop(self.cell, &reported)
     }
 
     /// A stop's features, its stripe told from reflections by the sheet of some stops before.
@@ -317,6 +327,12 @@ impl<'a> Session<'a> {
         let shots: Vec<Shot> = (before..self.book.stops.len()).map(|i| self.measured(i)).collect::<Result<_>>()?;
         Ok(check(&joint.fit, &shots, joint.expected_mm()))
     }
+}
+
+fn lost(why: &str) -> Fault {
+    Fault::input(format!("the board was not found at {LOST} poses in a row from which it ought to be seen: {why}"))
+        .cause("its squares or markers are too small at this distance, it is hidden or badly lit, or the poses are not the flange's")
+        .next("take a board of larger squares or begin nearer to it; check tool and work number of the controller (0)")
 }
 
 /// Refuses stops before and after which the board was moved.
