@@ -17,6 +17,8 @@ use std::time::Duration;
 const SETTLE: Duration = Duration::from_millis(200);
 /// Legs stay a little below the rules' longest step and widest turn.
 const BELOW: f64 = 0.95;
+/// Places on a straight way at which the controller is asked whether it reaches them.
+const ASKED: usize = 4;
 
 /// A real cell, or one that is simulated at its wires.
 pub struct ArmCell<'a> {
@@ -48,16 +50,21 @@ impl<'a> ArmCell<'a> {
     }
 }
 
+/// Share k of n of a straight way.
+fn share(from: &Rigid<Base, Flange>, to: &Rigid<Base, Flange>, k: usize, n: usize) -> Rigid<Base, Flange> {
+    if k == n {
+        return *to;
+    }
+    let (u, turn) = (k as f64 / n as f64, log(&(to.rotation * from.rotation.transpose())));
+    Rigid::new(exp(&(turn * u)) * from.rotation, from.translation + (to.translation - from.translation) * u)
+}
+
 /// A straight way in steps that keep the rules.
 fn legs(from: &Rigid<Base, Flange>, to: &Rigid<Base, Flange>, limits: &Limits, speed_mm_s: f64) -> Vec<Motion> {
-    let turn = log(&(to.rotation * from.rotation.transpose()));
-    let shift = to.translation - from.translation;
-    let steps = shift.norm() / (BELOW * limits.max_step_mm);
-    let turns = turn.norm().to_degrees() / (BELOW * limits.max_turn_deg);
-    let n = steps.max(turns).ceil().max(1.0) as usize;
-    let at = |u: f64| Rigid::new(exp(&(turn * u)) * from.rotation, from.translation + shift * u);
-    let leg = |k: usize| if k == n { *to } else { at(k as f64 / n as f64) };
-    (1..=n).map(|k| Motion { to: leg(k), way: Way::Straight, speed_mm_s }).collect()
+    let turn = log(&(to.rotation * from.rotation.transpose())).norm().to_degrees();
+    let steps = (to.translation - from.translation).norm() / (BELOW * limits.max_step_mm);
+    let n = steps.max(turn / (BELOW * limits.max_turn_deg)).ceil().max(1.0) as usize;
+    (1..=n).map(|k| Motion { to: share(from, to, k, n), way: Way::Straight, speed_mm_s }).collect()
 }
 
 impl Cell for ArmCell<'_> {
@@ -66,10 +73,19 @@ impl Cell for ArmCell<'_> {
     }
 
     fn may(&mut self, to: &Rigid<Base, Flange>) -> Result<bool> {
-        let (limits, from) = (self.limits()?, self.pose()?.translation);
+        let (limits, from) = (self.limits()?, self.pose()?);
         let free = limits.workspace.outside(&to.translation) <= 0.0
-            && limits.keep_out.iter().all(|k| k.inside_of(&from, &to.translation) <= 0.0);
-        Ok(free && !matches!(self.guard.link().reach(to)?, Reach::Refused(_)))
+            && limits.keep_out.iter().all(|k| k.inside_of(&from.translation, &to.translation) <= 0.0);
+        if !free {
+            return Ok(false);
+        }
+        // What is reached at its end may be out of reach on the way there.
+        for k in (1..=ASKED).rev() {
+            if matches!(self.guard.link().reach(&share(&from, to, k, ASKED))?, Reach::Refused(_)) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
     }
 
     fn go(&mut self, to: &Rigid<Base, Flange>) -> Result<Rigid<Base, Flange>> {
