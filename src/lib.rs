@@ -25,8 +25,9 @@
 //! ([`geometry::Rigid`]). Bad input is a [`fault::Fault`]: what happened with its number and limit, the likely cause, the next
 //! step.
 //!
-//! **Features.** `cli` (default) is the command line with clap and indicatif, `bench` what it measures; a program that uses the
-//! library takes neither: `default-features = false`.
+//! **Features.** `cli` (default) is the command line with clap and indicatif and all else, `bench` what it measures, `gige` cameras
+//! that speak GigE Vision, `cell` the simulated cell, `web` the operator's screen; a program that uses the library takes what it
+//! wants: `default-features = false`.
 //!
 //! The modules stand in floor order; each imports only from floors above it in this list (ARCHITECTURE.md, enforced by
 //! tests/floors.rs).

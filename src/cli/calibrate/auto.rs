@@ -95,7 +95,14 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let outputs = settings.outputs.unwrap_or_default();
     let mut cell = ArmCell::new(&mut guard, camera, outputs, &mut person, args.speed);
     let told = |stops: usize, mm: f64| console.say(format!("{stops} stops: a scanned point is expected to {mm:.4} mm"));
-    let result = calibrate_auto(&mut cell, &rig, &run, &told)?;
+    let result = calibrate_auto(&mut cell, &rig, &run, &told).inspect_err(|_| {
+        if args.out.join("line/meta.json").is_file() {
+            let (out, station) = (args.out.display(), args.station.display());
+            console.warn(format!(
+                "the pictures so far are kept: sheetlight calibrate joint {out}/* --station {station} makes of them what it can"
+            ));
+        }
+    })?;
     drop(cell);
     finish(&args.station, &result.joint, &args.keep, console)?;
     stale(&args.station, console);
