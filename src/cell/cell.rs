@@ -24,6 +24,15 @@ const BOARD_BESIDE_MM: [f64; 3] = [0.0, 170.0, 0.0];
 /// Greys of a printed board.
 const PRINT: [f64; 2] = [0.85, 0.06];
 
+/// What a person jogs the arm over.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Over {
+    /// A place of the scene: x, y, mm.
+    Place([f64; 2]),
+    /// The calibration board beside it.
+    Board,
+}
+
 /// A cell. Cheap to clone: all clones are one cell.
 #[derive(Clone)]
 pub struct Cell(Arc<Inside>);
@@ -169,6 +178,39 @@ impl Cell {
         let gripper = self.0.options.outputs.gripper;
         let now = self.0.clock.now();
         self.world().switch(now, gripper, true);
+        Ok(())
+    }
+
+    /// A person moves the arm with the pendant until the sensor looks at a place of the scene, or of the calibration board.
+    ///
+    /// # Errors
+    /// The arm moves, there is no such place, or it is out of reach.
+    pub fn jog(&self, over: Over) -> Result<()> {
+        let t = self.0.clock.now();
+        let mut world = self.world();
+        if world.moving_until(t).is_some() {
+            return Err(Fault::refused("the arm moves").next("wait until it stands, or stop it"));
+        }
+        let base_from_scene = world.places().base_from_scene;
+        let in_scene = match over {
+            Over::Place([x, y]) => Vec3::new(x, y, 0.0),
+            Over::Board if self.0.base_from_board.is_some() => Vec3::from(BOARD_BESIDE_MM),
+            Over::Board => {
+                return Err(Fault::usage("there is no calibration board in this cell").next("start it with one"));
+            }
+        };
+        // Sideways alone, from where the arm stood when the cell was started.
+        let start = START_DEG.map(f64::to_radians);
+        let mut flange = world.drawn().forward(&start);
+        let camera = flange * self.0.station.flange_from_camera;
+        let seen = base_from_scene.inverse() * camera;
+        let axis = seen.rotation.column(2).into_owned();
+        let foot = seen.translation - axis * (seen.translation.z / axis.z);
+        flange.translation += base_from_scene.rotation * (in_scene - foot);
+        let joints = world.drawn().inverse(&flange, &start).map_err(|_| {
+            Fault::refused("the arm cannot stand there").cause("it lies beyond its reach").next("take another place")
+        })?;
+        world.stand(t, joints);
         Ok(())
     }
 

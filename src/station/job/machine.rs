@@ -144,6 +144,17 @@ impl<'a> Job<'a> {
         Ok(report)
     }
 
+    /// Goes back up instead of on, and ends there.
+    ///
+    /// # Errors
+    /// As [`Job::run`].
+    pub fn back_out(mut self) -> Result<JobReport> {
+        if self.state.phase != Phase::Done {
+            self.state.phase = Phase::Retract;
+        }
+        self.run()
+    }
+
     /// After a crash: a scan that was not finished is made anew; after a motion that was cut off the tool backs out.
     fn pick_up(&mut self) -> Result<()> {
         if !self.state.moving {
@@ -208,7 +219,9 @@ impl<'a> Job<'a> {
         self.state.moving = true;
         self.store()?;
         let eye = &mut self.eye;
-        self.guard.make(&proposal, yes, &mut |arm, k| each(eye, arm, k))?;
+        let made = self.guard.make(&proposal, yes, &mut |arm, k| each(eye, arm, k));
+        self.operator.over();
+        made?;
         self.state.moving = false;
         self.store()
     }

@@ -21,6 +21,8 @@ pub struct Ask<'a> {
 pub trait Operator {
     /// Shows a motion and asks. `None` is a no.
     fn confirm(&mut self, ask: &Ask) -> Result<Option<Confirmation>>;
+    /// The motion that was confirmed has ended, or was stopped.
+    fn over(&mut self) {}
     /// Says what happens.
     fn tell(&mut self, line: &str);
 }

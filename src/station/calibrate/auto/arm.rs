@@ -109,7 +109,9 @@ impl Cell for ArmCell<'_> {
                 .cause("somebody said no")
                 .next("begin again where the arm may move"));
         };
-        self.guard.make(&proposal, confirmation, &mut |_, _| Ok(()))?;
+        let made = self.guard.make(&proposal, confirmation, &mut |_, _| Ok(()));
+        self.operator.over();
+        made?;
         std::thread::sleep(SETTLE);
         self.pose()
     }
