@@ -21,5 +21,6 @@ mod work;
 pub use api::openapi;
 pub use guard::{hashed, random_hex};
 pub use message::{Mode, declarations};
+pub use motion::SimulatedRobot;
 pub use serve::{Secured, ServeOptions, serve};
-pub use simulated::simulated;
+pub use simulated::{SimulatedOptions, simulated};

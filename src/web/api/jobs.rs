@@ -38,28 +38,27 @@ pub async fn order(
     Ok((StatusCode::ACCEPTED, job))
 }
 
-/// POST /jobs/{id}/stop, /resume, /accept
+/// POST /jobs/{id}/stop, /resume, /back_out, /accept
 pub async fn act(
     State(screen): Shared,
     Extension(tab): Extension<Tab>,
     UrlPath((id, what)): UrlPath<(String, String)>,
 ) -> Answer<Json<Job>> {
-    // Everybody may stop: it moves nothing.
+    // Everybody may stop.
     if what != "stop" {
         operates(&screen, &tab)?;
     }
     json(screen, move |s| match what.as_str() {
         "stop" => s.jobs.stop(&id),
-        "resume" => s.jobs.resume(&id),
+        "resume" => s.jobs.resume(&id, false),
+        "back_out" => s.jobs.resume(&id, true),
         "accept" => {
             let job = work::accept(&s.jobs, &s.jobs.get(&id)?)?;
             s.forget();
             Ok(job)
         }
-        other => {
-            Err(Fault::usage(format!("{other:?}: nothing of that name is done with a job"))
-                .next("stop, resume or accept"))
-        }
+        other => Err(Fault::usage(format!("{other:?}: nothing of that name is done with a job"))
+            .next("stop, resume, back_out or accept")),
     })
     .await
 }

@@ -1,18 +1,23 @@
 //! In: orders of an operator. Out: jobs that run one after the other on a thread of their own, kept on disk with their state.
 //! Frame and unit: as the procedures; mm, degrees.
 
+mod auto;
 mod calibrate;
 mod check;
 mod find;
+mod insert;
 mod jobs;
 mod place;
 mod procedures;
 mod recipes;
+mod resumes;
 mod run;
 mod scan;
 mod store;
+mod together;
 mod worker;
 
+pub use auto::boards;
 pub use calibrate::accept;
 pub use jobs::Jobs;
 pub use place::Place;
