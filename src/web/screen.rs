@@ -7,7 +7,7 @@ use super::guard::{Leases, Sessions};
 use super::message::{Bar, CalibrationAge, Event, JobState};
 use super::motion::Desk;
 use super::robot::Robot;
-use super::work::{Jobs, Place, scan_of};
+use super::work::{Jobs, Place, Views, scan_of};
 use super::{disk, station};
 use crate::fault::Result;
 use crate::gpu::adapters;
@@ -44,6 +44,8 @@ pub struct Screen {
     pub cookie: String,
     /// The robot, where one was named.
     pub robot: Option<Robot>,
+    /// Corners in calibrations' pictures.
+    pub views: Views,
     /// When the program started.
     pub started: Instant,
     adapter: OnceLock<(String, bool)>,
@@ -83,6 +85,7 @@ impl Screen {
             password: linked.password,
             cookie,
             robot: linked.robot,
+            views: Views::default(),
             started: Instant::now(),
             adapter: OnceLock::new(),
             read: Mutex::default(),

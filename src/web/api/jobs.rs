@@ -4,7 +4,7 @@
 use super::answer::{Answer, beside, body, json, operates};
 use crate::fault::{Fault, Result};
 use crate::web::guard::{Tab, resolve};
-use crate::web::message::{Job, Order};
+use crate::web::message::{BoardView, Job, Order};
 use crate::web::screen::{JOBS, Screen};
 use crate::web::work;
 use axum::body::Bytes;
@@ -61,6 +61,11 @@ pub async fn act(
             .next("stop, resume, back_out or accept")),
     })
     .await
+}
+
+/// GET /jobs/{id}/views
+pub async fn views(State(screen): Shared, UrlPath(id): UrlPath<String>) -> Answer<Json<Vec<BoardView>>> {
+    json(screen, move |s| s.views.of(&s.jobs, &id)).await
 }
 
 /// DELETE /jobs/{id}

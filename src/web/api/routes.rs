@@ -112,6 +112,12 @@ pub fn routes() -> Vec<Route> {
             post(jobs::act),
         )
         .leased(),
+        route(
+            ("GET", "/jobs/{id}/views"),
+            "Newest pictures of a calibration by the robot, with the corners that were found",
+            ("", "BoardView[]"),
+            get(jobs::views),
+        ),
         route(("GET", "/jobs/{id}/files/{*name}"), "A file that a job left", ("", BYTES), get(jobs::file)),
         route(
             ("GET", "/scans/{id}/map"),

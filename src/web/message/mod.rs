@@ -23,7 +23,7 @@ pub use outcome::{
     BenchRow, CalibrationFigures, CheckLine, GateLight, Inserted, Notation, Outcome, Position, RobotPoses, ScanFigures,
     SurfaceTouched, Term, Touched,
 };
-pub use place::{CalibrationState, PictureRef, RecipeText, RecordingInfo, StationInfo};
+pub use place::{BoardView, CalibrationState, PictureRef, RecipeText, RecordingInfo, StationInfo};
 pub use surface::{
     Distance, Fit, MapHead, Measure, MeasureAnswer, PlaneAsk, PointsAsk, Section, SectionAsk, SectionPoint,
 };

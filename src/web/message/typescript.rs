@@ -55,6 +55,7 @@ pub fn declarations() -> String {
         CalibrationState::decl(),
         StationInfo::decl(),
         RecordingInfo::decl(),
+        BoardView::decl(),
         PictureRef::decl(),
         RecipeText::decl(),
         MapHead::decl(),

@@ -1,7 +1,6 @@
 //! In: orders of an operator. Out: jobs that run one after the other on a thread of their own, kept on disk with their state.
 //! Frame and unit: as the procedures; mm, degrees.
 
-mod auto;
 mod calibrate;
 mod check;
 mod find;
@@ -14,11 +13,9 @@ mod resumes;
 mod run;
 mod scan;
 mod store;
-mod together;
 mod worker;
 
-pub use auto::boards;
-pub use calibrate::accept;
+pub use calibrate::{Views, accept, boards};
 pub use jobs::Jobs;
 pub use place::Place;
 pub use recipes::{recipe_path, recipes, save_recipe};

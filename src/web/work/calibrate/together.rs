@@ -1,7 +1,7 @@
 //! In: recordings of boards. Out: the whole rig from one solve beside the station's present one; stored together when it is accepted.
 //! Frame and unit: mm, degrees.
 
-use super::run::Run;
+use super::super::run::Run;
 use crate::calibrate::hand_eye::options::Mount;
 use crate::fault::{Fault, Result};
 use crate::recording::Recording;
@@ -18,7 +18,7 @@ const RESULT: &str = "result";
 /// Files of a joint calibration beside the records.
 const BESIDE: [&str; 2] = ["joint.json", "joint.html"];
 
-pub(super) fn joint(this: &Run, order: &JointOrder) -> Result<Outcome> {
+pub(in crate::web::work) fn joint(this: &Run, order: &JointOrder) -> Result<Outcome> {
     let place = &this.jobs.place;
     if order.recordings.is_empty() {
         return Err(Fault::usage("no recording was chosen").next("choose recordings of boards"));

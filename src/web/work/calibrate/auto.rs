@@ -2,8 +2,8 @@
 //! until it is accepted.
 //! Frame and unit: mm.
 
-use super::place::Place;
-use super::run::Run;
+use super::super::place::Place;
+use super::super::run::Run;
 use super::together::{keep, run};
 use crate::fault::{Fault, Result};
 use crate::recording::BoardSpec;
@@ -40,7 +40,7 @@ fn board(place: &Place, name: &str) -> Result<BoardSpec> {
     BoardSpec::load(&place.boards().join(format!("{name}.json")))
 }
 
-pub(super) fn auto(this: &Run, order: &AutoOrder) -> Result<Outcome> {
+pub(in crate::web::work) fn auto(this: &Run, order: &AutoOrder) -> Result<Outcome> {
     let place = &this.jobs.place;
     let (settings, rig) = (Settings::load(&place.station)?, Rig::load_camera(&place.station)?);
     let desk = &this.jobs.desk;

@@ -2,8 +2,8 @@
 //! in the station when it is accepted.
 //! Frame and unit: as the calibrations; px, mm, degrees.
 
-use super::jobs::Jobs;
-use super::run::Run;
+use super::super::jobs::Jobs;
+use super::super::run::Run;
 use crate::calibrate::camera::procedure::{CameraOptions, calibrate as camera};
 use crate::calibrate::camera::report::page;
 use crate::calibrate::hand_eye::options::Mount;
@@ -29,7 +29,7 @@ use std::path::Path;
 const RESULT: &str = "calibration.json";
 const PAGE: &str = "calibration.html";
 
-pub(super) fn calibrate(this: &Run, target: Target, name: &str, leave_out: &[usize]) -> Result<Outcome> {
+pub(in crate::web::work) fn calibrate(this: &Run, target: Target, name: &str, leave_out: &[usize]) -> Result<Outcome> {
     let place = &this.jobs.place;
     let recording = without(Recording::open(&resolve(&place.recordings, name)?)?, leave_out)?;
     let settings = Settings::load(&place.station)?;
