@@ -56,7 +56,9 @@ fn python(script: &str, args: &[&str]) -> bool {
         Err(e) => format!("python3: {e}"),
     };
     assert!(std::env::var("CI").as_deref() != Ok("true"), "{script} did not run: {why}");
-    eprintln!("\n*** SKIPPED: {script} needs python3, openssl, chromium and chromedriver (tools/browser.sh): {why} ***\n");
+    eprintln!(
+        "\n*** SKIPPED: {script} needs python3, openssl, chromium and chromedriver (tools/browser.sh): {why} ***\n"
+    );
     false
 }
 

@@ -90,9 +90,9 @@ class Server:
             said += more
         return int(said.split(b" ")[1]), s
 
-    def memory_mb(self):
+    def peak_mb(self):
         with open(f"/proc/{self.process.pid}/status") as f:
-            return next(int(line.split()[1]) for line in f if line.startswith("VmRSS")) / 1024
+            return next(int(line.split()[1]) for line in f if line.startswith("VmHWM")) / 1024
 
     def kill(self):
         self.process.kill()

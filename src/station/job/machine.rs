@@ -8,7 +8,7 @@ use super::places;
 use super::record::Record;
 use super::report::JobReport;
 use super::state::{JobState, Phase};
-use crate::arm::rules::{Evidence, Guard, Plan};
+use crate::arm::rules::{Confirmation, Evidence, Guard, Plan, Proposal};
 use crate::arm::{Arm, Motion, Way};
 use crate::fault::{Fault, Gate, Result};
 use crate::find::insert::picture;
@@ -206,15 +206,7 @@ impl<'a> Job<'a> {
         plan: Plan,
         each: &mut dyn FnMut(&mut Eye, &mut dyn Arm, usize) -> Result<()>,
     ) -> Result<()> {
-        let proposal = self.guard.propose(plan)?;
-        if !proposal.passed() {
-            return Err(Fault::refused(format!("{step}: {}", proposal.missed().join("; ")))
-                .next("look at what is named, then begin again"));
-        }
-        let Some(yes) = self.operator.confirm(&Ask { step, says, question, proposal: &proposal })? else {
-            return Err(Fault::refused(format!("stopped at '{step}' by the operator"))
-                .next("begin again when the cell is ready"));
-        };
+        let (proposal, yes) = self.agreed(step, &says, question, plan)?;
         self.state.confirmations += 1;
         self.state.moving = true;
         self.store()?;
@@ -224,6 +216,31 @@ impl<'a> Job<'a> {
         made?;
         self.state.moving = false;
         self.store()
+    }
+
+    /// Proposes until somebody has said yes or no.
+    fn agreed(
+        &mut self,
+        step: &'static str,
+        says: &[String],
+        question: &'static str,
+        plan: Plan,
+    ) -> Result<(Proposal, Confirmation)> {
+        loop {
+            let proposal = self.guard.propose(plan.clone())?;
+            if !proposal.passed() {
+                return Err(Fault::refused(format!("{step}: {}", proposal.missed().join("; ")))
+                    .next("look at what is named, then begin again"));
+            }
+            let ask = Ask { step, says: says.to_vec(), question, proposal: &proposal };
+            if let Some(yes) = self.operator.confirm(&ask)? {
+                return Ok((proposal, yes));
+            }
+            if !self.operator.again() {
+                return Err(Fault::refused(format!("stopped at '{step}' by the operator"))
+                    .next("begin again when the cell is ready"));
+            }
+        }
     }
 
     fn plan(&self, name: &str, why: String, legs: Vec<Motion>, evidence: Evidence) -> Plan {

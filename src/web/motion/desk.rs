@@ -48,6 +48,19 @@ pub struct Desk {
     wake: Condvar,
 }
 
+/// What becomes of a motion that was shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Answer {
+    /// It is made.
+    Yes,
+    /// It is not, and the job ends.
+    No,
+    /// Nobody said anything while it was good.
+    Late,
+    /// The job was ended.
+    Over,
+}
+
 /// A button that is down.
 struct Hold {
     tab: Tab,
@@ -281,25 +294,27 @@ impl Desk {
         self.tell(at);
     }
 
-    /// Shows a motion and waits for what becomes of it. `None`: the job is to end.
-    pub(super) fn ask(&self, asked: Asked) -> Option<bool> {
+    /// Shows a motion and waits for what becomes of it.
+    pub(super) fn ask(&self, asked: Asked) -> Answer {
+        let until = Instant::now() + Duration::from_secs_f64(asked.within_s);
         let mut at = self.at();
         (at.shown.asked, at.answer) = (Some(asked), None);
         self.tell(&at);
-        let until = Instant::now() + Duration::from_secs_f64(at.shown.asked.as_ref().map_or(0.0, |a| a.within_s));
-        loop {
-            let ended = at.stop.as_ref().is_none_or(|s| s.load(Ordering::SeqCst));
-            let answer = at.answer.filter(|_| !ended);
-            if answer.is_some() || ended || Instant::now() >= until {
-                if answer != Some(true) {
-                    at.shown.asked = None;
-                    at.shown.moving = false;
-                    self.tell(&at);
-                }
-                return answer;
+        let answer = loop {
+            if at.stop.as_ref().is_none_or(|s| s.load(Ordering::SeqCst)) {
+                break Answer::Over;
+            }
+            match at.answer {
+                Some(true) => return Answer::Yes,
+                Some(false) => break Answer::No,
+                None if Instant::now() >= until => break Answer::Late,
+                None => {}
             }
             at = self.wake.wait_timeout(at, Duration::from_millis(100)).unwrap_or_else(|e| e.into_inner()).0;
-        }
+        };
+        (at.shown.asked, at.shown.moving) = (None, false);
+        self.tell(&at);
+        answer
     }
 
     /// The confirmed motion has ended.

@@ -1,7 +1,7 @@
 //! In: what a job is about to do. Out: the yes of whoever holds the button at the screen.
 //! Frame and unit: base frame, in the station's notation.
 
-use super::desk::Desk;
+use super::desk::{Answer, Desk};
 use crate::arm::rules::Confirmation;
 use crate::fault::{Fault, Result};
 use crate::robot::Convention;
@@ -24,6 +24,8 @@ pub struct Person<'a> {
     pub within_s: f64,
     /// Hears of every step.
     pub step: &'a dyn Fn(&str),
+    /// Nobody answered in time.
+    pub late: bool,
 }
 
 impl Person<'_> {
@@ -51,12 +53,20 @@ impl Person<'_> {
 impl Operator for Person<'_> {
     fn confirm(&mut self, ask: &Ask) -> Result<Option<Confirmation>> {
         (self.step)(ask.step);
-        match self.desk.ask(self.asked(ask)) {
-            Some(yes) => Ok(yes.then(|| Confirmation::of(&*ask.proposal.hash))),
-            None => Err(Fault::refused(format!("'{}' was not confirmed", ask.step))
-                .cause(format!("STOP was pressed, or nobody held the button within {:.0} s", self.within_s))
-                .next("look at the cell, then begin again")),
+        let answer = self.desk.ask(self.asked(ask));
+        self.late = answer == Answer::Late;
+        match answer {
+            Answer::Yes => Ok(Some(Confirmation::of(&*ask.proposal.hash))),
+            Answer::No | Answer::Late => Ok(None),
+            Answer::Over => {
+                Err(Fault::refused(format!("stopped at '{}': STOP was pressed, or the job was ended", ask.step))
+                    .next("look at the cell, then begin again"))
+            }
         }
+    }
+
+    fn again(&mut self) -> bool {
+        self.late
     }
 
     fn over(&mut self) {

@@ -19,6 +19,8 @@ const PARTS: [(&str, &str); 4] = [
     ("flash", DEFAULT_SCENE),
     ("dimm", include_str!("../../../data/scenes/dimm.toml")),
 ];
+/// Solids that come first in those scenes.
+const BOARD_AND_TABLE: usize = 2;
 /// An operator jogs no better than this, mm.
 const JOGGED_OFF_MM: [f64; 2] = [3.0, -2.0];
 /// The log is written this often.
@@ -44,11 +46,16 @@ pub struct SimulatedRobot {
     over: Arc<AtomicBool>,
 }
 
+/// The board with this part's socket alone, in its middle: the pointer touches the bare board around it.
 fn scene(part: &str) -> Result<SceneSpec> {
     let text = PARTS.iter().find(|(name, _)| *name == part).map(|(_, text)| *text).ok_or_else(|| {
         Fault::usage(format!("{part:?}: there is no such component here")).next("choose one from the list")
     })?;
-    SceneSpec::parse(text)
+    let mut spec = SceneSpec::parse(text)?;
+    spec.part.retain(|p| p.name == part);
+    spec.solid.truncate(BOARD_AND_TABLE);
+    spec.part.iter_mut().for_each(|p| (p.at_mm[0], p.at_mm[1]) = (0.0, 0.0));
+    Ok(spec)
 }
 
 impl SimulatedRobot {
@@ -93,9 +100,7 @@ impl SimulatedRobot {
         let mut at = self.at.lock().unwrap_or_else(|e| e.into_inner());
         let part = holds.unwrap_or(&at.0).to_owned();
         let spec = scene(&part)?;
-        let place = spec.part.iter().find(|p| p.name == part).map_or([0.0; 2], |p| [p.at_mm[0], p.at_mm[1]]);
-        let near = [place[0] + JOGGED_OFF_MM[0], place[1] + JOGGED_OFF_MM[1]];
-        self.served.cell.jog(if over_board { Over::Board } else { Over::Place(near) })?;
+        self.served.cell.jog(if over_board { Over::Board } else { Over::Place(JOGGED_OFF_MM) })?;
         self.served.cell.lay(&spec, Some(&part))?;
         *at = (part, over_board);
         Ok(())
