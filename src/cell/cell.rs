@@ -21,6 +21,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 const GRIPPER_AT_MM: [f64; 3] = [72.0, 0.0, 160.0];
 /// The calibration board lies so far beside the scene's middle, mm.
 const BOARD_BESIDE_MM: [f64; 3] = [0.0, 170.0, 0.0];
+/// From so many working distances a whole board is in the picture, with the stripe on it.
+const BOARD_FROM: f64 = 1.5;
 /// Greys of a printed board.
 const PRINT: [f64; 2] = [0.85, 0.06];
 
@@ -199,7 +201,7 @@ impl Cell {
                 return Err(Fault::usage("there is no calibration board in this cell").next("start it with one"));
             }
         };
-        // Sideways alone, from where the arm stood when the cell was started.
+        // Sideways from where the arm stood when the cell was started; over the board also down, until stripe and spot are on it.
         let start = START_DEG.map(f64::to_radians);
         let mut flange = world.drawn().forward(&start);
         let camera = flange * self.0.station.flange_from_camera;
@@ -207,6 +209,11 @@ impl Cell {
         let axis = seen.rotation.column(2).into_owned();
         let foot = seen.translation - axis * (seen.translation.z / axis.z);
         flange.translation += base_from_scene.rotation * (in_scene - foot);
+        if over == Over::Board {
+            let depth = -seen.translation.z / axis.z;
+            let down = depth - BOARD_FROM * self.0.station.working_distance;
+            flange.translation += camera.rotation.column(2) * down;
+        }
         let joints = world.drawn().inverse(&flange, &start).map_err(|_| {
             Fault::refused("the arm cannot stand there").cause("it lies beyond its reach").next("take another place")
         })?;

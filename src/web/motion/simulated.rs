@@ -33,9 +33,9 @@ pub fn board() -> BoardSpec {
     BoardSpec::Charuco {
         squares: [11, 8],
         square_mm: 16.0,
-        marker_mm: 12.0,
+        marker_mm: 11.2,
         dictionary: "DICT_5X5_250".into(),
-        border_mm: 0.0,
+        border_mm: 9.6,
     }
 }
 
