@@ -226,25 +226,6 @@ fn whoever_goes_while_the_arm_moves_halts_it_in_time() {
     );
 }
 
-#[test]
-fn a_way_that_the_controller_does_not_begin_leaves_a_known_place() {
-    let served = cell(8, 50.0);
-    let mut guard = guard(&served, |_| {});
-    // The wrist would pass its stretched pose: both ends are within reach, the straight way is not.
-    let mut turned = leg(&mut guard, [0.0, 0.0, 0.0], 50.0);
-    turned.to.rotation = exp(&(Vec3::new(0.01, -1.0, 0.0).normalize() * 115f64.to_radians())) * turned.to.rotation;
-    let proposal = guard.propose(plan(vec![turned])).unwrap();
-    assert!(proposal.passed(), "{:?}", proposal.missed());
-    let yes = Confirmation::of(&*proposal.hash);
-    let refusal = guard.attempt(&proposal, yes, &mut |_, _| Ok(())).unwrap().expect("the way is not begun");
-    println!("{refusal}");
-    assert!(guard.unknown().is_none() && served.cell.moves() == 0, "{refusal}");
-    // Something else may be done at once, with a confirmation of its own.
-    let near = leg(&mut guard, [0.0, 0.0, -10.0], 50.0);
-    made(&mut guard, plan(vec![near])).unwrap();
-    assert_eq!(served.cell.moves(), 1);
-}
-
 /// An arm that refuses every motion; what it is like afterwards.
 struct Stubborn {
     at: Rigid<Base, Flange>,
