@@ -1,7 +1,7 @@
 //! In: a robot behind its rules, a camera with its lights, somebody who confirms. Out: the cell that a calibration drives.
 //! Frame and unit: base_from_flange, mm, mm/s. Every move is shown and confirmed; what the rules do not allow is not made.
 
-use super::cell::{Cell, Light};
+use super::cell::{Cell, Light, Went};
 use crate::arm::rules::{Confirmation, Guard, Limits, Plan, Proposal};
 use crate::arm::{Motion, Outputs, Reach, Way};
 use crate::capture::PictureSource;
@@ -111,7 +111,7 @@ impl Cell for ArmCell<'_> {
         Ok(true)
     }
 
-    fn go(&mut self, to: &Rigid<Base, Flange>) -> Result<Rigid<Base, Flange>> {
+    fn go(&mut self, to: &Rigid<Base, Flange>) -> Result<Went> {
         let (limits, from) = (self.limits()?, self.pose()?);
         let speed = self.speed_mm_s.map_or(limits.speed_mm_s, |s| s.min(limits.speed_mm_s));
         let legs = legs(&from, to, &limits, speed);
@@ -119,11 +119,13 @@ impl Cell for ArmCell<'_> {
         let plan = Plan { legs, ..Plan::single("calibrate", "the next picture of the board", last) };
         self.stops += 1;
         let (proposal, confirmation) = self.agreed(plan, to)?;
-        let made = self.guard.make(&proposal, confirmation, &mut |_, _| Ok(()));
+        let made = self.guard.attempt(&proposal, confirmation, &mut |_, _| Ok(()));
         self.operator.over();
-        made?;
+        if let Some(refusal) = made? {
+            return Ok(Went::NotBegun(refusal.what));
+        }
         std::thread::sleep(SETTLE);
-        self.pose()
+        Ok(Went::There(self.pose()?))
     }
 
     fn picture(&mut self, light: Light) -> Result<Image> {
