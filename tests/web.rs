@@ -96,7 +96,7 @@ fn components_are_inserted_through_the_pages_in_the_simulated_cell() {
     let dir = tempfile::tempdir().unwrap();
     let (folder, images) = (dir.path().to_str().unwrap(), source("docs/images"));
     // The long form at the cell's own pace, as an operator goes; the short one in a hurry, over a part of the field.
-    let (parts, speed, sweep) = if long() { ("led,osc,flash,dimm", "1", "0") } else { ("osc", "20", "34") };
+    let (parts, speed, sweep) = if long() { ("led,osc,flash,dimm", "1", "0") } else { ("osc", "20", "30") };
     let mut args = vec![PROGRAM, folder, parts, speed, sweep];
     args.extend(images.to_str().filter(|_| std::env::var_os("SHEETLIGHT_WRITE").is_some()));
     python("tests/web/insert.py", &args);

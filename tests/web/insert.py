@@ -60,8 +60,6 @@ def insert(s, b, part):
     if part == "osc":
         shot(b, pictures, "ask")
     held(b, "approach")
-    if part == "osc":
-        shot(b, pictures, "approach")
     held(b, "insert")
     time.sleep(0.3)
     log = events(folder)[before:]
