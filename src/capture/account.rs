@@ -158,6 +158,16 @@ impl Ledger {
         self.since_open = 0;
     }
 
+    /// Nothing comes any more; a camera that is still gone is missed to the end.
+    pub fn ended(&mut self, host_ns: u64) {
+        if let (true, Some(last), Some(period)) = (std::mem::take(&mut self.gone), self.last_ns, self.period_ns) {
+            let missed = (host_ns.saturating_sub(last) as f64 / period).round() as u64;
+            self.account.outages += 1;
+            self.account.missed += missed;
+            self.account.sent += missed;
+        }
+    }
+
     /// What an outage cost: the numbers in between where the device counted on, else the time since the last picture at the
     /// usual rate.
     fn back(&mut self, id: u64, host_ns: u64) {
@@ -241,6 +251,18 @@ mod tests {
         a.used = a.complete;
         assert_eq!((a.complete, a.missed, a.outages, a.sent), (51, 499, 1, 550));
         assert_eq!(a.unexplained(), 0);
+    }
+
+    #[test]
+    fn a_camera_that_does_not_come_back_is_missed_to_the_end() {
+        let mut ledger = Ledger::default();
+        (0..50).for_each(|i| assert_eq!(ledger.came(i, i * 20_000_000), Order::Next));
+        ledger.gone();
+        ledger.ended(49 * 20_000_000 + 2_000_000_000);
+        ledger.ended(1 << 60);
+        let a = ledger.account();
+        a.used = a.complete;
+        assert_eq!((a.missed, a.outages, a.sent, a.unexplained()), (100, 1, 150, 0));
     }
 
     /// Back so soon that the time says nothing was lost, while the numbers say that one was.
