@@ -3,13 +3,10 @@
 
 use super::joint::finish;
 use super::store::{Keep, stale};
-use crate::arm::rules::{Guard, MotionLog};
 use crate::calibrate::hand_eye::options::Mount;
-use crate::capture::CameraUri;
-use crate::cli::insert::job::{Person, on_this_machine};
+use crate::cli::insert::moving::Moving;
 use crate::cli::terminal::console::Console;
-use crate::cli::terminal::interrupt;
-use crate::fault::{Fault, Result};
+use crate::fault::Result;
 use crate::recording::BoardSpec;
 use crate::rig::Rig;
 use crate::scan::Where;
@@ -31,15 +28,8 @@ use std::path::PathBuf;
   sheetlight calibrate auto --station cell3 --robot bcap://192.168.0.1:5007 --camera gige://first \\
       --board board.json --out pictures --target-mm 0.025 --allow-motion")]
 pub struct Args {
-    /// Station folder that gets the calibrations; its station.toml states [motion] and [outputs]
-    #[arg(long)]
-    station: PathBuf,
-    /// The robot, for example bcap://192.168.0.1:5007
-    #[arg(long)]
-    robot: String,
-    /// The camera (docs/live.md)
-    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<CameraUri>)]
-    camera: CameraUri,
+    #[command(flatten)]
+    moving: Moving,
     /// The board's description (docs/boards.md)
     #[arg(long)]
     board: PathBuf,
@@ -52,15 +42,6 @@ pub struct Args {
     /// Stops at most
     #[arg(long, default_value_t = 40)]
     most: usize,
-    /// Speed of every motion, mm/s, at most the station's [default: the station's, else 50]
-    #[arg(long)]
-    speed: Option<f64>,
-    /// The arm may move
-    #[arg(long)]
-    allow_motion: bool,
-    /// Say yes to every motion: for simulated cells on this machine alone
-    #[arg(long)]
-    yes: bool,
     /// Where the stages run: auto (a GPU with processors of its own, else this machine's), gpu, or cpu
     #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
     on: Where,
@@ -69,12 +50,9 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
-    if args.yes && !on_this_machine(&args.robot) {
-        return Err(Fault::usage(format!("--yes with the robot {}", args.robot))
-            .cause("only a simulated cell on this machine may be moved without a person's yes")
-            .next("leave --yes out"));
-    }
-    let (settings, rig) = (Settings::load(&args.station)?, Rig::load_camera(&args.station)?);
+    let moving = &args.moving;
+    moving.check()?;
+    let (settings, rig) = (Settings::load(&moving.station)?, Rig::load_camera(&moving.station)?);
     let run = AutoRun {
         joint: JointRun::new(Mount::EyeInHand, asked(&settings, None), &settings.extraction, args.on),
         board: BoardSpec::load(&args.board)?,
@@ -86,25 +64,22 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         seed: 1,
     };
     run.check()?;
-    let camera = args.camera.open(None)?;
-    let log = MotionLog::file(&args.station.join("motions.jsonl"));
-    let mut guard = Guard::new(crate::arm::open(&args.robot)?, settings.motion.clone(), log);
-    guard.stop_button().listen(interrupt::asked_for());
-    guard.arm(args.allow_motion)?;
-    let mut person = Person { console, yes: args.yes };
+    let camera = moving.camera.open(None)?;
+    let mut guard = moving.guard(&settings)?;
+    let mut person = moving.person(console);
     let outputs = settings.outputs.unwrap_or_default();
-    let mut cell = ArmCell::new(&mut guard, camera, outputs, &mut person, args.speed);
+    let mut cell = ArmCell::new(&mut guard, camera, outputs, &mut person, moving.speed);
     let told = |stops: usize, mm: f64| console.say(format!("{stops} stops: a scanned point is expected to {mm:.4} mm"));
     let result = calibrate_auto(&mut cell, &rig, &run, &told).inspect_err(|_| {
         if args.out.join("line/meta.json").is_file() {
-            let (out, station) = (args.out.display(), args.station.display());
+            let (out, station) = (args.out.display(), moving.station.display());
             console.warn(format!(
                 "the pictures so far are kept: sheetlight calibrate joint {out}/* --station {station} makes of them what it can"
             ));
         }
     })?;
     drop(cell);
-    finish(&args.station, &result.joint, &args.keep, console)?;
-    stale(&args.station, console);
+    finish(&moving.station, &result.joint, &args.keep, console)?;
+    stale(&moving.station, console);
     Ok(())
 }

@@ -1,16 +1,13 @@
 //! In: a station, a robot, a camera, a recipe. Out: the insertion, step by step, each motion shown and confirmed; the job's report.
 //! Frame and unit: base frame; poses in the robot's own notation; mm, s.
 
-use crate::arm::rules::{Confirmation, Guard, MotionLog};
-use crate::capture::CameraUri;
+use super::moving::Moving;
 use crate::cli::terminal::console::Console;
-use crate::cli::terminal::interrupt;
 use crate::fault::{Fault, Result};
 use crate::robot::Convention;
 use crate::scan::Where;
 use crate::station::Settings;
-use crate::station::job::{Ask, Job, JobOptions, JobReport, Operator, Outcome};
-use std::io::{BufRead, IsTerminal};
+use crate::station::job::{Job, JobOptions, JobReport, Outcome};
 use std::path::{Path, PathBuf};
 
 /// Insert a part with a robot: touch, square, scan, find, approach, insert, retract
@@ -26,27 +23,14 @@ use std::path::{Path, PathBuf};
   sheetlight job --station cell --robot bcap://127.0.0.1:5007 --camera cell://127.0.0.1:5017?rate=-1 \\
       --recipe data/recipes/osc.toml --out job1 --allow-motion --yes")]
 pub struct Args {
-    /// Station folder: calibrations, and station.toml with [motion] and [tool] (docs/robots.md)
-    #[arg(long)]
-    station: PathBuf,
-    /// The robot: bcap://HOST[:5007][?network=udp][&full=MM_S]
-    #[arg(long)]
-    robot: String,
-    /// The camera (docs/live.md)
-    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<CameraUri>)]
-    camera: CameraUri,
+    #[command(flatten)]
+    moving: Moving,
     /// Recipe (TOML) of the part
     #[arg(long)]
     recipe: PathBuf,
     /// Folder of the job: its state, recordings, scan, report; with --repeat one folder a job in it
     #[arg(long)]
     out: PathBuf,
-    /// The arm may move
-    #[arg(long)]
-    allow_motion: bool,
-    /// Speed of every motion, mm/s, at most the station's [default: the station's, else 50]
-    #[arg(long)]
-    speed: Option<f64>,
     /// The line sweeps over so much about the picture's middle, mm [default: the field's short side]
     #[arg(long)]
     sweep: Option<f64>,
@@ -62,41 +46,29 @@ pub struct Args {
     /// Jobs one after the other; the first that is stopped ends them
     #[arg(long, default_value_t = 1)]
     repeat: u32,
-    /// Say yes to every motion: for simulated cells on this machine alone
-    #[arg(long)]
-    yes: bool,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
-    if args.yes && !on_this_machine(&args.robot) {
-        return Err(Fault::usage(format!("--yes with the robot {}", args.robot))
-            .cause("only a simulated cell on this machine may be moved without a person's yes")
-            .next("leave --yes out"));
-    }
-    let settings = Settings::load(&args.station)?;
-    let mut guard = Guard::new(
-        crate::arm::open(&args.robot)?,
-        settings.motion.clone(),
-        MotionLog::file(&args.station.join("motions.jsonl")),
-    );
-    guard.stop_button().listen(interrupt::asked_for());
-    guard.arm(args.allow_motion)?;
+    let moving = &args.moving;
+    moving.check()?;
+    let settings = Settings::load(&moving.station)?;
+    let mut guard = moving.guard(&settings)?;
     let robot = args.notation.or(settings.robot).unwrap_or(Convention::Denso);
     let mut reports = Vec::new();
     for k in 0..args.repeat.max(1) {
         let out = if args.repeat > 1 { args.out.join(format!("job_{k:04}")) } else { args.out.clone() };
         let options = JobOptions {
-            station: args.station.clone(),
+            station: moving.station.clone(),
             recipe: args.recipe.clone(),
             out: out.clone(),
             robot,
             place: args.on,
-            speed_mm_s: args.speed,
+            speed_mm_s: moving.speed,
             sweep_mm: args.sweep,
             max_tilt_deg: args.max_tilt_deg,
         };
-        let mut person = Person { console, yes: args.yes };
-        let report = Job::open(&options, &mut guard, args.camera.open(None)?, &mut person)?.run()?;
+        let mut person = moving.person(console);
+        let report = Job::open(&options, &mut guard, moving.camera.open(None)?, &mut person)?.run()?;
         let stopped = report.outcome == Outcome::Stopped;
         let why = report.why.clone();
         reports.push(report);
@@ -124,50 +96,4 @@ fn text(reports: &[JobReport]) -> String {
         format!("{end}; {position}; {:.1} s and {} confirmations in all", r.seconds, r.confirmations)
     };
     reports.iter().map(one).collect::<Vec<_>>().join("\n")
-}
-
-pub(in crate::cli) fn on_this_machine(uri: &str) -> bool {
-    let host = uri.split_once("://").map_or("", |(_, rest)| rest);
-    ["127.0.0.1:", "localhost:", "[::1]:"].iter().any(|h| host.starts_with(h))
-}
-
-/// Whoever sits at the terminal.
-pub(in crate::cli) struct Person<'a> {
-    pub console: &'a Console,
-    /// Every motion is confirmed without asking.
-    pub yes: bool,
-}
-
-impl Operator for Person<'_> {
-    fn confirm(&mut self, ask: &Ask) -> Result<Option<Confirmation>> {
-        let mut words = format!("{}:", ask.step);
-        for line in &ask.says {
-            words += &format!("\n   {line}");
-        }
-        let speed = ask.proposal.plan.legs.iter().map(|l| l.speed_mm_s).fold(0.0, f64::max);
-        words += &format!(
-            "\n   {} motions at {speed:.0} mm/s, {} gates met, pose {}",
-            ask.proposal.plan.legs.len(),
-            ask.proposal.gates.len(),
-            &ask.proposal.hash[..12]
-        );
-        self.console.say(words);
-        let yes = || Some(Confirmation::of(&*ask.proposal.hash));
-        if self.yes {
-            return Ok(yes());
-        }
-        if !std::io::stdin().is_terminal() {
-            return Err(Fault::usage(format!("nobody can answer '{}': standard input is no terminal", ask.question))
-                .next("run it in a terminal"));
-        }
-        self.console.ask(&format!("   {} [y/N] ", ask.question));
-        let mut line = String::new();
-        let read = std::io::stdin().lock().read_line(&mut line);
-        read.map_err(|e| Fault::input(format!("standard input: {e}")).next("run it in a terminal"))?;
-        Ok(if matches!(line.trim(), "y" | "Y" | "yes") { yes() } else { None })
-    }
-
-    fn tell(&mut self, line: &str) {
-        self.console.say(line);
-    }
 }

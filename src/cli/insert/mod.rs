@@ -3,3 +3,4 @@
 
 pub mod guide;
 pub mod job;
+pub(in crate::cli) mod moving;
