@@ -2,12 +2,13 @@
 //! Frame and unit: as [`super::Shot`].
 
 use super::source::{BadShot, Shot, Source};
-use crate::capture::record::{Handing, RecordReport, Written};
+use crate::capture::record::{Backlog, RecordReport, Recorded};
 use crate::capture::{Account, Fate, Format, Stream, Streamed};
 use crate::fault::{Fault, Result};
 use crate::raster::Image;
-use crate::recording::{FrameLines, Meta, Recording, Stand, Taken};
+use crate::recording::{Recording, Stand};
 use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -87,60 +88,37 @@ impl Source for StreamSource {
     }
 }
 
-/// What a recorder on another thread writes, scanned while it goes on recording. Pictures that have to wait are read from its disk again,
-/// so that nothing grows however far behind this is.
+/// What a recorder on another thread hands on, scanned while it goes on recording. Pictures that have to wait are read from its disk again.
 pub struct RecordedSource {
     format: Format,
     recording: Recording,
-    frames: FrameLines,
-    handing: Handing,
-    next: usize,
+    shots: Receiver<Recorded>,
+    backlog: Backlog,
     /// What the recording came to, once it has ended.
     report: Arc<Mutex<Option<Result<RecordReport>>>>,
 }
 
 impl RecordedSource {
-    /// `meta` and `frames` are what the recorder writes into `folder`; `report` is filled before `handing` ends.
-    ///
-    /// # Errors
-    /// There is no recording.
+    /// `meta` is what the recorder writes into `folder`; `report` is filled before the channel closes.
     pub fn new(
         folder: PathBuf,
-        meta: Meta,
-        handing: Handing,
+        meta: crate::recording::Meta,
+        shots: Receiver<Recorded>,
+        backlog: Backlog,
         report: Arc<Mutex<Option<Result<RecordReport>>>>,
-    ) -> Result<RecordedSource> {
+    ) -> RecordedSource {
         let format = Format { width: meta.image.width, height: meta.image.height, bits: meta.image.bits };
-        let frames = FrameLines::open(&folder.join(meta.frames_file.as_deref().unwrap_or_default()))?;
         let recording = Recording { folder, meta, channel: Default::default(), outside: false };
-        Ok(RecordedSource { format, recording, frames, handing, next: 0, report })
+        RecordedSource { format, recording, shots, backlog, report }
     }
 
-    /// The shot that is written next, with its picture where that is still here.
-    fn shot(&mut self, image: Option<Image>) -> std::result::Result<Shot, BadShot> {
-        let index = self.next as u32;
-        self.next += 1;
-        let bad = |name: &str, fault, last| Err(BadShot { index, name: name.into(), fault, last });
-        let frame = match self.frames.next() {
-            Ok(Some(frame)) => frame,
-            Ok(None) => {
-                let cut = Fault::input("the recording's list of frames ends before its last picture")
-                    .cause("somebody else writes into the folder")
-                    .next("leave it alone while it is recorded");
-                return bad("", cut, true);
+    fn image(&self, shot: &mut Recorded) -> Result<Image> {
+        match shot.image.take() {
+            Some(image) => {
+                self.backlog.taken();
+                Ok(image)
             }
-            Err(fault) => return bad("", fault, true),
-        };
-        let name = frame.laser.clone().unwrap_or_default();
-        let taken = frame.taken.as_ref();
-        let pose = || taken.and_then(|t| t.base_from_flange).map(Stand::Robot);
-        let Some(stand) = frame.count.map(Stand::Count).or_else(pose) else {
-            return Err(without_stand(index, &name));
-        };
-        let (slip, here_ns) = (taken.and_then(Taken::slip), taken.map(|t| t.host_ns));
-        match image.map_or_else(|| self.recording.picture(&name), Ok) {
-            Ok(image) => Ok(Shot { index, name, image, stand, slip, here_ns }),
-            Err(fault) => bad(&name, fault, false),
+            None => self.recording.picture(&shot.kept.name),
         }
     }
 }
@@ -159,14 +137,19 @@ impl Source for RecordedSource {
     }
 
     fn next(&mut self) -> Option<std::result::Result<Shot, BadShot>> {
-        loop {
-            match self.handing.shot(self.next, GLANCE) {
-                Written::Here(image) => return Some(self.shot(Some(image))),
-                Written::OnDisk => return Some(self.shot(None)),
-                Written::Quiet => {}
-                Written::Ended => return None,
+        let mut shot = loop {
+            match self.shots.recv_timeout(GLANCE) {
+                Ok(shot) => break shot,
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return None,
             }
-        }
+        };
+        let (index, name) = (shot.kept.index as u32, shot.kept.name.clone());
+        let Some(stand): Option<Stand> = shot.stand else { return Some(Err(without_stand(index, &name))) };
+        Some(match self.image(&mut shot) {
+            Ok(image) => Ok(Shot { index, name, image, stand, slip: shot.slip, here_ns: Some(shot.here_ns) }),
+            Err(fault) => Err(BadShot { index, name, fault, last: false }),
+        })
     }
 
     fn account(&self) -> Option<Account> {

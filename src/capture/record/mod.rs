@@ -6,5 +6,5 @@ mod run;
 mod space;
 
 pub use recorder::{Kept, Recorder, RecorderOptions, Shows, Store};
-pub use run::{Handing, Recording as RecordReport, Written, record};
+pub use run::{Backlog, Recorded, Recording as RecordReport, handing_on, record};
 pub use space::Space;

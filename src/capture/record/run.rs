@@ -5,13 +5,28 @@ use super::super::account::Account;
 use super::super::feed::Fate;
 use super::super::pair::LeftOut;
 use super::super::stream::{Stream, Streamed};
-use super::recorder::Recorder;
+use super::recorder::{Kept, Recorder};
 use super::space::Space;
 use crate::fault::{Fault, Result};
 use crate::raster::Image;
-use std::collections::VecDeque;
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use crate::recording::{Slip, Stand};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+/// A shot that has been recorded.
+pub struct Recorded {
+    /// Where it lies.
+    pub kept: Kept,
+    /// The picture, where few wait to be read: the others are read from the disk again.
+    pub image: Option<Image>,
+    /// Where what moves stood.
+    pub stand: Option<Stand>,
+    /// How far that may be off.
+    pub slip: Option<Slip>,
+    /// When its last byte was here, ns of the host's clock.
+    pub here_ns: u64,
+}
 
 /// What a recording came to.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -30,90 +45,31 @@ pub struct Recording {
 const HANDED: usize = 16;
 const GLANCE: Duration = Duration::from_millis(200);
 
-#[derive(Default)]
-struct Handed {
-    pictures: VecDeque<(usize, Image)>,
-    written: usize,
-    ended: bool,
-}
-
-/// Between a recorder and whoever reads beside it: how far it is, and its last pictures while few wait.
+/// Pictures handed on and not yet taken.
 #[derive(Clone, Default)]
-pub struct Handing(Arc<(Mutex<Handed>, Condvar)>);
+pub struct Backlog(Arc<Mutex<usize>>);
 
-struct Over(Handing);
-
-impl Drop for Over {
-    fn drop(&mut self) {
-        self.0.lock().ended = true;
-        self.0.0.1.notify_all();
+impl Backlog {
+    fn add(&self) -> bool {
+        let mut n = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let room = *n < HANDED;
+        *n += usize::from(room);
+        room
+    }
+    /// A picture that was handed on was taken.
+    pub fn taken(&self) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) -= 1;
     }
 }
 
-/// What comes of waiting for a shot of a recording under way.
-pub enum Written {
-    /// It is on the disk, and its picture here.
-    Here(Image),
-    /// It is on the disk.
-    OnDisk,
-    /// The time is over, it is not written yet.
-    Quiet,
-    /// The recording ends before it.
-    Ended,
-}
-
-impl Handing {
-    fn lock(&self) -> MutexGuard<'_, Handed> {
-        self.0.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Whether a picture that is written next is wanted in memory.
-    fn has_room(&self) -> bool {
-        self.lock().pictures.len() < HANDED
-    }
-
-    fn wrote(&self, index: usize, image: Option<Image>) {
-        let mut handed = self.lock();
-        handed.written = index + 1;
-        handed.pictures.extend(image.map(|i| (index, i)));
-        self.0.1.notify_all();
-    }
-
-    /// When this is let go, the recording is over.
-    pub fn ends(&self) -> impl Drop + use<> {
-        Over(self.clone())
-    }
-
-    /// Waits for a shot by its place in the recording; they are asked for in order.
-    pub fn shot(&self, index: usize, within: Duration) -> Written {
-        let until = Instant::now() + within;
-        let mut handed = self.lock();
-        loop {
-            if handed.written > index {
-                return match handed.pictures.front() {
-                    Some((at, _)) if *at == index => {
-                        handed.pictures.pop_front().map_or(Written::OnDisk, |(_, image)| Written::Here(image))
-                    }
-                    _ => Written::OnDisk,
-                };
-            }
-            let left = until.saturating_duration_since(Instant::now());
-            if handed.ended || left.is_zero() {
-                return if handed.ended { Written::Ended } else { Written::Quiet };
-            }
-            handed = self.0.1.wait_timeout(handed, left).unwrap_or_else(PoisonError::into_inner).0;
-        }
-    }
-}
-
-/// Records until the stream ends. `say` is told what a person should hear, and the account now and then. With `on` somebody reads beside it.
+/// Records until the stream ends. `say` is told what a person should hear, and the account now and then. With `on` each shot is handed on.
 ///
 /// # Errors
 /// The disk is full: what was recorded stays, and the pictures from then on are dropped. What ended the stream, where nobody wished it.
 pub fn record(
     stream: &mut Stream,
     mut recorder: Recorder,
-    on: Option<&Handing>,
+    on: Option<(Sender<Recorded>, Backlog)>,
     mut say: impl FnMut(&Stream, Option<String>),
 ) -> Result<Recording> {
     let mut space = Space::of(recorder.folder());
@@ -133,12 +89,15 @@ pub fn record(
             stream.fate(Fate::Disk);
             continue;
         }
+        let slip = shot.taken.slip();
         match recorder.add(&shot.picture.image, shot.stand.as_ref(), shot.taken, stream.feed().fill()) {
             Ok(kept) => {
                 stream.fate(Fate::Used);
-                if let Some(handing) = on {
-                    let image = handing.has_room().then_some(shot.picture.image);
-                    handing.wrote(kept.index, image);
+                if let Some((send, backlog)) = &on {
+                    let here_ns = shot.picture.host_ns;
+                    let image = backlog.add().then_some(shot.picture.image);
+                    // Nobody reads any more: recording goes on.
+                    let _ = send.send(Recorded { kept, image, stand: shot.stand, slip, here_ns });
                 }
             }
             Err(fault) => {
@@ -160,4 +119,10 @@ pub fn record(
     }
     let shots = finished?;
     Ok(Recording { shots, bytes, account: stream.account(), left_out })
+}
+
+/// [`record`] on a thread of its own; the shots come through the channel.
+pub fn handing_on() -> (Sender<Recorded>, Receiver<Recorded>, Backlog) {
+    let (send, receive) = channel();
+    (send, receive, Backlog::default())
 }
