@@ -49,7 +49,8 @@ pub trait Arm: PoseSource {
         Ok(())
     }
 
-    /// Makes one motion and returns when it has ended. Errors: it was not begun, or was stopped; the pose has to be read again.
+    /// Makes one motion and returns when it has ended. Errors: it was not begun, or was stopped; the pose has to be read again. Of kind
+    /// [`crate::fault::Kind::Refused`] where the controller answered with an error, of another where nobody knows what it did.
     fn make(&mut self, _allowed: Allowed) -> Result<()> {
         Err(reads_only(self.name()))
     }

@@ -15,7 +15,7 @@ mod verify;
 pub mod volume;
 
 pub use calibrate::auto::arm::ArmCell;
-pub use calibrate::auto::cell::{Cell, Light};
+pub use calibrate::auto::cell::{Cell, Light, Went};
 pub use calibrate::auto::check::SelfCheck;
 pub use calibrate::auto::procedure::{AutoResult, AutoRun, Ended, calibrate_auto};
 pub use calibrate::axis::{AxisRun, calibrate_axis};

@@ -4,12 +4,12 @@
 
 use super::cell;
 use sheetlight::arm::rules::{Confirmation, Evidence, Guard, Limits, MotionLog, Plan, Space, StopButton};
-use sheetlight::arm::{Motion, Way};
+use sheetlight::arm::{Allowed, Arm, ControllerError, Halt, Mode, Motion, PoseSource, State, TimedPose, Way};
 use sheetlight::cell::{Event, Served};
-use sheetlight::fault::Gate;
-use sheetlight::geometry::{Rigid, Vec3, exp};
+use sheetlight::fault::{Fault, Gate};
+use sheetlight::geometry::{Base, Flange, Rigid, Vec3, exp};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::SeqCst};
 use std::time::{Duration, Instant};
 
 const SPACE: Space = Space { from_mm: [150.0, -300.0, 200.0], to_mm: [500.0, 300.0, 700.0] };
@@ -224,4 +224,104 @@ fn whoever_goes_while_the_arm_moves_halts_it_in_time() {
         "halt at the controller after ms: STOP {ms:.1}, signal {signal:.1}, lease of 100 {lease:.1}, link cut {cut:.1}, silence of 200 {silent:.1}; {:?}",
         begun.elapsed()
     );
+}
+
+/// An arm that refuses every motion; what it is like afterwards.
+struct Stubborn {
+    at: Rigid<Base, Flange>,
+    fault: fn() -> Fault,
+    then: fn(&mut Stubborn),
+    state: State,
+    mute: bool,
+    halts: Arc<AtomicUsize>,
+}
+
+struct Counted(Arc<AtomicUsize>);
+
+impl Halt for Counted {
+    fn halt(&self) -> Result<(), Fault> {
+        self.0.fetch_add(1, SeqCst);
+        Ok(())
+    }
+}
+
+struct Stands(Rigid<Base, Flange>);
+
+fn timed(base_from_flange: Rigid<Base, Flange>) -> TimedPose {
+    let now = Instant::now();
+    TimedPose { base_from_flange, figure: None, asked: now, here: now, device: None }
+}
+
+impl PoseSource for Stands {
+    fn pose(&mut self) -> Result<TimedPose, Fault> {
+        Ok(timed(self.0))
+    }
+}
+
+impl PoseSource for Stubborn {
+    fn pose(&mut self) -> Result<TimedPose, Fault> {
+        Ok(timed(self.at))
+    }
+}
+
+impl Arm for Stubborn {
+    fn name(&self) -> &str {
+        "stubborn"
+    }
+    fn state(&mut self) -> Result<State, Fault> {
+        if self.mute { Err(Fault::device("no answer")) } else { Ok(self.state.clone()) }
+    }
+    fn watch(&self) -> Result<Box<dyn PoseSource>, Fault> {
+        Ok(Box::new(Stands(self.at)))
+    }
+    fn stop(&self) -> Result<Arc<dyn Halt>, Fault> {
+        Ok(Arc::new(Counted(self.halts.clone())))
+    }
+    fn take(&mut self) -> Result<(), Fault> {
+        Ok(())
+    }
+    fn make(&mut self, _: Allowed) -> Result<(), Fault> {
+        (self.then)(self);
+        Err((self.fault)())
+    }
+}
+
+/// What is said, whether the place is unknown afterwards, how often it was halted.
+fn refused_by(fault: fn() -> Fault, then: fn(&mut Stubborn)) -> (bool, bool, usize) {
+    let at = Rigid::new(sheetlight::geometry::Mat3::identity(), Vec3::new(300.0, 0.0, 400.0));
+    let state = State {
+        model: "stubborn".into(),
+        mode: Mode::Automatic,
+        motor: Some(true),
+        busy: Some(false),
+        emergency_stop: Some(false),
+        errors: vec![],
+        tool: Some(0),
+        work: Some(0),
+    };
+    let halts = Arc::new(AtomicUsize::new(0));
+    let arm = Stubborn { at, fault, then, state, mute: false, halts: halts.clone() };
+    let mut guard = Guard::new(Box::new(arm), Some(Limits::within(SPACE)), MotionLog::default());
+    guard.arm(true).unwrap();
+    let down = leg(&mut guard, [0.0, 0.0, -10.0], 50.0);
+    let proposal = guard.propose(plan(vec![down])).unwrap();
+    let yes = Confirmation::of(&*proposal.hash);
+    let said = guard.attempt(&proposal, yes, &mut |_, _| Ok(()));
+    (matches!(said, Ok(Some(_))), guard.unknown().is_some(), halts.load(SeqCst))
+}
+
+#[test]
+fn an_order_that_was_answered_with_an_error_is_known_only_where_nothing_moved() {
+    let code: fn() -> Fault = || Fault::refused("83204073");
+    assert_eq!(refused_by(code, |_| {}), (true, false, 0), "the arm stands as before");
+    let unknown = (false, true, 1);
+    assert_eq!(refused_by(|| Fault::device("silence"), |_| {}), unknown, "no answer: it may have begun");
+    assert_eq!(refused_by(code, |a| a.at.translation.z -= 0.05), unknown, "it has moved");
+    assert_eq!(refused_by(code, |a| a.at.rotation = exp(&Vec3::new(0.0, 0.0, 2e-4))), unknown, "it has turned");
+    assert_eq!(refused_by(code, |a| a.state.busy = Some(true)), unknown, "it moves");
+    assert_eq!(refused_by(code, |a| a.state.busy = None), unknown, "nobody says whether it moves");
+    assert_eq!(refused_by(code, |a| a.state.emergency_stop = Some(true)), unknown, "somebody stopped it");
+    assert_eq!(refused_by(code, |a| a.mute = true), unknown, "its state cannot be read");
+    let error = |a: &mut Stubborn| a.state.errors = vec![ControllerError { code: 1, text: String::new() }];
+    assert_eq!(refused_by(code, error), unknown, "an error stands: a person clears it");
 }

@@ -14,7 +14,7 @@ use sheetlight::raster::Image;
 use sheetlight::rig::{Rig, Volume};
 use sheetlight::scan::{Extraction, Where};
 use sheetlight::simulate::{Canvas, InScene, Scene, View, expose, hot_pixels, reported};
-use sheetlight::station::{AutoResult, AutoRun, Cell as Drives, Ended, JointRun, Light, calibrate_auto};
+use sheetlight::station::{AutoResult, AutoRun, Cell as Drives, Ended, JointRun, Light, Went, calibrate_auto};
 
 /// A robot with the sensor over one board.
 struct Simulated {
@@ -63,14 +63,14 @@ impl Drives for Simulated {
     fn may(&mut self, to: &Rigid<Base, Flange>) -> Result<bool> {
         Ok(self.inside(to))
     }
-    fn go(&mut self, to: &Rigid<Base, Flange>) -> Result<Rigid<Base, Flange>> {
+    fn go(&mut self, to: &Rigid<Base, Flange>) -> Result<Went> {
         assert!(self.inside(to), "a move out of the box");
         self.moves.push(*to);
         if self.moves.len() == self.pushed_after {
             self.cell.base_from_board.translation += Vec3::new(4.0, 1.0, 0.0);
         }
         self.pose = *to;
-        self.pose()
+        Ok(Went::There(self.pose()?))
     }
     fn picture(&mut self, light: Light) -> Result<Image> {
         let station = &self.cell.station;

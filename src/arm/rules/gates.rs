@@ -88,7 +88,8 @@ fn kept_out(plan: &Plan, limits: &Limits, from: &Rigid<Base, Flange>, to: &Rigid
     places.iter().map(|p| (0..pieces).map(|k| piece(k, p)).sum::<f64>()).fold(0.0, f64::max)
 }
 
-fn of_the_state(state: &State) -> Vec<Gate> {
+/// What mode, motor, errors and frames have to be before anything moves.
+pub fn of_the_state(state: &State) -> Vec<Gate> {
     let zero = |n: Option<i32>| n.map_or(f64::INFINITY, |n| f64::from(n.abs()));
     vec![
         must("automatic mode", state.mode == Mode::Automatic),

@@ -3,13 +3,13 @@
 //! Frame and unit: base_from_flange, mm, degrees, mm/s.
 
 use super::super::{Allowed, Arm, Halt, Motion, PoseSource, Reach, TimedPose, Way};
-use super::gates::{Situation, gates};
+use super::gates::{Situation, gates, of_the_state};
 use super::limits::Limits;
 use super::log::MotionLog;
 use super::plan::{Confirmation, Plan, Proposal, hash};
 use super::stop::StopButton;
 use super::watch::Watch;
-use crate::fault::{Fault, Result};
+use crate::fault::{Fault, Kind, Result};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Instant;
@@ -18,6 +18,8 @@ use std::time::Instant;
 const MOVED: (f64, f64) = (0.2, 0.05);
 /// A motion has arrived within so much of its goal, mm and degrees.
 const ARRIVED: (f64, f64) = (0.2, 0.05);
+/// Two readings of an arm that has not moved differ by no more, mm and degrees.
+const STILL: (f64, f64) = (0.01, 0.005);
 
 /// A robot behind its rules. Read-only until it is armed.
 pub struct Guard {
@@ -160,14 +162,28 @@ impl Guard {
     /// error ends the plan there.
     ///
     /// # Errors
-    /// A gate is not met (any more), the confirmation is of another proposal, was used or is too old, or the motion was stopped: then
-    /// the arm stands wherever it was stopped.
+    /// A gate is not met (any more), the confirmation is of another proposal, was used or is too old, the controller would not begin
+    /// a leg, or the motion was stopped: then the arm stands wherever it was stopped.
     pub fn make(
         &mut self,
         proposal: &Proposal,
         confirmation: Confirmation,
         each: &mut dyn FnMut(&mut dyn Arm, usize) -> Result<()>,
     ) -> Result<()> {
+        self.attempt(proposal, confirmation, each)?.map_or(Ok(()), Err)
+    }
+
+    /// The same for who has another way: a leg that the controller would not begin comes back as what it said. The arm then stands
+    /// where that leg was to begin, its place is known, and something else may be proposed.
+    ///
+    /// # Errors
+    /// All others of [`Guard::make`].
+    pub fn attempt(
+        &mut self,
+        proposal: &Proposal,
+        confirmation: Confirmation,
+        each: &mut dyn FnMut(&mut dyn Arm, usize) -> Result<()>,
+    ) -> Result<Option<Fault>> {
         if let Err(fault) = self.may(proposal, &confirmation) {
             self.log.note("refused", proposal, vec![fault.what.clone()])?;
             return Err(fault);
@@ -177,7 +193,8 @@ impl Guard {
         self.log.note("begun", proposal, vec![])?;
         let made = self.run(&proposal.plan, each);
         match &made {
-            Ok(()) => self.log.note("done", proposal, vec![])?,
+            Ok(None) => self.log.note("done", proposal, vec![])?,
+            Ok(Some(refusal)) => self.log.note("not begun", proposal, vec![refusal.what.clone()])?,
             Err(e) => self.log.note("stopped", proposal, vec![e.what.clone()])?,
         }
         made
@@ -230,7 +247,8 @@ impl Guard {
         refused(missed.join("; "), "what is named is not as it has to be")
     }
 
-    fn run(&mut self, plan: &Plan, each: &mut dyn FnMut(&mut dyn Arm, usize) -> Result<()>) -> Result<()> {
+    /// What the controller said where it would not begin a leg.
+    fn run(&mut self, plan: &Plan, each: &mut dyn FnMut(&mut dyn Arm, usize) -> Result<()>) -> Result<Option<Fault>> {
         let (Some(limits), Some(armed)) = (&self.limits, &mut self.armed) else { unreachable!("gates ask for both") };
         let speed = plan.legs.iter().map(|leg| leg.speed_mm_s).fold(0.0, f64::max);
         let watch = Watch::new(limits, &self.stop, &*armed.halt, speed);
@@ -244,11 +262,7 @@ impl Guard {
                 watch.end();
                 return Err(unwatched(e));
             }
-            let made = plan.legs.iter().enumerate().try_for_each(|(k, leg)| {
-                one(link, leg, &watch)?;
-                each(link, k)?;
-                watch.halted().map_or(Ok(()), |why| Err(stopped(why)))
-            });
+            let made = all(link, plan, &watch, each);
             if let Err(e) = &made {
                 watch.halt(e.what.clone());
             }
@@ -278,13 +292,49 @@ fn ends(legs: &[Motion]) -> impl Iterator<Item = &Motion> {
     legs.iter().enumerate().filter(move |(k, _)| k % stride == 0 || k + 1 == legs.len()).map(|(_, leg)| leg)
 }
 
-/// Makes one leg and looks where the arm has come to.
-fn one(link: &mut dyn Arm, leg: &Motion, watch: &Watch) -> Result<()> {
-    if let Some(why) = watch.stop.why().or_else(|| watch.halted()) {
-        return Err(stopped(why));
+/// Makes a plan's legs up to one that the controller would not begin; what it said of that one.
+fn all(
+    link: &mut dyn Arm,
+    plan: &Plan,
+    watch: &Watch,
+    each: &mut dyn FnMut(&mut dyn Arm, usize) -> Result<()>,
+) -> Result<Option<Fault>> {
+    for (k, leg) in plan.legs.iter().enumerate() {
+        if let Some(why) = watch.stop.why().or_else(|| watch.halted()) {
+            return Err(stopped(why));
+        }
+        let before = link.pose()?;
+        if let Err(fault) = link.make(Allowed::new(*leg)) {
+            return not_begun(link, &before, fault).map(Some);
+        }
+        arrived(link, leg, &before)?;
+        each(link, k)?;
+        if let Some(why) = watch.halted() {
+            return Err(stopped(why));
+        }
     }
-    let before = link.pose()?;
-    link.make(Allowed::new(*leg))?;
+    Ok(None)
+}
+
+/// An order that was answered with an error, read again: the arm is ready as before it and stands where it stood, so nothing was
+/// begun. Everything else is an error: nobody knows what the arm does.
+fn not_begun(link: &mut dyn Arm, before: &TimedPose, fault: Fault) -> Result<Fault> {
+    if fault.kind != Kind::Refused {
+        return Err(fault);
+    }
+    // The state first: an arm that starts after it is seen by its pose.
+    let ready = of_the_state(&link.state()?).iter().all(|gate| gate.passed);
+    let (angle, mm) = before.base_from_flange.difference(&link.pose()?.base_from_flange);
+    if !(ready && mm <= STILL.0 && angle.to_degrees() <= STILL.1) {
+        return Err(fault);
+    }
+    Ok(fault
+        .cause("the controller would not begin this motion; the arm has not moved")
+        .next("go there another way: from another place, or in parts"))
+}
+
+/// Looks where the arm has come to.
+fn arrived(link: &mut dyn Arm, leg: &Motion, before: &TimedPose) -> Result<()> {
     let after = link.pose()?;
     let (angle, mm) = after.base_from_flange.difference(&leg.to);
     if !(mm <= ARRIVED.0 && angle.to_degrees() <= ARRIVED.1) {

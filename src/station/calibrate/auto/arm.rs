@@ -1,7 +1,7 @@
 //! In: a robot behind its rules, a camera with its lights, somebody who confirms. Out: the cell that a calibration drives.
 //! Frame and unit: base_from_flange, mm, mm/s. Every move is shown and confirmed; what the rules do not allow is not made.
 
-use super::cell::{Cell, Light};
+use super::cell::{Cell, Light, Went};
 use crate::arm::rules::{Guard, Limits, Plan};
 use crate::arm::{Motion, Outputs, Reach, Way};
 use crate::capture::PictureSource;
@@ -88,7 +88,7 @@ impl Cell for ArmCell<'_> {
         Ok(true)
     }
 
-    fn go(&mut self, to: &Rigid<Base, Flange>) -> Result<Rigid<Base, Flange>> {
+    fn go(&mut self, to: &Rigid<Base, Flange>) -> Result<Went> {
         let (limits, from) = (self.limits()?, self.pose()?);
         let speed = self.speed_mm_s.map_or(limits.speed_mm_s, |s| s.min(limits.speed_mm_s));
         let legs = legs(&from, to, &limits, speed);
@@ -109,9 +109,11 @@ impl Cell for ArmCell<'_> {
                 .cause("somebody said no")
                 .next("begin again where the arm may move"));
         };
-        self.guard.make(&proposal, confirmation, &mut |_, _| Ok(()))?;
+        if let Some(refusal) = self.guard.attempt(&proposal, confirmation, &mut |_, _| Ok(()))? {
+            return Ok(Went::NotBegun(refusal.what));
+        }
         std::thread::sleep(SETTLE);
-        self.pose()
+        Ok(Went::There(self.pose()?))
     }
 
     fn picture(&mut self, light: Light) -> Result<Image> {

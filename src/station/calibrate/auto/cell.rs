@@ -16,14 +16,23 @@ pub enum Light {
     Pointer,
 }
 
+/// What came of a move.
+#[derive(Clone, Debug)]
+pub enum Went {
+    /// It stands there; where it says that it stands.
+    There(Rigid<Base, Flange>),
+    /// It was refused before it began, in these words: the robot stands where it stood.
+    NotBegun(String),
+}
+
 /// A robot with the sensor on its flange. Who implements it keeps the motion rules: a move that they do not allow is not made.
 pub trait Cell {
     /// Where the robot says that it stands.
     fn pose(&mut self) -> Result<Rigid<Base, Flange>>;
     /// Whether it may and can go there: reach, box, keep-outs. Nothing moves.
     fn may(&mut self, to: &Rigid<Base, Flange>) -> Result<bool>;
-    /// Goes there, waits until it stands still, and says where it stands then.
-    fn go(&mut self, to: &Rigid<Base, Flange>) -> Result<Rigid<Base, Flange>>;
+    /// Goes there, and waits until it stands still.
+    fn go(&mut self, to: &Rigid<Base, Flange>) -> Result<Went>;
     /// Takes one picture where it stands.
     fn picture(&mut self, light: Light) -> Result<Image>;
 }

@@ -2,7 +2,7 @@
 //! what the robot says of them.
 //! Frame and unit: flange, mm, degrees; px.
 
-use super::cell::Cell;
+use super::cell::{Cell, Went};
 use super::notebook::Notebook;
 use crate::calibrate::hand_eye::closed::{Pair, agree};
 use crate::calibrate::hand_eye::options::Mount;
@@ -45,7 +45,13 @@ pub fn moves(cell: &mut dyn Cell, home: &Rigid<Base, Flange>, book: &mut Noteboo
             if !cell.may(&to)? {
                 continue;
             }
-            let reported = cell.go(&to)?;
+            let reported = match cell.go(&to)? {
+                Went::There(reported) => reported,
+                Went::NotBegun(reason) => {
+                    why = reason;
+                    continue;
+                }
+            };
             let (found, reason) = book.stop(cell, &reported)?;
             if found.is_some() {
                 break;
@@ -53,7 +59,8 @@ pub fn moves(cell: &mut dyn Cell, home: &Rigid<Base, Flange>, book: &mut Noteboo
             why = reason;
         }
     }
-    cell.go(home)?;
+    // Where that is refused the arm goes on from where it stands.
+    let _ = cell.go(home)?;
     if book.stops.len() < FEWEST {
         return Err(Fault::refused(format!(
             "the board was found after {} of {} small moves, {FEWEST} are needed{}",

@@ -20,6 +20,8 @@ pub struct Notebook {
     poses: Vec<Rigid<Base, Flange>>,
     /// Every stop, in order.
     pub stops: Vec<Stop>,
+    /// Poses at which pictures were taken, the board found or not.
+    pub visits: usize,
 }
 
 /// Names of the two recordings.
@@ -37,13 +39,21 @@ impl Notebook {
         for (name, _) in NAMES {
             crate::files::make_folder(&folder.join(name))?;
         }
-        Ok(Notebook { folder: folder.into(), board: board.clone(), image: None, poses: vec![], stops: vec![] })
+        Ok(Notebook {
+            folder: folder.into(),
+            board: board.clone(),
+            image: None,
+            poses: vec![],
+            stops: vec![],
+            visits: 0,
+        })
     }
 
     /// Takes the pictures where the robot stands. `None` where the whole board is not found: nothing is kept, the reason is in
     /// the second place.
     pub fn stop(&mut self, cell: &mut dyn Cell, pose: &Rigid<Base, Flange>) -> Result<(Option<usize>, String)> {
         let room = cell.picture(Light::Room)?;
+        self.visits += 1;
         self.same_size(&room)?;
         let view = match find(&room, &self.board, &FindOptions::default()) {
             Ok(view) => view,

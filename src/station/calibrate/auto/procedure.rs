@@ -4,7 +4,7 @@
 
 use super::super::joint::measure::{Finders, unjudged};
 use super::super::joint::run::{FirstCamera, JointResult, JointRun, calibrate_joint};
-use super::cell::Cell;
+use super::cell::{Cell, Went};
 use super::check::{SelfCheck, check};
 use super::first;
 use super::notebook::Notebook;
@@ -36,7 +36,7 @@ pub struct AutoRun {
     pub out: PathBuf,
     /// Expected error of a scanned point at which it is enough, mm rms; above 0.
     pub target_mm: f64,
-    /// Stops at most, those of the check included; 20..=200.
+    /// Poses at which pictures are taken at most, those of the check and those from which the board is not found included; 20..=200.
     pub most: usize,
     /// Depths between which points will be scanned, mm; where nobody states them a fifth to both sides of the board as it is
     /// first seen.
@@ -53,6 +53,12 @@ const CHECKS: usize = 5;
 const FEWEST: usize = 14;
 /// So many predictions in a row that are wrong are no accident.
 const LOST: usize = 8;
+/// A move to a pose this near to one that the controller would not begin is not asked for again: share of the board's distance, and
+/// degrees.
+const NEAR: (f64, f64) = (0.15, 12.0);
+/// After so many refusals in a row the arm goes back to where it began, and after so many it is given up.
+const BACK: usize = 3;
+const STUCK: usize = 12;
 /// It does not fall any more where so many stops have gained less than 2 %.
 const STALLED: usize = 8;
 
@@ -99,6 +105,10 @@ struct Session<'a> {
     tries: u64,
     /// Stops in a row at which the board was not found where it was predicted.
     lost: usize,
+    home: Rigid<Base, Flange>,
+    /// Where the controller would not begin to go, and how many of these came one after the other.
+    refused: Vec<Rigid<Base, Flange>>,
+    stuck: usize,
 }
 
 impl AutoRun {
@@ -129,11 +139,14 @@ impl AutoRun {
 pub fn calibrate_auto(cell: &mut dyn Cell, rig: &Rig, run: &AutoRun, told: &dyn Fn(usize, f64)) -> Result<AutoResult> {
     run.check()?;
     let mut session = Session::begin(cell, rig, run)?;
-    let mut expected = Vec::new();
+    let (mut expected, mut known) = (Vec::new(), 0);
     let ended = loop {
         let belief = session.belief()?;
-        expected.push(belief.expected_mm());
-        told(session.shots.len(), belief.expected_mm());
+        if session.shots.len() > known {
+            known = session.shots.len();
+            expected.push(belief.expected_mm());
+            told(known, belief.expected_mm());
+        }
         if let Some(ended) = session.over(&expected) {
             break ended;
         }
@@ -211,7 +224,22 @@ impl<'a> Session<'a> {
         still(&shots, &fit, &options)?;
         let depth = middle_depth(&state.boards, &run.board);
         let working = run.working.unwrap_or([0.8 * depth, 1.2 * depth]);
-        Ok(Session { cell, run, book, first, options, shots, fit, working, tilt_deg: 14.0, tries: 0, lost: 0 })
+        Ok(Session {
+            cell,
+            run,
+            book,
+            first,
+            options,
+            shots,
+            fit,
+            working,
+            tilt_deg: 14.0,
+            tries: 0,
+            lost: 0,
+            home,
+            refused: vec![],
+            stuck: 0,
+        })
     }
 
     fn belief(&self) -> Result<Belief> {
@@ -227,7 +255,7 @@ impl<'a> Session<'a> {
         if n >= FEWEST && now <= self.run.target_mm {
             return Some(Ended::Target);
         }
-        if n + CHECKS >= self.run.most || self.tries as usize > 3 * self.run.most {
+        if self.book.visits + CHECKS >= self.run.most || self.tries as usize > 3 * self.run.most {
             return Some(Ended::Most);
         }
         let before = expected.len().checked_sub(STALLED + 1).map(|i| expected[i]);
@@ -251,6 +279,9 @@ impl<'a> Session<'a> {
         let mut out = Vec::new();
         for seen in candidates(state, &self.run.board, &looks, self.run.candidates, seed) {
             let to = flange(Mount::EyeInHand, &state.near_from_camera, &state.far_from_board[0], &seen);
+            if self.refused.iter().any(|r| alike(r, &to, self.working[1])) {
+                continue;
+            }
             if self.cell.may(&to)? {
                 out.push((seen, to));
             }
@@ -264,25 +295,46 @@ impl<'a> Session<'a> {
         let boards: Vec<Rigid<Camera, Board>> = all.iter().map(|c| c.0).collect();
         let Some(choice) = next(belief, &self.run.board, &boards, 0) else { return Ok(false) };
         let i = match self.visit(&all[choice.index].1)? {
-            (Some(i), _) => i,
-            (None, why) => {
+            Visit::Seen(i) => i,
+            Visit::NotBegun(why) => return self.elsewhere(all[choice.index].1, &why).map(|()| true),
+            Visit::Lost(why) => {
                 // The prediction was wrong: nearer to what is known.
                 self.tilt_deg = (0.7 * self.tilt_deg).max(8.0);
                 self.lost += 1;
                 return if self.lost < LOST { Ok(true) } else { Err(lost(&why)) };
             }
         };
-        self.lost = 0;
+        (self.lost, self.stuck) = (0, 0);
         self.tilt_deg = (1.3 * self.tilt_deg).min(LARGEST_TILT);
         self.shots.push(self.measured(i)?);
         self.solve()?;
         Ok(true)
     }
 
-    /// Goes there. The stop's number, none where the board is not found, and why.
-    fn visit(&mut self, to: &Rigid<Base, Flange>) -> Result<(Option<usize>, String)> {
-        let reported = self.cell.go(to)?;
-        self.book.stop(self.cell, &reported)
+    /// Goes there and takes the pictures.
+    fn visit(&mut self, to: &Rigid<Base, Flange>) -> Result<Visit> {
+        let reported = match self.cell.go(to)? {
+            Went::There(reported) => reported,
+            Went::NotBegun(why) => return Ok(Visit::NotBegun(why)),
+        };
+        let (seen, why) = self.book.stop(self.cell, &reported)?;
+        Ok(seen.map_or(Visit::Lost(why), Visit::Seen))
+    }
+
+    /// The controller would not go there: that neighbourhood is not asked for again, and the arm, where it is stuck, goes back to
+    /// where it began.
+    fn elsewhere(&mut self, to: Rigid<Base, Flange>, why: &str) -> Result<()> {
+        self.refused.push(to);
+        self.stuck += 1;
+        if self.stuck >= STUCK {
+            return Err(Fault::refused(format!("the controller would not begin {STUCK} moves in a row: {why}"))
+                .cause("straight ways from here lead through places that the arm cannot pass")
+                .next("jog the robot to where its wrist is bent, the board in view, and begin again"));
+        }
+        if self.stuck % BACK == 0 && self.cell.may(&self.home)? {
+            let _ = self.cell.go(&self.home)?;
+        }
+        Ok(())
     }
 
     /// A stop's features, its stripe told from reflections by the sheet of some stops before.
@@ -319,7 +371,7 @@ impl<'a> Session<'a> {
         let all = self.candidates()?;
         let before = self.book.stops.len();
         for (_, to) in all.iter().take(2 * CHECKS) {
-            if self.book.stops.len() == before + CHECKS {
+            if self.book.stops.len() == before + CHECKS || self.book.visits >= self.run.most {
                 break;
             }
             self.visit(to)?;
@@ -327,6 +379,22 @@ impl<'a> Session<'a> {
         let shots: Vec<Shot> = (before..self.book.stops.len()).map(|i| self.measured(i)).collect::<Result<_>>()?;
         Ok(check(&joint.fit, &shots, joint.expected_mm()))
     }
+}
+
+/// What came of going somewhere.
+enum Visit {
+    /// The board was seen: the stop's number.
+    Seen(usize),
+    /// It was not, in words.
+    Lost(String),
+    /// The arm did not go.
+    NotBegun(String),
+}
+
+/// Whether two flange poses are of one neighbourhood, `distance` from the board.
+fn alike(a: &Rigid<Base, Flange>, b: &Rigid<Base, Flange>, distance: f64) -> bool {
+    let (angle, mm) = a.difference(b);
+    mm < NEAR.0 * distance && angle.to_degrees() < NEAR.1
 }
 
 fn lost(why: &str) -> Fault {
