@@ -8,7 +8,7 @@ use crate::cli::terminal::interrupt;
 use crate::fault::Result;
 use crate::recording::BoardSpec;
 use crate::simulate::{DEFAULT_SCENE, RigSpec, SceneSpec};
-use crate::station::station_for;
+use crate::web::station_for;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::Duration;

@@ -3,7 +3,6 @@
 
 mod calibrate;
 mod find;
-mod for_cell;
 mod guide;
 mod height_witness;
 pub mod job;
@@ -30,7 +29,6 @@ pub use calibrate::laser_plane::{LaserPlaneRun, calibrate_laser_plane};
 pub use calibrate::latency::{LatencyFound, calibrate_latency};
 pub use calibrate::pointer::{PointerRun, calibrate_pointer};
 pub use find::{Looked, SecondLook, find_part, find_part_in_all, second_look, teach_part};
-pub use for_cell::station_for;
 pub use guide::{GuideOptions, Guided, Step, guide};
 pub use judge::figures::Judged;
 pub use judge::parts::{FoundPart, judge_parts};

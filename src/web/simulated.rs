@@ -2,10 +2,10 @@
 //! once: a first look at the product without camera, robot or GPU.
 //! Frame and unit: as recordings; px.
 
+use super::for_cell::station_for;
 use super::motion::{SimulatedRobot, board};
 use crate::fault::Result;
 use crate::simulate::{Set, SimulateOptions, simulate};
-use crate::station::station_for;
 use std::path::{Path, PathBuf};
 
 /// Cell and controller share this machine with everything else that runs on it: their link may be silent for so long, ms.

@@ -22,7 +22,8 @@ export function livePicture(place) {
       canvas.height = height;
       g.putImageData(image, 0, 0);
       canvas.dataset.number = String(n);
-      await new Promise(requestAnimationFrame);
+      // A glance: what else the page does, a held button above all, comes first.
+      await new Promise((go) => setTimeout(go, 150));
     }
   })();
   return () => (over = true);

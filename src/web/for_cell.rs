@@ -1,11 +1,11 @@
 //! In: a simulated cell. Out: a station folder that fits it: the sensor's true calibration, a workspace, the tool.
 //! Frame and unit: base frame, mm.
 
-use super::settings::{Settings, ToolSpec};
 use crate::arm::rules::{Limits, Space};
 use crate::cell::Cell;
 use crate::fault::Result;
 use crate::robot::Convention;
+use crate::station::{Settings, ToolSpec};
 use std::path::Path;
 
 /// Where a VS-060 on its own table may work, mm.
