@@ -88,6 +88,7 @@ def insert(s, b, part):
     # The arm is given back: the next one begins as the first did.
     s.json("POST", "/lease", {"firmly": True})
     s.json("POST", "/robot", {"armed": False})
+    s.json("POST", "/lease/release")
     quiet(b, part)
 
 
@@ -103,6 +104,7 @@ def again(s, b, part):
             s.json("POST", "/lease", {"firmly": True})
             s.json("POST", "/robot/looked")
             s.json("POST", "/robot", {"armed": False})
+            s.json("POST", "/lease/release")
 
 
 def main():
