@@ -14,7 +14,7 @@ use crate::raster::Image;
 use crate::simulate::{InScene, Scene, SceneSpec, Station, hot_pixels, part_pose};
 use rand::Rng;
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// The gripper on the flange: beside the sensor, pointing where the flange points, mm.
@@ -50,7 +50,7 @@ struct Inside {
     arm_error: ArmError,
     world: Mutex<World>,
     pictures: AtomicU64,
-    dark: AtomicBool,
+    stuck: Mutex<BTreeMap<u16, bool>>,
 }
 
 impl Cell {
@@ -85,7 +85,7 @@ impl Cell {
             arm_error,
             world: Mutex::new(world),
             pictures: AtomicU64::new(0),
-            dark: AtomicBool::new(false),
+            stuck: Mutex::default(),
             station,
             options,
         })))
@@ -133,8 +133,8 @@ impl Cell {
 
     fn seen(&self, t: f64, station: &Station) -> (Lit, Rigid<InScene, crate::geometry::Camera>) {
         let world = self.world();
-        let dark = self.0.dark.load(Ordering::Relaxed);
-        let on = |number: u16| world.output(number, t) && !dark;
+        let stuck = self.0.stuck.lock().unwrap_or_else(PoisonError::into_inner);
+        let on = |number: u16| stuck.get(&number).copied().unwrap_or_else(|| world.output(number, t));
         let outputs = self.0.options.outputs;
         let lit = Lit { line: on(outputs.line), pointer: on(outputs.pointer), room: on(outputs.room) };
         (lit, world.places().base_from_scene.inverse() * world.true_flange(t) * station.flange_from_camera)
@@ -142,7 +142,19 @@ impl Cell {
 
     /// No laser and no lamp follows its output any more: a fuse is out.
     pub fn set_dark(&self, dark: bool) {
-        self.0.dark.store(dark, Ordering::Relaxed);
+        let outputs = self.0.options.outputs;
+        for number in [outputs.line, outputs.pointer, outputs.room] {
+            self.stick(number, dark.then_some(false));
+        }
+    }
+
+    /// What hangs on an output stays on or off, whatever the output says: a wire is off, a relay is welded. `None`: it follows.
+    pub fn stick(&self, number: u16, at: Option<bool>) {
+        let mut stuck = self.0.stuck.lock().unwrap_or_else(PoisonError::into_inner);
+        match at {
+            Some(on) => stuck.insert(number, on),
+            None => stuck.remove(&number),
+        };
     }
 
     /// What happened so far.

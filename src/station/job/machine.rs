@@ -3,10 +3,12 @@
 //! Frame and unit: base frame; mm, mm/s, degrees, s.
 
 use super::eye::Eye;
+use super::lit::line_is_seen;
 use super::operator::{Ask, Operator};
 use super::places;
 use super::record::Record;
 use super::report::JobReport;
+use super::shoot::{settle, shoot};
 use super::state::{JobState, Phase};
 use crate::arm::rules::{Confirmation, Evidence, Guard, Plan, Proposal};
 use crate::arm::{Arm, Motion, Way};
@@ -25,7 +27,7 @@ use crate::station::scan::run::ScanOptions;
 use crate::station::settings::Settings;
 use crate::station::volume;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// What a job works on.
 #[derive(Clone, Debug)]
@@ -62,8 +64,6 @@ pub struct Job<'a> {
     since: Instant,
 }
 
-/// The arm stands still so long before a picture is taken, ms.
-const SETTLE: Duration = Duration::from_millis(5);
 /// A touched board whose points scatter more than this about their plane, as a share of the view's distance, is none.
 const FLAT: f64 = 0.01;
 
@@ -314,6 +314,7 @@ impl<'a> Job<'a> {
     /// Looks squarely at the board, and sweeps the line over it.
     fn scan(&mut self) -> Result<Phase> {
         let Some([centre, normal]) = self.state.surface else { return Ok(Phase::Touch) };
+        line_is_seen(&mut self.eye, self.guard.link(), &self.rig, &self.settings, &self.options.out.join("lit"))?;
         let hand_eye = self.rig.need_hand_eye()?.value;
         let camera = self.rig.need_camera()?.value;
         let depth = volume::view(&self.settings, &self.rig)?.middle();
@@ -332,7 +333,7 @@ impl<'a> Job<'a> {
         let mut record = Record::begin(&self.options.out.join("line"), "scan", Beam::Line, self.eye.format())?;
         self.go("scan", says, "is the path free?", plan, &mut |eye, arm, k| match k {
             0 => {
-                std::thread::sleep(SETTLE);
+                settle();
                 let at = arm.pose()?;
                 record.ambient(&eye.picture(arm, None)?, &at)
             }
@@ -476,26 +477,6 @@ impl<'a> Job<'a> {
         }
         Ok(Phase::Done)
     }
-}
-
-/// A picture of a beam with the pose at which it was taken; the arm stood still before and after, or it is refused.
-fn shoot(eye: &mut Eye, arm: &mut dyn Arm, record: &mut Record, beam: Option<Beam>) -> Result<()> {
-    /// As far apart as two readings of an arm that stands may be, mm and rad.
-    const STILL: [f64; 2] = [0.01, 1e-4];
-    std::thread::sleep(SETTLE);
-    let before = arm.pose()?;
-    let picture = eye.picture(arm, beam)?;
-    let after = arm.pose()?;
-    let (angle, mm) = before.base_from_flange.difference(&after.base_from_flange);
-    if mm > STILL[0] || angle > STILL[1] {
-        return Err(Fault::refused(format!(
-            "the arm moved by {mm:.3} mm while the picture was taken, limit {}",
-            STILL[0]
-        ))
-        .cause("it still swings, or somebody jogs it")
-        .next("begin again"));
-    }
-    record.shot(&picture, &after)
 }
 
 fn written(numbers: &[f64]) -> String {
