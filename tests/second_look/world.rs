@@ -62,13 +62,8 @@ pub struct Peak {
     pub share: f64,
 }
 
-/// Beams across the sheet, whose light a peak is the middle of, and along it for a pixel.
+/// Beams across the sheet, whose light a peak is the middle of.
 pub const ACROSS: i32 = 7;
-pub const BEAMS_A_PX: f64 = 3.0;
-/// Of a line seen by lens and pixel, standard deviation, px.
-pub const SPREAD_PX: f64 = 0.6;
-/// Fainter peaks are below the threshold of a recording of 8 bits.
-pub const LEAST_SHARE: f64 = 0.1;
 
 /// Rays of the sheet from one camera pose: the peaks of what it lights and the camera sees, one a column. At an edge a part of
 /// the light falls elsewhere: the peak is the middle of what is left.
@@ -78,8 +73,9 @@ pub fn peaks(station: &Station, scene: &Scene, from_camera: &Rigid<InScene, Came
     let along_x = across.y.abs() >= across.x.abs();
     let along = |p: &Vec2| if along_x { p.x } else { p.y };
     let (width, height) = (f64::from(station.camera.width), f64::from(station.camera.height));
+    // A third of a pixel apart.
     let range = station.working_distance - laser.source.z;
-    let beams_over = (2.0 * reach * range / station.working_distance * station.camera.fx * BEAMS_A_PX).ceil() as u32;
+    let beams_over = (2.0 * reach * range / station.working_distance * station.camera.fx * 3.0).ceil() as u32;
     let source = from_camera.point(&laser.source);
     let [axis, normal] = [laser.axis, laser.normal].map(|d| from_camera.direction(&d));
     let side = normal.cross(&axis);
@@ -92,9 +88,7 @@ pub fn peaks(station: &Station, scene: &Scene, from_camera: &Rigid<InScene, Came
         let faces = shown > 0.0 && scene.clear(&lifted, &eye);
         faces.then(|| Some((station.camera.pixel_from_point(&to_camera.point(&hit.point))?, shown))).flatten()
     };
-    let all: f64 = (-ACROSS..=ACROSS).map(|k| (-2.0 * (1.5 * f64::from(k) / f64::from(ACROSS)).powi(2)).exp()).sum();
-    // What each beam along the stripe shows: its place along and across, its share. A pixel takes in what falls within about one.
-    let mut shown = Vec::new();
+    let mut columns = std::collections::BTreeMap::<i64, Peak>::new();
     for i in 0..beams_over {
         let slope = reach * (2.0 * (f64::from(i) + 0.5) / f64::from(beams_over) - 1.0);
         let direction = (axis + side * slope).normalize();
@@ -106,48 +100,24 @@ pub fn peaks(station: &Station, scene: &Scene, from_camera: &Rigid<InScene, Came
                 Some((px, shown * (-2.0 * x * x).exp()))
             })
             .collect();
-        // Neighbouring beams whose images are far apart lie on two surfaces: two peaks.
-        for piece in beams.chunk_by(|a, b| (a.0 - b.0).dot(&across).abs() < 1.0) {
+        // Neighbouring beams whose images are far apart lie on two surfaces: two peaks, of which the stronger is taken.
+        let all: f64 =
+            (-ACROSS..=ACROSS).map(|k| (-2.0 * (1.5 * f64::from(k) / f64::from(ACROSS)).powi(2)).exp()).sum();
+        let pieces = beams.chunk_by(|a, b| (a.0 - b.0).dot(&across).abs() < 1.0);
+        let peak = pieces.map(|piece| {
             let light: f64 = piece.iter().map(|b| b.1).sum();
             let px = piece.iter().map(|b| b.0 * b.1).sum::<Vec2>() / light;
-            shown.push(Peak { px, share: light / all });
+            Peak { px, share: light / all }
+        });
+        let Some(peak) = peak.max_by(|a, b| a.share.total_cmp(&b.share)).filter(|p| p.share > 0.3) else { continue };
+        let slot = along(&peak.px).round() as i64;
+        let inside = peak.px.x > 0.0 && peak.px.y > 0.0 && peak.px.x < width - 1.0 && peak.px.y < height - 1.0;
+        let better = |old: &Peak| (along(&peak.px) - slot as f64).abs() < (along(&old.px) - slot as f64).abs();
+        if inside && columns.get(&slot).is_none_or(better) {
+            columns.insert(slot, peak);
         }
     }
-    let slots = if along_x { width } else { height } as i64;
-    let found = (1..slots - 1).filter_map(|slot| in_column(&shown, slot, &along, &across));
-    let mut peaks: Vec<Peak> = found.filter(|p| inside(p, width, height)).collect();
-    // Most of a line lies on level surfaces, which show all of it.
-    let mut light: Vec<f64> = peaks.iter().map(|p| p.share).collect();
-    light.sort_by(f64::total_cmp);
-    let full = light.get(light.len() / 2).copied().unwrap_or(1.0);
-    peaks.iter_mut().for_each(|p| p.share = (p.share / full).min(1.0));
-    peaks.retain(|p| p.share > LEAST_SHARE);
-    peaks
-}
-
-pub fn inside(p: &Peak, width: f64, height: f64) -> bool {
-    p.px.x > 0.0 && p.px.y > 0.0 && p.px.x < width - 1.0 && p.px.y < height - 1.0
-}
-
-/// The strongest peak of a pixel column: what optics and pixel take in of the light beside its middle.
-pub fn in_column(shown: &[Peak], slot: i64, along: &impl Fn(&Vec2) -> f64, across: &Vec2) -> Option<Peak> {
-    let weight = |p: &Peak| (-0.5 * ((along(&p.px) - slot as f64) / SPREAD_PX).powi(2)).exp();
-    let mut near: Vec<&Peak> = shown.iter().filter(|p| (along(&p.px) - slot as f64).abs() < 3.0 * SPREAD_PX).collect();
-    near.sort_by(|a, b| a.px.dot(across).total_cmp(&b.px.dot(across)));
-    let pieces = near.chunk_by(|a, b| (a.px - b.px).dot(across).abs() < 1.0);
-    let peak = pieces.map(|piece| {
-        let light: f64 = piece.iter().map(|p| p.share * weight(p)).sum();
-        let middle = piece.iter().map(|p| p.px.dot(across) * p.share * weight(p)).sum::<f64>() / light.max(1e-300);
-        // On the column's middle, where the light's middle lies across.
-        let s = slot as f64;
-        let px = if across.y.abs() >= across.x.abs() {
-            Vec2::new(s, (middle - s * across.x) / across.y)
-        } else {
-            Vec2::new((middle - s * across.y) / across.x, s)
-        };
-        Peak { px, share: light }
-    });
-    peak.max_by(|a, b| a.share.total_cmp(&b.share))
+    columns.into_values().collect()
 }
 
 /// Direction in the picture in which the stripe moves with depth.

@@ -16,9 +16,6 @@ pub(in crate::find) struct Row {
     /// Change of light for a millimetre across the edge.
     pub slope: f64,
     pub normal: [f64; 2],
-    /// What the walls of either side do to edges like this one: standard deviation of a shift along the normal that all of them
-    /// share, mm.
-    pub wall: [f64; 2],
     pub piece: (usize, usize, i32, i32),
 }
 
@@ -118,7 +115,7 @@ fn inverted(a: &Square) -> Option<Square> {
     Some(Square::from_fn(|i, k| inverse[(i, k)] * scale[i] * scale[k]))
 }
 
-/// Offsets of the pieces and of the sides whose walls show, plus the larger of two accounts of noise and poses: what the residuals of whole shots show when
+/// Offsets of the pieces, plus the larger of two accounts of noise and poses: what the residuals of whole shots show when
 /// each is left out in turn, and the samples' own noise with the poses' scatter.
 #[allow(clippy::too_many_arguments)]
 fn spread(
@@ -154,11 +151,6 @@ fn spread(
         for k in 0..2 {
             shot.2[k] += *w * r.slope * r.normal[k] * j;
         }
-    }
-    for side in 0..2 {
-        let shared = rows.iter().zip(weights).zip(&share).map(|((r, w), (j, _))| *w * r.slope * r.wall[side] * j);
-        let pull = shared.sum::<Unknowns>();
-        offsets += pull * pull.transpose();
     }
     let (mut seen, mut known) = (Square::zeros(), inverse * noise * inverse);
     for (score, information, moved) in shots.values() {

@@ -6,7 +6,6 @@ use super::edge_pieces::{N, Prior, Row, Unknowns, solve};
 use super::options::MeasureOptions;
 use super::points::Ordered;
 use super::shape::{Shape, shape_row};
-use super::walls::{FARTHER, wall_light};
 use crate::find::model::drawn_edges::EdgeSample;
 use crate::find::model::edge_index::EdgeIndex;
 use crate::find::model::face::Face;
@@ -102,14 +101,13 @@ pub(in crate::find) fn fit_light(
     let scatter = TURNS_TOO * pose_scatter(points, local, &deep, &on);
     let bias = options.edge_bias * along.norm().max(across.norm());
     let directions = [along.normalize(), across.normalize()];
-    let walls = wall_light(points, local, &deep, faces, edges, options.height_gate_mm, &directions[1]);
     let mut x = Unknowns::zeros();
     let priors = priors(unit, if shape.is_some() { FREE } else { DRAWN });
     priors.iter().for_each(|p| x[p.0] = p.1);
     x.fixed_rows_mut::<3>(7).copy_from(&shape.unwrap_or_default());
     let mut last = None;
     for _ in 0..ROUNDS {
-        let rows: Vec<Row> = samples.iter().filter_map(|s| row(s, edges, &x, &directions, &walls)).collect();
+        let rows: Vec<Row> = samples.iter().filter_map(|s| row(s, edges, &x, &directions)).collect();
         if rows.len() < MIN_SAMPLES {
             return None;
         }
@@ -239,7 +237,7 @@ fn pose_scatter(points: &Ordered, local: &[Option<Vec3>], deep: &[bool], on: &[O
 }
 
 /// The light that a sample should send back, its derivatives, and which piece of which edge it measures.
-fn row(s: &Sample, edges: &EdgeIndex, x: &Unknowns, directions: &[Vector2<f64>; 2], walls: &[f64; 2]) -> Option<Row> {
+fn row(s: &Sample, edges: &EdgeIndex, x: &Unknowns, directions: &[Vector2<f64>; 2]) -> Option<Row> {
     let (sin, cos) = x[2].sin_cos();
     let (dx, dy) = (s.at.x - x[0], s.at.y - x[1]);
     let (px, py) = (cos * dx + sin * dy, cos * dy - sin * dx);
@@ -272,11 +270,7 @@ fn row(s: &Sample, edges: &EdgeIndex, x: &Unknowns, directions: &[Vector2<f64>; 
     for (k, by) in shape_row(px, py, nx, ny).into_iter().enumerate() {
         j[7 + k] = slope * by;
     }
-    let mut wall = [0.0; 2];
-    let side = usize::from(nx * directions[1].x + ny * directions[1].y > 0.0);
-    wall[side] = FARTHER * walls[side] * share[1] * width;
-    let piece = edges.piece(edge, px, py);
-    Some(Row { j, residual: s.light - lit, shot: s.row, slope, normal: [nx, ny], wall, piece })
+    Some(Row { j, residual: s.light - lit, shot: s.row, slope, normal: [nx, ny], piece: edges.piece(edge, px, py) })
 }
 
 /// How many widths of the light's fall a place lies inside an edge, the shares of the two directions in its normal, and that

@@ -14,4 +14,3 @@ pub mod shape;
 mod sizes;
 pub mod slide;
 pub mod surface_ends;
-mod walls;
