@@ -3,6 +3,7 @@
 //! Frame and unit: none.
 
 use super::folder::{remove, sync_folder};
+use super::leftover::temporary;
 use super::moment;
 use crate::fault::{Fault, Result};
 use std::io::{Result as Io, Write};
@@ -95,15 +96,6 @@ fn rename(file: NamedTempFile, path: &Path) -> Io<()> {
 
 fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."))
-}
-
-/// A temporary file that others may read as they may read any other result: temporary files are private by default, and
-/// stay so when they are renamed.
-fn temporary(folder: &Path) -> Io<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder.tempfile_in(folder)
 }
 
 #[cfg(test)]

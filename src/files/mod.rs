@@ -7,6 +7,7 @@ mod atomic;
 mod folder;
 mod inputs;
 mod journal;
+mod leftover;
 mod lock;
 mod moment;
 mod natural;
@@ -19,6 +20,7 @@ pub use atomic::{Aside, keep_all, write, write_aside, write_beside, write_unsync
 pub use folder::{make_folder, remove};
 pub use inputs::{not_over, not_over_any};
 pub use journal::append_line;
+pub use leftover::sweep;
 pub use lock::Lock;
 pub use moment::moment;
 pub use natural::natural;

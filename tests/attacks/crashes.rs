@@ -96,8 +96,10 @@ fn a_scan_that_is_stopped_anywhere_is_resumed_to_the_same_bytes() {
             }
             run(&b.scan("recording", &out, &["--resume"]));
             assert!(results(&b.at(&out)) == whole, "{out}: resumed to other bytes");
-            let left: Vec<_> =
-                snapshot(&b.at(&out)).into_keys().filter(|p| p.display().to_string().contains("tmp")).collect();
+            let left: Vec<_> = snapshot(&b.at(&out))
+                .into_keys()
+                .filter(|p| p.display().to_string().contains(".sheetlight."))
+                .collect();
             assert!(left.is_empty(), "{out}: {left:?} are left");
             tried += 1;
             at += if long() { 1 } else { 13 };

@@ -102,9 +102,11 @@ impl Stopped {
                     }
                     run(&self.args(&work, 1));
                     let again = content(&snapshot(&work));
-                    // Who was killed leaves a temporary file.
                     let wrong: Vec<_> = new.keys().filter(|f| is_kept(f) && again.get(*f) != new.get(*f)).collect();
                     assert!(wrong.is_empty(), "{place}: run again, {wrong:?} are others");
+                    // Who was killed leaves a temporary file, and who writes there next takes it away.
+                    let left: Vec<_> = again.keys().filter(|f| is_temporary(f)).collect();
+                    assert!(left.is_empty(), "{place}: run again, {left:?} are left");
                 }
             }
         }
@@ -133,10 +135,14 @@ impl Stopped {
 
 type Content = BTreeMap<PathBuf, Vec<u8>>;
 
+fn is_temporary(file: &Path) -> bool {
+    file.file_name().is_some_and(|n| n.to_string_lossy().starts_with(".sheetlight."))
+}
+
 /// Neither temporary nor a former calibration, of which two may be there.
 fn is_kept(file: &Path) -> bool {
     let name = file.file_name().unwrap_or_default().to_string_lossy();
-    !name.starts_with(".tmp") && !name.contains("previous")
+    !is_temporary(file) && !name.contains("previous")
 }
 
 /// Files without what the clock puts into them.

@@ -89,14 +89,7 @@ pub(in crate::station) fn make(out: &Path) -> Result<()> {
 
 /// What a killed process left half-written in the working folder of a scan that is resumed.
 pub(in crate::station) fn sweep(part: &Path) -> Result<()> {
-    let sweep = |folder: &Path| -> Io<()> {
-        let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
-        for path in entries.flatten().map(|e| e.path()) {
-            if path.file_name().is_some_and(|n| n.to_string_lossy().starts_with(".tmp")) {
-                remove(&path)?;
-            }
-        }
-        Ok(())
-    };
-    sweep(part).and_then(|()| sweep(&part.join("overlays"))).map_err(|e| Fault::write(part, e))
+    crate::files::sweep(part)
+        .and_then(|()| crate::files::sweep(&part.join("overlays")))
+        .map_err(|e| Fault::write(part, e))
 }

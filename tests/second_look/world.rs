@@ -1,0 +1,286 @@
+//! In: designs of stations, a part before them. Out: what a program gets of two looks at it, with known truth, and the station that it
+//! believes in. Points come from rays of the scene, not from pictures. Frame and unit: base frame; mm, px.
+
+use nalgebra::{DMatrix, DVector};
+use rand::Rng;
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64;
+use rayon::prelude::*;
+use sheetlight::find::look::looks::other_side;
+use sheetlight::find::{LocateOptions, Recipe, Report, agree, locate};
+use sheetlight::geometry::{Base, Camera, Flange, Mat3, Part, Plane, Rigid, Vec2, Vec3, exp};
+use sheetlight::rig::{Calibration, Covariance, Kind, Quality, Rig, Verdict};
+use sheetlight::robot::Convention;
+use sheetlight::scan::CloudPoint;
+use sheetlight::simulate::{InScene, RigSpec, Scene, SceneSpec, Station, base_from_scene, part_pose, scan};
+use std::path::PathBuf;
+
+/// Errors of the calibrations, one standard deviation, as good stations of the paper's size have them; lengths of other designs
+/// in proportion to their field.
+pub const HAND_EYE_MM: f64 = 0.03;
+pub const HAND_EYE_RAD: f64 = 1.5e-4;
+pub const PLANE_RAD: f64 = 1e-4;
+pub const PLANE_MM: f64 = 0.015;
+/// Of a pose's reading.
+pub const ROBOT_MM: f64 = 0.007;
+pub const PEAK_PX: f64 = 0.06;
+/// Shots of a look.
+pub const SHOTS: usize = 130;
+/// Designs of the long form; the first is the short form's. Stripes lie, stand and lean.
+pub const DESIGNS: [&str; 10] =
+    ["paper", "paper", "fine", "shallow", "slant30", "upright", "behind", "webcam", "portrait", "microscope"];
+
+/// What a program gets of one look: peaks by shot, and the robot's poses.
+#[derive(Clone)]
+pub struct Recorded {
+    pub peaks: Vec<Vec<Peak>>,
+    pub poses: Vec<Rigid<Base, Flange>>,
+}
+
+/// A station that a program believes in.
+#[derive(Clone)]
+pub struct Believed {
+    pub station: Station,
+    /// Lengths of the design over those of the paper's rig.
+    pub unit: f64,
+    pub plane: Plane<Camera>,
+    pub hand_eye: Rigid<Flange, Camera>,
+}
+
+pub struct World {
+    pub station: Station,
+    pub unit: f64,
+    pub recipe: Recipe,
+    pub truth: Rigid<Base, Part>,
+    pub looks: [Recorded; 2],
+}
+
+/// A peak: where it is seen and how much of the sheet's light it sends back, 0 to 1.
+#[derive(Clone, Copy)]
+pub struct Peak {
+    pub px: Vec2,
+    pub share: f64,
+}
+
+/// Beams across the sheet, whose light a peak is the middle of.
+pub const ACROSS: i32 = 7;
+
+/// Rays of the sheet from one camera pose: the peaks of what it lights and the camera sees, one a column. At an edge a part of
+/// the light falls elsewhere: the peak is the middle of what is left.
+pub fn peaks(station: &Station, scene: &Scene, from_camera: &Rigid<InScene, Camera>, reach: f64) -> Vec<Peak> {
+    let laser = &station.laser;
+    let across = across(station);
+    let along_x = across.y.abs() >= across.x.abs();
+    let along = |p: &Vec2| if along_x { p.x } else { p.y };
+    let (width, height) = (f64::from(station.camera.width), f64::from(station.camera.height));
+    // A third of a pixel apart.
+    let range = station.working_distance - laser.source.z;
+    let beams_over = (2.0 * reach * range / station.working_distance * station.camera.fx * 3.0).ceil() as u32;
+    let source = from_camera.point(&laser.source);
+    let [axis, normal] = [laser.axis, laser.normal].map(|d| from_camera.direction(&d));
+    let side = normal.cross(&axis);
+    let (eye, to_camera) = (from_camera.translation, from_camera.inverse());
+    // Where a beam's light is seen, and its share by Lambert: a wall that is seen at grazing angles sends back next to nothing.
+    let seen = |start: &Vec3, direction: &Vec3| -> Option<(Vec2, f64)> {
+        let hit = scene.hit(start, direction, 2000.0)?;
+        let lifted = hit.point + hit.normal * 1e-6;
+        let shown = hit.normal.dot(&(eye - hit.point).normalize());
+        let faces = shown > 0.0 && scene.clear(&lifted, &eye);
+        faces.then(|| Some((station.camera.pixel_from_point(&to_camera.point(&hit.point))?, shown))).flatten()
+    };
+    let mut columns = std::collections::BTreeMap::<i64, Peak>::new();
+    for i in 0..beams_over {
+        let slope = reach * (2.0 * (f64::from(i) + 0.5) / f64::from(beams_over) - 1.0);
+        let direction = (axis + side * slope).normalize();
+        let radius = laser.radius(station.working_distance);
+        let beams: Vec<(Vec2, f64)> = (-ACROSS..=ACROSS)
+            .filter_map(|k| {
+                let x = 1.5 * f64::from(k) / f64::from(ACROSS);
+                let (px, shown) = seen(&(source + normal * (x * radius)), &direction)?;
+                Some((px, shown * (-2.0 * x * x).exp()))
+            })
+            .collect();
+        // Neighbouring beams whose images are far apart lie on two surfaces: two peaks, of which the stronger is taken.
+        let all: f64 =
+            (-ACROSS..=ACROSS).map(|k| (-2.0 * (1.5 * f64::from(k) / f64::from(ACROSS)).powi(2)).exp()).sum();
+        let pieces = beams.chunk_by(|a, b| (a.0 - b.0).dot(&across).abs() < 1.0);
+        let peak = pieces.map(|piece| {
+            let light: f64 = piece.iter().map(|b| b.1).sum();
+            let px = piece.iter().map(|b| b.0 * b.1).sum::<Vec2>() / light;
+            Peak { px, share: light / all }
+        });
+        let Some(peak) = peak.max_by(|a, b| a.share.total_cmp(&b.share)).filter(|p| p.share > 0.3) else { continue };
+        let slot = along(&peak.px).round() as i64;
+        let inside = peak.px.x > 0.0 && peak.px.y > 0.0 && peak.px.x < width - 1.0 && peak.px.y < height - 1.0;
+        let better = |old: &Peak| (along(&peak.px) - slot as f64).abs() < (along(&old.px) - slot as f64).abs();
+        if inside && columns.get(&slot).is_none_or(better) {
+            columns.insert(slot, peak);
+        }
+    }
+    columns.into_values().collect()
+}
+
+/// Direction in the picture in which the stripe moves with depth.
+pub fn across(station: &Station) -> Vec2 {
+    let (sin, cos) = station.rig.laser.side_deg.to_radians().sin_cos();
+    Vec2::new(cos, sin)
+}
+
+/// What a rig looks at: the LED socket of the board before the paper's, else the notched plate that fits its field.
+pub fn looked_at(rig: &RigSpec, name: &str) -> (SceneSpec, Recipe) {
+    let root = PathBuf::from(env!("CARGO_MANIFEST_DIR"));
+    let (mut spec, recipe, half, part) = if name == "paper" {
+        let spec = SceneSpec::load(&root.join("data/scenes/board.toml")).unwrap();
+        (spec, Recipe::load(&root.join("data/recipes/led.toml")).unwrap(), [20.0, 13.0], "led")
+    } else {
+        let u = rig.scale();
+        // Steps of a scan of the plate alone, turned and tilted.
+        let shots = (SHOTS as f64 * 32.0 / 30.0) as usize;
+        (rig.scene(), Recipe::parse(&rig.recipe(shots)).unwrap(), [21.0 * u, 14.5 * u], "notched")
+    };
+    let part = spec.part.iter().find(|p| p.name == part).unwrap().clone();
+    let (x, y) = (part.at_mm[0], part.at_mm[1]);
+    spec.region_mm = [x - half[0], y - half[1], x + half[0], y + half[1]];
+    (spec, recipe)
+}
+
+impl World {
+    pub fn new(index: usize) -> World {
+        let name = DESIGNS[index];
+        let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("data/rigs/{name}.toml"));
+        let rig = RigSpec::load(&path).unwrap();
+        let (w, h) = (rig.camera.width_px, rig.camera.height_px);
+        // What a larger sensor would cost is time.
+        let width = w.min(800);
+        let station = Station::of(&rig, 100 + index as u64).with_size(width, width * h / w);
+        let unit = rig.scale();
+        let (spec, mut recipe) = looked_at(&rig, name);
+        // What is judged is the measurement: the robot that inserts is exact.
+        (recipe.robot.sigma_mm, recipe.robot.sigma_deg) = (0.0, 0.0);
+        recipe.gates.second_look = true;
+        recipe.gates.max_unseen_height_mm *= unit.max(1.0);
+        let part = spec.part.iter().find(|p| p.name == recipe.name).unwrap();
+        let in_scene: Rigid<InScene, Part> = part_pose(part);
+        let [x0, _, x1, _] = spec.region_mm;
+        let reach = 0.72 * (x1 - x0) / (station.working_distance - station.laser.source.z);
+        let scene = Scene::new(spec).unwrap();
+        let placed = base_from_scene(&station);
+        let truth = placed * in_scene;
+        let mut rng = station.rng("second look", 0);
+        let path = scan(&station, &scene, SHOTS);
+        let other = other_side(&truth, 150.0 + rng.random_range(0.0..60.0), 15.0 + rng.random_range(0.0..10.0));
+        let looks = [None, Some(other)].map(|side| {
+            let shots = path.par_iter().map(|in_scene| {
+                let here = placed * *in_scene;
+                let camera = side.map_or(here, |s| s * here);
+                let seen = peaks(&station, &scene, &(placed.inverse() * camera), reach);
+                (seen, camera * station.flange_from_camera.inverse())
+            });
+            let (peaks, poses) = shots.unzip();
+            Recorded { peaks, poses }
+        });
+        World { station, unit, recipe, truth, looks }
+    }
+
+    /// What is recorded: peaks and the robot's readings with their noise.
+    pub fn recorded(&self, rng: &mut Pcg64) -> [Recorded; 2] {
+        let mut looks = self.looks.clone();
+        let across = across(&self.station);
+        for look in &mut looks {
+            for pose in &mut look.poses {
+                pose.translation += Vec3::from_fn(|_, _| self.unit * ROBOT_MM * rng.sample::<f64, _>(StandardNormal));
+            }
+            for peak in look.peaks.iter_mut().flatten() {
+                peak.px += across * (PEAK_PX * rng.sample::<f64, _>(StandardNormal));
+            }
+        }
+        looks
+    }
+
+    /// The calibrations as a good calibration would give them: off by what their covariance says.
+    pub fn believed(&self, rng: &mut Pcg64) -> Believed {
+        let mut normal = |sigma: f64| sigma * rng.sample::<f64, _>(StandardNormal);
+        let w = Vec3::from_fn(|_, _| normal(HAND_EYE_RAD));
+        let t = Vec3::from_fn(|_, _| normal(self.unit * HAND_EYE_MM));
+        let x = self.station.flange_from_camera;
+        let plane = self.station.laser.plane();
+        let tilt = Vec3::from_fn(|_, _| normal(PLANE_RAD));
+        let tilted = exp(&(tilt - plane.normal * plane.normal.dot(&tilt))) * plane.normal;
+        // The plane turns about where it was seen: the working distance.
+        let pivot = Vec3::new(0.0, 0.0, self.station.working_distance);
+        let offset = tilted.dot(&(pivot - plane.normal * plane.distance(&pivot))) + normal(self.unit * PLANE_MM);
+        Believed {
+            station: self.station.clone(),
+            unit: self.unit,
+            plane: Plane::new(tilted, offset).unwrap(),
+            hand_eye: Rigid::new(exp(&w) * x.rotation, x.translation + t),
+        }
+    }
+
+    pub fn cloud(&self, b: &Believed, look: &Recorded) -> Vec<CloudPoint> {
+        let mut out = Vec::new();
+        for (shot, (peaks, pose)) in look.peaks.iter().zip(&look.poses).enumerate() {
+            let camera = *pose * b.hand_eye;
+            for p in peaks {
+                let Some(point) = b.station.camera.ray_from_pixel(&p.px).and_then(|r| r.meet(&b.plane)) else {
+                    continue;
+                };
+                let q = camera.point(&point);
+                out.push(CloudPoint {
+                    position: [q.x as f32, q.y as f32, q.z as f32],
+                    sigma_mm: (0.02 * self.unit) as f32,
+                    intensity: (150.0 * p.share) as f32,
+                    quality: 1.0,
+                    shot: shot as u32,
+                    u: p.px.x as f32,
+                    v: p.px.y as f32,
+                });
+            }
+        }
+        out
+    }
+
+    /// Both looks with the station that is believed.
+    pub fn look(&self, b: &Believed, looks: &[Recorded; 2]) -> Result<(Vec<Report>, Report), String> {
+        let rig = rig(b);
+        let mut reports: Vec<Report> = Vec::new();
+        for look in looks {
+            let options = LocateOptions::default();
+            let options = if let Some(first) = reports.first() { options.again(first) } else { options };
+            reports.push(locate(&self.cloud(b, look), &self.recipe, Some(&rig), &options).map_err(|e| e.what)?);
+        }
+        let both = agree(reports.clone(), None, &self.recipe, Convention::Matrix).map_err(|e| e.what)?;
+        Ok((reports, both))
+    }
+}
+
+pub fn rig(b: &Believed) -> Rig {
+    let quality = Quality {
+        verdict: Verdict::Good,
+        reasons: vec![],
+        advice: vec![],
+        figures: Default::default(),
+        per_picture: vec![],
+    };
+    let n = b.plane.normal;
+    let pivot = Vec3::new(0.0, 0.0, b.station.working_distance);
+    // Tangent of the unit normal; the offset follows the turn about the pivot.
+    let tangent = Mat3::identity() - n * n.transpose();
+    let mut j = DMatrix::zeros(4, 4);
+    j.view_mut((0, 0), (3, 3)).copy_from(&(tangent * PLANE_RAD));
+    j.view_mut((3, 0), (1, 3)).copy_from(&(pivot.transpose() * tangent * PLANE_RAD));
+    j[(3, 3)] = b.unit * PLANE_MM;
+    let plane = Covariance::new(&["nx", "ny", "nz", "offset_mm"], &(&j * j.transpose()));
+    let (t, w) = ((b.unit * HAND_EYE_MM).powi(2), HAND_EYE_RAD.powi(2));
+    let names = ["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"];
+    let hand_eye = Covariance::new(&names, &DMatrix::from_diagonal(&DVector::from_vec(vec![t, t, t, w, w, w])));
+    let none = Covariance::default();
+    let camera = Calibration::new(Kind::Camera, b.station.camera, None, none, quality.clone());
+    Rig {
+        laser_plane: Some(Calibration::new(Kind::LaserPlane, b.plane, Some(&camera), plane, quality.clone())),
+        hand_eye: Some(Calibration::new(Kind::HandEye, b.hand_eye, Some(&camera), hand_eye, quality)),
+        pointer: None,
+        camera: Some(camera),
+        ..Rig::default()
+    }
+}
