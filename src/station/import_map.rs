@@ -72,6 +72,7 @@ pub fn import_map(file: &Path, light: Option<&Path>, stated: &Stated, out: &Path
         peaks: BTreeMap::new(),
         dark_shots: vec![],
         camera: None,
+        delay: None,
         skipped: vec![],
         seconds: begun.elapsed().as_secs_f64(),
         shots_per_second: 0.0,
