@@ -4,7 +4,7 @@
 
 use super::calibration::FORMAT;
 use super::seal::{apart, sealed, shaped, unsealed};
-use super::{Calibration, HandEye, Kind, Measured, Verdict};
+use super::{Calibration, HandEye, Joint, Kind, Measured, Verdict};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::files::Together;
@@ -29,6 +29,8 @@ pub struct Rig {
     pub linear_axis: Option<Calibration<Axis>>,
     /// What turns parts before the camera.
     pub turntable: Option<Calibration<Axis>>,
+    /// Covariance of the records together, where they were calibrated together.
+    pub joint: Joint,
 }
 
 impl Rig {
@@ -42,6 +44,7 @@ impl Rig {
             base_camera: load(station, Kind::BaseCamera)?,
             linear_axis: load(station, Kind::LinearAxis)?,
             turntable: load(station, Kind::Turntable)?,
+            joint: Joint::load(station),
         })
     }
 

@@ -1,0 +1,125 @@
+//! In: `calibration/joint.json`, a rig. Out: the covariance of all its records together, where it is of these records.
+//! Frame and unit: as in the records: mm, rad, px.
+
+use super::{Kind, Rig, unsealed};
+use nalgebra::DMatrix;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Errors of all records together: which parameter of which record, and their covariance.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JointCovariance {
+    /// Version of the file's format: 1.
+    pub format: u32,
+    /// What the records hold, as [`super::Calibration::content`] has it: the covariance is of these and no others.
+    pub of: BTreeMap<Kind, String>,
+    /// `record.parameter`, in the order of the matrix.
+    pub parameters: Vec<String>,
+    /// Square and symmetric, row by row.
+    pub matrix: Vec<Vec<f64>>,
+}
+
+/// What a station says of the covariance of its records together.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Joint {
+    /// Nothing: they were calibrated one by one.
+    #[default]
+    Absent,
+    /// This; whether it is of the rig's records is asked for with [`Rig::joint`].
+    Stated(JointCovariance),
+    /// Something that cannot be used, and why.
+    Spoilt(String),
+}
+
+impl Joint {
+    /// Of a station. A file that cannot be read spoils nothing else.
+    pub(super) fn load(station: &Path) -> Joint {
+        let path = station.join("calibration").join("joint.json");
+        let text = match crate::files::read_text_if_there(&path) {
+            Ok(Some(text)) => text,
+            Ok(None) => return Joint::Absent,
+            Err(fault) => return Joint::Spoilt(fault.what),
+        };
+        match unsealed::<JointCovariance>(&text, "joint.json") {
+            Ok(c) if c.format != 1 => Joint::Spoilt(format!("joint.json is of format {}, 1 is read", c.format)),
+            Ok(c) if !c.whole() => Joint::Spoilt("joint.json holds no covariance".into()),
+            Ok(c) => Joint::Stated(c),
+            Err(fault) => Joint::Spoilt(fault.what),
+        }
+    }
+}
+
+impl JointCovariance {
+    fn whole(&self) -> bool {
+        let n = self.parameters.len();
+        self.matrix.len() == n
+            && self.matrix.iter().all(|row| row.len() == n && row.iter().all(|x| x.is_finite()))
+            && (0..n).all(|i| self.matrix[i][i] >= 0.0)
+    }
+
+    /// The covariance of some of the parameters, by their indices.
+    pub fn of_parameters(&self, at: &[usize]) -> DMatrix<f64> {
+        DMatrix::from_fn(at.len(), at.len(), |i, j| self.matrix[at[i]][at[j]])
+    }
+}
+
+impl Rig {
+    /// The covariance of camera, laser plane and hand-eye together. `None` where none was ever stated.
+    ///
+    /// # Errors
+    /// Why what is stated is not of these records: one was exchanged since, or the file is spoilt. In words.
+    pub fn joint(&self) -> Option<Result<&JointCovariance, String>> {
+        let stated = match &self.joint {
+            Joint::Absent => return None,
+            Joint::Spoilt(why) => return Some(Err(why.clone())),
+            Joint::Stated(c) => c,
+        };
+        let now = [
+            (Kind::Camera, self.camera.as_ref().map(|c| c.content())),
+            (Kind::LaserPlane, self.laser_plane.as_ref().map(|c| c.content())),
+            (Kind::HandEye, self.hand_eye.as_ref().map(|c| c.content())),
+        ];
+        let other = now.iter().find(|(kind, content)| content.is_none() || stated.of.get(kind) != content.as_ref());
+        Some(match other {
+            None => Ok(stated),
+            Some((kind, _)) => Err(format!("joint.json is of another {} than the station's", kind.words())),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Calibration, Covariance, Quality, Verdict, sealed};
+    use super::*;
+    use crate::geometry::{Plane, Vec3};
+
+    fn plane(offset: f64) -> Calibration<Plane<crate::geometry::Camera>> {
+        let (reasons, advice, figures, per_picture) = (vec![], vec![], Default::default(), vec![]);
+        let quality = Quality { verdict: Verdict::Good, reasons, advice, figures, per_picture };
+        let plane = Plane::new(Vec3::new(0.0, 0.9, 0.4), offset).unwrap();
+        Calibration::new(Kind::LaserPlane, plane, None, Covariance::default(), quality)
+    }
+
+    #[test]
+    fn what_is_spoilt_or_of_other_records_is_said() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().join("calibration");
+        std::fs::create_dir_all(&folder).unwrap();
+        assert_eq!(Joint::load(dir.path()), Joint::Absent);
+        let of = [(Kind::LaserPlane, plane(70.0).content())].into();
+        let c = JointCovariance { format: 1, of, parameters: vec!["laser_plane.nx".into()], matrix: vec![vec![1e-8]] };
+        let write = |text: &str| std::fs::write(folder.join("joint.json"), text).unwrap();
+        write(&sealed(&c));
+        let joint = Joint::load(dir.path());
+        assert_eq!(joint, Joint::Stated(c.clone()));
+        let said = |rig: &Rig| rig.joint().unwrap().unwrap_err();
+        let rig = Rig { joint, laser_plane: Some(plane(70.0)), ..Rig::default() };
+        assert!(said(&rig).contains("another camera"), "{}", said(&rig));
+        write(&sealed(&c).replace("1e-8", "1e-9"));
+        assert!(matches!(Joint::load(dir.path()), Joint::Spoilt(why) if why.contains("changed after")));
+        write(&sealed(&JointCovariance { matrix: vec![vec![1.0, 2.0]], ..c.clone() }));
+        assert!(matches!(Joint::load(dir.path()), Joint::Spoilt(why) if why.contains("no covariance")));
+        assert!(Rig::default().joint().is_none());
+    }
+}
