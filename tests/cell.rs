@@ -4,6 +4,8 @@
 
 mod common;
 
+#[path = "cell/cold.rs"]
+mod cold;
 #[path = "cell/golden.rs"]
 mod golden;
 #[path = "cell/job.rs"]

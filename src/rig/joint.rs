@@ -87,39 +87,3 @@ impl Rig {
         })
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::super::{Calibration, Covariance, Quality, Verdict, sealed};
-    use super::*;
-    use crate::geometry::{Plane, Vec3};
-
-    fn plane(offset: f64) -> Calibration<Plane<crate::geometry::Camera>> {
-        let (reasons, advice, figures, per_picture) = (vec![], vec![], Default::default(), vec![]);
-        let quality = Quality { verdict: Verdict::Good, reasons, advice, figures, per_picture };
-        let plane = Plane::new(Vec3::new(0.0, 0.9, 0.4), offset).unwrap();
-        Calibration::new(Kind::LaserPlane, plane, None, Covariance::default(), quality)
-    }
-
-    #[test]
-    fn what_is_spoilt_or_of_other_records_is_said() {
-        let dir = tempfile::tempdir().unwrap();
-        let folder = dir.path().join("calibration");
-        std::fs::create_dir_all(&folder).unwrap();
-        assert_eq!(Joint::load(dir.path()), Joint::Absent);
-        let of = [(Kind::LaserPlane, plane(70.0).content())].into();
-        let c = JointCovariance { format: 1, of, parameters: vec!["laser_plane.nx".into()], matrix: vec![vec![1e-8]] };
-        let write = |text: &str| std::fs::write(folder.join("joint.json"), text).unwrap();
-        write(&sealed(&c));
-        let joint = Joint::load(dir.path());
-        assert_eq!(joint, Joint::Stated(c.clone()));
-        let said = |rig: &Rig| rig.joint().unwrap().unwrap_err();
-        let rig = Rig { joint, laser_plane: Some(plane(70.0)), ..Rig::default() };
-        assert!(said(&rig).contains("another camera"), "{}", said(&rig));
-        write(&sealed(&c).replace("1e-8", "1e-9"));
-        assert!(matches!(Joint::load(dir.path()), Joint::Spoilt(why) if why.contains("changed after")));
-        write(&sealed(&JointCovariance { matrix: vec![vec![1.0, 2.0]], ..c.clone() }));
-        assert!(matches!(Joint::load(dir.path()), Joint::Spoilt(why) if why.contains("no covariance")));
-        assert!(Rig::default().joint().is_none());
-    }
-}

@@ -14,14 +14,14 @@ use sheetlight::station::{Settings, ToolSpec};
 use std::path::{Path, PathBuf};
 
 /// A person who says yes to every motion that is shown, up to a step.
-struct Yes {
+pub struct Yes {
     no_at: Option<&'static str>,
     asked: Vec<&'static str>,
-    told: Vec<String>,
+    pub told: Vec<String>,
 }
 
 impl Yes {
-    fn always() -> Yes {
+    pub fn always() -> Yes {
         Yes { no_at: None, asked: vec![], told: vec![] }
     }
 }
@@ -37,7 +37,7 @@ impl Operator for Yes {
 }
 
 /// The circuit board with one part of the shipped scene alone, turned by the seed.
-fn scene(part: &str, seed: u64) -> SceneSpec {
+pub fn scene(part: &str, seed: u64) -> SceneSpec {
     let dimm = include_str!("../../data/scenes/dimm.toml");
     let text = if part == "dimm" { dimm } else { sheetlight::simulate::DEFAULT_SCENE };
     let mut spec = SceneSpec::parse(text).unwrap();

@@ -13,7 +13,7 @@ use sheetlight::calibrate::joint::volume::scanned;
 use sheetlight::find::look::levers::Seen;
 use sheetlight::find::look::part_seen::PartSeen;
 use sheetlight::geometry::{Base, Camera, Flange, Part, Rigid, Vec3};
-use sheetlight::rig::{Calibration, HandEye, Joint, Kind, Quality, Rig, Verdict};
+use sheetlight::rig::{Calibration, HandEye, Joint, JointCovariance, Kind, Quality, Rig, Verdict, sealed};
 
 /// What a solve leaves in a station.
 fn stored(fit: &JointFit) -> Rig {
@@ -119,13 +119,39 @@ fn a_found_pose_is_off_by_what_the_budget_says() {
 }
 
 #[test]
-fn a_record_that_was_exchanged_is_not_taken_together_with_the_others() {
+fn what_is_stated_of_all_records_together_counts_for_these_records_alone() {
     let cell = Cell::new(&rig("paper"), 3);
     let fit = calibrate(&cell, &stops(&cell, 14, 35.0, &QUIET, 3), &JointOptions::default()).unwrap();
-    let mut rig = stored(&fit);
-    assert!(rig.joint().unwrap().is_ok());
-    let plane = rig.laser_plane.as_mut().unwrap();
-    plane.value.offset += 1e-3;
-    let said = rig.joint().unwrap().unwrap_err();
-    assert!(said.contains("another laser plane"), "{said}");
+    let rig = stored(&fit);
+    let dir = tempfile::tempdir().unwrap();
+    rig.store_all(dir.path()).unwrap();
+    let path = dir.path().join("calibration/joint.json");
+    assert!(Rig::load(dir.path()).unwrap().joint().is_none(), "nothing is stated");
+    // A rotation comes back from its file orthonormal to the last digit: what a reader finds is named.
+    let found = Rig::load(dir.path()).unwrap();
+    let of = [
+        (Kind::Camera, found.camera.as_ref().unwrap().content()),
+        (Kind::LaserPlane, found.laser_plane.as_ref().unwrap().content()),
+        (Kind::HandEye, found.hand_eye.as_ref().unwrap().content()),
+    ];
+    let stated = together(&fit, Kind::HandEye, of.into());
+    let text = sealed(&stated);
+    let said = |text: &str| {
+        std::fs::write(&path, text).unwrap();
+        Rig::load(dir.path()).unwrap().joint().unwrap().map(|_| ()).unwrap_err()
+    };
+    std::fs::write(&path, &text).unwrap();
+    let mut rig = Rig::load(dir.path()).unwrap();
+    assert_eq!(rig.joint().unwrap().unwrap(), &stated);
+    rig.laser_plane.as_mut().unwrap().value.offset += 1e-3;
+    let exchanged = rig.joint().unwrap().unwrap_err();
+    assert!(exchanged.contains("another laser plane"), "{exchanged}");
+    rig.hand_eye = None;
+    assert!(rig.joint().unwrap().is_err());
+    assert!(said(&text.replacen("e-", "e-1", 1)).contains("changed after"), "an edit");
+    assert!(said("{").contains("joint.json"), "half a file");
+    let short = JointCovariance { parameters: stated.parameters[1..].to_vec(), ..stated.clone() };
+    assert!(said(&sealed(&short)).contains("no covariance"));
+    let newer = JointCovariance { format: 2, ..stated };
+    assert!(said(&sealed(&newer)).contains("format 2"));
 }
