@@ -4,10 +4,10 @@
 
 use crate::geometry::{Base, Camera, Flange, Plane, Ray, Rigid, Vec2, Vec3};
 
-/// Touches lie at these shares of the field around its middle: corners and the middles of all sides, so that one side that lies
-/// beside the board, or two ends of a long part, leave five that are on it and of which no plane but its own is.
+/// Touches lie at these shares of the field around its middle, on eight sides: where one side of the picture lies beside the board,
+/// or a part fills it, six are left on the board, and no other plane has more than four (two rows of three would have six).
 const TOUCHES: [[f64; 2]; 8] =
-    [[-1.0, -1.0], [0.0, -1.0], [1.0, -1.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [-1.0, 1.0], [-1.0, 0.0]];
+    [[-1.0, -0.5], [-0.5, -1.0], [0.5, -1.0], [1.0, -0.5], [1.0, 0.5], [0.5, 1.0], [-0.5, 1.0], [-1.0, 0.5]];
 
 /// Flange poses from which the pointer's spots lie around the foot of the camera's axis, `half` mm to each side. The camera stands
 /// `now` from the board along its axis, and goes to `then`.
@@ -82,11 +82,14 @@ mod tests {
             |x: f64, y: f64| Vec3::new(50.0 * x, 40.0 * y, 3.0 * x - 5.0 * y + 0.02 * (7.0 * x + 3.0 * y).sin());
         let board: Vec<Vec3> = TOUCHES.iter().map(|&[x, y]| tilted(x, y)).collect();
         assert_eq!(on_one_plane(&board, 0.3).len(), 8);
-        // A side of the picture is beside the board: another plane through both would fit two rows of three.
+        // A side of the picture is beside the board.
         let mut low = board.clone();
-        (4..7).for_each(|i| low[i].z -= 6.0);
-        assert_eq!(on_one_plane(&low, 0.3), [0, 1, 2, 3, 7]);
-        // A long part.
+        (5..7).for_each(|i| low[i].z -= 6.0);
+        assert_eq!(on_one_plane(&low, 0.3), [0, 1, 2, 3, 4, 7]);
+        // Half of it is: two planes of four, and nobody knows which is the board.
+        [4, 7].into_iter().for_each(|i| low[i].z -= 6.0);
+        assert!(on_one_plane(&low, 0.3).is_empty());
+        // Two sides have a part on them, one touch each.
         let mut part = board.clone();
         [3, 7].into_iter().for_each(|i| part[i].z += 8.0);
         assert_eq!(on_one_plane(&part, 0.3), [0, 1, 2, 4, 5, 6]);
