@@ -399,7 +399,7 @@ impl<'a> Session<'a> {
         let mut state = self.fit.state.clone();
         state.boards =
             self.shots.iter().map(|s| Ok(board(&state.camera, &s.seen)?.camera_from_board)).collect::<Result<_>>()?;
-        self.fit = solve(&self.shots, &state, self.fit.noise, &self.options)?;
+        self.fit = solve(&with_beam(&self.shots), &state, self.fit.noise, &self.options)?;
         still(&self.shots, &self.fit, &self.options)?;
         let moved = self.fit.left_out.iter().filter(|l| l.part == Part::RobotPlace).count();
         if moved * 4 > self.shots.len() {
@@ -477,6 +477,18 @@ fn middle_depth(boards: &[Rigid<Camera, Board>], spec: &BoardSpec) -> f64 {
     boards.iter().map(|b| b.point(&centre).z).sum::<f64>() / boards.len().max(1) as f64
 }
 
+/// Fewest spots that tell a beam: two would leave nothing to judge them by.
+const SPOTS: usize = 3;
+
+/// The stops, their spots only where they are enough to tell a beam: else nothing at all would be determined.
+fn with_beam(shots: &[Shot]) -> Vec<Shot> {
+    let mut out = shots.to_vec();
+    if shots.iter().filter(|s| s.spot.is_some()).count() < SPOTS {
+        out.iter_mut().for_each(|s| s.spot = None);
+    }
+    out
+}
+
 /// All stops so far, solved from the beginning.
 fn solved(
     book: &Notebook,
@@ -487,7 +499,7 @@ fn solved(
     let recordings = book.recordings();
     let mut shots = unjudged(&book.stops.iter().collect::<Vec<_>>(), &run.joint.finders(&recordings, first))?;
     let (state, _) = start(&mut shots, 1, &first.value, None, options)?;
-    let fit = solve(&shots, &state, Noise::usual(), options)?;
+    let fit = solve(&with_beam(&shots), &state, Noise::usual(), options)?;
     still(&shots, &fit, options)?;
     Ok((shots, fit))
 }
