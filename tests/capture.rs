@@ -4,6 +4,8 @@
 
 mod common;
 
+#[path = "capture/axis.rs"]
+mod axis;
 #[path = "capture/cell.rs"]
 mod cell;
 #[path = "capture/device.rs"]
@@ -14,6 +16,8 @@ mod gige;
 mod pairing;
 #[path = "capture/recording.rs"]
 mod recording;
+#[path = "capture/robot.rs"]
+mod robot;
 #[path = "capture/sources.rs"]
 mod sources;
 

@@ -184,6 +184,7 @@ fn scan(part: &'static str, seed: u64) -> Scanned {
                 image,
                 stand: sheetlight::recording::Stand::Robot(base_from_flange),
                 slip: None,
+                here_ns: None,
             })
             .unwrap();
         cloud.extend(scanner.ready().unwrap().into_iter().flat_map(|p| p.points));

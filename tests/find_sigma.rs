@@ -136,6 +136,7 @@ fn trial(seed: u64) -> Option<Trial> {
                 image,
                 stand: sheetlight::recording::Stand::Robot(base_from_flange),
                 slip: None,
+                here_ns: None,
             })
             .unwrap();
         cloud.extend(scanner.ready().unwrap().into_iter().flat_map(|p| p.points));

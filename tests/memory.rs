@@ -37,6 +37,7 @@ impl Source for Repeating {
                 image,
                 stand: sheetlight::recording::Stand::Robot(base_from_flange),
                 slip: None,
+                here_ns: None,
             })
         })
     }

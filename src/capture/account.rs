@@ -94,13 +94,18 @@ pub struct Ledger {
     expected: Option<u64>,
     /// Accounted for since the camera was opened.
     since_open: u64,
-    /// Host time of the last picture, and the usual time between two, ns.
+    /// Host time of the last picture, and the usual time between two by their numbers, ns.
     last_ns: Option<u64>,
     period_ns: Option<f64>,
+    /// Pictures of a while ago, number and host time, that the usual time is reckoned from.
+    since: [Option<(u64, u64)>; 2],
     /// The camera was gone since the last picture; the number that was expected when it went.
     gone: bool,
     before: Option<u64>,
 }
+
+/// The rate is that of one to two such times, ns.
+const WHILE: u64 = 10_000_000_000;
 
 /// What the number of a picture says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,7 +120,7 @@ impl Ledger {
     /// A whole picture came.
     pub fn came(&mut self, id: u64, host_ns: u64) -> Order {
         self.back(id, host_ns);
-        self.follow(host_ns);
+        self.follow(id, host_ns);
         let order = self.step(id);
         match order {
             Order::Next => self.account.complete += 1,
@@ -154,8 +159,19 @@ impl Ledger {
     /// The camera is gone; its numbers may begin anew when it is back.
     pub fn gone(&mut self) {
         self.before = self.expected.take().or(self.before);
+        self.since = [None; 2];
         self.gone = true;
         self.since_open = 0;
+    }
+
+    /// Nothing comes any more; a camera that is still gone is missed to the end.
+    pub fn ended(&mut self, host_ns: u64) {
+        if let (true, Some(last), Some(period)) = (std::mem::take(&mut self.gone), self.last_ns, self.period_ns) {
+            let missed = (host_ns.saturating_sub(last) as f64 / period).round() as u64;
+            self.account.outages += 1;
+            self.account.missed += missed;
+            self.account.sent += missed;
+        }
     }
 
     /// What an outage cost: the numbers in between where the device counted on, else the time since the last picture at the
@@ -179,14 +195,17 @@ impl Ledger {
         self.last_ns = None;
     }
 
-    fn follow(&mut self, host_ns: u64) {
-        if let Some(last) = self.last_ns {
-            let step = host_ns.saturating_sub(last) as f64;
-            let period = self.period_ns.get_or_insert(step);
-            // Pauses and bursts move it little: each picture a twentieth of the way, at most by half.
-            *period += 0.05 * (step - *period).clamp(-0.5 * *period, 0.5 * *period);
-        }
+    /// Arrivals come in bursts on a busy machine; over many pictures they tell the rate all the same.
+    fn follow(&mut self, id: u64, host_ns: u64) {
         self.last_ns = Some(host_ns);
+        let (first, first_ns) = *self.since[0].get_or_insert((id, host_ns));
+        let (_, later_ns) = *self.since[1].get_or_insert((id, host_ns));
+        if id > first && host_ns > first_ns {
+            self.period_ns = Some((host_ns - first_ns) as f64 / (id - first) as f64);
+        }
+        if host_ns.saturating_sub(later_ns) > WHILE {
+            self.since = [self.since[1], Some((id, host_ns))];
+        }
     }
 
     /// What the camera itself says it has sent since it was opened: those it sent and nobody saw are missed.
@@ -241,6 +260,29 @@ mod tests {
         a.used = a.complete;
         assert_eq!((a.complete, a.missed, a.outages, a.sent), (51, 499, 1, 550));
         assert_eq!(a.unexplained(), 0);
+    }
+
+    /// The first ones wait somewhere and come at once: the rate is that of all.
+    #[test]
+    fn bursts_are_no_rate() {
+        let mut ledger = Ledger::default();
+        (0..50u64).for_each(|i| drop(ledger.came(i, 200_000_000.max(i * 25_000_000) + 100_000 * (i % 7))));
+        ledger.gone();
+        ledger.came(1, 49 * 25_000_000 + 10_000_000_000);
+        let missed = ledger.account().missed;
+        assert!((399..480).contains(&missed), "{missed}");
+    }
+
+    #[test]
+    fn a_camera_that_does_not_come_back_is_missed_to_the_end() {
+        let mut ledger = Ledger::default();
+        (0..50).for_each(|i| assert_eq!(ledger.came(i, i * 20_000_000), Order::Next));
+        ledger.gone();
+        ledger.ended(49 * 20_000_000 + 2_000_000_000);
+        ledger.ended(1 << 60);
+        let a = ledger.account();
+        a.used = a.complete;
+        assert_eq!((a.missed, a.outages, a.sent, a.unexplained()), (100, 1, 150, 0));
     }
 
     /// Back so soon that the time says nothing was lost, while the numbers say that one was.

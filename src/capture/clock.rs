@@ -72,9 +72,15 @@ pub struct ClockMap {
     one_way: bool,
     /// There, the first reading: times are told from here, so that f64 holds them.
     origin: Option<(u64, u64)>,
-    last_there: u64,
+    /// The host's time of the last reading.
+    newest: u64,
     jumps: u32,
+    /// Nobody knows what the other clock said up to this moment of the host's: it jumped.
+    unsure_until: u64,
 }
+
+/// Readings that disagree by more than their ways and a drift explain, and by this, ns, are of a clock that was set.
+const ODD: f64 = 2e5;
 
 impl ClockMap {
     /// Takes in a reading with both ends.
@@ -96,14 +102,16 @@ impl ClockMap {
         // A clock that was set, or that began anew: what was known of it is of no use.
         let jumped = self.best.back().is_some_and(|b| {
             let behind = there + 1.0 < b.there - STRETCH as f64;
-            behind || (reading.offset - b.offset).abs() > 0.5e9 + DRIFT * (there - b.there).abs()
+            let ways = if self.one_way { 0.5e9 } else { half + b.half + ODD };
+            behind || (reading.offset - b.offset).abs() > ways + DRIFT * (there - b.there).abs()
         });
         if jumped {
             self.jumps += 1;
             (self.best, self.origin) = (VecDeque::new(), None);
+            self.unsure_until = here_ns + if half.is_finite() { half as u64 } else { 0 };
             return self.add(there_ns, here_ns, half);
         }
-        self.last_there = there_ns;
+        self.newest = here_ns;
         let same = |b: &Reading| (b.there / STRETCH as f64).floor() == (there / STRETCH as f64).floor();
         match self.best.back_mut().filter(|b| same(b)) {
             Some(b) => {
@@ -122,6 +130,18 @@ impl ClockMap {
     /// How often the other clock jumped or began anew.
     pub fn jumps(&self) -> u32 {
         self.jumps
+    }
+
+    /// When the other clock said this, by the host's, of something that was here at `here_ns`: `None` where the clock has not been read
+    /// since, so that it may have jumped; `Err` where it did.
+    pub fn told(&self, there_ns: u64, here_ns: u64) -> Option<Result<Moment, String>> {
+        if here_ns <= self.unsure_until {
+            return Some(Err("the camera's clock jumped around it".into()));
+        }
+        if !self.one_way && self.newest < here_ns {
+            return None;
+        }
+        self.host(there_ns).map(Ok)
     }
 
     /// When the other clock said this, by the host's; none before anything was read.
@@ -188,6 +208,28 @@ mod tests {
         map.round_trip(RoundTrip { before_ns: 41_000_000_000, there_ns: 5, after_ns: 41_000_100_000 });
         assert_eq!(map.jumps(), 1);
         assert!((map.host(5).unwrap().ns - 41_000_050_000.0).abs() < 1.0);
+    }
+
+    /// A jump of 30 ms, which the ways of half a millisecond do not explain: what came around it has no time.
+    #[test]
+    fn a_small_jump_is_seen_and_what_came_around_it_is_not_told() {
+        let mut map = ClockMap::default();
+        let read = |map: &mut ClockMap, before_ns: u64, ahead: u64| {
+            map.round_trip(RoundTrip {
+                before_ns,
+                there_ns: before_ns + 250_000 + ahead,
+                after_ns: before_ns + 500_000,
+            });
+        };
+        (0..50).for_each(|k| read(&mut map, k * 200_000_000, 0));
+        let last = 49 * 200_000_000;
+        assert!(map.told(last, last).unwrap().is_ok() && map.told(last + 50_000_000, last + 50_000_000).is_none());
+        read(&mut map, last + 200_000_000, 30_000_000);
+        assert_eq!(map.jumps(), 1);
+        assert!(map.told(last + 50_000_000, last + 50_000_000).unwrap().is_err());
+        read(&mut map, last + 400_000_000, 30_000_000);
+        let told = map.told(last + 330_000_000, last + 310_000_000).unwrap().unwrap();
+        assert!((told.ns - (last + 300_000_000) as f64).abs() < 1e6, "{told:?}");
     }
 
     #[test]

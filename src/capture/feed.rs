@@ -76,7 +76,7 @@ const GIVE_BACK: Duration = Duration::from_millis(1000);
 /// From one attempt to bring a camera back to the next.
 const RETRY: Duration = Duration::from_millis(500);
 /// From one reading of the device's clock to the next, and how many at the beginning.
-const CLOCK: Duration = Duration::from_secs(1);
+const CLOCK: Duration = Duration::from_millis(200);
 const CLOCK_FIRST: usize = 8;
 
 #[derive(Default)]
@@ -109,6 +109,7 @@ pub struct Feed {
     shared: Arc<Shared>,
     format: Format,
     name: String,
+    device: String,
     stop: Arc<AtomicBool>,
     thread: Option<std::thread::JoinHandle<()>>,
 }
@@ -119,14 +120,14 @@ impl Feed {
     /// # Errors
     /// No thread can be started.
     pub fn start(source: Box<dyn PictureSource>, options: FeedOptions) -> Result<Feed> {
-        let (format, name) = (source.format(), source.name());
+        let (format, name, device) = (source.format(), source.name(), source.device());
         let shared = Arc::new(Shared::default());
         let (theirs, stop) = (shared.clone(), Arc::new(AtomicBool::new(false)));
         let reader =
             Reader { source, shared: theirs, options, ours: stop.clone(), begun: Instant::now(), asked: None, came: 0 };
         let thread = std::thread::Builder::new().name("camera".into()).spawn(move || reader.run());
         let thread = Some(thread.map_err(|e| Fault::threads(&e))?);
-        Ok(Feed { shared, format, name, stop, thread })
+        Ok(Feed { shared, format, name, device, stop, thread })
     }
 
     /// Size and depth of all its pictures.
@@ -137,6 +138,11 @@ impl Feed {
     /// What it is and where.
     pub fn name(&self) -> &str {
         &self.name
+    }
+
+    /// Which device it is, however it was named.
+    pub fn device(&self) -> &str {
+        &self.device
     }
 
     /// The next picture, waited for at most this long.
@@ -271,6 +277,7 @@ impl Reader {
         // Whoever hears of the end can have the camera: it was given back.
         drop(source);
         let mut state = shared.lock();
+        state.ledger.ended(now_ns());
         (state.resent, state.ended, state.fault) = (resent, true, fault);
         shared.changed.notify_all();
     }
@@ -290,7 +297,15 @@ impl Reader {
         // A device that does not answer is lost by its pictures, not by its clock.
         if let Ok(Some(trip)) = self.source.clock() {
             self.asked = Some(Instant::now());
-            self.shared.lock().clock.round_trip(trip);
+            let mut state = self.shared.lock();
+            let jumps = state.clock.jumps();
+            state.clock.round_trip(trip);
+            if state.clock.jumps() > jumps {
+                let name = self.source.name();
+                state
+                    .said
+                    .push(format!("{name}: its clock jumped: what came around it is paired with no pose by time"));
+            }
         }
     }
 
@@ -344,16 +359,24 @@ impl Reader {
             state.clock = ClockMap::default();
             state.said.push(format!("{}: gone: {}; waiting for it", self.source.name(), fault.what));
         }
+        let mut why = fault.what.clone();
         while since.elapsed() < self.options.patience {
             if self.over() {
                 return Err(None);
             }
-            if self.source.reopen().is_ok() {
-                let seconds = (now_ns() - gone) as f64 * 1e-9;
-                self.shared.lock().said.push(format!("{}: back after {seconds:.1} s", self.source.name()));
-                self.asked = None;
-                (0..CLOCK_FIRST).for_each(|_| self.read_clock());
-                return Ok(());
+            match self.source.reopen() {
+                Ok(()) => {
+                    let seconds = (now_ns() - gone) as f64 * 1e-9;
+                    self.shared.lock().said.push(format!("{}: back after {seconds:.1} s", self.source.name()));
+                    self.asked = None;
+                    (0..CLOCK_FIRST).for_each(|_| self.read_clock());
+                    return Ok(());
+                }
+                Err(again) if again.what != why => {
+                    self.shared.lock().said.push(format!("{}: still waited for: {}", self.source.name(), again.what));
+                    why = again.what;
+                }
+                Err(_) => {}
             }
             std::thread::sleep(RETRY);
         }

@@ -4,6 +4,7 @@
 
 mod account;
 mod clock;
+mod delay;
 mod feature;
 mod feed;
 mod format;
@@ -19,6 +20,7 @@ pub mod wire;
 
 pub use account::{Account, Ledger, Order};
 pub use clock::{ClockMap, Moment, RoundTrip, now_ns};
+pub use delay::{Delay, Delays};
 pub use feature::{Feature, Range, Value};
 pub use feed::{Fate, Fed, Feed, FeedOptions, Mode};
 pub use format::{Format, RawFormat, RawFrames};

@@ -123,4 +123,9 @@ pub trait PictureSource: Send {
 
     /// In messages: what it is and where.
     fn name(&self) -> String;
+
+    /// Which device it is, however it was named: of a camera on a network its serial number.
+    fn device(&self) -> String {
+        self.name()
+    }
 }

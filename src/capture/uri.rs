@@ -129,8 +129,8 @@ impl std::str::FromStr for CameraUri {
 }
 
 fn sim(seed: &str, query: &str) -> Said<SimSpec> {
-    let keys = ["rate", "speed", "size", "axis", "scene", "delay_ms", "exposure_us"];
-    let [rate, speed, size, axis, scene, delay, exposure] = options(query, keys)?;
+    let keys = ["rate", "speed", "size", "axis", "scene", "delay_ms", "exposure_us", "shows"];
+    let [rate, speed, size, axis, scene, delay, exposure, shows] = options(query, keys)?;
     let usual = SimSpec::default();
     let seed = seed.parse().map_err(|_| format!("sim:{seed} names no seed, a whole number"))?;
     let size = size.map_or(Ok(usual.size), |s| {
@@ -144,8 +144,14 @@ fn sim(seed: &str, query: &str) -> Said<SimSpec> {
         Some("turntable") => Some(AxisKind::Turntable),
         Some(other) => return Err(format!("axis={other}: robot, linear or turntable")),
     };
+    let board = match shows {
+        None | Some("scene") => false,
+        Some("board") => true,
+        Some(other) => return Err(format!("shows={other}: scene or board")),
+    };
     Ok(SimSpec {
         seed,
+        board,
         rate_hz: number("rate", rate, usual.rate_hz)?,
         speed: number("speed", speed, usual.speed)?,
         size,

@@ -35,6 +35,8 @@ pub struct CellOptions {
     pub holds: Option<String>,
     /// Pictures that the camera takes in a second of the cell, 1 to 2000.
     pub fps: f64,
+    /// What the camera says of a picture's time is late by so much, ms, -1000 to 1000.
+    pub camera_delay_ms: f64,
     /// Where lasers, lamp and gripper hang.
     pub outputs: Outputs,
 }
@@ -56,6 +58,7 @@ impl CellOptions {
             tilt_deg: 2.0,
             holds: None,
             fps: 100.0,
+            camera_delay_ms: 0.0,
             outputs: Outputs::default(),
         }
     }
@@ -74,6 +77,7 @@ impl CellOptions {
             ("arm error in degrees", self.arm_error_deg, 0.0, 1.0),
             ("tilt in degrees", self.tilt_deg, 0.0, 15.0),
             ("fps", self.fps, 1.0, 2000.0),
+            ("camera delay in ms", self.camera_delay_ms, -1e3, 1e3),
         ];
         match limits.iter().find(|(_, v, low, high)| !(*low..=*high).contains(v)) {
             Some((name, v, low, high)) => {

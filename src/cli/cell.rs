@@ -65,6 +65,9 @@ pub struct Args {
     /// Largest tilt of the scene, degrees
     #[arg(long, default_value_t = 2.0)]
     tilt_deg: f64,
+    /// What the camera says of its pictures' times is late by so much, ms
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    camera_delay_ms: f64,
     /// Port of the controller, TCP and UDP; 0: any
     #[arg(long, default_value_t = 5007)]
     robot_port: u16,
@@ -104,6 +107,7 @@ fn simulate(args: &Args, console: &Console) -> Result<()> {
         arm_error_mm: args.arm_error_mm,
         arm_error_deg: args.arm_error_deg,
         tilt_deg: args.tilt_deg,
+        camera_delay_ms: args.camera_delay_ms,
         holds: args.part.clone(),
         ..CellOptions::of(scene, args.seed)
     };

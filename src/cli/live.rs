@@ -3,14 +3,13 @@
 
 use super::capture::options::Running;
 use super::terminal::console::Console;
-use crate::capture::{CameraUri, Fate, Fed, Format, Mode, RawFormat, now_ns};
+use crate::capture::{CameraUri, Delays, Fate, Fed, Format, Mode, RawFormat, now_ns};
 use crate::fault::{Fault, Result};
 use crate::raster::Light;
 use crate::rig::Rig;
 use crate::scan::{Live, Where};
 use crate::stages::stripe::point::Point;
 use crate::station::Settings;
-use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -55,8 +54,6 @@ struct Line {
     xyz_sigma_mm: Option<Vec<[f32; 4]>>,
 }
 
-/// Delays that percentiles are taken of.
-const RECENT: usize = 100_000;
 const GLANCE: Duration = Duration::from_millis(200);
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
@@ -72,7 +69,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let feed = running.open(args.raw, Mode::Newest)?;
     let mut live = early.map_or_else(|| begin(feed.format()), Ok)?;
     let (mut teller, bar) = (running.teller(), console.bar("live", 0));
-    let (mut waits, mut measured_count) = (VecDeque::new(), 0usize);
+    let (mut waits, mut measured_count) = (Delays::default(), 0usize);
     let (mut without_stripe, mut unlit) = (0, None);
     let ended = loop {
         feed.news().into_iter().for_each(|n| console.warn(n));
@@ -82,7 +79,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
             Fed::Ended(fault) => break fault,
         };
         // Looked at only while nothing was seen: it takes as long as a stage.
-        let light = waits.is_empty().then(|| Light::of(&picture.image));
+        let light = (measured_count == 0).then(|| Light::of(&picture.image));
         let frame = picture.id;
         let measured = live.measure(frame as u32, picture.image)?;
         feed.fate(Fate::Used);
@@ -93,10 +90,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         };
         let latency_ms = now_ns().saturating_sub(picture.host_ns) as f64 * 1e-6;
         measured_count += 1;
-        waits.push_back(latency_ms);
-        if waits.len() > RECENT {
-            waits.pop_front();
-        }
+        waits.add(latency_ms);
         let there = measured.points.iter().filter(|p| p.sigma_mm.is_finite());
         let list = |p: &Point| [p.position[0], p.position[1], p.position[2], p.sigma_mm];
         let line = Line {
@@ -125,17 +119,13 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     if a.sent != a.complete {
         console.say(format!("the camera: {a}"));
     }
-    if let Some(light) = unlit.filter(|_| waits.is_empty()) {
+    if let Some(light) = unlit.filter(|_| measured_count == 0) {
         console.warn(format!("no frame showed a stripe; the last one: {light}"));
     }
     ended.map_or(Ok(()), Err::<(), Fault>)
 }
 
 /// Median and 99th percentile.
-fn delays(waits: &VecDeque<f64>) -> String {
-    let mut sorted: Vec<f64> = waits.iter().copied().collect();
-    sorted.sort_by(f64::total_cmp);
-    let percentile = |p: f64| sorted.get((sorted.len().saturating_sub(1) as f64 * p).round() as usize);
-    let ms = |p: f64| percentile(p).map_or("none".into(), |v| format!("{v:.1} ms"));
-    format!("{} (median), {} (99 %)", ms(0.5), ms(0.99))
+fn delays(waits: &Delays) -> String {
+    waits.so_far().map_or("none".into(), |d| d.to_string())
 }

@@ -244,6 +244,12 @@ fn summary(r: &ScanReport, out: &Path) -> String {
     for (name, why) in &r.skipped {
         s += &format!("  left out {name}: {why}\n");
     }
+    if let Some(account) = &r.camera {
+        s += &format!("the camera: {account}\n");
+    }
+    if let Some(delay) = &r.delay {
+        s += &format!("from a picture's last byte to its points: {delay}\n");
+    }
     if let Some(h) = &r.height_map {
         s += &format!(
             "height map {}x{} cells of {:.3} mm, {:.1} % covered, z {:.2} to {:.2} mm\n",

@@ -41,6 +41,9 @@ pub struct Meta {
     /// What moved between the frames; the robot with the sensor where nothing is said.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub motion: Option<Motion>,
+    /// The devices that it was recorded from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sources: Option<Sources>,
     /// Name of the pose file without extension.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pose_file: Option<String>,
@@ -87,6 +90,17 @@ pub enum Beam {
     Line,
     /// A round beam: a spot.
     Pointer,
+}
+
+/// Which camera a recording was taken with, and who told where things stood.
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Sources {
+    /// The source of the pictures: of a camera on a network its serial number, else how it is addressed.
+    pub camera: String,
+    /// The source of poses or counts, where there was one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub poses: Option<String>,
 }
 
 /// A picture with the laser off.

@@ -19,7 +19,7 @@ pub use board::BoardSpec;
 pub use board_poses::load_board_poses;
 pub use frame::FrameRef;
 pub use markers::Markers;
-pub use meta::{AmbientRef, Beam, ImageSpec, Meta};
+pub use meta::{AmbientRef, Beam, ImageSpec, Meta, Sources};
 pub use motion::{Carries, Motion, MotionKind};
 pub use poses::{PoseFile, load_poses, save_poses};
 pub use raw::raw_name;

@@ -69,7 +69,8 @@ impl Source for StreamSource {
                     let Some(stand) = shot.stand else { return Some(Err(without_stand(index, &name))) };
                     self.next += 1;
                     self.stream.fate(Fate::Used);
-                    return Some(Ok(Shot { index, name, image: shot.picture.image, stand, slip: shot.taken.slip() }));
+                    let (slip, here_ns) = (shot.taken.slip(), Some(shot.picture.host_ns));
+                    return Some(Ok(Shot { index, name, image: shot.picture.image, stand, slip, here_ns }));
                 }
             }
         }
@@ -146,7 +147,7 @@ impl Source for RecordedSource {
         let (index, name) = (shot.kept.index as u32, shot.kept.name.clone());
         let Some(stand): Option<Stand> = shot.stand else { return Some(Err(without_stand(index, &name))) };
         Some(match self.image(&mut shot) {
-            Ok(image) => Ok(Shot { index, name, image, stand, slip: shot.slip }),
+            Ok(image) => Ok(Shot { index, name, image, stand, slip: shot.slip, here_ns: Some(shot.here_ns) }),
             Err(fault) => Err(BadShot { index, name, fault, last: false }),
         })
     }

@@ -6,7 +6,7 @@ use crate::capture::{Account, Format, Latency, RawFormat, RawFrames};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid};
 use crate::raster::Image;
-use crate::recording::{FrameRef, Recording, Slip, Stand};
+use crate::recording::{FrameRef, Meta, Pairing, Recording, Slip, Stand};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::io::Read;
@@ -25,6 +25,8 @@ pub struct Shot {
     pub stand: Stand,
     /// How far that may be off, where the time between the two is uncertain.
     pub slip: Option<Slip>,
+    /// When its last byte was here, ns of the host's clock; none of files.
+    pub here_ns: Option<u64>,
 }
 
 /// A shot that could not be had, with the reason; the next one may be fine.
@@ -74,6 +76,11 @@ pub struct RecordingSource {
     shots: Receiver<std::result::Result<Shot, BadShot>>,
 }
 
+/// Whether pictures and poses were brought together by time.
+fn by_clock(meta: &Meta) -> bool {
+    meta.frames.iter().flat_map(|f| &f.taken).any(|t| t.pairing == Some(Pairing::Clock))
+}
+
 impl RecordingSource {
     /// Starts decoding at shot `first`. `poses` names the pose file where meta.json does not.
     /// Refused: no laser pictures, a pose index outside the pose file.
@@ -91,7 +98,8 @@ impl RecordingSource {
     ) -> Result<RecordingSource> {
         let meta = &recording.meta;
         let mut stands = if meta.motion().axis().is_some() { counted(recording)? } else { posed(recording, poses)? };
-        if let Some(latency) = latency {
+        if let Some(latency) = latency.filter(|_| by_clock(meta)) {
+            latency.of(meta.sources.as_ref())?;
             let taken = meta.frames.iter().filter(|f| f.laser.is_some()).map(|f| f.taken.as_ref());
             for ((_, stand, slip), taken) in stands.iter_mut().zip(taken) {
                 if let (Ok(at), Some(taken)) = (&stand, taken) {
@@ -124,7 +132,7 @@ impl RecordingSource {
                         let (index, name, slip) = (*index, name.clone(), *slip);
                         let shot = stand.clone().and_then(|s| Ok((s, recording.picture(&name)?)));
                         match shot {
-                            Ok((stand, image)) => Ok(Shot { index, name, image, stand, slip }),
+                            Ok((stand, image)) => Ok(Shot { index, name, image, stand, slip, here_ns: None }),
                             Err(fault) => Err(BadShot { index, name, fault, last: false }),
                         }
                     })
@@ -286,7 +294,7 @@ impl<R: Read> Source for RawSource<R> {
             return bad(self.uneven(format!("more than {came} frames")));
         };
         self.next += 1;
-        Some(Ok(Shot { index, name, image, stand: Stand::Robot(base_from_flange), slip: None }))
+        Some(Ok(Shot { index, name, image, stand: Stand::Robot(base_from_flange), slip: None, here_ns: None }))
     }
 }
 

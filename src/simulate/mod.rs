@@ -26,4 +26,4 @@ pub use scene::{CutSpec, Hit, Material, PartSpec, Scene, SceneSpec, ShapeSpec, S
 pub use sensor::Sensor;
 pub use station::{LineLaser, Pointer, Station, TRUE_VALUES};
 pub use truth::{CloudErrors, PartTruth, PointerTruth, Truth, TruthFile};
-pub use write::{DEFAULT_SCENE, Set, SimulateOptions, Simulated, simulate};
+pub use write::{DEFAULT_SCENE, Set, SimulateOptions, Simulated, riding_board, scene_from_board, simulate};

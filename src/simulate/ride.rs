@@ -73,6 +73,11 @@ impl Ride {
         (self.axis.moved(count) * self.camera_from_scene).inverse()
     }
 
+    /// Where the camera stands over the board that rides along, at a count.
+    pub fn board_from_camera(&self, count: f64) -> Rigid<Board, Camera> {
+        (self.axis.moved(count) * self.camera_from_board).inverse()
+    }
+
     /// The scene in the cloud's frame.
     pub fn cloud_from_scene(&self) -> Rigid<Base, InScene> {
         let axis_from_scene = self.axis.camera_from_axis.inverse() * self.camera_from_scene;

@@ -258,8 +258,8 @@ struct Plan {
     motion: Option<Motion>,
 }
 
-/// The board that rides on an axis: small enough to be in the picture along some way of it, or all around.
-fn riding_board(rig: &RigSpec) -> BoardSpec {
+/// The board that rides on an axis when no other is named: small enough to be in the picture along some way of it, or all around.
+pub fn riding_board(rig: &RigSpec) -> BoardSpec {
     chessboard(9, 6, 6.0, 5.0, rig.board_scale())
 }
 
@@ -289,7 +289,7 @@ fn chessboard(columns: u32, rows: u32, square_mm: f64, border_mm: f64, scale: f6
 }
 
 /// A board's scene has its z out of the board, the board's own z goes into it.
-fn scene_from_board() -> Rigid<InScene, Board> {
+pub fn scene_from_board() -> Rigid<InScene, Board> {
     Rigid::new(Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0)), Vec3::zeros())
 }
 
@@ -459,6 +459,7 @@ impl Plan {
             ambient: None,
             frames: vec![],
             frames_file: None,
+            sources: None,
             motion: self.motion.clone(),
             pose_file: None,
             pose_files: Default::default(),

@@ -23,6 +23,7 @@ const ADDRESS: u32 = 0x0d18;
 const LATCH: u32 = 0x0944;
 const MONO8: u32 = 0x0108_0001;
 const MONO12: u32 = 0x0110_0005;
+const BAYER: u32 = 0x0108_0009;
 
 /// What the camera does wrong.
 #[derive(Clone, Copy, Default)]
@@ -31,8 +32,22 @@ pub struct Faults {
     pub lost_per_mille: u64,
     /// It sends again what is asked for.
     pub resends: bool,
+    /// It sends colours.
+    pub colour: bool,
+    /// After so many pictures its clock goes on by so many ns.
+    pub jump: Option<(u64, u64)>,
+    /// Its first picture has this number; 0: 1.
+    pub first: u64,
     /// Every so many pictures one is taken and not sent at all; 0: none.
     pub skips: u64,
+}
+
+impl Faults {
+    /// What its clock says after so many pictures.
+    fn clock(&self, begun: Instant, taken: u64) -> u64 {
+        let jumped = self.jump.filter(|(after, _)| taken > *after).map_or(0, |(_, by)| by);
+        begun.elapsed().as_nanos() as u64 + jumped
+    }
 }
 
 struct Registers {
@@ -83,12 +98,16 @@ impl Device {
         let data = UdpSocket::bind((ip, 0)).unwrap();
         let deep = matches!(pictures[0].pixels, Pixels::U16(_));
         let registers = Arc::new(Mutex::new(registers(ip, &pictures[0], deep)));
+        if faults.colour {
+            registers.lock().unwrap().put(FORMAT, BAYER);
+        }
         let (stop, taken, lost) =
             (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)), Arc::new(AtomicU64::new(0)));
         let sent: Arc<Mutex<VecDeque<(u64, Vec<Vec<u8>>)>>> = Arc::default();
         let begun = Instant::now();
         let (stopped, map, old, out) = (stop.clone(), registers.clone(), sent.clone(), data.try_clone().unwrap());
-        let answer = move || answer(&control, &out, &map, &old, &stopped, faults, begun);
+        let counted = taken.clone();
+        let answer = move || answer(&control, &out, &map, &old, &stopped, faults, begun, &counted);
         let (stopped, map, counted, dropped) = (stop.clone(), registers, taken.clone(), lost.clone());
         let stream =
             move || stream(&data, &pictures, rate_hz, count, faults, &map, &sent, &stopped, &counted, &dropped, begun);
@@ -174,7 +193,7 @@ fn xml() -> String {
         integer("Width", WIDTH),
         integer("Height", HEIGHT),
         integer("PayloadSize", PAYLOAD),
-        format!("<Enumeration Name=\"PixelFormat\"><EnumEntry Name=\"Mono8\"><Value>{MONO8}</Value></EnumEntry><EnumEntry Name=\"Mono12\"><Value>{MONO12}</Value></EnumEntry><pValue>PixelFormatReg</pValue></Enumeration>"),
+        format!("<Enumeration Name=\"PixelFormat\"><EnumEntry Name=\"Mono8\"><Value>{MONO8}</Value></EnumEntry><EnumEntry Name=\"BayerRG8\"><Value>{BAYER}</Value></EnumEntry><EnumEntry Name=\"Mono12\"><Value>{MONO12}</Value></EnumEntry><pValue>PixelFormatReg</pValue></Enumeration>"),
         reg("PixelFormat", FORMAT, "RW"),
         reg("Acquisition", START, "RW"),
         command("AcquisitionStart", "AcquisitionReg", 1),
@@ -196,6 +215,7 @@ fn xml() -> String {
 
 type Sent = Mutex<VecDeque<(u64, Vec<Vec<u8>>)>>;
 
+#[allow(clippy::too_many_arguments)]
 fn answer(
     control: &UdpSocket,
     data: &UdpSocket,
@@ -204,6 +224,7 @@ fn answer(
     stop: &AtomicBool,
     faults: Faults,
     begun: Instant,
+    taken: &AtomicU64,
 ) {
     let mut buffer = [0; 2048];
     while !stop.load(Ordering::Relaxed) {
@@ -223,7 +244,7 @@ fn answer(
                     let (register, value) = (word(at), word(at + 4));
                     r.put(register, value);
                     if register == LATCH {
-                        let now = begun.elapsed().as_nanos() as u64;
+                        let now = faults.clock(begun, taken.load(Ordering::Relaxed));
                         r.put(0x948, (now >> 32) as u32);
                         r.put(0x94c, now as u32);
                     }
@@ -334,8 +355,8 @@ fn stream(
             continue;
         }
         // Numbers of 16 bits without 0.
-        let block = done % 65_535 + 1;
-        let ns = begun.elapsed().as_nanos() as u64;
+        let block = (done + faults.first.saturating_sub(1)) % 65_535 + 1;
+        let ns = faults.clock(begun, done);
         let all = packets(&pictures[done as usize % pictures.len()], block, ns, size);
         for packet in &all {
             dice = dice.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);

@@ -5,9 +5,11 @@
 use super::device::{Device, Faults};
 use super::{cloud_of, scan_folder, text};
 use crate::common::{sheetlight, sheetlight_fails};
-use sheetlight::capture::{Account, CameraUri, Fate, Fed, Feed, FeedOptions};
+use sheetlight::capture::pair::{PoseFeed, Sample, Way};
+use sheetlight::capture::{Account, CameraUri, Fate, Fed, Feed, FeedOptions, Stream, Streamed, now_ns};
+use sheetlight::geometry::{Base, Flange, Rigid, Vec3};
 use sheetlight::raster::Image;
-use sheetlight::recording::Recording;
+use sheetlight::recording::{Recording, Stand};
 use std::net::Ipv4Addr;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -69,7 +71,7 @@ fn lost_packets_cost_pictures_that_are_counted_and_never_torn() {
     let sent = pictures();
     for (last, faults) in [
         (2, Faults { lost_per_mille: 5, resends: true, ..Faults::default() }),
-        (3, Faults { lost_per_mille: 2, resends: false, skips: 17 }),
+        (3, Faults { lost_per_mille: 2, skips: 17, ..Faults::default() }),
     ] {
         let count = 100;
         let device = Device::start(address(last), sent.clone(), 50.0, count, faults);
@@ -91,6 +93,74 @@ fn lost_packets_cost_pictures_that_are_counted_and_never_torn() {
             assert!(a.incomplete > 0 && a.missed > 0 && a.used < taken, "{a}");
         }
     }
+}
+
+/// Its numbers have 16 bits: after 65535 comes 1.
+#[test]
+fn numbers_that_begin_anew_after_sixteen_bits_go_on() {
+    let (count, sent) = (60, pictures());
+    let faults = Faults { first: 65_510, skips: 9, ..Faults::default() };
+    let device = Device::start(address(6), sent.clone(), 100.0, count, faults);
+    let mut ids = Vec::new();
+    let options = FeedOptions { seconds: Some(2.5), ..FeedOptions::default() };
+    let (a, said) = receive(&format!("gige://{}", address(6)), options, |id, _| ids.push(id));
+    println!("across the end of 16 bits: {a}");
+    // The last of all is one that it skips, or is not.
+    assert_eq!((a.late, a.outages, a.unexplained(), said.len()), (0, 0, 0, 0), "{a} {said:?}");
+    assert!(a.missed >= count / 9 - 1 && a.missed <= count / 9 + 2 && a.used + a.missed + 1 >= count, "{a}");
+    assert!(ids.is_sorted() && ids.last().is_some_and(|id| *id > 65_560), "{ids:?}");
+    drop(device);
+}
+
+/// Pictures carry the device's time, which jumps by 120 ms after forty: those around it have no pose, all others the right one.
+#[test]
+fn a_clock_that_jumps_costs_what_came_around_it_and_pairs_nothing_wrongly() {
+    const SPEED: f64 = 200.0;
+    let rate = 40.0;
+    let faults = Faults { jump: Some((40, 120_000_000)), ..Faults::default() };
+    let device = Device::start(address(7), pictures(), rate, 120, faults);
+    let start = now_ns();
+    let at = |ns: u64| (ns - start) as f64 * 1e-9 * SPEED;
+    let sample = |k: u64| {
+        let ns = start + k * 8_000_000;
+        let pose = Rigid::<Base, Flange>::from_vectors(&Vec3::new(3.1, 0.0, 0.0), Vec3::new(at(ns), 0.0, 300.0));
+        Sample { ns, sigma_ns: 0.0, stand: Stand::Robot(pose) }
+    };
+    let poses = PoseFeed::of((0..1000).map(sample));
+    let source = format!("gige://{}", address(7)).parse::<CameraUri>().unwrap().open(None).unwrap();
+    let feed = Feed::start(source, FeedOptions { seconds: Some(3.6), ..FeedOptions::default() }).unwrap();
+    let mut stream = Stream::new(feed, Way::Clock { poses, delay_ns: 0.0, delay_sigma_ns: 0.0 });
+    let (mut ahead, mut said): (f64, Vec<String>) = (f64::MIN, Vec::new());
+    loop {
+        said.extend(stream.news());
+        match stream.next(Duration::from_millis(200)) {
+            Streamed::Shot(shot) => {
+                stream.fate(Fate::Used);
+                let Some(Stand::Robot(pose)) = shot.stand else { panic!("no pose") };
+                // It comes after it was taken, how long after is the machine's load: a pose of after it came is of a wrong time.
+                ahead = ahead.max((pose.translation.x - at(shot.picture.host_ns)) / SPEED);
+            }
+            Streamed::Quiet => {}
+            Streamed::Ended(fault) => break assert!(fault.is_none(), "{fault:?}"),
+        }
+    }
+    let a = stream.account();
+    println!("a clock that jumps by 120 ms: {a}; poses at most {:.1} ms after a picture came, {said:?}", 1e3 * ahead);
+    assert!(said.iter().any(|s| s.contains("clock jumped")), "{said:?}");
+    assert!((1..=20).contains(&a.unpaired) && a.used >= 90 && a.unexplained() == 0, "{a}");
+    assert!(stream.left_out().iter().all(|l| l.why.contains("clock jumped")), "{:?}", stream.left_out());
+    assert!(ahead < 0.01, "{ahead} s");
+    drop(device);
+}
+
+#[test]
+fn a_colour_camera_and_one_that_is_not_there_are_answered() {
+    let device = Device::start(address(8), pictures(), 50.0, 5, Faults { colour: true, ..Faults::default() });
+    let said = sheetlight_fails(&["record", "--camera", &format!("gige://{}", address(8)), "--out", "x"]).1;
+    assert!(said.contains("pixel format is BayerRG8") && said.contains("set PixelFormat Mono8"), "{said}");
+    let said = sheetlight_fails(&["camera", "show", "--camera", "gige://NOSUCH"]).1;
+    assert!(said.contains("NOSUCH") && said.contains("firewall"), "{said}");
+    drop(device);
 }
 
 #[test]
@@ -176,10 +246,35 @@ fn the_fake_cameras_pictures_are_all_explained_and_its_features_kept_to() {
                 u64::from((0..256).any(|y| (0..1024).step_by(97).any(|x| u32::from(image.get(x, y)) != want(x, y))));
         });
         println!("fake camera, {loss} per mille lost, {:.0} s: {a}", begun.elapsed().as_secs_f64());
-        assert_eq!((torn, a.unexplained(), a.used), (0, 0, came), "{a}");
+        assert_eq!((torn, a.unexplained(), a.late, a.used), (0, 0, 0, came), "{a}");
         assert!(a.sent as f64 > 40.0 * (seconds - 1.5), "{a}");
     }
     shown_and_kept_to();
+    comes_back_as_it_was_set();
+}
+
+/// Its power is out for a while: it comes back without its settings, and gets them again.
+fn comes_back_as_it_was_set() {
+    let Some(camera) = fake("0") else { return };
+    for (name, value) in [("Width", "256"), ("Height", "128"), ("AcquisitionFrameRate", "40")] {
+        sheetlight(&["camera", "set", name, value, "--camera", FAKE]);
+    }
+    let out = if std::env::var("SHEETLIGHT_LONG").is_ok() { 10.0 } else { 1.5 };
+    let pull = std::thread::spawn(move || {
+        std::thread::sleep(Duration::from_secs_f64(1.5));
+        drop(camera);
+        std::thread::sleep(Duration::from_secs_f64(out));
+        fake("0")
+    });
+    let mut last = None;
+    let options = FeedOptions { seconds: Some(out + 6.5), ..FeedOptions::default() };
+    let (a, said) = receive(FAKE, options, |_, image| last = Some((image.width, image.height, Instant::now())));
+    drop(pull.join().unwrap());
+    println!("without power for {out} s at 40 a second: {a}; {said:?}");
+    let (width, height, at) = last.expect("pictures");
+    assert!((width, height) == (256, 128) && at.elapsed() < Duration::from_secs(2), "{a} {said:?}");
+    assert_eq!((a.outages, a.unexplained(), a.late), (1, 0, 0), "{a} {said:?}");
+    assert!(a.missed as f64 > 0.8 * 40.0 * out, "{a}");
 }
 
 /// What a camera can be set to.

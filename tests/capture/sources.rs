@@ -197,6 +197,64 @@ fn words_that_name_nothing_are_answered() {
     }
 }
 
+/// The last child of a process; none while it has none.
+fn child_of(pid: u32) -> Option<u32> {
+    let of = |entry: std::fs::DirEntry| {
+        let stat = std::fs::read_to_string(entry.path().join("stat")).ok()?;
+        let parent: u32 = stat.rsplit(')').next()?.split_whitespace().nth(1)?.parse().ok()?;
+        (parent == pid && stat.contains("(ffmpeg)")).then(|| entry.file_name().to_string_lossy().parse().ok())?
+    };
+    std::fs::read_dir("/proc").ok()?.flatten().find_map(of)
+}
+
+#[test]
+fn what_ends_a_run_is_said_with_the_next_step_and_what_was_recorded_stays() {
+    let dir = tempfile::tempdir().unwrap();
+    let run = |args: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_sheetlight"));
+        command.args(args).stdout(Stdio::null()).stderr(Stdio::piped());
+        command
+    };
+    let said = |mut command: Command| String::from_utf8(command.output().unwrap().stderr).unwrap();
+    let out = text(&dir.path().join("out"));
+    let mut missing = run(&["record", "--camera", "ffmpeg:video.mkv", "--out", &out]);
+    missing.env("PATH", "/nowhere");
+    let missing = said(missing);
+    assert!(missing.contains("ffmpeg cannot be started") && missing.contains("install it"), "{missing}");
+    // Pictures of another shape than the station's camera.
+    for command in ["scan", "live"] {
+        let mut args = vec![command, "--camera", "sim:1?size=200x200&rate=20"];
+        let (station, scan) = (super::station(), text(&dir.path().join("scan")));
+        args.extend(["--station", &station]);
+        if command == "scan" {
+            args.extend(["--pair", "given", "--out", &scan]);
+        }
+        let other = said(run(&args));
+        assert!(
+            other.contains("pictures are 200x200") && other.contains("calibrated at 320x240"),
+            "{command}: {other}"
+        );
+    }
+    if Command::new("ffmpeg").arg("-version").output().is_err() {
+        eprintln!("SKIPPED: ffmpeg is not installed");
+        return;
+    }
+    let endless = "ffmpeg:-f lavfi -i testsrc2=size=64x48:rate=25";
+    let ended = run(&["record", "--camera", endless, "--out", &out]).spawn().unwrap();
+    let begun = Instant::now();
+    let recorded = || Recording::open(dir.path().join("out").as_path()).map_or(0, |r| r.meta.frames.len());
+    while recorded() < 20 {
+        assert!(begun.elapsed() < Duration::from_secs(20), "it does not begin");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let ffmpeg = child_of(ended.id()).expect("ffmpeg is its child").to_string();
+    assert!(Command::new("kill").args(["-9", &ffmpeg]).status().unwrap().success());
+    let done = ended.wait_with_output().unwrap();
+    let why = String::from_utf8_lossy(&done.stderr);
+    assert!(!done.status.success() && why.contains("ffmpeg ended (signal: 9") && why.contains("shots, whole"), "{why}");
+    assert!(recorded() >= 20);
+}
+
 #[test]
 fn an_exposure_is_found_at_which_the_stripe_stands_right() {
     for exposure in ["60", "20000"] {

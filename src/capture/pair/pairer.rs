@@ -123,8 +123,11 @@ impl Pairer {
                 Some(table.at(number, picture.count).map(|s| plain(Some(Pairing::Count), Some(s))))
             }
             Way::Step(poses, still) => {
+                // A picture may be long under way: where the device has a clock, its exposure began when that says.
                 let exposed = picture.exposure_ns.unwrap_or(0);
-                let (from, to) = (picture.host_ns.saturating_sub(exposed + BEFORE), picture.host_ns);
+                let told = picture.device_ns.and_then(|ns| clock.host(ns)).map(|m| (m.ns - m.sigma_ns).max(0.0) as u64);
+                let begun = told.unwrap_or(u64::MAX).min(picture.host_ns.saturating_sub(exposed));
+                let (from, to) = (begun.saturating_sub(BEFORE), picture.host_ns);
                 let (before, after) = match (poses.at(from), poses.at(to)) {
                     (Some(Ok(a)), Some(Ok(b))) => (a.stand, b.stand),
                     (Some(Err(why)), _) | (_, Some(Err(why))) => return Some(Err(why)),
@@ -133,7 +136,12 @@ impl Pairer {
                 Some(still.check(&before, &after).map(|()| plain(Some(Pairing::Step), Some(before))))
             }
             Way::Clock { poses, delay_ns, delay_sigma_ns } => {
-                let middle = middle(picture, clock);
+                let middle = match picture.device_ns.map(|ns| clock.told(ns, picture.host_ns)) {
+                    Some(Some(Err(why))) => return Some(Err(why)),
+                    // Its clock is read again soon.
+                    Some(None) if !late => return None,
+                    _ => middle(picture, clock),
+                };
                 let at = middle.ns - delay_ns;
                 let Some(told) = poses.at(at.max(0.0) as u64) else {
                     return late.then(|| Err("no pose came after the picture; nothing is extrapolated".into()));

@@ -16,6 +16,18 @@ pub enum PoseUri {
     Robot(String),
 }
 
+impl std::fmt::Display for PoseUri {
+    /// Whom it names, without what is asked of it.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let place = |s: &str| s.split('?').next().unwrap_or_default().to_owned();
+        match self {
+            PoseUri::Tcp(address) => write!(f, "tcp://{address}"),
+            PoseUri::Lines(path) => write!(f, "lines:{}", path.display()),
+            PoseUri::Sim(word) | PoseUri::Robot(word) => f.write_str(&place(word)),
+        }
+    }
+}
+
 impl std::str::FromStr for PoseUri {
     type Err = String;
     fn from_str(s: &str) -> Result<PoseUri, String> {

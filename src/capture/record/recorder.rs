@@ -7,7 +7,7 @@ use super::super::pair::LeftOut;
 use crate::fault::{Fault, Result};
 use crate::files::{Append, Lock};
 use crate::raster::{Image, Response};
-use crate::recording::{Beam, FrameRef, ImageSpec, Meta, Motion, Stand, Taken, raw_name};
+use crate::recording::{Beam, BoardSpec, FrameRef, ImageSpec, Meta, Motion, Sources, Stand, Taken, raw_name};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -70,6 +70,10 @@ pub struct RecorderOptions {
     pub shows: Shows,
     /// What they are stored as.
     pub store: Store,
+    /// Which devices are recorded; none: it is nobody's business.
+    pub sources: Option<Sources>,
+    /// The board that pictures show, where they show one.
+    pub board: Option<BoardSpec>,
 }
 
 /// From one wait for the disk to the next: what a power cut may cost.
@@ -244,11 +248,12 @@ fn meta(format: Format, options: &RecorderOptions) -> Meta {
         units: "mm".into(),
         image: ImageSpec { width, height, bits, channels: 1, response, pixel_centre },
         beam,
-        board: None,
+        board: options.board.clone(),
         boards: vec![],
         ambient: None,
         frames: vec![],
         frames_file: Some(FRAMES.into()),
+        sources: options.sources.clone(),
         motion: options.motion.clone(),
         pose_file: None,
         pose_files: Default::default(),

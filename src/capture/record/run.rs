@@ -24,6 +24,8 @@ pub struct Recorded {
     pub stand: Option<Stand>,
     /// How far that may be off.
     pub slip: Option<Slip>,
+    /// When its last byte was here, ns of the host's clock.
+    pub here_ns: u64,
 }
 
 /// What a recording came to.
@@ -92,15 +94,16 @@ pub fn record(
             Ok(kept) => {
                 stream.fate(Fate::Used);
                 if let Some((send, backlog)) = &on {
+                    let here_ns = shot.picture.host_ns;
                     let image = backlog.add().then_some(shot.picture.image);
                     // Nobody reads any more: recording goes on.
-                    let _ = send.send(Recorded { kept, image, stand: shot.stand, slip });
+                    let _ = send.send(Recorded { kept, image, stand: shot.stand, slip, here_ns });
                 }
             }
             Err(fault) => {
                 stream.fate(Fate::Disk);
                 stream.feed().stop();
-                full = Some(fault);
+                full = Some(fault.next("make room, then record into another folder; what was recorded can be scanned"));
             }
         }
         if let Some(said) = space.warn(recorder.folder(), recorder.bytes()) {

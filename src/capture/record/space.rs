@@ -39,9 +39,9 @@ impl Space {
         (left < SOON && left < 0.5 * self.said).then(|| {
             self.said = left;
             format!(
-                "the disk of {} has {:.1} GB left: {:.1} minutes at {:.0} MB/s",
+                "the disk of {} has {:.0} MB left: {:.1} minutes at {:.1} MB/s",
                 folder.display(),
-                free * 1e-9,
+                free * 1e-6,
                 left / 60.0,
                 rate * 1e-6
             )

@@ -9,10 +9,10 @@ use crate::capture::picture::{Event, Picture, PictureSource};
 use crate::fault::{Fault, Result};
 use crate::geometry::{AxisKind, Camera, Rigid};
 use crate::raster::Image;
-use crate::recording::{BoardSpec, Motion, Stand};
+use crate::recording::{Motion, Stand};
 use crate::simulate::{
     Canvas, DEFAULT_SCENE, InScene, Ride, Scene, SceneSpec, Station, View, base_from_scene, expose, flange, hot_pixels,
-    scan,
+    riding_board, scan, scene_from_board,
 };
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -37,6 +37,8 @@ pub struct SimSpec {
     pub delay_ms: f64,
     /// Exposure, us.
     pub exposure_us: f64,
+    /// An axis moves the board that it is calibrated from, in room light, in place of the scene under the laser.
+    pub board: bool,
 }
 
 impl Default for SimSpec {
@@ -50,6 +52,7 @@ impl Default for SimSpec {
             scene: None,
             delay_ms: 0.0,
             exposure_us: 1000.0,
+            board: false,
         }
     }
 }
@@ -58,6 +61,10 @@ impl Default for SimSpec {
 const RAMP: f64 = 0.1;
 /// Steps that a turn, or a way, of an axis is told in; only their ends are used.
 const STEPS: usize = 200;
+/// Rays a pixel's side of pictures in room light; how bright a board's fields are, as paper and toner.
+const RAYS: u32 = 2;
+const WHITE: f64 = 0.85;
+const BLACK: f64 = 0.06;
 
 /// A simulated station whose parts or whose robot move: to and fro along a scan, or round and round.
 #[derive(Clone)]
@@ -67,13 +74,16 @@ pub struct SimMotion {
     scene: Arc<Scene>,
     way: Way,
     speed: f64,
+    /// The board is shown.
+    board: bool,
 }
 
 #[derive(Clone)]
 enum Way {
     /// The camera's first and last place over the scene.
     Robot([Rigid<InScene, Camera>; 2]),
-    Axis(Arc<Ride>),
+    /// From one count to another.
+    Axis(Arc<Ride>, [f64; 2]),
 }
 
 impl SimMotion {
@@ -96,30 +106,36 @@ impl SimMotion {
             Some(path) => SceneSpec::load(path)?,
             None => SceneSpec::parse(DEFAULT_SCENE)?,
         };
-        let scene = Scene::new(scene)?;
+        let mut scene = Scene::new(scene)?;
         let way = match spec.axis {
+            None if spec.board => {
+                return Err(Fault::usage("a simulated board rides on an axis, and none is simulated")
+                    .next("name one, axis=linear or axis=turntable; a robot over a board is a cell's: sheetlight cell simulate"));
+            }
             None => {
                 let ends = scan(&station, &scene, 2);
                 Way::Robot([ends[0], ends[1]])
             }
             Some(kind) => {
-                let board = BoardSpec::Chessboard {
-                    inner_corners: [9, 6],
-                    square_mm: 6.0,
-                    border_mm: 5.0,
-                    first_square: "black".into(),
-                };
-                Way::Axis(Arc::new(Ride::new(kind, &station, &scene, &board, STEPS)))
+                let board = riding_board(&station.rig);
+                let ride = Ride::new(kind, &station, &scene, &board, STEPS);
+                let ends = |counts: &[f64]| [counts[0], counts[counts.len() - 1]];
+                let mut range = ends(&ride.counts);
+                if spec.board {
+                    let stops: Vec<f64> = ride.stops(&station, &board)?.into_iter().map(|s| s.0).collect();
+                    (range, scene) = (ends(&stops), Scene::of_board(&board, WHITE, BLACK)?);
+                }
+                Way::Axis(Arc::new(ride), range)
             }
         };
-        Ok(SimMotion { station: station.into(), scene: scene.into(), way, speed: spec.speed })
+        Ok(SimMotion { station: station.into(), scene: scene.into(), way, speed: spec.speed, board: spec.board })
     }
 
     /// What moves, as meta.json says it.
     pub fn motion(&self) -> Motion {
         match &self.way {
             Way::Robot(_) => Motion::default(),
-            Way::Axis(ride) => ride.motion(),
+            Way::Axis(ride, _) => ride.motion(),
         }
     }
 
@@ -151,14 +167,19 @@ impl SimMotion {
                 let base_from_camera = base_from_scene(&self.station) * scene_from_camera;
                 (scene_from_camera, Stand::Robot(flange(&self.station, &base_from_camera)))
             }
-            Way::Axis(ride) => {
-                let last = ride.counts.last().copied().unwrap_or(1.0);
+            Way::Axis(ride, [from, to]) => {
                 let per_count = match ride.axis.kind {
                     AxisKind::Linear => ride.axis.pitch,
                     AxisKind::Turntable => ride.axis.pitch.to_degrees(),
                 };
-                let count = (last * self.share(ns, last * per_count.abs())).round();
-                (ride.scene_from_camera(count), Stand::Count(count))
+                let length = (to - from).abs() * per_count.abs();
+                let count = (from + (to - from) * self.share(ns, length)).round();
+                let scene_from_camera = if self.board {
+                    scene_from_board() * ride.board_from_camera(count)
+                } else {
+                    ride.scene_from_camera(count)
+                };
+                (scene_from_camera, Stand::Count(count))
             }
         }
     }
@@ -193,14 +214,18 @@ impl SimCamera {
         let station = &*self.motion.station;
         let view = View { station, scene: &self.motion.scene, scene_from_camera };
         let (w, h) = (station.camera.width, station.camera.height);
-        let mut light = Canvas::new(w, h);
-        view.sheet(&mut light);
-        let leak = station.sensor.ambient_leak;
-        let room = if leak > 0.0 { view.faint_ambient() } else { Canvas::new(w, h) };
         // The sensor's figures are those of a millisecond.
         let longer = (1e-3 * self.spec.exposure_us) as f32;
+        let (mut light, leak) = (Canvas::new(w, h), station.sensor.ambient_leak);
+        let (room, gain) = if self.motion.board {
+            (view.ambient(RAYS), station.sensor.ambient_white as f32)
+        } else {
+            view.sheet(&mut light);
+            let room = if leak > 0.0 { view.faint_ambient() } else { Canvas::new(w, h) };
+            (room, leak as f32)
+        };
         light.pixels.iter_mut().for_each(|p| *p *= longer);
-        expose(&station.sensor, &light, &room, leak as f32 * longer, &self.hot, &mut station.rng("sim", self.next))
+        expose(&station.sensor, &light, &room, gain * longer, &self.hot, &mut station.rng("sim", self.next))
     }
 }
 

@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 const LOOK: Duration = Duration::from_millis(5);
-/// Exposure that is stated, s; a picture shows its beginning.
+/// Exposure that is stated, s; a picture shows its middle.
 const EXPOSURE_S: f64 = 1e-3;
 
 /// What one client has asked for, and what it was sent.
@@ -64,17 +64,24 @@ impl Viewer {
         self.stream.lock().unwrap_or_else(PoisonError::into_inner).write_all(&write(message))
     }
 
-    /// The picture of a moment; time stands still while it is made.
-    fn picture(&self, t: f64) -> std::io::Result<()> {
+    /// The picture of a moment, asked for one by one: time stands still while it is made.
+    fn snap(&self) -> std::io::Result<()> {
         let held = self.cell.clock().hold();
+        let message = self.picture(self.cell.clock().now());
+        drop(held);
+        self.send(&message)
+    }
+
+    /// The picture of a moment that has come.
+    fn picture(&self, t: f64) -> Message {
         let image = if self.in_gripper { self.cell.gripper_picture(t) } else { self.cell.picture(t) };
         let mut taken = self.taken.lock().unwrap_or_else(PoisonError::into_inner);
         let [id, sent] = *taken;
         *taken = [id + 1, sent + 1];
-        let device_ns = (t * 1e9) as u64;
-        let sent = Sent { image, id, device_ns, exposure_ns: (EXPOSURE_S * 1e9) as u64, count: None, sent: sent + 1 };
-        drop(held);
-        self.send(&Message::Picture(Box::new(sent)))
+        let begun = t - 0.5 * EXPOSURE_S + 1e-3 * self.cell.options().camera_delay_ms;
+        let (device_ns, exposure_ns) = ((begun.max(0.0) * 1e9) as u64, (EXPOSURE_S * 1e9) as u64);
+        let sent = Sent { image, id, device_ns, exposure_ns, count: None, sent: sent + 1 };
+        Message::Picture(Box::new(sent))
     }
 
     fn listen(&self, lines: TcpStream, over: &AtomicBool, faults: &Faults) {
@@ -85,7 +92,7 @@ impl Viewer {
             }
             let said = self.answer(line.trim());
             let snapped = line.trim() == "snap";
-            if self.send(&Message::Text(said)).is_err() || (snapped && self.picture(self.cell.clock().now()).is_err()) {
+            if self.send(&Message::Text(said)).is_err() || (snapped && self.snap().is_err()) {
                 break;
             }
         }
@@ -135,7 +142,8 @@ impl Viewer {
         }
     }
 
-    /// Takes pictures at the rate that was asked for, at even moments of the cell's time.
+    /// Takes pictures at the rate that was asked for, at even moments of the cell's time, which goes on meanwhile: those whose moment
+    /// has passed when the one before is made are taken and not sent, and their numbers are missing.
     fn run(&self, over: &AtomicBool, faults: &Faults) {
         let mut next = None::<f64>;
         while !over.load(Ordering::Relaxed) && !Faults::on(&faults.camera_gone) {
@@ -150,10 +158,13 @@ impl Viewer {
                 next = Some(at);
                 continue;
             }
-            if self.picture(at).is_err() {
+            let message = self.picture(at);
+            if self.send(&message).is_err() {
                 break;
             }
-            next = Some(at + 1.0 / fps);
+            let passed = ((self.cell.clock().now() - at) * fps).floor().max(1.0);
+            self.taken.lock().unwrap_or_else(PoisonError::into_inner)[0] += passed as u64 - 1;
+            next = Some(at + passed / fps);
         }
         let _ = self.stream.lock().unwrap_or_else(PoisonError::into_inner).shutdown(std::net::Shutdown::Both);
     }

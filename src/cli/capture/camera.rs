@@ -122,8 +122,9 @@ fn set(key: &str, value: &str, named: &Named, console: &Console) -> Result<()> {
     let mut source = named.open()?;
     source.set(key, value)?;
     let now = source.features()?.into_iter().find(|f| f.name == key);
-    let shown = now.as_ref().and_then(|f| f.value.as_ref()).map_or(String::new(), Value::to_string);
-    console.result(&now, &format!("{key} is {shown}"));
+    // A camera from before the standard's second version calls it otherwise.
+    let shown = now.as_ref().and_then(|f| f.value.as_ref()).map_or("set".into(), |v| format!("is {v}"));
+    console.result(&now, &format!("{key} {shown}"));
     Ok(())
 }
 

@@ -2,12 +2,12 @@
 //! Frame and unit: mm, degrees, counts; s.
 
 use crate::capture::pair::{PoseFeed, PoseUri, Still, Table, Way};
-use crate::capture::{CameraUri, Feed, FeedOptions, Mode, RawFormat, Stream};
+use crate::capture::{CameraUri, Feed, FeedOptions, Latency, Mode, RawFormat, Stream};
 use crate::cli::terminal::arguments::parse;
 use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
 use crate::geometry::CountUnit;
-use crate::recording::{Carries, Motion, MotionKind, Stand, load_poses};
+use crate::recording::{Carries, Motion, MotionKind, Sources, Stand, load_poses};
 use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -191,11 +191,20 @@ impl Capture {
         station: Option<&Path>,
         mode: Mode,
     ) -> Result<Stream> {
-        let way = self.way(self.running.named()?, poses, station)?;
-        Ok(Stream::new(self.running.open(raw, mode)?, way))
+        let clocked = station.filter(|_| self.pair() == Pair::Clock);
+        let latency = clocked.map(Latency::load).transpose()?.flatten();
+        let way = self.way(self.running.named()?, poses, latency.as_ref())?;
+        let feed = self.running.open(raw, mode)?;
+        latency.map_or(Ok(()), |l| l.of(Some(&self.sources(&feed))))?;
+        Ok(Stream::new(feed, way))
     }
 
-    fn way(&self, uri: &CameraUri, poses: Option<&Path>, station: Option<&Path>) -> Result<Way> {
+    /// Whose pictures, and against whose poses.
+    pub fn sources(&self, feed: &Feed) -> Sources {
+        Sources { camera: feed.device().into(), poses: self.pose_stream.as_ref().map(PoseUri::to_string) }
+    }
+
+    fn way(&self, uri: &CameraUri, poses: Option<&Path>, latency: Option<&Latency>) -> Result<Way> {
         let stream = || {
             let uri_of = self.pose_stream.as_ref().ok_or_else(|| {
                 Fault::usage("--pair step and clock need to know where things stand while pictures are taken")
@@ -209,12 +218,8 @@ impl Capture {
             Pair::Given => Way::Given,
             Pair::Step => Way::Step(stream()?, Still::default()),
             Pair::Clock => {
-                let latency = station.map(crate::capture::Latency::load).transpose()?.flatten().unwrap_or_default();
-                Way::Clock {
-                    poses: stream()?,
-                    delay_ns: 1e6 * latency.delay_ms,
-                    delay_sigma_ns: 1e6 * latency.sigma_ms,
-                }
+                let [delay_ns, delay_sigma_ns] = latency.map_or([0.0; 2], |l| [1e6 * l.delay_ms, 1e6 * l.sigma_ms]);
+                Way::Clock { poses: stream()?, delay_ns, delay_sigma_ns }
             }
             Pair::Count => Way::Count(match (poses, self.counts_per_shot) {
                 (Some(path), None) => {

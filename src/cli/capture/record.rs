@@ -7,6 +7,7 @@ use crate::capture::{Mode, RawFormat};
 use crate::cli::terminal::arguments::parse;
 use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
+use crate::recording::BoardSpec;
 use std::path::PathBuf;
 
 /// Record a running camera: every picture in order, each with where things stood
@@ -21,7 +22,8 @@ use std::path::PathBuf;
       --station cell3 --out recordings/board8
   sheetlight record --camera gige://first --motion linear:count --pair count \\
       --counts-per-shot 20 --out recordings/parcel4
-  sheetlight record --camera ffmpeg:/dev/video0 --shows room --shots 20 --out recordings/boards
+  sheetlight record --camera ffmpeg:/dev/video0 --shows room --board boards/charuco.json \
+      --shots 20 --out recordings/boards
   sheetlight record --camera sim:1?rate=10 --pair given --shots 50 --out try/scan")]
 pub struct Args {
     #[command(flatten)]
@@ -41,16 +43,26 @@ pub struct Args {
     /// What the pictures show: line (the stripe), pointer (its spot) or room (a board, the lasers off)
     #[arg(long, default_value = "line", value_parser = parse::<Shows>)]
     shows: Shows,
+    /// The board that they show (JSON as sheetlight board writes it)
+    #[arg(long)]
+    board: Option<PathBuf>,
     /// How they are stored: png, raw (one file of raw frames), auto (raw where PNG is too slow)
     #[arg(long, default_value = "auto", value_parser = parse::<Store>)]
     store: Store,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let board = args.board.as_deref().map(BoardSpec::load).transpose()?;
     let set = if args.shows == Shows::Room { "boards" } else { "scan" };
     let mut stream = args.capture.open(args.raw, args.poses.as_deref(), args.station.as_deref(), Mode::All)?;
-    let options =
-        RecorderOptions { set: set.into(), motion: args.capture.motion(), shows: args.shows, store: args.store };
+    let options = RecorderOptions {
+        set: set.into(),
+        motion: args.capture.motion(),
+        shows: args.shows,
+        store: args.store,
+        sources: Some(args.capture.sources(stream.feed())),
+        board,
+    };
     let recorder = Recorder::create(&args.out, stream.format(), options)?;
     let mut teller = args.capture.running.teller();
     let bar = console.bar("recording", 0);

@@ -6,7 +6,7 @@ use crate::capture::record::{RecordReport, Recorder, RecorderOptions, handing_on
 use crate::capture::{Mode, RawFormat};
 use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
-use crate::recording::Motion;
+use crate::recording::{Motion, Sources};
 use crate::rig::Rig;
 use crate::scan::{RecordedSource, Source, StreamSource};
 use crate::station::{ScanOptions, ScanReport};
@@ -50,7 +50,7 @@ pub fn scan_camera(
         };
         return crate::station::scan("camera", &name, open, rig, options, progress);
     };
-    let recorder = Recorder::create(keep, stream.format(), options_of(motion))?;
+    let recorder = Recorder::create(keep, stream.format(), options_of(motion, capture.sources(stream.feed())))?;
     let meta = recorder.meta();
     let (send, receive, backlog) = handing_on();
     let report: Arc<Mutex<Option<Result<RecordReport>>>> = Arc::default();
@@ -75,6 +75,7 @@ pub fn scan_camera(
     Ok(scanned)
 }
 
-fn options_of(motion: Motion) -> RecorderOptions {
-    RecorderOptions { set: "scan".into(), motion: Some(motion), ..RecorderOptions::default() }
+fn options_of(motion: Motion, sources: Sources) -> RecorderOptions {
+    let (motion, sources) = (Some(motion), Some(sources));
+    RecorderOptions { set: "scan".into(), motion, sources, ..RecorderOptions::default() }
 }

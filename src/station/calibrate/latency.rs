@@ -91,6 +91,7 @@ pub fn calibrate_latency(
         sigma_ms,
         created: jiff::Timestamp::now().to_string(),
         recordings: vec![recording.folder.display().to_string()],
+        sources: recording.meta.sources.clone(),
     };
     Ok(LatencyFound { latency, beyond, shots: shots.len() })
 }

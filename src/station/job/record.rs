@@ -41,6 +41,7 @@ impl Record {
             ambient: None,
             frames: vec![],
             frames_file: None,
+            sources: None,
             motion: None,
             pose_file: Some("poses".into()),
             pose_files: Default::default(),

@@ -3,7 +3,7 @@
 
 use super::scan_folder::settle;
 use super::seen::Seen;
-use crate::capture::Account;
+use crate::capture::{Account, Delay};
 use crate::fault::{Fault, Result};
 use crate::recording::Motion;
 use crate::rig::{Volume, hash_file};
@@ -51,6 +51,9 @@ pub struct ScanReport {
     /// What became of every picture that the camera sent, where one did.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<Account>,
+    /// From a picture's last byte to its points in the cloud, of a running camera.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub delay: Option<Delay>,
     /// Shots left out, with the reason.
     pub skipped: Vec<(String, String)>,
     /// Median over the points of the standard deviation that each carries, mm; none without points.

@@ -8,7 +8,7 @@ use super::report::{FORMAT, ScanReport, Spent};
 use super::scan_folder::{self, FORMER_PROGRESS};
 use super::seen::Seen;
 use super::watch::Watch;
-use crate::capture::Latency;
+use crate::capture::{Delays, Latency};
 use crate::fault::{Fault, Result};
 use crate::files::Lock;
 use crate::raster::Image;
@@ -133,6 +133,7 @@ pub fn scan_on(
         overlays,
         seen,
         pictures,
+        delays: Delays::default(),
         spent,
         stopped: None,
     };
@@ -141,7 +142,7 @@ pub fn scan_on(
     let saved = work.save();
     ended.map_err(|fault| kept(fault, &work.state, saved.is_ok(), total))?;
     saved?;
-    let Work { cloud, mut state, scanner, mut spent, seen, stopped, .. } = work;
+    let Work { cloud, mut state, scanner, mut spent, seen, delays, stopped, .. } = work;
     let points = cloud.finish()?;
     let seconds = started.elapsed().as_secs_f64();
     let products = Instant::now();
@@ -177,6 +178,7 @@ pub fn scan_on(
         peaks: state.peaks,
         dark_shots: state.dark,
         camera: source.account(),
+        delay: delays.so_far(),
         skipped: state.skipped,
         seconds,
         shots_per_second: (state.shots - first) as f64 / seconds.max(1e-9),
@@ -233,8 +235,9 @@ struct Work<'a> {
     scanner: Scanner,
     overlays: Overlays,
     seen: Seen,
-    /// Fingerprints of the pictures under way, oldest first.
-    pictures: VecDeque<(u32, u32)>,
+    /// Fingerprints of the pictures under way, and when they were here, oldest first.
+    pictures: VecDeque<(u32, u32, Option<u64>)>,
+    delays: Delays,
     spent: Spent,
     /// Said in the report where a stream was ended before its end.
     stopped: Option<String>,
@@ -301,14 +304,15 @@ impl Work<'_> {
                 .cause("the interrupted scan was of another recording, or its pictures were replaced")
                 .next("scan again without --resume, or into another folder"));
         }
-        self.pictures.push_back((shot.index, is));
+        self.pictures.push_back((shot.index, is, shot.here_ns));
         Ok(())
     }
 
     fn take(&mut self, ready: &[Profile]) -> Result<()> {
         for profile in ready {
-            let (index, picture) = self.pictures.pop_front().expect("a picture a profile");
+            let (index, picture, here_ns) = self.pictures.pop_front().expect("a picture a profile");
             assert_eq!(index, profile.shot, "profiles come in the order of their pictures");
+            here_ns.into_iter().for_each(|ns| self.delays.since(ns));
             if self.repeated > 0 {
                 self.repeated -= 1;
                 continue;

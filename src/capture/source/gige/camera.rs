@@ -2,15 +2,16 @@
 //! Frame and unit: the camera's clock in ns.
 
 use super::find::find;
+use super::order::{InOrder, Numbers};
 use super::pixels::{depth, unpack};
 use crate::capture::clock::{RoundTrip, now_ns};
 use crate::capture::feature::{Feature, Range, Value};
 use crate::capture::format::Format;
 use crate::capture::picture::{Event, Picture, PictureSource};
 use crate::fault::{Fault, Result};
-use std::collections::BTreeMap;
 use std::time::{Duration, Instant};
 use viva_genicam::genapi::FeatureValue;
+use viva_genicam::gige::DeviceInfo;
 use viva_genicam::{Camera, ControlState, FrameStream, GenicamError, GigeRegisterIo, StreamOptions, blocking};
 
 /// Nothing came for this long: it is asked whether the camera is still there.
@@ -28,11 +29,31 @@ const FORMER: [(&str, &str); 5] = [
     ("TriggerDelay", "TriggerDelayAbs"),
     ("AcquisitionFrameRateEnable", "AcquisitionFrameRateEnabled"),
 ];
+/// Set again, in this order, where a camera comes back without.
+const SETTINGS: [&str; 15] = [
+    "PixelFormat",
+    "Width",
+    "Height",
+    "OffsetX",
+    "OffsetY",
+    "ExposureTime",
+    "Gain",
+    "AcquisitionFrameRateEnable",
+    "AcquisitionFrameRate",
+    "TriggerSelector",
+    "TriggerSource",
+    "TriggerActivation",
+    "TriggerDelay",
+    "TriggerMode",
+    "ChunkModeActive",
+];
 const CHUNKS: [&str; 4] = ["ChunkCounterValue", "ChunkEncoderValue", "ChunkLineStatusAll", "ChunkEncoderStatusValue"];
 
 /// A camera on the network.
 pub struct GigeCamera {
     word: String,
+    /// Its serial number, or its address where it has none.
+    serial: String,
     packet: Option<u32>,
     camera: Camera<GigeRegisterIo>,
     stream: Option<FrameStream>,
@@ -45,7 +66,10 @@ pub struct GigeCamera {
     chunk: Option<&'static str>,
     resent: u64,
     heard: Instant,
-    order: Order,
+    order: InOrder,
+    numbers: Numbers,
+    /// What it was set to when it began to send: one that lost its power comes back without.
+    kept: Vec<(&'static str, String)>,
 }
 
 fn said(what: &str, e: &GenicamError) -> Fault {
@@ -63,6 +87,10 @@ fn said(what: &str, e: &GenicamError) -> Fault {
         .next("see what it answers: sheetlight camera show")
 }
 
+fn serial(device: &DeviceInfo) -> String {
+    device.serial.clone().filter(|s| !s.is_empty()).unwrap_or_else(|| device.ip.to_string())
+}
+
 impl GigeCamera {
     /// Takes control of the camera; it sends nothing yet. `packet`: bytes of a packet; none: as large as the network carries.
     ///
@@ -75,6 +103,7 @@ impl GigeCamera {
         let packet = packet.or(device.ip.is_loopback().then_some(USUAL_PACKET));
         let mut camera = GigeCamera {
             word: word.into(),
+            serial: serial(&device),
             packet,
             camera,
             stream: None,
@@ -86,7 +115,9 @@ impl GigeCamera {
             chunk: None,
             resent: 0,
             heard: Instant::now(),
-            order: Order::default(),
+            order: InOrder::default(),
+            numbers: Numbers::default(),
+            kept: Vec::new(),
         };
         camera.look()?;
         Ok(camera)
@@ -117,6 +148,9 @@ impl GigeCamera {
     /// Has the camera send.
     fn start(&mut self) -> Result<()> {
         let at = format!("gige://{}", self.word);
+        if self.kept.is_empty() {
+            self.kept = self.settings();
+        }
         let options = StreamOptions::new();
         let options = match self.packet {
             Some(size) => options.packet_size(size),
@@ -126,7 +160,7 @@ impl GigeCamera {
         stream.set_deliver_incomplete(true);
         self.camera.acquisition_start().map_err(|e| said(&at, &e))?;
         self.stream = Some(stream);
-        self.order = Order::default();
+        (self.order, self.numbers) = Default::default();
         self.heard = Instant::now();
         Ok(())
     }
@@ -143,17 +177,23 @@ impl GigeCamera {
     }
 
     fn taken(&mut self, frame: viva_genicam::Frame) -> Event {
+        let host_ns = now_ns();
         self.heard = Instant::now();
-        let (id, host_ns) = (frame.block_id, now_ns());
+        let Some(id) = self.numbers.on_from(frame.block_id) else {
+            return self.gone(&format!("its count began anew, at {}: it was reset", frame.block_id));
+        };
         if !frame.is_complete() {
             return Event::Incomplete { id, why: format!("{:?}", frame.status) };
         }
         let count = self.chunk_count(&frame);
+        let device_ns = frame.ts_dev.map(|t| self.ns(t));
         let format = frame.pixel_format.name().unwrap_or(&self.pixel_format).to_owned();
-        let image = unpack(&format, frame.width, frame.height, usize::from(frame.padding_x), &frame.payload);
+        let viva_genicam::Frame { payload, raw_payload, width, height, padding_x, .. } = frame;
+        // Of the two that share the bytes one goes, so that the other can be had without a copy.
+        drop(raw_payload);
+        let image = unpack(&format, width, height, usize::from(padding_x), payload.into());
         match image {
             Ok(image) if Format::of(&image) == self.format => {
-                let device_ns = frame.ts_dev.map(|t| self.ns(t));
                 let exposure_ns = self.exposure_ns;
                 Event::Picture(Box::new(Picture { image, id, device_ns, host_ns, exposure_ns, count, stand: None }))
             }
@@ -163,34 +203,13 @@ impl GigeCamera {
             Err(fault) => Event::Incomplete { id, why: fault.what },
         }
     }
-}
 
-/// A picture that waits for packets is overtaken by those after it: so many, and so long, are held back for it.
-const OVERTAKING: usize = 12;
-const HELD: Duration = Duration::from_millis(250);
-
-/// Pictures in the order of their numbers again.
-#[derive(Default)]
-struct Order {
-    held: BTreeMap<u64, (Event, Instant)>,
-    next: Option<u64>,
-}
-
-impl Order {
-    fn put(&mut self, id: u64, event: Event) {
-        self.held.insert(id, (event, Instant::now()));
-    }
-
-    /// The next in order; one whose forerunner is missing once that has had its time.
-    fn take(&mut self) -> Option<Event> {
-        let (id, (_, since)) = self.held.first_key_value()?;
-        let id = *id;
-        let due = self.next.is_none_or(|next| id <= next);
-        if !due && self.held.len() <= OVERTAKING && since.elapsed() < HELD {
-            return None;
-        }
-        self.next = Some(self.next.unwrap_or(0).max(id + 1));
-        self.held.remove(&id).map(|(event, _)| event)
+    fn gone(&self, what: &str) -> Event {
+        Event::Lost(
+            Fault::input(format!("gige://{}: {what}", self.word))
+                .cause("its cable or power is out, or another program took it")
+                .next("plug it in; a running command goes on by itself"),
+        )
     }
 }
 
@@ -232,9 +251,15 @@ impl PictureSource for GigeCamera {
 
     fn reopen(&mut self) -> Result<()> {
         self.stream = None;
-        let device = find(&self.word)?;
-        self.camera = blocking::connect(&device).map_err(|e| said(&format!("gige://{}", self.word), &e))?;
+        let (at, device) = (format!("gige://{}", self.word), find(&self.word)?);
+        self.camera = blocking::connect(&device).map_err(|e| said(&at, &e))?;
         let former = self.format;
+        for (name, value) in self.kept.clone() {
+            let is = self.feature(name).and_then(|f| f.value);
+            if is.is_some_and(|v| v.to_string() != value) {
+                self.camera.set(name, &value).map_err(|e| said(&format!("{at}: {name} = {value}"), &e))?;
+            }
+        }
         self.look()?;
         if self.format != former {
             return Err(Fault::input(format!("the camera is {} now, was {former}", self.format)).next("start again"));
@@ -286,6 +311,10 @@ impl PictureSource for GigeCamera {
     fn name(&self) -> String {
         format!("gige://{}", self.word)
     }
+
+    fn device(&self) -> String {
+        format!("gige://{}", self.serial)
+    }
 }
 
 impl GigeCamera {
@@ -299,16 +328,9 @@ impl GigeCamera {
         let stream = self.stream.as_mut().expect("started above");
         let got = stream.next_frame_blocking(within);
         self.resent = stream.stats().resend_recovered;
-        let gone = |what: String| {
-            Event::Lost(
-                Fault::input(what)
-                    .cause("its cable or power is out, or another program took it")
-                    .next("plug it in; a running command goes on by itself"),
-            )
-        };
         match got {
             Ok(Some(frame)) => self.taken(frame),
-            Ok(None) => gone(format!("gige://{}: the stream ended", self.word)),
+            Ok(None) => self.gone("the stream ended"),
             Err(GenicamError::Timeout(_)) => {
                 if self.heard.elapsed() < SILENCE {
                     return Event::Quiet;
@@ -319,12 +341,22 @@ impl GigeCamera {
                 self.camera.invalidate("Width");
                 match self.camera.get_integer("Width") {
                     Ok(_) if there => Event::Quiet,
-                    Ok(_) => gone(format!("gige://{}: control of the camera was lost", self.word)),
-                    Err(e) => gone(format!("gige://{}: does not answer: {e}", self.word)),
+                    Ok(_) => self.gone("control of the camera was lost"),
+                    Err(e) => self.gone(&format!("does not answer: {e}")),
                 }
             }
-            Err(e) => gone(format!("gige://{}: {e}", self.word)),
+            Err(e) => self.gone(&e.to_string()),
         }
+    }
+
+    /// What it is set to, of all that pictures depend on.
+    fn settings(&mut self) -> Vec<(&'static str, String)> {
+        let kept = |name: &&'static str| {
+            let own = self.own_name(name);
+            let feature = self.feature(own)?;
+            Some((own, feature.value.filter(|_| feature.writable)?.to_string()))
+        };
+        SETTINGS.iter().filter_map(kept).collect()
     }
 
     /// What this camera calls a standard feature: cameras from before the standard's second version have names of their own.
@@ -363,24 +395,5 @@ impl Drop for GigeCamera {
         if self.stream.take().is_some() {
             let _ = self.camera.acquisition_stop();
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn pictures_that_were_overtaken_come_in_order() {
-        let mut order = Order::default();
-        let mut out = Vec::new();
-        for id in [1, 2, 4, 5, 3, 6].into_iter().chain(8..=20) {
-            order.put(id, Event::Incomplete { id, why: String::new() });
-            while let Some(Event::Incomplete { id, .. }) = order.take() {
-                out.push(id);
-            }
-        }
-        // 7 never came: its followers wait until they are too many.
-        assert_eq!(out, (1..=20).filter(|id| *id != 7).collect::<Vec<u64>>());
     }
 }

@@ -3,6 +3,7 @@
 
 mod camera;
 mod find;
+mod order;
 mod pixels;
 
 pub use camera::GigeCamera;

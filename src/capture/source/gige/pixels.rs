@@ -46,11 +46,11 @@ pub fn depth(format: &str) -> Result<u8> {
     })
 }
 
-/// The picture. `padding`: bytes after each row.
+/// The picture; a byte a level without padding is taken over as it is. `padding`: bytes after each row.
 ///
 /// # Errors
 /// A format that is not grey; fewer bytes than it has; a level above its depth.
-pub fn unpack(format: &str, width: u32, height: u32, padding: usize, bytes: &[u8]) -> Result<Image> {
+pub fn unpack(format: &str, width: u32, height: u32, padding: usize, mut bytes: Vec<u8>) -> Result<Image> {
     let bits = depth(format)?;
     let (_, layout) = layout(format).expect("it has a depth");
     let (w, h) = (width as usize, height as usize);
@@ -75,10 +75,13 @@ pub fn unpack(format: &str, width: u32, height: u32, padding: usize, bytes: &[u8
         .cause("the camera's size or format was changed while it runs")
         .next("stop, set the camera, start again"));
     }
+    if layout == Layout::Byte && padding == 0 {
+        bytes.truncate(whole);
+        return Ok(Image::from_u8(width, height, bytes));
+    }
     let rows = |y: usize| &bytes[y * (row + padding)..][..row];
     if layout == Layout::Byte {
-        let pixels = if padding == 0 { bytes[..w * h].to_vec() } else { (0..h).flat_map(rows).copied().collect() };
-        return Ok(Image::from_u8(width, height, pixels));
+        return Ok(Image::from_u8(width, height, (0..h).flat_map(rows).copied().collect()));
     }
     let level = |bytes: &[u8], x: usize| match layout {
         Layout::Word => u16::from_le_bytes([bytes[2 * x], bytes[2 * x + 1]]),
@@ -96,7 +99,7 @@ pub fn unpack(format: &str, width: u32, height: u32, padding: usize, bytes: &[u8
         }
     };
     let levels: Vec<u16> = if dense {
-        (0..w * h).map(|i| level(bytes, i)).collect()
+        (0..w * h).map(|i| level(&bytes, i)).collect()
     } else {
         (0..h).flat_map(|y| (0..w).map(move |x| (y, x))).map(|(y, x)| level(rows(y), x)).collect()
     };
@@ -117,10 +120,11 @@ mod tests {
     #[test]
     fn each_grey_format_is_read_as_the_standard_lays_it() {
         let want = [0x123u16, 0xabc, 0x7ff, 0x001];
-        let levels = |format: &str, bytes: &[u8], padding| match unpack(format, 2, 2, padding, bytes).unwrap().pixels {
-            Pixels::U16(levels) => levels,
-            Pixels::U8(levels) => levels.into_iter().map(u16::from).collect(),
-        };
+        let levels =
+            |format: &str, bytes: &[u8], padding| match unpack(format, 2, 2, padding, bytes.to_vec()).unwrap().pixels {
+                Pixels::U16(levels) => levels,
+                Pixels::U8(levels) => levels.into_iter().map(u16::from).collect(),
+            };
         assert_eq!(levels("Mono8", &[1, 2, 0, 3, 4, 0], 1), [1, 2, 3, 4]);
         let words: Vec<u8> = want.iter().flat_map(|l| l.to_le_bytes()).collect();
         assert_eq!(levels("Mono12", &words, 0), want);
@@ -129,8 +133,8 @@ mod tests {
         // 0x3ff, 0, 0x155, 0x2aa: ten bits each, the lowest first.
         assert_eq!(levels("Mono10p", &[0xff, 0x03, 0x50, 0x95, 0xaa], 0), [0x3ff, 0, 0x155, 0x2aa]);
         assert_eq!(levels("Mono10Packed", &[0xff, 0x03, 0x00, 0x55, 0x21, 0xaa], 0), [0x3ff, 0, 0x155, 0x2aa]);
-        assert!(unpack("Mono12", 2, 2, 0, &[0xff; 8]).unwrap_err().what.contains("4095"));
-        assert!(unpack("Mono8", 2, 2, 0, &[0; 3]).unwrap_err().what.contains("has 4"));
+        assert!(unpack("Mono12", 2, 2, 0, vec![0xff; 8]).unwrap_err().what.contains("4095"));
+        assert!(unpack("Mono8", 2, 2, 0, vec![0; 3]).unwrap_err().what.contains("has 4"));
         assert!(depth("BayerRG8").unwrap_err().next.contains("Mono8"));
     }
 }

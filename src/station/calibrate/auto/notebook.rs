@@ -128,6 +128,7 @@ impl Notebook {
             pose_file: Some("poses".into()),
             pose_files: Default::default(),
             frames_file: None,
+            sources: None,
             part: None,
             model: None,
             target: None,

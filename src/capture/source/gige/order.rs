@@ -1,0 +1,104 @@
+//! In: a camera's pictures with the numbers that came over the wire, in any order. Out: the same in order, numbered on where 16 bits end.
+//! Frame and unit: pictures.
+
+use crate::capture::picture::Event;
+use std::collections::BTreeMap;
+use std::time::{Duration, Instant};
+
+/// A picture that waits for packets is overtaken by those after it: so many, and so long, are held back for it.
+const OVERTAKING: usize = 12;
+const HELD: Duration = Duration::from_millis(250);
+
+/// Pictures in the order of their numbers again.
+#[derive(Default)]
+pub(super) struct InOrder {
+    held: BTreeMap<u64, (Event, Instant)>,
+    next: Option<u64>,
+}
+
+impl InOrder {
+    pub fn put(&mut self, id: u64, event: Event) {
+        self.held.insert(id, (event, Instant::now()));
+    }
+
+    /// The next in order; one whose forerunner is missing once that has had its time.
+    pub fn take(&mut self) -> Option<Event> {
+        let (id, (_, since)) = self.held.first_key_value()?;
+        let id = *id;
+        let due = self.next.is_none_or(|next| id <= next);
+        if !due && self.held.len() <= OVERTAKING && since.elapsed() < HELD {
+            return None;
+        }
+        self.next = Some(self.next.unwrap_or(0).max(id + 1));
+        self.held.remove(&id).map(|(event, _)| event)
+    }
+}
+
+/// Numbers of 16 bits go from 65535 on to 1: the standard leaves 0 out, some cameras do not.
+const CYCLE: u64 = 65_535;
+/// Nothing is overtaken by more: a number farther back is of a count that began anew.
+const FARTHEST: u64 = 16;
+
+/// Numbers that go on where those on the wire begin anew after 16 bits.
+#[derive(Default)]
+pub(super) struct Numbers {
+    newest: Option<u64>,
+    turns: u64,
+}
+
+impl Numbers {
+    /// The number of a picture; `None` where the camera's count began anew: it was reset.
+    pub fn on_from(&mut self, raw: u64) -> Option<u64> {
+        let Some(newest) = self.newest else {
+            self.newest = Some(raw);
+            return Some(raw);
+        };
+        // Wider numbers than 16 bits go on by themselves.
+        let wide = self.turns == 0 && newest.max(raw) > CYCLE;
+        let turned = |turns: u64| raw + turns * CYCLE;
+        let near = |id: &u64| (*id + FARTHEST > newest) && (wide || *id < newest + CYCLE / 2);
+        let candidates = [turned(self.turns), turned(self.turns + 1), turned(self.turns.saturating_sub(1))];
+        let found = candidates.into_iter().take(if wide { 1 } else { 3 }).find(near)?;
+        if found > newest {
+            (self.newest, self.turns) = (Some(found), (found - raw) / CYCLE);
+        }
+        Some(found)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_that_were_overtaken_come_in_order() {
+        let mut order = InOrder::default();
+        let mut out = Vec::new();
+        for id in [1, 2, 4, 5, 3, 6].into_iter().chain(8..=20) {
+            order.put(id, Event::Incomplete { id, why: String::new() });
+            while let Some(Event::Incomplete { id, .. }) = order.take() {
+                out.push(id);
+            }
+        }
+        // 7 never came: its followers wait until they are too many.
+        assert_eq!(out, (1..=20).filter(|id| *id != 7).collect::<Vec<u64>>());
+    }
+
+    #[test]
+    fn numbers_go_on_after_sixteen_bits_and_a_reset_is_seen() {
+        let all = |raw: &[u64]| {
+            let mut numbers = Numbers::default();
+            raw.iter().map(|r| numbers.on_from(*r)).collect::<Vec<_>>()
+        };
+        assert_eq!(all(&[65_534, 65_535, 1, 65_533, 2, 5]), [65_534, 65_535, 65_536, 65_533, 65_537, 65_540].map(Some));
+        // Three times round, a picture in twenty thousand.
+        let mut numbers = Numbers::default();
+        for id in (1..4 * CYCLE).step_by(20_000) {
+            assert_eq!(numbers.on_from((id - 1) % CYCLE + 1), Some(id));
+        }
+        // 64 bits: nothing to go round.
+        assert_eq!(all(&[65_535, 65_536, 200_000, 199_999]), [65_535, 65_536, 200_000, 199_999].map(Some));
+        assert_eq!(all(&[5000, 1]), [Some(5000), None]);
+        assert_eq!(all(&[3, 1, 4]), [3, 1, 4].map(Some));
+    }
+}

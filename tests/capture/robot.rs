@@ -1,0 +1,204 @@
+//! In: a simulated cell's robot and camera on their wires, the arm moving and resting, passing a part to and fro. Out: whether pictures that
+//! were taken while it moved are refused and those at rest paired with where it stood; the delay between camera and controller found.
+//! Frame and unit: base frame, mm; s of the cell.
+
+use super::{json, text};
+use crate::common::{sheetlight, sheetlight_fails};
+use sheetlight::bcap::{Call, Client, ClientOptions, Handle, Network, Variant};
+use sheetlight::cell::{Cell, CellOptions, Served};
+use sheetlight::recording::Recording;
+use sheetlight::simulate::{RigSpec, SceneSpec};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// A cell in real time with a small camera, lasers on, motor on.
+fn cell(change: impl FnOnce(&mut CellOptions)) -> Served {
+    let mut rig = RigSpec::paper();
+    (rig.camera.width_px, rig.camera.height_px, rig.camera.pixel_um) = (320, 240, 2.0 * rig.camera.pixel_um);
+    let scene = SceneSpec::parse(SCENE).unwrap();
+    let mut options = CellOptions { rig, ..CellOptions::of(scene, 5) };
+    change(&mut options);
+    let served = Served::here(Cell::new(options).unwrap()).unwrap();
+    served.controller.set_motor(true);
+    let mut arm = sheetlight::arm::open(&served.robot_uri()).unwrap();
+    arm.put_output(served.cell.options().outputs.line, true).unwrap();
+    served
+}
+
+/// A plate with wedges all over, slanted each way.
+const SCENE: &str = "name = 'wedges'\nregion_mm = [-30, -9, 30, 9]\n\
+    [[solid]]\nshape = { block = { size_mm = [120, 60, 5] } }\nat_mm = [0, 0, 0]\n\
+    [[solid]]\nshape = { wedge = { size_mm = [14, 14, 9], drop_mm = 7 } }\nat_mm = [-20, 0, 7]\nturn_deg = 70\n\
+    [[solid]]\nshape = { wedge = { size_mm = [14, 14, 9], drop_mm = 7 } }\nat_mm = [0, 0, 7]\nturn_deg = 250\n\
+    [[solid]]\nshape = { wedge = { size_mm = [14, 14, 9], drop_mm = 7 } }\nat_mm = [20, 0, 7]\nturn_deg = 110\n";
+
+/// A second client that moves the arm.
+struct Mover(Client, Handle, [f64; 6]);
+
+impl Mover {
+    fn new(served: &Served) -> Mover {
+        let options =
+            ClientOptions { network: Network::Tcp, patience: Duration::from_secs(30), ..ClientOptions::default() };
+        let mut client = Client::connect(&served.robot.to_string(), options).unwrap();
+        let controller = client.controller().unwrap();
+        let robot = client.robot(controller).unwrap();
+        client.execute(robot, "TakeArm", Variant::I32s(vec![0, 0])).unwrap();
+        client.execute(robot, "Motor", Variant::I32s(vec![1, 0])).unwrap();
+        let stands = client.execute(robot, "CurPos", Variant::Empty).unwrap();
+        let at = stands.as_f64s().unwrap();
+        Mover(client, robot, std::array::from_fn(|k| at[k]))
+    }
+
+    /// Straight on by so much along x from where it began; comes back when it is there.
+    fn to(&mut self, dx: f64, speed_percent: f64) {
+        let [x, y, z, rx, ry, rz] = self.2;
+        let pose = Variant::F64s(vec![x + dx, y, z, rx, ry, rz, -1.0]);
+        let word = |s: &str| Variant::Text(s.into());
+        let goal = Variant::Variants(vec![pose, word("P"), word("@E")]);
+        let arguments = vec![self.1.into(), Variant::I32(2), goal, Variant::Text(format!("SPEED={speed_percent}"))];
+        self.0.call(Call::RobotMove, arguments).unwrap().unwrap();
+    }
+}
+
+fn spawn(args: &[&str]) -> Child {
+    let program = env!("CARGO_BIN_EXE_sheetlight");
+    Command::new(program).args(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
+fn recorded(child: Child) -> serde_json::Value {
+    let done = child.wait_with_output().unwrap();
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    serde_json::from_slice(&done.stdout).unwrap()
+}
+
+#[test]
+fn pictures_of_a_robot_that_moved_are_refused_and_those_at_rest_are_paired() {
+    let served = cell(|_| {});
+    let dir = tempfile::tempdir().unwrap();
+    let (out, camera, robot) =
+        (dir.path().join("step"), format!("cell://{}?rate=20", served.camera), served.robot_uri());
+    let to = text(&out);
+    let record = spawn(&[
+        "record",
+        "--camera",
+        &camera,
+        "--pair",
+        "step",
+        "--pose-stream",
+        &robot,
+        "--seconds",
+        "6",
+        "--out",
+        &to,
+        "--json",
+    ]);
+    let (mut mover, begun) = (Mover::new(&served), Instant::now());
+    // Half a second's rest, a way at 20 mm/s or so, and back.
+    let mut side = 0.0;
+    while begun.elapsed() < Duration::from_secs_f64(6.5) {
+        std::thread::sleep(Duration::from_millis(600));
+        side = 15.0 - side;
+        mover.to(side, 2.0);
+    }
+    let report = recorded(record);
+    let (account, left) = (&report["account"], report["left_out"].as_array().unwrap());
+    let recording = Recording::open(&out).unwrap();
+    let poses = recording.poses(None).unwrap();
+    let taken: Vec<_> = recording.meta.frames.iter().map(|f| f.taken.as_ref().unwrap()).collect();
+    // When each number was exposed: evenly spaced by the cell's own clock.
+    let first = taken[0];
+    let moment = |id: u64| (first.device_ns.unwrap() as f64 * 1e-9 + 0.5e-3) + (id as f64 - first.id as f64) / 20.0;
+    let way = |a: f64, b: f64| (served.cell.true_flange(a).translation - served.cell.true_flange(b).translation).norm();
+    let (mut farthest, mut off): (f64, f64) = (0.0, 0.0);
+    for (t, pose) in taken.iter().zip(&poses) {
+        let at = moment(t.id);
+        farthest = farthest.max(way(at - 0.5e-3, at + 0.5e-3));
+        off = off.max((served.cell.true_flange(at).translation - pose.translation).norm());
+    }
+    // Those that were refused though nothing moved for a tenth of a second around them.
+    let moved: Vec<u64> = left
+        .iter()
+        .filter(|l| l["why"].as_str().unwrap().contains("moved by"))
+        .map(|l| l["id"].as_u64().unwrap())
+        .collect();
+    let still = |id: &&u64| way(moment(**id) - 0.1, moment(**id) + 0.05) < 1e-3;
+    let wrongly = moved.iter().filter(still).count();
+    println!(
+        "step: {account}; {} at rest, at most {farthest:.4} mm on the way in an exposure, {off:.3} mm from the pose; {} refused as moved, {wrongly} of them at rest",
+        taken.len(),
+        moved.len()
+    );
+    assert!(taken.len() >= 8 && moved.len() >= 8, "{account}");
+    assert!(farthest < 0.002, "a picture of an arm on its way: {farthest} mm in a millisecond");
+    // The arm's repeatability is 0.02 mm an axis.
+    assert!(off < 0.1, "{off}");
+    assert!(wrongly * 10 <= moved.len(), "{wrongly} of {}", moved.len());
+    assert!(poses.iter().any(|p| (p.translation.x - mover.2[0] - 15.0).abs() < 0.01), "it stood at both ends");
+}
+
+#[test]
+fn a_delay_between_camera_and_controller_is_found_and_belongs_to_both() {
+    let long = std::env::var("SHEETLIGHT_LONG").is_ok();
+    let delay = 6.3;
+    let served = cell(|o| o.camera_delay_ms = delay);
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| text(&dir.path().join(name));
+    let station = dir.path().join("station");
+    std::fs::create_dir(&station).unwrap();
+    served.cell.station().store(&station).unwrap();
+    let (camera, robot) = (format!("cell://{}?rate=25", served.camera), served.robot_uri());
+    let mut mover = Mover::new(&served);
+    mover.to(-35.0, 5.0);
+    let (seconds, passed) = (if long { "30" } else { "9" }, at("passed"));
+    let record = spawn(&[
+        "record",
+        "--camera",
+        &camera,
+        "--pair",
+        "clock",
+        "--pose-stream",
+        &robot,
+        "--seconds",
+        seconds,
+        "--out",
+        &passed,
+        "--json",
+    ]);
+    let begun = Instant::now();
+    let mut side = -35.0;
+    while begun.elapsed().as_secs_f64() < seconds.parse::<f64>().unwrap() + 0.5 {
+        side = -side;
+        mover.to(side, 5.0);
+    }
+    let report = recorded(record);
+    let found = sheetlight(&["calibrate", "latency", &passed, "--station", &text(&station), "--on", "cpu", "--json"]);
+    let found: serde_json::Value = serde_json::from_str(&found).unwrap();
+    let is = |key: &str| found["latency"][key].as_f64().unwrap();
+    println!(
+        "a delay of {delay} ms in the cell: {:.3} ms, sigma {:.3} ms, speeds {}; {} shots, {}",
+        is("delay_ms"),
+        is("sigma_ms"),
+        found["beyond"]["speeds"],
+        report["shots"],
+        report["account"]
+    );
+    assert!((is("delay_ms") - delay).abs() < 0.2, "{found}");
+    // It is this camera's against this robot's, and sealed.
+    let file = station.join("calibration/latency.json");
+    let stored = json(&file);
+    assert_eq!(stored["sources"]["camera"], format!("cell://{}", served.camera));
+    assert_eq!(stored["sources"]["poses"], served.robot_uri());
+    let scan = |from: &str, out: &str| {
+        sheetlight_fails(&["scan", from, "--station", &text(&station), "--out", out, "--on", "cpu"]).1
+    };
+    let meta = std::fs::read_to_string(dir.path().join("passed/meta.json")).unwrap();
+    let other = meta.replace(&served.robot.port().to_string(), "5007");
+    std::fs::write(dir.path().join("passed/meta.json"), other).unwrap();
+    let said = scan(&passed, &at("s1"));
+    assert!(said.contains("latency is of cell://") && said.contains("calibrate latency"), "{said}");
+    std::fs::write(dir.path().join("passed/meta.json"), meta).unwrap();
+    let edited = std::fs::read_to_string(&file).unwrap().replace("\"delay_ms\": 6.", "\"delay_ms\": 5.");
+    std::fs::write(&file, edited).unwrap();
+    let said = scan(&passed, &at("s2"));
+    assert!(said.contains("was changed after it was made") && said.contains("calibrate latency"), "{said}");
+}
