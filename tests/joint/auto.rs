@@ -30,9 +30,6 @@ struct Simulated {
     pictures: u64,
     /// After so many moves the board is pushed, by 4 mm.
     pushed_after: usize,
-    /// Moves that end farther than this along the base's x are not begun, mm; those that were asked for.
-    refuses_mm: f64,
-    refused: Vec<Rigid<Base, Flange>>,
 }
 
 impl Simulated {
@@ -50,20 +47,7 @@ impl Simulated {
         let seen: Rigid<Camera, Board> = Rigid::new(tilt, ray * (z / ray.z) - tilt * middle);
         let home = cell.robot(&seen);
         let (pose, box_mm) = (home, 2.2 * z);
-        Simulated {
-            cell,
-            scene,
-            pose,
-            home,
-            noise,
-            rng,
-            box_mm,
-            moves: vec![],
-            pictures: 0,
-            pushed_after: usize::MAX,
-            refuses_mm: f64::MAX,
-            refused: vec![],
-        }
+        Simulated { cell, scene, pose, home, noise, rng, box_mm, moves: vec![], pictures: 0, pushed_after: usize::MAX }
     }
 
     fn inside(&self, to: &Rigid<Base, Flange>) -> bool {
@@ -81,10 +65,6 @@ impl Drives for Simulated {
     }
     fn go(&mut self, to: &Rigid<Base, Flange>) -> Result<Went> {
         assert!(self.inside(to), "a move out of the box");
-        if to.translation.x - self.home.translation.x > self.refuses_mm {
-            self.refused.push(*to);
-            return Ok(Went::NotBegun("the figure cannot be kept".into()));
-        }
         self.moves.push(*to);
         if self.moves.len() == self.pushed_after {
             self.cell.base_from_board.translation += Vec3::new(4.0, 1.0, 0.0);
@@ -149,8 +129,6 @@ fn a_cell_calibrates_itself() {
     let mut all = Vec::new();
     for seed in seeds(1) {
         let mut cell = Simulated::new("paper", seed, size, [0.02, 0.004]);
-        // A controller that does not go everywhere that is within reach.
-        cell.refuses_mm = 0.12 * cell.box_mm / 2.2;
         let (result, off) = run(&mut cell, target, &Rig::default()).unwrap_or_else(|e| panic!("{e}"));
         let expected = result.joint.expected_mm();
         println!(
@@ -160,15 +138,6 @@ fn a_cell_calibrates_itself() {
             result.check,
             result.joint.quality.reasons.join("\n  ")
         );
-        let near = |a: &Rigid<Base, Flange>, b: &Rigid<Base, Flange>| {
-            let (angle, mm) = a.difference(b);
-            mm < 20.0 && angle < 0.15
-        };
-        let again = (0..cell.refused.len()).any(|i| (0..i).any(|k| near(&cell.refused[i], &cell.refused[k])));
-        println!("  {} moves were not begun", cell.refused.len());
-        assert!(!cell.refused.is_empty() && !again, "{} refusals", cell.refused.len());
-        let back = cell.pose.difference(&cell.home);
-        assert!(back.1 < 1e-9, "it ends {} mm from where it began", back.1);
         assert!(cell.moves.len() <= 60 && result.stops + 5 <= 40, "{} moves", cell.moves.len());
         let check = result.check.expect("five more poses");
         assert!(check.stops == 5 && check.off_mm < 2.0 * check.expected_mm, "{check:?}");
