@@ -2,7 +2,7 @@
 
 export type Mode = "live" | "replay" | "simulated";
 
-export type RobotState = "no_link" | "read_only" | "moving";
+export type RobotState = "no_link" | "read_only" | "armed" | "moving";
 
 export type Frames = { 
 /**
@@ -51,6 +51,10 @@ mode: Mode,
  * Name of the station.
  */
 station: string, 
+/**
+ * A camera was named.
+ */
+camera: boolean, 
 /**
  * What the robot may do.
  */
@@ -214,7 +218,45 @@ recording: string,
  */
 leave_out: Array<number>, };
 
-export type Order = { "procedure": "check" } & Plain | { "procedure": "scan" } & ScanOrder | { "procedure": "find" } & FindOrder | { "procedure": "teach" } & TeachOrder | { "procedure": "touch" } & TouchOrder | { "procedure": "calibrate" } & CalibrateOrder | { "procedure": "benchmark" } & Plain;
+export type JointOrder = { 
+/**
+ * Recordings of boards.
+ */
+recordings: Array<string>, };
+
+export type AutoOrder = { 
+/**
+ * Name of the board's description in the station's folder boards.
+ */
+board: string, 
+/**
+ * Expected error of a scanned point at which it is enough, mm rms.
+ */
+target_mm: number, 
+/**
+ * Stops at most, 20 to 200; null: 40.
+ */
+most?: number | null, };
+
+export type InsertOrder = { 
+/**
+ * Name of the recipe.
+ */
+recipe: string, 
+/**
+ * The line sweeps over so much about the picture's middle, mm; null: the field's short side.
+ */
+sweep_mm?: number | null, 
+/**
+ * Speed of every motion, mm/s; null: the station's.
+ */
+speed_mm_s?: number | null, 
+/**
+ * Where it was cut off it goes back up instead of on.
+ */
+back_out: boolean, };
+
+export type Order = { "procedure": "check" } & Plain | { "procedure": "scan" } & ScanOrder | { "procedure": "find" } & FindOrder | { "procedure": "teach" } & TeachOrder | { "procedure": "touch" } & TouchOrder | { "procedure": "calibrate" } & CalibrateOrder | { "procedure": "joint" } & JointOrder | { "procedure": "auto" } & AutoOrder | { "procedure": "insert" } & InsertOrder | { "procedure": "benchmark" } & Plain;
 
 export type CheckLine = { 
 /**
@@ -540,6 +582,28 @@ left_out: Array<[string, string]>,
  */
 accepted: boolean, };
 
+export type Inserted = { 
+/**
+ * From the beginning to the confirmed position, s.
+ */
+time_to_position_s: number | null, 
+/**
+ * Motions that were confirmed until then.
+ */
+confirmations_to_position: number | null, 
+/**
+ * Work and waits, s.
+ */
+seconds: number, 
+/**
+ * Motions that were confirmed.
+ */
+confirmations: number, 
+/**
+ * Where the part was found; null where it was found before the program was started again.
+ */
+found: Position | null, };
+
 export type BenchRow = { 
 /**
  * What it ran on.
@@ -570,7 +634,7 @@ recipe: string,
 /**
  * Found on its own scan.
  */
-proof: Position, } | { "procedure": "touch" } & Touched | { "procedure": "calibrate" } & CalibrationFigures | { "procedure": "benchmark", 
+proof: Position, } | { "procedure": "touch" } & Touched | { "procedure": "calibrate" } & CalibrationFigures | { "procedure": "joint" } & CalibrationFigures | { "procedure": "auto" } & CalibrationFigures | { "procedure": "insert" } & Inserted | { "procedure": "benchmark", 
 /**
  * One a size and processor.
  */
@@ -622,6 +686,132 @@ outcome: Outcome | null,
  */
 resumable: boolean, };
 
+export type Asked = { 
+/**
+ * The job that asks.
+ */
+job: string, 
+/**
+ * One or two words: touch, scan, approach, insert, retract, calibrate.
+ */
+step: string, 
+/**
+ * What was found, a sentence a line.
+ */
+says: Array<string>, 
+/**
+ * The question.
+ */
+question: string, 
+/**
+ * Names this motion and no other: poses, speed, reason and number.
+ */
+hash: string, 
+/**
+ * What it has to keep, all of it kept.
+ */
+gates: Array<GateLight>, 
+/**
+ * Motions that are confirmed as one.
+ */
+motions: number, 
+/**
+ * The fastest of them, mm/s.
+ */
+speed_mm_s: number, 
+/**
+ * How the flange's pose is written.
+ */
+convention: string, 
+/**
+ * One a number, with its unit.
+ */
+labels: Array<string>, 
+/**
+ * Where the flange ends.
+ */
+numbers: Array<number>, 
+/**
+ * The button may stay down from the motion before to this one.
+ */
+stays_down: boolean, 
+/**
+ * It has to be confirmed within so long after it was shown, s.
+ */
+within_s: number, };
+
+export type SimulatedCell = { 
+/**
+ * Parts whose component the gripper can hold.
+ */
+parts: Array<string>, 
+/**
+ * Whose it holds.
+ */
+holds: string, 
+/**
+ * The arm stands over the part, or over the calibration board.
+ */
+over_board: boolean, };
+
+export type MotionState = { 
+/**
+ * A robot was named.
+ */
+robot: boolean, 
+/**
+ * The program was started with leave to move it.
+ */
+may_move: boolean, 
+/**
+ * A short name of the tab that armed it; null: it is not armed.
+ */
+armed: string | null, 
+/**
+ * A confirmed motion is under way.
+ */
+moving: boolean, 
+/**
+ * Why somebody has to look at the robot first; null: nobody has to.
+ */
+look: string | null, 
+/**
+ * The job that moves it, or the last one that did.
+ */
+job: string | null, 
+/**
+ * What waits for a person.
+ */
+asked: Asked | null, 
+/**
+ * What the job said so far.
+ */
+said: Array<string>, 
+/**
+ * Of a calibration: stops so far, expected error then, mm.
+ */
+expected: Array<[number, number]>, 
+/**
+ * Null: the robot is none of ours.
+ */
+simulated: SimulatedCell | null, };
+
+export type Arming = { 
+/**
+ * False: gives it back.
+ */
+armed: boolean, };
+
+export type InTheCell = { 
+/**
+ * Puts the component that belongs to this part into the gripper; null: what it holds stays.
+ */
+holds?: string | null, 
+/**
+ * Jogs the arm over the calibration board, else over the part.
+ */
+over_board: boolean, };
+
 export type Event = { "event": "state", "data": { 
 /**
  * The bar.
@@ -630,7 +820,11 @@ bar: Bar,
 /**
  * Newest first, at most 200.
  */
-jobs: Array<Job>, } } | { "event": "bar", "data": Bar } | { "event": "job", "data": Job } | { "event": "gone", "data": string };
+jobs: Array<Job>, 
+/**
+ * The robot as it may be moved from here.
+ */
+motion: MotionState, } } | { "event": "bar", "data": Bar } | { "event": "job", "data": Job } | { "event": "motion", "data": MotionState } | { "event": "gone", "data": string };
 
 export type Knock = { 
 /**
@@ -654,19 +848,13 @@ export type TakeLease = {
  */
 firmly: boolean, };
 
-export type Goal = "approach" | "insertion" | "retract";
-
 export type Confirmed = { 
 /**
- * The job that found the pose.
+ * The job that asks.
  */
 job: string, 
 /**
- * Which pose.
- */
-goal: Goal, 
-/**
- * `hash` of the poses that were shown.
+ * `hash` of the motion that was shown.
  */
 hash: string, };
 
@@ -787,6 +975,28 @@ motion: string,
  * Why it cannot be used; null: it can.
  */
 problem: Problem | null, };
+
+export type BoardView = { 
+/**
+ * What it is called.
+ */
+name: string, 
+/**
+ * Its file, in the job.
+ */
+file: string, 
+/**
+ * Columns, px.
+ */
+width: number, 
+/**
+ * Rows, px.
+ */
+height: number, 
+/**
+ * The corners that were found, u and v, px.
+ */
+corners: Array<[number, number]>, };
 
 export type PictureRef = { 
 /**

@@ -6,16 +6,28 @@ mod common;
 
 #[path = "cell/cold.rs"]
 mod cold;
+#[path = "cell/faults.rs"]
+mod faults;
 #[path = "cell/golden.rs"]
 mod golden;
+#[path = "cell/guard.rs"]
+mod guard;
 #[path = "cell/job.rs"]
 mod job;
 #[path = "cell/programs.rs"]
 mod programs;
+#[path = "cell/refusals.rs"]
+mod refusals;
 #[path = "cell/rules.rs"]
 mod rules;
+#[path = "cell/socket.rs"]
+mod socket;
 #[path = "cell/wire.rs"]
 mod wire;
+#[path = "cell/workplace.rs"]
+mod workplace;
+#[path = "cell/worlds.rs"]
+mod worlds;
 
 use sheetlight::cell::{Cell, CellOptions, Served};
 use sheetlight::simulate::SceneSpec;

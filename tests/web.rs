@@ -56,7 +56,9 @@ fn python(script: &str, args: &[&str]) -> bool {
         Err(e) => format!("python3: {e}"),
     };
     assert!(std::env::var("CI").as_deref() != Ok("true"), "{script} did not run: {why}");
-    eprintln!("\n*** SKIPPED: {script} needs python3, chromium and chromedriver (tools/browser.sh): {why} ***\n");
+    eprintln!(
+        "\n*** SKIPPED: {script} needs python3, openssl, chromium and chromedriver (tools/browser.sh): {why} ***\n"
+    );
     false
 }
 
@@ -76,6 +78,45 @@ fn an_operator_goes_from_scan_to_position_through_the_pages() {
     let mut args = vec![PROGRAM, folder];
     args.extend(images.to_str().filter(|_| pictures));
     python("tests/web/pages.py", &args);
+}
+
+#[test]
+fn other_machines_need_the_password_and_speak_tls() {
+    let dir = copy();
+    python("tests/web/secured.py", &[PROGRAM, dir.path().to_str().unwrap()]);
+}
+
+/// Whether the long forms run.
+fn long() -> bool {
+    std::env::var_os("SHEETLIGHT_LONG").is_some()
+}
+
+#[test]
+fn components_are_inserted_through_the_pages_in_the_simulated_cell() {
+    let dir = tempfile::tempdir().unwrap();
+    let (folder, images) = (dir.path().to_str().unwrap(), source("docs/images"));
+    // The long form at the cell's own pace, as an operator goes; the short one in a hurry, over a part of the field.
+    let (parts, speed, sweep) = if long() { ("led,osc,flash,dimm", "1", "0") } else { ("osc", "20", "30") };
+    let mut args = vec![PROGRAM, folder, parts, speed, sweep];
+    args.extend(images.to_str().filter(|_| std::env::var_os("SHEETLIGHT_WRITE").is_some()));
+    python("tests/web/insert.py", &args);
+}
+
+#[test]
+fn nothing_moves_that_nobody_holds_the_button_for() {
+    let [dir, second] = [0; 2].map(|_| tempfile::tempdir().unwrap());
+    python("tests/web/motion.py", &[PROGRAM, dir.path().to_str().unwrap(), second.path().to_str().unwrap()]);
+}
+
+#[test]
+fn a_rig_is_calibrated_from_nothing_through_the_pages() {
+    if long() {
+        let dir = tempfile::tempdir().unwrap();
+        let (folder, images) = (dir.path().to_str().unwrap(), source("docs/images"));
+        let mut args = vec![PROGRAM, folder];
+        args.extend(images.to_str().filter(|_| std::env::var_os("SHEETLIGHT_WRITE").is_some()));
+        python("tests/web/calibrate.py", &args);
+    }
 }
 
 #[test]

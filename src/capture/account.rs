@@ -266,7 +266,9 @@ mod tests {
     #[test]
     fn bursts_are_no_rate() {
         let mut ledger = Ledger::default();
-        (0..50u64).for_each(|i| drop(ledger.came(i, 200_000_000.max(i * 25_000_000) + 100_000 * (i % 7))));
+        for i in 0..50u64 {
+            ledger.came(i, 200_000_000.max(i * 25_000_000) + 100_000 * (i % 7));
+        }
         ledger.gone();
         ledger.came(1, 49 * 25_000_000 + 10_000_000_000);
         let missed = ledger.account().missed;

@@ -14,15 +14,26 @@ use crate::raster::Image;
 use crate::simulate::{InScene, Scene, SceneSpec, Station, hot_pixels, part_pose};
 use rand::Rng;
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// The gripper on the flange: beside the sensor, pointing where the flange points, mm.
 const GRIPPER_AT_MM: [f64; 3] = [72.0, 0.0, 160.0];
 /// The calibration board lies so far beside the scene's middle, mm.
 const BOARD_BESIDE_MM: [f64; 3] = [0.0, 170.0, 0.0];
+/// From so many working distances a whole board is in the picture, with the stripe on it.
+const BOARD_FROM: f64 = 1.5;
 /// Greys of a printed board.
 const PRINT: [f64; 2] = [0.85, 0.06];
+
+/// What a person jogs the arm over.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Over {
+    /// A place of the scene: x, y, mm.
+    Place([f64; 2]),
+    /// The calibration board beside it.
+    Board,
+}
 
 /// A cell. Cheap to clone: all clones are one cell.
 #[derive(Clone)]
@@ -39,7 +50,7 @@ struct Inside {
     arm_error: ArmError,
     world: Mutex<World>,
     pictures: AtomicU64,
-    dark: AtomicBool,
+    stuck: Mutex<BTreeMap<u16, bool>>,
 }
 
 impl Cell {
@@ -74,7 +85,7 @@ impl Cell {
             arm_error,
             world: Mutex::new(world),
             pictures: AtomicU64::new(0),
-            dark: AtomicBool::new(false),
+            stuck: Mutex::default(),
             station,
             options,
         })))
@@ -122,8 +133,8 @@ impl Cell {
 
     fn seen(&self, t: f64, station: &Station) -> (Lit, Rigid<InScene, crate::geometry::Camera>) {
         let world = self.world();
-        let dark = self.0.dark.load(Ordering::Relaxed);
-        let on = |number: u16| world.output(number, t) && !dark;
+        let stuck = self.0.stuck.lock().unwrap_or_else(PoisonError::into_inner);
+        let on = |number: u16| stuck.get(&number).copied().unwrap_or_else(|| world.output(number, t));
         let outputs = self.0.options.outputs;
         let lit = Lit { line: on(outputs.line), pointer: on(outputs.pointer), room: on(outputs.room) };
         (lit, world.places().base_from_scene.inverse() * world.true_flange(t) * station.flange_from_camera)
@@ -131,7 +142,19 @@ impl Cell {
 
     /// No laser and no lamp follows its output any more: a fuse is out.
     pub fn set_dark(&self, dark: bool) {
-        self.0.dark.store(dark, Ordering::Relaxed);
+        let outputs = self.0.options.outputs;
+        for number in [outputs.line, outputs.pointer, outputs.room] {
+            self.stick(number, dark.then_some(false));
+        }
+    }
+
+    /// What hangs on an output stays on or off, whatever the output says: a wire is off, a relay is welded. `None`: it follows.
+    pub fn stick(&self, number: u16, at: Option<bool>) {
+        let mut stuck = self.0.stuck.lock().unwrap_or_else(PoisonError::into_inner);
+        match at {
+            Some(on) => stuck.insert(number, on),
+            None => stuck.remove(&number),
+        };
     }
 
     /// What happened so far.
@@ -169,6 +192,44 @@ impl Cell {
         let gripper = self.0.options.outputs.gripper;
         let now = self.0.clock.now();
         self.world().switch(now, gripper, true);
+        Ok(())
+    }
+
+    /// A person moves the arm with the pendant until the sensor looks at a place of the scene, or of the calibration board.
+    ///
+    /// # Errors
+    /// The arm moves, there is no such place, or it is out of reach.
+    pub fn jog(&self, over: Over) -> Result<()> {
+        let t = self.0.clock.now();
+        let mut world = self.world();
+        if world.moving_until(t).is_some() {
+            return Err(Fault::refused("the arm moves").next("wait until it stands, or stop it"));
+        }
+        let base_from_scene = world.places().base_from_scene;
+        let in_scene = match over {
+            Over::Place([x, y]) => Vec3::new(x, y, 0.0),
+            Over::Board if self.0.base_from_board.is_some() => Vec3::from(BOARD_BESIDE_MM),
+            Over::Board => {
+                return Err(Fault::usage("there is no calibration board in this cell").next("start it with one"));
+            }
+        };
+        // Sideways from where the arm stood when the cell was started; over the board also down, until stripe and spot are on it.
+        let start = START_DEG.map(f64::to_radians);
+        let mut flange = world.drawn().forward(&start);
+        let camera = flange * self.0.station.flange_from_camera;
+        let seen = base_from_scene.inverse() * camera;
+        let axis = seen.rotation.column(2).into_owned();
+        let foot = seen.translation - axis * (seen.translation.z / axis.z);
+        flange.translation += base_from_scene.rotation * (in_scene - foot);
+        if over == Over::Board {
+            let depth = -seen.translation.z / axis.z;
+            let down = depth - BOARD_FROM * self.0.station.working_distance;
+            flange.translation += camera.rotation.column(2) * down;
+        }
+        let joints = world.drawn().inverse(&flange, &start).map_err(|_| {
+            Fault::refused("the arm cannot stand there").cause("it lies beyond its reach").next("take another place")
+        })?;
+        world.stand(t, joints);
         Ok(())
     }
 

@@ -20,6 +20,11 @@ pub enum Event {
     },
     /// The motion that was under way has ended.
     Arrived,
+    /// A person moved the arm with the pendant.
+    Jogged {
+        /// Where to.
+        to: Rigid<Base, Flange>,
+    },
     /// Somebody halted it, or an emergency stop did.
     Halt {
         /// Which connection; none where the cell did it.

@@ -16,7 +16,7 @@ mod serve;
 mod trajectory;
 mod world;
 
-pub use cell::Cell;
+pub use cell::{Cell, Over};
 pub use clock::Clock;
 pub use kinematics::{ArmError, Joints, Unreachable, Vs060};
 pub use log::{Entry, Event, Insertion};

@@ -151,6 +151,13 @@ impl World {
         self.log.len()
     }
 
+    /// A person has moved the arm with the pendant; it stands there.
+    pub fn stand(&mut self, t: f64, joints: Joints) {
+        self.segments.clear();
+        self.rest = (joints, [0.0; 6]);
+        self.note(t, Event::Jogged { to: self.drawn.forward(&joints) });
+    }
+
     /// Stops whatever moves; says whether something did.
     pub fn halt(&mut self, t: f64, connection: Option<u64>) -> bool {
         let moving = self.moving_until(t).is_some();

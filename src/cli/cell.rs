@@ -2,15 +2,13 @@
 //! gripper's camera; what happened, judged by its truth.
 //! Frame and unit: base frame, mm, degrees; s of the cell.
 
-use crate::arm::rules::{Limits, Space};
 use crate::cell::{Cell, CellOptions, Event, Served};
 use crate::cli::terminal::console::Console;
 use crate::cli::terminal::interrupt;
 use crate::fault::Result;
 use crate::recording::BoardSpec;
-use crate::robot::Convention;
 use crate::simulate::{DEFAULT_SCENE, RigSpec, SceneSpec};
-use crate::station::{Settings, ToolSpec};
+use crate::web::station_for;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 use std::time::Duration;
@@ -88,9 +86,6 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
     }
 }
 
-/// Where a VS-060 on its own table may work, mm.
-const WORKSPACE: Space = Space { from_mm: [150.0, -350.0, 200.0], to_mm: [650.0, 350.0, 750.0] };
-
 fn simulate(args: &Args, console: &Console) -> Result<()> {
     let scene = match &args.scene {
         Some(path) => SceneSpec::load(path)?,
@@ -113,12 +108,7 @@ fn simulate(args: &Args, console: &Console) -> Result<()> {
     };
     let cell = Cell::new(options)?;
     if let Some(folder) = &args.station {
-        crate::files::make_folder(folder)?;
-        cell.station().store(folder)?;
-        let tool = Some(ToolSpec { flange_from_tool: cell.flange_from_tool() });
-        let motion = Some(Limits::within(WORKSPACE));
-        let name = "simulated cell".into();
-        Settings { name, robot: Some(Convention::Denso), motion, tool, ..Settings::default() }.store(folder)?;
+        station_for(&cell, folder, "simulated cell", None)?;
     }
     let at = |port: u16| format!("127.0.0.1:{port}");
     let gripper_port = if args.camera_port == 0 { 0 } else { args.camera_port.saturating_add(1) };

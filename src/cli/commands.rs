@@ -4,7 +4,7 @@
 use super::capture::{camera, record};
 use super::doctor::command as doctor;
 use super::find::{locate as find, model, program, second_look, teach};
-use super::insert::{guide, job};
+use super::insert::{guide, job, robot};
 use super::terminal::console::Console;
 use super::terminal::threads;
 use super::{bench, board, calibrate, cell, demo, live, range, scan, shift_scan, simulate, station, verify};
@@ -59,6 +59,9 @@ enum Command {
     Program(program::Args),
     Range(range::Args),
     Record(record::Args),
+    /// Answer a robot that drives itself
+    #[command(subcommand)]
+    Robot(robot::Command),
     Scan(scan::Args),
     SecondLook(second_look::Args),
     ShiftScan(shift_scan::Args),
@@ -88,6 +91,7 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Program(a) => program::run(a, console),
         Command::Range(a) => range::run(a, console),
         Command::Record(a) => record::run(a, console),
+        Command::Robot(c) => robot::run(c, console),
         Command::Scan(a) => scan::run(a, console),
         Command::SecondLook(a) => second_look::run(a, console),
         Command::ShiftScan(a) => shift_scan::run(a, console),

@@ -45,6 +45,8 @@ pub(super) fn read(text: &str) -> Result<Read> {
 
 struct Header {
     convention: Convention,
+    /// Denso's figure is the last column.
+    figure: bool,
     length_stated: bool,
     angle_stated: bool,
 }
@@ -81,7 +83,12 @@ impl Header {
                 .cause("the header line is missing")
                 .next("put a header first, e.g. frame,X_mm,Y_mm,Z_mm,RX_deg,RY_deg,RZ_deg"));
         }
-        let columns: Vec<_> = cells.iter().map(|c| column(c)).collect();
+        let mut columns: Vec<_> = cells.iter().map(|c| column(c)).collect();
+        let of_denso = matches!(convention, Some(Convention::Denso | Convention::DensoT));
+        let figure = of_denso && columns.last().is_some_and(|(name, _)| matches!(name.as_str(), "fig" | "figure"));
+        if figure {
+            columns.pop();
+        }
         let names = columns[1..].iter().map(|(name, _)| name.as_str());
         let matrix = names.clone().eq(Convention::Matrix.labels().iter().copied());
         let Some(convention) = convention.or(matrix.then_some(Convention::Matrix)) else {
@@ -116,13 +123,13 @@ impl Header {
                 columns[1..].iter().zip(&wanted).filter(|(_, (_, w))| w.as_deref().is_some_and(|w| units.contains(&w)));
             of.clone().next().is_none() || of.all(|((_, is), _)| is.is_some())
         };
-        Ok(Header { convention, length_stated: stated(["mm", "m"]), angle_stated: stated(["deg", "rad"]) })
+        Ok(Header { convention, figure, length_stated: stated(["mm", "m"]), angle_stated: stated(["deg", "rad"]) })
     }
 }
 
 fn row(line: &str, header: &Header) -> Result<Row> {
     let cells: Vec<&str> = line.split(',').collect();
-    let wanted = header.convention.labels().len() + 1;
+    let wanted = header.convention.labels().len() + 1 + usize::from(header.figure);
     if cells.len() != wanted {
         let whole = |c: &&str| c.trim().trim_matches('"').parse::<i64>().is_ok();
         let cause = if line.contains(';') {
@@ -165,8 +172,10 @@ mod tests {
         ] {
             assert_eq!(said(&with("denso", good)), "", "{good}");
         }
+        assert_eq!(said("# convention: denso\nframe,X,Y,Z,RX,RY,RZ,Fig\n0,1,2,3,4,5,6,5\n"), "");
         for (convention, header, want) in [
             ("denso", "frame,rx,ry,rz,x,y,z", "another order"),
+            ("kuka", "frame,X,Y,Z,A,B,C,Fig", "another order"),
             ("denso", "frame,X_m,Y_m,Z_m,RX,RY,RZ", "column 2 is 'X_m', denso has it in mm"),
             ("kuka", "frame,X,Y,Z,A_rad,B_rad,C_rad", "column 5 is 'A_rad', kuka has it in deg"),
             ("kuka", "frame,X,Y,Z,C,B,A", "another order"),

@@ -1,7 +1,7 @@
-//! In: `calibration/joint.json`, a rig. Out: the covariance of all its records together, where it is of these records.
+//! In: `calibration/joint.json`. Out: the covariance of all records together, and of which records it is.
 //! Frame and unit: as in the records: mm, rad, px.
 
-use super::{Kind, Rig, unsealed};
+use super::{Kind, unsealed};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -26,7 +26,7 @@ pub enum Joint {
     /// Nothing: they were calibrated one by one.
     #[default]
     Absent,
-    /// This; whether it is of the rig's records is asked for with [`Rig::joint`].
+    /// This; whether it is of the rig's records is asked for with [`super::Rig::joint`].
     Stated(JointCovariance),
     /// Something that cannot be used, and why.
     Spoilt(String),
@@ -58,32 +58,15 @@ impl JointCovariance {
             && (0..n).all(|i| self.matrix[i][i] >= 0.0)
     }
 
+    /// The first of these records, each with what it holds, that the covariance is not of; a record that is missing is none.
+    pub(super) fn other(&self, now: &[(Kind, Option<String>)]) -> Option<Kind> {
+        let other =
+            |(kind, content): &&(Kind, Option<String>)| content.is_none() || self.of.get(kind) != content.as_ref();
+        now.iter().find(other).map(|(kind, _)| *kind)
+    }
+
     /// The covariance of some of the parameters, by their indices.
     pub fn of_parameters(&self, at: &[usize]) -> DMatrix<f64> {
         DMatrix::from_fn(at.len(), at.len(), |i, j| self.matrix[at[i]][at[j]])
-    }
-}
-
-impl Rig {
-    /// The covariance of camera, laser plane and hand-eye together. `None` where none was ever stated.
-    ///
-    /// # Errors
-    /// Why what is stated is not of these records: one was exchanged since, or the file is spoilt. In words.
-    pub fn joint(&self) -> Option<Result<&JointCovariance, String>> {
-        let stated = match &self.joint {
-            Joint::Absent => return None,
-            Joint::Spoilt(why) => return Some(Err(why.clone())),
-            Joint::Stated(c) => c,
-        };
-        let now = [
-            (Kind::Camera, self.camera.as_ref().map(|c| c.content())),
-            (Kind::LaserPlane, self.laser_plane.as_ref().map(|c| c.content())),
-            (Kind::HandEye, self.hand_eye.as_ref().map(|c| c.content())),
-        ];
-        let other = now.iter().find(|(kind, content)| content.is_none() || stated.of.get(kind) != content.as_ref());
-        Some(match other {
-            None => Ok(stated),
-            Some((kind, _)) => Err(format!("joint.json is of another {} than the station's", kind.words())),
-        })
     }
 }

@@ -8,6 +8,9 @@ pub mod program;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Frame, Mat3, Rigid, Vec3, exp, log, repair};
 
+/// Figures of Denso: -1 to -3 leave the choice to the controller, five bits say shoulder, elbow, wrist, joints 6 and 4.
+const FIGURES: std::ops::RangeInclusive<f64> = -3.0..=31.0;
+
 /// How a robot writes a pose as numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -105,10 +108,32 @@ impl Convention {
         }
     }
 
+    /// Denso writes a figure behind a pose: which way round shoulder, elbow and wrist are. A pose without its joints does not need
+    /// it; what stands there must be one, though, or the numbers are in another order.
+    fn without_figure(self, numbers: &[f64]) -> Result<&[f64]> {
+        let (pose, figure) = match (self, numbers.split_last()) {
+            (Convention::Denso, Some((figure, pose))) if pose.len() == 6 => (pose, *figure),
+            (Convention::DensoT, Some((figure, pose))) if pose.len() == 9 => (pose, *figure),
+            _ => return Ok(numbers),
+        };
+        if figure.fract() == 0.0 && FIGURES.contains(&figure) {
+            return Ok(pose);
+        }
+        Err(Fault::input(format!(
+            "the figure behind a {} pose is {figure:?}, a whole number from {} to {} is one",
+            self.name(),
+            FIGURES.start(),
+            FIGURES.end()
+        ))
+        .cause("numbers in another order, or one too many")
+        .next("write X Y Z RX RY RZ and the figure, or leave the figure out"))
+    }
+
     /// Reads a pose. Wrong counts, numbers that are not finite and quaternions whose length is
     /// off by more than 1e-2 are refused, and angles of more than ten turns.
     pub fn read<To: Frame, From: Frame>(self, numbers: &[f64]) -> Result<Rigid<To, From>> {
         let want = self.labels().len();
+        let numbers = self.without_figure(numbers)?;
         if numbers.len() != want {
             return Err(Fault::input(format!(
                 "a {} pose has {want} numbers ({}), {} given",
@@ -293,5 +318,11 @@ mod tests {
     #[test]
     fn a_wrong_count_is_refused() {
         assert!(Convention::Abb.read::<Base, Flange>(&[0.0; 6]).is_err());
+        let read = |n: &[f64]| Convention::Denso.read::<Base, Flange>(n);
+        let pose = [300.0, 0.0, 590.0, 180.0, 0.0, 180.0];
+        assert_eq!(read(&[&pose[..], &[5.0]].concat()).unwrap(), read(&pose).unwrap());
+        for figure in [5.5, 32.0, f64::NAN] {
+            assert!(read(&[&pose[..], &[figure]].concat()).unwrap_err().what.contains("figure"));
+        }
     }
 }

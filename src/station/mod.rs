@@ -10,6 +10,7 @@ mod judge;
 mod range;
 mod scan;
 mod settings;
+pub mod socket;
 mod values;
 mod verify;
 pub mod volume;

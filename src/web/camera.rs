@@ -1,9 +1,11 @@
 //! In: a camera's URI, the station's rig. Out: the newest picture with its peaks by fate, and how long that took; pictures that came
-//! meanwhile are passed over and counted.
+//! meanwhile are passed over and counted. A job that moves the robot borrows the camera: its pictures are shown then.
 //! Frame and unit: px of the picture, grey levels of 8 bits, ms.
 
 use super::message::Frames;
-use crate::capture::{Account, CameraUri, Fate, Fed, Feed, FeedOptions, Format, Mode, RawFormat, now_ns};
+use crate::capture::{
+    Account, CameraUri, Event, Fate, Fed, Feed, FeedOptions, Format, Mode, PictureSource, RawFormat, RoundTrip, now_ns,
+};
 use crate::fault::{Fault, Result};
 use crate::rig::Rig;
 use crate::scan::{Live, Where};
@@ -12,12 +14,14 @@ use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Waited for a picture at most so long before is looked whether to end.
 const WITHIN: Duration = Duration::from_millis(200);
 /// A camera that is not there is looked for again after so long.
 const AGAIN: Duration = Duration::from_secs(1);
+/// A camera is given up by who looks at it within this.
+const GIVEN_UP: Duration = Duration::from_secs(5);
 /// Delays that p50 and p99 are of.
 const DELAYS: usize = 512;
 
@@ -49,8 +53,19 @@ struct State {
 
 /// A camera that is looked at.
 pub struct Camera {
+    uri: CameraUri,
     state: Arc<Mutex<State>>,
     ended: Arc<AtomicBool>,
+    use_: Arc<Use>,
+}
+
+/// Who has the camera.
+#[derive(Default)]
+struct Use {
+    /// A job wants it, or has it.
+    lent: AtomicBool,
+    /// It is looked at: its connection is open.
+    open: AtomicBool,
 }
 
 fn lock(state: &Mutex<State>) -> MutexGuard<'_, State> {
@@ -64,10 +79,22 @@ impl Camera {
         let parsed: CameraUri =
             uri.parse().map_err(|e: String| Fault::usage(e).next("name a camera as docs/live.md shows"))?;
         let (state, ended) = (Arc::new(Mutex::new(State::default())), Arc::new(AtomicBool::new(false)));
-        let (tell, end, station) = (state.clone(), ended.clone(), station.to_owned());
+        let use_ = Arc::new(Use::default());
+        let (tell, end, station, uses, uri) =
+            (state.clone(), ended.clone(), station.to_owned(), use_.clone(), parsed.clone());
         let body = move || {
             while !end.load(Ordering::Relaxed) {
-                let why = look(&parsed, raw, &station, &tell, &end);
+                if uses.lent.load(Ordering::SeqCst) {
+                    std::thread::sleep(Duration::from_millis(20));
+                    continue;
+                }
+                uses.open.store(true, Ordering::SeqCst);
+                let ends = || end.load(Ordering::Relaxed) || uses.lent.load(Ordering::SeqCst);
+                let why = look(&parsed, raw, &station, &tell, &ends);
+                uses.open.store(false, Ordering::SeqCst);
+                if ends() {
+                    continue;
+                }
                 lock(&tell).wrong =
                     Some(why.map_or_else(|fault| fault.what, |()| "the camera's pictures have ended".into()));
                 if parsed == CameraUri::Input {
@@ -78,7 +105,32 @@ impl Camera {
             }
         };
         std::thread::Builder::new().name("look".into()).spawn(body).map_err(|e| Fault::threads(&e))?;
-        Ok(Camera { state, ended })
+        Ok(Camera { uri, state, ended, use_ })
+    }
+
+    /// The camera for a job, until what is given back is dropped; nobody else looks through it meanwhile, what it takes is shown.
+    ///
+    /// # Errors
+    /// It is not there, is lent already, or is a pipe.
+    pub fn lend(&self) -> Result<Box<dyn PictureSource>> {
+        if self.uri == CameraUri::Input {
+            return Err(Fault::refused("pictures of a pipe cannot be asked for when the arm stands")
+                .next("serve the screen with a camera that has an address"));
+        }
+        if self.use_.lent.swap(true, Ordering::SeqCst) {
+            return Err(Fault::refused("another job has the camera").next("wait until it has ended"));
+        }
+        let mut lent = Lent { inner: None, state: self.state.clone(), use_: self.use_.clone() };
+        let give_up = Instant::now() + GIVEN_UP;
+        while self.use_.open.load(Ordering::SeqCst) && Instant::now() < give_up {
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        let uri = match self.uri.clone() {
+            CameraUri::Cell { address, .. } => CameraUri::Cell { address, rate_hz: -1.0 },
+            uri => uri,
+        };
+        lent.inner = Some(uri.open(None)?);
+        Ok(Box::new(lent))
     }
 
     /// The newest picture, if it is not the one of this number.
@@ -114,15 +166,66 @@ impl Drop for Camera {
     }
 }
 
+/// A camera that a job has.
+struct Lent {
+    inner: Option<Box<dyn PictureSource>>,
+    state: Arc<Mutex<State>>,
+    use_: Arc<Use>,
+}
+
+impl Lent {
+    fn source(&mut self) -> &mut dyn PictureSource {
+        &mut **self.inner.as_mut().expect("opened")
+    }
+}
+
+impl PictureSource for Lent {
+    fn format(&self) -> Format {
+        self.inner.as_ref().expect("opened").format()
+    }
+    fn name(&self) -> String {
+        self.inner.as_ref().expect("opened").name()
+    }
+    fn next(&mut self, within: Duration) -> Event {
+        let event = self.source().next(within);
+        if let Event::Picture(p) = &event {
+            let mut state = lock(&self.state);
+            let number = state.newest.as_ref().map_or(0, |l| l.number) + 1;
+            let (width, height, grey) = (p.image.width, p.image.height, p.image.to_u8());
+            state.newest = Some(Arc::new(Looked { number, width, height, grey, peaks: vec![], delay_ms: 0.0 }));
+        }
+        event
+    }
+    fn trigger(&mut self) -> Result<bool> {
+        self.source().trigger()
+    }
+    fn clock(&mut self) -> Result<Option<RoundTrip>> {
+        self.source().clock()
+    }
+}
+
+impl Drop for Lent {
+    fn drop(&mut self) {
+        self.inner = None;
+        self.use_.lent.store(false, Ordering::SeqCst);
+    }
+}
+
 /// Measures the newest picture, and the next newest, until the source ends.
-fn look(uri: &CameraUri, raw: Option<RawFormat>, station: &Path, tell: &Mutex<State>, end: &AtomicBool) -> Result<()> {
+fn look(
+    uri: &CameraUri,
+    raw: Option<RawFormat>,
+    station: &Path,
+    tell: &Mutex<State>,
+    ends: &dyn Fn() -> bool,
+) -> Result<()> {
     let feed = Feed::start(uri.open(raw)?, FeedOptions { mode: Mode::Newest, ..FeedOptions::default() })?;
     let mut live = begin(station, feed.format());
     if let Err(fault) = &live {
         lock(tell).wrong = Some(fault.what.clone());
     }
     let mut number = lock(tell).newest.as_ref().map_or(0, |l| l.number);
-    while !end.load(Ordering::Relaxed) {
+    while !ends() {
         let picture = match feed.next(WITHIN) {
             Fed::Picture(picture) => picture,
             Fed::Quiet => continue,

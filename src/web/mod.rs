@@ -6,6 +6,7 @@ mod api;
 mod camera;
 mod disk;
 mod event;
+mod for_cell;
 mod guard;
 mod message;
 mod motion;
@@ -19,7 +20,9 @@ mod surface;
 mod work;
 
 pub use api::openapi;
+pub use for_cell::station_for;
 pub use guard::{hashed, random_hex};
 pub use message::{Mode, declarations};
+pub use motion::SimulatedRobot;
 pub use serve::{Secured, ServeOptions, serve};
-pub use simulated::simulated;
+pub use simulated::{SimulatedOptions, simulated};

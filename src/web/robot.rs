@@ -22,7 +22,7 @@ pub struct Seen {
     pub wrong: Option<String>,
 }
 
-/// A robot that is looked at. It is never moved from here.
+/// A robot that is looked at, over a link of its own; it is moved from [`super::motion`].
 pub struct Robot {
     seen: Arc<Mutex<Seen>>,
     ended: Arc<AtomicBool>,
@@ -78,9 +78,10 @@ fn look(uri: &str, tell: &Mutex<Seen>, end: &AtomicBool) -> Result<()> {
 
 impl Seen {
     /// As the bar shows it.
-    pub fn bar(&self) -> RobotState {
+    pub fn bar(&self, armed: bool, moving: bool) -> RobotState {
         match &self.state {
-            Some(s) if s.busy == Some(true) => RobotState::Moving,
+            Some(s) if moving || s.busy == Some(true) => RobotState::Moving,
+            Some(_) if armed => RobotState::Armed,
             Some(_) => RobotState::ReadOnly,
             None => RobotState::NoLink,
         }

@@ -5,9 +5,9 @@ use super::camera::Camera;
 use super::event::Hub;
 use super::guard::{Leases, Sessions};
 use super::message::{Bar, CalibrationAge, Event, JobState};
-use super::motion::Grants;
+use super::motion::Desk;
 use super::robot::Robot;
-use super::work::{Jobs, Place, scan_of};
+use super::work::{Jobs, Place, Views, scan_of};
 use super::{disk, station};
 use crate::fault::Result;
 use crate::gpu::adapters;
@@ -36,16 +36,16 @@ pub struct Screen {
     pub sessions: Arc<Sessions>,
     /// Who operates.
     pub leases: Leases,
-    /// Confirmed motions that were not made yet.
-    pub grants: Grants,
+    /// What moves the robot, and who confirms it.
+    pub desk: Arc<Desk>,
     /// Argon2 hash, where others than this machine may ask.
     pub password: Option<String>,
     /// Name of the cookie.
     pub cookie: String,
-    /// The camera, where one was named.
-    pub camera: Option<Camera>,
     /// The robot, where one was named.
     pub robot: Option<Robot>,
+    /// Corners in calibrations' pictures.
+    pub views: Views,
     /// When the program started.
     pub started: Instant,
     adapter: OnceLock<(String, bool)>,
@@ -58,8 +58,6 @@ pub struct Screen {
 pub struct Linked {
     /// Argon2 hash, where others than this machine may ask.
     pub password: Option<String>,
-    /// A camera that runs.
-    pub camera: Option<Camera>,
     /// A robot's controller.
     pub robot: Option<Robot>,
 }
@@ -80,19 +78,24 @@ impl Screen {
         Screen {
             place: jobs.place.clone(),
             hub: jobs.hub.clone(),
+            desk: jobs.desk.clone(),
             jobs,
             sessions,
             leases: Leases::default(),
-            grants: Grants::default(),
             password: linked.password,
             cookie,
-            camera: linked.camera,
             robot: linked.robot,
+            views: Views::default(),
             started: Instant::now(),
             adapter: OnceLock::new(),
             read: Mutex::default(),
             map: Mutex::default(),
         }
+    }
+
+    /// The camera, where one was named.
+    pub fn camera(&self) -> Option<&Arc<Camera>> {
+        self.desk.links.camera.as_ref()
     }
 
     /// Asks the system for its adapters, once; the first time takes a moment.
@@ -135,10 +138,12 @@ impl Screen {
         if read.left_gb.is_some_and(|gb| gb < LITTLE_DISK) {
             alarms.push(format!("{:.1} GB of disk left", read.left_gb.unwrap_or(0.0)));
         }
-        let camera = self.camera.as_ref().map(Camera::seen);
+        let camera = self.camera().map(|c| c.seen());
         alarms.extend(camera.as_ref().and_then(|c| c.2.clone()));
         let robot = self.robot.as_ref().map(Robot::seen).unwrap_or_default();
         alarms.extend(robot.wrong.clone());
+        let motion = self.desk.state();
+        alarms.extend(motion.look.iter().map(|why| format!("look at the robot: {why}")));
         let cut = self.jobs.list(JOBS).iter().filter(|j| j.state == JobState::CutOff).count();
         if cut > 0 {
             alarms.push(format!("{cut} jobs were cut off: resume them or take them away"));
@@ -148,7 +153,8 @@ impl Screen {
         Bar {
             mode: self.place.mode,
             station: read.name,
-            robot: robot.bar(),
+            camera: self.camera().is_some(),
+            robot: robot.bar(motion.armed.is_some(), motion.moving),
             laser: None,
             frames,
             delay_ms,
@@ -165,7 +171,7 @@ impl Screen {
 
     /// Everything that a viewer starts from.
     pub fn state(&self) -> Event {
-        Event::State { bar: self.bar(), jobs: self.jobs.list(JOBS) }
+        Event::State { bar: self.bar(), jobs: self.jobs.list(JOBS), motion: Box::new(self.desk.state()) }
     }
 
     /// The height map of a scan; the last one that was asked for is kept in memory.

@@ -6,6 +6,7 @@ use super::camera::Camera;
 use super::event::Hub;
 use super::guard::{Door, Doorway, Sessions, door, tls, verify};
 use super::message::Event;
+use super::motion::{Desk, Links, SimulatedRobot};
 use super::robot::Robot;
 use super::screen::{Linked, Screen};
 use super::work::{Jobs, Place, Worker};
@@ -51,8 +52,10 @@ pub struct ServeOptions {
     pub next_free: bool,
     /// A camera's URI, and what frames on standard input are like.
     pub camera: Option<(String, Option<RawFormat>)>,
-    /// A robot's URI; it is looked at, never moved.
+    /// A robot's URI.
     pub robot: Option<String>,
+    /// It may be moved: --allow-motion.
+    pub may_move: bool,
     /// Password and TLS.
     pub secured: Option<Secured>,
     /// Ends the server when it is set.
@@ -66,11 +69,16 @@ const LOOK: Duration = Duration::from_millis(100);
 /// The bar is told so often.
 const BAR: Duration = Duration::from_secs(1);
 
-/// Serves until `stop`. `ready` is told the address to open, with the token of this start behind `#`.
+/// Serves until `stop`; `simulated` is the cell that robot and camera are of, where it is one of ours. `ready` is told the address to open, with the token of this start behind `#`.
 ///
 /// # Errors
 /// A station that is none or in use by another server, an address that cannot be listened on or is not guarded, bad TLS files.
-pub fn serve(options: &ServeOptions, token: &str, ready: impl FnOnce(&str) -> Result<()>) -> Result<()> {
+pub fn serve(
+    options: &ServeOptions,
+    simulated: Option<SimulatedRobot>,
+    token: &str,
+    ready: impl FnOnce(&str) -> Result<()>,
+) -> Result<()> {
     check(options)?;
     let place = Place { station: options.station.clone(), recordings: options.recordings.clone(), mode: options.mode };
     crate::files::make_folder(&place.jobs())?;
@@ -82,7 +90,18 @@ pub fn serve(options: &ServeOptions, token: &str, ready: impl FnOnce(&str) -> Re
         .build()
         .map_err(|e| Fault::threads(&e))?;
     let hub = Arc::new(Hub::default());
-    let jobs = Jobs::open(place, hub)?;
+    let camera = options.camera.as_ref();
+    let camera = camera.map(|(uri, raw)| Camera::watch(uri, *raw, &options.station)).transpose()?.map(Arc::new);
+    let links = Links {
+        station: options.station.clone(),
+        robot: options.robot.clone(),
+        may_move: options.may_move,
+        camera,
+        simulated,
+        stop: options.stop.clone(),
+    };
+    let desk = Arc::new(Desk::new(links, hub.clone()));
+    let jobs = Jobs::open(place, hub, desk)?;
     let worker = Worker::start(jobs.clone())?;
     let served = runtime.block_on(run(options, token, jobs, ready));
     // The job that runs ends with its checkpoint before the program does.
@@ -127,10 +146,8 @@ async fn run(
     let guard =
         Arc::new(Door { hosts: hosts(options, address), scheme, sessions: sessions.clone(), cookie: cookie.clone() });
     let robot = options.robot.as_deref().map(Robot::watch).transpose()?;
-    let camera = options.camera.as_ref();
-    let camera = camera.map(|(uri, raw)| Camera::watch(uri, *raw, &options.station)).transpose()?;
     let password = options.secured.as_ref().map(|s| s.password.clone());
-    let screen = Arc::new(Screen::new(jobs, sessions, cookie, Linked { password, camera, robot }));
+    let screen = Arc::new(Screen::new(jobs, sessions, cookie, Linked { password, robot }));
     let app = router(screen.clone()).layer(from_fn_with_state(guard, door));
     let doorway = Doorway::new(listener, acceptor).map_err(lost)?;
     let first = screen.clone();

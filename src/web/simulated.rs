@@ -1,32 +1,56 @@
-//! In: a folder. Out: a simulated station in it with recordings to scan, made once: a first look at the product without
-//! camera, robot or GPU.
+//! In: a folder. Out: a simulated cell that runs in this process, a station in the folder that fits it, and recordings to scan, made
+//! once: a first look at the product without camera, robot or GPU.
 //! Frame and unit: as recordings; px.
 
+use super::for_cell::station_for;
+use super::motion::{SimulatedRobot, board};
 use crate::fault::Result;
-use crate::robot::Convention;
 use crate::simulate::{Set, SimulateOptions, simulate};
-use crate::station::Settings;
 use std::path::{Path, PathBuf};
 
-/// Of the simulated robot.
-const NOTATION: Convention = Convention::Denso;
-const SEED: u64 = 3;
+/// Cell and controller share this machine with everything else that runs on it: their link may be silent for so long, ms.
+const SILENCE_MS: f64 = 2000.0;
 
-/// Makes `folder/station` and recordings beside it where they are not there yet, `shots` a scan; `progress` counts pictures.
+/// What is simulated.
+#[derive(Clone, Debug)]
+pub struct SimulatedOptions {
+    /// Shots of the recorded scan.
+    pub shots: usize,
+    /// Recordings beside the cell.
+    pub sets: Vec<Set>,
+    /// Part whose component the gripper holds: led, osc, flash or dimm.
+    pub part: String,
+    /// Specimen, places and noise.
+    pub seed: u64,
+    /// Seconds of the cell in one of ours, 0.1 to 1000.
+    pub speed: f64,
+}
+
+/// Starts the cell, and makes `folder/station` and recordings beside it where they are not there yet; `progress` counts pictures.
 /// Gives the station.
 pub fn simulated(
     folder: &Path,
-    shots: usize,
-    sets: &[Set],
+    options: &SimulatedOptions,
     progress: &(dyn Fn(usize, usize) + Sync),
-) -> Result<PathBuf> {
+) -> Result<(PathBuf, SimulatedRobot)> {
+    crate::files::make_folder(folder)?;
     let station = folder.join("station");
+    let robot = SimulatedRobot::start(folder, &options.part, options.seed, options.speed)?;
     // Its settings come last, so that a station that has them is whole.
-    if station.join("station.toml").is_file() {
-        return Ok(station);
+    if !station.join("station.toml").is_file() {
+        if !options.sets.is_empty() {
+            let (sets, shots) = (options.sets.clone(), options.shots);
+            simulate(
+                folder,
+                &SimulateOptions { sets, seed: options.seed, shots, ..SimulateOptions::default() },
+                progress,
+            )?;
+        }
+        let boards = station.join("boards");
+        crate::files::make_folder(&boards)?;
+        let text = serde_json::to_string_pretty(&board()).expect("plain data");
+        crate::files::write(&boards.join("charuco-16.json"), text.as_bytes())?;
+        station_for(robot.cell(), &station, "simulated", Some(SILENCE_MS))?;
     }
-    let options = SimulateOptions { sets: sets.to_vec(), seed: SEED, shots, ..SimulateOptions::default() };
-    let made = simulate(folder, &options, progress)?;
-    Settings { name: "simulated".into(), robot: Some(NOTATION), ..Settings::default() }.store(&made.station)?;
-    Ok(made.station)
+    Ok((station, robot))
 }

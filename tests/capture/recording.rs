@@ -31,7 +31,7 @@ fn account(value: &serde_json::Value) -> Account {
 fn what_is_recorded_is_what_was_sent_and_scans_to_the_same_bytes() {
     let dir = tempfile::tempdir().unwrap();
     let want = cloud_of(&scan_folder(), &dir.path().join("file"));
-    let camera = format!("play:{}?rate=60", text(&scan_folder()));
+    let camera = format!("play:{}?rate=30", text(&scan_folder()));
     for store in ["png", "raw", "auto"] {
         let out = dir.path().join(store);
         let to = text(&out);

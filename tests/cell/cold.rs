@@ -2,7 +2,7 @@
 //! drives by itself over the robot's and the camera's wires, and whether parts are inserted with it; judged by the cell's truth.
 //! Frame and unit: base frame; mm, degrees, s.
 
-use super::job::{Yes, scene};
+use super::workplace::{Yes, scene};
 use sheetlight::arm::rules::{Confirmation, Guard, Limits, MotionLog, Plan, Space};
 use sheetlight::arm::{Motion, Outputs, Way};
 use sheetlight::calibrate::hand_eye::closed::{Far, Near};

@@ -103,6 +103,20 @@ class Browser:
         self.ask("POST", "/actions", {"actions": [{"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": steps}]})
         self.clicks += 1
 
+    def hold(self, css):
+        """Presses and keeps pressing until `let_go`."""
+        self.until(f"{css} can be pressed", "const e = document.querySelector(arguments[0]); return e && !e.disabled", 20, css)
+        self.run("document.querySelector(arguments[0]).scrollIntoView({ block: 'center' })", css)
+        x, y = self.run("const r = document.querySelector(arguments[0]).getBoundingClientRect(); return [r.left + r.width / 2, r.top + r.height / 2]", css)
+        self.mouse({"type": "pointerMove", "duration": 0, "x": round(x), "y": round(y)}, {"type": "pointerDown", "button": 0})
+        self.clicks += 1
+
+    def let_go(self):
+        self.mouse({"type": "pointerUp", "button": 0})
+
+    def mouse(self, *steps):
+        self.ask("POST", "/actions", {"actions": [{"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": list(steps)}]})
+
     def keys(self, *keys):
         steps = [x for k in keys for x in ({"type": "keyDown", "value": k}, {"type": "keyUp", "value": k})]
         self.ask("POST", "/actions", {"actions": [{"type": "key", "id": "keys", "actions": steps}]})

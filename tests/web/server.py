@@ -16,7 +16,9 @@ class Server:
     """`sheetlight station serve` on any free port."""
 
     def __init__(self, program, folder, *more, stdin=None):
-        command = [program, "--json", "station", "serve", "--station", os.path.join(folder, "station"), "--port", "0", *more]
+        """With --simulate the folder gets its station; else it holds one."""
+        station = folder if "--simulate" in more else os.path.join(folder, "station")
+        command = [program, "--json", "station", "serve", "--station", station, "--port", "0", *more]
         self.process = subprocess.Popen(command, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         self.said = []
         threading.Thread(target=lambda: self.said.extend(line.decode() for line in self.process.stderr), daemon=True).start()
@@ -72,14 +74,14 @@ class Server:
             time.sleep(0.05)
         raise AssertionError(f"{name} did not end in {seconds} s: {job}")
 
-    def socket(self, token=True, **headers):
+    def socket(self, token=True, tab=None, **headers):
         """A WebSocket after its handshake: status and the socket."""
         name, port = self.host.rsplit(":", 1)
         s = socket.create_connection((name, int(port)), timeout=20)
         head = {"Host": self.host, "Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": base64.b64encode(os.urandom(16)).decode(), **{k.replace("_", "-"): v for k, v in headers.items()}}
         if token:
             head["Authorization"] = f"Bearer {self.token if token is True else token}"
-        s.sendall(("GET /api/v1/events HTTP/1.1\r\n" + "".join(f"{k}: {v}\r\n" for k, v in head.items()) + "\r\n").encode())
+        s.sendall((f"GET /api/v1/events{f'?tab={tab}' if tab else ''} HTTP/1.1\r\n" + "".join(f"{k}: {v}\r\n" for k, v in head.items()) + "\r\n").encode())
         said = b""
         while b"\r\n\r\n" not in said:
             more = s.recv(1)
@@ -88,9 +90,9 @@ class Server:
             said += more
         return int(said.split(b" ")[1]), s
 
-    def memory_mb(self):
+    def peak_mb(self):
         with open(f"/proc/{self.process.pid}/status") as f:
-            return next(int(line.split()[1]) for line in f if line.startswith("VmRSS")) / 1024
+            return next(int(line.split()[1]) for line in f if line.startswith("VmHWM")) / 1024
 
     def kill(self):
         self.process.kill()
@@ -100,6 +102,21 @@ class Server:
         """Ends it as Ctrl-C does."""
         self.process.terminate()
         return self.process.wait(20)
+
+
+def say(s, text):
+    """A text of less than 126 bytes to a WebSocket, masked as clients have to."""
+    mask, data = os.urandom(4), text.encode()
+    s.sendall(bytes([0x81, 0x80 | len(data)]) + mask + bytes(b ^ mask[i % 4] for i, b in enumerate(data)))
+
+
+def events(folder):
+    """What happened in the simulated cell so far."""
+    path = os.path.join(folder, "cell.jsonl")
+    if not os.path.exists(path):
+        return []
+    with open(path) as f:
+        return [json.loads(line) for line in f if line.endswith("\n")]
 
 
 def frame(s):

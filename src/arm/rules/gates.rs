@@ -14,6 +14,8 @@ pub struct Situation {
     pub state: State,
     /// Where it stands.
     pub at: Rigid<Base, Flange>,
+    /// With which figure, where the controller says it.
+    pub figure: Option<i32>,
     /// It may be moved: `--allow-motion` was given and it was armed.
     pub armed: bool,
     /// A motion was stopped and nobody has looked at the robot since.

@@ -116,8 +116,9 @@ impl Guard {
     }
 
     fn situation(&mut self) -> Result<Situation> {
-        let (state, at) = (self.link.state()?, self.link.pose()?.base_from_flange);
-        Ok(Situation { state, at, armed: self.armed.is_some(), unknown: self.unknown.is_some() })
+        let (state, pose) = (self.link.state()?, self.link.pose()?);
+        let (at, figure) = (pose.base_from_flange, pose.figure);
+        Ok(Situation { state, at, figure, armed: self.armed.is_some(), unknown: self.unknown.is_some() })
     }
 
     /// Looks at a plan from where the arm stands now. The proposal shows every gate, met or not.
@@ -129,7 +130,8 @@ impl Guard {
         let number = self.proposed;
         let now = self.situation()?;
         let hash = hash(&plan, &now.at, number);
-        let mut proposal = Proposal { plan, from: now.at, gates: vec![], reasons: vec![], hash, shown: Instant::now() };
+        let (from, figure, shown) = (now.at, now.figure, Instant::now());
+        let mut proposal = Proposal { plan, from, figure, gates: vec![], reasons: vec![], hash, shown };
         (proposal.gates, proposal.reasons) = self.judge(&proposal.plan, &now)?;
         self.log.note("asked", &proposal, proposal.missed())?;
         Ok(proposal)
@@ -191,7 +193,7 @@ impl Guard {
         self.used.insert(confirmation.hash);
         // What is begun stands in the log before it begins.
         self.log.note("begun", proposal, vec![])?;
-        let made = self.run(&proposal.plan, each);
+        let made = self.run(&proposal.plan, proposal.figure, each);
         match &made {
             Ok(None) => self.log.note("done", proposal, vec![])?,
             Ok(Some(refusal)) => self.log.note("not begun", proposal, vec![refusal.what.clone()])?,
@@ -239,6 +241,14 @@ impl Guard {
             );
             return refused(what, "somebody jogged it, or another program has it");
         }
+        if let (Some(shown), Some(figure)) = (proposal.figure, now.figure)
+            && shown != figure
+        {
+            return refused(
+                format!("the arm's figure is {figure}, it was {shown} when the pose was shown"),
+                "somebody moved it to the same place by another way of its joints",
+            );
+        }
         let (gates, reasons) = self.judge(&proposal.plan, &now)?;
         let missed: Vec<String> = gates.iter().filter(|g| !g.passed).map(|g| g.words()).chain(reasons).collect();
         if missed.is_empty() {
@@ -248,10 +258,17 @@ impl Guard {
     }
 
     /// What the controller said where it would not begin a leg.
-    fn run(&mut self, plan: &Plan, each: &mut dyn FnMut(&mut dyn Arm, usize) -> Result<()>) -> Result<Option<Fault>> {
+    fn run(
+        &mut self,
+        plan: &Plan,
+        figure: Option<i32>,
+        each: &mut dyn FnMut(&mut dyn Arm, usize) -> Result<()>,
+    ) -> Result<Option<Fault>> {
         let (Some(limits), Some(armed)) = (&self.limits, &mut self.armed) else { unreachable!("gates ask for both") };
         let speed = plan.legs.iter().map(|leg| leg.speed_mm_s).fold(0.0, f64::max);
-        let watch = Watch::new(limits, &self.stop, &*armed.halt, speed);
+        let straight = plan.legs.iter().all(|leg| leg.way == Way::Straight);
+        let figure = figure.filter(|_| straight);
+        let watch = Watch::new(limits, &self.stop, &*armed.halt, speed, figure);
         let link = &mut *self.link;
         let poses = &mut *armed.poses;
         let made = std::thread::scope(|threads| {

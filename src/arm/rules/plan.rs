@@ -49,6 +49,8 @@ pub struct Proposal {
     pub plan: Plan,
     /// From where.
     pub from: Rigid<Base, Flange>,
+    /// The arm's figure there, where the controller says it.
+    pub figure: Option<i32>,
     /// What it has to keep, all of it.
     pub gates: Vec<Gate>,
     /// Why it cannot be made where a gate has no words of its own (reach, controller's errors).

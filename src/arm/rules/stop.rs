@@ -8,6 +8,8 @@ use std::time::{Duration, Instant};
 #[derive(Default)]
 struct Inside {
     pressed: AtomicBool,
+    /// Why, where it was not the button itself.
+    reason: Mutex<Option<String>>,
     signals: Mutex<Vec<Arc<AtomicBool>>>,
     lease: Mutex<Option<(Instant, Duration)>>,
 }
@@ -21,8 +23,14 @@ impl StopButton {
     pub fn press(&self) {
         self.0.pressed.store(true, Ordering::SeqCst);
     }
+    /// The same for another reason, which is said then; the first one stands.
+    pub fn press_for(&self, why: &str) {
+        self.0.reason.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| why.to_owned());
+        self.press();
+    }
     /// Lets motions be proposed again.
     pub fn release(&self) {
+        *self.0.reason.lock().unwrap_or_else(PoisonError::into_inner) = None;
         self.0.pressed.store(false, Ordering::SeqCst);
     }
     /// Counts a flag as pressed while it is up: Ctrl-C.
@@ -51,7 +59,8 @@ impl StopButton {
     /// Why nothing may move; `None` where it may.
     pub fn why(&self) -> Option<String> {
         if self.0.pressed.load(Ordering::SeqCst) {
-            return Some("STOP was pressed".into());
+            let reason = self.0.reason.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            return Some(reason.unwrap_or_else(|| "STOP was pressed".into()));
         }
         let signals = self.0.signals.lock().unwrap_or_else(PoisonError::into_inner);
         if signals.iter().any(|s| s.load(Ordering::SeqCst)) {

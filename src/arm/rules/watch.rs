@@ -28,6 +28,8 @@ pub struct Watch<'a> {
     pub halt: &'a dyn Halt,
     /// Greatest speed that was confirmed, mm/s.
     pub speed_mm_s: f64,
+    /// The figure that has to stay, where the controller says it and the way is straight.
+    pub figure: Option<i32>,
     over: AtomicBool,
     /// When a pose was read last.
     heard: Mutex<Instant>,
@@ -35,9 +37,15 @@ pub struct Watch<'a> {
 }
 
 impl<'a> Watch<'a> {
-    pub fn new(limits: &'a Limits, stop: &'a StopButton, halt: &'a dyn Halt, speed_mm_s: f64) -> Watch<'a> {
+    pub fn new(
+        limits: &'a Limits,
+        stop: &'a StopButton,
+        halt: &'a dyn Halt,
+        speed_mm_s: f64,
+        figure: Option<i32>,
+    ) -> Watch<'a> {
         let (over, heard, why) = (AtomicBool::new(false), Mutex::new(Instant::now()), Mutex::new(None));
-        Watch { limits, stop, halt, speed_mm_s, over, heard, why }
+        Watch { limits, stop, halt, speed_mm_s, figure, over, heard, why }
     }
 
     /// The motion has ended.
@@ -103,6 +111,11 @@ impl<'a> Watch<'a> {
         let outside = self.limits.workspace.outside(&at);
         if !(outside <= OUTSIDE_MM) {
             return Some(format!("the flange is {outside:.1} mm outside the workspace, limit {OUTSIDE_MM}"));
+        }
+        if let (Some(stays), Some(figure)) = (self.figure, pose.figure)
+            && stays != figure
+        {
+            return Some(format!("the figure changed on the way, from {stays} to {figure}"));
         }
         let t = pose
             .device

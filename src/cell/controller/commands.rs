@@ -51,13 +51,14 @@ impl Connection {
         let cell = controller.cell();
         let now = cell.clock().now();
         let joints = cell.world().joints(now);
-        let pose = || goal::position(&cell.world().reported(now), goal::figure_of(&joints));
+        let figure = controller.panel().figure.unwrap_or_else(|| goal::figure_of(&joints));
+        let pose = || goal::position(&cell.world().reported(now), figure);
         let ms = (now * 1e3).round();
         let timed = |values: Vec<f64>| Variant::F64s([ms].into_iter().chain(values).collect());
         match command {
             "curpos" => Ok(Some(Variant::F64s(pose()))),
             "curjnt" => Ok(Some(Variant::F64s(goal::joints(&joints)))),
-            "curtrn" => Ok(Some(Variant::F64s(goal::transform(&cell.world().reported(now), goal::figure_of(&joints))))),
+            "curtrn" => Ok(Some(Variant::F64s(goal::transform(&cell.world().reported(now), figure)))),
             "highcurposex" => Ok(Some(timed(pose()))),
             "highcurjntex" => Ok(Some(timed(goal::joints(&joints)))),
             "curtool" => Ok(Some(Variant::I32(controller.panel().tool))),

@@ -6,6 +6,9 @@ use super::{Controller, EMERGENCY};
 use crate::bcap::Outcome;
 use crate::geometry::Vec3;
 
+/// A client that is none of ours.
+const ANOTHER: u64 = u64::MAX;
+
 /// What a person does at the controller, and what tests do instead.
 impl Controller {
     /// Presses the emergency stop: the arm brakes, the motor loses its power, the error stands.
@@ -53,9 +56,23 @@ impl Controller {
     pub fn set_fence(&self, fence: Option<[Vec3; 2]>) {
         self.panel().fence = fence;
     }
+    /// The next motion takes the arm to its goal with another figure, as a controller does that chooses it by itself.
+    pub fn turn_figure(&self, to: i32) {
+        self.panel().next_figure = Some(to);
+    }
+    /// It has it already: somebody moved the arm there and back.
+    pub fn turned_figure(&self) {
+        let mut panel = self.panel();
+        panel.figure = panel.next_figure.take().or(panel.figure);
+    }
     /// Another client takes the arm.
     pub fn take_by_another(&self) {
-        self.panel().taken = Some(u64::MAX);
+        self.panel().taken = Some(ANOTHER);
+    }
+    /// That client gives it back.
+    pub fn given_by_another(&self) {
+        let mut panel = self.panel();
+        panel.taken = panel.taken.filter(|by| *by != ANOTHER);
     }
 
     /// A client has gone: its handles and the arm are free.

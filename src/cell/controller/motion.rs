@@ -117,6 +117,9 @@ impl Connection {
         };
         world.begin(now, trajectory.map_err(unreachable)?, straight, self.number);
         panel.motions += 1;
+        if let Some(figure) = panel.next_figure.take() {
+            panel.figure = Some(figure);
+        }
         let number = panel.motions;
         panel.motion = Some((number, None));
         if words.split(',').any(|w| w.trim() == "NEXT") {

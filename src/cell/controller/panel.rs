@@ -32,6 +32,9 @@ pub struct Panel {
     pub external: [f64; 3],
     /// Internal speed.
     pub internal: f64,
+    /// The figure that the arm says it has, where it is another than its joints'; and the one that the next motion gives it.
+    pub figure: Option<i32>,
+    pub next_figure: Option<i32>,
     pub variables: BTreeMap<String, Variant>,
     /// Corners of a box that nothing may enter, mm.
     pub fence: Option<[Vec3; 2]>,
@@ -57,6 +60,8 @@ impl Default for Panel {
             work: 0,
             external: [100.0; 3],
             internal: 100.0,
+            figure: None,
+            next_figure: None,
             variables: BTreeMap::new(),
             fence: None,
             motion: None,

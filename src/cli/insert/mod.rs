@@ -4,3 +4,4 @@
 pub mod guide;
 pub mod job;
 pub(in crate::cli) mod moving;
+pub mod robot;

@@ -6,7 +6,7 @@ use crate::cli::terminal::interrupt;
 use crate::fault::{Fault, Result};
 use crate::scan::RawFormat;
 use crate::simulate::Set;
-use crate::web::{Mode, Secured, ServeOptions, hashed, random_hex, serve, simulated};
+use crate::web::{Mode, Secured, ServeOptions, SimulatedOptions, SimulatedRobot, hashed, random_hex, serve, simulated};
 use std::io::{BufRead, IsTerminal};
 use std::net::{IpAddr, Ipv4Addr};
 use std::path::{Path, PathBuf};
@@ -29,13 +29,23 @@ pub struct Serve {
     /// Folder below which recordings lie [default: the folder that holds the station]
     #[arg(long)]
     recordings: Option<PathBuf>,
-    /// Look around without camera and robot: makes a simulated station in STATION/station and recordings beside it, once
+    /// Without camera and robot: starts a simulated cell with both, makes a station for it in STATION/station and recordings beside
+    /// it, once
     #[arg(long, conflicts_with = "recordings")]
     simulate: bool,
+    /// Part whose component the simulated gripper holds at first: led, osc, flash or dimm
+    #[arg(long, default_value = "osc", requires = "simulate")]
+    part: String,
+    /// Another specimen of the simulated cell for every seed
+    #[arg(long, default_value_t = 3, requires = "simulate")]
+    seed: u64,
+    /// Seconds of the simulated cell in one of ours, 0.1 to 1000
+    #[arg(long, default_value_t = 1.0, requires = "simulate")]
+    speed: f64,
     /// Shots of the simulated scan
     #[arg(long, default_value_t = 200, requires = "simulate")]
     shots: usize,
-    /// Recordings to simulate, separated by commas: scan, surface, intrinsics, handeye, laserplane, pointer_cal, pointer, all
+    /// Recordings to simulate, separated by commas: scan, surface, intrinsics, handeye, laserplane, pointer_cal, pointer, all, none
     #[arg(long = "set", value_delimiter = ',', default_value = "all", requires = "simulate")]
     sets: Vec<String>,
     /// The camera, e.g. cell://HOST:PORT, or - with --raw: its newest picture is shown with its peaks (docs/live.md)
@@ -44,9 +54,12 @@ pub struct Serve {
     /// Raw frames on standard input: WIDTHxHEIGHT:gray8, gray10le, gray12le or gray16le
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<RawFormat>, requires = "camera")]
     raw: Option<RawFormat>,
-    /// The robot's controller, e.g. bcap://10.0.0.2: its state and pose are shown
-    #[arg(long)]
+    /// The robot's controller, e.g. bcap://10.0.0.2: its state is shown; it is moved with --allow-motion alone
+    #[arg(long, conflicts_with = "simulate")]
     robot: Option<String>,
+    /// The arm may move: jobs may be begun, each motion is shown and confirmed by a held button
+    #[arg(long)]
+    allow_motion: bool,
     /// Port; the next free one where it is taken, 0 for any [default: 8620, or the next free one]
     #[arg(long)]
     port: Option<u16>,
@@ -81,8 +94,10 @@ pub struct Password {
 const PORT: u16 = 8620;
 
 pub fn run(args: &Serve, console: &Console) -> Result<()> {
-    let (station, mode) =
-        if args.simulate { (make(args, console)?, Mode::Simulated) } else { (args.station.clone(), Mode::Replay) };
+    let (station, mode, cell) = match args.simulate {
+        true => make(args, console).map(|(station, cell)| (station, Mode::Simulated, Some(cell)))?,
+        false => (args.station.clone(), Mode::Replay, None),
+    };
     let holder = || match station.canonicalize() {
         Ok(real) => real.parent().unwrap_or(Path::new("/")).to_owned(),
         Err(_) => station.clone(),
@@ -104,12 +119,13 @@ pub fn run(args: &Serve, console: &Console) -> Result<()> {
         address: args.listen,
         port: args.port.unwrap_or(PORT),
         next_free: true,
-        camera: args.camera.clone().map(|uri| (uri, args.raw)),
-        robot: args.robot.clone(),
+        camera: cell.as_ref().map(|c| (c.camera_uri(), None)).or(args.camera.clone().map(|uri| (uri, args.raw))),
+        robot: cell.as_ref().map(SimulatedRobot::robot_uri).or(args.robot.clone()),
+        may_move: args.allow_motion || cell.is_some(),
         secured,
         stop: interrupt::asked_for(),
     };
-    serve(&options, &random_hex(), |url| {
+    serve(&options, cell, &random_hex(), |url| {
         let said =
             format!("open {url}\nthe address holds the token of this start; Ctrl-C ends the screen, jobs are kept");
         console.result(&serde_json::json!({ "url": url }), &said);
@@ -117,21 +133,24 @@ pub fn run(args: &Serve, console: &Console) -> Result<()> {
     })
 }
 
-fn make(args: &Serve, console: &Console) -> Result<PathBuf> {
+fn make(args: &Serve, console: &Console) -> Result<(PathBuf, SimulatedRobot)> {
     let mut sets = Vec::new();
     for name in &args.sets {
         match name.as_str() {
             "all" => sets.extend(Set::ALL),
+            "none" => {}
             name => sets.push(name.parse().map_err(|e: String| Fault::usage(e).next("name a set"))?),
         }
     }
     let bar = console.bar("simulating a station", 0);
-    let station = simulated(&args.station, args.shots, &sets, &|n, of| {
+    let options =
+        SimulatedOptions { shots: args.shots, sets, part: args.part.clone(), seed: args.seed, speed: args.speed };
+    let made = simulated(&args.station, &options, &|n, of| {
         bar.set_length(of as u64);
         bar.set_position(n as u64);
     })?;
     bar.finish_and_clear();
-    Ok(station)
+    Ok(made)
 }
 
 pub fn password(args: &Password, console: &Console) -> Result<()> {

@@ -1,11 +1,13 @@
-//! In: a picture, a skeleton pixel, the expected stripe. Out: the maximum-likelihood Gaussian profile across it.
+//! In: pictures, skeleton pixels, the expected stripe. Out: direction and background there; peaks by the maximum-likelihood Gaussian across.
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels. docs/math.md, Stripe peak (1) to (5).
 
 use super::PeakFrame;
 use super::found::{Peak, SATURATED};
-use super::grey::Grey;
-use super::profile::{Profile, SIDES, by_columns, share};
-use super::turn::GRADIENTS;
+use super::grey::{Grey, Inner, Place};
+use super::lanes::LANES;
+use super::profile::{Profiles, by_columns};
+use super::scoring;
+use super::turn::{DIAGONAL, EVEN_ROW, MIDDLE_ROW};
 
 /// Direction across the stripe: the strongest eigenvector of the structure tensor, on grey levels so far apart that noise
 /// of single pixels does not turn it, and what so far differences make of it is put right (docs/math.md, Stripe peak (1)).
@@ -37,27 +39,50 @@ pub(super) fn direction<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> (f3
     (sign * nx / l, sign * ny / l)
 }
 
+/// Every other place of a lattice's row, as the gradients want them.
+#[inline(always)]
+fn odd<G: Grey>(image: G, x: i32, y: i32, u: i32) -> [i32; 3] {
+    [image.whole(x - 2 * u, y), image.whole(x, y), image.whole(x + 2 * u, y)]
+}
+
+/// The places between.
+#[inline(always)]
+fn even<G: Grey>(image: G, x: i32, y: i32, u: i32) -> [i32; 4] {
+    [image.whole(x - 3 * u, y), image.whole(x - u, y), image.whole(x + u, y), image.whole(x + 3 * u, y)]
+}
+
 /// Half the difference of the diagonal, the other element, and half the difference of the eigenvalues. Sums of whole numbers, of
 /// ten bits a gradient: which pixels a profile is made of hangs on the direction, and must not hang on rounding.
 #[inline(always)]
 fn tensor<G: Grey>(image: G, x: i32, y: i32, u: i32, v: i32, deep: u32) -> (f32, f32, f32) {
     let half = 1 << deep >> 1;
-    let gradient = |a: (i32, i32), b: (i32, i32)| {
-        let at = |(i, j): (i32, i32)| image.at(x + i * u, y + j * v) as i32;
-        (at(a) - at(b) + half) >> deep
-    };
-    let (mut xx, mut xy, mut yy) = (0i32, 0i32, 0i32);
-    for (i, j, weight) in GRADIENTS {
-        let gx = gradient((i + 1, j), (i - 1, j));
-        let gy = gradient((i, j + 1), (i, j - 1));
-        xx += weight * (gx * gx);
-        xy += weight * (gx * gy);
-        yy += weight * (gy * gy);
+    let (a, b, c) = (odd(image, x, y - 3 * v, u), even(image, x, y - 2 * v, u), odd(image, x, y - v, u));
+    let (d, e) = (even(image, x, y, u), odd(image, x, y + v, u));
+    let (f, g) = (even(image, x, y + 2 * v, u), odd(image, x, y + 3 * v, u));
+    let mut sums = [0i32; 3];
+    for (above, row, below, weights) in [(a, b, c, EVEN_ROW), (c, d, e, MIDDLE_ROW), (e, f, g, EVEN_ROW)] {
+        for i in 0..3 {
+            let (gx, gy) = ((row[i + 1] - row[i] + half) >> deep, (below[i] - above[i] + half) >> deep);
+            add(&mut sums, weights[i], gx, gy);
+        }
+    }
+    for (above, row, below) in [(b, c, d), (d, e, f)] {
+        for i in 0..2 {
+            let (gx, gy) = ((row[i + 1] - row[i] + half) >> deep, (below[i + 1] - above[i + 1] + half) >> deep);
+            add(&mut sums, DIAGONAL, gx, gy);
+        }
     }
     let ratio = v as f32 / u as f32;
-    let (xx, xy, yy) = ((ratio * ratio) * xx as f32, ratio * xy as f32, yy as f32);
+    let (xx, xy, yy) = ((ratio * ratio) * sums[0] as f32, ratio * sums[1] as f32, sums[2] as f32);
     let d = 0.5 * (xx - yy);
     (d, xy, (d * d + xy * xy).sqrt())
+}
+
+#[inline(always)]
+fn add(sums: &mut [i32; 3], weight: i32, gx: i32, gy: i32) {
+    sums[0] += weight * (gx * gx);
+    sums[1] += weight * (gx * gy);
+    sums[2] += weight * (gy * gy);
 }
 
 /// Level beside the stripe, 4 to 6 widths out: the darker side, because a second stripe lights one side only. On three lines
@@ -69,149 +94,67 @@ pub(super) fn background<G: Grey>(image: G, x: i32, y: i32, nx: f32, ny: f32, s:
     let along = 1.2 * s.s0;
     // Not 0.5: at slopes of 1 in 32 and the like rounding would decide.
     let (along_u, along_v) = ((along * ny + 0.47).floor() as i32, (0.47 - along * nx).floor() as i32);
-    let (mut low, mut high, mut n) = (0f32, 0f32, 0f32);
+    let (mut low, mut high, mut n) = (0, 0, 0f32);
     let mut q = from;
     while q <= to {
         let (du, dv) = ((q as f32 * nx + 0.47).floor() as i32, (q as f32 * ny + 0.47).floor() as i32);
         for (tu, tv) in [(0, 0), (along_u, along_v), (-along_u, -along_v)] {
-            low += image.at(x + tu - du, y + tv - dv);
-            high += image.at(x + tu + du, y + tv + dv);
+            low += image.whole(x + tu - du, y + tv - dv);
+            high += image.whole(x + tu + du, y + tv + dv);
         }
         n += 3.0;
         q += s.stride;
     }
-    low.min(high) / n
+    low.min(high) as f32 / n
 }
 
-/// Samples for which the noise model counts.
-const BELIEF: f32 = 10.0;
-/// Grey levels that are no light, but whose square is no denormal number: those take a CPU many times as long.
-const DARK: f32 = 1e-9;
-/// Share of a number's information that is left at least where another number explains it: what f32 can tell from nothing.
-const LEAST: f32 = 1e-5;
-/// Share of the ceiling over which clipped pixels fall silent: at once, and rounding would decide.
-const SOFT: f32 = 0.05;
-
-// The digits of the shader.
-#[allow(clippy::approx_constant)]
-/// e to the power of x from -80 to 80, to 2e-7 of itself: every machine has its own `exp`, this one is the shader's.
-#[inline(always)]
-pub(super) fn exponential(x: f32) -> f32 {
-    let t = (x * std::f32::consts::LOG2_E).clamp(-120.0, 120.0);
-    let whole = (t + 0.5).floor();
-    let f = t - whole;
-    let p = 0.009_618_129 + f * (0.001_333_356 + f * 0.000_154_035_3);
-    let p = 1.0 + f * (0.693_147_2 + f * (0.240_226_5 + f * (0.055_504_11 + f * p)));
-    p * f32::from_bits(((whole as i32 + 127) as u32) << 23)
+/// What is known of a place before its profile is fitted.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Seen {
+    /// Unit vector across the stripe.
+    pub n: (f32, f32),
+    /// Level beside the stripe.
+    pub base: f32,
 }
 
-/// Fisher scoring of amplitude, offset and width on the profile. Variance of a pixel: read noise + gain · level +
-/// speckle² · light². A saturated pixel says only "at least this bright".
+/// Puts the profiles of up to [`LANES`] skeleton pixels side by side.
 #[inline(always)]
-pub(super) fn gaussian<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak {
-    let n = direction(image, x, y, s);
-    let base = background(image, x, y, n.0, n.1, s);
-    let profile = Profile::new(image, (x, y), n, s);
-    let (m0, mut a) = profile.guess(base, s);
-    // The width that is expected of the profile.
-    let s0 = (s.s0 * s.s0 + profile.blur2).sqrt();
-    let (mut m, mut w) = (m0, s0);
-    // A weak belief that the width is the expected one keeps two or three lit pixels solvable.
-    let prior = 4.0 / (s0 * s0);
-    let (mut i11, mut squares, mut believed) = (0f32, 0f32, 0f32);
-    let near = profile.span(m0, 3.0 * s0);
-    let saturated = (-profile.half..profile.half).any(|k| share(k, near) > 0.0 && profile.clipped(k) > 0.0);
-    let quiet = s.read2 + s.gain * base;
-    let ceiling = s.full_scale - base;
-    let soft = 1.0 / (SOFT * ceiling).max(1.0);
-    let mut step = 0;
-    while step < s.steps {
-        let inverse = 1.0 / w;
-        let wide = profile.step * inverse;
-        let z0 = (profile.offset - m) * inverse;
-        // Sums over certainty times model squared times z^0, z^1, .. z^4; certainty, residual, model and z^0, z^1, z^2.
-        let (mut e, mut r) = ([[0f32; 5]; 2], [[0f32; 3]; 2]);
-        let (mut chi2, mut count) = ([0f32; 2], [0f32; 2]);
-        for (side, sample) in SIDES.into_iter().enumerate() {
-            let (mut z, dz) = if side == 0 { (z0, wide) } else { (z0 - wide, -wide) };
-            // A Gaussian at equal steps: its ratio from sample to sample falls by a constant factor. From the middle to
-            // both sides, because what has become 0 stays 0.
-            let mut model = a * exponential(-0.5 * (z * z));
-            let mut ratio = exponential(-0.5 * (dz * dz) - dz * z);
-            let fall = exponential(-(wide * wide));
-            for k in (0..profile.half).map(sample) {
-                let inside = share(k, near);
-                if inside > 0.0 {
-                    let (light, lost) = (profile.level(k) - base, profile.clipped(k));
-                    // Clipped pixels pull while the model is below them, and are silent above.
-                    let above = (soft * (model - ceiling) + 0.5).clamp(0.0, 1.0);
-                    let all = inside * profile.weight;
-                    let heard = (1.0 - above * lost).max(1e-3);
-                    let residual = (light - model) + (above * lost) * (model - ceiling);
-                    let inverse = all / (heard * (quiet + model * (s.gain + s.speckle2 * model)));
-                    let certainty = (heard * heard) * inverse;
-                    let pull = (heard * inverse) * residual;
-                    let (mut h, mut p) = (certainty * (model * model), pull * model);
-                    for sum in &mut e[side] {
-                        *sum += h;
-                        h *= z;
-                    }
-                    for sum in &mut r[side] {
-                        *sum += p;
-                        p *= z;
-                    }
-                    chi2[side] += (inverse * residual) * residual;
-                    count[side] += all * heard;
-                }
-                model = (model * ratio).max(DARK);
-                ratio *= fall;
-                z += dz;
-            }
-        }
-        let e: [f32; 5] = std::array::from_fn(|i| e[0][i] + e[1][i]);
-        let r: [f32; 3] = std::array::from_fn(|i| r[0][i] + r[1][i]);
-        // In parts of amplitude, width and width; a prior of nearly nothing keeps darkness solvable.
-        let (h00, h01, h02, h11, h12) = (e[0] + 1e-9, e[1], e[2], e[2] + 1e-9, e[3]);
-        let h22 = e[4] + prior * (w * w);
-        let (g0, g1, g2) = (r[0], r[1], r[2] + (prior * w) * (s0 - w));
-        // Amplitude, then width are eliminated, the centre comes last: d1 is what the light says of it alone. Where it says nothing,
-        // as of a stripe that is clipped all over, rounding shall not make up a certainty.
-        let (l01, l02) = (h01 / h00, h02 / h00);
-        let d2 = (h22 - l02 * h02).max(LEAST * h22);
-        let s12 = h12 - l02 * h01;
-        let l12 = s12 / d2;
-        let d1 = (h11 - (l01 * h01 + l12 * s12)).max(LEAST * h11);
-        let y2 = g2 - l02 * g0;
-        let x1 = (g1 - (l01 * g0 + l12 * y2)) / d1;
-        let x2 = y2 / d2 - l12 * x1;
-        let x0 = g0 / h00 - (l02 * x2 + l01 * x1);
-        // Bounded steps: the model is not linear far from the answer.
-        let da = (a * x0).clamp(-0.5 * a, a);
-        let dm = (w * x1).clamp(-0.7 * s0, 0.7 * s0);
-        let dw = (w * x2).clamp(-0.3 * s0, 0.3 * s0);
-        i11 = (w * w) / d1;
-        // By what this step lowers the squares: they are wanted where the fit ends.
-        let gain = (g0 * (da / a) + g1 * (dm / w)) + g2 * (dw / w);
-        a = (a + da).max(1.0);
-        m = (m + dm).clamp(m0 - 2.0 * s0, m0 + 2.0 * s0);
-        w = (w + dw).clamp(0.3 * s0, 3.0 * s0);
-        (squares, believed) = ((chi2[0] + chi2[1] - gain).max(0.0), (count[0] + count[1]) / profile.weight);
-        step += 1;
-        // The next step would be a tenth of this one and less: far below what noise leaves.
-        if dm.abs() < 1e-2 * s0 && dw.abs() < 3e-2 * s0 && da.abs() < 3e-2 * a {
-            break;
-        }
+pub(super) fn look<G: Grey>(places: &[Place<G>], profiles: &mut Profiles, s: &PeakFrame) -> [Seen; LANES] {
+    let mut seen = [Seen::default(); LANES];
+    // Farther than that neither of the two looks.
+    let reach = (3 * s.lattice_u.max(s.lattice_v)).max((8.0 * s.s0 + 4.0) as i32);
+    let inner = |x: i32, y: i32| x.min(y) >= reach && x < s.width - reach && y < s.height - reach;
+    for (lane, (place, seen)) in places.iter().zip(&mut seen).enumerate() {
+        let (x, y) = place.at();
+        *seen = if inner(x, y) { beside(Inner(place.image), x, y, s) } else { beside(place.image, x, y, s) };
+        profiles.put(lane, place, seen.n, seen.base, s);
     }
-    // A sample is the weighted mean of pixels that err independently: its variance is a pixel's times this.
-    let share = profile.square / profile.weight;
-    // Where the noise is larger than the model says, the centre is less certain by the same factor. Few samples tell
-    // little of it, so where it seems smaller the model counts for ten samples.
-    let free = (believed - 3.0).max(1.0);
-    let chi2 = squares / share;
-    let noise = (chi2 / free).max((BELIEF + chi2) / (BELIEF + free));
-    let sigma = (i11 * share * noise).max(0.0).sqrt();
-    let width = (w * w - profile.blur2).max(0.01 * s.s0 * s.s0).sqrt();
-    finish(x, y, n, m, a, base, width, sigma, saturated, s)
+    seen
+}
+
+#[inline(always)]
+fn beside<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Seen {
+    let n = direction(image, x, y, s);
+    Seen { n, base: background(image, x, y, n.0, n.1, s) }
+}
+
+/// Peaks of up to [`LANES`] skeleton pixels: their profiles, then the Gaussians of all of them at once.
+#[inline(always)]
+pub(super) fn gaussians<G: Grey>(
+    places: &[Place<G>],
+    profiles: &mut Profiles,
+    s: &PeakFrame,
+    mut take: impl FnMut(Peak),
+) {
+    let seen = look(places, profiles, s);
+    let found = scoring::gaussians(profiles, places.len(), s);
+    for (lane, (place, Seen { n, base })) in places.iter().zip(seen).enumerate() {
+        let (x, y) = place.at();
+        let [m, a, width, sigma, clipped] =
+            [found.m, found.a, found.width, found.sigma, found.clipped].map(|v| v.0[lane]);
+        let peak = finish(x, y, n, m, a, base, width, sigma, clipped > 0.0, s);
+        take(Peak { pixel: place.pixel, shot: place.shot, ..peak });
+    }
 }
 
 #[inline(always)]

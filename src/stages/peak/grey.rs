@@ -1,9 +1,35 @@
 //! In: a picture. Out: its grey levels by column and row, whatever its depth.
 //! Frame and unit: px, grey levels.
 
-/// Grey levels with the border repeated, as f32.
+/// Grey levels of a picture.
 pub(crate) trait Grey: Copy + Sync {
-    fn at(&self, x: i32, y: i32) -> f32;
+    /// The level of a pixel in the picture.
+    fn inside(&self, x: i32, y: i32) -> i32;
+    /// With the border repeated.
+    fn whole(&self, x: i32, y: i32) -> i32;
+    /// Four in a row, the first in the picture; what lies beyond its right border is any of its levels.
+    fn four(&self, x: i32, y: i32) -> [i32; 4];
+
+    /// With the border repeated.
+    #[inline(always)]
+    fn level(&self, x: i32, y: i32) -> f32 {
+        self.whole(x, y) as f32
+    }
+}
+
+/// A skeleton pixel of a picture, x | y << 16.
+#[derive(Clone, Copy)]
+pub(crate) struct Place<G> {
+    pub(crate) image: G,
+    pub(crate) pixel: u32,
+    pub(crate) shot: u32,
+}
+
+impl<G> Place<G> {
+    #[inline(always)]
+    pub(super) fn at(&self) -> (i32, i32) {
+        ((self.pixel & 0xffff) as i32, (self.pixel >> 16) as i32)
+    }
 }
 
 /// A picture as it lies in memory: rows from the top, sizes in px.
@@ -14,10 +40,41 @@ pub(crate) struct View<'a, T> {
     pub(crate) height: i32,
 }
 
-impl<T: Copy + Sync + Into<f32>> Grey for View<'_, T> {
+impl<T: Copy + Sync + Into<i32>> Grey for View<'_, T> {
     #[inline(always)]
-    fn at(&self, x: i32, y: i32) -> f32 {
-        let (x, y) = (x.clamp(0, self.width - 1), y.clamp(0, self.height - 1));
+    fn inside(&self, x: i32, y: i32) -> i32 {
         self.pixels[(y * self.width + x) as usize].into()
+    }
+    #[inline(always)]
+    fn whole(&self, x: i32, y: i32) -> i32 {
+        self.inside(x.clamp(0, self.width - 1), y.clamp(0, self.height - 1))
+    }
+    #[inline(always)]
+    fn four(&self, x: i32, y: i32) -> [i32; 4] {
+        let from = (y * self.width + x) as usize;
+        match self.pixels.get(from..from + 4) {
+            Some(&[a, b, c, d]) => [a, b, c, d].map(Into::into),
+            // The last row's end.
+            _ => [0, 1, 2, 3].map(|i| self.whole(x + i, y)),
+        }
+    }
+}
+
+/// The same picture for places whose surroundings all lie in it.
+#[derive(Clone, Copy)]
+pub(super) struct Inner<G>(pub G);
+
+impl<G: Grey> Grey for Inner<G> {
+    #[inline(always)]
+    fn inside(&self, x: i32, y: i32) -> i32 {
+        self.0.inside(x, y)
+    }
+    #[inline(always)]
+    fn whole(&self, x: i32, y: i32) -> i32 {
+        self.0.inside(x, y)
+    }
+    #[inline(always)]
+    fn four(&self, x: i32, y: i32) -> [i32; 4] {
+        self.0.four(x, y)
     }
 }

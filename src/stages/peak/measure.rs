@@ -3,9 +3,9 @@
 
 use super::found::Peak;
 use super::grey::{Grey, View};
-use super::params::{PeakParams, Stripe};
+use super::params::{Method, PeakParams, Stripe};
 use super::scatter::{Scatter, Sums};
-use super::{PeakFrame, fit};
+use super::{PeakFrame, twin};
 use crate::raster::{Image, Pixels};
 use crate::stages::stripe::choose_params::ChooseParams;
 
@@ -56,15 +56,15 @@ pub fn measure(image: &Image, skeleton: &[u32], p: &PeakParams, across: [f32; 2]
 
 /// Width and squared residuals of the peaks that can be believed: clipped light hides both, and a spot of one pixel is a hot pixel.
 fn fits<G: Grey>(image: G, sample: &[(i32, i32)], s: &PeakFrame) -> Vec<(f32, Sums)> {
-    let mut pixels = Vec::new();
-    sample
-        .iter()
-        .filter_map(|&(x, y)| {
-            let k = fit::gaussian(image, x, y, s);
-            let usable = k.flags == 0 && k.snr > 10.0 && (0.4 * s.s0..2.5 * s.s0).contains(&k.width_px);
-            if usable { Some((k.width_px, residuals(image, x, y, &k, s, &mut pixels)?)) } else { None }
-        })
-        .collect()
+    let (mut pixels, mut fits) = (Vec::new(), Vec::new());
+    let skeleton: Vec<u32> = sample.iter().map(|&(x, y)| x as u32 | (y as u32) << 16).collect();
+    for (k, &(x, y)) in twin::each(image, &skeleton, 0, s, Method::Gaussian).iter().zip(sample) {
+        let usable = k.flags == 0 && k.snr > 10.0 && (0.4 * s.s0..2.5 * s.s0).contains(&k.width_px);
+        if usable && let Some(sums) = residuals(image, x, y, k, s, &mut pixels) {
+            fits.push((k.width_px, sums));
+        }
+    }
+    fits
 }
 
 /// A pixel that takes part: its weight, its residual, and what the model says of it: derivatives, light, variance.
@@ -129,7 +129,7 @@ fn window<G: Grey>(
             let (a, b) = (x + di, y + dj);
             if (d - m0).abs() <= half && a >= 0 && b >= 0 && a < s.width && b < s.height {
                 let fade = (1.0 - s.along_factor * (t * t)).max(0.0);
-                visit(d, fade * fade, image.at(a, b));
+                visit(d, fade * fade, image.inside(a, b) as f32);
             }
         }
         i += 1;

@@ -2,56 +2,83 @@
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels.
 
 use super::PeakFrame;
-use super::fit::{background, direction, exponential, finish};
+use super::fit::{Seen, background, finish, look};
 use super::found::Peak;
-use super::grey::Grey;
-use super::profile::{Profile, SIDES, share};
+use super::grey::{Grey, Place};
+use super::lanes::{Lanes, exponential};
+use super::profile::{Profiles, number, share};
 
 /// Centre of gravity of the light above the background, within three widths of a first guess.
 #[inline(always)]
-pub(super) fn centroid<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak {
-    let n = direction(image, x, y, s);
-    let base = background(image, x, y, n.0, n.1, s);
-    let profile = Profile::new(image, (x, y), n, s);
-    let (m0, _) = profile.guess(base, s);
-    let near = profile.span(m0, 3.0 * s.s0);
-    let quiet = s.read2 + s.gain * base;
+pub(super) fn centroids<G: Grey>(
+    places: &[Place<G>],
+    profiles: &mut Profiles,
+    s: &PeakFrame,
+    mut take: impl FnMut(Peak),
+) {
+    let seen = look(places, profiles, s);
+    let (m0, _) = profiles.guess(s);
+    let near = profiles.span(m0, Lanes::all(3.0 * s.s0));
+    let quiet = Lanes::all(s.read2) + s.gain * profiles.base;
     // In samples.
-    let z = (m0 - profile.offset) / profile.step;
-    let (mut sum, mut moment, mut second, mut noise) = ([0f32; 2], [0f32; 2], [0f32; 2], [0f32; 2]);
-    let (mut top, mut saturated) = (0f32, false);
-    for (side, sample) in SIDES.into_iter().enumerate() {
-        for k in (0..profile.half).map(sample) {
-            let inside = share(k, near);
-            let (light, d) = (inside * (profile.level(k) - base), k as f32);
-            sum[side] += light;
-            moment[side] += light * d;
-            second[side] += light * (d * d);
+    let z = (m0 - profiles.offset) / profiles.step;
+    let none = [Lanes::ZERO; 2];
+    let (mut sum, mut moment, mut second, mut noise) = (none, none, none, none);
+    let (mut top, mut clipped) = (Lanes::ZERO, Lanes::ZERO);
+    for side in 0..2 {
+        let samples = profiles.levels[side][..profiles.half].iter().zip(&profiles.clipped[side]);
+        for (j, (&level, &lost)) in samples.enumerate() {
+            let d = number(side, j);
+            let inside = share(d, near);
+            let light = inside * (level - profiles.base);
+            sum[side] = sum[side] + light;
+            moment[side] = moment[side] + d * light;
+            second[side] = second[side] + (d * d) * light;
             top = top.max(light);
-            saturated = saturated || (inside > 0.0 && profile.clipped(k) > 0.0);
-            let (e, lit) = (inside * (d - z), light.max(0.0));
-            noise[side] += (e * e) * (quiet + s.gain * light + s.speckle2 * (lit * lit));
+            clipped = clipped.max(lost.with(inside, |lost, inside| if inside > 0.0 { lost } else { 0.0 }));
+            let (e, lit) = (inside * (Lanes::all(d) - z), light.max(Lanes::ZERO));
+            noise[side] = noise[side] + (e * e) * (quiet + s.gain * light + s.speckle2 * (lit * lit));
         }
     }
     let all = sum[0] + sum[1];
     let middle = (moment[0] + moment[1]) / all;
-    let centre = (profile.offset + profile.step * middle).clamp(m0 - 2.0 * s.s0, m0 + 2.0 * s.s0);
-    let m = if all > 0.0 { centre } else { m0 };
-    let spread = (second[0] + second[1]) / all.max(1e-6) - middle * middle;
-    let width = ((profile.step * profile.step) * spread - profile.blur2).max(0.0).sqrt();
-    let share = profile.square / (profile.weight * profile.weight);
-    let sigma = profile.step.abs() * ((noise[0] + noise[1]) * share).sqrt() / all.max(1e-6);
-    finish(x, y, n, m, top.max(1.0), base, width, sigma, saturated, s)
+    let reach = Lanes::all(2.0 * s.s0);
+    let centre = (profiles.offset + profiles.step * middle).clamp(m0 - reach, m0 + reach);
+    let m = Lanes(std::array::from_fn(|l| if all.0[l] > 0.0 { centre.0[l] } else { m0.0[l] }));
+    let least = all.max(Lanes::all(1e-6));
+    let spread = (second[0] + second[1]) / least - middle * middle;
+    let width = ((profiles.step * profiles.step) * spread - profiles.blur2).max(Lanes::ZERO).sqrt();
+    let share = profiles.square / (profiles.weight * profiles.weight);
+    let sigma = profiles.step.map(f32::abs) * ((noise[0] + noise[1]) * share).sqrt() / least;
+    for (lane, (place, Seen { n, base })) in places.iter().zip(seen).enumerate() {
+        let (x, y) = place.at();
+        let [m, top, width, sigma, clipped] = [m, top, width, sigma, clipped].map(|v| v.0[lane]);
+        let peak = finish(x, y, n, m, top.max(1.0), base, width, sigma, clipped > 0.0, s);
+        take(Peak { pixel: place.pixel, shot: place.shot, ..peak });
+    }
+}
+
+/// Centres by derivatives, each where the centre of gravity is.
+#[inline(always)]
+pub(super) fn derivatives<G: Grey>(
+    places: &[Place<G>],
+    profiles: &mut Profiles,
+    s: &PeakFrame,
+    mut take: impl FnMut(Peak),
+) {
+    let seen = look(places, profiles, s);
+    let (m0, _) = profiles.guess(s);
+    for (lane, (place, seen)) in places.iter().zip(seen).enumerate() {
+        let peak = derivative(place.image, place.at(), m0.0[lane], seen, s);
+        take(Peak { pixel: place.pixel, shot: place.shot, ..peak });
+    }
 }
 
 /// Steger's line point: second-order Taylor expansion of the picture smoothed with a Gaussian of sigma
 /// width / √3 or more, which is where the response to a bar has one maximum (\[steger98\] sec. 2.2).
 #[inline(always)]
-pub(super) fn derivative<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak {
-    let n = direction(image, x, y, s);
-    let base = background(image, x, y, n.0, n.1, s);
+fn derivative<G: Grey>(image: G, (x, y): (i32, i32), m0: f32, Seen { n, base }: Seen, s: &PeakFrame) -> Peak {
     // The expansion holds within half a pixel: it starts at the pixel nearest to the centre of gravity.
-    let (m0, _) = Profile::new(image, (x, y), n, s).guess(base, s);
     let (dx, dy) = ((m0 * n.0 + 0.5).floor() as i32, (m0 * n.1 + 0.5).floor() as i32);
     let (cx, cy) = (x + dx, y + dy);
     let sigma = (s.s0 / 3f32.sqrt()).max(0.8);
@@ -60,9 +87,9 @@ pub(super) fn derivative<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Pe
     let (mut top, mut saturated) = (0f32, false);
     for j in -r..=r {
         for i in -r..=r {
-            let level = image.at(cx + i, cy + j);
+            let level = image.level(cx + i, cy + j);
             let d = i as f32 * n.0 + j as f32 * n.1;
-            let kernel = exponential(-0.5 * inverse * (i * i + j * j) as f32);
+            let kernel = exponential(Lanes::all(-0.5 * inverse * (i * i + j * j) as f32)).0[0];
             let first = kernel * d * inverse;
             // Derivatives along the normal only: there the expansion is one-dimensional.
             d1 += first * (level - base);
@@ -87,10 +114,12 @@ const EVEN: f32 = 0.288_675_13;
 
 /// The pixel itself, on a stripe that lies as it should and is as wide as expected.
 #[inline(always)]
-pub(super) fn pixel<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Peak {
+pub(super) fn pixel<G: Grey>(place: &Place<G>, s: &PeakFrame) -> Peak {
+    let (image, (x, y)) = (place.image, place.at());
     let sign = if s.across_v < 0.0 { -1.0 } else { 1.0 };
     let n = (sign * s.across_u, sign * s.across_v);
     let base = background(image, x, y, n.0, n.1, s);
-    let level = image.at(x, y);
-    finish(x, y, n, 0.0, (level - base).max(1.0), base, s.s0, EVEN, level >= s.full_scale, s)
+    let level = image.level(x, y);
+    let peak = finish(x, y, n, 0.0, (level - base).max(1.0), base, s.s0, EVEN, level >= s.full_scale, s);
+    Peak { pixel: place.pixel, shot: place.shot, ..peak }
 }

@@ -1,33 +1,37 @@
-//! In: a picture, a skeleton pixel, the direction across the stripe. Out: the stripe's profile there, averaged along it.
+//! In: pictures, skeleton pixels, the directions across the stripe. Out: the stripe's profiles there, averaged along it, side by side.
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels. docs/math.md, Stripe peak (2).
 
 use super::PeakFrame;
-use super::grey::Grey;
+use super::grey::{Grey, Place};
+use super::lanes::Lanes;
 use super::params::SAMPLES;
 
 /// Weights along the stripe are whole numbers up to this: sums are then exact, and four pixels of a word add up in two
 /// multiplications.
 const WEIGHT: f32 = 127.0;
 
-/// The stripe's light over the offset across, sample k at `offset + k step`, k = -half..half. Pixels beside each other
-/// along the stripe are added up along an image axis, a wide stripe's columns in groups of four, each shifted by whole
-/// pixels to follow the line; what the shifts leave, and the rows of a sample, widens the profile by `blur2`, which is
-/// known.
-pub(super) struct Profile {
-    /// Grey levels, and the shares of the weights of saturated pixels; sample k at k + half.
-    levels: [f32; SAMPLES],
-    clipped: [f32; SAMPLES],
-    pub half: i32,
+/// The stripe's light over the offset across, one profile a lane, which know nothing of each other: sample k at `offset + k step`,
+/// k = -half..half. Pixels beside each other along the stripe are added up along an image axis, a wide stripe's columns in groups of
+/// four, each shifted by whole pixels to follow the line; what the shifts leave, and the rows of a sample, widens the profile by
+/// `blur2`, which is known.
+pub(super) struct Profiles {
+    /// Grey levels, from the middle to both sides, as the shader walks: k = 0, 1, .. and k = -1, -2, ..
+    pub levels: [[Lanes; SAMPLES / 2]; 2],
+    /// Shares of the weights of saturated pixels.
+    pub clipped: [[Lanes; SAMPLES / 2]; 2],
+    pub half: usize,
     /// First and last sample that lies in the picture.
-    low: f32,
-    high: f32,
-    pub offset: f32,
-    pub step: f32,
+    low: Lanes,
+    high: Lanes,
+    pub offset: Lanes,
+    pub step: Lanes,
     /// Sum of the weights along the stripe, and of their squares.
-    pub weight: f32,
-    pub square: f32,
+    pub weight: Lanes,
+    pub square: Lanes,
     /// Variance of the pixels' offsets within a sample, px^2.
-    pub blur2: f32,
+    pub blur2: Lanes,
+    /// Level beside the stripe.
+    pub base: Lanes,
 }
 
 /// Columns where the stripe is nearer to the horizontal, else rows; at 45 degrees rounding shall not decide.
@@ -35,118 +39,208 @@ pub(super) fn by_columns((nx, ny): (f32, f32)) -> bool {
     1.001 * ny >= nx.abs()
 }
 
-/// Samples from the middle to both sides, as the shader walks: upwards k = 0, 1, .. and downwards k = -1, -2, ..
-pub(super) const SIDES: [fn(i32) -> i32; 2] = [|j| j, |j| -1 - j];
+/// Number of sample j of a side.
+#[inline(always)]
+pub(super) fn number(side: usize, j: usize) -> f32 {
+    if side == 0 { j as f32 } else { -1.0 - j as f32 }
+}
 
 /// How much of sample k lies in a span: a sample that were in or out would hang on the last bit of the span's ends.
 #[inline(always)]
-pub(super) fn share(k: i32, (from, to): (f32, f32)) -> f32 {
-    ((k as f32 - from).min(to - k as f32) + 0.5).clamp(0.0, 1.0)
+pub(super) fn share(k: f32, (from, to): (Lanes, Lanes)) -> Lanes {
+    let k = Lanes::all(k);
+    ((k - from).min(to - k) + Lanes::all(0.5)).clamp(Lanes::ZERO, Lanes::all(1.0))
 }
 
-impl Profile {
+/// The window of a profile: a counts along the image axis that the stripe is nearer to, b across it.
+struct Window {
+    columns: bool,
+    a0: i32,
+    b0: i32,
+    /// The normal along a and b.
+    na: f32,
+    nb: f32,
+    /// First and last a that lie in the picture; a group's middle.
+    begin: i32,
+    end: i32,
+    middle: f32,
+    /// 1 / R^2 along a.
+    fade: f32,
+    /// Samples that are read.
+    from: i32,
+    to: i32,
+}
+
+impl Window {
+    /// Weight of the pixels i beside the skeleton's.
     #[inline(always)]
-    pub fn level(&self, k: i32) -> f32 {
-        self.levels[(k + self.half) as usize]
+    fn weight(&self, i: i32) -> i32 {
+        let f = (1.0 - self.fade * (i * i) as f32).max(0.0);
+        if self.a0 + i <= self.end { (WEIGHT * (f * f) + 0.5) as i32 } else { 0 }
     }
-    /// The share of a sample's weight that is saturated.
+    /// Whole pixels by which a group follows the line. Not + 0.5: at 45 degrees rounding would decide.
     #[inline(always)]
-    pub fn clipped(&self, k: i32) -> f32 {
-        self.clipped[(k + self.half) as usize]
+    fn shift(&self, a: i32) -> i32 {
+        (-(((a - self.a0) as f32 + self.middle) * self.na) / self.nb + 0.47).floor() as i32
     }
-    /// Where the samples begin and end that lie within `reach` of m, in their numbers; not whole.
+}
+
+/// Weighted sums over the pixels of a window; samples at k + half.
+struct Gathered {
+    levels: [f32; SAMPLES],
+    clipped: [f32; SAMPLES],
+    sum: f32,
+    square: f32,
+    moment: f32,
+    second: f32,
+}
+
+impl Gathered {
+    /// Weights of a group's pixels, whose first lies at this offset across.
     #[inline(always)]
-    pub fn span(&self, m: f32, reach: f32) -> (f32, f32) {
-        let (a, b) = ((m - reach - self.offset) / self.step, (m + reach - self.offset) / self.step);
-        (a.min(b).max(self.low - 0.5), a.max(b).min(self.high + 0.5))
+    fn weigh(&mut self, c: f32, na: f32, f: [f32; 4]) {
+        let all = (f[0] + f[1]) + (f[2] + f[3]);
+        let run = na * (f[1] + (2.0 * f[2] + 3.0 * f[3]));
+        let run2 = (na * na) * (f[1] + (4.0 * f[2] + 9.0 * f[3]));
+        self.sum += all;
+        self.square += (f[0] * f[0] + f[1] * f[1]) + (f[2] * f[2] + f[3] * f[3]);
+        self.moment += c * all + run;
+        self.second += c * (c * all + 2.0 * run) + run2;
     }
 
+    /// One row of each sample, pixel by pixel along the window.
     #[inline(always)]
-    pub fn new<G: Grey>(image: G, (x, y): (i32, i32), (nx, ny): (f32, f32), s: &PeakFrame) -> Profile {
-        let columns = by_columns((nx, ny));
-        let (na, nb) = if columns { (nx, ny) } else { (ny, nx) };
-        let (x0, y0, width, height) = if columns { (x, y, s.width, s.height) } else { (y, x, s.height, s.width) };
-        let at = |a: i32, b: i32| if columns { image.at(a, b) } else { image.at(b, a) };
-        // A wide stripe's columns go in groups of four, as they lie in memory; all else goes one by one.
-        let fours = columns && s.fours > 0;
-        let (mask, size, middle) = if fours { (!3, 4, 1.5f32) } else { (!0, 1, 0.0) };
-        let left = if fours { (x0 - 2 * s.fours + 2) & !3 } else { x0 - s.reach_along };
-        let right = if fours { left + 4 * s.fours - 1 } else { x0 + s.reach_along };
-        let (begin, end) = (left.max(0), right.min(width - 1));
-        let fade = s.along_factor / (nb * nb);
-        let weight = |i: i32| {
-            let f = (1.0 - fade * (i * i) as f32).max(0.0);
-            if x0 + i <= end { (WEIGHT * (f * f) + 0.5) as i32 } else { 0 }
-        };
-        // Whole pixels by which a group follows the line. Not + 0.5: at 45 degrees rounding would decide.
-        let shift = |a: i32| (-(((a - x0) as f32 + middle) * na) / nb + 0.47).floor() as i32;
-        let (stride, tall) = (s.stride_across, s.stride_across * s.rows);
-        let last = end & mask;
-        // Samples whose rows all lie in the picture.
-        let low = -(y0 + shift(begin).min(shift(last))).div_euclid(tall);
-        let high = (height - 1 - shift(begin).max(shift(last)) - y0 - (tall - stride)).div_euclid(tall);
-        let half = 2 * s.quads();
-        let (mut sum, mut square, mut moment, mut second) = (0f32, 0f32, 0f32, 0f32);
-        let (mut levels, mut clipped) = ([0f32; SAMPLES], [0f32; SAMPLES]);
-        for row in (0..tall).step_by(stride as usize) {
-            for a in (begin..=end).step_by(size) {
-                let b = shift(a) + row;
-                let c = b as f32 * nb + (a - x0) as f32 * na;
-                let mut g = [0i32; 4];
-                for q in 0..size {
-                    g[q] = weight(a + q as i32 - x0);
-                }
-                let f = g.map(|g| g as f32);
-                let all = (f[0] + f[1]) + (f[2] + f[3]);
-                let run = na * (f[1] + (2.0 * f[2] + 3.0 * f[3]));
-                let run2 = (na * na) * (f[1] + (4.0 * f[2] + 9.0 * f[3]));
-                sum += all;
-                square += (f[0] * f[0] + f[1] * f[1]) + (f[2] * f[2] + f[3] * f[3]);
-                moment += c * all + run;
-                second += c * (c * all + 2.0 * run) + run2;
-                for k in (-half).max(low)..half.min(high + 1) {
-                    let (mut light, mut full) = (0, 0);
-                    for q in 0..size {
-                        let level = at(a + q as i32, y0 + b + k * tall);
-                        light += g[q] * level as i32;
-                        full += if level >= s.full_scale { g[q] } else { 0 };
-                    }
-                    levels[(k + half) as usize] += light as f32;
-                    clipped[(k + half) as usize] += full as f32;
+    fn singles<G: Grey>(&mut self, image: G, w: &Window, row: i32, tall: i32, half: i32, full_scale: i32) {
+        for a in w.begin..=w.end {
+            let b = w.shift(a) + row;
+            let g = w.weight(a - w.a0);
+            self.weigh(b as f32 * w.nb + (a - w.a0) as f32 * w.na, w.na, [g as f32, 0.0, 0.0, 0.0]);
+            for k in w.from..w.to {
+                let across = w.b0 + b + k * tall;
+                let level = if w.columns { image.inside(a, across) } else { image.inside(across, a) };
+                self.levels[(k + half) as usize] += (g * level) as f32;
+                if level >= full_scale {
+                    self.clipped[(k + half) as usize] += g as f32;
                 }
             }
         }
-        let (mean, scale) = (moment / sum, 1.0 / sum);
-        Profile {
-            levels: levels.map(|v| v * scale),
-            clipped: clipped.map(|v| v * scale),
-            half,
-            low: low as f32,
-            high: high as f32,
-            offset: mean,
-            step: tall as f32 * nb,
-            weight: sum / WEIGHT,
-            square: square / (WEIGHT * WEIGHT),
-            blur2: (second / sum - mean * mean).max(0.0),
+    }
+
+    /// The same of a wide stripe by columns, four at a time.
+    #[inline(always)]
+    fn fours<G: Grey>(&mut self, image: G, w: &Window, row: i32, tall: i32, half: i32, full_scale: i32) {
+        for a in (w.begin..=w.end).step_by(4) {
+            let b = w.shift(a) + row;
+            let i = a - w.a0;
+            let g = [w.weight(i), w.weight(i + 1), w.weight(i + 2), w.weight(i + 3)];
+            let f = [g[0] as f32, g[1] as f32, g[2] as f32, g[3] as f32];
+            self.weigh(b as f32 * w.nb + i as f32 * w.na, w.na, f);
+            for k in w.from..w.to {
+                let [p, q, r, s] = image.four(a, w.b0 + b + k * tall);
+                self.levels[(k + half) as usize] += ((g[0] * p + g[1] * q) + (g[2] * r + g[3] * s)) as f32;
+                if p.max(q).max(r.max(s)) >= full_scale {
+                    let full = |level: i32, g: i32| if level >= full_scale { g } else { 0 };
+                    let full = (full(p, g[0]) + full(q, g[1])) + (full(r, g[2]) + full(s, g[3]));
+                    self.clipped[(k + half) as usize] += full as f32;
+                }
+            }
         }
+    }
+}
+
+impl Profiles {
+    pub fn new(s: &PeakFrame) -> Profiles {
+        let none = [[Lanes::ZERO; SAMPLES / 2]; 2];
+        let [zero, one] = [0.0, 1.0].map(Lanes::all);
+        Profiles {
+            levels: none,
+            clipped: none,
+            half: 2 * s.quads() as usize,
+            low: zero,
+            high: zero,
+            offset: zero,
+            step: one,
+            weight: one,
+            square: one,
+            blur2: zero,
+            base: zero,
+        }
+    }
+
+    /// Puts the profile at a place into a lane; `base` is the level beside the stripe.
+    #[inline(always)]
+    pub fn put<G: Grey>(&mut self, lane: usize, place: &Place<G>, (nx, ny): (f32, f32), base: f32, s: &PeakFrame) {
+        let (x, y) = place.at();
+        let columns = by_columns((nx, ny));
+        let (na, nb) = if columns { (nx, ny) } else { (ny, nx) };
+        let (a0, b0, width, height) = if columns { (x, y, s.width, s.height) } else { (y, x, s.height, s.width) };
+        // A wide stripe's columns go in groups of four, as they lie in memory; all else goes one by one.
+        let fours = columns && s.fours > 0;
+        let (mask, middle) = if fours { (!3, 1.5f32) } else { (!0, 0.0) };
+        let left = if fours { (a0 - 2 * s.fours + 2) & !3 } else { a0 - s.reach_along };
+        let right = if fours { left + 4 * s.fours - 1 } else { a0 + s.reach_along };
+        let (begin, end) = (left.max(0), right.min(width - 1));
+        let fade = s.along_factor / (nb * nb);
+        let mut window = Window { columns, a0, b0, na, nb, begin, end, middle, fade, from: 0, to: 0 };
+        let (stride, tall) = (s.stride_across, s.stride_across * s.rows);
+        let (first, last) = (window.shift(begin), window.shift(end & mask));
+        // Samples whose rows all lie in the picture.
+        let low = -(b0 + first.min(last)).div_euclid(tall);
+        let high = (height - 1 - first.max(last) - b0 - (tall - stride)).div_euclid(tall);
+        let half = self.half as i32;
+        (window.from, window.to) = ((-half).max(low), half.min(high + 1));
+        let none = [0.0; SAMPLES];
+        let mut seen = Gathered { levels: none, clipped: none, sum: 0.0, square: 0.0, moment: 0.0, second: 0.0 };
+        let full_scale = s.full_scale as i32;
+        for row in 0..s.rows {
+            if fours {
+                seen.fours(place.image, &window, row * stride, tall, half, full_scale);
+            } else {
+                seen.singles(place.image, &window, row * stride, tall, half, full_scale);
+            }
+        }
+        let (sum, mean, scale) = (seen.sum, seen.moment / seen.sum, 1.0 / seen.sum);
+        for j in 0..self.half {
+            for (side, at) in [(0, self.half + j), (1, self.half - 1 - j)] {
+                self.levels[side][j].0[lane] = seen.levels[at] * scale;
+                self.clipped[side][j].0[lane] = seen.clipped[at] * scale;
+            }
+        }
+        self.low.0[lane] = low as f32;
+        self.high.0[lane] = high as f32;
+        self.offset.0[lane] = mean;
+        self.step.0[lane] = tall as f32 * nb;
+        self.weight.0[lane] = sum / WEIGHT;
+        self.square.0[lane] = seen.square / (WEIGHT * WEIGHT);
+        self.blur2.0[lane] = (seen.second / sum - mean * mean).max(0.0);
+        self.base.0[lane] = base;
+    }
+
+    /// Where the samples begin and end that lie within `reach` of m, in their numbers; not whole.
+    #[inline(always)]
+    pub fn span(&self, m: Lanes, reach: Lanes) -> (Lanes, Lanes) {
+        let (a, b) = ((m - reach - self.offset) / self.step, (m + reach - self.offset) / self.step);
+        (a.min(b).max(self.low - Lanes::all(0.5)), a.max(b).min(self.high + Lanes::all(0.5)))
     }
 
     /// First guess of offset and amplitude: centre of gravity and sum above the background. A window of 1.5 widths:
     /// neighbours of the stripe shall not pull.
     #[inline(always)]
-    pub fn guess(&self, background: f32, s: &PeakFrame) -> (f32, f32) {
-        let near = self.span(0.0, 1.5 * s.s0 + 0.5);
-        let (mut sum, mut moment) = ([0f32; 2], [0f32; 2]);
-        for (side, sample) in SIDES.into_iter().enumerate() {
-            for k in (0..self.half).map(sample) {
-                let light = share(k, near) * (self.level(k) - background).max(0.0);
-                sum[side] += light;
-                moment[side] += light * k as f32;
+    pub fn guess(&self, s: &PeakFrame) -> (Lanes, Lanes) {
+        let near = self.span(Lanes::ZERO, Lanes::all(1.5 * s.s0 + 0.5));
+        let (mut sum, mut moment) = ([Lanes::ZERO; 2], [Lanes::ZERO; 2]);
+        for side in 0..2 {
+            for (j, &level) in self.levels[side][..self.half].iter().enumerate() {
+                let k = number(side, j);
+                let light = share(k, near) * (level - self.base).max(Lanes::ZERO);
+                sum[side] = sum[side] + light;
+                moment[side] = moment[side] + light * Lanes::all(k);
             }
         }
         let (sum, moment) = (sum[0] + sum[1], moment[0] + moment[1]);
         let count = near.1 - near.0;
-        let m = if sum > 0.0 { self.offset + self.step * (moment / sum) } else { 0.0 };
-        (m, (1.25 * sum / count.max(1e-6)).max(1.0))
+        let centre = self.offset + self.step * (moment / sum);
+        let m = centre.with(sum, |c, sum| if sum > 0.0 { c } else { 0.0 });
+        (m, (1.25 * sum / count.max(Lanes::all(1e-6))).max(Lanes::all(1.0)))
     }
 }

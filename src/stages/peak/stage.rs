@@ -4,9 +4,11 @@
 use super::found::Peak;
 use super::frame;
 use super::frame::{SHARED, frame_of};
-use super::grey::Grey;
+use super::grey::{Grey, Place};
+use super::lanes::LANES;
 use super::params::Method;
-use super::twin::one;
+use super::profile::Profiles;
+use super::twin::measured;
 use crate::gpu::Access::*;
 use crate::gpu::{Binding, Stage};
 use crate::stages::frame::PX_LOG2;
@@ -58,12 +60,19 @@ struct Packed<'a> {
 
 impl Grey for Packed<'_> {
     #[inline(always)]
-    fn at(&self, x: i32, y: i32) -> f32 {
-        let (x, y) = (x.clamp(0, self.width - 1), y.clamp(0, self.height - 1));
+    fn inside(&self, x: i32, y: i32) -> i32 {
         let bits = 32 >> self.px_log2;
         let place = x as u32 & ((1 << self.px_log2) - 1);
         let word = self.words[(y * self.pitch + (x >> self.px_log2)) as usize];
-        (word >> (place * bits) & ((1u32 << bits) - 1)) as f32
+        (word >> (place * bits) & ((1u32 << bits) - 1)) as i32
+    }
+    #[inline(always)]
+    fn whole(&self, x: i32, y: i32) -> i32 {
+        self.inside(x.clamp(0, self.width - 1), y.clamp(0, self.height - 1))
+    }
+    #[inline(always)]
+    fn four(&self, x: i32, y: i32) -> [i32; 4] {
+        [0, 1, 2, 3].map(|i| self.whole(x + i, y))
     }
 }
 
@@ -74,13 +83,19 @@ pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     let px_log2 = value(PX_LOG2);
     let method = Method::ALL[value(METHOD) as usize];
     let [_, image, header, points, peaks, strongest] = b else { unreachable!() };
+    let place = |p: &[u32]| {
+        let from = (p[1] * f.shot_words) as usize;
+        let words = &image[from..from + f.shot_words as usize];
+        let image = Packed { words, pitch: f.pitch as i32, width: f.width, height: f.height, px_log2 };
+        Place { image, pixel: p[0], shot: p[1] }
+    };
     let mut found: Vec<Peak> = points[..2 * header[3] as usize]
-        .par_chunks_exact(2)
-        .map(|p| {
-            let from = (p[1] * f.shot_words) as usize;
-            let words = &image[from..from + f.shot_words as usize];
-            let view = Packed { words, pitch: f.pitch as i32, width: f.width, height: f.height, px_log2 };
-            one(view, p[0], p[1], &f, method)
+        .par_chunks(2 * LANES)
+        .flat_map_iter(|some| {
+            let places: Vec<_> = some.chunks_exact(2).map(place).collect();
+            let (mut peaks, mut profiles) = (Vec::with_capacity(LANES), Profiles::new(&f));
+            measured(&places, &mut profiles, &f, method, |peak| peaks.push(peak));
+            peaks
         })
         .collect();
     for k in &mut found {

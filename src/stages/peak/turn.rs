@@ -45,20 +45,26 @@ pub(super) fn turn<const N: usize>(s0: f32, lattice: (i32, i32), k: [f64; N], up
     normal.cholesky().map_or([0.0; N], |c| std::array::from_fn(|j| c.solve(&right)[j] as f32))
 }
 
-/// Places of the gradients and their weights (1 - r² / 16)² in 64ths: every other one of a lattice, because a gradient looks at
-/// its four neighbours, which lie on the other colour of the board.
-pub(super) const GRADIENTS: [(i32, i32, i32); 13] = [
-    (0, 0, 64),
-    (-1, -1, 49),
-    (1, -1, 49),
-    (-1, 1, 49),
-    (1, 1, 49),
-    (0, -2, 36),
-    (-2, 0, 36),
-    (2, 0, 36),
-    (0, 2, 36),
-    (-2, -2, 16),
-    (2, -2, 16),
-    (-2, 2, 16),
-    (2, 2, 16),
+/// Weights (1 - r² / 16)² of the gradients in 64ths: of the rows two above and two below the pixel, of its own, and of those one
+/// step away along both axes.
+pub(super) const EVEN_ROW: [i32; 3] = [16, 36, 16];
+pub(super) const MIDDLE_ROW: [i32; 3] = [36, 64, 36];
+pub(super) const DIAGONAL: i32 = 49;
+
+/// Places of the gradients and their weights: every other one of a lattice, because a gradient looks at its four neighbours, which
+/// lie on the other colour of the board.
+const GRADIENTS: [(i32, i32, i32); 13] = [
+    (0, 0, MIDDLE_ROW[1]),
+    (-1, -1, DIAGONAL),
+    (1, -1, DIAGONAL),
+    (-1, 1, DIAGONAL),
+    (1, 1, DIAGONAL),
+    (0, -2, EVEN_ROW[1]),
+    (-2, 0, MIDDLE_ROW[0]),
+    (2, 0, MIDDLE_ROW[2]),
+    (0, 2, EVEN_ROW[1]),
+    (-2, -2, EVEN_ROW[0]),
+    (2, -2, EVEN_ROW[2]),
+    (-2, 2, EVEN_ROW[0]),
+    (2, 2, EVEN_ROW[2]),
 ];

@@ -3,8 +3,10 @@
 
 use super::found::Peak;
 use super::frame::PeakFrame;
-use super::grey::{Grey, View};
+use super::grey::{Grey, Place, View};
+use super::lanes::LANES;
 use super::params::{Method, PeakParams};
+use super::profile::Profiles;
 use super::{fit, methods};
 use crate::raster::{Image, Pixels};
 use crate::stages::stripe::choose_params::ChooseParams;
@@ -36,20 +38,28 @@ pub const TOGETHER: usize = 256;
 #[multiversion(targets = "simd")]
 pub fn each<G: Grey>(image: G, pixels: &[u32], shot: u32, frame: &PeakFrame, method: Method) -> Vec<Peak> {
     let mut peaks = Vec::with_capacity(pixels.len());
-    for &pixel in pixels {
-        peaks.push(one(image, pixel, shot, frame, method));
+    let mut profiles = Profiles::new(frame);
+    for some in pixels.chunks(LANES) {
+        let mut places = [Place { image, pixel: 0, shot }; LANES];
+        places.iter_mut().zip(some).for_each(|(place, &pixel)| place.pixel = pixel);
+        measured(&places[..some.len()], &mut profiles, frame, method, |peak| peaks.push(peak));
     }
     peaks
 }
 
+/// The peaks of up to [`LANES`] places, in their order; `profiles` is memory that is used again.
 #[inline(always)]
-pub fn one<G: Grey>(image: G, pixel: u32, shot: u32, frame: &PeakFrame, method: Method) -> Peak {
-    let (x, y) = ((pixel & 0xffff) as i32, (pixel >> 16) as i32);
-    let peak = match method {
-        Method::Gaussian => fit::gaussian(image, x, y, frame),
-        Method::Centroid => methods::centroid(image, x, y, frame),
-        Method::Derivative => methods::derivative(image, x, y, frame),
-        Method::Pixel => methods::pixel(image, x, y, frame),
-    };
-    Peak { pixel, shot, ..peak }
+pub(super) fn measured<G: Grey>(
+    places: &[Place<G>],
+    profiles: &mut Profiles,
+    frame: &PeakFrame,
+    method: Method,
+    take: impl FnMut(Peak),
+) {
+    match method {
+        Method::Gaussian => fit::gaussians(places, profiles, frame, take),
+        Method::Centroid => methods::centroids(places, profiles, frame, take),
+        Method::Derivative => methods::derivatives(places, profiles, frame, take),
+        Method::Pixel => places.iter().map(|place| methods::pixel(place, frame)).for_each(take),
+    }
 }

@@ -47,6 +47,11 @@ impl Eye {
     /// A picture that was begun after now.
     pub fn picture(&mut self, arm: &mut dyn Arm, beam: Option<Beam>) -> Result<Image> {
         self.light(arm, beam)?;
+        self.fresh()
+    }
+
+    /// A picture that was begun after now, in whatever light there is.
+    pub fn fresh(&mut self) -> Result<Image> {
         let triggered = self.camera.trigger()?;
         let since = if triggered { None } else { self.camera.clock()?.map(|c| c.there_ns) };
         let mut pass_over = if triggered || since.is_some() { 0 } else { ON_THEIR_WAY };

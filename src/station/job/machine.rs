@@ -3,12 +3,14 @@
 //! Frame and unit: base frame; mm, mm/s, degrees, s.
 
 use super::eye::Eye;
+use super::lit::line_is_seen;
 use super::operator::{Ask, Operator};
 use super::places;
 use super::record::Record;
 use super::report::JobReport;
+use super::shoot::{settle, shoot};
 use super::state::{JobState, Phase};
-use crate::arm::rules::{Evidence, Guard, Plan};
+use crate::arm::rules::{Confirmation, Evidence, Guard, Plan, Proposal};
 use crate::arm::{Arm, Motion, Way};
 use crate::fault::{Fault, Gate, Result};
 use crate::find::insert::picture;
@@ -25,7 +27,7 @@ use crate::station::scan::run::ScanOptions;
 use crate::station::settings::Settings;
 use crate::station::volume;
 use std::path::PathBuf;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// What a job works on.
 #[derive(Clone, Debug)]
@@ -63,8 +65,6 @@ pub struct Job<'a> {
     since: Instant,
 }
 
-/// The arm stands still so long before a picture is taken, ms.
-const SETTLE: Duration = Duration::from_millis(5);
 /// Touches of one board lie about its plane by less than this share of the view's distance: a board's thickness is more.
 const ONE_PLANE: f64 = 0.002;
 /// A known part lies so near to the picture's middle, as a share of the field's short side.
@@ -150,6 +150,17 @@ impl<'a> Job<'a> {
         Ok(report)
     }
 
+    /// Goes back up instead of on, and ends there.
+    ///
+    /// # Errors
+    /// As [`Job::run`].
+    pub fn back_out(mut self) -> Result<JobReport> {
+        if self.state.phase != Phase::Done {
+            self.state.phase = Phase::Retract;
+        }
+        self.run()
+    }
+
     /// After a crash: a scan that was not finished is made anew; after a motion that was cut off the tool backs out.
     fn pick_up(&mut self) -> Result<()> {
         if !self.state.moving {
@@ -208,22 +219,41 @@ impl<'a> Job<'a> {
         plan: Plan,
         each: &mut dyn FnMut(&mut Eye, &mut dyn Arm, usize) -> Result<()>,
     ) -> Result<()> {
-        let proposal = self.guard.propose(plan)?;
-        if !proposal.passed() {
-            return Err(Fault::refused(format!("{step}: {}", proposal.missed().join("; ")))
-                .next("look at what is named, then begin again"));
-        }
-        let Some(yes) = self.operator.confirm(&Ask { step, says, question, proposal: &proposal })? else {
-            return Err(Fault::refused(format!("stopped at '{step}' by the operator"))
-                .next("begin again when the cell is ready"));
-        };
+        let (proposal, yes) = self.agreed(step, &says, question, plan)?;
         self.state.confirmations += 1;
         self.state.moving = true;
         self.store()?;
         let eye = &mut self.eye;
-        self.guard.make(&proposal, yes, &mut |arm, k| each(eye, arm, k))?;
+        let made = self.guard.make(&proposal, yes, &mut |arm, k| each(eye, arm, k));
+        self.operator.over();
+        made?;
         self.state.moving = false;
         self.store()
+    }
+
+    /// Proposes until somebody has said yes or no.
+    fn agreed(
+        &mut self,
+        step: &'static str,
+        says: &[String],
+        question: &'static str,
+        plan: Plan,
+    ) -> Result<(Proposal, Confirmation)> {
+        loop {
+            let proposal = self.guard.propose(plan.clone())?;
+            if !proposal.passed() {
+                return Err(Fault::refused(format!("{step}: {}", proposal.missed().join("; ")))
+                    .next("look at what is named, then begin again"));
+            }
+            let ask = Ask { step, says: says.to_vec(), question, proposal: &proposal };
+            if let Some(yes) = self.operator.confirm(&ask)? {
+                return Ok((proposal, yes));
+            }
+            if !self.operator.again() {
+                return Err(Fault::refused(format!("stopped at '{step}' by the operator"))
+                    .next("begin again when the cell is ready"));
+            }
+        }
     }
 
     fn plan(&self, name: &str, why: String, legs: Vec<Motion>, evidence: Evidence) -> Plan {
@@ -318,6 +348,7 @@ impl<'a> Job<'a> {
     /// Looks squarely at the board, and sweeps the line over it.
     fn scan(&mut self) -> Result<Phase> {
         let Some([centre, normal]) = self.state.surface else { return Ok(Phase::Touch) };
+        line_is_seen(&mut self.eye, self.guard.link(), &self.rig, &self.settings, &self.options.out.join("lit"))?;
         let hand_eye = self.rig.need_hand_eye()?.value;
         let camera = self.rig.need_camera()?.value;
         let depth = volume::view(&self.settings, &self.rig)?.middle();
@@ -340,7 +371,7 @@ impl<'a> Job<'a> {
         let mut record = Record::begin(&self.options.out.join("line"), "scan", Beam::Line, self.eye.format())?;
         self.go("scan", says, "is the path free?", plan, &mut |eye, arm, k| match k {
             0 => {
-                std::thread::sleep(SETTLE);
+                settle();
                 let at = arm.pose()?;
                 record.ambient(&eye.picture(arm, None)?, &at)
             }
@@ -484,26 +515,6 @@ impl<'a> Job<'a> {
         }
         Ok(Phase::Done)
     }
-}
-
-/// A picture of a beam with the pose at which it was taken; the arm stood still before and after, or it is refused.
-fn shoot(eye: &mut Eye, arm: &mut dyn Arm, record: &mut Record, beam: Option<Beam>) -> Result<()> {
-    /// As far apart as two readings of an arm that stands may be, mm and rad.
-    const STILL: [f64; 2] = [0.01, 1e-4];
-    std::thread::sleep(SETTLE);
-    let before = arm.pose()?;
-    let picture = eye.picture(arm, beam)?;
-    let after = arm.pose()?;
-    let (angle, mm) = before.base_from_flange.difference(&after.base_from_flange);
-    if mm > STILL[0] || angle > STILL[1] {
-        return Err(Fault::refused(format!(
-            "the arm moved by {mm:.3} mm while the picture was taken, limit {}",
-            STILL[0]
-        ))
-        .cause("it still swings, or somebody jogs it")
-        .next("begin again"));
-    }
-    record.shot(&picture, &after)
 }
 
 fn written(numbers: &[f64]) -> String {

@@ -3,15 +3,18 @@
 //! Frame and unit: base frame; mm, degrees.
 
 pub(in crate::station) mod eye;
+mod lit;
 mod machine;
 mod operator;
 mod places;
 mod record;
 mod report;
+mod shoot;
 mod state;
 
 pub use eye::Eye;
 pub use machine::{Job, JobOptions};
 pub use operator::{Ask, Operator};
+pub(in crate::station) use record::Record;
 pub use report::{JobReport, Outcome};
 pub use state::{JobState, Phase};

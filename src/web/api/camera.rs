@@ -28,7 +28,7 @@ pub struct After {
 /// GET /camera/newest?after=: number, columns, rows, number of peaks (u32), delay in ms (float), then u, v (float) and fate (u32) of
 /// each peak, then the grey levels; 204 where none came within a second.
 pub async fn newest(State(screen): State<Arc<Screen>>, Query(ask): Query<After>) -> Answer<Response> {
-    let Some(camera) = &screen.camera else {
+    let Some(camera) = screen.camera() else {
         return Err(Fault::input("no camera: the screen was served without --camera")
             .next("start it with --camera URI")
             .into());

@@ -4,7 +4,7 @@
 use super::answer::{Answer, beside, body, json, operates};
 use crate::fault::{Fault, Result};
 use crate::web::guard::{Tab, resolve};
-use crate::web::message::{Job, Order};
+use crate::web::message::{BoardView, Job, Order};
 use crate::web::screen::{JOBS, Screen};
 use crate::web::work;
 use axum::body::Bytes;
@@ -38,30 +38,34 @@ pub async fn order(
     Ok((StatusCode::ACCEPTED, job))
 }
 
-/// POST /jobs/{id}/stop, /resume, /accept
+/// POST /jobs/{id}/stop, /resume, /back_out, /accept
 pub async fn act(
     State(screen): Shared,
     Extension(tab): Extension<Tab>,
     UrlPath((id, what)): UrlPath<(String, String)>,
 ) -> Answer<Json<Job>> {
-    // Everybody may stop: it moves nothing.
+    // Everybody may stop.
     if what != "stop" {
         operates(&screen, &tab)?;
     }
     json(screen, move |s| match what.as_str() {
         "stop" => s.jobs.stop(&id),
-        "resume" => s.jobs.resume(&id),
+        "resume" => s.jobs.resume(&id, false),
+        "back_out" => s.jobs.resume(&id, true),
         "accept" => {
             let job = work::accept(&s.jobs, &s.jobs.get(&id)?)?;
             s.forget();
             Ok(job)
         }
-        other => {
-            Err(Fault::usage(format!("{other:?}: nothing of that name is done with a job"))
-                .next("stop, resume or accept"))
-        }
+        other => Err(Fault::usage(format!("{other:?}: nothing of that name is done with a job"))
+            .next("stop, resume, back_out or accept")),
     })
     .await
+}
+
+/// GET /jobs/{id}/views
+pub async fn views(State(screen): Shared, UrlPath(id): UrlPath<String>) -> Answer<Json<Vec<BoardView>>> {
+    json(screen, move |s| s.views.of(&s.jobs, &id)).await
 }
 
 /// DELETE /jobs/{id}

@@ -1,11 +1,11 @@
-//! In: a button that goes down over a pose, and one that was held. Out: one motion to that pose, or why not.
-//! Frame and unit: poses by their hash; mm.
+//! In: a robot to arm, a button that goes down over a motion that is shown, is held, is let go. Out: that motion, once; or why not.
+//! Frame and unit: motions by their hash.
 
 use super::answer::{Answer, body, json, operates};
 use crate::fault::{Fault, Result};
 use crate::web::guard::Tab;
-use crate::web::message::{Confirmed, Grant, Job, JobState, Outcome, Redeem, RobotPoses};
-use crate::web::screen::Screen;
+use crate::web::message::{Arming, Confirmed, Grant, InTheCell, JobState, MotionState, Redeem};
+use crate::web::screen::{JOBS, Screen};
 use axum::body::Bytes;
 use axum::extract::State;
 use axum::{Extension, Json};
@@ -14,64 +14,88 @@ use std::sync::Arc;
 
 type Shared = State<Arc<Screen>>;
 
+/// GET /motion
+pub async fn state(State(screen): Shared) -> Json<MotionState> {
+    Json(screen.desk.state())
+}
+
+/// POST /robot: arms it from this tab, or gives it back.
+pub async fn arm(State(screen): Shared, Extension(tab): Extension<Tab>, bytes: Bytes) -> Answer<Json<MotionState>> {
+    operates(&screen, &tab)?;
+    let ask: Arming = body(&bytes)?;
+    json(screen, move |s| if ask.armed { s.desk.arm(&tab) } else { s.desk.disarm() }).await
+}
+
+/// POST /robot/looked: a person has looked at the robot.
+pub async fn looked(State(screen): Shared, Extension(tab): Extension<Tab>) -> Answer<Json<MotionState>> {
+    operates(&screen, &tab)?;
+    json(screen, |s| s.desk.looked()).await
+}
+
 /// POST /motion/press: the button goes down. Answers the name under which it can be redeemed once.
 pub async fn press(State(screen): Shared, Extension(tab): Extension<Tab>, bytes: Bytes) -> Answer<Json<Grant>> {
     operates(&screen, &tab)?;
     let what: Confirmed = body(&bytes)?;
-    json(screen, move |s| {
-        shown(s, &what)?;
-        Ok(Grant { grant: s.grants.give(&tab, what) })
-    })
-    .await
+    json(screen, move |s| s.desk.press(&tab, &what).map(|grant| Grant { grant })).await
 }
 
-/// POST /motion/go: it was held long enough.
+/// POST /motion/go: it was held long enough, and is held on.
 pub async fn go(State(screen): Shared, Extension(tab): Extension<Tab>, bytes: Bytes) -> Answer<Json<Value>> {
     operates(&screen, &tab)?;
     let ask: Redeem = body(&bytes)?;
+    json(screen, move |s| s.desk.go(&tab, &ask.grant, &ask.what).map(|()| object!({}))).await
+}
+
+/// POST /motion/refuse: no; the job ends.
+pub async fn refuse(State(screen): Shared, Extension(tab): Extension<Tab>, bytes: Bytes) -> Answer<Json<Value>> {
+    operates(&screen, &tab)?;
+    let what: Confirmed = body(&bytes)?;
+    json(screen, move |s| s.desk.refuse(&what).map(|()| object!({}))).await
+}
+
+/// POST /motion/release: the button was let go. Needs no lease: who lost it lets go too.
+pub async fn release(State(screen): Shared, Extension(tab): Extension<Tab>) -> Answer<Json<Value>> {
     json(screen, move |s| {
-        s.grants.redeem(&ask.grant, &tab, &ask.what)?;
-        shown(s, &ask.what)?;
-        Err::<Value, _>(
-            Fault::refused("this screen moves no robot: nothing was moved")
-                .cause("it reads the controller's state at most")
-                .next("take the numbers over to the controller"),
-        )
+        s.desk.let_go(&tab, "the button was let go");
+        Ok(object!({}))
     })
     .await
 }
 
-/// POST /motion/release: the button was let go before its time.
-pub async fn release(State(screen): Shared, Extension(tab): Extension<Tab>) -> Answer<Json<Value>> {
+/// POST /stop: everybody may.
+pub async fn stop(State(screen): Shared) -> Answer<Json<Value>> {
+    json(screen, |s| {
+        // The robot first: what is on the disk can wait.
+        s.desk.stop();
+        for job in s.jobs.list(JOBS) {
+            if matches!(job.state, JobState::Running | JobState::Queued) {
+                // One that has just ended needs no stop.
+                let _ = s.jobs.stop(&job.id);
+            }
+        }
+        Ok(object!({}))
+    })
+    .await
+}
+
+/// POST /simulated: what a person does in the simulated cell.
+pub async fn simulated(
+    State(screen): Shared,
+    Extension(tab): Extension<Tab>,
+    bytes: Bytes,
+) -> Answer<Json<MotionState>> {
     operates(&screen, &tab)?;
-    screen.grants.drop_all();
-    Ok(Json(object!({})))
-}
-
-/// The poses that a confirmation names, where they still are those that were shown and nothing newer was found.
-fn shown(screen: &Screen, what: &Confirmed) -> Result<RobotPoses> {
-    let job = screen.jobs.get(&what.job)?;
-    let old = |why: &str| {
-        Err(Fault::refused(why).cause("nothing was moved").next("look at the newest position and hold its button"))
-    };
-    let Some(poses) = poses_of(&job) else { return old("this job has no pose: a gate was missed, or it is not done") };
-    if poses.hash != what.hash {
-        return old("the pose is not the one that was shown");
-    }
-    // What was found later, and every scan that began later, makes a pose old: the part may have been moved for it.
-    let newer = screen.jobs.list(usize::MAX).into_iter().find(|j| {
-        j.id > job.id
-            && (matches!(j.outcome, Some(Outcome::Find(_)) | Some(Outcome::Scan(_))) || j.state == JobState::Running)
-    });
-    match newer {
-        Some(j) => old(&format!("the pose is older than {}", j.id)),
-        None => Ok(poses),
-    }
-}
-
-fn poses_of(job: &Job) -> Option<RobotPoses> {
-    match &job.outcome {
-        Some(Outcome::Find(p)) if job.state == JobState::Done && p.passed => p.poses.clone(),
-        _ => None,
-    }
+    let ask: InTheCell = body(&bytes)?;
+    json(screen, move |s| -> Result<MotionState> {
+        let Some(cell) = &s.desk.links.simulated else {
+            return Err(Fault::refused("this cell is not a simulated one of this program")
+                .next("jog the arm with its own pendant"));
+        };
+        if s.desk.has_job() {
+            return Err(Fault::refused("a job has the robot").next("wait until it has ended, or stop it"));
+        }
+        cell.put(ask.holds.as_deref(), ask.over_board)?;
+        Ok(s.desk.told())
+    })
+    .await
 }

@@ -130,6 +130,11 @@ fn smaller(image: &Image, width: Option<u32>) -> Image {
     Image::from_u8(w, h, out)
 }
 
+/// GET /boards
+pub async fn boards(State(screen): State<Arc<Screen>>) -> Answer<Json<Vec<String>>> {
+    json(screen, |s| work::boards(&s.place)).await
+}
+
 /// GET /recipes
 pub async fn recipes(State(screen): State<Arc<Screen>>) -> Answer<Json<Vec<RecipeText>>> {
     json(screen, |s| work::recipes(&s.place)).await

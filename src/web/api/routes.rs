@@ -107,11 +107,17 @@ pub fn routes() -> Vec<Route> {
         route(("DELETE", "/jobs/{id}"), "Take a job and its files away", ("", ""), delete(jobs::remove)).leased(),
         route(
             ("POST", "/jobs/{id}/{what}"),
-            "stop, resume or accept a job; stop needs no lease",
+            "stop, resume, back_out or accept a job; stop needs no lease",
             ("", "Job"),
             post(jobs::act),
         )
         .leased(),
+        route(
+            ("GET", "/jobs/{id}/views"),
+            "Newest pictures of a calibration by the robot, with the corners that were found",
+            ("", "BoardView[]"),
+            get(jobs::views),
+        ),
         route(("GET", "/jobs/{id}/files/{*name}"), "A file that a job left", ("", BYTES), get(jobs::file)),
         route(
             ("GET", "/scans/{id}/map"),
@@ -138,16 +144,52 @@ pub fn routes() -> Vec<Route> {
             post(surface::measured),
         ),
         route(("GET", "/scans/{id}/points"), "Points to look at (most=)", ("", BYTES), get(surface::points)),
+        route(("GET", "/motion"), "The robot as it may be moved from here", ("", "MotionState"), get(motion::state)),
+        route(
+            ("POST", "/robot"),
+            "Arm the robot from this tab, or give it back",
+            ("Arming", "MotionState"),
+            post(motion::arm),
+        )
+        .leased(),
+        route(
+            ("POST", "/robot/looked"),
+            "Somebody has looked at the robot after a motion that was stopped",
+            ("", "MotionState"),
+            post(motion::looked),
+        )
+        .leased(),
         route(
             ("POST", "/motion/press"),
-            "The button over a pose goes down",
+            "The button over a motion goes down",
             ("Confirmed", "Grant"),
             post(motion::press),
         )
         .leased(),
-        route(("POST", "/motion/go"), "It was held: move to that pose, once", ("Redeem", ""), post(motion::go))
+        route(
+            ("POST", "/motion/go"),
+            "It was held: make that motion, once; say 'held GRANT' over the WebSocket while it is held on",
+            ("Redeem", ""),
+            post(motion::go),
+        )
+        .leased(),
+        route(("POST", "/motion/refuse"), "No: the job that asks ends", ("Confirmed", ""), post(motion::refuse))
             .leased(),
-        route(("POST", "/motion/release"), "It was let go", ("", ""), post(motion::release)).leased(),
+        route(
+            ("POST", "/motion/release"),
+            "The button was let go: what moves is halted",
+            ("", ""),
+            post(motion::release),
+        ),
+        route(("POST", "/stop"), "STOP: what moves is halted, every job ends", ("", ""), post(motion::stop)),
+        route(
+            ("POST", "/simulated"),
+            "What a person does in the simulated cell: a component into the gripper, the arm jogged",
+            ("InTheCell", "MotionState"),
+            post(motion::simulated),
+        )
+        .leased(),
+        route(("GET", "/boards"), "Names of the station's calibration boards", ("", ""), get(place::boards)),
         route(
             ("GET", "/support"),
             "Settings, jobs and machine for somebody who helps",

@@ -8,7 +8,7 @@ use crate::web::guard::{Tab, verify};
 use crate::web::message::{Event, Knock, Lease, Session, TakeLease};
 use crate::web::screen::Screen;
 use axum::body::Bytes;
-use axum::extract::{State, WebSocketUpgrade};
+use axum::extract::{Query, State, WebSocketUpgrade};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
@@ -70,7 +70,7 @@ pub async fn take(
         screen.leases.take(&tab, ask.firmly)?;
         let lease = screen.leases.state();
         if before != lease.holder {
-            screen.grants.drop_all();
+            screen.desk.handed_over();
             screen.hub.tell(&Event::Bar(screen.bar()));
         }
         Ok(lease)
@@ -83,21 +83,47 @@ pub async fn release(State(screen): State<Arc<Screen>>, Extension(tab): Extensio
     operates(&screen, &tab)?;
     json(screen, move |screen| {
         screen.leases.release(&tab);
-        screen.grants.drop_all();
+        screen.desk.let_go(&tab, "the operator let another screen operate");
         screen.hub.tell(&Event::Bar(screen.bar()));
         Ok(screen.leases.state())
     })
     .await
 }
 
-/// GET /events: the WebSocket.
-pub async fn events(State(screen): State<Arc<Screen>>, upgrade: WebSocketUpgrade) -> Answer<Response> {
+/// Which tab looks on.
+#[derive(serde::Deserialize)]
+pub struct Who {
+    #[serde(default)]
+    tab: String,
+}
+
+/// GET /events: the WebSocket. A tab that holds the button says `held GRANT` over it; its end halts what that tab moves.
+pub async fn events(
+    State(screen): State<Arc<Screen>>,
+    Extension(asks): Extension<Tab>,
+    Query(who): Query<Who>,
+    upgrade: WebSocketUpgrade,
+) -> Answer<Response> {
     let Some(seat) = screen.hub.sit() else {
         let fault = Fault::refused("64 browsers look on already").next("close one of them");
         return Err(Refusal(StatusCode::SERVICE_UNAVAILABLE, fault));
     };
     let hub = screen.hub.clone();
-    // What viewers send is short: they have nothing to say.
+    // What viewers send is short.
     let upgrade = upgrade.max_message_size(1024).max_write_buffer_size(8 << 20);
-    Ok(upgrade.on_upgrade(move |socket| stream(socket, hub, seat, move || screen.state())))
+    let name: String = who.tab.chars().filter(char::is_ascii_alphanumeric).take(32).collect();
+    let tab = if name.is_empty() { asks } else { Tab { tab: name, ..asks } };
+    Ok(upgrade.on_upgrade(async move |socket| {
+        let hears = |text: &str| match text.split_once(' ') {
+            // Who holds the button operates.
+            Some(("held", grant)) if screen.desk.held(&tab, grant) => {
+                if screen.leases.need(&tab).is_err() {
+                    screen.desk.let_go(&tab, "the operator's lease was lost");
+                }
+            }
+            _ => {}
+        };
+        stream(socket, hub, seat, || screen.state(), hears).await;
+        screen.desk.let_go(&tab, "the screen that held the button is gone");
+    }))
 }

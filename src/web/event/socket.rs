@@ -15,12 +15,13 @@ const PATIENCE: Duration = Duration::from_secs(20);
 /// Rows of the growing map are sent this often at most.
 const PICTURE: Duration = Duration::from_millis(100);
 
-/// Serves one viewer until it goes. `state` is asked for at first and whenever events were missed.
+/// Serves one viewer until it goes. `state` is asked for at first and whenever events were missed; `hears` gets what it says.
 pub async fn stream(
     mut socket: WebSocket,
     hub: Arc<Hub>,
     (_seat, mut events): (Seat, Receiver<Arc<str>>),
     state: impl Fn() -> Event + Send,
+    hears: impl Fn(&str) + Send,
 ) {
     let mut pictures = interval(PICTURE);
     pictures.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -41,7 +42,8 @@ pub async fn stream(
             },
             _ = pictures.tick() => next = rows(&hub, &mut shown),
             heard = socket.recv() => match heard {
-                // Viewers have nothing to say here; what they order goes through the API.
+                // All that viewers say here is that a button is held; what they order goes through the API.
+                Some(Ok(Message::Text(text))) => hears(&text),
                 Some(Ok(Message::Close(_))) | Some(Err(_)) | None => return,
                 Some(Ok(_)) => {}
             },

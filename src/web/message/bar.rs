@@ -25,6 +25,8 @@ pub enum RobotState {
     NoLink,
     /// Its state is read, it is never moved.
     ReadOnly,
+    /// It was taken for motions, each of which is confirmed.
+    Armed,
     /// It moves.
     Moving,
 }
@@ -70,6 +72,8 @@ pub struct Bar {
     pub mode: Mode,
     /// Name of the station.
     pub station: String,
+    /// A camera was named.
+    pub camera: bool,
     /// What the robot may do.
     pub robot: RobotState,
     /// Whether the line is on; null where nobody switches it from here.

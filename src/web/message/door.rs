@@ -30,27 +30,13 @@ pub struct TakeLease {
     pub firmly: bool,
 }
 
-/// Which of a position's poses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, TS)]
-#[serde(rename_all = "snake_case")]
-pub enum Goal {
-    /// Above the insertion.
-    Approach,
-    /// The tool at its place.
-    Insertion,
-    /// Above it, on the way back.
-    Retract,
-}
-
 /// What a person confirms by holding the button.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct Confirmed {
-    /// The job that found the pose.
+    /// The job that asks.
     pub job: String,
-    /// Which pose.
-    pub goal: Goal,
-    /// `hash` of the poses that were shown.
+    /// `hash` of the motion that was shown.
     pub hash: String,
 }
 

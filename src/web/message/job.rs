@@ -1,7 +1,7 @@
 //! In: nothing. Out: a job as pages and disk know it, and what is told of it while it runs.
 //! Frame and unit: times in UTC, RFC 3339.
 
-use super::{Bar, Order, Outcome};
+use super::{Bar, MotionState, Order, Outcome};
 use crate::fault::{Fault, Kind};
 use serde::{Deserialize, Serialize};
 use ts_rs::TS;
@@ -88,11 +88,15 @@ pub enum Event {
         bar: Bar,
         /// Newest first, at most 200.
         jobs: Vec<Job>,
+        /// The robot as it may be moved from here.
+        motion: Box<MotionState>,
     },
     /// Once a second, and when something in it changes.
     Bar(Bar),
     /// A job began, went on or ended.
     Job(Box<Job>),
+    /// Arming, what waits for a person, what a job says.
+    Motion(Box<MotionState>),
     /// A job was taken away.
     Gone(String),
 }

@@ -4,6 +4,7 @@
 mod bar;
 mod door;
 mod job;
+mod motion;
 mod order;
 mod outcome;
 mod place;
@@ -11,14 +12,18 @@ mod surface;
 mod typescript;
 
 pub use bar::{Bar, CalibrationAge, Frames, Lease, Mode, RobotState};
-pub use door::{Confirmed, Goal, Grant, Knock, Redeem, Session, TakeLease};
+pub use door::{Confirmed, Grant, Knock, Redeem, Session, TakeLease};
 pub use job::{Event, Job, JobState, Problem};
-pub use order::{CalibrateOrder, FindOrder, Order, Plain, ScanOrder, Target, TeachOrder, TouchOrder};
+pub use motion::{Arming, Asked, InTheCell, MotionState, SimulatedCell};
+pub use order::{
+    AutoOrder, CalibrateOrder, FindOrder, InsertOrder, JointOrder, Order, Plain, ScanOrder, Target, TeachOrder,
+    TouchOrder,
+};
 pub use outcome::{
-    BenchRow, CalibrationFigures, CheckLine, GateLight, Notation, Outcome, Position, RobotPoses, ScanFigures,
+    BenchRow, CalibrationFigures, CheckLine, GateLight, Inserted, Notation, Outcome, Position, RobotPoses, ScanFigures,
     SurfaceTouched, Term, Touched,
 };
-pub use place::{CalibrationState, PictureRef, RecipeText, RecordingInfo, StationInfo};
+pub use place::{BoardView, CalibrationState, PictureRef, RecipeText, RecordingInfo, StationInfo};
 pub use surface::{
     Distance, Fit, MapHead, Measure, MeasureAnswer, PlaneAsk, PointsAsk, Section, SectionAsk, SectionPoint,
 };

@@ -21,6 +21,12 @@ pub enum Order {
     Touch(TouchOrder),
     /// A calibration from a recording; it is stored when it is accepted.
     Calibrate(CalibrateOrder),
+    /// Camera, hand-eye, laser plane and pointer from any recordings of boards, in one solve; stored when it is accepted.
+    Joint(JointOrder),
+    /// The same by moves of the robot that the program chooses.
+    Auto(AutoOrder),
+    /// A part with the robot: touch, square, scan, find, approach, insert, retract.
+    Insert(InsertOrder),
     /// The time of a shot on this machine, with and without its GPU.
     Benchmark(Plain),
 }
@@ -84,6 +90,47 @@ pub struct CalibrateOrder {
     pub leave_out: Vec<usize>,
 }
 
+/// What is calibrated together.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[serde(deny_unknown_fields)]
+pub struct JointOrder {
+    /// Recordings of boards.
+    pub recordings: Vec<String>,
+}
+
+/// A calibration that drives itself.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[serde(deny_unknown_fields)]
+pub struct AutoOrder {
+    /// Name of the board's description in the station's folder boards.
+    pub board: String,
+    /// Expected error of a scanned point at which it is enough, mm rms.
+    pub target_mm: f64,
+    /// Stops at most, 20 to 200; null: 40.
+    #[serde(default)]
+    #[ts(optional = nullable)]
+    pub most: Option<usize>,
+}
+
+/// An insertion.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[serde(deny_unknown_fields)]
+pub struct InsertOrder {
+    /// Name of the recipe.
+    pub recipe: String,
+    /// The line sweeps over so much about the picture's middle, mm; null: the field's short side.
+    #[serde(default)]
+    #[ts(optional = nullable)]
+    pub sweep_mm: Option<f64>,
+    /// Speed of every motion, mm/s; null: the station's.
+    #[serde(default)]
+    #[ts(optional = nullable)]
+    pub speed_mm_s: Option<f64>,
+    /// Where it was cut off it goes back up instead of on.
+    #[serde(default)]
+    pub back_out: bool,
+}
+
 /// What is calibrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, TS)]
 #[serde(rename_all = "snake_case")]
@@ -126,6 +173,11 @@ pub struct TeachOrder {
 }
 
 impl Order {
+    /// It moves the robot.
+    pub fn moves(&self) -> bool {
+        matches!(self, Order::Auto(_) | Order::Insert(_))
+    }
+
     /// The word that folders and pages call it by.
     pub fn word(&self) -> &'static str {
         match self {
@@ -135,6 +187,9 @@ impl Order {
             Order::Teach(_) => "teach",
             Order::Touch(_) => "touch",
             Order::Calibrate(_) => "calibrate",
+            Order::Joint(_) => "joint",
+            Order::Auto(_) => "auto",
+            Order::Insert(_) => "insert",
             Order::Benchmark(_) => "benchmark",
         }
     }

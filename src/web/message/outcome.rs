@@ -29,6 +29,12 @@ pub enum Outcome {
     Touch(Box<Touched>),
     /// A calibration to be accepted.
     Calibrate(Box<CalibrationFigures>),
+    /// All calibrations of a rig together, to be accepted.
+    Joint(Box<CalibrationFigures>),
+    /// The same by moves of the robot.
+    Auto(Box<CalibrationFigures>),
+    /// The component is in.
+    Insert(Box<Inserted>),
     /// Times of a shot.
     Benchmark {
         /// One a size and processor.
@@ -186,6 +192,27 @@ pub struct GateLight {
     pub limit: f64,
     /// Kept.
     pub passed: bool,
+}
+
+impl From<&crate::fault::Gate> for GateLight {
+    fn from(g: &crate::fault::Gate) -> GateLight {
+        GateLight { name: g.name.into(), value: g.value, limit: g.limit, passed: g.passed }
+    }
+}
+
+/// An insertion that came to its end.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+pub struct Inserted {
+    /// From the beginning to the confirmed position, s.
+    pub time_to_position_s: Option<f64>,
+    /// Motions that were confirmed until then.
+    pub confirmations_to_position: Option<u32>,
+    /// Work and waits, s.
+    pub seconds: f64,
+    /// Motions that were confirmed.
+    pub confirmations: u32,
+    /// Where the part was found; null where it was found before the program was started again.
+    pub found: Option<Position>,
 }
 
 /// What the pointer touched.

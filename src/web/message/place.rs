@@ -69,6 +69,21 @@ pub struct RecordingInfo {
     pub problem: Option<Problem>,
 }
 
+/// A picture of a calibration board.
+#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+pub struct BoardView {
+    /// What it is called.
+    pub name: String,
+    /// Its file, in the job.
+    pub file: String,
+    /// Columns, px.
+    pub width: u32,
+    /// Rows, px.
+    pub height: u32,
+    /// The corners that were found, u and v, px.
+    pub corners: Vec<[f64; 2]>,
+}
+
 /// Which picture of a recording.
 #[derive(Clone, Debug, PartialEq, Deserialize, TS)]
 #[serde(deny_unknown_fields)]

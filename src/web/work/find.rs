@@ -65,7 +65,7 @@ fn keep(this: &Run, report: &Report, picture: &RgbImage) -> Result<()> {
 }
 
 /// The report as the page shows it.
-fn position(r: &Report, recipe: &Recipe, convention: Convention) -> Position {
+pub(super) fn position(r: &Report, recipe: &Recipe, convention: Convention) -> Position {
     let poses = r.poses.as_ref().map(|p| {
         let stated =
             serde_json::to_vec(&(&p.approach.base_from_tool, &p.insertion.base_from_tool, &p.retract.base_from_tool));
@@ -103,11 +103,7 @@ fn position(r: &Report, recipe: &Recipe, convention: Convention) -> Position {
         within_tolerance: r.within_tolerance,
         terms: r.budget.terms.iter().map(term).collect(),
         complete: r.budget.complete,
-        gates: r
-            .gates
-            .iter()
-            .map(|g| GateLight { name: g.name.into(), value: g.value, limit: g.limit, passed: g.passed })
-            .collect(),
+        gates: r.gates.iter().map(GateLight::from).collect(),
         score: r.found.score,
         second_score: r.found.second_score,
         part: r.base_from_part.to_rows(),

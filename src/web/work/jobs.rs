@@ -6,6 +6,7 @@ use super::store::{self, FORMAT, number_of};
 use crate::fault::{Fault, Result};
 use crate::web::event::Hub;
 use crate::web::message::{Event, Frames, Job, JobState, Order, Outcome, Problem};
+use crate::web::motion::Desk;
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -23,6 +24,8 @@ pub struct Jobs {
     pub place: Place,
     /// Who is told.
     pub hub: Arc<Hub>,
+    /// What moves the robot, and who confirms it.
+    pub desk: Arc<Desk>,
     /// Frames of the scan that runs, or of the last one.
     pub frames: Mutex<Frames>,
     state: Mutex<State>,
@@ -50,10 +53,17 @@ pub(super) struct Taken {
 
 impl Jobs {
     /// Reads what there is.
-    pub fn open(place: Place, hub: Arc<Hub>) -> Result<Arc<Jobs>> {
+    pub fn open(place: Place, hub: Arc<Hub>, desk: Arc<Desk>) -> Result<Arc<Jobs>> {
         let all = store::load(&place.jobs())?;
         let state = State { all, waiting: VecDeque::new(), running: None, closing: false };
-        Ok(Arc::new(Jobs { place, hub, frames: Mutex::default(), state: Mutex::new(state), wake: Condvar::new() }))
+        Ok(Arc::new(Jobs {
+            place,
+            hub,
+            desk,
+            frames: Mutex::default(),
+            state: Mutex::new(state),
+            wake: Condvar::new(),
+        }))
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -117,16 +127,22 @@ impl Jobs {
         Ok(job)
     }
 
-    /// Goes on with a job that was cut off or stopped.
-    pub fn resume(&self, id: &str) -> Result<Job> {
+    /// Goes on with a job that was cut off or stopped; `back_out`: an insertion goes back up instead.
+    pub fn resume(&self, id: &str, back_out: bool) -> Result<Job> {
         let mut job = self.get(id)?;
+        if back_out && !matches!(job.order, Order::Insert(_)) {
+            return Err(Fault::usage(format!("{id}: moves no robot, there is nothing to back out of"))
+                .next("take it away, or resume it"));
+        }
         if !matches!(job.state, JobState::CutOff | JobState::Stopped | JobState::Failed) {
             return Err(
                 Fault::usage(format!("{id}: is {:?}, nothing is left to go on with", job.state)).next("order it again")
             );
         }
-        job.state = JobState::Queued;
-        job.problem = None;
+        if let Order::Insert(ask) = &mut job.order {
+            ask.back_out = back_out;
+        }
+        (job.state, job.problem, job.outcome) = (JobState::Queued, None, None);
         self.put(&job)?;
         self.state().waiting.push_back(number_of(id).expect("a job's id"));
         self.wake.notify_all();
@@ -140,6 +156,10 @@ impl Jobs {
         let mut state = self.state();
         if let Some(r) = state.running.as_ref().filter(|r| r.number == number) {
             r.stop.store(true, Ordering::Relaxed);
+            drop(state);
+            if job.order.moves() {
+                self.desk.stop();
+            }
             return Ok(job);
         }
         let waited = state.waiting.len();
@@ -225,7 +245,7 @@ impl Jobs {
             Ok(outcome) => (job.state, job.outcome, job.resumable) = (JobState::Done, Some(outcome), false),
             Err(fault) => {
                 job.state = if stopped { JobState::Stopped } else { JobState::Failed };
-                job.resumable = stopped || matches!(job.order, Order::Scan(_));
+                job.resumable = super::resumes::resumes(&self.folder(&job), &job.order, stopped);
                 job.problem = Some(Problem::from(&fault));
             }
         }

@@ -4,16 +4,18 @@
 mod calibrate;
 mod check;
 mod find;
+mod insert;
 mod jobs;
 mod place;
 mod procedures;
 mod recipes;
+mod resumes;
 mod run;
 mod scan;
 mod store;
 mod worker;
 
-pub use calibrate::accept;
+pub use calibrate::{Views, accept, boards};
 pub use jobs::Jobs;
 pub use place::Place;
 pub use recipes::{recipe_path, recipes, save_recipe};

@@ -20,6 +20,10 @@ impl Place {
     pub fn jobs(&self) -> PathBuf {
         self.station.join("jobs")
     }
+    /// Descriptions of calibration boards.
+    pub fn boards(&self) -> PathBuf {
+        self.station.join("boards")
+    }
     /// Recipes of this station.
     pub fn recipes(&self) -> PathBuf {
         self.station.join("recipes")

@@ -2,7 +2,7 @@
 //! Frame and unit: as the procedures.
 
 use super::run::Run;
-use super::{calibrate, check, find, scan};
+use super::{calibrate, check, find, insert, scan};
 use crate::bench::way_times;
 use crate::fault::Result;
 use crate::geometry::Vec3;
@@ -22,6 +22,9 @@ pub(super) fn run(this: &Run, order: &Order) -> Result<Outcome> {
         Order::Teach(ask) => find::teach(this, ask),
         Order::Touch(ask) => touch(this, &ask.recording),
         Order::Calibrate(ask) => calibrate::calibrate(this, ask.target, &ask.recording, &ask.leave_out),
+        Order::Joint(ask) => calibrate::joint(this, ask),
+        Order::Auto(ask) => calibrate::auto(this, ask),
+        Order::Insert(ask) => insert::insert(this, ask),
         Order::Benchmark(_) => benchmark(),
     }
 }

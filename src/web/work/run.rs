@@ -10,6 +10,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub(super) struct Run {
     /// Of its station.
     pub jobs: Arc<Jobs>,
+    /// Its name.
+    pub id: String,
     /// Its number.
     pub number: u32,
     /// Its folder, made.

@@ -45,7 +45,8 @@ fn one(jobs: &Arc<Jobs>, Taken { mut job, stop }: Taken) {
     let again = job.done > 0 || job.resumable || job.seconds > 0.0;
     job.state = JobState::Running;
     let number = number_of(&job.id).expect("a job's id");
-    let this = Run { jobs: jobs.clone(), number, folder: jobs.folder(&job), again, stop: stop.clone() };
+    let id = job.id.clone();
+    let this = Run { jobs: jobs.clone(), id, number, folder: jobs.folder(&job), again, stop: stop.clone() };
     let order = job.order.clone();
     let ended = jobs.put(&job).and_then(|()| {
         catch_unwind(AssertUnwindSafe(|| run(&this, &order))).unwrap_or_else(|panic| {

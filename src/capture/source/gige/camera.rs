@@ -2,7 +2,7 @@
 //! Frame and unit: the camera's clock in ns.
 
 use super::find::find;
-use super::order::{InOrder, Numbers};
+use super::numbers::Numbers;
 use super::pixels::{depth, unpack};
 use crate::capture::clock::{RoundTrip, now_ns};
 use crate::capture::feature::{Feature, Range, Value};
@@ -66,7 +66,6 @@ pub struct GigeCamera {
     chunk: Option<&'static str>,
     resent: u64,
     heard: Instant,
-    order: InOrder,
     numbers: Numbers,
     /// What it was set to when it began to send: one that lost its power comes back without.
     kept: Vec<(&'static str, String)>,
@@ -115,7 +114,6 @@ impl GigeCamera {
             chunk: None,
             resent: 0,
             heard: Instant::now(),
-            order: InOrder::default(),
             numbers: Numbers::default(),
             kept: Vec::new(),
         };
@@ -160,7 +158,7 @@ impl GigeCamera {
         stream.set_deliver_incomplete(true);
         self.camera.acquisition_start().map_err(|e| said(&at, &e))?;
         self.stream = Some(stream);
-        (self.order, self.numbers) = Default::default();
+        self.numbers = Numbers::default();
         self.heard = Instant::now();
         Ok(())
     }
@@ -219,15 +217,7 @@ impl PictureSource for GigeCamera {
     }
 
     fn next(&mut self, within: Duration) -> Event {
-        if let Some(event) = self.order.take() {
-            return event;
-        }
-        match self.receive(within) {
-            Event::Picture(picture) => self.order.put(picture.id, Event::Picture(picture)),
-            Event::Incomplete { id, why } => self.order.put(id, Event::Incomplete { id, why }),
-            other => return other,
-        }
-        self.order.take().unwrap_or(Event::Quiet)
+        self.receive(within)
     }
 
     fn resent(&self) -> u64 {

@@ -3,7 +3,7 @@
 
 mod camera;
 mod find;
-mod order;
+mod numbers;
 mod pixels;
 
 pub use camera::GigeCamera;

@@ -2,7 +2,7 @@
 //! Frame and unit: base_from_flange, mm, mm/s. Every move is shown and confirmed; what the rules do not allow is not made.
 
 use super::cell::{Cell, Light, Went};
-use crate::arm::rules::{Guard, Limits, Plan};
+use crate::arm::rules::{Confirmation, Guard, Limits, Plan, Proposal};
 use crate::arm::{Motion, Outputs, Reach, Way};
 use crate::capture::PictureSource;
 use crate::fault::{Fault, Result};
@@ -47,6 +47,29 @@ impl<'a> ArmCell<'a> {
                 .cause("station.toml has no [motion]")
                 .next("write [motion] with workspace = { from_mm = [...], to_mm = [...] } (docs/robots.md)")
         })
+    }
+
+    /// Proposes until somebody has said yes or no.
+    fn agreed(&mut self, plan: Plan, to: &Rigid<Base, Flange>) -> Result<(Proposal, Confirmation)> {
+        let t = to.translation;
+        let says = vec![format!("stop {}: flange to {:.1} {:.1} {:.1} mm", self.stops, t.x, t.y, t.z)];
+        loop {
+            let proposal = self.guard.propose(plan.clone())?;
+            if !proposal.passed() {
+                return Err(Fault::refused(proposal.missed().join("; "))
+                    .cause("what is named is not as it has to be")
+                    .next("put it right and begin again; the arm stands still"));
+            }
+            let ask = Ask { step: "calibrate", says: says.clone(), question: "go there?", proposal: &proposal };
+            if let Some(confirmation) = self.operator.confirm(&ask)? {
+                return Ok((proposal, confirmation));
+            }
+            if !self.operator.again() {
+                return Err(Fault::refused("the move was not confirmed")
+                    .cause("somebody said no")
+                    .next("begin again where the arm may move"));
+            }
+        }
     }
 }
 
@@ -94,22 +117,11 @@ impl Cell for ArmCell<'_> {
         let legs = legs(&from, to, &limits, speed);
         let last = *legs.last().expect("one or more");
         let plan = Plan { legs, ..Plan::single("calibrate", "the next picture of the board", last) };
-        let proposal = self.guard.propose(plan)?;
-        if !proposal.passed() {
-            return Err(Fault::refused(proposal.missed().join("; "))
-                .cause("what is named is not as it has to be")
-                .next("put it right and begin again; the arm stands still"));
-        }
         self.stops += 1;
-        let t = to.translation;
-        let says = vec![format!("stop {}: flange to {:.1} {:.1} {:.1} mm", self.stops, t.x, t.y, t.z)];
-        let ask = Ask { step: "calibrate", says, question: "go there?", proposal: &proposal };
-        let Some(confirmation) = self.operator.confirm(&ask)? else {
-            return Err(Fault::refused("the move was not confirmed")
-                .cause("somebody said no")
-                .next("begin again where the arm may move"));
-        };
-        if let Some(refusal) = self.guard.attempt(&proposal, confirmation, &mut |_, _| Ok(()))? {
+        let (proposal, confirmation) = self.agreed(plan, to)?;
+        let made = self.guard.attempt(&proposal, confirmation, &mut |_, _| Ok(()));
+        self.operator.over();
+        if let Some(refusal) = made? {
             return Ok(Went::NotBegun(refusal.what));
         }
         std::thread::sleep(SETTLE);

@@ -48,10 +48,17 @@ export const picture = (recording, frame, width, light) =>
   url(`/picture?recording=${encodeURIComponent(recording)}&frame=${frame}${width ? `&width=${width}` : ""}${light ? `&light=${light}` : ""}`);
 
 /** Listens to the server for as long as the page is open; opens the socket again where it breaks. */
+let socket = null;
+/** Says something over the socket; false where it is not open. */
+export function say(text) {
+  if (socket?.readyState !== WebSocket.OPEN) return false;
+  socket.send(text);
+  return true;
+}
 export function listen({ event, rows, lost }) {
   let wait = 300;
   const open = () => {
-    const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}${ROOT}/events`);
+    socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}${ROOT}/events?tab=${tab}`);
     socket.binaryType = "arraybuffer";
     socket.onopen = () => { wait = 300; lost(false); };
     socket.onmessage = (m) => (typeof m.data === "string" ? event(JSON.parse(m.data)) : rows(m.data));

@@ -6,13 +6,14 @@
 export const store = {
   /** @type {Bar | null} */ bar: null,
   /** @type {Map<string, Job>} */ jobs: new Map(),
+  /** @type {import("../../../../docs/messages").MotionState | null} */ motion: null,
   /** The scan that grows: { job, columns, total, done, heights }. */ growing: null,
   /** false, true, or "over" where the session ended. */ lost: false,
 };
 
 const ears = new Map();
 
-/** Calls `hear` at each `what` (bar, jobs, rows, lost). Returns what ends it. */
+/** Calls `hear` at each `what` (bar, jobs, motion, rows, lost). Returns what ends it. */
 export function on(what, hear) {
   if (!ears.has(what)) ears.set(what, new Set());
   ears.get(what).add(hear);
@@ -36,8 +37,14 @@ export function take(event) {
     case "state":
       store.bar = data.bar;
       store.jobs = new Map(data.jobs.map((j) => [j.id, j]));
+      store.motion = data.motion;
       tell("bar");
       tell("jobs", null);
+      tell("motion");
+      break;
+    case "motion":
+      store.motion = data;
+      tell("motion");
       break;
     case "bar":
       store.bar = data;

@@ -1,34 +1,38 @@
-// Calibrate: a target, a recording; residuals a picture; old against new; accept.
+// Calibrate: a target, a recording, or everything at once by moves of the robot; residuals a picture; old against new; accept.
 
-import { picture, post } from "../base/api.js";
+import { picture, post, url } from "../base/api.js";
 import { fill, h, num } from "../base/dom.js";
 import { jobs, store } from "../base/store.js";
 import { t } from "../base/text.js";
 import { operate, operating } from "../widgets/bar.js";
+import { byTheRobot } from "../widgets/auto.js";
 import { attempt } from "../widgets/problem.js";
 import { choice, follow, order, panel, recordings, table } from "../widgets/parts.js";
 
-const TARGETS = { camera: "Camera", hand_eye: "Hand-eye", laser_plane: "Laser plane", pointer: "Pointer" };
-const SUITS = { camera: (r) => r.board, hand_eye: (r) => r.board && !r.beam, laser_plane: (r) => r.board && r.beam !== "pointer", pointer: (r) => r.board && r.beam !== "line" };
+const TARGETS = { auto: "All at once, by the robot", joint: "All at once", camera: "Camera", hand_eye: "Hand-eye", laser_plane: "Laser plane", pointer: "Pointer" };
+const SUITS = { joint: (r) => r.board, camera: (r) => r.board, hand_eye: (r) => r.board && !r.beam, laser_plane: (r) => r.board && r.beam !== "pointer", pointer: (r) => r.board && r.beam !== "line" };
 
 export async function show(place, query) {
   const all = await recordings((r) => r.board);
   const named = store.jobs.get(query.get("job"));
-  let target = named?.order.target ?? "camera", name = named?.order.recording, out = new Set(named?.order.leave_out ?? []);
+  let target = query.get("target") ?? named?.order.target ?? { auto: "auto", joint: "joint" }[named?.order.procedure] ?? "camera", name = named?.order.recording, out = new Set(named?.order.leave_out ?? []);
   const problem = h("div"), progress = h("div"), pictures = h("div"), verdict = h("div"), head = h("div", { class: "head" });
   let follows = () => {}, result = null;
-  const fits = () => all.filter(SUITS[target]);
+  const body = h("div", { class: "split" });
+  let leave = () => {};
+  const fits = () => all.filter(SUITS[target] ?? (() => false));
+  const chosen = new Set(named?.order.recordings ?? all.map((r) => r.name));
   const current = () => fits().find((r) => r.name === name) ?? fits().find((r) => r.name.replace(/[_-]/g, "").includes(target.replace("_", ""))) ?? fits()[0];
   const heads = () => {
     const r = current();
     name = r?.name;
     fill(head, h("h1", {}, t("Calibrate")),
       h("div", { class: "tools", role: "group", "aria-label": t("Target") }, Object.entries(TARGETS).map(([k, w]) => h("button", { "aria-pressed": String(k === target), "data-target": k, onclick: () => { target = k; name = undefined; out = new Set(); result = null; latest(); } }, t(w)))),
-      h("span", { class: "grow" }), choice(t("Recording"), fits().map((x) => [x.name, `${x.name} · ${x.frames}`]), name, (v) => { name = v; out = new Set(); result = null; heads(); thumbs(); }),
-      h("button", { class: "main", id: "calibrate", disabled: !r, onclick: run }, t("Calibrate")));
+      h("span", { class: "grow" }), target !== "auto" && target !== "joint" && choice(t("Recording"), fits().map((x) => [x.name, `${x.name} · ${x.frames}`]), name, (v) => { name = v; out = new Set(); result = null; heads(); thumbs(); }),
+      target !== "auto" && h("button", { class: "main", id: "calibrate", disabled: !r, onclick: run }, t("Calibrate")));
   };
   const run = () => attempt(async () => {
-    const j = await order({ procedure: "calibrate", target, recording: name, leave_out: [...out] });
+    const j = await order(target === "joint" ? { procedure: "joint", recordings: [...chosen] } : { procedure: "calibrate", target, recording: name, leave_out: [...out] });
     follows();
     follows = follow(progress, j.id, shown);
   }, problem);
@@ -36,15 +40,18 @@ export async function show(place, query) {
     result = j;
     const f = j.outcome, keys = Object.keys(f.figures).filter((k) => !/^(n_|seed)/.test(k));
     const accept = () => attempt(async () => { if (!operating()) await operate(false); await post(`/jobs/${j.id}/accept`); }, problem);
-    fill(verdict, panel(`${t(TARGETS[j.order.target])} · ${j.id}`,
+    fill(verdict, panel(`${t(TARGETS[j.order.target ?? j.order.procedure])} · ${j.id}`,
       h("p", {}, h("span", { class: `dot ${f.verdict === "good" ? "good" : f.verdict === "usable" ? "poor" : "bad"}` }), " ", h("b", {}, t(f.verdict)), f.accepted ? ` · ${t("accepted")}` : ""),
       f.reasons.map((r) => h("p", { class: "small" }, r)), f.advice.map((a) => h("p", { class: "note small" }, `${t("Next picture")}: ${a}`)),
       h("button", { class: "main", id: "accept", disabled: f.accepted || !["good", "usable"].includes(f.verdict), onclick: accept }, t("Accept into the station"))),
       panel(t("Old against new"), table([t("Figure"), `#${t("Station")}`, `#${t("New")}`], keys.map((k) => [k, num(f.former[k], 4), num(f.figures[k], 4)]))),
+      f.kind === "joint" && h("p", {}, h("a", { href: url(`/jobs/${j.id}/files/result/calibration/joint.html`), target: "_blank" }, t("The whole report"))),
       f.left_out.length > 0 && panel(t("Not used"), f.left_out.map(([n, why]) => h("p", { class: "small" }, h("b", {}, n), `: ${why}`))));
     thumbs();
   }
   function thumbs() {
+    if (target === "auto") return;
+    if (target === "joint") return void fill(pictures, h("p", { class: "small quiet" }, t("Recordings that are solved together.")), fits().map((x) => h("p", {}, h("label", {}, h("input", { type: "checkbox", checked: chosen.has(x.name), onchange: (e) => (e.target.checked ? chosen.add(x.name) : chosen.delete(x.name)) }), `${x.name} · ${x.frames} · ${x.beam ?? t("room light")}`))));
     const r = current();
     if (!r) return void fill(pictures, h("p", { class: "quiet" }, t("There is no recording of a board for this.")));
     const residual = result && result.order.recording === r.name ? Object.fromEntries(result.outcome.per_picture.map(([n, v]) => [Number(/(\d+)(?!.*\d)/.exec(n)?.[1] ?? -1), [n, v]])) : {};
@@ -60,10 +67,18 @@ export async function show(place, query) {
   const latest = () => {
     fill(verdict);
     heads();
-    const last = jobs((j) => j.order.procedure === "calibrate" && j.state === "done" && j.order.target === target)[0];
-    last && last.order.recording === name ? shown(last) : thumbs();
+    leave();
+    leave = () => {};
+    if (target === "auto") {
+      const moving = h("div", { class: "stack" });
+      fill(body, moving, h("div", { class: "stack" }, verdict));
+      leave = byTheRobot(moving, (j) => shown(j));
+    } else fill(body, panel(t("Pictures"), pictures), h("div", { class: "stack" }, verdict));
+    const same = (j) => (target === "auto" || target === "joint" ? j.order.procedure === target : j.order.target === target && j.order.recording === name);
+    const last = jobs((j) => j.state === "done" && same(j))[0];
+    last ? shown(last) : thumbs();
   };
-  fill(place, head, problem, progress, h("div", { class: "split" }, panel(t("Pictures"), pictures), h("div", { class: "stack" }, verdict)));
+  fill(place, head, problem, progress, body);
   latest();
-  return () => follows();
+  return () => { follows(); leave(); };
 }

@@ -13,7 +13,7 @@ const FATES = [["kept", "#3ddc84"], ["outside the working volume", "#5aa9ff"], [
 
 export async function show(place) {
   const list = await recordings(() => true);
-  const camera = store.bar?.mode === "live";
+  const camera = store.bar?.camera;
   if (!list.length && !camera) return void fill(place, h("h1", {}, t("Picture")), h("p", { class: "quiet" }, t("There is no recording.")));
   let r = camera ? null : list.find((x) => x.name === sessionStorage.getItem("recording")) ?? list[0], frame = r ? Math.floor(r.frames / 2) : 0, turn = 0;
   const box = h("div"), figs = h("div"), fates = h("div"), hist = h("div"), along = h("div"), head = h("div", { class: "head" });

@@ -6,7 +6,7 @@ import { t } from "../base/text.js";
 import { jobs, on, store, tell } from "../base/store.js";
 import { attempt } from "./problem.js";
 
-const ROBOT = { no_link: ["no link", ""], read_only: ["read-only", "good"], moving: ["moving", "poor"] };
+const ROBOT = { no_link: ["no link", ""], read_only: ["read-only", ""], armed: ["armed", "good"], moving: ["moving", "poor"] };
 
 /** Whether this tab operates. */
 export const operating = () => store.bar?.lease.holder === tab.slice(0, 4);
@@ -17,7 +17,7 @@ export async function operate(firmly = false) {
 }
 
 export async function stopAll() {
-  for (const j of jobs((j) => j.state === "running" || j.state === "queued")) await attempt(() => post(`/jobs/${j.id}/stop`));
+  await attempt(() => post("/stop"));
   tell("stop");
 }
 
@@ -77,5 +77,5 @@ const age = (days) => (days < 1 ? t("today") : `${Math.round(days)} d`);
 
 /** Where a job is looked at. */
 export function pageOf(job) {
-  return { check: "station", scan: "scan", find: "position", teach: "part", touch: "touch", calibrate: "calibrate", benchmark: "health" }[job.order.procedure];
+  return { check: "station", scan: "scan", find: "position", teach: "part", touch: "touch", calibrate: "calibrate", joint: "calibrate", auto: "calibrate", insert: "position", benchmark: "health" }[job.order.procedure];
 }

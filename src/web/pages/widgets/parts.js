@@ -79,7 +79,8 @@ export function follow(place, id, ended) {
     const resumable = ["cut_off", "stopped", "failed"].includes(j.state) && j.resumable;
     fill(place, j.problem && fault(j.problem), j.state !== "done" && h("div", { class: "row note", "data-job": j.state },
       h("span", {}, `${j.id}: ${t({ cut_off: "cut off when the program ended", stopped: "stopped; what was done is kept", failed: "failed" }[j.state])}`),
-      resumable && h("button", { onclick: async () => { await operate(false).catch(() => {}); act("resume"); } }, t("Resume"))));
+      resumable && h("button", { class: "resume", onclick: async () => { await operate(false).catch(() => {}); act("resume"); } }, t("Resume")),
+      resumable && j.order.procedure === "insert" && h("button", { class: "back-out", onclick: async () => { await operate(false).catch(() => {}); act("back_out"); } }, t("Back out"))));
     if (j.state === "done") ended?.(j);
   };
   const off = on("jobs", (j) => (!j || j.id === id) && draw());

@@ -1,9 +1,9 @@
-//! In: a pose that a page shows, a button that is held. Out: the right to one motion to that pose, used up by making it.
-//! Frame and unit: seconds; poses are named by their hash.
+//! In: a motion that a page shows, a button that is held. Out: the right to make it, once, used up by making it.
+//! Frame and unit: seconds; motions are named by their hash.
 
-use super::guard::{Tab, random_hex};
-use super::message::Confirmed;
 use crate::fault::{Fault, Result};
+use crate::web::guard::{Tab, random_hex};
+use crate::web::message::Confirmed;
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
@@ -60,7 +60,15 @@ impl Grants {
         Ok(())
     }
 
-    /// The button was let go.
+    /// A tab lets go: what it had is gone.
+    pub fn drop_of(&self, tab: &Tab) {
+        let mut held = self.0.lock().unwrap_or_else(|e| e.into_inner());
+        if held.as_ref().is_some_and(|g| g.tab == *tab) {
+            *held = None;
+        }
+    }
+
+    /// The button was let go, or nobody may go on.
     pub fn drop_all(&self) {
         *self.0.lock().unwrap_or_else(|e| e.into_inner()) = None;
     }
@@ -69,12 +77,11 @@ impl Grants {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::web::message::Goal;
 
     #[test]
     fn a_right_is_for_one_pose_one_tab_and_one_time() {
         let tab = |t: &str| Tab { session: "s".into(), tab: t.into() };
-        let what = |hash: &str| Confirmed { job: "0001-find".into(), goal: Goal::Approach, hash: hash.into() };
+        let what = |hash: &str| Confirmed { job: "0001-insert".into(), hash: hash.into() };
         let grants = Grants::default();
         let held = |ms: u64| {
             let name = grants.give(&tab("a"), what("x"));

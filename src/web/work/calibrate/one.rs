@@ -2,8 +2,8 @@
 //! in the station when it is accepted.
 //! Frame and unit: as the calibrations; px, mm, degrees.
 
-use super::jobs::Jobs;
-use super::run::Run;
+use super::super::jobs::Jobs;
+use super::super::run::Run;
 use crate::calibrate::camera::procedure::{CameraOptions, calibrate as camera};
 use crate::calibrate::camera::report::page;
 use crate::calibrate::hand_eye::options::Mount;
@@ -29,7 +29,7 @@ use std::path::Path;
 const RESULT: &str = "calibration.json";
 const PAGE: &str = "calibration.html";
 
-pub(super) fn calibrate(this: &Run, target: Target, name: &str, leave_out: &[usize]) -> Result<Outcome> {
+pub(in crate::web::work) fn calibrate(this: &Run, target: Target, name: &str, leave_out: &[usize]) -> Result<Outcome> {
     let place = &this.jobs.place;
     let recording = without(Recording::open(&resolve(&place.recordings, name)?)?, leave_out)?;
     let settings = Settings::load(&place.station)?;
@@ -126,20 +126,23 @@ fn former(station: &Path, kind: Kind) -> BTreeMap<String, f64> {
 /// Stores a finished calibration in the station. Errors: another job, a verdict that is not good enough, accepted before.
 pub fn accept(jobs: &Jobs, job: &Job) -> Result<Job> {
     let refuse = |what: String| Err(Fault::usage(what).next("calibrate again"));
-    let (Order::Calibrate(ask), JobState::Done) = (&job.order, job.state) else {
-        return refuse(format!("{}: is no finished calibration", job.id));
+    let target = match (&job.order, job.state) {
+        (Order::Calibrate(ask), JobState::Done) => Some(ask.target),
+        (Order::Joint(_) | Order::Auto(_), JobState::Done) => None,
+        _ => return refuse(format!("{}: is no finished calibration", job.id)),
     };
     let mut job = job.clone();
     match &mut job.outcome {
-        Some(Outcome::Calibrate(f)) if !f.accepted => f.accepted = true,
+        Some(Outcome::Calibrate(f) | Outcome::Joint(f) | Outcome::Auto(f)) if !f.accepted => f.accepted = true,
         _ => return refuse(format!("{}: was accepted already", job.id)),
     }
     let (folder, station) = (jobs.folder(&job), &jobs.place.station);
-    match ask.target {
-        Target::Camera => store::<crate::camera::Intrinsics>(&folder, station)?,
-        Target::HandEye => store::<crate::rig::HandEye>(&folder, station)?,
-        Target::LaserPlane => store::<crate::geometry::Plane<crate::geometry::Camera>>(&folder, station)?,
-        Target::Pointer => store::<crate::geometry::Ray<crate::geometry::Camera>>(&folder, station)?,
+    match target {
+        None => super::together::store(&folder, station)?,
+        Some(Target::Camera) => store::<crate::camera::Intrinsics>(&folder, station)?,
+        Some(Target::HandEye) => store::<crate::rig::HandEye>(&folder, station)?,
+        Some(Target::LaserPlane) => store::<crate::geometry::Plane<crate::geometry::Camera>>(&folder, station)?,
+        Some(Target::Pointer) => store::<crate::geometry::Ray<crate::geometry::Camera>>(&folder, station)?,
     }
     jobs.put(&job)?;
     Ok(job)

@@ -1,38 +1,5 @@
-//! In: a camera's pictures with the numbers that came over the wire, in any order. Out: the same in order, numbered on where 16 bits end.
+//! In: the numbers of a camera's pictures as they came over the wire. Out: numbers that go on where 16 bits end; whether the count began anew.
 //! Frame and unit: pictures.
-
-use crate::capture::picture::Event;
-use std::collections::BTreeMap;
-use std::time::{Duration, Instant};
-
-/// A picture that waits for packets is overtaken by those after it: so many, and so long, are held back for it.
-const OVERTAKING: usize = 12;
-const HELD: Duration = Duration::from_millis(250);
-
-/// Pictures in the order of their numbers again.
-#[derive(Default)]
-pub(super) struct InOrder {
-    held: BTreeMap<u64, (Event, Instant)>,
-    next: Option<u64>,
-}
-
-impl InOrder {
-    pub fn put(&mut self, id: u64, event: Event) {
-        self.held.insert(id, (event, Instant::now()));
-    }
-
-    /// The next in order; one whose forerunner is missing once that has had its time.
-    pub fn take(&mut self) -> Option<Event> {
-        let (id, (_, since)) = self.held.first_key_value()?;
-        let id = *id;
-        let due = self.next.is_none_or(|next| id <= next);
-        if !due && self.held.len() <= OVERTAKING && since.elapsed() < HELD {
-            return None;
-        }
-        self.next = Some(self.next.unwrap_or(0).max(id + 1));
-        self.held.remove(&id).map(|(event, _)| event)
-    }
-}
 
 /// Numbers of 16 bits go from 65535 on to 1: the standard leaves 0 out, some cameras do not.
 const CYCLE: u64 = 65_535;
@@ -69,20 +36,6 @@ impl Numbers {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn pictures_that_were_overtaken_come_in_order() {
-        let mut order = InOrder::default();
-        let mut out = Vec::new();
-        for id in [1, 2, 4, 5, 3, 6].into_iter().chain(8..=20) {
-            order.put(id, Event::Incomplete { id, why: String::new() });
-            while let Some(Event::Incomplete { id, .. }) = order.take() {
-                out.push(id);
-            }
-        }
-        // 7 never came: its followers wait until they are too many.
-        assert_eq!(out, (1..=20).filter(|id| *id != 7).collect::<Vec<u64>>());
-    }
 
     #[test]
     fn numbers_go_on_after_sixteen_bits_and_a_reset_is_seen() {

@@ -1,0 +1,91 @@
+//! In: a station, a camera, recipes, an address. Out: what a robot's own program asks for over TCP, answered until Ctrl-C.
+//! Frame and unit: poses in the robot's own notation.
+
+use crate::capture::CameraUri;
+use crate::cli::terminal::console::Console;
+use crate::cli::terminal::interrupt;
+use crate::fault::{Fault, Result};
+use crate::robot::Convention;
+use crate::scan::Where;
+use crate::station::Settings;
+use crate::station::socket::{Patience, Session, SocketOptions, serve};
+use std::net::TcpListener;
+use std::path::PathBuf;
+use std::time::Duration;
+
+#[derive(clap::Subcommand)]
+pub enum Command {
+    Serve(Serve),
+}
+
+/// Answer a robot's own program over a TCP socket: it scans, asks for a part, gets poses in its notation
+///
+/// For controllers that are not linked: the robot's program moves the arm, switches the line, and says at each stop where its
+/// flange is; sheetlight takes the pictures and answers. One program at a time. docs/robots has the lines and programs for UR,
+/// KUKA, FANUC, ABB and Denso. Nothing here moves a robot.
+#[derive(clap::Args)]
+#[command(after_help = "Example:
+  sheetlight robot serve --station cell3 --camera gige://first --recipes data/recipes \\
+      --notation ur --listen 0.0.0.0:5050 --out scans")]
+pub struct Serve {
+    /// Station folder: calibrations; [tool] in station.toml for poses of the flange
+    #[arg(long)]
+    station: PathBuf,
+    /// The camera (docs/live.md)
+    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<CameraUri>)]
+    camera: CameraUri,
+    /// Folder of recipes: FIND led takes led.toml
+    #[arg(long)]
+    recipes: PathBuf,
+    /// Folder of the scans, a folder each
+    #[arg(long)]
+    out: PathBuf,
+    /// Address and port to listen on; anybody who reaches it may ask
+    #[arg(long, default_value = "127.0.0.1:5050")]
+    listen: String,
+    /// Notation of the poses [default: the station's robot]
+    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Convention>)]
+    notation: Option<Convention>,
+    /// A program that says nothing for so long is let go, s, 1 to 86400
+    #[arg(long, default_value_t = 600.0)]
+    patience: f64,
+    /// Where the stages run: auto, gpu, or cpu
+    #[arg(long, default_value = "auto", value_parser = crate::cli::terminal::arguments::parse::<Where>)]
+    on: Where,
+}
+
+pub fn run(command: &Command, console: &Console) -> Result<()> {
+    let Command::Serve(args) = command;
+    if !(1.0..=86_400.0).contains(&args.patience) {
+        return Err(
+            Fault::usage(format!("--patience {}, 1 to 86400 s are allowed", args.patience)).next("correct the option")
+        );
+    }
+    let notation = args.notation.or(Settings::load(&args.station)?.robot).ok_or_else(|| {
+        Fault::usage("the robot's notation is not known")
+            .cause("neither --notation nor station.toml's robot names it, and it is never guessed")
+            .next("give --notation, for example ur")
+    })?;
+    let listener = TcpListener::bind(&args.listen).map_err(|e| {
+        Fault::device(format!("{}: cannot be listened on: {e}", args.listen))
+            .cause("another program has the port, or the address is not this machine's")
+            .next("choose another --listen")
+    })?;
+    let at = listener.local_addr().map_or_else(|_| args.listen.clone(), |a| a.to_string());
+    let options = SocketOptions {
+        station: args.station.clone(),
+        recipes: args.recipes.clone(),
+        out: args.out.clone(),
+        notation,
+        place: args.on,
+    };
+    let mut session = Session::new(options, args.camera.open(None)?)?;
+    console.result(
+        &serde_json::json!({ "listens": at, "notation": notation.name() }),
+        &format!("listens on {at}, poses in the notation {}", notation.name()),
+    );
+    let patience = Patience { idle: Duration::from_secs_f64(args.patience), ..Patience::default() };
+    let stop = interrupt::asked_for();
+    serve(&listener, &mut session, patience, &stop, &mut |line| console.say(line))
+        .map_err(|e| Fault::device(format!("{at}: {e}")).next("start it again"))
+}

@@ -1,0 +1,95 @@
+//! In: numbers of eight fits that run side by side. Out: arithmetic on all of them at once, each rounded as if it were alone.
+//! Frame and unit: none.
+
+use std::array::from_fn;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// As many as a vector register of most processors holds; where it holds fewer, two take turns.
+pub(super) const LANES: usize = 8;
+
+/// One number of each fit.
+#[derive(Clone, Copy)]
+#[repr(align(32))]
+pub(super) struct Lanes(pub [f32; LANES]);
+
+impl Lanes {
+    pub const ZERO: Lanes = Lanes::all(0.0);
+
+    #[inline(always)]
+    pub const fn all(value: f32) -> Lanes {
+        Lanes([value; LANES])
+    }
+    #[inline(always)]
+    pub fn map(self, f: impl Fn(f32) -> f32) -> Lanes {
+        Lanes(from_fn(|i| f(self.0[i])))
+    }
+    #[inline(always)]
+    pub fn with(self, other: Lanes, f: impl Fn(f32, f32) -> f32) -> Lanes {
+        Lanes(from_fn(|i| f(self.0[i], other.0[i])))
+    }
+    /// The larger; `other` where this is no number. One instruction, which `f32::max` is not.
+    #[inline(always)]
+    pub fn max(self, other: Lanes) -> Lanes {
+        self.with(other, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
+    pub fn min(self, other: Lanes) -> Lanes {
+        self.with(other, |a, b| if a < b { a } else { b })
+    }
+    #[inline(always)]
+    pub fn sqrt(self) -> Lanes {
+        self.map(f32::sqrt)
+    }
+    #[inline(always)]
+    pub fn clamp(self, low: Lanes, high: Lanes) -> Lanes {
+        self.max(low).min(high)
+    }
+    /// This in the lanes that run, `other` in those that have ended.
+    #[inline(always)]
+    pub fn or(self, runs: &[bool; LANES], other: Lanes) -> Lanes {
+        Lanes(from_fn(|i| if runs[i] { self.0[i] } else { other.0[i] }))
+    }
+}
+
+macro_rules! by_lane {
+    ($($name:ident $call:ident $sign:tt),*) => {$(
+        impl $name for Lanes {
+            type Output = Lanes;
+            #[inline(always)]
+            fn $call(self, other: Lanes) -> Lanes {
+                self.with(other, |a, b| a $sign b)
+            }
+        }
+        impl $name<Lanes> for f32 {
+            type Output = Lanes;
+            #[inline(always)]
+            fn $call(self, other: Lanes) -> Lanes {
+                Lanes::all(self) $sign other
+            }
+        }
+    )*};
+}
+by_lane!(Add add +, Sub sub -, Mul mul *, Div div /);
+
+impl Neg for Lanes {
+    type Output = Lanes;
+    #[inline(always)]
+    fn neg(self) -> Lanes {
+        self.map(|a| -a)
+    }
+}
+
+// The digits of the shader.
+#[allow(clippy::approx_constant)]
+/// e to the power of x from -80 to 80, to 2e-7 of itself: every machine has its own `exp`, this one is the shader's.
+#[inline(always)]
+pub(super) fn exponential(x: Lanes) -> Lanes {
+    let t = (x * Lanes::all(std::f32::consts::LOG2_E)).clamp(Lanes::all(-120.0), Lanes::all(120.0));
+    let whole = (t + Lanes::all(0.5)).map(f32::floor);
+    let f = t - whole;
+    let p = Lanes::all(0.009_618_129) + f * (Lanes::all(0.001_333_356) + 0.000_154_035_3 * f);
+    let p = Lanes::all(0.240_226_5) + f * (Lanes::all(0.055_504_11) + f * p);
+    let p = Lanes::all(1.0) + f * (Lanes::all(0.693_147_2) + f * p);
+    // Whole numbers from -120 to 120, which the exponent's bits hold.
+    p.with(whole, |p, whole| p * f32::from_bits(((whole as i32 + 127) as u32) << 23))
+}

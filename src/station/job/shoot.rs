@@ -1,0 +1,36 @@
+//! In: an arm that has come to a stop, a camera, a beam. Out: a picture of the beam in a recording, with the pose at which it was taken.
+//! Frame and unit: base_from_flange, mm; ms.
+
+use super::eye::Eye;
+use super::record::Record;
+use crate::arm::Arm;
+use crate::fault::{Fault, Result};
+use crate::recording::Beam;
+use std::time::Duration;
+
+/// The arm stands still so long before a picture is taken, ms.
+const SETTLE: Duration = Duration::from_millis(5);
+/// Waits until an arm that has arrived stands still.
+pub fn settle() {
+    std::thread::sleep(SETTLE);
+}
+
+/// A picture of a beam with the pose at which it was taken; the arm stood still before and after, or it is refused.
+pub fn shoot(eye: &mut Eye, arm: &mut dyn Arm, record: &mut Record, beam: Option<Beam>) -> Result<()> {
+    /// As far apart as two readings of an arm that stands may be, mm and rad.
+    const STILL: [f64; 2] = [0.01, 1e-4];
+    settle();
+    let before = arm.pose()?;
+    let picture = eye.picture(arm, beam)?;
+    let after = arm.pose()?;
+    let (angle, mm) = before.base_from_flange.difference(&after.base_from_flange);
+    if mm > STILL[0] || angle > STILL[1] {
+        return Err(Fault::refused(format!(
+            "the arm moved by {mm:.3} mm while the picture was taken, limit {}",
+            STILL[0]
+        ))
+        .cause("it still swings, or somebody jogs it")
+        .next("begin again"));
+    }
+    record.shot(&picture, &after)
+}

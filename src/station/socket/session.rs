@@ -1,0 +1,228 @@
+//! In: requests of a robot's program, one after the other; a camera, a station, recipes. Out: what is done about each, and its answer.
+//! Frame and unit: base_from_flange as the notation has it, mm here; tool 0 and work frame 0 on the controller.
+
+use super::words::{self, Code, Of, Request, Which, Wrong};
+use crate::arm::{Outputs, TimedPose};
+use crate::capture::PictureSource;
+use crate::fault::{Fault, Kind, Result};
+use crate::find::{LocateOptions, Recipe, Report};
+use crate::geometry::{Base, Flange, Rigid, Vec3};
+use crate::recording::Beam;
+use crate::rig::Rig;
+use crate::robot::Convention;
+use crate::scan::Where;
+use crate::station::find::find_part;
+use crate::station::job::{Eye, Record};
+use crate::station::scan::recorded::scan_recording;
+use crate::station::scan::run::ScanOptions;
+use crate::station::settings::Settings;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Shots of one scan; more are a program that does not end.
+const MOST_SHOTS: usize = 5000;
+/// A flange this near to its base's origin, mm, is stated in another unit; one that far off too.
+const BELIEVED_MM: [f64; 2] = [50.0, 10_000.0];
+/// A pose as near as this to that of the shot before is that shot, asked for again: mm and rad.
+const SAME: [f64; 2] = [0.002, 2e-6];
+
+/// What a session works on.
+#[derive(Clone, Debug)]
+pub struct SocketOptions {
+    /// Folder of the station.
+    pub station: PathBuf,
+    /// Folder of the recipes: `FIND led` takes led.toml.
+    pub recipes: PathBuf,
+    /// Folder of the scans, one folder each.
+    pub out: PathBuf,
+    /// Notation of all poses, asked for and given.
+    pub notation: Convention,
+    /// Where the scan's stages run.
+    pub place: Where,
+}
+
+/// A scan that is made.
+struct Scan {
+    record: Record,
+    shots: usize,
+    last: Rigid<Base, Flange>,
+}
+
+/// What one robot's program has come to.
+pub struct Session {
+    options: SocketOptions,
+    settings: Settings,
+    rig: Rig,
+    eye: Eye,
+    scan: Option<Scan>,
+    found: Option<Report>,
+    scans: usize,
+}
+
+type Said = std::result::Result<String, Wrong>;
+
+impl Session {
+    /// A station that can answer.
+    ///
+    /// # Errors
+    /// The station lacks a calibration, the camera is another one, there is no such folder of recipes.
+    pub fn new(options: SocketOptions, camera: Box<dyn PictureSource>) -> Result<Session> {
+        let (settings, rig) = (Settings::load(&options.station)?, Rig::load(&options.station)?);
+        rig.belong_together()?;
+        rig.need_hand_eye()?;
+        rig.need_laser_plane()?;
+        let (format, of_rig) = (camera.format(), rig.need_camera()?.value);
+        if [format.width, format.height] != [of_rig.width, of_rig.height] {
+            return Err(Fault::input(format!(
+                "the camera sends {}x{}, the station was calibrated with {}x{}",
+                format.width, format.height, of_rig.width, of_rig.height
+            ))
+            .cause("another camera, or another region of it")
+            .next("set the camera as it was calibrated, or calibrate it anew"));
+        }
+        if !options.recipes.is_dir() {
+            return Err(Fault::usage(format!("{}: is no folder of recipes", options.recipes.display()))
+                .next("give the folder in which NAME.toml lies for each FIND NAME"));
+        }
+        crate::files::make_folder(&options.out)?;
+        let eye = Eye::new(camera, Outputs::default());
+        Ok(Session { options, settings, rig, eye, scan: None, found: None, scans: 0 })
+    }
+
+    /// Another program has come: it knows nothing of what the one before did.
+    pub fn afresh(&mut self) {
+        (self.scan, self.found) = (None, None);
+    }
+
+    /// Does what a line asks for, and answers it with one.
+    pub fn answer(&mut self, line: &str) -> String {
+        let said = words::read(line).and_then(|request| self.done(request));
+        said.map_or_else(|wrong| words::no(&wrong), |yes| words::yes(&yes))
+    }
+
+    fn done(&mut self, request: Request) -> Said {
+        match request {
+            Request::Hello => Ok(format!("sheetlight 1 {}", self.options.notation.name())),
+            Request::Status => Ok(self.status()),
+            Request::Scan => self.begin(),
+            Request::Pose(numbers) => self.shot(&numbers),
+            Request::Find(name) => self.find(&name),
+            Request::Give(which, of) => self.give(which, of),
+            Request::Bye => Ok("bye".into()),
+        }
+    }
+
+    fn status(&self) -> String {
+        match (&self.scan, &self.found) {
+            (Some(scan), _) => format!("scanning {}", scan.shots),
+            (None, Some(found)) => format!("found {}", found.recipe),
+            (None, None) => "idle".into(),
+        }
+    }
+
+    fn begin(&mut self) -> Said {
+        self.found = None;
+        // Folders of former runs stay.
+        let free = (self.scans..).find(|k| !self.options.out.join(format!("scan_{k:04}")).exists());
+        self.scans = free.expect("numbers do not end");
+        let folder = self.options.out.join(format!("scan_{:04}", self.scans));
+        let record = Record::begin(&folder.join("line"), "scan", Beam::Line, self.eye.format()).map_err(ours)?;
+        let last = Rigid::from_vectors(&Vec3::zeros(), Vec3::zeros());
+        self.scan = Some(Scan { record, shots: 0, last });
+        Ok("0".into())
+    }
+
+    fn shot(&mut self, numbers: &[f64]) -> Said {
+        let Some(scan) = &mut self.scan else {
+            return Err(Wrong::new(Code::Order, "no scan was begun: SCAN comes before POSE"));
+        };
+        let at: Rigid<Base, Flange> =
+            self.options.notation.read(numbers).map_err(|e| Wrong::new(Code::Numbers, e.what))?;
+        let far = at.translation.norm();
+        if !(BELIEVED_MM[0]..=BELIEVED_MM[1]).contains(&far) {
+            let [least, most] = BELIEVED_MM;
+            let what =
+                format!("the flange would be {far:.3} mm from its base, {least} to {most} are believed: another unit?");
+            return Err(Wrong::new(Code::Numbers, what));
+        }
+        let (angle, mm) = at.difference(&scan.last);
+        if scan.shots > 0 && mm < SAME[0] && angle < SAME[1] {
+            // The answer was lost, and it is asked for again.
+            return Ok(scan.shots.to_string());
+        }
+        if scan.shots >= MOST_SHOTS {
+            return Err(Wrong::new(
+                Code::Order,
+                format!("{MOST_SHOTS} shots are taken, no more fit: FIND, or SCAN anew"),
+            ));
+        }
+        let asked = Instant::now();
+        let picture = self.eye.fresh().map_err(ours)?;
+        let timed = TimedPose { base_from_flange: at, figure: None, asked, here: asked, device: None };
+        scan.record.shot(&picture, &timed).map_err(ours)?;
+        (scan.shots, scan.last) = (scan.shots + 1, at);
+        Ok(scan.shots.to_string())
+    }
+
+    fn find(&mut self, name: &str) -> Said {
+        if !self.scan.as_ref().is_some_and(|s| s.shots >= 2) {
+            let shots = self.scan.as_ref().map_or(0, |s| s.shots);
+            return Err(Wrong::new(
+                Code::Order,
+                format!("{shots} shots were taken, 2 at least are asked for: SCAN, then POSE at each stop"),
+            ));
+        }
+        let path = self.options.recipes.join(format!("{name}.toml"));
+        if !path.is_file() {
+            return Err(Wrong::new(Code::Refused, format!("there is no recipe '{name}'")));
+        }
+        let recipe = Recipe::load(&path).map_err(ours)?;
+        let scan = self.scan.take().expect("asked for");
+        let folder = self.options.out.join(format!("scan_{:04}", self.scans));
+        let report = self.located(scan, &recipe, &folder).map_err(ours)?;
+        let Some(_) = &report.poses else {
+            return Err(Wrong::new(Code::Refused, format!("no pose: {}", report.reasons.join("; "))));
+        };
+        let said = format!("{:.3}", report.found.score);
+        self.found = Some(report);
+        Ok(said)
+    }
+
+    fn located(&self, scan: Scan, recipe: &Recipe, folder: &std::path::Path) -> Result<Report> {
+        let to = folder.join("scan");
+        let run = ScanOptions { place: self.options.place, ..ScanOptions::for_station(&self.settings, &self.rig, &to) };
+        scan_recording(&scan.record.end()?, None, &self.rig, &run, |_, _| {})?;
+        let options = LocateOptions { robot: self.options.notation, ..LocateOptions::default() };
+        let (report, picture) = find_part(&to, recipe, Some(&self.options.station), &options)?;
+        let text = serde_json::to_string_pretty(&report).expect("plain data");
+        let image = folder.join("found.png");
+        crate::files::write_beside((&folder.join("found.json"), text.as_bytes()), &[(&image, &picture.to_png())])?;
+        Ok(report)
+    }
+
+    fn give(&self, which: Which, of: Of) -> Said {
+        let Some(poses) = self.found.as_ref().and_then(|f| f.poses.as_ref()) else {
+            return Err(Wrong::new(Code::Order, "nothing was found yet: SCAN, POSE at each stop, FIND, then GIVE"));
+        };
+        let pose = match which {
+            Which::Approach => &poses.approach,
+            Which::Insertion => &poses.insertion,
+            Which::Retract => &poses.retract,
+        };
+        let notation = self.options.notation;
+        match (of, self.settings.tool) {
+            (Of::Tool, _) => Ok(words::pose(notation, &pose.base_from_tool)),
+            (Of::Flange, Some(tool)) => {
+                Ok(words::pose(notation, &(pose.base_from_tool * tool.flange_from_tool.inverse())))
+            }
+            (Of::Flange, None) => {
+                Err(Wrong::new(Code::Failed, "station.toml has no [tool]: where the flange stands is not known"))
+            }
+        }
+    }
+}
+
+/// A fault on our side; a refusal is the part's.
+fn ours(fault: Fault) -> Wrong {
+    Wrong::new(if fault.kind == Kind::Refused { Code::Refused } else { Code::Failed }, fault.what)
+}

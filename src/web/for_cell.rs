@@ -1,0 +1,26 @@
+//! In: a simulated cell. Out: a station folder that fits it: the sensor's true calibration, a workspace, the tool.
+//! Frame and unit: base frame, mm.
+
+use crate::arm::rules::{Limits, Space};
+use crate::cell::Cell;
+use crate::fault::Result;
+use crate::robot::Convention;
+use crate::station::{Settings, ToolSpec};
+use std::path::Path;
+
+/// Where a VS-060 on its own table may work, mm.
+const WORKSPACE: Space = Space { from_mm: [150.0, -350.0, 200.0], to_mm: [650.0, 350.0, 750.0] };
+
+/// Writes calibrations and station.toml of a cell into `folder`; its link may be silent for `silence_ms`, `None`: as usual.
+///
+/// # Errors
+/// A file cannot be written.
+pub fn station_for(cell: &Cell, folder: &Path, name: &str, silence_ms: Option<f64>) -> Result<()> {
+    crate::files::make_folder(folder)?;
+    cell.station().store(folder)?;
+    let usual = Limits::within(WORKSPACE);
+    let motion = Limits { max_silence_ms: silence_ms.unwrap_or(usual.max_silence_ms), ..usual };
+    let tool = Some(ToolSpec { flange_from_tool: cell.flange_from_tool() });
+    Settings { name: name.into(), robot: Some(Convention::Denso), motion: Some(motion), tool, ..Settings::default() }
+        .store(folder)
+}

@@ -1,0 +1,345 @@
+//! In: what tabs do (arm, press, hold, let go, STOP), what jobs ask. Out: each motion confirmed by one tab that held its button while it
+//! was shown; a Halt where it lets go, goes, or loses the lease.
+//! Frame and unit: s.
+
+use super::grants::Grants;
+use super::simulated::SimulatedRobot;
+use crate::arm::rules::{Guard, MotionLog, StopButton};
+use crate::fault::{Fault, Result};
+use crate::station::Settings;
+use crate::web::camera::Camera;
+use crate::web::event::Hub;
+use crate::web::guard::Tab;
+use crate::web::message::{Asked, Confirmed, Event, MotionState};
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard};
+use std::time::{Duration, Instant};
+
+/// While something moves the tab that holds the button says so again and again; silence for so long halts.
+const SILENCE: Duration = Duration::from_secs(1);
+/// Lines of what a job said that are kept.
+const MOST_SAID: usize = 60;
+
+/// What a screen can move and look with.
+#[derive(Default)]
+pub struct Links {
+    /// The station's folder: [motion], [tool], the log of motions.
+    pub station: PathBuf,
+    /// The robot's URI.
+    pub robot: Option<String>,
+    /// It may be moved.
+    pub may_move: bool,
+    /// The camera.
+    pub camera: Option<Arc<Camera>>,
+    /// The cell that robot and camera are of, where it is one of ours.
+    pub simulated: Option<SimulatedRobot>,
+    /// Ends the program.
+    pub stop: Arc<AtomicBool>,
+}
+
+/// Where the operator sits.
+pub struct Desk {
+    /// What there is.
+    pub links: Links,
+    hub: Arc<Hub>,
+    grants: Grants,
+    at: Mutex<At>,
+    wake: Condvar,
+}
+
+/// What becomes of a motion that was shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Answer {
+    /// It is made.
+    Yes,
+    /// It is not, and the job ends.
+    No,
+    /// Nobody said anything while it was good.
+    Late,
+    /// The job was ended.
+    Over,
+}
+
+/// A button that is down.
+struct Hold {
+    tab: Tab,
+    grant: String,
+    heard: Instant,
+}
+
+#[derive(Default)]
+pub(super) struct At {
+    /// Here while no job has it.
+    pub guard: Option<Guard>,
+    pub button: Option<StopButton>,
+    armed: Option<Tab>,
+    hold: Option<Hold>,
+    answer: Option<bool>,
+    /// Ends the job that runs.
+    pub stop: Option<Arc<AtomicBool>>,
+    pub shown: MotionState,
+}
+
+fn no(what: impl Into<String>) -> Fault {
+    Fault::refused(what).cause("nothing was moved").next("look at the motion that is shown and hold its button again")
+}
+
+impl Desk {
+    /// Nothing is armed.
+    pub fn new(links: Links, hub: Arc<Hub>) -> Desk {
+        let shown = MotionState { robot: links.robot.is_some(), may_move: links.may_move, ..MotionState::default() };
+        let at = At { shown, ..At::default() };
+        Desk { links, hub, grants: Grants::default(), at: Mutex::new(at), wake: Condvar::new() }
+    }
+
+    pub(super) fn at(&self) -> MutexGuard<'_, At> {
+        self.at.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
+    /// As it stands.
+    pub fn state(&self) -> MotionState {
+        self.seen(&self.at())
+    }
+
+    fn seen(&self, at: &At) -> MotionState {
+        let armed = at.armed.as_ref().filter(|_| at.button.is_some()).map(Tab::short);
+        let simulated = self.links.simulated.as_ref().map(SimulatedRobot::state);
+        MotionState { armed, simulated, ..at.shown.clone() }
+    }
+
+    pub(super) fn tell(&self, at: &At) {
+        self.hub.tell(&Event::Motion(Box::new(self.seen(at))));
+    }
+
+    /// Tells everybody how it stands.
+    pub fn told(&self) -> MotionState {
+        let at = self.at();
+        self.tell(&at);
+        self.seen(&at)
+    }
+
+    /// A job has the robot.
+    pub fn has_job(&self) -> bool {
+        self.at().stop.is_some()
+    }
+
+    /// Takes the arm for motions from this tab.
+    pub fn arm(&self, tab: &Tab) -> Result<MotionState> {
+        let Some(uri) = &self.links.robot else {
+            return Err(Fault::refused("no robot: the screen was served without --robot")
+                .next("start it with --robot URI, or with --simulate"));
+        };
+        let taken = self.at().button.is_some();
+        let made = if taken {
+            None
+        } else {
+            let settings = Settings::load(&self.links.station)?;
+            let log = MotionLog::file(&self.links.station.join("motions.jsonl"));
+            let mut guard = Guard::new(crate::arm::open(uri)?, settings.motion, log);
+            guard.stop_button().listen(self.links.stop.clone());
+            guard.arm(self.links.may_move)?;
+            Some(guard)
+        };
+        let mut at = self.at();
+        if let Some(guard) = made.filter(|_| at.button.is_none()) {
+            (at.button, at.guard) = (Some(guard.stop_button()), Some(guard));
+        }
+        at.armed = Some(tab.clone());
+        self.tell(&at);
+        Ok(self.seen(&at))
+    }
+
+    /// Gives the arm back.
+    pub fn disarm(&self) -> Result<MotionState> {
+        let mut at = self.at();
+        if at.stop.is_some() {
+            return Err(Fault::refused("a job has the robot").next("stop the job first"));
+        }
+        (at.armed, at.button) = (None, None);
+        let guard = at.guard.take();
+        self.tell(&at);
+        let state = self.seen(&at);
+        drop(at);
+        drop(guard);
+        Ok(state)
+    }
+
+    /// Somebody has looked at the robot after a motion that was stopped: motions may be proposed again.
+    pub fn looked(&self) -> Result<MotionState> {
+        let mut at = self.at();
+        if at.stop.is_some() {
+            return Err(Fault::refused("a job has the robot").next("wait until it has ended"));
+        }
+        if let Some(guard) = &mut at.guard {
+            guard.looked()?;
+        }
+        if let Some(button) = &at.button {
+            button.release();
+        }
+        at.shown.look = None;
+        self.tell(&at);
+        Ok(self.seen(&at))
+    }
+
+    /// The button goes down over the motion that is shown. Gives the name under which it is redeemed once.
+    pub fn press(&self, tab: &Tab, what: &Confirmed) -> Result<String> {
+        let at = self.at();
+        self.may(&at, tab, what)?;
+        let asked = at.shown.asked.as_ref().expect("it may");
+        let down = at.hold.as_ref().is_some_and(|h| h.heard.elapsed() < SILENCE);
+        if down && !asked.stays_down {
+            return Err(no(format!("'{}' wants the button pressed anew", asked.step)));
+        }
+        Ok(self.grants.give(tab, what.clone()))
+    }
+
+    /// It was held long enough: the motion is confirmed, once.
+    pub fn go(&self, tab: &Tab, grant: &str, what: &Confirmed) -> Result<()> {
+        self.grants.redeem(grant, tab, what)?;
+        let mut at = self.at();
+        self.may(&at, tab, what)?;
+        if let Some(button) = &at.button {
+            button.lease(SILENCE);
+        }
+        at.hold = Some(Hold { tab: tab.clone(), grant: grant.to_owned(), heard: Instant::now() });
+        (at.answer, at.shown.moving) = (Some(true), true);
+        self.tell(&at);
+        self.wake.notify_all();
+        Ok(())
+    }
+
+    fn may(&self, at: &At, tab: &Tab, what: &Confirmed) -> Result<()> {
+        if at.armed.as_ref() != Some(tab) {
+            return Err(no("the robot is not armed from this screen"));
+        }
+        if let Some(why) = &at.shown.look {
+            return Err(no(format!("somebody has to look at the robot first: {why}")));
+        }
+        let same = |a: &Asked| a.hash == what.hash && a.job == what.job;
+        match &at.shown.asked {
+            Some(asked) if same(asked) && at.answer.is_none() => Ok(()),
+            Some(asked) if same(asked) => Err(no("this motion was confirmed already")),
+            Some(_) => Err(no("the motion is not the one that is shown now")),
+            None => Err(no("no motion waits for a confirmation")),
+        }
+    }
+
+    /// No: the job that asks ends.
+    pub fn refuse(&self, what: &Confirmed) -> Result<()> {
+        let mut at = self.at();
+        match &at.shown.asked {
+            Some(asked) if asked.hash == what.hash && at.answer.is_none() => {
+                at.answer = Some(false);
+                self.wake.notify_all();
+                Ok(())
+            }
+            _ => Err(no("that motion is not asked for")),
+        }
+    }
+
+    /// The tab that holds the button says that it still does. False: it holds none.
+    pub fn held(&self, tab: &Tab, grant: &str) -> bool {
+        let mut at = self.at();
+        let At { hold: Some(hold), button, .. } = &mut *at else { return false };
+        if hold.tab != *tab || hold.grant != grant {
+            return false;
+        }
+        hold.heard = Instant::now();
+        if let Some(button) = button {
+            button.renew();
+        }
+        true
+    }
+
+    /// The button was let go, or can be held no longer: what moves is halted.
+    pub fn let_go(&self, tab: &Tab, why: &str) {
+        let mut at = self.at();
+        self.grants.drop_of(tab);
+        if at.hold.as_ref().is_some_and(|h| h.tab == *tab) {
+            at.hold = None;
+            if at.shown.moving {
+                self.halt(&mut at, why);
+            }
+        }
+    }
+
+    /// Another tab operates from now on: nothing is armed from the former one.
+    pub fn handed_over(&self) {
+        let mut at = self.at();
+        self.grants.drop_all();
+        at.armed = None;
+        if at.hold.take().is_some() && at.shown.moving {
+            self.halt(&mut at, "another screen took over");
+        }
+        self.tell(&at);
+    }
+
+    /// STOP, from any screen: the job that has the robot ends, what moves is halted.
+    pub fn stop(&self) {
+        let mut at = self.at();
+        self.grants.drop_all();
+        if let Some(stop) = &at.stop {
+            stop.store(true, Ordering::SeqCst);
+            self.halt(&mut at, "STOP was pressed");
+        }
+        self.wake.notify_all();
+    }
+
+    fn halt(&self, at: &mut At, why: &str) {
+        if let Some(button) = &at.button {
+            button.press_for(why);
+        }
+        at.shown.look.get_or_insert_with(|| why.to_owned());
+        self.tell(at);
+    }
+
+    /// Shows a motion and waits for what becomes of it.
+    pub(super) fn ask(&self, asked: Asked) -> Answer {
+        let until = Instant::now() + Duration::from_secs_f64(asked.within_s);
+        let mut at = self.at();
+        (at.shown.asked, at.answer) = (Some(asked), None);
+        self.tell(&at);
+        let answer = loop {
+            if at.stop.as_ref().is_none_or(|s| s.load(Ordering::SeqCst)) {
+                break Answer::Over;
+            }
+            match at.answer {
+                Some(true) => return Answer::Yes,
+                Some(false) => break Answer::No,
+                None if Instant::now() >= until => break Answer::Late,
+                None => {}
+            }
+            at = self.wake.wait_timeout(at, Duration::from_millis(100)).unwrap_or_else(|e| e.into_inner()).0;
+        };
+        (at.shown.asked, at.shown.moving) = (None, false);
+        self.tell(&at);
+        answer
+    }
+
+    /// The confirmed motion has ended.
+    pub(super) fn over(&self) {
+        let mut at = self.at();
+        (at.shown.asked, at.shown.moving, at.answer) = (None, false, None);
+        if let Some(button) = &at.button {
+            button.end_lease();
+        }
+        self.tell(&at);
+    }
+
+    /// A line of the job.
+    pub fn say(&self, line: &str) {
+        let mut at = self.at();
+        at.shown.said.push(line.to_owned());
+        let more = at.shown.said.len().saturating_sub(MOST_SAID);
+        at.shown.said.drain(..more);
+        self.tell(&at);
+    }
+
+    /// A calibration's stops and the error that is expected after them, mm.
+    pub fn expects(&self, stops: usize, mm: f64) {
+        let mut at = self.at();
+        at.shown.expected.push((stops, mm));
+        self.tell(&at);
+    }
+}

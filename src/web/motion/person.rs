@@ -1,0 +1,79 @@
+//! In: what a job is about to do. Out: the yes of whoever holds the button at the screen.
+//! Frame and unit: base frame, in the station's notation.
+
+use super::desk::{Answer, Desk};
+use crate::arm::rules::Confirmation;
+use crate::fault::{Fault, Result};
+use crate::robot::Convention;
+use crate::station::job::{Ask, Operator};
+use crate::web::message::{Asked, GateLight};
+use std::sync::Arc;
+
+/// Steps that only look, far from the part: the button may stay down from one to the next.
+const LOOKING: [&str; 3] = ["touch", "scan", "calibrate"];
+
+/// Whoever operates.
+pub struct Person<'a> {
+    /// Where he sits.
+    pub desk: &'a Arc<Desk>,
+    /// The job that asks him.
+    pub job: &'a str,
+    /// Notation of the poses that he is shown.
+    pub robot: Convention,
+    /// A motion is good for so long after it was shown, s.
+    pub within_s: f64,
+    /// Hears of every step.
+    pub step: &'a dyn Fn(&str),
+    /// Nobody answered in time.
+    pub late: bool,
+}
+
+impl Person<'_> {
+    fn asked(&self, ask: &Ask) -> Asked {
+        let plan = &ask.proposal.plan;
+        let ends = plan.legs.last().map_or(ask.proposal.from, |leg| leg.to);
+        Asked {
+            job: self.job.to_owned(),
+            step: ask.step.to_owned(),
+            says: ask.says.clone(),
+            question: ask.question.to_owned(),
+            hash: ask.proposal.hash.clone(),
+            gates: ask.proposal.gates.iter().map(GateLight::from).collect(),
+            motions: plan.legs.len(),
+            speed_mm_s: plan.legs.iter().map(|l| l.speed_mm_s).fold(0.0, f64::max),
+            convention: self.robot.name().into(),
+            labels: self.robot.labels().iter().map(|l| (*l).to_owned()).collect(),
+            numbers: self.robot.write(&ends),
+            stays_down: LOOKING.contains(&ask.step),
+            within_s: self.within_s,
+        }
+    }
+}
+
+impl Operator for Person<'_> {
+    fn confirm(&mut self, ask: &Ask) -> Result<Option<Confirmation>> {
+        (self.step)(ask.step);
+        let answer = self.desk.ask(self.asked(ask));
+        self.late = answer == Answer::Late;
+        match answer {
+            Answer::Yes => Ok(Some(Confirmation::of(&*ask.proposal.hash))),
+            Answer::No | Answer::Late => Ok(None),
+            Answer::Over => {
+                Err(Fault::refused(format!("stopped at '{}': STOP was pressed, or the job was ended", ask.step))
+                    .next("look at the cell, then begin again"))
+            }
+        }
+    }
+
+    fn again(&mut self) -> bool {
+        self.late
+    }
+
+    fn over(&mut self) {
+        self.desk.over();
+    }
+
+    fn tell(&mut self, line: &str) {
+        self.desk.say(line);
+    }
+}

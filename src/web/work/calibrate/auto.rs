@@ -1,0 +1,82 @@
+//! In: a board below an armed robot. Out: the whole rig by moves that the program chooses, each shown at the screen and confirmed; kept
+//! until it is accepted.
+//! Frame and unit: mm.
+
+use super::super::place::Place;
+use super::super::run::Run;
+use super::together::{keep, run};
+use crate::fault::{Fault, Result};
+use crate::recording::BoardSpec;
+use crate::rig::Rig;
+use crate::robot::Convention;
+use crate::station::{ArmCell, AutoRun, Settings, calibrate_auto};
+use crate::web::guard::plain;
+use crate::web::message::{AutoOrder, Outcome};
+use crate::web::motion::{Person, Session};
+use std::path::PathBuf;
+
+/// Stops at most where nobody says.
+const MOST: usize = 40;
+
+/// Names of the boards that the station has descriptions of.
+pub fn boards(place: &Place) -> Result<Vec<String>> {
+    let entries = std::fs::read_dir(place.boards()).into_iter().flatten().flatten();
+    let name = |e: std::fs::DirEntry| {
+        let path = e.path();
+        let name = path.file_stem()?.to_string_lossy().into_owned();
+        (path.extension()? == "json" && plain(&name)).then_some(name)
+    };
+    let mut names: Vec<String> = entries.filter_map(name).collect();
+    names.sort_by_key(|n| crate::files::natural(n));
+    Ok(names)
+}
+
+fn board(place: &Place, name: &str) -> Result<BoardSpec> {
+    if !boards(place)?.iter().any(|b| b == name) {
+        return Err(Fault::input(format!("{name:?}: is no board of this station"))
+            .cause("its folder boards has no such description")
+            .next("write one with sheetlight board, and put its .json into STATION/boards"));
+    }
+    BoardSpec::load(&place.boards().join(format!("{name}.json")))
+}
+
+pub(in crate::web::work) fn auto(this: &Run, order: &AutoOrder) -> Result<Outcome> {
+    let place = &this.jobs.place;
+    let (settings, rig) = (Settings::load(&place.station)?, Rig::load_camera(&place.station)?);
+    let desk = &this.jobs.desk;
+    let camera = desk.links.camera.as_ref().ok_or_else(|| {
+        Fault::refused("no camera: the screen was served without --camera").next("start it with --camera URI")
+    })?;
+    let asked = AutoRun {
+        joint: run(&settings),
+        board: board(place, &order.board)?,
+        out: folder(this),
+        target_mm: order.target_mm,
+        most: order.most.unwrap_or(MOST),
+        working: settings.volume().map(|v| [v.near_mm, v.far_mm]),
+        candidates: 150,
+        seed: 1,
+    };
+    asked.check()?;
+    let mut session = Session::begin(desk, &this.id, &this.stop)?;
+    let within_s = session.guard().limits().map_or(0.0, |l| l.max_shown_s);
+    let robot = settings.robot.unwrap_or(Convention::Denso);
+    let mut person = Person { desk, job: &this.id, robot, within_s, step: &|_| {}, late: false };
+    let mut cell =
+        ArmCell::new(session.guard(), camera.lend()?, settings.outputs.unwrap_or_default(), &mut person, None);
+    let most = asked.most;
+    let told = |stops: usize, mm: f64| {
+        this.progress(stops, Some(most));
+        desk.expects(stops, mm);
+    };
+    let result = calibrate_auto(&mut cell, &rig, &asked, &told)?;
+    drop(cell);
+    drop(session);
+    Ok(Outcome::Auto(Box::new(keep(this, &result.joint)?)))
+}
+
+/// Where this try's pictures go: one that was cut off keeps those that it has, and the next begins beside it.
+fn folder(this: &Run) -> PathBuf {
+    let name = |k: usize| this.folder.join(if k == 0 { "pictures".into() } else { format!("pictures-{k}") });
+    (0..).map(name).find(|f| !f.exists()).expect("some name is free")
+}

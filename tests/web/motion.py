@@ -1,0 +1,263 @@
+"""In: the program, two folders. Out: failure where the robot of a simulated cell moves that must not: without lease, for another motion than
+the one shown, twice, too early, from another tab, with a former start's token; where letting go, going away, silence, another operator or
+STOP do not halt it; where a killed server says that something is done that is not.
+Frame and unit: s."""
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import time
+
+from server import Server, events, frame, say
+
+program, folder, second = sys.argv[1:4]
+HELD = 0.9
+
+
+def refused(what, answer):
+    status = answer[0] if isinstance(answer, tuple) else answer
+    assert 400 <= status < 500, f"{what}: {status}, a 4xx was wanted"
+
+
+def count(what, where=folder):
+    time.sleep(0.2)
+    return sum(e["what"] == what for e in events(where))
+
+
+class Operator:
+    """A tab with its socket: what a page does."""
+
+    def __init__(self, s, tab="tests", session=None):
+        self.s, self.tab = s, tab
+        status, self.socket = s.socket(tab=tab)
+        assert status == 101, status
+        threading.Thread(target=self.listen, daemon=True).start()
+
+    def listen(self):
+        try:
+            while True:
+                frame(self.socket)
+        except (AssertionError, OSError):
+            pass
+
+    def post(self, path, body=None):
+        return self.s.ask("POST", "/api/v1" + path, body or {}, tab=self.tab)
+
+    def asked(self, step=None, seconds=60):
+        end = time.time() + seconds
+        while time.time() < end:
+            m = self.s.json("GET", "/motion")
+            if m["asked"] and not m["moving"] and step in (None, m["asked"]["step"]):
+                return {"job": m["asked"]["job"], "hash": m["asked"]["hash"]}
+            time.sleep(0.05)
+        raise AssertionError(f"{step} was not asked for: {m}, {self.s.json('GET', '/jobs')[0]}")
+
+    def begin(self):
+        """Arms, looks, orders; gives the job that now asks for its first motion."""
+        self.s.json("POST", "/lease", {"firmly": True}, tab=self.tab)
+        self.s.json("POST", "/robot", {"armed": True}, tab=self.tab)
+        self.s.json("POST", "/robot/looked", tab=self.tab)
+        return self.s.json("POST", "/jobs", {"procedure": "insert", "recipe": "osc", "sweep_mm": 20}, tab=self.tab)["id"]
+
+    def press(self, what):
+        status, _, body = self.post("/motion/press", what)
+        assert status == 200, (status, body)
+        return json.loads(body)["grant"]
+
+    def go(self, what):
+        """Presses, holds, confirms; from then on the caller says that it is held."""
+        grant = self.press(what)
+        time.sleep(HELD)
+        status, _, body = self.post("/motion/go", {"grant": grant, "what": what})
+        assert status == 200, (status, body)
+        return grant
+
+    def hold(self, grant, until, seconds=120):
+        end = time.time() + seconds
+        while not until():
+            say(self.socket, f"held {grant}")
+            time.sleep(0.15)
+            assert time.time() < end, "it did not come to that"
+
+
+def moving(s, where=folder):
+    """The arm is under way now."""
+    log = events(where)
+    last = [e["what"] for e in log if e["what"] in ("move", "arrived", "halt")]
+    return bool(last) and last[-1] == "move"
+
+
+def nothing_moves(s, former):
+    """Every way to a motion that is none. The controller's log stays empty of moves."""
+    a, b = Operator(s), Operator(s, "other")
+    refused("a job before arming", s.ask("POST", "/api/v1/robot", {"armed": True}, tab="other"))
+    s.json("POST", "/lease", {"firmly": True})
+    unarmed = s.json("POST", "/jobs", {"procedure": "insert", "recipe": "osc"})["id"]
+    assert s.ended(unarmed)["problem"]["what"].startswith("the robot is not armed")
+    job = a.begin()
+    what = a.asked("touch")
+    refused("press without the lease", b.post("/motion/press", what))
+    refused("press for another motion", a.post("/motion/press", {**what, "hash": "0" * 64}))
+    refused("press for another job", a.post("/motion/press", {**what, "job": "0099-insert"}))
+    refused("go that nobody pressed for", a.post("/motion/go", {"grant": "0" * 32, "what": what}))
+    grant = a.press(what)
+    refused("go before it was held", a.post("/motion/go", {"grant": grant, "what": what}))
+    grant = a.press(what)
+    time.sleep(HELD)
+    refused("go for another motion", a.post("/motion/go", {"grant": grant, "what": {**what, "hash": "1" * 64}}))
+    refused("go after a wrong try", a.post("/motion/go", {"grant": grant, "what": what}))
+    grant = a.press(what)
+    time.sleep(HELD)
+    refused("go without the lease", b.post("/motion/go", {"grant": grant, "what": what}))
+    a.post("/motion/release")
+    refused("go after it was let go", a.post("/motion/go", {"grant": grant, "what": what}))
+    grant = a.press(what)
+    time.sleep(HELD)
+    s.json("POST", "/lease", {"firmly": True}, tab="other")
+    refused("go after another took over", a.post("/motion/go", {"grant": grant, "what": what}))
+    refused("go by the other", b.post("/motion/go", {"grant": grant, "what": what}))
+    refused("press by who did not arm", b.post("/motion/press", what))
+    s.json("POST", "/lease", {"firmly": True})
+    refused("press after somebody else operated, unarmed", a.post("/motion/press", what))
+    for token in (former, "0" * 32, False):
+        refused("press with another token", s.ask("POST", "/api/v1/motion/press", what, token=token))
+        refused("go with another token", s.ask("POST", "/api/v1/motion/go", {"grant": grant, "what": what}, token=token))
+        refused("arm with another token", s.ask("POST", "/api/v1/robot", {"armed": True}, token=token))
+    refused("press of a page of another origin", s.ask("POST", "/api/v1/motion/press", what, Origin="http://evil.example"))
+    refused("jogging while a job has the arm", a.post("/simulated", {"holds": "osc"}))
+    refused("giving back while a job has the arm", a.post("/robot", {"armed": False}))
+    # No: the job ends, and nothing moved.
+    a.post("/robot", {"armed": True})
+    assert a.post("/motion/refuse", what)[0] == 200
+    ended = s.ended(job)
+    assert ended["state"] == "failed" and not ended["resumable"], ended
+    refused("press of a motion of a job that has ended", a.post("/motion/press", what))
+    assert count("move") == 0, "something moved"
+
+
+def halts(s):
+    """Whatever ends the hold halts; the job says why, and the next motion wants somebody to look."""
+    a = Operator(s)
+
+    def let_go(grant):
+        a.post("/motion/release")
+
+    def silence(grant):
+        pass
+
+    def gone(grant):
+        a.socket.close()
+
+    def taken_over(grant):
+        s.json("POST", "/lease", {"firmly": True}, tab="other")
+
+    def stop(grant):
+        assert s.ask("POST", "/api/v1/stop", {}, tab="watcher")[0] == 200
+
+    def end_job(grant):
+        s.ask("POST", f"/api/v1/jobs/{s.json('GET', '/jobs')[0]['id']}/stop", {}, tab="watcher")
+
+    for how, why in ((let_go, "let go"), (silence, "lease ran out"), (gone, "gone"), (taken_over, "took over"), (stop, "STOP"), (end_job, "STOP")):
+        s.json("POST", "/lease", {"firmly": True})
+        s.json("POST", "/simulated", {"holds": "osc"})
+        before = count("halt")
+        job = a.begin()
+        what = a.asked("touch")
+        grant = a.go(what)
+        a.hold(grant, lambda: moving(s))
+        refused("the same again", a.post("/motion/go", {"grant": grant, "what": what}))
+        refused("a press while it moves", a.post("/motion/press", what))
+        begun = time.time()
+        how(grant)
+        while count("halt") == before:
+            assert time.time() - begun < 5, f"{how.__name__}: not halted"
+        took = time.time() - begun
+        ended = s.ended(job)
+        assert ended["state"] in ("failed", "stopped") and why in ended["problem"]["what"], (how.__name__, ended["problem"])
+        assert ended["outcome"] is None and ended["resumable"], ended
+        m = s.json("GET", "/motion")
+        assert m["look"] and not m["moving"] and m["asked"] is None, m
+        assert any("look at the robot" in x for x in s.json("GET", "/bar")["alarms"])
+        if how is gone:
+            a = Operator(s)
+        print(f"{how.__name__}: halted, seen after {took:.2f} s")
+    # Nobody has looked: the next motion is refused although it is armed and held.
+    s.json("POST", "/lease", {"firmly": True})
+    s.json("POST", "/robot", {"armed": True})
+    moves = count("move")
+    job = s.json("POST", "/jobs", {"procedure": "insert", "recipe": "osc"})["id"]
+    assert s.ended(job)["state"] == "failed"
+    assert count("move") == moves
+    # The halted one is offered: it backs out, and says that nothing was inserted.
+    s.json("POST", "/robot/looked")
+    s.json("POST", f"/jobs/{ended['id']}/back_out")
+    ended = s.ended(ended["id"])
+    assert ended["state"] == "failed" and ended["outcome"] is None and "backed out" in ended["problem"]["what"], ended
+
+
+def killed(former):
+    """Server and cell are two programs; the server is killed in a motion. The next start offers the job; nothing half done is done."""
+    os.makedirs(second, exist_ok=True)
+    log = os.path.join(second, "cell.jsonl")
+    cell = subprocess.Popen([program, "--json", "cell", "simulate", "--part", "osc", "--seed", "3", "--robot-port", "0", "--camera-port", "0", "--station", os.path.join(second, "station"), "--log", log], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    try:
+        text = ""
+        while text.count("{") != text.count("}") or not text:
+            text += cell.stdout.readline().decode()
+        uris = json.loads(text)
+        toml = os.path.join(second, "station", "station.toml")
+        with open(toml) as f:
+            settings = f.read()
+        # Two busy cores may keep the link's threads waiting.
+        with open(toml, "w") as f:
+            f.write(settings.replace("max_silence_ms = 400.0", "max_silence_ms = 3000.0"))
+        more = ("--recordings", second, "--robot", uris["robot"], "--camera", uris["camera"])
+        s = Server(program, second, *more)
+        s.json("POST", "/lease")
+        refused("arming without --allow-motion", s.ask("POST", "/api/v1/robot", {"armed": True}))
+        s.end()
+        s = Server(program, second, *more, "--allow-motion")
+        a = Operator(s)
+        job = a.begin()
+        grant = a.go(a.asked("touch"))
+        a.hold(grant, lambda: moving(s, second))
+        s.kill()
+        again = Server(program, second, *more, "--allow-motion")
+        cut = again.json("GET", f"/jobs/{job}")
+        assert cut["state"] == "cut_off" and cut["outcome"] is None and cut["resumable"], cut
+        refused("the former start's token", again.ask("POST", "/api/v1/motion/go", {"grant": grant, "what": {"job": job, "hash": "0"}}, token=s.token))
+        time.sleep(4)
+        moves = count("move", second)
+        a = Operator(again)
+        again.json("POST", "/lease")
+        again.json("POST", "/robot", {"armed": True})
+        again.json("POST", f"/jobs/{job}/resume")
+        a.asked("touch")
+        assert count("move", second) == moves, "it moved by itself after the restart"
+        assert again.json("GET", f"/jobs/{job}")["state"] == "running"
+        again.json("POST", "/stop")
+        ended = again.ended(job)
+        assert ended["outcome"] is None and ended["state"] in ("stopped", "failed"), ended
+        assert again.end() == 0
+    finally:
+        cell.terminate()
+        cell.wait(10)
+
+
+def main():
+    former = Server(program, folder, "--simulate", "--set", "none")
+    token = former.token
+    former.end()
+    s = Server(program, folder, "--simulate", "--set", "none")
+    nothing_moves(s, token)
+    halts(s)
+    with open(os.path.join(folder, "station", "motions.jsonl")) as f:
+        said = [json.loads(line)["event"] for line in f]
+    assert said.count("begun") == 6 and said.count("stopped") == 6, said
+    assert s.end() == 0
+    killed(token)
+
+
+main()
