@@ -4,6 +4,8 @@
 
 mod common;
 
+#[path = "cell/cold.rs"]
+mod cold;
 #[path = "cell/faults.rs"]
 mod faults;
 #[path = "cell/golden.rs"]

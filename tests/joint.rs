@@ -9,6 +9,8 @@ mod accuracy;
 mod arm;
 #[path = "joint/auto.rs"]
 mod auto;
+#[path = "joint/budget.rs"]
+mod budget;
 #[path = "joint/choice.rs"]
 mod choice;
 #[path = "joint/derivatives.rs"]

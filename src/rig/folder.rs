@@ -4,7 +4,7 @@
 
 use super::calibration::FORMAT;
 use super::seal::{apart, sealed, shaped, unsealed};
-use super::{Calibration, HandEye, Kind, Measured, Verdict};
+use super::{Calibration, HandEye, Joint, JointCovariance, Kind, Measured, Verdict};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::files::Together;
@@ -29,6 +29,8 @@ pub struct Rig {
     pub linear_axis: Option<Calibration<Axis>>,
     /// What turns parts before the camera.
     pub turntable: Option<Calibration<Axis>>,
+    /// Covariance of the records together, where they were calibrated together.
+    pub joint: Joint,
 }
 
 impl Rig {
@@ -42,6 +44,7 @@ impl Rig {
             base_camera: load(station, Kind::BaseCamera)?,
             linear_axis: load(station, Kind::LinearAxis)?,
             turntable: load(station, Kind::Turntable)?,
+            joint: Joint::load(station),
         })
     }
 
@@ -188,6 +191,25 @@ impl Rig {
         })
         .cause("the camera was calibrated or imported anew, or files of two stations were mixed")
         .next(again(kind)))
+    }
+
+    /// The covariance of camera, laser plane and hand-eye together. `None` where none was ever stated.
+    ///
+    /// # Errors
+    /// Why what is stated is not of these records: one was exchanged since, or the file is spoilt. In words.
+    pub fn joint(&self) -> Option<std::result::Result<&JointCovariance, String>> {
+        let stated = match &self.joint {
+            Joint::Absent => return None,
+            Joint::Spoilt(why) => return Some(Err(why.clone())),
+            Joint::Stated(c) => c,
+        };
+        let now = [
+            (Kind::Camera, self.camera.as_ref().map(|c| c.content())),
+            (Kind::LaserPlane, self.laser_plane.as_ref().map(|c| c.content())),
+            (Kind::HandEye, self.hand_eye.as_ref().map(|c| c.content())),
+        ];
+        let other = |kind: Kind| format!("joint.json is of another {} than the station's", kind.words());
+        Some(stated.other(&now).map_or(Ok(stated), |kind| Err(other(kind))))
     }
 
     /// What a report must say of the calibrations it rests on: what people have vouched for, and what is badly determined.

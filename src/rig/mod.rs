@@ -7,6 +7,7 @@ mod checks;
 mod covariance;
 mod folder;
 mod hash;
+mod joint;
 mod kind;
 mod measured;
 mod seal;
@@ -19,6 +20,7 @@ pub use calibration::{
 pub use covariance::Covariance;
 pub use folder::{Rig, asked};
 pub use hash::hash_text;
+pub use joint::{Joint, JointCovariance};
 pub use kind::{Kind, Place, Units};
 pub use measured::Measured;
 pub use seal::{sealed, unsealed};

@@ -5,7 +5,7 @@
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Axis, AxisKind, Base, Camera, ORTHONORMAL_WARN, Plane, Ray, Rigid, Vec3};
-use crate::rig::{Calibration, Covariance, HandEye, Kind, Quality, Rig, Verdict, asked};
+use crate::rig::{Calibration, Covariance, HandEye, Joint, Kind, Quality, Rig, Verdict, asked};
 use std::path::Path;
 
 /// The values of a rig as one JSON object; every entry may be missing, other keys are left alone.
@@ -126,9 +126,10 @@ impl Values {
             pointer.as_ref().map_or(Ok(()), |c| asked(&c.value))?;
             hand_eye.as_ref().map_or(Ok(()), |c| asked(&c.value))?;
         }
-        let stored = Rig { camera, laser_plane, pointer, hand_eye, base_camera, linear_axis, turntable }
-            .store_all(station)
-            .map_err(|e| e.at(source.display()).next("correct the file; nothing was imported of it"))?;
+        let stored =
+            Rig { camera, laser_plane, pointer, hand_eye, base_camera, linear_axis, turntable, joint: Joint::Absent }
+                .store_all(station)
+                .map_err(|e| e.at(source.display()).next("correct the file; nothing was imported of it"))?;
         if stored.is_empty() {
             return Err(Fault::input(format!("{}: holds none of the rig's values", source.display()))
                 .cause("another kind of JSON file")

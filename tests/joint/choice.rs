@@ -27,7 +27,7 @@ enum By {
 
 fn looks(cell: &Cell) -> Looks {
     let depths = cell.station.rig.board_distances([0.85, 1.5], cell.station.working_distance);
-    Looks { depths, tilt_deg: 45.0, turn_deg: 180.0, margin_px: 4.0, upright: 0.0 }
+    Looks { depths, tilt_deg: 45.0, turn_deg: 180.0, margin_px: 4.0, upright: 0.0, lit: true }
 }
 
 /// Eight small moves, then stops until the expected error is below the target: how many, and the true error then.

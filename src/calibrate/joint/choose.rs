@@ -190,9 +190,11 @@ pub struct Looks {
     pub margin_px: f64,
     /// The board's turn about the optical axis that a turn of 0 is, rad.
     pub upright: f64,
+    /// Some of the stripe has to be in view; not asked for while nobody knows where the sheet is.
+    pub lit: bool,
 }
 
-/// Boards before the camera, the whole board and some of the stripe in view; at most `count`, the same for the same seed.
+/// Boards before the camera, the whole board and, where it is asked for, some of the stripe in view; at most `count`, the same for the same seed.
 pub fn candidates(s: &State, spec: &BoardSpec, looks: &Looks, count: usize, seed: u64) -> Vec<Rigid<Camera, Board>> {
     let mut rng = rand_pcg::Pcg64::seed_from_u64(seed);
     let features = spec.features();
@@ -208,7 +210,7 @@ pub fn candidates(s: &State, spec: &BoardSpec, looks: &Looks, count: usize, seed
         let rotation = exp(&(Vec3::new(azimuth.cos(), azimuth.sin(), 0.0) * tilt)) * exp(&(Vec3::z() * turn));
         let board = Rigid::new(rotation, Vec3::new(n.x, n.y, 1.0) * depth - rotation * centre);
         let whole = features.iter().all(|p| in_picture(&s.camera, &board.point(p), looks.margin_px).is_some());
-        (whole && stripe_on(s, spec, &board).is_some()).then_some(board)
+        (whole && (!looks.lit || stripe_on(s, spec, &board).is_some())).then_some(board)
     };
     (0..60 * count).filter_map(|_| one(&mut rng)).take(count).collect()
 }

@@ -13,23 +13,9 @@ use crate::calibrate::limits::Limits;
 use crate::calibrate::pointer::solve::{BEAM_NAMES, basis as beam_basis};
 use crate::camera::{ALWAYS_NAMED, NAMES, PARAMETERS, ParameterCovariance};
 use crate::geometry::{Camera, Plane};
-use crate::rig::{Covariance, Kind, Quality, Verdict};
+use crate::rig::{Covariance, JointCovariance, Kind, Quality, Verdict};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
-
-/// Errors of all records together: which parameter of which record, and their covariance.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Together {
-    /// Version of the file's format: 1.
-    pub format: u32,
-    /// What the records hold, as [`crate::rig::Calibration::content`] has it: the covariance is of these and no others.
-    pub of: BTreeMap<Kind, String>,
-    /// `record.parameter`, in the order of the matrix.
-    pub parameters: Vec<String>,
-    /// Square and symmetric, row by row.
-    pub matrix: Vec<Vec<f64>>,
-}
 
 /// How the numbers of one record follow the shared unknowns: names and derivatives.
 struct Follows {
@@ -90,7 +76,7 @@ fn symmetric(m: DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// All records' covariance in one; `of` names what each holds.
-pub fn together(fit: &JointFit, hand_eye: Kind, of: BTreeMap<Kind, String>) -> Together {
+pub fn together(fit: &JointFit, hand_eye: Kind, of: BTreeMap<Kind, String>) -> JointCovariance {
     let all = follows(fit, hand_eye);
     let rows: usize = all.iter().map(|f| f.names.len()).sum();
     let mut by = DMatrix::zeros(rows, fit.layout.shared());
@@ -102,7 +88,7 @@ pub fn together(fit: &JointFit, hand_eye: Kind, of: BTreeMap<Kind, String>) -> T
     }
     let c = symmetric(&by * &fit.covariance * by.transpose());
     let matrix = c.row_iter().map(|r| r.iter().copied().collect()).collect();
-    Together { format: 1, of, parameters, matrix }
+    JointCovariance { format: 1, of, parameters, matrix }
 }
 
 /// The covariance of the shared unknowns as separate calibrations state it: each for itself, nothing between them.

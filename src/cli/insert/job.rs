@@ -7,7 +7,7 @@ use crate::fault::{Fault, Result};
 use crate::robot::Convention;
 use crate::scan::Where;
 use crate::station::Settings;
-use crate::station::job::{Job, JobOptions, JobReport, Outcome};
+use crate::station::job::{Job, JobOptions, JobReport, Outcome, Phase};
 use std::path::{Path, PathBuf};
 
 /// Insert a part with a robot: touch, square, scan, find, approach, insert, retract
@@ -31,7 +31,8 @@ pub struct Args {
     /// Folder of the job: its state, recordings, scan, report; with --repeat one folder a job in it
     #[arg(long)]
     out: PathBuf,
-    /// The line sweeps over so much about the picture's middle, mm [default: the field's short side]
+    /// The line sweeps over so much about the picture's middle, mm [default: over the part
+    /// and an eighth of the field's short side to both sides, at most over that side]
     #[arg(long)]
     sweep: Option<f64>,
     /// Notation in which poses are shown [default: the station's robot, else denso]
@@ -93,7 +94,9 @@ fn text(reports: &[JobReport]) -> String {
             format!("position confirmed after {s:.1} s and {} confirmations", r.confirmations_to_position.unwrap_or(0))
         });
         let end = if r.outcome == Outcome::Inserted { "inserted".into() } else { format!("stopped: {}", r.why) };
-        format!("{end}; {position}; {:.1} s and {} confirmations in all", r.seconds, r.confirmations)
+        let step = |(phase, s): (&Phase, &f64)| format!("{} {s:.1} s", format!("{phase:?}").to_lowercase());
+        let steps = r.seconds_by_phase.iter().map(step).collect::<Vec<_>>().join(", ");
+        format!("{end}; {position}; {:.1} s and {} confirmations in all ({steps})", r.seconds, r.confirmations)
     };
     reports.iter().map(one).collect::<Vec<_>>().join("\n")
 }

@@ -3,7 +3,7 @@
 //! (docs/math.md, Insertion (5)). Frame and unit: the part's own axes; mm, degrees; one standard deviation.
 
 use super::recipe::Recipe;
-use crate::find::look::levers::{AXIS, HAND_EYE, Lever};
+use crate::find::look::levers::{AXIS, HAND_EYE, Lever, TOGETHER};
 use crate::find::look::part_seen::PartSeen;
 use crate::find::measure::points::Ordered;
 use crate::find::measure::pose::Measured;
@@ -28,7 +28,8 @@ pub struct Term {
 /// The budget and its sum over the terms that are known.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Budget {
-    /// One a source; "peak noise" is contained in "match" and not added again.
+    /// One a source; "peak noise" is contained in "match" and not added again, nor are calibrations by themselves where there is a
+    /// line of them together.
     pub terms: Vec<Term>,
     /// One standard deviation along x, y, z of the part, mm.
     pub sigma_mm: [f64; 3],
@@ -90,6 +91,7 @@ pub fn budget(points: &Ordered, measured: &Measured, rig: Option<&Rig>, recipe: 
     let seen = rig.and_then(|r| PartSeen::new(points, &recipe.drawing(), measured, r, &recipe.measure));
     let levers = seen.as_ref().zip(rig).map_or(Vec::new(), |(seen, rig)| seen.levers(rig));
     let into_part = both(&measured.base_from_part.rotation.transpose());
+    let (together, aside) = seen.as_ref().zip(rig).map_or((None, None), |(seen, rig)| at_once(seen, rig));
     let carrying = if rig.is_some_and(|r| r.axis().is_some()) { AXIS } else { HAND_EYE };
     for name in ["laser plane", carrying] {
         let known = levers.iter().find(|l| l.name == name);
@@ -98,8 +100,14 @@ pub fn budget(points: &Ordered, measured: &Measured, rig: Option<&Rig>, recipe: 
                 let c = lever.of_pose();
                 let shift = c.fixed_view::<3, 3>(0, 0).trace().max(0.0).sqrt();
                 let c = into_part * c * into_part.transpose();
-                covariance += c;
-                terms.push(term(name, &c, format!("{shift:.4} mm at {:.0} mm from the camera", seen.target().norm())));
+                let mut note = format!("{shift:.4} mm at {:.0} mm from the camera", seen.target().norm());
+                if together.is_some() {
+                    note += &format!("; contained in '{TOGETHER}'");
+                } else {
+                    covariance += c;
+                    aside.iter().for_each(|why| note += &format!("; as if independent: {why}"));
+                }
+                terms.push(term(name, &c, note));
             }
             _ => {
                 complete = false;
@@ -108,11 +116,28 @@ pub fn budget(points: &Ordered, measured: &Measured, rig: Option<&Rig>, recipe: 
             }
         }
     }
+    if let Some(lever) = together {
+        let c = into_part * lever.of_pose() * into_part.transpose();
+        covariance += c;
+        terms.push(term(TOGETHER, &c, "camera, laser plane and hand-eye, from joint.json".into()));
+    }
     terms.push(term("robot", &repeatability, "repeatability, from the recipe".into()));
     let [sigma_mm, sigma_deg] = sigmas(&covariance);
     let base_from_camera = seen.as_ref().map(PartSeen::base_from_camera);
     let shape = measured.shape;
     Budget { terms, sigma_mm, sigma_deg, complete, covariance, own, levers, shape, seen, base_from_camera }
+}
+
+/// The lever of calibrations that were made at once; else why what is stated of that is not used, where anything is.
+fn at_once(seen: &PartSeen, rig: &Rig) -> (Option<Lever>, Option<String>) {
+    if rig.axis().is_some() {
+        return (None, None);
+    }
+    match rig.joint() {
+        None => (None, None),
+        Some(Err(why)) => (None, Some(why)),
+        Some(Ok(joint)) => (seen.together(rig, joint), None),
+    }
 }
 
 /// Standard deviations of a pose's covariance: x y z in mm, turns about them in degrees.

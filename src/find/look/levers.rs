@@ -2,9 +2,9 @@
 //! what no calibration holds (delay, length of the robot's steps), what an error of each of its numbers does to the measurement.
 //! Frame and unit: base frame, mm, rad; sizes as shares, the part's axes. docs/math.md, Second look.
 
-use crate::camera::Intrinsics;
+use crate::camera::{Intrinsics, NAMES, Parameters, difference_step};
 use crate::geometry::{Axis, AxisKind, Base, Camera, Plane, Ride, Rigid, Vec3};
-use crate::rig::{Covariance, HandEye, Rig};
+use crate::rig::{Covariance, HandEye, JointCovariance, Kind, Rig};
 use nalgebra::{DMatrix, Matrix6, SVector};
 
 /// Numbers of an [`Answer`].
@@ -16,6 +16,8 @@ pub type Answer = SVector<f64, NUMBERS>;
 
 /// Names of the levers of what carries the sensor or the part.
 pub const HAND_EYE: &str = "hand-eye";
+/// Name of the lever of calibrations that were made at once.
+pub const TOGETHER: &str = "calibrations together";
 /// Name of the lever of a linear axis or a turntable.
 pub const AXIS: &str = "axis";
 
@@ -98,6 +100,58 @@ pub fn levers(seen: &[Seen], rig: &Rig, answer: impl Fn(&[Vec3]) -> Answer) -> V
     out.push(supposed(lever("delay", &["shots"], &|s, _| s.late), &[1.0]));
     out.push(supposed(lever("robot's steps", &["share"], &|s, _| s.longer), &[0.01]));
     out
+}
+
+/// The lever of camera, lens, laser plane and hand-eye, calibrated at once. `None` where the rig has not all of these.
+pub fn together(
+    seen: &[Seen],
+    rig: &Rig,
+    joint: &JointCovariance,
+    answer: impl Fn(&[Vec3]) -> Answer,
+) -> Option<Lever> {
+    let (camera, plane, hand_eye) =
+        (rig.camera.as_ref()?.value, rig.laser_plane.as_ref()?.value, rig.hand_eye.as_ref()?.value);
+    let (mut at, mut columns) = (Vec::new(), Vec::new());
+    for (i, name) in joint.parameters.iter().enumerate() {
+        let Some((record, parameter)) = name.split_once('.') else { continue };
+        let of = |names: &[&str]| names.iter().position(|n| *n == parameter);
+        let by: Box<dyn Fn(&Seen) -> Vec3> = match record {
+            r if r == Kind::Camera.name() => {
+                let k = of(&NAMES)?;
+                Box::new(move |s| by_lens(s, &camera, &plane, k))
+            }
+            r if r == Kind::LaserPlane.name() => {
+                let k = of(Kind::LaserPlane.parameters().0)?;
+                Box::new(move |s| by_plane(s, &plane, k))
+            }
+            r if r == Kind::HandEye.name() => {
+                let k = of(Kind::HandEye.parameters().0)?;
+                Box::new(move |s| by_hand_eye(s, &hand_eye, k))
+            }
+            // The pointer scans nothing.
+            _ => continue,
+        };
+        at.push(i);
+        columns.push(answer(&seen.iter().map(by).collect::<Vec<_>>()));
+    }
+    let jacobian = DMatrix::from_fn(NUMBERS, columns.len(), |r, c| columns[c][r]);
+    let covariance = Some(joint.of_parameters(&at));
+    Some(Lever { name: TOGETHER, parameters: &[], jacobian, covariance, supposed: false })
+}
+
+/// The pixel stays, the camera or its lens changes: by differences.
+fn by_lens(s: &Seen, camera: &Intrinsics, plane: &Plane<Camera>, k: usize) -> Vec3 {
+    let Some(pixel) = camera.pixel_from_point(&s.at) else { return Vec3::zeros() };
+    let step = difference_step(k);
+    let with = |d: f64| {
+        let mut change = Parameters::zeros();
+        change[k] = d;
+        camera.changed(&change).ray_from_pixel(&pixel)?.meet(plane)
+    };
+    match (with(step), with(-step)) {
+        (Some(a), Some(b)) => s.base_from_camera.direction(&((a - b) / (2.0 * step))),
+        _ => Vec3::zeros(),
+    }
 }
 
 /// P = ray offset / (n ray), so that dP = P (d offset - P dn) / offset.

@@ -2,7 +2,7 @@
 //! part's measured pose and sizes answer where points move.
 //! Frame and unit: camera frame and base frame; answers as in `levers`; mm, rad.
 
-use super::levers::{Answer, Lever, Seen, levers};
+use super::levers::{Answer, Lever, Seen, levers, together};
 use crate::find::measure::options::MeasureOptions;
 use crate::find::measure::points::Ordered;
 use crate::find::measure::points::localise;
@@ -10,7 +10,7 @@ use crate::find::measure::pose::Measured;
 use crate::find::measure::shape::shape_row;
 use crate::find::model::drawing::Drawing;
 use crate::geometry::{Base, Camera, Mat3, Part, Rigid, Vec2, Vec3};
-use crate::rig::Rig;
+use crate::rig::{JointCovariance, Rig};
 use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector};
 
 /// Shots that are looked at, places in each, and the least that say how a camera stood.
@@ -57,11 +57,7 @@ impl PartSeen {
     }
 
     /// `edges`: x, y and normal in the part.
-    pub(in crate::find) fn of(
-        base_from_part: Rigid<Base, Part>,
-        seen: Vec<Seen>,
-        edges: Vec<[f64; 4]>,
-    ) -> Option<PartSeen> {
+    pub fn of(base_from_part: Rigid<Base, Part>, seen: Vec<Seen>, edges: Vec<[f64; 4]>) -> Option<PartSeen> {
         (!seen.is_empty() && edges.len() >= 4).then_some(PartSeen { base_from_part, seen, edges })
     }
 
@@ -106,8 +102,19 @@ impl PartSeen {
         PartSeen { seen, ..self.clone() }
     }
 
-    /// What the rig's errors do to the part's pose and sizes.
+    /// What the rig's errors do to the part's pose and sizes, each calibration by itself.
     pub fn levers(&self, rig: &Rig) -> Vec<Lever> {
+        levers(&self.seen, rig, self.answer())
+    }
+
+    /// What they do all together: camera, lens, laser plane and hand-eye were calibrated at once, and their errors cancel in part.
+    /// `None` where the rig has not all of these.
+    pub fn together(&self, rig: &Rig, joint: &JointCovariance) -> Option<Lever> {
+        together(&self.seen, rig, joint, self.answer())
+    }
+
+    /// The part's measured pose and sizes where places move: displacements, base frame.
+    pub fn answer(&self) -> impl Fn(&[Vec3]) -> Answer + '_ {
         let into_part = self.base_from_part.inverse();
         let places: Vec<Vec3> = self.seen.iter().map(|s| into_part.point(&s.base_from_camera.point(&s.at))).collect();
         // Displacements are taken to change evenly over the part: a constant and a slope along each axis.
@@ -123,7 +130,7 @@ impl PartSeen {
         };
         let (placed, shaped) = (edge(false), edge(true));
         let to_part = self.base_from_part.rotation.transpose();
-        levers(&self.seen, rig, |moved| {
+        move |moved: &[Vec3]| {
             let u = DMatrix::from_fn(moved.len(), 3, |r, c| (to_part.row(c) * moved[r])[0]);
             let field: SMatrix<f64, 4, 3> = (&even * u).fixed_view::<4, 3>(0, 0).into();
             let across = DVector::from_iterator(
@@ -137,7 +144,7 @@ impl PartSeen {
             let shift = self.base_from_part.rotation * Vec3::new(place[0], place[1], field[(0, 2)]);
             let turn = self.base_from_part.rotation * Vec3::new(field[(2, 2)], -field[(1, 2)], place[2]);
             Answer::from_iterator(shift.iter().chain(&turn).chain(shape.rows(3, 3).iter()).copied())
-        })
+        }
     }
 }
 

@@ -16,11 +16,11 @@ use crate::fault::{Fault, Gate, Result};
 use crate::find::insert::picture;
 use crate::find::{LocateOptions, Recipe, Report, locate};
 use crate::geometry::{Base, Flange, Mat3, Rigid, Vec3};
-use crate::recording::Beam;
+use crate::recording::{Beam, Recording};
 use crate::rig::Rig;
 use crate::robot::Convention;
 use crate::scan::Where;
-use crate::station::range::{RangeRun, measure_range};
+use crate::station::range::{RangeReport, RangeRun, measure_range};
 use crate::station::scan::recorded::scan_recording;
 use crate::station::scan::report::{cloud_of, load_report};
 use crate::station::scan::run::ScanOptions;
@@ -44,7 +44,8 @@ pub struct JobOptions {
     pub place: Where,
     /// Speed of every motion, mm/s; `None`: the station's.
     pub speed_mm_s: Option<f64>,
-    /// The line sweeps over so much about the picture's middle, mm, 5 to 1000; `None`: over the field's short side.
+    /// The line sweeps over so much about the picture's middle, mm, 5 to 1000; `None`: over the part, an eighth of the
+    /// field's short side to both sides, at most over that side.
     pub sweep_mm: Option<f64>,
     /// Largest angle between the part's top and the touched board, degrees, 0.1 to 20.
     pub max_tilt_deg: f64,
@@ -64,6 +65,10 @@ pub struct Job<'a> {
     since: Instant,
 }
 
+/// Touches of one board lie about its plane by less than this share of the view's distance: a board's thickness is more.
+const ONE_PLANE: f64 = 0.002;
+/// A known part lies so near to the picture's middle, as a share of the field's short side.
+const ASIDE: f64 = 1.0 / 8.0;
 /// A touched board whose points scatter more than this about their plane, as a share of the view's distance, is none.
 const FLAT: f64 = 0.01;
 
@@ -121,6 +126,7 @@ impl<'a> Job<'a> {
         self.pick_up()?;
         while !matches!(self.state.phase, Phase::Done | Phase::Stopped) {
             let (phase, step) = (self.state.phase, self.step());
+            self.tick();
             match step {
                 Ok(next) => self.state.phase = next,
                 Err(fault) => {
@@ -171,8 +177,15 @@ impl<'a> Job<'a> {
         self.store()
     }
 
+    /// What has passed since is the present phase's.
+    fn tick(&mut self) {
+        let passed = std::mem::replace(&mut self.since, Instant::now()).elapsed().as_secs_f64();
+        self.state.seconds += passed;
+        *self.state.seconds_by_phase.entry(self.state.phase).or_default() += passed;
+    }
+
     fn store(&mut self) -> Result<()> {
-        self.state.seconds += std::mem::replace(&mut self.since, Instant::now()).elapsed().as_secs_f64();
+        self.tick();
         self.state.store(&self.options.out)
     }
 
@@ -269,8 +282,7 @@ impl<'a> Job<'a> {
         self.go("touch", says, "is the way free?", plan, &mut |eye, arm, _| {
             shoot(eye, arm, &mut record, Some(Beam::Pointer))
         })?;
-        let run = RangeRun { one_surface: true, ..RangeRun::default() };
-        let touched = measure_range(&record.end()?, &self.rig, &run)?;
+        let touched = self.board(record.end()?, then)?;
         let surface = touched.surface.as_ref().expect("asked for");
         if !(surface.rms_mm <= FLAT * then) {
             return Err(Fault::refused(format!(
@@ -288,6 +300,28 @@ impl<'a> Job<'a> {
         ));
         self.state.surface = Some([centre, normal]);
         Ok(Phase::Scan)
+    }
+
+    /// The plane of the touches that lie on one: others met a part, or what lies beside the board.
+    fn board(&self, mut touches: Recording, distance: f64) -> Result<RangeReport> {
+        let all = measure_range(&touches, &self.rig, &RangeRun::default())?;
+        let at: Vec<(&str, Vec3)> =
+            all.distances.iter().filter_map(|d| Some((d.picture.as_str(), Vec3::from(d.point_base_mm?)))).collect();
+        let points: Vec<Vec3> = at.iter().map(|a| a.1).collect();
+        let on = places::on_one_plane(&points, ONE_PLANE * distance);
+        if on.len() < 4 {
+            return Err(Fault::refused(format!(
+                "{} of {} touches lie on one plane within {:.2} mm, more than half are needed",
+                on.len(),
+                points.len(),
+                ONE_PLANE * distance
+            ))
+            .cause("the pointer met parts or the table instead of the board")
+            .next("jog the arm so that more of the bare board is in view, then begin again"));
+        }
+        let counted: Vec<&str> = on.iter().map(|&i| at[i].0).collect();
+        touches.meta.frames.retain(|f| f.laser.as_deref().is_some_and(|name| counted.contains(&name)));
+        measure_range(&touches, &self.rig, &RangeRun { one_surface: true, ..RangeRun::default() })
     }
 
     /// How far the board is, and where the flange stood; nothing moves.
@@ -321,7 +355,11 @@ impl<'a> Job<'a> {
         let square = self.square(&normal, &centre, depth)?;
         let field =
             [f64::from(camera.width) / camera.fx, f64::from(camera.height) / camera.fy].map(|share| share * depth);
-        let length = self.options.sweep_mm.unwrap_or(field[0].min(field[1]));
+        let short = field[0].min(field[1]);
+        // However it is turned, and as far beside the picture's middle as an operator leaves it.
+        let [x0, y0, x1, y1] = self.recipe.drawing().bounds();
+        let part = (x1 - x0).hypot(y1 - y0) + 2.0 * ASIDE * short;
+        let length = self.options.sweep_mm.unwrap_or(part.min(short));
         // About two steps a cell of the recipe's map, and no finer than what a pixel sees.
         let step = (0.6 * self.recipe.cell_mm).max(depth / camera.fx);
         let path = places::sweep(&square, &hand_eye, &self.rig.need_laser_plane()?.value, depth, length, step);

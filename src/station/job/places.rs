@@ -1,12 +1,13 @@
 //! In: where the camera stands, how far the board is, how the beams lie in the camera's frame. Out: flange poses from which the
-//! pointer touches the board around the picture's middle, and along which the line sweeps over it. Pure.
+//! pointer touches the board around the picture's middle, and along which the line sweeps over it; which touches are the board's. Pure.
 //! Frame and unit: base_from_flange, mm.
 
 use crate::geometry::{Base, Camera, Flange, Plane, Ray, Rigid, Vec2, Vec3};
 
-/// Touches lie at these shares of the field around its middle: corners and the middles of the picture's long sides, where a long
-/// part along the stripe is not.
-const TOUCHES: [[f64; 2]; 6] = [[-1.0, -1.0], [0.0, -1.0], [1.0, -1.0], [1.0, 1.0], [0.0, 1.0], [-1.0, 1.0]];
+/// Touches lie at these shares of the field around its middle, on eight sides: where one side of the picture lies beside the board,
+/// or a part fills it, six are left on the board, and no other plane has more than four (two rows of three would have six).
+const TOUCHES: [[f64; 2]; 8] =
+    [[-1.0, -0.5], [-0.5, -1.0], [0.5, -1.0], [1.0, -0.5], [1.0, 0.5], [0.5, 1.0], [-0.5, 1.0], [-1.0, 0.5]];
 
 /// Flange poses from which the pointer's spots lie around the foot of the camera's axis, `half` mm to each side. The camera stands
 /// `now` from the board along its axis, and goes to `then`.
@@ -23,6 +24,28 @@ pub fn touches(
         *base_from_camera * Rigid::<Camera, Camera>::from_vectors(&Vec3::zeros(), shift) * flange_from_camera.inverse()
     };
     TOUCHES.iter().map(place).collect()
+}
+
+/// Indices of the touches that lie within `gate` mm of one plane, the most that do; empty where that is not more than half of them.
+pub fn on_one_plane(points: &[Vec3], gate: f64) -> Vec<usize> {
+    let n = points.len();
+    let through = |i: usize, j: usize, k: usize| {
+        let normal = (points[j] - points[i]).cross(&(points[k] - points[i]));
+        let size = (points[j] - points[i]).norm() * (points[k] - points[i]).norm();
+        // Three in a row have no plane.
+        (normal.norm() > 0.1 * size).then(|| (normal.normalize(), points[i]))
+    };
+    let mut best = (Vec::new(), f64::INFINITY);
+    for (i, j, k) in (0..n).flat_map(|i| (0..i).flat_map(move |j| (0..j).map(move |k| (i, j, k)))) {
+        let Some((normal, at)) = through(i, j, k) else { continue };
+        let off = |p: &Vec3| normal.dot(&(p - at)).abs();
+        let on: Vec<usize> = (0..n).filter(|&m| off(&points[m]) <= gate).collect();
+        let rest = on.iter().map(|&m| off(&points[m]).powi(2)).sum::<f64>();
+        if on.len() > best.0.len() || (on.len() == best.0.len() && rest < best.1) {
+            best = (on, rest);
+        }
+    }
+    if 2 * best.0.len() > n { best.0 } else { Vec::new() }
 }
 
 /// Flange poses of a sweep: the camera looks as it does at `square`, `depth` from the board, and goes along the direction across
@@ -52,6 +75,28 @@ pub fn sweep(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn touches_beside_the_board_and_on_parts_do_not_count() {
+        let tilted =
+            |x: f64, y: f64| Vec3::new(50.0 * x, 40.0 * y, 3.0 * x - 5.0 * y + 0.02 * (7.0 * x + 3.0 * y).sin());
+        let board: Vec<Vec3> = TOUCHES.iter().map(|&[x, y]| tilted(x, y)).collect();
+        assert_eq!(on_one_plane(&board, 0.3).len(), 8);
+        // A side of the picture is beside the board.
+        let mut low = board.clone();
+        (5..7).for_each(|i| low[i].z -= 6.0);
+        assert_eq!(on_one_plane(&low, 0.3), [0, 1, 2, 3, 4, 7]);
+        // Half of it is: two planes of four, and nobody knows which is the board.
+        [4, 7].into_iter().for_each(|i| low[i].z -= 6.0);
+        assert!(on_one_plane(&low, 0.3).is_empty());
+        // Two sides have a part on them, one touch each.
+        let mut part = board.clone();
+        [3, 7].into_iter().for_each(|i| part[i].z += 8.0);
+        assert_eq!(on_one_plane(&part, 0.3), [0, 1, 2, 4, 5, 6]);
+        let mut rubble = board;
+        (0..8).for_each(|i| rubble[i].z += 2.0 * f64::from(i as u32 % 5) * f64::from(i as u32));
+        assert!(on_one_plane(&rubble, 0.3).is_empty());
+    }
 
     #[test]
     fn spots_and_stripe_lie_where_they_are_wanted() {

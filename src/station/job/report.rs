@@ -3,6 +3,7 @@
 
 use super::state::{JobState, Phase};
 use crate::find::Report;
+use std::collections::BTreeMap;
 
 /// How a job ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -25,6 +26,8 @@ pub struct JobReport {
     pub phase: Phase,
     /// Work and waits, s.
     pub seconds: f64,
+    /// The same by step.
+    pub seconds_by_phase: BTreeMap<Phase, f64>,
     /// From the beginning to the confirmed insertion pose, s.
     pub time_to_position_s: Option<f64>,
     /// Times a person was asked until then.
@@ -43,6 +46,7 @@ impl JobReport {
             why: state.why.clone(),
             phase: state.phase,
             seconds: state.seconds,
+            seconds_by_phase: state.seconds_by_phase.clone(),
             time_to_position_s: state.seconds_to_position,
             confirmations_to_position: state.confirmations_to_position,
             confirmations: state.confirmations,

@@ -3,6 +3,7 @@
 
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid, Vec3};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// What is done next.
@@ -51,6 +52,9 @@ pub struct JobState {
     pub confirmations: u32,
     /// Seconds of work so far, the waits for a person included.
     pub seconds: f64,
+    /// The same by phase.
+    #[serde(default)]
+    pub seconds_by_phase: BTreeMap<Phase, f64>,
     /// The same until the insertion pose was confirmed.
     pub seconds_to_position: Option<f64>,
     /// Confirmations until then.
@@ -75,6 +79,7 @@ impl JobState {
             released: false,
             confirmations: 0,
             seconds: 0.0,
+            seconds_by_phase: BTreeMap::new(),
             seconds_to_position: None,
             confirmations_to_position: None,
             why: String::new(),

@@ -49,6 +49,8 @@ pub struct AutoRun {
 
 /// Stops that no solve sees.
 const CHECKS: usize = 5;
+/// So often poses are drawn for these: some are refused, from some the board is not found.
+const CHECK_ROUNDS: usize = 3;
 /// Fewest stops that are believed, whatever they promise: as few tell the robot's scatter badly.
 const FEWEST: usize = 14;
 /// So many predictions in a row that are wrong are no accident.
@@ -59,6 +61,8 @@ const NEAR: (f64, f64) = (0.15, 12.0);
 /// After so many refusals in a row the arm goes back to where it began, and after so many it is given up.
 const BACK: usize = 3;
 const STUCK: usize = 12;
+/// Poses that are tried until stripes tell where the sheet is.
+const LIGHTS: usize = 10;
 /// It does not fall any more where so many stops have gained less than 2 %.
 const STALLED: usize = 8;
 
@@ -105,7 +109,8 @@ struct Session<'a> {
     tries: u64,
     /// Stops in a row at which the board was not found where it was predicted.
     lost: usize,
-    home: Rigid<Base, Flange>,
+    /// Where the arm has been, the beginning first.
+    trail: Vec<Rigid<Base, Flange>>,
     /// Where the controller would not begin to go, and how many of these came one after the other.
     refused: Vec<Rigid<Base, Flange>>,
     stuck: usize,
@@ -157,15 +162,18 @@ pub fn calibrate_auto(cell: &mut dyn Cell, rig: &Rig, run: &AutoRun, told: &dyn 
     let stops = session.shots.len();
     let joint = calibrate_joint(&session.book.recordings(), rig, &run.joint, &|_, _| {})?;
     let check = session.check(&joint)?;
+    // What was calibrated stays so where the arm does not come back.
+    let stranded = session.home().err();
     let mut result = AutoResult { joint, expected_mm: expected, stops, ended, check };
-    result.judge(run);
+    result.judge(run, stranded.map(|e| e.what));
     Ok(result)
 }
 
 impl AutoResult {
     /// What the check and the end say goes into every record.
-    fn judge(&mut self, run: &AutoRun) {
-        let mut reasons = Vec::new();
+    fn judge(&mut self, run: &AutoRun, stranded: Option<String>) {
+        let mut reasons: Vec<String> =
+            stranded.into_iter().map(|why| format!("the arm did not go back to where it began: {why}")).collect();
         let mut worst = Verdict::Good;
         let last = self.expected_mm.last().copied().unwrap_or(f64::INFINITY);
         if last > run.target_mm {
@@ -217,14 +225,10 @@ impl<'a> Session<'a> {
             camera_prior: first.prior.clone(),
             ..JointOptions::default()
         };
-        let finders = run.joint.finders(&recordings, &first);
-        let mut shots = unjudged(&book.stops.iter().collect::<Vec<_>>(), &finders)?;
-        let (state, _) = start(&mut shots, 1, &first.value, None, &options)?;
-        let fit = solve(&shots, &state, Noise::usual(), &options)?;
-        still(&shots, &fit, &options)?;
-        let depth = middle_depth(&state.boards, &run.board);
+        let (shots, fit) = solved(&book, run, &first, &options)?;
+        let depth = middle_depth(&fit.state.boards, &run.board);
         let working = run.working.unwrap_or([0.8 * depth, 1.2 * depth]);
-        Ok(Session {
+        let mut session = Session {
             cell,
             run,
             book,
@@ -236,14 +240,38 @@ impl<'a> Session<'a> {
             tilt_deg: 14.0,
             tries: 0,
             lost: 0,
-            home,
+            trail: vec![home],
             refused: vec![],
             stuck: 0,
-        })
+        };
+        session.light()?;
+        Ok(session)
+    }
+
+    /// From where it began the sheet may pass beside the board: poses within the working depths, until stripes tell where it is.
+    fn light(&mut self) -> Result<()> {
+        for _ in 0..LIGHTS {
+            if self.fit.has(Part::Stripe) {
+                break;
+            }
+            let all = self.candidates()?;
+            let Some((_, to)) = all.first() else { break };
+            match self.visit(to)? {
+                Visit::Seen(_) => {
+                    let first = FirstCamera { value: self.fit.state.camera, ..self.first.clone() };
+                    (self.shots, self.fit) = solved(&self.book, self.run, &first, &self.options)?;
+                }
+                Visit::NotBegun(why) => self.elsewhere(*to, &why)?,
+                Visit::Lost(_) => {}
+            }
+        }
+        Ok(())
     }
 
     fn belief(&self) -> Result<Belief> {
-        Belief::after(&self.fit, &places(&self.fit.state, self.working), &self.options).ok_or_else(|| {
+        let known = self.fit.has(Part::Stripe);
+        let belief = Belief::after(&self.fit, &places(&self.fit.state, self.working), &self.options);
+        belief.filter(|_| known).ok_or_else(|| {
             Fault::refused("camera, hand-eye and laser plane are not determined by the stops so far")
                 .cause("the stripe or the spot was not seen on the board")
                 .next("check that line and pointer fall on the board, and begin again")
@@ -274,6 +302,7 @@ impl<'a> Session<'a> {
             turn_deg: (4.0 * self.tilt_deg).min(180.0),
             margin_px: 0.02 * f64::from(state.camera.width),
             upright: upright(&state.boards),
+            lit: self.fit.has(Part::Stripe),
         };
         let seed = self.run.seed.wrapping_mul(1_000_003).wrapping_add(self.tries);
         let mut out = Vec::new();
@@ -317,6 +346,7 @@ impl<'a> Session<'a> {
             Went::There(reported) => reported,
             Went::NotBegun(why) => return Ok(Visit::NotBegun(why)),
         };
+        self.trail.push(*to);
         let (seen, why) = self.book.stop(self.cell, &reported)?;
         Ok(seen.map_or(Visit::Lost(why), Visit::Seen))
     }
@@ -331,8 +361,25 @@ impl<'a> Session<'a> {
                 .cause("straight ways from here lead through places that the arm cannot pass")
                 .next("jog the robot to where its wrist is bent, the board in view, and begin again"));
         }
-        if self.stuck % BACK == 0 && self.cell.may(&self.home)? {
-            let _ = self.cell.go(&self.home)?;
+        if self.stuck % BACK == 0 { self.home() } else { Ok(()) }
+    }
+
+    /// Back to where it began: straight, or from the last place before from which that can be done. A straight way that was gone can be
+    /// gone back.
+    fn home(&mut self) -> Result<()> {
+        let began = self.trail[0];
+        while self.trail.len() > 1 {
+            if self.cell.may(&began)?
+                && let Went::There(_) = self.cell.go(&began)?
+            {
+                self.trail.truncate(1);
+                return Ok(());
+            }
+            self.trail.pop();
+            let before = *self.trail.last().expect("the beginning stays");
+            if let Went::NotBegun(_) = self.cell.go(&before)? {
+                return Ok(());
+            }
         }
         Ok(())
     }
@@ -352,7 +399,7 @@ impl<'a> Session<'a> {
         let mut state = self.fit.state.clone();
         state.boards =
             self.shots.iter().map(|s| Ok(board(&state.camera, &s.seen)?.camera_from_board)).collect::<Result<_>>()?;
-        self.fit = solve(&self.shots, &state, self.fit.noise, &self.options)?;
+        self.fit = solve(&with_beam(&self.shots), &state, self.fit.noise, &self.options)?;
         still(&self.shots, &self.fit, &self.options)?;
         let moved = self.fit.left_out.iter().filter(|l| l.part == Part::RobotPlace).count();
         if moved * 4 > self.shots.len() {
@@ -368,13 +415,16 @@ impl<'a> Session<'a> {
 
     /// Goes to poses that were not in the solve.
     fn check(&mut self, joint: &JointResult) -> Result<Option<SelfCheck>> {
-        let all = self.candidates()?;
         let before = self.book.stops.len();
-        for (_, to) in all.iter().take(2 * CHECKS) {
-            if self.book.stops.len() == before + CHECKS || self.book.visits >= self.run.most {
-                break;
+        for _ in 0..CHECK_ROUNDS {
+            for (_, to) in self.candidates()?.iter().take(2 * CHECKS) {
+                if self.book.stops.len() == before + CHECKS || self.book.visits >= self.run.most {
+                    break;
+                }
+                if let Visit::NotBegun(_) = self.visit(to)? {
+                    self.refused.push(*to);
+                }
             }
-            self.visit(to)?;
         }
         let shots: Vec<Shot> = (before..self.book.stops.len()).map(|i| self.measured(i)).collect::<Result<_>>()?;
         Ok(check(&joint.fit, &shots, joint.expected_mm()))
@@ -425,6 +475,33 @@ fn middle_depth(boards: &[Rigid<Camera, Board>], spec: &BoardSpec) -> f64 {
     let features = spec.features();
     let centre = features.iter().sum::<crate::geometry::Vec3>() / features.len() as f64;
     boards.iter().map(|b| b.point(&centre).z).sum::<f64>() / boards.len().max(1) as f64
+}
+
+/// Fewest spots that tell a beam: two would leave nothing to judge them by.
+const SPOTS: usize = 3;
+
+/// The stops, their spots only where they are enough to tell a beam: else nothing at all would be determined.
+fn with_beam(shots: &[Shot]) -> Vec<Shot> {
+    let mut out = shots.to_vec();
+    if shots.iter().filter(|s| s.spot.is_some()).count() < SPOTS {
+        out.iter_mut().for_each(|s| s.spot = None);
+    }
+    out
+}
+
+/// All stops so far, solved from the beginning.
+fn solved(
+    book: &Notebook,
+    run: &AutoRun,
+    first: &FirstCamera,
+    options: &JointOptions,
+) -> Result<(Vec<Shot>, JointFit)> {
+    let recordings = book.recordings();
+    let mut shots = unjudged(&book.stops.iter().collect::<Vec<_>>(), &run.joint.finders(&recordings, first))?;
+    let (state, _) = start(&mut shots, 1, &first.value, None, options)?;
+    let fit = solve(&with_beam(&shots), &state, Noise::usual(), options)?;
+    still(&shots, &fit, options)?;
+    Ok((shots, fit))
 }
 
 /// The station's camera where it has one, else one that the small moves tell.

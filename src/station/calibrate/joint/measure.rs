@@ -22,7 +22,7 @@ use crate::calibrate::measured_pose::{MeasuredPose, SeenBoard, measure_view, poo
 use crate::calibrate::pointer::solve::{PointerFit, SpotView, solve as solve_pointer};
 use crate::calibrate::pointer::spot::{SpotPicture, find_spots, hot_pixels};
 use crate::camera::{Intrinsics, ParameterCovariance};
-use crate::fault::Result;
+use crate::fault::{Kind, Result};
 use crate::raster::Image;
 use crate::recording::Recording;
 
@@ -233,7 +233,7 @@ fn spots(boards: &[Placed<'_>], how: &Finders<'_>, out: &mut Measured) -> Result
 }
 
 /// Stops whose poses, stripes and spots nothing has been compared with yet: the joint solve does that. A stop whose board has
-/// no pose is refused.
+/// no pose is refused; stripes that tell no sheet are none.
 pub fn unjudged(stops: &[&Stop], how: &Finders<'_>) -> Result<Vec<Shot>> {
     let mut boards: Vec<Placed<'_>> = Vec::new();
     for stop in stops {
@@ -243,7 +243,10 @@ pub fn unjudged(stops: &[&Stop], how: &Finders<'_>) -> Result<Vec<Shot>> {
     let shot = |b: &Placed<'_>| Shot { seen: seen(b), robot: b.0.robot, stripe: Vec::new(), spot: None };
     let shots = boards.iter().map(shot).collect();
     let mut out = Measured { shots, left_out: Vec::new(), separate: Separate::default() };
-    stripes(&boards, how, &mut out)?;
+    match stripes(&boards, how, &mut out) {
+        Err(fault) if fault.kind != Kind::Refused => return Err(fault),
+        _ => {}
+    }
     for (i, view) in found_spots(&boards, how, &mut out)? {
         out.shots[i].spot = Some(Spot { pixel: view.pixel, covariance: view.covariance });
     }

@@ -11,7 +11,7 @@ use crate::calibrate::hand_eye::closed::Near;
 use crate::calibrate::hand_eye::options::Mount;
 use crate::calibrate::joint::limits::systematic;
 use crate::calibrate::joint::options::{CameraPrior, JointOptions, Noise};
-use crate::calibrate::joint::records::{Beside, Together, covariances, judge, separately, together};
+use crate::calibrate::joint::records::{Beside, covariances, judge, separately, together};
 use crate::calibrate::joint::shots::{Part, Shot};
 use crate::calibrate::joint::solve::{JointFit, solve};
 use crate::calibrate::joint::start::start;
@@ -27,7 +27,7 @@ use crate::camera::{Intrinsics, PARAMETERS, ParameterCovariance, named};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Camera, Plane, Ray, Rigid, Vec3};
 use crate::recording::Recording;
-use crate::rig::{Calibration, HandEye, Kind, Quality, Rig, Verdict, Volume, sealed};
+use crate::rig::{Calibration, HandEye, JointCovariance, Kind, Quality, Rig, Verdict, Volume, sealed};
 use crate::scan::{Extraction, Where};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -83,7 +83,7 @@ pub struct JointResult {
     /// The records that the recordings speak of; the others are `None`.
     pub rig: Rig,
     /// Covariance of all records together.
-    pub together: Together,
+    pub together: JointCovariance,
     /// The verdict, the same in every record.
     pub quality: Quality,
     /// For people.
@@ -325,7 +325,7 @@ pub fn store_joint(station: &Path, result: &JointResult) -> Result<Vec<Kind>> {
     // A rotation comes back from its file orthonormal to the last digit: what a reader finds is named.
     let stored_rig = Rig::load(station)?;
     let of = contents(&stored_rig).into_iter().filter(|(kind, _)| stored.contains(kind)).collect();
-    let together = Together { of, ..result.together.clone() };
+    let together = JointCovariance { of, ..result.together.clone() };
     let folder = station.join("calibration");
     let page = folder.join("joint.html");
     let html = result.page.html();
