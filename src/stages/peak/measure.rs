@@ -3,8 +3,8 @@
 
 use super::found::Peak;
 use super::grey::{Grey, View};
+use super::noise::scatter::{Scatter, Sums};
 use super::params::{Method, PeakParams, Stripe};
-use super::scatter::{Scatter, Sums};
 use super::{PeakFrame, twin};
 use crate::raster::{Image, Pixels};
 use crate::stages::stripe::choose_params::ChooseParams;

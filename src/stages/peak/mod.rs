@@ -12,7 +12,6 @@ mod methods;
 mod noise;
 pub mod params;
 mod profile;
-mod scatter;
 mod scoring;
 mod stage;
 mod turn;

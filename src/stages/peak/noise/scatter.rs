@@ -1,12 +1,12 @@
 //! In: squared residuals of pixels whose light is known. Out: read noise, shot noise and speckle, which have scattered them.
 //! Frame and unit: grey levels of the picture's depth within, of an 8-bit picture in [`Scatter`]. docs/math.md, Stripe peak (6).
 
-use super::params::PeakParams;
+use crate::stages::peak::params::PeakParams;
 use nalgebra::{Matrix3, Vector3};
 
 /// What scatters a pixel's level, as [`PeakParams`] has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Scatter {
+pub(in super::super) struct Scatter {
     pub read_noise: f32,
     pub gain: f32,
     pub speckle: f32,
@@ -19,7 +19,7 @@ const BELIEF: f64 = 10.0;
 
 /// Least squares of e² against left (r² + k level + c² light²) over some pixels, each in units of its expected variance.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Sums {
+pub(in super::super) struct Sums {
     normal: Matrix3<f64>,
     right: Vector3<f64>,
     squares: f64,

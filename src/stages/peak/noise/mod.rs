@@ -1,6 +1,8 @@
 //! In: a picture, most of it dark or smooth. Out: by how much a dark pixel scatters.
 //! Frame and unit: standard deviation, grey levels of an 8-bit picture. docs/math.md, Stripe peak (6).
 
+pub(super) mod scatter;
+
 use crate::raster::Image;
 
 /// Pixels looked at, about; the median of so many is good to 1 % of the scatter.
