@@ -147,8 +147,8 @@ fn right_stations_pass_two_looks_and_the_pose_is_as_good_as_it_says() {
         "{passed} of {n} pass; error over stated sigma {one:.2?} of one look, {two:.2?} of two; worse in the plane: {worse}"
     );
     assert!(passed * 100 >= n * 99 - if long() { 0 } else { 100 }, "{passed} of {n} right ones pass");
-    // Six draws at one station tell a sigma to a factor of two.
-    let range = if long() { 0.8..=1.25 } else { 0.4..=2.5 };
+    // What 0.8 to 1.25 comes to in six draws of one station but once in a thousand: chi squared of six, 0.38 and 22.5.
+    let range = if long() { 0.8..=1.25 } else { 0.2..=2.4 };
     assert!(one.iter().chain(&two).all(|h| range.contains(h)), "{one:.2?} {two:.2?}");
     assert!(worse * 2 < n, "two looks are worse than one in {worse} of {n}");
 }

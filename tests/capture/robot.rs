@@ -182,7 +182,9 @@ fn a_delay_between_camera_and_controller_is_found_and_belongs_to_both() {
         report["shots"],
         report["account"]
     );
-    assert!((is("delay_ms") - delay).abs() < 0.2, "{found}");
+    // The arm's repeatability is 0.4 ms of its way at this speed: what a few passes leave is stated, what a minute's leave is 0.2 ms.
+    let bar = if long { 0.2 } else { 3.0 * is("sigma_ms") };
+    assert!(is("sigma_ms") < 0.2 && (is("delay_ms") - delay).abs() < bar, "{found}");
     // It is this camera's against this robot's, and sealed.
     let file = station.join("calibration/latency.json");
     let stored = json(&file);

@@ -254,8 +254,12 @@ fn the_programs_in_the_documents_speak_the_protocol() {
             answers += said.len();
             continue;
         }
-        programs += 1;
         assert!(text.to_lowercase().contains("never tried"), "{}: what was never tried is not said", path.display());
+        // A KUKA program's channel: where it listens, no words.
+        if path.extension().is_some_and(|e| e == "xml") {
+            continue;
+        }
+        programs += 1;
         // Texts in the language's quotes that begin with a word of the protocol.
         let quoted = text.split(['"', '\'']).skip(1).map(str::trim_end);
         let words = ["HELLO", "STATUS", "SCAN", "POSE", "FIND", "GIVE", "BYE"];

@@ -25,8 +25,8 @@ use std::path::PathBuf;
 /// Sheetlight is no safety device: somebody stands at the emergency stop.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
-  sheetlight calibrate auto --station cell3 --robot bcap://192.168.0.1:5007 --camera gige://first \\
-      --board board.json --out pictures --target-mm 0.025 --allow-motion")]
+  sheetlight calibrate auto --station cell3 --robot bcap://192.168.0.1:5007 \\
+      --camera gige://first --board board.json --out pictures --target-mm 0.025 --allow-motion")]
 pub struct Args {
     #[command(flatten)]
     moving: Moving,

@@ -63,3 +63,27 @@ pub(super) fn measured<G: Grey>(
         Method::Pixel => places.iter().map(|place| methods::pixel(place, frame)).for_each(take),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stages::cases::stripe;
+
+    /// What lies in the lanes beside a profile, and what lay there before, is nothing to it: places all over a stripe, at the picture's
+    /// borders too, wide and narrow ones, each alone and with its seven neighbours of the list.
+    #[test]
+    fn a_profile_among_others_comes_to_the_bits_that_it_comes_to_alone() {
+        for (width, method) in [0.8, 2.5, 7.0].into_iter().flat_map(|w| Method::ALL.map(|m| (w, m))) {
+            let image = stripe(160, 120, 8, width, 5, 4);
+            let places: Vec<u32> = (0..160).map(|x| x | (x * 7 % 120) << 16).collect();
+            let params = PeakParams { width_px: width as f32, method, ..PeakParams::default() };
+            let together = peaks(&image, &places, 3, &params, [0.1, 0.99]);
+            assert_eq!(together.len(), places.len());
+            for (place, seen) in places.iter().zip(&together) {
+                let alone = peaks(&image, std::slice::from_ref(place), 3, &params, [0.1, 0.99]);
+                let bits = |peak: &Peak| bytemuck::cast::<Peak, [u32; 12]>(*peak);
+                assert_eq!(bits(&alone[0]), bits(seen), "{method:?}, {width} px, {place:x}");
+            }
+        }
+    }
+}

@@ -5,6 +5,8 @@ use super::Hub;
 use super::hub::Seat;
 use crate::web::message::Event;
 use axum::extract::ws::{Message, WebSocket};
+use futures_util::stream::{SplitSink, SplitStream};
+use futures_util::{SinkExt, StreamExt};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::sync::broadcast::{Receiver, error::RecvError};
@@ -15,13 +17,28 @@ const PATIENCE: Duration = Duration::from_secs(20);
 /// Rows of the growing map are sent this often at most.
 const PICTURE: Duration = Duration::from_millis(100);
 
-/// Serves one viewer until it goes. `state` is asked for at first and whenever events were missed; `hears` gets what it says.
+/// Serves one viewer until it goes. `state` is asked for at first and whenever events were missed; `hears` gets what it says: at once,
+/// however slowly it takes what it is sent, because a button that is held must be heard.
 pub async fn stream(
-    mut socket: WebSocket,
+    socket: WebSocket,
     hub: Arc<Hub>,
-    (_seat, mut events): (Seat, Receiver<Arc<str>>),
+    (_seat, events): (Seat, Receiver<Arc<str>>),
     state: impl Fn() -> Event + Send,
     hears: impl Fn(&str) + Send,
+) {
+    let (sink, said) = socket.split();
+    tokio::select! {
+        () = told(sink, &hub, events, state) => {}
+        () = heard(said, hears) => {}
+    }
+}
+
+/// Tells the viewer what happens until it takes nothing any more.
+async fn told(
+    mut viewer: SplitSink<WebSocket, Message>,
+    hub: &Hub,
+    mut events: Receiver<Arc<str>>,
+    state: impl Fn() -> Event + Send,
 ) {
     let mut pictures = interval(PICTURE);
     pictures.set_missed_tick_behavior(MissedTickBehavior::Delay);
@@ -29,7 +46,7 @@ pub async fn stream(
     let mut next = Some(Message::text(text(&state())));
     loop {
         if let Some(message) = next.take() {
-            match timeout(PATIENCE, socket.send(message)).await {
+            match timeout(PATIENCE, viewer.send(message)).await {
                 Ok(Ok(())) => {}
                 _ => return,
             }
@@ -40,13 +57,18 @@ pub async fn stream(
                 Err(RecvError::Lagged(_)) => Some(Message::text(text(&state()))),
                 Err(RecvError::Closed) => return,
             },
-            _ = pictures.tick() => next = rows(&hub, &mut shown),
-            heard = socket.recv() => match heard {
-                // All that viewers say here is that a button is held; what they order goes through the API.
-                Some(Ok(Message::Text(text))) => hears(&text),
-                Some(Ok(Message::Close(_))) | Some(Err(_)) | None => return,
-                Some(Ok(_)) => {}
-            },
+            _ = pictures.tick() => next = rows(hub, &mut shown),
+        }
+    }
+}
+
+/// Hears the viewer until it goes. All that viewers say here is that a button is held; what they order goes through the API.
+async fn heard(mut viewer: SplitStream<WebSocket>, hears: impl Fn(&str) + Send) {
+    while let Some(Ok(message)) = viewer.next().await {
+        match message {
+            Message::Text(text) => hears(&text),
+            Message::Close(_) => return,
+            _ => {}
         }
     }
 }
