@@ -5,7 +5,6 @@ pub mod budget;
 mod from_drawing;
 pub mod locate;
 pub mod picture;
-mod places;
 pub mod recipe;
 pub mod teach;
 pub mod verdict;

@@ -10,4 +10,3 @@ pub mod mirror;
 pub mod outline;
 pub mod shape;
 pub mod shape_model;
-pub mod template;

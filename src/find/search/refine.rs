@@ -2,7 +2,6 @@
 //! squares over distances to edges, with covariance (docs/math.md, Shape matching (3) and (4)).
 //! Frame and unit: pixels of level 0, radians, scale as a factor.
 
-use super::options::Free;
 use crate::find::model::gradient::Field;
 use crate::find::model::shape_model::{ModelPoint, ShapeModel, ridge_offset};
 use crate::find::scene::Kind;
@@ -69,7 +68,7 @@ pub fn refine(
     fields: &[(Kind, &Field, f32)],
     model: &ShapeModel,
     start: Pose,
-    free: Free,
+    free_scale: bool,
     ignore_polarity: bool,
     rounds: usize,
 ) -> Option<Refined> {
@@ -80,11 +79,11 @@ pub fn refine(
     for _ in 0..rounds {
         let rows: Vec<(Vector4<f64>, f64)> =
             points.iter().filter_map(|p| row(fields, p, &pose, ignore_polarity)).collect();
-        let unknowns = 2 + usize::from(free.angle) + usize::from(free.scale);
+        let unknowns = if free_scale { 4 } else { 3 };
         if rows.len() < 2 * unknowns {
             return None;
         }
-        let (step, covariance, sigma) = solve(&rows, free)?;
+        let (step, covariance, sigma) = solve(&rows, free_scale)?;
         pose.x += step.x;
         pose.y += step.y;
         pose.angle += step.z;
@@ -126,9 +125,7 @@ fn row(fields: &[(Kind, &Field, f32)], p: &ModelPoint, pose: &Pose, ignore: bool
 }
 
 /// Tukey-weighted least squares; the step, the covariance and the robust sigma.
-fn solve(rows: &[(Vector4<f64>, f64)], free: Free) -> Option<(Vector4<f64>, Matrix4<f64>, f64)> {
-    let held = [false, false, !free.angle, !free.scale];
-    let held = || (0..4).filter(move |&k| held[k]);
+fn solve(rows: &[(Vector4<f64>, f64)], free_scale: bool) -> Option<(Vector4<f64>, Matrix4<f64>, f64)> {
     let mut step = Vector4::zeros();
     let mut sigma = 1.0f64;
     let mut inverse = Matrix4::zeros();
@@ -147,11 +144,13 @@ fn solve(rows: &[(Vector4<f64>, f64)], free: Free) -> Option<(Vector4<f64>, Matr
         if weight < 6.0 {
             return None;
         }
-        for k in held() {
-            a.row_mut(k).fill(0.0);
-            a.column_mut(k).fill(0.0);
-            a[(k, k)] = 1.0;
-            b[k] = 0.0;
+        if !free_scale {
+            for k in 0..4 {
+                a[(3, k)] = 0.0;
+                a[(k, 3)] = 0.0;
+            }
+            a[(3, 3)] = 1.0;
+            b[3] = 0.0;
         }
         // Scaled to unit diagonal, a free motion shows as a tiny eigenvalue.
         let scale = Vector4::from_fn(|k, _| a[(k, k)].max(1e-300).sqrt().recip());
@@ -164,9 +163,11 @@ fn solve(rows: &[(Vector4<f64>, f64)], free: Free) -> Option<(Vector4<f64>, Matr
         step = inverse * b;
     }
     let mut covariance = inverse * (sigma * sigma);
-    for k in held() {
-        covariance.row_mut(k).fill(0.0);
-        covariance.column_mut(k).fill(0.0);
+    if !free_scale {
+        for k in 0..4 {
+            covariance[(3, k)] = 0.0;
+            covariance[(k, 3)] = 0.0;
+        }
     }
     Some((step, covariance, sigma))
 }
