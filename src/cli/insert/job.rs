@@ -20,8 +20,8 @@ use std::path::{Path, PathBuf};
 #[derive(clap::Args)]
 #[command(after_help = "Example, with a simulated cell:
   sheetlight cell simulate --part osc --station cell --robot-port 5007 --camera-port 5017
-  sheetlight job --station cell --robot bcap://127.0.0.1:5007 --camera cell://127.0.0.1:5017?rate=-1 \\
-      --recipe data/recipes/osc.toml --out job1 --allow-motion --yes")]
+  sheetlight job --station cell --robot bcap://127.0.0.1:5007 --out job1 --allow-motion --yes \\
+      --camera cell://127.0.0.1:5017?rate=-1 --recipe data/recipes/osc.toml")]
 pub struct Args {
     #[command(flatten)]
     moving: Moving,

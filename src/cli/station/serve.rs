@@ -20,8 +20,8 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "Examples:
   sheetlight station serve --station demo-cell --simulate
   sheetlight station serve --station cell3 --recordings recordings
-  sheetlight station serve --station cell3 --listen 0.0.0.0 --name cell3.plant --password-file pw \\
-      --tls-cert cert.pem --tls-key key.pem")]
+  sheetlight station serve --station cell3 --listen 0.0.0.0 --name cell3.plant \\
+      --password-file pw --tls-cert cert.pem --tls-key key.pem")]
 pub struct Serve {
     /// Station folder; with --simulate the folder in which a simulated station and its recordings are made
     #[arg(long)]
