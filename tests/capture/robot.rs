@@ -149,7 +149,7 @@ fn a_delay_between_camera_and_controller_is_found_and_belongs_to_both() {
     let (camera, robot) = (format!("cell://{}?rate=25", served.camera), served.robot_uri());
     let mut mover = Mover::new(&served);
     mover.to(-35.0, 5.0);
-    let (seconds, passed) = (if long { "30" } else { "9" }, at("passed"));
+    let (seconds, passed) = (if long { "60" } else { "9" }, at("passed"));
     let record = spawn(&[
         "record",
         "--camera",
@@ -182,9 +182,10 @@ fn a_delay_between_camera_and_controller_is_found_and_belongs_to_both() {
         report["shots"],
         report["account"]
     );
-    // The arm's repeatability is 0.4 ms of its way at this speed: what a few passes leave is stated, what a minute's leave is 0.2 ms.
-    let bar = if long { 0.2 } else { 3.0 * is("sigma_ms") };
-    assert!(is("sigma_ms") < 0.2 && (is("delay_ms") - delay).abs() < bar, "{found}");
+    // The arm's repeatability is 0.4 ms of its way at this speed: seven passes tell a delay to what they say, which is itself known to
+    // a third; a minute of them to 0.2 ms.
+    let (sigma, bar) = if long { (0.2, 0.2) } else { (1.0, 3.0 * is("sigma_ms")) };
+    assert!(is("sigma_ms") < sigma && (is("delay_ms") - delay).abs() < bar, "{found}");
     // It is this camera's against this robot's, and sealed.
     let file = station.join("calibration/latency.json");
     let stored = json(&file);
