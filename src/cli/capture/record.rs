@@ -22,7 +22,7 @@ use std::path::PathBuf;
       --station cell3 --out recordings/board8
   sheetlight record --camera gige://first --motion linear:count --pair count \\
       --counts-per-shot 20 --out recordings/parcel4
-  sheetlight record --camera ffmpeg:/dev/video0 --shows room --board boards/charuco.json \
+  sheetlight record --camera ffmpeg:/dev/video0 --shows room --board boards/charuco.json \\
       --shots 20 --out recordings/boards
   sheetlight record --camera sim:1?rate=10 --pair given --shots 50 --out try/scan")]
 pub struct Args {

@@ -165,7 +165,7 @@ impl Session {
     }
 
     fn find(&mut self, name: &str) -> Said {
-        if !self.scan.as_ref().is_some_and(|s| s.shots >= 2) {
+        if self.scan.as_ref().is_none_or(|s| s.shots < 2) {
             let shots = self.scan.as_ref().map_or(0, |s| s.shots);
             return Err(Wrong::new(
                 Code::Order,

@@ -199,7 +199,7 @@ mod tests {
     fn words_are_read_as_controllers_write_them() {
         let pose = |n: &[f64]| Ok(Request::Pose(n.to_vec()));
         assert_eq!(read("find led\r"), Ok(Request::Find("led".into())));
-        assert_eq!(read(" POSE p[0.1, -0.2, 3e-1, 0, 3.14, 0]"), pose(&[0.1, -0.2, 0.3, 0.0, 3.14, 0.0]));
+        assert_eq!(read(" POSE p[0.1, -0.2, 3e-1, 0, 3.1, 0]"), pose(&[0.1, -0.2, 0.3, 0.0, 3.1, 0.0]));
         assert_eq!(read("POSE [1,2,3],[1,0,0,0]"), pose(&[1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0]));
         assert_eq!(read("Give Approach flange"), Ok(Request::Give(Which::Approach, Of::Flange)));
         let says = |line: &str| no(&read(line).unwrap_err());

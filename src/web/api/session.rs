@@ -114,14 +114,12 @@ pub async fn events(
     let name: String = who.tab.chars().filter(char::is_ascii_alphanumeric).take(32).collect();
     let tab = if name.is_empty() { asks } else { Tab { tab: name, ..asks } };
     Ok(upgrade.on_upgrade(async move |socket| {
-        let hears = |text: &str| match text.split_once(' ') {
+        let hears = |text: &str| {
+            let Some(("held", grant)) = text.split_once(' ') else { return };
             // Who holds the button operates.
-            Some(("held", grant)) if screen.desk.held(&tab, grant) => {
-                if screen.leases.need(&tab).is_err() {
-                    screen.desk.let_go(&tab, "the operator's lease was lost");
-                }
+            if screen.desk.held(&tab, grant) && screen.leases.need(&tab).is_err() {
+                screen.desk.let_go(&tab, "the operator's lease was lost");
             }
-            _ => {}
         };
         stream(socket, hub, seat, || screen.state(), hears).await;
         screen.desk.let_go(&tab, "the screen that held the button is gone");

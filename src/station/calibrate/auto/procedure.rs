@@ -361,7 +361,7 @@ impl<'a> Session<'a> {
                 .cause("straight ways from here lead through places that the arm cannot pass")
                 .next("jog the robot to where its wrist is bent, the board in view, and begin again"));
         }
-        if self.stuck % BACK == 0 { self.home() } else { Ok(()) }
+        if self.stuck.is_multiple_of(BACK) { self.home() } else { Ok(()) }
     }
 
     /// Back to where it began: straight, or from the last place before from which that can be done. A straight way that was gone can be
