@@ -152,8 +152,7 @@ fn an_axis_before_a_running_camera_scans_as_accurately_as_a_robot() {
         let turned = of.angle(&is).to_degrees();
         let [pitch, true_pitch] = [&found, &truth].map(|c| c["value"]["pitch"].as_f64().unwrap());
         println!(
-            "{motion}, calibrated from {}: {}, direction {turned:.4} degrees off, pitch by {:.2e} of it",
-            "pictures of a board that rode past",
+            "{motion}, calibrated from pictures of a board that rode past: {}, direction {turned:.4} degrees off, pitch by {:.2e} of it",
             found["quality"]["verdict"],
             pitch / true_pitch - 1.0
         );
