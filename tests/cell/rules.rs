@@ -268,7 +268,6 @@ fn a_way_that_the_controller_does_not_begin_leaves_a_known_place() {
 }
 
 #[test]
-#[ignore = "written, never run: no build came to its end in time"]
 fn a_figure_that_changes_is_refused_before_and_halted_on_the_way() {
     let served = cell(8, 1.0);
     let mut guard = guard(&served, |_| {});
@@ -295,7 +294,6 @@ fn a_figure_that_changes_is_refused_before_and_halted_on_the_way() {
 }
 
 #[test]
-#[ignore = "written, never run: no build came to its end in time"]
 fn a_flange_that_leaves_the_workspace_on_its_way_is_halted() {
     let served = cell(9, 5.0);
     let to = |guard: &mut Guard, y: f64, way: Way| {

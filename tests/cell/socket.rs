@@ -167,7 +167,6 @@ fn played(notation: Convention, seed: u64) -> f64 {
 }
 
 #[test]
-#[ignore = "written, never run: no build came to its end in time"]
 fn a_controllers_own_program_scans_asks_and_gets_the_part() {
     let long = std::env::var_os("SHEETLIGHT_LONG").is_some();
     let all = [Convention::Ur, Convention::Kuka, Convention::Fanuc, Convention::Abb, Convention::Denso];
@@ -179,7 +178,7 @@ fn a_controllers_own_program_scans_asks_and_gets_the_part() {
 }
 
 #[test]
-#[ignore = "written, never run: no build came to its end in time"]
+#[ignore = "red: a line without an end is answered by a reset, which may overtake the words"]
 fn whatever_comes_over_the_socket_gets_one_clear_line() {
     let set = set(scene("osc", 1), 1, 2.0);
     let patience = Patience { idle: Duration::from_secs(2), line: Duration::from_millis(400) };

@@ -162,13 +162,11 @@ fn lights_and_boards_that_are_not_there_end_the_job_before_the_sweep() {
 }
 
 #[test]
-#[ignore = "written, never run: no build came to its end in time"]
 fn a_part_that_is_half_hidden_or_on_a_slope_is_left_alone() {
     parts()[..2].iter().for_each(|w| kept_away(w, 2, false));
 }
 
 #[test]
-#[ignore = "written, never run: no build came to its end in time"]
 fn nothing_moves_towards_what_the_recipe_does_not_have() {
     if std::env::var_os("SHEETLIGHT_LONG").is_none() {
         return;
