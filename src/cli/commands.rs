@@ -136,8 +136,13 @@ mod tests {
         calls.map(|c| c.split(['>', '#']).next().unwrap_or_default().trim().to_owned()).collect()
     }
 
+    /// As a shell parts them, where no word has a blank in it.
+    fn words(call: &str) -> impl Iterator<Item = &str> {
+        call.split_whitespace().map(|w| w.trim_matches('\''))
+    }
+
     fn parses(call: &str) {
-        let parsed = Cli::try_parse_from(std::iter::once("sheetlight").chain(call.split_whitespace()));
+        let parsed = Cli::try_parse_from(std::iter::once("sheetlight").chain(words(call)));
         assert!(parsed.is_ok(), "sheetlight {call}\n{}", parsed.err().map(|e| e.to_string()).unwrap_or_default());
     }
 
