@@ -196,7 +196,11 @@ scans: Array<string>,
 /**
  * Name of the recipe.
  */
-recipe: string, };
+recipe: string, 
+/**
+ * Two places in the first scan's map, mm: the tool goes where the middle of the pins there says; null: where the recipe says.
+ */
+pins?: [[number, number], [number, number]] | null, };
 
 export type TouchOrder = { 
 /**
@@ -787,6 +791,10 @@ asked: Asked | null,
  * What the job said so far.
  */
 said: Array<string>, 
+/**
+ * While the last motion was made: the longest that nothing was heard of the held button, ms; null: none was made.
+ */
+silence_ms: number | null, 
 /**
  * Of a calibration: stops so far, expected error then, mm.
  */

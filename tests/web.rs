@@ -102,6 +102,28 @@ fn components_are_inserted_through_the_pages_in_the_simulated_cell() {
     python("tests/web/insert.py", &args);
 }
 
+/// One script of the long forms over a simulated station of so many columns.
+fn measured(script: &str, width: &str, shots: &str) {
+    if long() {
+        let dir = tempfile::tempdir().unwrap();
+        let folder = dir.path().to_str().unwrap();
+        sheetlight(&[
+            "--quiet", "simulate", "--out", folder, "--set", "scan", "--seed", "3", "--width", width, "--shots", shots,
+        ]);
+        python(script, &[PROGRAM, folder]);
+    }
+}
+
+#[test]
+fn a_live_picture_to_two_browsers_leaves_a_scan_its_time() {
+    measured("tests/web/rates.py", "1280", "300");
+}
+
+#[test]
+fn a_million_points_turn() {
+    measured("tests/web/million.py", "1280", "300");
+}
+
 #[test]
 fn nothing_moves_that_nobody_holds_the_button_for() {
     let [dir, second] = [0; 2].map(|_| tempfile::tempdir().unwrap());

@@ -17,6 +17,29 @@ pictures = sys.argv[6] if len(sys.argv) > 6 else None
 # At the cell's own pace an operator takes his time over each click.
 PAUSE = 2.0 if float(speed) == 1 else 0.2
 PATIENCE = 600
+# Notes the longest time between two pulses of the page while the button is down.
+PULSES = """
+  window.silent = 0;
+  let last = 0;
+  const say = WebSocket.prototype.send;
+  WebSocket.prototype.send = function (text) {
+    const now = performance.now();
+    if (last) window.silent = Math.max(window.silent, now - last);
+    last = now;
+    return say.call(this, text);
+  };
+  addEventListener('pointerup', () => (last = 0), true);"""
+SILENT = "return Math.round(window.silent)"
+# What a page would say that takes the held button for a new press.
+PRESS = """
+  const ask = new XMLHttpRequest(), m = new XMLHttpRequest();
+  m.open('GET', '/api/v1/motion', false);
+  m.send();
+  const { job, hash } = JSON.parse(m.responseText).asked;
+  ask.open('POST', '/api/v1/motion/press', false);
+  ask.setRequestHeader('X-Sheetlight-Tab', sessionStorage.tab);
+  ask.send(JSON.stringify({ job, hash }));
+  return [ask.status, ask.responseText];"""
 
 
 def step(b, *names):
@@ -27,16 +50,21 @@ def step(b, *names):
       if (document.querySelector('[data-inserted]')) return 'inserted';
       return ask.dataset.moving === 'false' && arguments[0].includes(ask.dataset.step) ? ask.dataset.step : null;"""
     got = b.until(f"one of {names}", script, PATIENCE, list(names))
-    assert got in names, f"{names} were waited for: {got}"
+    assert got in names, f"{names} were waited for: {got}; the page was silent for {b.run(SILENT)} ms at the longest while the button was down"
     return got
 
 
-def held(b, *names):
-    """Holds the button until one of these is asked for."""
+def held(s, b, *names):
+    """Holds the button until one of these is asked for; gives the longest that the server heard nothing of it, ms."""
     time.sleep(PAUSE)
     b.hold("#send")
     try:
-        return step(b, *names)
+        step(b, *names)
+        if names == ("approach",):
+            # Still down from what only looked: at the part the button is pressed anew, whatever a page says.
+            said = b.run(PRESS)
+            assert said[0] == 409 and "pressed anew" in said[1], said
+        return s.json("GET", "/motion")["silence_ms"]
     finally:
         b.let_go()
 
@@ -59,13 +87,11 @@ def insert(s, b, part):
     step(b, "touch")
     if part == "osc":
         shot(b, pictures, "ask")
-    held(b, "approach")
-    held(b, "insert")
+    silence = [held(s, b, "approach"), held(s, b, "insert")]
     time.sleep(0.3)
     log = events(folder)[before:]
     to_position = [e for e in log if e["what"] == "arrived"][-1]["t_s"] - log[0]["t_s"]
-    held(b, "retract")
-    held(b, "inserted")
+    silence += [held(s, b, "retract"), held(s, b, "inserted")]
     clicks = b.clicks
     time.sleep(0.3)
     log = events(folder)[before:]
@@ -76,7 +102,7 @@ def insert(s, b, part):
     assert job["state"] == "done" and job["outcome"]["confirmations"] == 5, job["state"]
     print(
         f"{part}: inserted {judged[0]['lateral_mm']:.3f} mm aside, {judged[0]['turn_deg']:.3f} degrees; {clicks} clicks, position after "
-        f"{to_position:.1f} s of the cell ({job['outcome']['time_to_position_s']:.1f} s of this machine), {time.time() - begun:.1f} s in all"
+        f"{to_position:.1f} s of the cell ({job['outcome']['time_to_position_s']:.1f} s of this machine), {time.time() - begun:.1f} s in all; the held button was not heard for {max(silence):.0f} ms at the longest (limit 1000), the page was silent for {b.run(SILENT)}"
     )
     assert clicks <= 8, f"{clicks} clicks"
     if float(speed) == 1:
@@ -89,22 +115,7 @@ def insert(s, b, part):
     s.json("POST", "/lease", {"firmly": True})
     s.json("POST", "/robot", {"armed": False})
     s.json("POST", "/lease/release")
-    quiet(b, part)
-
-
-def again(s, b, part):
-    """A machine too busy to say for a second that the button is held halts, as it has to: said aloud, looked at, tried anew."""
-    for left in (2, 1, 0):
-        try:
-            return insert(s, b, part)
-        except AssertionError as e:
-            if "lease ran out" not in str(e) or not left:
-                raise
-            print(f"*** {part}: halted, because this machine was too busy to say in time that the button was held; once more ***")
-            s.json("POST", "/lease", {"firmly": True})
-            s.json("POST", "/robot/looked")
-            s.json("POST", "/robot", {"armed": False})
-            s.json("POST", "/lease/release")
+    quiet(b, part, refused=1)
 
 
 def main():
@@ -114,8 +125,9 @@ def main():
         try:
             b.open(s.url)
             b.ready("station")
+            b.run(PULSES)
             for part in parts.split(","):
-                again(s, b, part)
+                insert(s, b, part)
         finally:
             b.close()
             print("".join(s.said)[-2000:])

@@ -9,30 +9,12 @@ import subprocess
 import sys
 import threading
 import time
-import zlib
 
-from browser import unfilter
+from raw import grey
 from server import Server
 
 program, folder = sys.argv[1:3]
 RATE, SECONDS = 25, 4
-
-
-def grey(path):
-    """A PNG of 8 bits as it comes from a sensor."""
-    with open(path, "rb") as f:
-        png = f.read()
-    width, height = struct.unpack(">II", png[16:24])
-    place, data = 8, b""
-    while place < len(png):
-        length, kind = struct.unpack(">I4s", png[place:place + 8])
-        data += png[place + 8:place + 8 + length] if kind == b"IDAT" else b""
-        place += 12 + length
-    raw, before, rows = zlib.decompress(data), bytearray(width), []
-    for y in range(height):
-        before = unfilter(raw[y * (width + 1)], bytearray(raw[y * (width + 1) + 1:(y + 1) * (width + 1)]), before, 1)
-        rows.append(bytes(before))
-    return b"".join(rows)
 
 
 names = sorted(glob.glob(os.path.join(folder, "scan", "laser_*.png")))[20:28]

@@ -101,6 +101,13 @@ def nothing_moves(s, former):
     refused("press without the lease", b.post("/motion/press", what))
     refused("press for another motion", a.post("/motion/press", {**what, "hash": "0" * 64}))
     refused("press for another job", a.post("/motion/press", {**what, "job": "0099-insert"}))
+    # All else is as it has to be: only who asks is wrong.
+    grant = a.press(what)
+    time.sleep(HELD)
+    for why, other in (("a former start's token", {"token": former}), ("a token that is none", {"token": "0" * 32}), ("no token", {"token": False}), ("a page of another origin", {"Origin": "http://evil.example"}), ("another host's name", {"host": "evil.example"})):
+        refused(f"go by {why}", s.ask("POST", "/api/v1/motion/go", {"grant": grant, "what": what}, **other))
+        refused(f"press by {why}", s.ask("POST", "/api/v1/motion/press", what, **other))
+        refused(f"arm by {why}", s.ask("POST", "/api/v1/robot", {"armed": True}, **other))
     refused("go that nobody pressed for", a.post("/motion/go", {"grant": "0" * 32, "what": what}))
     grant = a.press(what)
     refused("go before it was held", a.post("/motion/go", {"grant": grant, "what": what}))
@@ -113,6 +120,20 @@ def nothing_moves(s, former):
     refused("go without the lease", b.post("/motion/go", {"grant": grant, "what": what}))
     a.post("/motion/release")
     refused("go after it was let go", a.post("/motion/go", {"grant": grant, "what": what}))
+    # Who gives the lease back operates no more, although nobody else does and the arm is his still.
+    assert a.post("/lease/release")[0] == 200
+    refused("press after the lease was given back", a.post("/motion/press", what))
+    refused("confirming after the lease was given back", a.post("/motion/refuse", what))
+    s.json("POST", "/lease", {})
+    refused("press of what was armed under a former lease", a.post("/motion/press", what))
+    a.post("/robot", {"armed": True})
+    # A tab whose name begins like the operator's is another one.
+    grant = a.press(what)
+    time.sleep(HELD)
+    s.json("POST", "/lease", {"firmly": True}, tab="tests2")
+    s.json("POST", "/lease", {"firmly": True})
+    refused("go after a tab of nearly the same name took over", a.post("/motion/go", {"grant": grant, "what": what}))
+    a.post("/robot", {"armed": True})
     grant = a.press(what)
     time.sleep(HELD)
     s.json("POST", "/lease", {"firmly": True}, tab="other")
@@ -121,11 +142,6 @@ def nothing_moves(s, former):
     refused("press by who did not arm", b.post("/motion/press", what))
     s.json("POST", "/lease", {"firmly": True})
     refused("press after somebody else operated, unarmed", a.post("/motion/press", what))
-    for token in (former, "0" * 32, False):
-        refused("press with another token", s.ask("POST", "/api/v1/motion/press", what, token=token))
-        refused("go with another token", s.ask("POST", "/api/v1/motion/go", {"grant": grant, "what": what}, token=token))
-        refused("arm with another token", s.ask("POST", "/api/v1/robot", {"armed": True}, token=token))
-    refused("press of a page of another origin", s.ask("POST", "/api/v1/motion/press", what, Origin="http://evil.example"))
     refused("jogging while a job has the arm", a.post("/simulated", {"holds": "osc"}))
     refused("giving back while a job has the arm", a.post("/robot", {"armed": False}))
     # No: the job ends, and nothing moved.
@@ -139,13 +155,22 @@ def nothing_moves(s, former):
 
 def halts(s):
     """Whatever ends the hold halts; the job says why, and the next motion wants somebody to look."""
-    a = Operator(s)
+    a, watcher = Operator(s), Operator(s, "watcher")
 
     def let_go(grant):
         a.post("/motion/release")
 
     def silence(grant):
         pass
+
+    def not_mine(grant):
+        # Another tab that knows the name, and the holder under a name that is none, hold nothing.
+        def talk():
+            for _ in range(40):
+                say(watcher.socket, f"held {grant}")
+                say(a.socket, f"held {'0' * 32}")
+                time.sleep(0.15)
+        threading.Thread(target=talk, daemon=True).start()
 
     def gone(grant):
         a.socket.close()
@@ -159,7 +184,7 @@ def halts(s):
     def end_job(grant):
         s.ask("POST", f"/api/v1/jobs/{s.json('GET', '/jobs')[0]['id']}/stop", {}, tab="watcher")
 
-    for how, why in ((let_go, "let go"), (silence, "lease ran out"), (gone, "gone"), (taken_over, "took over"), (stop, "STOP"), (end_job, "STOP")):
+    for how, why in ((let_go, "let go"), (silence, "lease ran out"), (not_mine, "lease ran out"), (gone, "gone"), (taken_over, "took over"), (stop, "STOP"), (end_job, "STOP")):
         s.json("POST", "/lease", {"firmly": True})
         s.json("POST", "/simulated", {"holds": "osc"})
         before = count("halt")
@@ -178,6 +203,8 @@ def halts(s):
         assert ended["state"] in ("failed", "stopped") and why in ended["problem"]["what"], (how.__name__, ended["problem"])
         assert ended["outcome"] is None and ended["resumable"], ended
         m = s.json("GET", "/motion")
+        # Who goes silent is not heard for a second, and a little until that is seen and the arm stands.
+        assert (1000 if "lease" in why else 0) < m["silence_ms"] < 2500, (how.__name__, m["silence_ms"])
         assert m["look"] and not m["moving"] and m["asked"] is None, m
         assert any("look at the robot" in x for x in s.json("GET", "/bar")["alarms"])
         if how is gone:
@@ -255,7 +282,7 @@ def main():
     halts(s)
     with open(os.path.join(folder, "station", "motions.jsonl")) as f:
         said = [json.loads(line)["event"] for line in f]
-    assert said.count("begun") == 6 and said.count("stopped") == 6, said
+    assert said.count("begun") == 7 and said.count("stopped") == 7, said
     assert s.end() == 0
     killed(token)
 

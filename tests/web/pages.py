@@ -164,6 +164,78 @@ def teach(s, b):
     quiet(b, "teach", refused=1)
 
 
+# Opposite contacts of data/recipes/led.toml, in the part's own frame.
+PINS = ((-5.5 * 2.54, -7.62), (5.5 * 2.54, 7.62))
+
+
+def pins(s, b):
+    """Two clicks on pins: the tool goes where their middle says, with the sigma of two pins; a click beside all pins is named."""
+    scan = next(j for j in s.json("GET", "/jobs") if j["order"]["procedure"] == "scan")["id"]
+    former = next(j for j in s.json("GET", "/jobs") if j["order"]["procedure"] == "find")["outcome"]
+    head = s.json("GET", f"/scans/{scan}/map")
+    grid, part = head["base_from_grid"], former["part"]
+
+    def on_map(x, y):
+        base = [part[4 * k] * x + part[4 * k + 1] * y + part[4 * k + 3] - grid[4 * k + 3] for k in range(3)]
+        return [sum(grid[4 * k + i] * base[k] for k in range(3)) for i in (0, 1)]
+
+    b.page("part")
+    b.until("the map", "return document.querySelector('.map canvas')?.width > 300")
+    b.run("const s = document.querySelectorAll('select')[1]; s.value = 'led'; s.dispatchEvent(new Event('change'))")
+    size = [head["width"] * head["cell_mm"], head["height"] * head["cell_mm"]]
+
+    def click(place):
+        # What is said above the map makes it smaller: it is looked at before each click.
+        time.sleep(0.2)
+        w, h = b.run("const r = document.querySelector('.map canvas').getBoundingClientRect(); return [r.width, r.height]")
+        k = min(w / size[0], h / size[1]) * 0.97
+        at = (0.5 + k * (place[0] - size[0] / 2) / w, 0.5 - k * (place[1] - size[1] / 2) / h)
+        b.drag(".map canvas", at, at)
+
+    b.click("[data-tool=pins]")
+    click(on_map(*PINS[0]))
+    click(on_map(PINS[1][0] + 6, PINS[1][1] + 6))
+    b.until("that no pin lies there", "return /no pin lies within/.test(document.querySelector('.problem')?.innerText ?? '')", 60)
+    b.click("[data-tool=pins]")
+    b.clicks = 0
+    click(on_map(*PINS[0]))
+    click(on_map(*PINS[1]))
+    b.ready("position")
+    b.until("the position", "return document.querySelector('.found-pose')", 60)
+    assert b.clicks == 2, b.clicks
+    job = next(j for j in s.json("GET", "/jobs") if j["order"].get("pins") and j["state"] == "done")
+    found = job["outcome"]
+    assert found["passed"] and any("middle of pin[1,1], pin[12,2]" in n for n in found["notes"]), found["notes"]
+    term = next(t for t in found["terms"] if t["name"] == "construction")
+    assert 0.01 < term["sigma_mm"][0] < 0.2 and all(found["sigma_mm"][i] >= term["sigma_mm"][i] for i in (0, 1)), term
+    assert found["sigma_mm"][0] > former["sigma_mm"][0], (found["sigma_mm"], former["sigma_mm"])
+    moved = math.dist(found["poses"]["insertion"][:3], former["poses"]["insertion"][:3])
+    aside = math.hypot(*found["sigma_mm"][:2])
+    assert 1e-4 < moved < 4 * aside, f"two pins say {moved:.4f} mm from what all edges say, sigma {aside:.4f}"
+    print(f"two clicks on pins: {moved:.4f} mm from what all edges say, sigma {aside:.4f} mm (all edges {math.hypot(*former['sigma_mm'][:2]):.4f})")
+    shot(b, "pins")
+    quiet(b, "pins")
+
+
+def copied(s, b):
+    """A copied tab comes with the operator's name in its memory and is another tab all the same; a page that is loaded again is the same."""
+    mine = lambda: b.run("return sessionStorage.tab")
+    b.page("station")
+    name, here = mine(), b.ask("GET", "/window")
+    b.run("location.reload()")
+    b.ready("station")
+    assert mine() == name, "a page that was loaded again has another name"
+    b.run("window.open(location.href)")
+    there = next(w for w in b.ask("GET", "/window/handles") if w != here)
+    b.ask("POST", "/window", {"handle": there})
+    b.ready("station")
+    assert len(mine()) == 16 and mine() != name, "two tabs operate under one name"
+    b.ask("DELETE", "/window")
+    b.ask("POST", "/window", {"handle": here})
+    assert mine() == name
+    quiet(b, "copied")
+
+
 def replay(s, b):
     """The same recording with another setting, beside the former one."""
     b.page("replay")
@@ -234,6 +306,8 @@ def main():
             insertion(s, b)
             surface(s, b)
             teach(s, b)
+            pins(s, b)
+            copied(s, b)
             replay(s, b)
             rest(s, b)
             legible(b)

@@ -1,6 +1,7 @@
 """In: the program under test, a folder with a simulated station. Out: its screen as a process, and raw requests to it.
 Frame and unit: seconds."""
 
+import atexit
 import base64
 import http.client
 import json
@@ -20,6 +21,8 @@ class Server:
         station = folder if "--simulate" in more else os.path.join(folder, "station")
         command = [program, "--json", "station", "serve", "--station", station, "--port", "0", *more]
         self.process = subprocess.Popen(command, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        # A test that fails leaves nobody serving.
+        atexit.register(self.process.kill)
         self.said = []
         threading.Thread(target=lambda: self.said.extend(line.decode() for line in self.process.stderr), daemon=True).start()
         text = ""

@@ -5,6 +5,7 @@
 use super::recipe::Recipe;
 use crate::find::look::levers::{AXIS, HAND_EYE, Lever, TOGETHER};
 use crate::find::look::part_seen::PartSeen;
+use crate::find::measure::construct::Built;
 use crate::find::measure::points::Ordered;
 use crate::find::measure::pose::Measured;
 use crate::find::measure::shape::Shape;
@@ -58,6 +59,16 @@ pub struct Budget {
 }
 
 impl Budget {
+    /// The pose goes where a construction says: it is known no better than the few shapes that went into that.
+    pub(in crate::find) fn built(&mut self, b: &Built) {
+        let v = b.measured.sigma_mm.powi(2);
+        let c = Matrix6::from_diagonal(&nalgebra::Vector6::new(v, v, 0.0, 0.0, 0.0, 0.0));
+        self.terms.push(term("construction", &c, format!("'{}', of {} measured shapes", b.name, b.shapes)));
+        self.own += c;
+        self.covariance += c;
+        [self.sigma_mm, self.sigma_deg] = sigmas(&self.covariance);
+    }
+
     /// Of a look of which only its own covariance (base axes, or the part's where it has a turn) is known.
     pub(in crate::find) fn of_look(own: Matrix6<f64>) -> Budget {
         let [sigma_mm, sigma_deg] = sigmas(&own);

@@ -328,7 +328,8 @@ fn conclude(
     mut notes: Vec<String>,
 ) -> Report {
     let spec = &recipe.insertion;
-    let budget = budget(points, &measured, rig, recipe);
+    let mut budget = budget(points, &measured, rig, recipe);
+    constructions.iter().filter(|b| b.name == spec.construction).for_each(|b| budget.built(b));
     let sizes = size_check(&budget, recipe);
     let named = |name: &Option<String>| constructions.iter().find(|b| Some(&b.name) == name.as_ref());
     let disagreement_mm = named(&spec.two_pin)

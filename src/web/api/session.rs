@@ -66,10 +66,9 @@ pub async fn take(
             .into());
     }
     json(screen, move |screen| -> Result<Lease> {
-        let before = screen.leases.state().holder;
-        screen.leases.take(&tab, ask.firmly)?;
+        let other = screen.leases.take(&tab, ask.firmly)?;
         let lease = screen.leases.state();
-        if before != lease.holder {
+        if other {
             screen.desk.handed_over();
             screen.hub.tell(&Event::Bar(screen.bar()));
         }

@@ -36,7 +36,8 @@ pub struct Leases(Mutex<Option<Held>>);
 
 impl Leases {
     /// Takes it, or renews it. Refused while another tab holds it, unless `firmly`: a person at the machine may take it over.
-    pub fn take(&self, tab: &Tab, firmly: bool) -> Result<()> {
+    /// Says whether it came from elsewhere: it was another tab's, or nobody's any more.
+    pub fn take(&self, tab: &Tab, firmly: bool) -> Result<bool> {
         let mut held = self.0.lock().unwrap_or_else(|e| e.into_inner());
         match &*held {
             Some(h) if h.tab != *tab && h.used.elapsed() < IDLE && !firmly => Err(Fault::refused(format!(
@@ -47,8 +48,9 @@ impl Leases {
             .cause("one operates, the others watch")
             .next("ask there, wait, or take over")),
             _ => {
+                let renewed = held.as_ref().is_some_and(|h| h.tab == *tab && h.used.elapsed() < IDLE);
                 *held = Some(Held { tab: tab.clone(), used: Instant::now() });
-                Ok(())
+                Ok(!renewed)
             }
         }
     }
@@ -101,6 +103,9 @@ mod tests {
         assert!(leases.need(&tab("b")).is_err() && leases.take(&tab("b"), false).is_err());
         leases.release(&tab("b"));
         assert_eq!(leases.state().holder.as_deref(), Some("a"));
+        assert!(leases.take(&tab("b"), true).unwrap() && !leases.take(&tab("b"), false).unwrap());
+        // Names that begin alike are other tabs all the same.
+        assert!(leases.take(&tab("operator1"), true).unwrap() && leases.take(&tab("operator2"), true).unwrap());
         leases.take(&tab("b"), true).unwrap();
         assert!(leases.need(&tab("a")).is_err());
         // Of another session, a tab of the same name is another tab.

@@ -66,6 +66,8 @@ pub struct MotionState {
     pub asked: Option<Asked>,
     /// What the job said so far.
     pub said: Vec<String>,
+    /// While the last motion was made: the longest that nothing was heard of the held button, ms; null: none was made.
+    pub silence_ms: Option<f64>,
     /// Of a calibration: stops so far, expected error then, mm.
     pub expected: Vec<(usize, f64)>,
     /// Null: the robot is none of ours.

@@ -67,6 +67,10 @@ pub struct FindOrder {
     pub scans: Vec<String>,
     /// Name of the recipe.
     pub recipe: String,
+    /// Two places in the first scan's map, mm: the tool goes where the middle of the pins there says; null: where the recipe says.
+    #[serde(default)]
+    #[ts(optional = nullable)]
+    pub pins: Option<[[f64; 2]; 2]>,
 }
 
 /// What was touched.

@@ -81,6 +81,16 @@ pub(super) struct At {
     pub shown: MotionState,
 }
 
+impl At {
+    /// Counts the time since the held button was heard, while something moves.
+    fn silent(&mut self) {
+        if let (true, Some(hold)) = (self.shown.moving, &self.hold) {
+            let ms = hold.heard.elapsed().as_secs_f64() * 1e3;
+            self.shown.silence_ms = self.shown.silence_ms.map(|longest| longest.max(ms));
+        }
+    }
+}
+
 fn no(what: impl Into<String>) -> Fault {
     Fault::refused(what).cause("nothing was moved").next("look at the motion that is shown and hold its button again")
 }
@@ -203,7 +213,7 @@ impl Desk {
             button.lease(SILENCE);
         }
         at.hold = Some(Hold { tab: tab.clone(), grant: grant.to_owned(), heard: Instant::now() });
-        (at.answer, at.shown.moving) = (Some(true), true);
+        (at.answer, at.shown.moving, at.shown.silence_ms) = (Some(true), true, Some(0.0));
         self.tell(&at);
         self.wake.notify_all();
         Ok(())
@@ -241,6 +251,7 @@ impl Desk {
     /// The tab that holds the button says that it still does. False: it holds none.
     pub fn held(&self, tab: &Tab, grant: &str) -> bool {
         let mut at = self.at();
+        at.silent();
         let At { hold: Some(hold), button, .. } = &mut *at else { return false };
         if hold.tab != *tab || hold.grant != grant {
             return false;
@@ -320,6 +331,7 @@ impl Desk {
     /// The confirmed motion has ended.
     pub(super) fn over(&self) {
         let mut at = self.at();
+        at.silent();
         (at.shown.asked, at.shown.moving, at.answer) = (None, false, None);
         if let Some(button) = &at.button {
             button.end_lease();

@@ -3,9 +3,11 @@
 
 mod fit;
 mod measure;
+mod pins;
 mod section;
 mod view;
 
 pub use measure::measure;
+pub use pins::between_pins;
 pub use section::section;
 pub use view::view;

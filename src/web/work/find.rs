@@ -13,16 +13,26 @@ use crate::geometry::Vec3;
 use crate::raster::RgbImage;
 use crate::robot::Convention;
 use crate::station::{Looked, Settings, find_part_in_all, teach_part};
-use crate::web::message::{GateLight, Notation, Outcome, Position, RecipeText, RobotPoses, TeachOrder, Term};
+use crate::web::message::{
+    FindOrder, GateLight, Notation, Outcome, Position, RecipeText, RobotPoses, TeachOrder, Term,
+};
+use crate::web::surface::between_pins;
 use std::path::PathBuf;
 
-pub(super) fn find(this: &Run, scans: &[String], recipe: &str) -> Result<Outcome> {
+pub(super) fn find(this: &Run, ask: &FindOrder) -> Result<Outcome> {
     let place = &this.jobs.place;
-    let (recipe, folders) = (load(place, recipe)?, scan_folders(this, scans)?);
+    let (mut recipe, folders) = (load(place, &ask.recipe)?, scan_folders(this, &ask.scans)?);
     let convention = Settings::load(&place.station)?.robot.unwrap_or(Convention::Matrix);
     let options = LocateOptions { robot: convention, accelerator: Accelerator::open(), ..LocateOptions::default() };
     let looked = Looked { scans: &folders, range: None };
-    let (report, picture) = find_part_in_all(&looked, &recipe, Some(&place.station), &options)?;
+    let (mut report, mut picture) = find_part_in_all(&looked, &recipe, Some(&place.station), &options)?;
+    if let Some(places) = &ask.pins {
+        let grid_from_part = report.map.base_from_grid.inverse() * report.base_from_part;
+        recipe = between_pins(&recipe, &grid_from_part, places)?;
+        let of = recipe.construction.last().map(|c| c.of.join(", ")).unwrap_or_default();
+        (report, picture) = find_part_in_all(&looked, &recipe, Some(&place.station), &options)?;
+        report.notes.insert(0, format!("the tool goes where the middle of {of} says"));
+    }
     keep(this, &report, &picture)?;
     Ok(Outcome::Find(Box::new(position(&report, &recipe, convention))))
 }

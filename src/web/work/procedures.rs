@@ -18,7 +18,7 @@ pub(super) fn run(this: &Run, order: &Order) -> Result<Outcome> {
     match order {
         Order::Check(_) => check::check(this),
         Order::Scan(ask) => scan::scan(this, ask),
-        Order::Find(ask) => find::find(this, &ask.scans, &ask.recipe),
+        Order::Find(ask) => find::find(this, ask),
         Order::Teach(ask) => find::teach(this, ask),
         Order::Touch(ask) => touch(this, &ask.recording),
         Order::Calibrate(ask) => calibrate::calibrate(this, ask.target, &ask.recording, &ask.leave_out),

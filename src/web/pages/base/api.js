@@ -3,13 +3,19 @@
 
 const ROOT = "/api/v1";
 
-/** This tab's name: it operates or watches by it, also after a reload. */
-export const tab = (() => {
+/** A copy of a tab waits so long for the name that it came with, ms; a page that is loaded again gets it at once. */
+const COPY = 700;
+/** Takes a name for as long as this page lives; false where another page lives under it. */
+const takes = (name) => new Promise((done) => {
+  const taken = () => { done(true); return new Promise(() => {}); };
+  navigator.locks.request(`tab-${name}`, { signal: AbortSignal.timeout(COPY) }, taken).catch(() => done(false));
+});
+/** This tab's name: it operates or watches by it, also after a reload. A copied tab gets one of its own: two that share a name would hold
+ * one button. */
+export const tab = await (async () => {
   let name = sessionStorage.getItem("tab");
-  if (!name) {
-    name = Array.from(crypto.getRandomValues(new Uint8Array(8)), (b) => b.toString(16).padStart(2, "0")).join("");
-    sessionStorage.setItem("tab", name);
-  }
+  while (!name || !(await takes(name))) name = Array.from(crypto.getRandomValues(new Uint8Array(8)), (b) => b.toString(16).padStart(2, "0")).join("");
+  sessionStorage.setItem("tab", name);
   return name;
 })();
 

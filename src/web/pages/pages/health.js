@@ -28,7 +28,7 @@ export async function show(place, query) {
   const count = () => {
     const b = store.bar;
     if (!b) return;
-    fill(counters, figures([String(b.frames.seen), t("frames in")], [String(b.frames.measured), t("measured")], ...Object.entries(b.frames.dropped).map(([k, n]) => [String(n), k, "poor-ink"]), [String(b.viewers), t("browsers look on")], [num(b.disk_left_gb, 1, "GB"), t("disk left")]));
+    fill(counters, figures([String(b.frames.seen), t("frames in")], [String(b.frames.measured), t("measured")], ...Object.entries(b.frames.dropped).map(([k, n]) => [String(n), k, "poor-ink"]), [String(b.viewers), t("browsers look on")], store.motion?.silence_ms != null && [num(store.motion.silence_ms, 0, "ms"), t("held button: longest silence, of 1 s")], [num(b.disk_left_gb, 1, "GB"), t("disk left")]));
   };
   fill(place, h("div", { class: "head" }, h("h1", {}, t("Health")), h("span", { class: "grow" }), h("a", { href: url("/support"), download: "sheetlight-support.json" }, t("Support file (no pictures)")), h("button", { class: "main", id: "benchmark", onclick: run }, t("Benchmark"))),
     problem, progress, h("div", { class: "even" }, panel(t("Time of the last scan"), time), h("div", { class: "stack" }, panel(t("This machine"), bench), panel(t("Counters"), counters))));

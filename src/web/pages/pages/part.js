@@ -52,7 +52,9 @@ export async function show(place, query) {
     ...part.holes.map(([x, y, r]) => ({ kind: "circle", points: [[x, y], [x + r, y]], colour: "#5ad1ff" }))]);
   const corners = (a, b) => [Math.min(a[0], b[0]), Math.min(a[1], b[1]), Math.max(a[0], b[0]), Math.max(a[1], b[1])];
   const angle = () => Number(turn.querySelector("input").value) || 0;
+  const between = (a, b) => run({ procedure: "find", scans: [scan.id], recipe: name, pins: [a, b] }, (j) => (j.outcome.passed ? (location.hash = `#/position?job=${j.id}`) : shown(j, j.outcome)));
   const kinds = {
+    pins: ["Two pins", { shape: "line", says: t("One pin, then another: the tool goes where their middle says"), done: between }],
     outline: ["Outline", { shape: "box", says: t("Draw a box around the body"), done: (a, b) => { part.outline = corners(a, b); drawn(); } }],
     window: ["Window", { shape: "box", says: t("Draw a box around a window"), done: (a, b) => { part.windows.push(corners(a, b)); drawn(); } }],
     hole: ["Hole", { shape: "circle", says: t("From a hole's middle to its rim"), done: (a, b) => { part.holes.push([a[0], a[1], Math.hypot(b[0] - a[0], b[1] - a[1])]); drawn(); } }],
@@ -62,7 +64,8 @@ export async function show(place, query) {
     view.tool(kind ? kinds[kind][1] : null);
   };
   const undo = () => { if (part.holes.length) part.holes.pop(); else if (part.windows.length) part.windows.pop(); else part.outline = null; drawn(); };
-  fill(tools, h("span", { class: "quiet small" }, t("Teach")), Object.entries(kinds).map(([k, [words]]) => h("button", { "data-tool": k, "aria-pressed": "false", onclick: () => select(k) }, t(words))), h("button", { onclick: undo }, t("Undo")), h("button", { onclick: () => select(null) }, t("Move the map")));
+  const [pins, ...teaching] = Object.entries(kinds).map(([k, [words]]) => h("button", { "data-tool": k, "aria-pressed": "false", onclick: () => select(k) }, t(words)));
+  fill(tools, pins, h("span", { class: "quiet small" }, t("Teach")), teaching, h("button", { onclick: undo }, t("Undo")), h("button", { onclick: () => select(null) }, t("Move the map")));
   const turn = field(t("Turn"), { type: "number", value: "0", step: "0.5", min: "-180", max: "180", id: "turn", oninput: () => marks() }, "°");
   const title = field(t("Name"), { type: "text", value: "part", maxlength: "60" });
   const bears = field(t("Bears"), { type: "number", value: "0.2", step: "0.05", min: "0.01" }, "mm"), turns = field("", { type: "number", value: "1", step: "0.1", min: "0.01", "aria-label": t("Bears, degrees") }, "°"), above = field(t("Approach"), { type: "number", value: "20", step: "1", min: "0" }, "mm");

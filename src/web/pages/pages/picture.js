@@ -11,6 +11,9 @@ import { choice, figures, panel, recordings } from "../widgets/parts.js";
 /** Fates of peaks by number (src/stages/peak/found.rs): word and colour. */
 const FATES = [["kept", "#3ddc84"], ["outside the working volume", "#5aa9ff"], ["faint", "#b0b0b0"], ["narrow", "#ff5ac8"], ["wide", "#ffb02e"], ["uncertain", "#c78bff"], ["steep", "#ff8a5a"], ["echo", "#ff5252"], ["without neighbour", "#ffe14d"], ["no point", "#7fd6d6"]];
 
+/** A picture that is drawn in less than this leaves the machine its time, ms. */
+const FLUENT = 15;
+
 export async function show(place) {
   const list = await recordings(() => true);
   const camera = store.bar?.camera;
@@ -41,35 +44,42 @@ export async function show(place) {
       const b = await bytes(`/camera/newest?after=${number}`).catch(() => null);
       if (mine !== turn) return;
       if (!b || b.byteLength < 20) { await new Promise((go) => setTimeout(go, b ? 0 : 1000)); continue; }
-      const [n, width, height, many] = new Uint32Array(b, 0, 4), delay = new Float32Array(b, 16, 1)[0], words = new DataView(b, 20, 12 * many), peaks = {};
+      const begun = performance.now(), [n, width, height, many] = new Uint32Array(b, 0, 4), delay = new Float32Array(b, 16, 1)[0], words = new DataView(b, 20, 12 * many), peaks = {};
       number = n;
       for (let i = 0; i < many; i++) (peaks[words.getUint32(12 * i + 8, true)] ??= []).push([words.getFloat32(12 * i, true) + 0.5, height - 0.5 - words.getFloat32(12 * i + 4, true)]);
+      const before = counted;
       show_(new Uint8Array(b, 20 + 12 * many), width, height);
       view.marks(Object.entries(peaks).map(([fate, points]) => ({ kind: "dots", points, colour: FATES[fate][1] })));
       box.dataset.number = String(n);
-      fill(fates, h("p", { class: "small quiet" }, `${t("picture")} ${n} · ${num(delay, 1, "ms")}`), figures(...Object.entries(peaks).map(([fate, points]) => [String(points.length), t(FATES[fate][0]), fate === "0" ? "good-ink" : ""])));
+      if (counted !== before) fill(fates, h("p", { class: "small quiet" }, `${t("picture")} ${n} · ${num(delay, 1, "ms")}`), figures(...Object.entries(peaks).map(([fate, points]) => [String(points.length), t(FATES[fate][0]), fate === "0" ? "good-ink" : ""])));
       await new Promise(requestAnimationFrame);
+      // Drawing takes its share of this machine, not what a scan needs: where it is slow, fewer pictures are shown, each the newest.
+      const took = performance.now() - begun;
+      if (took > FLUENT) await new Promise((go) => setTimeout(go, Math.min(1000, took * (store.bar?.running ? 3 : 1))));
     }
   }
+  let counted = 0;
   function show_(grey, width, height) {
-    const levels = new Float32Array(width * height), counts = new Array(64).fill(0);
-    let saturated = 0, brightest = 0, dark = 0;
-    const peaks = new Array(width).fill(0);
-    for (let y = 0; y < height; y++) for (let x = 0; x < width; x++) {
-      const v = grey[y * width + x];
-      levels[(height - 1 - y) * width + x] = v;
+    const reads = (p) => { const [u, v] = [Math.floor(p[0]), height - 1 - Math.floor(p[1])]; return `u ${u}  v ${v}  ${u >= 0 && v >= 0 && u < width && v < height ? grey[v * width + u] : "–"}`; };
+    view.picture(width, height, grey, reads);
+    // Figures are read by people: twice a second is enough of a live picture.
+    if (!r && performance.now() - counted < 500) return;
+    counted = performance.now();
+    const counts = new Uint32Array(64), peaks = new Uint8Array(width);
+    let saturated = 0;
+    for (let i = 0, x = 0; i < grey.length; i++) {
+      const v = grey[i];
       counts[v >> 2]++;
-      saturated += v === 255;
-      brightest = Math.max(brightest, v);
-      peaks[x] = Math.max(peaks[x], v);
+      if (v === 255) saturated++;
+      if (v > peaks[x]) peaks[x] = v;
+      if (++x === width) x = 0;
     }
-    dark = peaks.filter((v) => v < 16).length / width;
-    view.show({ width, height, cell_mm: 1, bare: true }, levels, { range: [0, 255], unit: "", digits: 0, colours: "grey", reads: (p) => `u ${Math.floor(p[0])}  v ${height - 1 - Math.floor(p[1])}  ${num(levels[view.index(p)], 0)}` });
+    const brightest = Math.max(...peaks), dark = peaks.filter((v) => v < 16).length / width;
     const share = saturated / (width * height);
     fill(figs, figures([`${width}×${height}`, t("pixels")], [String(brightest), t("brightest of 255"), brightest > 217 || brightest < 120 ? "poor-ink" : ""], [num(100 * share, 3, "%"), t("saturated"), share > 0.005 ? "bad-ink" : ""], [num(100 * dark, 1, "%"), t("columns without light")]));
     const most = Math.log1p(Math.max(...counts));
-    fill(hist, svg("svg", { class: "plot", viewBox: "0 0 64 100", preserveAspectRatio: "none", role: "img", "aria-label": t("Histogram") }, counts.map((n, i) => svg("rect", { class: "bar", x: i, y: 100 - (95 * Math.log1p(n)) / most, width: 0.9, height: (95 * Math.log1p(n)) / most }))));
-    fill(along, svg("svg", { class: "plot", viewBox: `0 0 ${width} 255`, preserveAspectRatio: "none", role: "img", "aria-label": t("Brightest level in each column") }, svg("polyline", { class: "curve", "vector-effect": "non-scaling-stroke", points: peaks.map((v, x) => `${x},${255 - v}`).join(" ") })));
+    fill(hist, svg("svg", { class: "plot", viewBox: "0 0 64 100", preserveAspectRatio: "none", role: "img", "aria-label": t("Histogram") }, Array.from(counts, (n, i) => svg("rect", { class: "bar", x: i, y: 100 - (95 * Math.log1p(n)) / most, width: 0.9, height: (95 * Math.log1p(n)) / most }))));
+    fill(along, svg("svg", { class: "plot", viewBox: `0 0 ${width} 255`, preserveAspectRatio: "none", role: "img", "aria-label": t("Brightest level in each column") }, svg("polyline", { class: "curve", "vector-effect": "non-scaling-stroke", points: Array.from(peaks, (v, x) => `${x},${255 - v}`).join(" ") })));
   }
   place.classList.add("fit");
   fill(place, head, h("div", { class: "split" }, h("section", { class: "panel fill" }, box), h("div", { class: "stack" }, panel(t("Levels"), figs), fates, panel(t("Histogram (logarithmic)"), hist), panel(t("Brightest level in each column"), along))));

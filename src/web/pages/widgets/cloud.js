@@ -7,7 +7,7 @@ import { fill, h, num, thousands } from "../base/dom.js";
 import { t } from "../base/text.js";
 import { span } from "./colour.js";
 
-const FIRST = 150000, MOST = 1000000;
+const FIRST = 150000, MOST = 2000000;
 /** A frame that takes longer than this has too many points, ms. */
 const FRAME = 30;
 
@@ -75,11 +75,12 @@ export async function cloud(place, id) {
     const p = [f / w, 0, 0, 0, 0, f, 0, 0, 0, 0, (farther + near) / (near - farther), -1, 0, 0, (2 * farther * near) / (near - farther), 0];
     return product(p, v);
   };
-  let asked = false, still = 0;
+  let asked = false, still = 0, from = null, far = 0;
   const redraw = (moving) => {
     c.moving = moving;
     clearTimeout(still);
-    if (moving) still = setTimeout(() => redraw(false), 180);
+    // All points are drawn when it stands: while a finger is down it may turn on at any moment.
+    if (moving && !from) still = setTimeout(() => redraw(false), 180);
     if (!asked) { asked = true; requestAnimationFrame(draw); }
   };
   const draw = () => {
@@ -98,6 +99,7 @@ export async function cloud(place, id) {
     if (c.moving) c.budget = Math.max(5000, Math.min(data.n, Math.round(c.budget * Math.max(0.5, Math.min(1.5, FRAME / took)))));
     else c.budget = Math.max(5000, Math.min(data.n, Math.round(n * Math.min(1, FRAME / took))));
     box.dataset.shown = String(n);
+    box.dataset.drawn = String(Number(box.dataset.drawn ?? 0) + 1);
     const p = c.picked;
     read.textContent = `${thousands(n)} ${t("of")} ${thousands(data.all)} ${t("points")}` + (p === null ? "" : `\nx ${num(data.origin[0] + data.f[5 * p], 3)}  y ${num(data.origin[1] + data.f[5 * p + 1], 3)}  z ${num(data.origin[2] + data.f[5 * p + 2], 3)} mm  σ ${num(data.f[5 * p + 3], 4)} mm`);
   };
@@ -115,7 +117,6 @@ export async function cloud(place, id) {
   };
   const turn = (dx, dy) => { c.yaw += dx * 0.008; c.pitch = Math.max(0.05, Math.min(1.57, c.pitch + dy * 0.008)); redraw(true); };
   const move = (dx, dy) => { const k = (c.far / canvas.clientHeight) * 0.7, sy = Math.sin(c.yaw), cy = Math.cos(c.yaw); c.at[0] += -dx * cy * k + dy * sy * k; c.at[1] += dx * sy * k + dy * cy * k; redraw(true); };
-  let from = null, far = 0;
   canvas.oncontextmenu = (e) => e.preventDefault();
   canvas.addEventListener("pointerdown", (e) => { canvas.setPointerCapture(e.pointerId); from = [e.clientX, e.clientY]; far = 0; });
   canvas.addEventListener("pointermove", (e) => {
@@ -126,9 +127,12 @@ export async function cloud(place, id) {
     e.buttons === 2 || e.shiftKey ? move(dx, dy) : turn(dx, dy);
   });
   canvas.addEventListener("pointerup", (e) => {
-    if (from && far < 4) { const r = canvas.getBoundingClientRect(), k = devicePixelRatio || 1; c.picked = pick((e.clientX - r.left) * k, (e.clientY - r.top) * k); redraw(false); }
+    const turned = far >= 4;
+    if (from && !turned) { const r = canvas.getBoundingClientRect(), k = devicePixelRatio || 1; c.picked = pick((e.clientX - r.left) * k, (e.clientY - r.top) * k); redraw(false); }
     from = null;
+    if (turned) redraw(true);
   });
+  canvas.addEventListener("pointercancel", () => { from = null; redraw(true); });
   const zoom = (by) => { c.far = Math.max(size * 0.02, Math.min(size * 6, c.far * by)); redraw(true); };
   canvas.addEventListener("wheel", (e) => { e.preventDefault(); zoom(Math.exp(e.deltaY * 0.001)); }, { passive: false });
   canvas.addEventListener("keydown", (e) => {

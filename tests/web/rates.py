@@ -1,0 +1,95 @@
+"""In: the program, a folder with a simulated station of 1280x960 and its scan. Out: the numbers of a busy screen, printed: how fast the
+scan runs alone, beside a camera of 30 pictures a second, and with two browsers that look at it; how old the pictures are that they show.
+Failure where a picture is shown that is not the newest, or one is not counted: what does not hang on the clock.
+Frame and unit: px, ms, pictures and shots a second."""
+
+import glob
+import os
+import statistics
+import subprocess
+import sys
+import tempfile
+
+from browser import Browser
+from raw import Feed, grey
+from server import Server
+from shots import quiet
+
+program, folder = sys.argv[1:3]
+RATE, RUNS, SIZE = 30, 5, (1280, 960)
+
+# Notes which picture is drawn when: its number is in its first four pixels.
+WATCH = """
+  window.seen = [];
+  let last = -1;
+  const asks = window.fetch;
+  window.fetch = async (...a) => {
+    const answer = await asks(...a);
+    if (!String(a[0]).includes('/camera/newest') || answer.status !== 200) return answer;
+    const bytes = await answer.arrayBuffer(), at = 20 + 12 * new Uint32Array(bytes, 0, 4)[3];
+    last = new DataView(bytes, at, 4).getUint32(0, true);
+    return new Response(bytes, { status: 200, headers: answer.headers });
+  };
+  const box = document.querySelector('.map');
+  new MutationObserver(() => { const n = last; requestAnimationFrame(() => window.seen.push([Date.now(), n])); }).observe(box, { attributes: true, attributeFilter: ['data-number'] });"""
+
+
+def scans(s):
+    """Shots a second of scans, one after the other."""
+    rates = []
+    for _ in range(RUNS):
+        job = s.job({"procedure": "scan", "recording": "scan"}, 300)
+        assert job["state"] == "done", job
+        rates.append(job["outcome"]["shots_per_second"])
+        s.json("DELETE", f"/jobs/{job['id']}")
+    return statistics.median(rates), rates
+
+
+def share(values, q):
+    return sorted(values)[round((len(values) - 1) * q)]
+
+
+def main():
+    names = sorted(glob.glob(os.path.join(folder, "scan", "laser_*.png")))
+    frames = [grey(n) for n in names[len(names) // 2:][:6]]
+    assert all(len(f) == SIZE[0] * SIZE[1] for f in frames)
+    s = Server(program, folder, "--recordings", folder, "--camera", "-", "--raw", f"{SIZE[0]}x{SIZE[1]}:gray8", stdin=subprocess.PIPE)
+    scans(s)
+    alone, rates = scans(s)
+    said = lambda what, rate, rates: print(f"{what}: {rate:.0f} shots/s ({', '.join(f'{r:.0f}' for r in rates)}), {100 * (1 - rate / alone):.0f} % less than alone")
+    said("alone", alone, rates)
+    feed = Feed(s.process.stdin, frames, RATE)
+    said(f"a camera of {RATE}/s", *scans(s))
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as one, tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as two:
+        browsers = [Browser(one), Browser(two)]
+        try:
+            for b in browsers:
+                b.open(s.url)
+                b.ready("station")
+                b.page("picture")
+                b.until("a picture", "return document.querySelector('.map')?.dataset.number", 30)
+                b.run(WATCH)
+            said("two browsers look on", *scans(s))
+            for k, b in enumerate(browsers):
+                seen = b.run("return window.seen")
+                numbers = [n for _, n in seen]
+                assert len(seen) > 10 and numbers == sorted(set(numbers)), f"browser {k}: {numbers[:20]}: newest first, each once"
+                ages = [at - 1000 * feed.sent[n] for at, n in seen if n < len(feed.sent)]
+                span = (seen[-1][0] - seen[0][0]) / 1000
+                print(f"browser {k}: {len(seen) / span:.1f} pictures/s, age when drawn p50 {share(ages, 0.5):.0f} ms, p99 {share(ages, 0.99):.0f} ms")
+                quiet(b, f"browser {k}")
+        finally:
+            for b in browsers:
+                b.close()
+    feed.end()
+    count = s.json("GET", "/bar")["frames"]
+    over = sum(count["dropped"].values())
+    print(f"{len(feed.sent)} sent, {count['seen']} seen, {count['measured']} measured, {over} dropped by cause: {count['dropped']}")
+    assert abs(count["seen"] - len(feed.sent)) <= 1 and abs(count["measured"] + over - count["seen"]) <= 2, (count, len(feed.sent))
+    s.end()
+
+
+if not Browser.there():
+    print("no chromium and chromedriver here")
+    sys.exit(77)
+main()

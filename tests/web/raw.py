@@ -1,0 +1,49 @@
+"""In: recorded pictures. Out: the same as a camera's bytes, sent at a steady rate.
+Frame and unit: px, pictures a second."""
+
+import struct
+import threading
+import time
+import zlib
+
+from browser import unfilter
+
+
+def grey(path):
+    """A PNG of 8 bits as it comes from a sensor."""
+    with open(path, "rb") as f:
+        png = f.read()
+    width, height = struct.unpack(">II", png[16:24])
+    place, data = 8, b""
+    while place < len(png):
+        length, kind = struct.unpack(">I4s", png[place:place + 8])
+        data += png[place + 8:place + 8 + length] if kind == b"IDAT" else b""
+        place += 12 + length
+    raw, before, rows = zlib.decompress(data), bytearray(width), []
+    for y in range(height):
+        before = unfilter(raw[y * (width + 1)], bytearray(raw[y * (width + 1) + 1:(y + 1) * (width + 1)]), before, 1)
+        rows.append(bytes(before))
+    return b"".join(rows)
+
+
+class Feed:
+    """Sends pictures in turn until `end`; the first four pixels of each are its number, `sent[number]` is when its last byte went."""
+
+    def __init__(self, pipe, frames, rate):
+        self.pipe, self.frames, self.rate, self.sent, self.over = pipe, frames, rate, [], False
+        self.thread = threading.Thread(target=self.run, daemon=True)
+        self.thread.start()
+
+    def run(self):
+        begun = time.time()
+        while not self.over:
+            n = len(self.sent)
+            self.pipe.write(struct.pack("<I", n) + self.frames[n % len(self.frames)][4:])
+            self.pipe.flush()
+            self.sent.append(time.time())
+            time.sleep(max(0.0, begun + (n + 1) / self.rate - time.time()))
+        self.pipe.close()
+
+    def end(self):
+        self.over = True
+        self.thread.join(20)
