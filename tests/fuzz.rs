@@ -13,12 +13,14 @@ use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use sheetlight::fault::Fault;
 use sheetlight::find::dxf::{self, DxfOptions};
-use sheetlight::find::{Drawing, Recipe};
+use sheetlight::find::{Drawing, ModelOptions, Recipe, Scene as FindScene, SearchOptions, Template, find};
 use sheetlight::geometry::{Base, Flange};
 use sheetlight::raster::{Channel, Image, decode, float_tiff, png, read_float_tiff};
 use sheetlight::recording::{BoardSpec, Markers, Meta, load_board_poses, load_poses};
 use sheetlight::rig::{Rig, sealed};
-use sheetlight::scan::{CloudPoint, CloudWriter, HeightMap, RawFormat, RawFrames, read_cloud, write_cloud};
+use sheetlight::scan::{
+    CloudPoint, CloudWriter, HeightMap, RawFormat, RawFrames, Stated, lines, read_cloud, read_foreign, write_cloud,
+};
 use sheetlight::simulate::{RigSpec, Scene, SceneSpec, Truth};
 use sheetlight::station::{Checkpoint, Settings, Values, load_report};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -444,6 +446,55 @@ fn clouds() {
     write_cloud(&path, &points).unwrap();
     let seed = std::fs::read(&path).unwrap();
     survives("PLY", vec![seed], through_file("cloud.ply", |p| read_cloud(p).map(drop)));
+}
+
+/// Height maps and clouds of other programs, and templates of `match`.
+#[test]
+fn foreign_maps() {
+    let xyz = "property float x\nproperty float y\nproperty float z\n";
+    let ply = |format: &str| {
+        format!("ply\nformat {format} 1.0\nelement vertex 90\n{xyz}property uchar intensity\nend_header\n")
+    };
+    let pcd = |data: &str| {
+        format!(
+            "VERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH 30\nHEIGHT 3\nPOINTS 90\nDATA {data}\n"
+        )
+    };
+    let place = |i: usize| [(i % 30) as f32, (i / 30) as f32, 0.1 * (i % 4) as f32];
+    let words: String = (0..90).map(|i| format!("{} {} {} 7\n", place(i)[0], place(i)[1], place(i)[2])).collect();
+    let bytes = |tail: &[u8]| -> Vec<u8> {
+        (0..90).flat_map(|i| [place(i).map(f32::to_le_bytes).concat(), tail.to_vec()].concat()).collect()
+    };
+    let with = |head: String, body: Vec<u8>| [head.into_bytes(), body].concat();
+    let columns: Vec<u8> =
+        (0..4).flat_map(|k| (0..90).flat_map(move |i| place(i).get(k).map_or([0; 4], |v| v.to_le_bytes()))).collect();
+    let stored: Vec<u8> = columns.chunks(32).flat_map(|c| [&[c.len() as u8 - 1], c].concat()).collect();
+    let lengths = [stored.len() as u32, columns.len() as u32].map(u32::to_le_bytes).concat();
+    let seeds = vec![
+        with(ply("ascii"), words.clone().into_bytes()),
+        with(ply("binary_little_endian"), bytes(&[9])),
+        with(pcd("ascii"), words.into_bytes()),
+        with(pcd("binary"), bytes(&[1, 2, 3, 4])),
+        with(pcd("binary_compressed"), [lengths, stored].concat()),
+        float_tiff(30, 3, &(0..90).map(|i| place(i)[2]).collect::<Vec<_>>(), "mm"),
+    ];
+    let stated = Stated { unit_mm: Some(1.0), spacing_mm: Some([1.0, 1.0]), ..Stated::default() };
+    survives("foreign maps", seeds, move |b| {
+        let made = lines(&read_foreign(b)?, None, &stated)?;
+        assert!(made.points.iter().all(|p| p.position.iter().all(|v| v.is_finite())) && made.sigma_mm > 0.0);
+        Ok(())
+    });
+    let pixels =
+        (0..48 * 40).map(|i| if (14..34).contains(&(i % 48)) && (10..30).contains(&(i / 48)) { 200 } else { 20 });
+    let image = Image::from_u8(48, 40, pixels.collect());
+    let options = ModelOptions { max_points: 40, ..ModelOptions::default() };
+    let taught = Template::teach("box", &image, None, ("a.png".into(), "0".into()), &options).unwrap();
+    let seed = serde_json::to_vec(&taught).unwrap();
+    survives("templates", vec![seed], move |b| {
+        let taught = Template::parse(&text(b))?;
+        let least = SearchOptions { min_score: 0.9, ..SearchOptions::default() };
+        find(&FindScene::from_image(&image), &taught.model, &least).map(drop)
+    });
 }
 
 #[test]

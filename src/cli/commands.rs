@@ -3,7 +3,7 @@
 
 use super::capture::{camera, record};
 use super::doctor::command as doctor;
-use super::find::{locate as find, model, program, second_look, teach};
+use super::find::{import_map, locate as find, matching, model, program, second_look, teach};
 use super::insert::{guide, job, robot};
 use super::terminal::console::Console;
 use super::terminal::threads;
@@ -53,8 +53,10 @@ enum Command {
     Doctor(doctor::Args),
     Find(find::Args),
     Guide(guide::Args),
+    ImportMap(import_map::Args),
     Job(job::Args),
     Live(live::Args),
+    Match(matching::Args),
     Model(model::Args),
     Program(program::Args),
     Range(range::Args),
@@ -85,8 +87,10 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Doctor(a) => doctor::run(a, console),
         Command::Find(a) => find::run(a, console),
         Command::Guide(a) => guide::run(a, console),
+        Command::ImportMap(a) => import_map::run(a, console),
         Command::Job(a) => job::run(a, console),
         Command::Live(a) => live::run(a, console),
+        Command::Match(a) => matching::run(a, console),
         Command::Model(a) => model::run(a, console),
         Command::Program(a) => program::run(a, console),
         Command::Range(a) => range::run(a, console),

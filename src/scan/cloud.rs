@@ -45,8 +45,8 @@ const PROPERTIES: [(&str, &str); 9] = [
 /// Points read or written at a time: 2.3 MB.
 const CHUNK: usize = 1 << 16;
 
-/// Frames that clouds are in: [`crate::recording::Motion::frame`].
-const FRAMES: [&str; 3] = ["base", "axis", "flange"];
+/// Frames that clouds are in: [`crate::recording::Motion::frame`], and that of an imported map.
+const FRAMES: [&str; 4] = ["base", "axis", "flange", "map"];
 
 fn header(count: u64, frame: &str) -> String {
     // Leading zeros, not spaces: every PLY reader takes them as a number.

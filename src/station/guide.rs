@@ -150,7 +150,8 @@ pub fn guide(options: &GuideOptions, confirm: &mut dyn FnMut(&Step) -> Result<bo
 
     let cloud = crate::station::scan::report::cloud_of(&scan_folder)?;
     let accelerator = (options.place != Where::Cpu).then(Accelerator::open).flatten();
-    let locate_options = LocateOptions { up: Some(normal), robot: options.robot, accelerator, expected: None };
+    let locate_options =
+        LocateOptions { up: Some(normal), robot: options.robot, accelerator, ..LocateOptions::default() };
     let report = locate(&cloud, &recipe, Some(&rig), &locate_options)?;
     picture::draw(&report, &recipe.drawing()).save_png(&options.out.join("found.png"))?;
     let tilt = report.base_from_part.direction(&Vec3::z()).dot(&normal).clamp(-1.0, 1.0).acos().to_degrees();

@@ -51,6 +51,9 @@ pub struct Args {
     /// Direction towards the camera in the base frame [default: from the station, else 0,0,1]
     #[arg(long, value_name = "X,Y,Z", value_parser = crate::cli::terminal::arguments::numbers::<3>, allow_hyphen_values = true)]
     up: Option<[f64; 3]>,
+    /// List every place of the scan that looks like the part, not the best one alone
+    #[arg(long)]
+    all: bool,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
@@ -65,7 +68,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         return Err(Fault::usage("--up has no direction").next("give three numbers, e.g. 0,0,1"));
     }
     let robot = args.robot.or(of_station).unwrap_or(Convention::Matrix);
-    let options = LocateOptions { up, robot, accelerator: Accelerator::open(), expected: None };
+    let options = LocateOptions { up, robot, accelerator: Accelerator::open(), expected: None, all: args.all };
     let range = args.range.as_deref().map(Recording::open).transpose()?;
     let looked = Looked { scans: &args.scans, range: range.as_ref() };
     let (report, picture) = find_part_in_all(&looked, &recipe, args.station.as_deref(), &options)?;
@@ -112,6 +115,15 @@ pub(super) fn summary(r: &Report) -> String {
         "match        score {:.3}, next best pose {:.3}; {} edges to {:.3} mm, {} surface points to {:.3} mm\n",
         r.found.score, r.found.second_score, r.edges, r.edge_rms_mm, r.surface_points, r.surface_rms_mm
     );
+    for (k, p) in r.all.iter().enumerate() {
+        s += &format!(
+            "  place {:3}    {} mm, {:8.2} degrees, score {:.3}\n",
+            k + 1,
+            row(&p.at_mm, 2),
+            p.angle_deg,
+            p.score
+        );
+    }
     for c in &r.constructions {
         s += &format!(
             "  {:24} {:+.3} {:+.3} mm{} from where the pose puts it ({} shapes)\n",

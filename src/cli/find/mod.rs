@@ -1,7 +1,9 @@
 //! In: the command line's words about parts. Out: models, recipes, found poses, second looks.
 //! Frame and unit: base frame, mm.
 
+pub mod import_map;
 pub mod locate;
+pub mod matching;
 pub mod model;
 pub mod program;
 pub mod second_look;

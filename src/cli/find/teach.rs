@@ -1,33 +1,54 @@
-//! In: a scan folder and where the part's outline, windows and holes lie in its height map. Out: a
-//! recipe, proven on that scan, and a picture of the proof.
-//! Frame and unit: height map's grid frame, mm from its corner.
+//! In: a scan folder and where the part's outline, windows and holes lie in its height map, or a picture and a region of it. Out: a
+//! recipe, proven on that scan, and a picture of the proof; or a template for `match` and a picture of its edges.
+//! Frame and unit: height map's grid frame, mm from its corner; pixels of the picture.
 
+use super::matching::taught;
 use crate::cli::insertion::InsertionArgs;
 use crate::cli::terminal::console::Console;
 use crate::cli::terminal::outputs;
 use crate::cli::terminal::outputs::Inputs;
 use crate::fault::Result;
+use crate::find::ModelOptions;
 use crate::find::insert::teach::TeachOptions;
+use crate::find::search::picture::draw_model;
+use crate::raster::Channel;
 use crate::station::teach_part;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Teach a new part: from one scan and a few numbers to a recipe
 ///
 /// The numbers are millimetres in the height map that scan.json and height.png show (from its corner,
 /// x along columns, y along rows), to half a millimetre; the points give the exact dimensions.
+///
+/// With --region a picture is taught instead of a scan: what lies in the region becomes a template that sheetlight match finds in
+/// other pictures.
 #[derive(clap::Args)]
-#[command(after_help = "Example:
+#[command(after_help = "Examples:
+  sheetlight teach board.png --name relay --region 210,90,64,40 --out relay.json
   sheetlight teach scans/board7 --name relay --outline 84,20,104.4,32.8 --window 89,24,99.4,28.4 \\
       --hole 86.5,22.5,0.72 --hole 101.7,30.2,0.72 --out relay.toml")]
 pub struct Args {
-    /// Folder that sheetlight scan --out wrote
+    /// Folder that sheetlight scan --out wrote; with --region a picture
     scan: PathBuf,
     /// A name for the part
     #[arg(long)]
     name: String,
+    /// Where the part lies in the picture, px: x,y of the top left pixel, width, height
+    #[arg(long, value_name = "X,Y,W,H", value_parser = crate::cli::terminal::arguments::numbers::<4>,
+        conflicts_with_all = ["outline", "angle_deg", "windows", "holes"])]
+    region: Option<[f64; 4]>,
+    /// With --region: weakest edge, as a share of the strong ones
+    #[arg(long, requires = "region", default_value_t = ModelOptions::default().contrast)]
+    contrast: f64,
+    /// With --region: part of a colour picture to use: red, green, blue or luma
+    #[arg(long, requires = "region", default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
+    channel: Channel,
+    /// With --region: depth of the picture, 8 to 16 bits
+    #[arg(long, requires = "region", default_value_t = 8, value_parser = clap::value_parser!(u8).range(8..=16))]
+    bits: u8,
     /// Corners of the body before it is turned, mm: x0,y0,x1,y1
-    #[arg(long, value_parser = crate::cli::terminal::arguments::numbers::<4>)]
-    outline: [f64; 4],
+    #[arg(long, value_parser = crate::cli::terminal::arguments::numbers::<4>, required_unless_present = "region")]
+    outline: Option<[f64; 4]>,
     /// Turn of the body about its centre from x towards y, degrees
     #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
     angle_deg: f64,
@@ -39,17 +60,18 @@ pub struct Args {
     holes: Vec<[f64; 3]>,
     #[command(flatten)]
     insertion: InsertionArgs,
-    /// File for the recipe (TOML); the picture goes beside it with .png
+    /// File for the recipe (TOML) or template (JSON); the picture goes beside it with .png
     #[arg(long)]
     out: PathBuf,
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let image = args.out.with_extension("png");
+    let Some(outline) = args.outline else { return template(args, &image, console) };
     outputs::check(&[&args.out, &image], &Inputs { scans: &[&args.scan], ..Inputs::default() })?;
     let options = TeachOptions {
         name: args.name.clone(),
-        outline: args.outline,
+        outline,
         angle_deg: args.angle_deg,
         windows: args.windows.clone(),
         holes: args.holes.clone(),
@@ -63,5 +85,26 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     }
     console.result(&recipe, &format!("{text}\n{}", crate::cli::find::locate::summary(&proof)));
     console.say(format!("see {} and {}", args.out.display(), image.display()));
+    Ok(())
+}
+
+/// A template of the picture's region.
+fn template(args: &Args, picture: &Path, console: &Console) -> Result<()> {
+    outputs::check(&[&args.out, picture], &Inputs { files: &[&args.scan], ..Inputs::default() })?;
+    let options = ModelOptions { contrast: args.contrast, ..ModelOptions::default() };
+    let (template, image) = taught(&args.scan, &args.name, args.region, (args.channel, args.bits), &options)?;
+    let [x, y, w, h] = template.region_px.map(f64::from);
+    let drawn = draw_model(&image, &template.model, [x + 0.5 * (w - 1.0), y + 0.5 * (h - 1.0)]);
+    let text = serde_json::to_string_pretty(&template).expect("plain data");
+    crate::files::write_beside((&args.out, text.as_bytes()), &[(picture, &drawn.to_png())])?;
+    let edges = template.model.levels[0].len();
+    let said = format!(
+        "{}: {edges} edges on {} levels, radius {:.1} px",
+        template.name,
+        template.model.levels.len(),
+        template.model.radius
+    );
+    console.result(&template, &said);
+    console.say(format!("see {} and {}", args.out.display(), picture.display()));
     Ok(())
 }

@@ -3,6 +3,7 @@
 //! Frame and unit: base frame; mm, degrees; sigmas along the part's own axes.
 
 use super::budget::{Budget, budget};
+use super::places::{Place, places};
 use super::recipe::{Gates, Recipe};
 use super::verdict::{Agreement, TurnVote, judge, vote};
 use crate::fault::Gate;
@@ -19,6 +20,7 @@ use crate::find::model::shape_model::ShapeModel;
 use crate::find::scene::{Kind, Layer, Scene};
 use crate::find::search::accelerator::Accelerator;
 use crate::find::search::full::{Match, find_on};
+use crate::find::search::options::SearchOptions;
 use crate::find::search::refine::Pose;
 use crate::geometry::{Base, Grid, Part, Rigid, Tool, Vec3};
 use crate::rig::Rig;
@@ -38,11 +40,13 @@ pub struct LocateOptions {
     /// Where another look found the part: tried before what the search finds. From the side a part hides some of its own
     /// edges, and the best match may lie beside it.
     pub expected: Option<Rigid<Base, Part>>,
+    /// List every place that looks like the part.
+    pub all: bool,
 }
 
 impl Default for LocateOptions {
     fn default() -> Self {
-        LocateOptions { up: None, robot: Convention::Matrix, accelerator: None, expected: None }
+        LocateOptions { up: None, robot: Convention::Matrix, accelerator: None, expected: None, all: false }
     }
 }
 
@@ -109,6 +113,9 @@ pub struct Report {
     pub base_from_part: Rigid<Base, Part>,
     /// The match in the height map at which the measurement began; px of the map.
     pub found: Match,
+    /// Every place of the map that looks like the part, best first, where all were asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub all: Vec<Place>,
     /// How far the points agree with the drawing at the measured pose.
     pub agreement: Agreement,
     /// Votes on each other turn at which the part looks nearly alike.
@@ -155,6 +162,10 @@ pub fn locate(cloud: &[CloudPoint], recipe: &Recipe, rig: Option<&Rig>, options:
     let model = model_of(recipe, &scene)?;
     let mut search = recipe.search;
     search.max_matches = search.max_matches.max(3);
+    if options.all {
+        search.max_matches = SearchOptions::MOST_MATCHES;
+        search.candidates = search.candidates.max(2000);
+    }
     search.min_score = search.min_score.min(recipe.gates.min_score);
     let matches = find_on(&scene, &model, &search, options.accelerator.as_ref())?;
     let Some(best) = matches.first().cloned() else {
@@ -170,9 +181,10 @@ pub fn locate(cloud: &[CloudPoint], recipe: &Recipe, rig: Option<&Rig>, options:
         notes.push(format!(
             "{} places look like the part, scores {}; the best was taken",
             matches.len(),
-            matches.iter().map(|m| format!("{:.3}", m.score)).collect::<Vec<_>>().join(" ")
+            matches.iter().take(8).map(|m| format!("{:.3}", m.score)).collect::<Vec<_>>().join(" ")
         ));
     }
+    let all = if options.all { places(&matches, &map) } else { vec![] };
     let Judged { found: best, mut measured } =
         best_hypothesis(&points, &map, recipe, options.expected.as_ref(), &best, &matches)?;
     let mut turns = vote(&points, &drawing, &measured.base_from_part, recipe.alike_turns, &recipe.measure);
@@ -202,7 +214,8 @@ pub fn locate(cloud: &[CloudPoint], recipe: &Recipe, rig: Option<&Rig>, options:
             Err(e) => notes.push(e.what),
         }
     }
-    Ok(conclude(recipe, rig, options, &points, map, best, measured, agreement, turns, constructions, notes))
+    let report = conclude(recipe, rig, options, &points, map, best, measured, agreement, turns, constructions, notes);
+    Ok(Report { all, ..report })
 }
 
 struct Judged {
@@ -373,6 +386,7 @@ fn conclude(
         gates,
         base_from_part: measured.base_from_part,
         found,
+        all: vec![],
         agreement,
         turns,
         constructions,

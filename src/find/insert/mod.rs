@@ -5,6 +5,7 @@ pub mod budget;
 mod from_drawing;
 pub mod locate;
 pub mod picture;
+mod places;
 pub mod recipe;
 pub mod teach;
 pub mod verdict;

@@ -10,3 +10,4 @@ pub mod mirror;
 pub mod outline;
 pub mod shape;
 pub mod shape_model;
+pub mod template;

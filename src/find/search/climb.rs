@@ -177,11 +177,15 @@ pub(in crate::find) fn climb(
     let turn = 1.0 / (radius / px).max(4.0);
     let ignore = options.ignore_polarity;
     let turned = |pose: &Pose, by: i32| Pose { angle: pose.angle + f64::from(by) * turn, ..*pose };
+    // A step out of the range is not taken.
+    let turns = |from: &Pose| {
+        let from = *from;
+        (-1..=1).map(move |by| turned(&from, by)).filter(|pose| options.holds_angle(pose.angle, 1e-9))
+    };
     let mut best = Candidate { score: score(layers, points, level, &from.pose, ignore).0, pose: from.pose };
     if first {
         // The coarse grid is STRIDE px wide and the turns as far apart: look around once.
-        for by in -1..=1 {
-            let pose = turned(&from.pose, by);
+        for pose in turns(&from.pose) {
             let found = Around::<5, 8>::new(layers, points, level, &pose, ignore).best(&pose, px);
             if found.score > best.score {
                 best = found;
@@ -190,8 +194,7 @@ pub(in crate::find) fn climb(
     }
     for _ in 0..ROUNDS {
         let start = best;
-        for by in -1..=1 {
-            let pose = turned(&start.pose, by);
+        for pose in turns(&start.pose) {
             let found = Around::<3, 4>::new(layers, points, level, &pose, ignore).best(&pose, px);
             if found.score > best.score {
                 best = found;

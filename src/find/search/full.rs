@@ -3,6 +3,7 @@
 //! Frame and unit: pixels of the scene, degrees in options, radians in poses.
 
 use super::accelerator::Accelerator;
+use super::area::Area;
 use super::climb::{Candidate, Directions, climb, score};
 use super::coarse::{Query, Turn, turn_between};
 use super::level::Level;
@@ -60,7 +61,38 @@ pub fn find_on(
     options: &SearchOptions,
     accelerator: Option<&Accelerator>,
 ) -> Result<Vec<Match>> {
+    find_in(scene, model, options, None, accelerator)
+}
+
+/// As [`find_on`], among places whose middle lies in an area; no more of the scene is looked at than that needs.
+pub fn find_in(
+    scene: &Scene,
+    model: &ShapeModel,
+    options: &SearchOptions,
+    area: Option<&Area>,
+    accelerator: Option<&Accelerator>,
+) -> Result<Vec<Match>> {
     options.check()?;
+    let Some(area) = area else { return search(scene, model, options, &|_| true, accelerator) };
+    let cells = area.cells(scene, model, options)?;
+    let (dx, dy) = (cells.x0 as f64, cells.y0 as f64);
+    let shifted = |p: &Pose| Pose { x: p.x + dx, y: p.y + dy, ..*p };
+    let inside = |p: &Pose| area.holds(model, &shifted(p));
+    let mut found = search(&scene.crop(cells), model, options, &inside, accelerator)?;
+    for m in &mut found {
+        m.pose = shifted(&m.pose);
+        m.rivals.iter_mut().for_each(|r| r.0 = shifted(&r.0));
+    }
+    Ok(found)
+}
+
+fn search(
+    scene: &Scene,
+    model: &ShapeModel,
+    options: &SearchOptions,
+    inside: &(dyn Fn(&Pose) -> bool + Sync),
+    accelerator: Option<&Accelerator>,
+) -> Result<Vec<Match>> {
     for p in &model.levels[0] {
         if !scene.layers.iter().any(|l| l.kind == p.kind) {
             return Err(Fault::usage(format!("the model has {:?} edges, the scene has no such layer", p.kind))
@@ -107,7 +139,7 @@ pub fn find_on(
         candidates.retain(|c| c.score >= limit);
         candidates = distinct(candidates, (1 << level) as f64, model.radius, keep);
     }
-    Ok(finish(scene, &levels[0], model, candidates, options))
+    Ok(finish(scene, &levels[0], model, candidates, options, inside))
 }
 
 /// Three times the noise, but not below a thousandth of the layer's strong slopes: a noise-free picture
@@ -199,16 +231,22 @@ fn finish(
     model: &ShapeModel,
     candidates: Vec<Candidate>,
     options: &SearchOptions,
+    inside: &(dyn Fn(&Pose) -> bool + Sync),
 ) -> Vec<Match> {
     let points = &model.levels[0];
     let fields: Vec<(Kind, &Field, f32)> = layers.iter().map(|d| (d.kind, &d.field, d.threshold)).collect();
-    let free_scale = options.scales[1] > options.scales[0];
+    let free = options.free();
     let refined: Vec<_> = candidates
         .par_iter()
         .filter_map(|c| {
-            let r = refine(&fields, model, c.pose, free_scale, options.ignore_polarity, 8)?;
+            let r = refine(&fields, model, c.pose, free, options.ignore_polarity, 8)?;
             // A refinement that walks away was not standing on the edges that it was sent to.
             if !same(&r.pose, &c.pose, 4.0, model.radius) {
+                return None;
+            }
+            // The range limits what is returned, not where the search begins.
+            let slack = |k: usize| 3.0 * r.covariance[(k, k)].max(0.0).sqrt();
+            if !options.holds_angle(r.pose.angle, slack(2)) || !options.holds_scale(r.pose.scale, slack(3)) {
                 return None;
             }
             let (s, coverage) = score(layers, points, 0, &r.pose, options.ignore_polarity);
@@ -223,7 +261,7 @@ fn finish(
         if *s < options.min_score || out.len() == options.max_matches {
             break;
         }
-        if out.iter().any(|(_, m)| overlap(model, &m.pose, &r.pose) > options.max_overlap) {
+        if !inside(&r.pose) || out.iter().any(|(_, m)| overlap(model, &m.pose, &r.pose) > options.max_overlap) {
             continue;
         }
         let mut rivals: Vec<(Pose, f64)> = Vec::new();

@@ -2,9 +2,11 @@
 //! Frame and unit: scene pixels, radians (docs/math.md, Shape matching).
 
 pub mod accelerator;
+pub mod area;
 mod climb;
 pub mod coarse;
 pub mod full;
 pub mod level;
 pub mod options;
+pub mod picture;
 pub mod refine;

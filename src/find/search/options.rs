@@ -27,6 +27,15 @@ pub struct SearchOptions {
     pub candidates: usize,
 }
 
+/// What the least squares may change beside the place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Free {
+    /// The turn.
+    pub angle: bool,
+    /// The scale.
+    pub scale: bool,
+}
+
 impl Default for SearchOptions {
     fn default() -> Self {
         SearchOptions {
@@ -44,6 +53,27 @@ impl Default for SearchOptions {
 }
 
 impl SearchOptions {
+    /// Most matches of one search.
+    pub const MOST_MATCHES: usize = 1000;
+
+    /// Whether a turn (rad) lies in the range, or outside by no more than `slack` (rad).
+    pub(super) fn holds_angle(&self, angle: f64, slack: f64) -> bool {
+        let [first, last] = self.angles_deg.map(f64::to_radians);
+        let beyond = (angle - first + slack).rem_euclid(std::f64::consts::TAU);
+        beyond <= last - first + 2.0 * slack
+    }
+
+    /// Whether a scale lies in the range, or outside by no more than `slack`.
+    pub(super) fn holds_scale(&self, scale: f64, slack: f64) -> bool {
+        let [least, most] = self.scales;
+        (least - slack..=most + slack).contains(&scale)
+    }
+
+    /// Whether turn and scale are measured: of a range of one value both ends are what they are said to be.
+    pub(super) fn free(&self) -> Free {
+        Free { angle: self.angles_deg[1] > self.angles_deg[0], scale: self.scales[1] > self.scales[0] }
+    }
+
     /// Refuses options outside their ranges.
     pub fn check(&self) -> Result<()> {
         let bad = |what: String| Err(Fault::usage(what).next("correct the search options"));
@@ -58,8 +88,8 @@ impl SearchOptions {
         if !(0.1..=1.0).contains(&self.min_score) {
             return bad(format!("min_score is {}, wanted 0.1 to 1", self.min_score));
         }
-        if !(1..=1000).contains(&self.max_matches) {
-            return bad(format!("max_matches is {}, wanted 1 to 1000", self.max_matches));
+        if !(1..=Self::MOST_MATCHES).contains(&self.max_matches) {
+            return bad(format!("max_matches is {}, wanted 1 to {}", self.max_matches, Self::MOST_MATCHES));
         }
         if !(0.0..=1.0).contains(&self.max_overlap) {
             return bad(format!("max_overlap is {}, wanted 0 to 1", self.max_overlap));

@@ -2,6 +2,7 @@
 //! squares over distances to edges, with covariance (docs/math.md, Shape matching (3) and (4)).
 //! Frame and unit: pixels of level 0, radians, scale as a factor.
 
+use super::options::Free;
 use crate::find::model::gradient::Field;
 use crate::find::model::shape_model::{ModelPoint, ShapeModel, ridge_offset};
 use crate::find::scene::Kind;
@@ -68,7 +69,7 @@ pub fn refine(
     fields: &[(Kind, &Field, f32)],
     model: &ShapeModel,
     start: Pose,
-    free_scale: bool,
+    free: Free,
     ignore_polarity: bool,
     rounds: usize,
 ) -> Option<Refined> {
@@ -79,11 +80,11 @@ pub fn refine(
     for _ in 0..rounds {
         let rows: Vec<(Vector4<f64>, f64)> =
             points.iter().filter_map(|p| row(fields, p, &pose, ignore_polarity)).collect();
-        let unknowns = if free_scale { 4 } else { 3 };
+        let unknowns = 2 + usize::from(free.angle) + usize::from(free.scale);
         if rows.len() < 2 * unknowns {
             return None;
         }
-        let (step, covariance, sigma) = solve(&rows, free_scale)?;
+        let (step, covariance, sigma) = solve(&rows, free)?;
         pose.x += step.x;
         pose.y += step.y;
         pose.angle += step.z;
@@ -125,7 +126,9 @@ fn row(fields: &[(Kind, &Field, f32)], p: &ModelPoint, pose: &Pose, ignore: bool
 }
 
 /// Tukey-weighted least squares; the step, the covariance and the robust sigma.
-fn solve(rows: &[(Vector4<f64>, f64)], free_scale: bool) -> Option<(Vector4<f64>, Matrix4<f64>, f64)> {
+fn solve(rows: &[(Vector4<f64>, f64)], free: Free) -> Option<(Vector4<f64>, Matrix4<f64>, f64)> {
+    let held = [false, false, !free.angle, !free.scale];
+    let held = || (0..4).filter(move |&k| held[k]);
     let mut step = Vector4::zeros();
     let mut sigma = 1.0f64;
     let mut inverse = Matrix4::zeros();
@@ -144,13 +147,11 @@ fn solve(rows: &[(Vector4<f64>, f64)], free_scale: bool) -> Option<(Vector4<f64>
         if weight < 6.0 {
             return None;
         }
-        if !free_scale {
-            for k in 0..4 {
-                a[(3, k)] = 0.0;
-                a[(k, 3)] = 0.0;
-            }
-            a[(3, 3)] = 1.0;
-            b[3] = 0.0;
+        for k in held() {
+            a.row_mut(k).fill(0.0);
+            a.column_mut(k).fill(0.0);
+            a[(k, k)] = 1.0;
+            b[k] = 0.0;
         }
         // Scaled to unit diagonal, a free motion shows as a tiny eigenvalue.
         let scale = Vector4::from_fn(|k, _| a[(k, k)].max(1e-300).sqrt().recip());
@@ -163,11 +164,9 @@ fn solve(rows: &[(Vector4<f64>, f64)], free_scale: bool) -> Option<(Vector4<f64>
         step = inverse * b;
     }
     let mut covariance = inverse * (sigma * sigma);
-    if !free_scale {
-        for k in 0..4 {
-            covariance[(3, k)] = 0.0;
-            covariance[(k, 3)] = 0.0;
-        }
+    for k in held() {
+        covariance.row_mut(k).fill(0.0);
+        covariance.column_mut(k).fill(0.0);
     }
     Some((step, covariance, sigma))
 }

@@ -406,7 +406,7 @@ impl<'a> Job<'a> {
         let Some([_, normal]) = self.state.surface else { return Ok(Phase::Touch) };
         let folder = self.options.out.join("scan");
         let cloud = cloud_of(&folder)?;
-        let options = LocateOptions { up: Some(normal), robot: self.options.robot, accelerator: None, expected: None };
+        let options = LocateOptions { up: Some(normal), robot: self.options.robot, ..LocateOptions::default() };
         let report = locate(&cloud, &self.recipe, Some(&self.rig), &options)?;
         picture::draw(&report, &self.recipe.drawing()).save_png(&self.options.out.join("found.png"))?;
         let tilt = report.base_from_part.direction(&Vec3::z()).dot(&normal).clamp(-1.0, 1.0).acos().to_degrees();

@@ -76,6 +76,34 @@ pub struct ScanReport {
     pub remarks: Vec<String>,
     /// SHA-256 of the cloud and of the height map, by file name.
     pub files: BTreeMap<String, String>,
+    /// Where the points came from that no rig of this program measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub imported: Option<Imported>,
+}
+
+/// What an imported file was, and what its user stated about it.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Imported {
+    /// Its name.
+    pub file: String,
+    /// SHA-256 of it.
+    pub sha256: String,
+    /// SHA-256 of the picture of the light that came with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub light_sha256: Option<String>,
+    /// mm in one level or coordinate, as stated.
+    pub unit_mm: f64,
+    /// Distance of columns and rows, as stated, mm.
+    pub spacing_mm: Option<[f64; 2]>,
+    /// Height of level 0, as stated, mm.
+    pub offset_mm: f64,
+    /// Level where nothing was measured, as stated.
+    pub missing: Option<f64>,
+    /// Whether y runs along the rows, as stated.
+    pub rows_up: bool,
+    /// Standard deviation of a height, stated or measured, mm.
+    pub sigma_mm: f64,
 }
 
 /// Bytes of a height map's file: 64 million cells and what stands before them.

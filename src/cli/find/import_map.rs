@@ -1,0 +1,93 @@
+//! In: a height map or cloud of another sensor. Out: a scan folder on which find works.
+//! Frame and unit: the file's own frame, called map; mm.
+
+use crate::cli::terminal::arguments::numbers;
+use crate::cli::terminal::console::Console;
+use crate::fault::Result;
+use crate::scan::Stated;
+use crate::station::{ScanReport, import_map};
+use std::path::PathBuf;
+
+/// Take in a height map or cloud of another sensor, so that find works on it
+///
+/// Reads float TIFF, TIFF, PNG, PGM and BMP of 8 or 16 bits whose levels are heights, PLY (text, binary) and PCD (text, binary,
+/// compressed). Units, distances and the level that means nothing was measured are stated, never guessed; how much heights scatter
+/// is measured unless stated. The result is a scan folder with cloud, height map and scan.json, which names the file and its hash.
+/// Its frame is called map: poses that find gives are in it, not in a robot's base, and no calibration is in their error budget.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sheetlight import-map plate.png --unit-mm 0.02 --spacing-mm 0.216,0.209 --missing 0 \\
+      --light plate_light.png --out scans/plate
+  sheetlight import-map heights.tif --unit-mm 1 --spacing-mm 0.1,0.1 --out scans/heights
+  sheetlight import-map cloud.pcd --unit-mm 1000 --out scans/cloud
+  sheetlight import-map cloud.ply --unit-mm 1 --spacing-mm 0.2,0.2 --out scans/cloud
+  sheetlight find scans/plate --recipe star.toml --out star.json")]
+pub struct Args {
+    /// Height picture, PLY or PCD
+    file: PathBuf,
+    /// mm in one level of a picture, or in one unit of a cloud's coordinates: 1 for mm, 1000 for m
+    #[arg(long)]
+    unit_mm: Option<f64>,
+    /// Distance of a picture's columns and of its rows, mm; for a cloud without lines the distance of its points
+    #[arg(long, value_name = "X,Y", value_parser = numbers::<2>)]
+    spacing_mm: Option<[f64; 2]>,
+    /// Height of a picture's level 0, mm
+    #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
+    offset_mm: f64,
+    /// Level of a picture where nothing was measured, or none; NaN of a float TIFF is always missing
+    #[arg(long, value_name = "LEVEL", value_parser = level, allow_hyphen_values = true)]
+    missing: Option<Level>,
+    /// A picture whose rows run upwards, or that is seen from behind: y runs along the rows, not against them
+    #[arg(long)]
+    rows_up: bool,
+    /// Picture of the light that came with a height picture, of the same size
+    #[arg(long)]
+    light: Option<PathBuf>,
+    /// Standard deviation of a height, mm [default: measured from neighbours]
+    #[arg(long)]
+    sigma_mm: Option<f64>,
+    /// Folder for cloud, height map and scan.json
+    #[arg(long)]
+    out: PathBuf,
+}
+
+/// The missing level, `None` where every level is a height.
+#[derive(Clone, Copy, Debug)]
+struct Level(Option<f64>);
+
+fn level(s: &str) -> std::result::Result<Level, String> {
+    let number = || s.parse().ok().filter(|v: &f64| v.is_finite());
+    if s == "none" { Ok(Level(None)) } else { number().map(|v| Level(Some(v))).ok_or(format!("'{s}' is no level")) }
+}
+
+pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let stated = Stated {
+        spacing_mm: args.spacing_mm,
+        unit_mm: args.unit_mm,
+        offset_mm: args.offset_mm,
+        missing: args.missing.map(|m| m.0),
+        rows_up: args.rows_up,
+        sigma_mm: args.sigma_mm,
+    };
+    let report = import_map(&args.file, args.light.as_deref(), &stated, &args.out)?;
+    console.result(&report, &summary(&report));
+    console.say(format!("see {}", args.out.display()));
+    Ok(())
+}
+
+fn summary(r: &ScanReport) -> String {
+    let mut s = format!("{} points in {} lines, frame {}\n", r.points, r.shots, r.frame);
+    if let Some(m) = &r.height_map {
+        s += &format!(
+            "height map {} x {} cells of {:.4} mm, {:.1} % seen, heights {:.3} to {:.3} mm above its plane\n",
+            m.width,
+            m.height,
+            m.cell_mm,
+            100.0 * m.coverage,
+            m.z_low_mm,
+            m.z_high_mm
+        );
+    }
+    r.remarks.iter().for_each(|n| s += &format!("note {n}\n"));
+    s
+}

@@ -1,0 +1,138 @@
+//! In: a picture and the region of it that shows the part; or the file that was made of it. Out: a model with where it came from,
+//! for searches in other pictures; the file.
+//! Frame and unit: pixels of the picture; places of the model about the region's middle, turn 0 as in the picture.
+
+use super::shape_model::{MIN_POINTS, ModelOptions, ModelPoint, ShapeModel};
+use crate::fault::{Fault, Result};
+use crate::find::scene::{Kind, Region, Scene};
+use crate::raster::Image;
+
+/// A part as one picture shows it. What `teach --region` writes and `match` reads.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Template {
+    /// Version of this file: 1.
+    pub format: u32,
+    /// What the part is called.
+    pub name: String,
+    /// The picture it was taught from, as it was named then.
+    pub picture: String,
+    /// SHA-256 of that picture's file.
+    pub picture_sha256: String,
+    /// The part in that picture: x, y of its top left pixel, width, height; px.
+    pub region_px: [u32; 4],
+    /// How the edges were chosen.
+    pub options: ModelOptions,
+    /// The part's edges.
+    pub model: ShapeModel,
+}
+
+/// Edges farther than this from the part's middle come from no picture, px.
+const FARTHEST_PX: f64 = 131_072.0;
+/// Places of a level in a file: [`ModelOptions::max_points`] at most.
+const MOST_PLACES: usize = 5000;
+
+impl Template {
+    /// Learns what `region` (x, y, width, height; all of the picture where `None`) shows. `source` is the picture's name and SHA-256.
+    ///
+    /// # Errors
+    /// A region that leaves the picture, one without a clear outline.
+    pub fn teach(
+        name: &str,
+        image: &Image,
+        region: Option<[u32; 4]>,
+        source: (String, String),
+        options: &ModelOptions,
+    ) -> Result<Template> {
+        let [x, y, w, h] = region.unwrap_or([0, 0, image.width, image.height]);
+        let end = |a: u32, b: u32| a as usize + b as usize;
+        let cells = Region { x0: x as usize, y0: y as usize, x1: end(x, w), y1: end(y, h) };
+        let model = ShapeModel::from_region(&Scene::from_image(image), cells, None, options)?;
+        Ok(Template {
+            format: 1,
+            name: name.into(),
+            picture: source.0,
+            picture_sha256: source.1,
+            region_px: [x, y, w, h],
+            options: *options,
+            model,
+        })
+    }
+
+    /// Parses a file and checks every number of it.
+    ///
+    /// # Errors
+    /// Text that is no template, and numbers that no picture gives.
+    pub fn parse(text: &str) -> Result<Template> {
+        let strange = |what: String| {
+            Fault::input(format!("is no taught part: {what}"))
+                .cause("another file, another version, or edited by hand")
+                .next("teach the part again: sheetlight teach PICTURE --region X,Y,W,H --out PART.json")
+        };
+        let template: Template = serde_json::from_str(text).map_err(|e| strange(e.to_string()))?;
+        if template.format != 1 {
+            return Err(strange(format!("format {}, this version reads 1", template.format)));
+        }
+        template.options.check().map_err(|e| strange(e.what))?;
+        check(&template.model).map_err(strange)?;
+        Ok(template)
+    }
+}
+
+fn check(model: &ShapeModel) -> std::result::Result<(), String> {
+    if !(1..=8).contains(&model.levels.len()) {
+        return Err(format!("{} levels, wanted 1 to 8", model.levels.len()));
+    }
+    for (level, points) in model.levels.iter().enumerate() {
+        if !(MIN_POINTS..=MOST_PLACES).contains(&points.len()) {
+            return Err(format!("{} edge places on level {level}, wanted {MIN_POINTS} to {MOST_PLACES}", points.len()));
+        }
+        let strange = |p: &ModelPoint| {
+            let unit = (p.gx.hypot(p.gy) - 1.0).abs() < 1e-6;
+            !(p.x.hypot(p.y) <= FARTHEST_PX && unit && p.kind == Kind::Intensity)
+        };
+        if let Some(p) = points.iter().find(|p| strange(p)) {
+            return Err(format!("an edge at {}, {} with direction {}, {}", p.x, p.y, p.gx, p.gy));
+        }
+    }
+    let sizes = model.half_size.iter().chain([&model.radius, &model.spacing]);
+    if sizes.clone().any(|v| !(*v >= 0.0 && *v <= FARTHEST_PX))
+        || model.centre.iter().any(|v| !(v.abs() <= FARTHEST_PX))
+    {
+        return Err("sizes that no picture gives".into());
+    }
+    let reach = model.levels[0].iter().map(|p| p.x.hypot(p.y)).fold(0.0, f64::max);
+    if (reach - model.radius).abs() > 1e-3 || !(model.spacing > 0.0) {
+        return Err(format!("a radius of {} px, its edges reach {reach:.3} px", model.radius));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_taught_comes_back_and_strange_numbers_do_not() {
+        let pixels =
+            (0..64 * 48).map(|i| if (16..48).contains(&(i % 64)) && (12..36).contains(&(i / 64)) { 200 } else { 20 });
+        let image = Image::from_u8(64, 48, pixels.collect());
+        let source = ("a.png".to_owned(), "0".repeat(64));
+        let taught =
+            Template::teach("box", &image, Some([8, 6, 48, 36]), source.clone(), &ModelOptions::default()).unwrap();
+        let text = serde_json::to_string(&taught).unwrap();
+        assert_eq!(Template::parse(&text).unwrap(), taught);
+        for (from, to) in [
+            ("\"format\":1", "\"format\":2"),
+            ("\"radius\":", "\"radius\":1e9,\"radiu\":"),
+            ("\"gx\":", "\"gx\":3.0,\"g\":"),
+        ] {
+            assert!(Template::parse(&text.replacen(from, to, 1)).is_err(), "{to}");
+        }
+        let mut far = taught.clone();
+        far.model.levels[0][0].x = 1e7;
+        assert!(Template::parse(&serde_json::to_string(&far).unwrap()).unwrap_err().what.contains("an edge at"));
+        let outside = Template::teach("box", &image, Some([8, 6, 60, 36]), source, &ModelOptions::default());
+        assert!(outside.unwrap_err().what.contains("does not lie in"));
+    }
+}

@@ -1,0 +1,231 @@
+//! In: what a foreign file holds, and what its user states about it. Out: a cloud in lines, as if a scan had made one shot of each.
+//! Frame and unit: the file's own frame, mm. A height picture's x runs along its columns, z towards the sensor, and y makes the frame
+//! right-handed: against the rows of a picture that is seen from the sensor.
+
+use super::raw::Raw;
+use crate::fault::{Fault, Result};
+use crate::scan::CloudPoint;
+
+/// What no file says for certain, and nobody guesses.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Stated {
+    /// Columns and rows of a height picture are so far apart, mm; points of a cloud without lines are taken as so far apart.
+    pub spacing_mm: Option<[f64; 2]>,
+    /// mm in one level of a height picture, or in one unit of a cloud's coordinates.
+    pub unit_mm: Option<f64>,
+    /// Height of level 0, mm.
+    pub offset_mm: f64,
+    /// The level of a picture of whole numbers where nothing was measured; `Some(None)`: every level is a height.
+    pub missing: Option<Option<f64>>,
+    /// The picture is seen from behind the sensor, or its rows run upwards: y runs along the rows.
+    pub rows_up: bool,
+    /// Standard deviation of a height, mm; measured where `None`.
+    pub sigma_mm: Option<f64>,
+}
+
+/// The cloud, and what was found on the way.
+#[derive(Clone, Debug)]
+pub struct Lines {
+    /// Line by line; `shot` is the line, `u` the place in it.
+    pub points: Vec<CloudPoint>,
+    /// Standard deviation that every point carries, mm.
+    pub sigma_mm: f64,
+    /// Lines, and places in the longest.
+    pub size: [usize; 2],
+    /// What was done, a sentence each.
+    pub notes: Vec<String>,
+}
+
+/// Columns of a line that `find` can take.
+const MOST_PLACES: usize = 1 << 17;
+/// Farthest coordinate, mm: beyond it f32 forgets hundredths.
+const FARTHEST_MM: f64 = 1e5;
+/// Smallest and largest unit of a file, mm: a nanometre, a kilometre.
+const UNITS_MM: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
+/// Fewer neighbours do not show how much heights scatter.
+const NEEDED: usize = 30;
+
+/// Makes lines of points; `light` are levels of light for a height picture, of the same size.
+///
+/// # Errors
+/// What must be stated and is not, numbers out of all proportion, nothing measured at all.
+pub fn lines(raw: &Raw, light: Option<&Raw>, stated: &Stated) -> Result<Lines> {
+    let unit = stated.unit_mm.ok_or_else(|| {
+        Fault::usage("the unit of the heights is not stated")
+            .cause("files hold numbers, not millimetres")
+            .next("give --unit-mm: mm in one level of a picture, or in one unit of a cloud (1 for mm, 1000 for m)")
+    })?;
+    if !UNITS_MM.contains(&unit) {
+        return Err(Fault::usage(format!("the unit is {unit} mm, wanted {} to {}", UNITS_MM.start(), UNITS_MM.end()))
+            .next("correct --unit-mm"));
+    }
+    if stated.spacing_mm.is_some_and(|s| s.iter().any(|v| !(UNITS_MM.contains(v)))) {
+        return Err(Fault::usage("the spacing is not above 0 mm").next("correct --spacing-mm"));
+    }
+    if !(stated.offset_mm.abs() <= FARTHEST_MM) || stated.sigma_mm.is_some_and(|s| !(s > 0.0 && s < 100.0)) {
+        return Err(Fault::usage("offset or sigma out of range")
+            .cause("the offset is at most 100000 mm, sigma above 0 and below 100 mm")
+            .next("correct --offset-mm or --sigma-mm"));
+    }
+    let mut notes = Vec::new();
+    let placed = match raw {
+        Raw::Picture { width, height, levels, whole } => {
+            picture([*width, *height], levels, *whole, light, unit, stated, &mut notes)?
+        }
+        Raw::Points { line: Some(line), points, intensity } => organised(*line, points, intensity.as_deref(), unit),
+        Raw::Points { line: None, points, intensity } => {
+            scattered(points, intensity.as_deref(), unit, stated, &mut notes)?
+        }
+    };
+    finish(placed, stated, notes)
+}
+
+/// A point with its line and its place in the line.
+type Placed = (u32, u32, [f64; 3], f32);
+
+fn picture(
+    [width, height]: [usize; 2],
+    levels: &[f32],
+    whole: bool,
+    light: Option<&Raw>,
+    unit: f64,
+    stated: &Stated,
+    notes: &mut Vec<String>,
+) -> Result<Vec<Placed>> {
+    let [dx, dy] = stated.spacing_mm.ok_or_else(|| {
+        Fault::usage("the distance of columns and rows is not stated")
+            .cause("a picture of heights does not say how large its pixels are")
+            .next("give --spacing-mm X,Y")
+    })?;
+    let missing = match stated.missing {
+        None if whole => {
+            return Err(Fault::usage("it is not stated which level means that nothing was measured")
+                .cause("whole numbers have no sign for it: often 0, of signed maps -32768")
+                .next("give --missing LEVEL, or --missing none"));
+        }
+        None => None,
+        Some(level) => level,
+    };
+    let light = match light {
+        None => None,
+        Some(Raw::Picture { width: w, height: h, levels, .. }) if (*w, *h) == (width, height) => Some(levels),
+        Some(_) => {
+            return Err(Fault::input(format!("the picture of the light is not one of {width}x{height} pixels"))
+                .cause("it belongs to another map")
+                .next("give the picture that was taken with the heights"));
+        }
+    };
+    let sign = if stated.rows_up { 1.0 } else { -1.0 };
+    notes.push(format!(
+        "frame 'map': origin at the first pixel, x along the columns, y {} the rows, z up",
+        if stated.rows_up { "along" } else { "against" }
+    ));
+    let at = |i: usize, v: f32| {
+        let (x, y) = (i % width, i / width);
+        let place = [x as f64 * dx, sign * y as f64 * dy, stated.offset_mm + unit * f64::from(v)];
+        (y as u32, x as u32, place, light.map_or(1.0, |l| l[i]))
+    };
+    let there = |v: f32| v.is_finite() && missing != Some(f64::from(v));
+    Ok(levels.iter().enumerate().filter(|(_, v)| there(**v)).map(|(i, v)| at(i, *v)).collect())
+}
+
+fn organised(line: usize, points: &[[f64; 3]], light: Option<&[f32]>, unit: f64) -> Vec<Placed> {
+    let at = |(i, p): (usize, &[f64; 3])| {
+        let level = light.map_or(1.0, |l| l[i]);
+        ((i / line) as u32, (i % line) as u32, p.map(|v| unit * v), level)
+    };
+    points.iter().enumerate().filter(|(_, p)| p.iter().all(|v| v.is_finite())).map(at).collect()
+}
+
+fn scattered(
+    points: &[[f64; 3]],
+    light: Option<&[f32]>,
+    unit: f64,
+    stated: &Stated,
+    notes: &mut Vec<String>,
+) -> Result<Vec<Placed>> {
+    let [dx, dy] = stated.spacing_mm.ok_or_else(|| {
+        Fault::usage("the distance of the points is not stated")
+            .cause("the file has points in no order; they are put in lines along x, one every Y mm")
+            .next("give --spacing-mm X,Y: the distance along a line, and of the lines")
+    })?;
+    let finite = |p: &&[f64; 3]| p.iter().all(|v| v.is_finite());
+    let low = points.iter().filter(finite).fold([f64::MAX; 2], |m, p| [m[0].min(unit * p[0]), m[1].min(unit * p[1])]);
+    notes.push(format!("points in no order were put in lines along x, {dy} mm apart, {dx} mm from point to point"));
+    let mut out = Vec::with_capacity(points.len());
+    for (i, p) in points.iter().enumerate().filter(|(_, p)| finite(p)) {
+        let p = p.map(|v| unit * v);
+        let (column, line) = (((p[0] - low[0]) / dx).round(), ((p[1] - low[1]) / dy).round());
+        if column.max(line) >= MOST_PLACES as f64 {
+            return Err(Fault::refused(format!(
+                "the points reach over more than {MOST_PLACES} places of {dx} x {dy} mm"
+            ))
+            .cause("a wrong unit or spacing, or a stray point")
+            .next("correct --unit-mm or --spacing-mm, or take stray points out"));
+        }
+        out.push((line as u32, column as u32, p, light.map_or(1.0, |l| l[i])));
+    }
+    Ok(out)
+}
+
+fn finish(mut placed: Vec<Placed>, stated: &Stated, mut notes: Vec<String>) -> Result<Lines> {
+    if placed.is_empty() {
+        return Err(Fault::refused("no point was measured anywhere in the file")
+            .cause("an empty map, or every level is the missing one")
+            .next("look at the file, and at --missing"));
+    }
+    if let Some(p) = placed.iter().map(|p| p.2).find(|p| p.iter().any(|v| !(v.abs() <= FARTHEST_MM))) {
+        return Err(Fault::refused(format!(
+            "a point lies at {:.0}, {:.0}, {:.0} mm, limit {FARTHEST_MM}",
+            p[0], p[1], p[2]
+        ))
+        .cause("a wrong unit, or coordinates of a map of the land")
+        .next("correct --unit-mm, or move the points near their origin"));
+    }
+    if placed.iter().any(|p| p.1 as usize >= MOST_PLACES) {
+        return Err(Fault::refused(format!("a line has more than {MOST_PLACES} places"))
+            .cause("no sensor is so wide")
+            .next("cut out the part that is to be searched"));
+    }
+    // Lines ascend, places ascend in them; where two points fall into one place both stay in the cloud.
+    placed.sort_by_key(|p| (p.0, p.1));
+    let sigma_mm = match stated.sigma_mm {
+        Some(s) => s,
+        None => {
+            let s = scatter(&placed)?;
+            notes.push(format!("sigma of a height measured from neighbours in a line: {s:.4} mm"));
+            s
+        }
+    };
+    let size = [0, 1].map(|k| placed.iter().map(|p| if k == 0 { p.0 } else { p.1 }).max().unwrap_or(0) as usize + 1);
+    let point = |&(line, place, p, light): &Placed| CloudPoint {
+        position: p.map(|v| v as f32),
+        sigma_mm: sigma_mm as f32,
+        intensity: if light.is_finite() && light > 0.0 { light } else { 1.0 },
+        quality: 1.0,
+        shot: line,
+        u: place as f32,
+        v: 0.0,
+    };
+    Ok(Lines { points: placed.iter().map(point).collect(), sigma_mm, size, notes })
+}
+
+/// Robust standard deviation of one height: of three neighbours in a line the middle one is off the others' mean by
+/// sqrt(3/2) sigma; slopes cancel.
+fn scatter(placed: &[Placed]) -> Result<f64> {
+    let neighbours = |w: &&[Placed]| w[0].0 == w[2].0 && w[1].1 == w[0].1 + 1 && w[2].1 == w[0].1 + 2;
+    let bend = |w: &[Placed]| (w[1].2[2] - 0.5 * (w[0].2[2] + w[2].2[2])).abs();
+    let mut bends: Vec<f64> = placed.windows(3).filter(neighbours).map(bend).collect();
+    if bends.len() < NEEDED {
+        return Err(Fault::refused(format!(
+            "{} places have neighbours on both sides, {NEEDED} are needed",
+            bends.len()
+        ))
+        .cause("a spacing that is finer than the points lie, or next to nothing measured")
+        .next("correct --spacing-mm, or state --sigma-mm"));
+    }
+    let middle = bends.len() / 2;
+    let median = *bends.select_nth_unstable_by(middle, f64::total_cmp).1;
+    // Never finer than the tenth of a micrometre that heights are kept to.
+    Ok((1.4826 * median / 1.5f64.sqrt()).max(1e-4))
+}

@@ -1,0 +1,14 @@
+//! In: height maps and clouds that other sensors and programs wrote. Out: the same points as a scan's, line by line.
+//! Frame and unit: files in their own frame and unit, which the caller states; points in that frame, mm.
+
+mod fields;
+mod lines;
+mod pcd;
+mod picture;
+mod ply;
+mod raw;
+mod read;
+
+pub use lines::{Lines, Stated, lines};
+pub use raw::Raw;
+pub use read::read_foreign;

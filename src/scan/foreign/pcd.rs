@@ -1,0 +1,187 @@
+//! In: a PCD (Point Cloud Library): text, binary or compressed. Out: its points, in lines where it is organised.
+//! Frame and unit: the file's own.
+
+use super::fields::{Number, Points, Wanted};
+use super::raw::{MOST_POINTS, Raw};
+use crate::fault::{Fault, Result};
+
+/// Longest header, bytes.
+const MOST_HEADER: usize = 16 << 10;
+
+fn strange(what: impl std::fmt::Display) -> Fault {
+    Fault::input(format!("is not a PCD that can be read: {what}"))
+        .cause("a damaged file, or one without x, y and z")
+        .next("write the cloud again with the Point Cloud Library, or export it as PLY")
+}
+
+/// Whether a file begins as one does, comments apart.
+pub(super) fn begins(bytes: &[u8]) -> bool {
+    let head = &bytes[..bytes.len().min(4096)];
+    let mut lines = head.split(|&b| b == b'\n').skip_while(|l| l.starts_with(b"#") || l.trim_ascii().is_empty());
+    lines.next().is_some_and(|l| l.starts_with(b"VERSION") || l.starts_with(b"FIELDS"))
+}
+
+#[derive(Default)]
+struct Header {
+    names: Vec<String>,
+    numbers: Vec<Number>,
+    counts: Vec<usize>,
+    width: usize,
+    height: usize,
+    points: usize,
+    data: String,
+}
+
+pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
+    let (h, start) = header(bytes)?;
+    let wanted = Wanted::among(h.names.iter().map(String::as_str)).ok_or_else(|| strange("x, y or z is missing"))?;
+    let body = &bytes[start..];
+    let mut found = Points::default();
+    let each: Vec<usize> = h.numbers.iter().zip(&h.counts).map(|(n, c)| n.bytes() * c).collect();
+    let starts = |sizes: &[usize]| -> Vec<usize> {
+        sizes.iter().scan(0usize, |at, n| Some(std::mem::replace(at, *at + n))).collect()
+    };
+    let record: usize = each.iter().sum();
+    let whole = h.points.saturating_mul(record);
+    match h.data.as_str() {
+        "ascii" => {
+            let text = std::str::from_utf8(body).map_err(|e| strange(e))?;
+            let columns = starts(&h.counts);
+            let wanted = Wanted { xyz: wanted.xyz.map(|k| columns[k]), light: wanted.light.map(|k| columns[k]) };
+            let mut records = text.lines().filter(|l| !l.trim().is_empty());
+            let mut words = Vec::new();
+            for k in 0..h.points {
+                words.clear();
+                words.extend(records.next().unwrap_or("").split_ascii_whitespace());
+                if !found.take_text(&wanted, &words) {
+                    return Err(strange(format!("point {k} of {} is missing or no numbers", h.points)));
+                }
+            }
+        }
+        "binary" => {
+            let offsets = starts(&each);
+            let body = body.get(..whole).ok_or_else(|| strange(format!("it ends before its {} points", h.points)))?;
+            for r in body.chunks_exact(record) {
+                found.take(&wanted, |k| h.numbers[k].read(&r[offsets[k]..], false));
+            }
+        }
+        "binary_compressed" => {
+            let length = |at: usize| body.get(at..at + 4).map(|b| Number::U32.read(b, false) as usize);
+            let (Some(packed), Some(unpacked)) = (length(0), length(4)) else {
+                return Err(strange("it ends in its header"));
+            };
+            let packed = body.get(8..packed.saturating_add(8)).ok_or_else(|| strange("it ends before its points"))?;
+            if unpacked != whole {
+                return Err(strange(format!("it unpacks to {unpacked} bytes, its points have {whole}")));
+            }
+            let body = unpack(packed, whole).ok_or_else(|| strange("its compressed points are damaged"))?;
+            // Field by field: all x, then all y, ...
+            let columns: Vec<usize> = starts(&each).iter().map(|s| s * h.points).collect();
+            for i in 0..h.points {
+                found.take(&wanted, |k| h.numbers[k].read(&body[columns[k] + i * each[k]..], false));
+            }
+        }
+        other => return Err(strange(format!("its data are '{other}'"))),
+    }
+    let (points, intensity) = found.intensity();
+    Ok(Raw::Points { line: (h.height > 1).then_some(h.width), points, intensity })
+}
+
+fn header(bytes: &[u8]) -> Result<(Header, usize)> {
+    let mut h = Header::default();
+    let (mut sizes, mut kinds) = (Vec::new(), String::new());
+    let mut at = 0;
+    while h.data.is_empty() {
+        let rest = &bytes[at..bytes.len().min(MOST_HEADER)];
+        let end = rest.iter().position(|&b| b == b'\n').ok_or_else(|| strange("its header has no end"))?;
+        let line = std::str::from_utf8(&rest[..end]).map_err(|e| strange(e))?;
+        at += end + 1;
+        let mut words = line.split_ascii_whitespace();
+        let key = words.next().unwrap_or("");
+        let count = |words: &mut std::str::SplitAsciiWhitespace| {
+            let n = words.next().and_then(|w| w.parse().ok()).filter(|&n| n <= MOST_POINTS);
+            n.ok_or_else(|| strange(format!("'{line}', limit {MOST_POINTS}")))
+        };
+        match key {
+            "FIELDS" => h.names = words.map(str::to_owned).collect(),
+            "SIZE" => sizes = words.map(str::to_owned).collect::<Vec<_>>(),
+            "TYPE" => kinds = words.collect(),
+            "COUNT" => h.counts = words.map(|w| w.parse().unwrap_or(0)).collect(),
+            "WIDTH" => h.width = count(&mut words)?,
+            "HEIGHT" => h.height = count(&mut words)?,
+            "POINTS" => h.points = count(&mut words)?,
+            "DATA" => h.data = words.next().unwrap_or("nothing").to_owned(),
+            _ => {}
+        }
+    }
+    if h.counts.is_empty() {
+        h.counts = vec![1; h.names.len()];
+    }
+    let numbers: Option<Vec<Number>> = sizes.iter().zip(kinds.chars()).map(|(s, k)| number(k, s)).collect();
+    h.numbers = numbers.ok_or_else(|| strange("a field's size and type are of no number"))?;
+    let n = h.names.len();
+    if [h.numbers.len(), h.counts.len(), sizes.len()] != [n; 3] || h.counts.iter().any(|c| !(1..=4096).contains(c)) {
+        return Err(strange("FIELDS, SIZE, TYPE and COUNT do not go together"));
+    }
+    if h.width.saturating_mul(h.height) != h.points {
+        return Err(strange(format!("it has {} points in {} lines of {}", h.points, h.height, h.width)));
+    }
+    Ok((h, at))
+}
+
+fn number(kind: char, size: &str) -> Option<Number> {
+    Some(match (kind, size) {
+        ('I', "1") => Number::I8,
+        ('U', "1") => Number::U8,
+        ('I', "2") => Number::I16,
+        ('U', "2") => Number::U16,
+        ('I', "4") => Number::I32,
+        ('U', "4") => Number::U32,
+        ('F', "4") => Number::F32,
+        ('F', "8") => Number::F64,
+        _ => return None,
+    })
+}
+
+/// LZF: a control byte below 32 is followed by one byte more than it says as they are; others repeat what was written before:
+/// length in the upper three bits (7: another byte adds to it), distance in the lower five and the byte after.
+fn unpack(packed: &[u8], length: usize) -> Option<Vec<u8>> {
+    let mut out = Vec::with_capacity(length.min(packed.len().saturating_mul(264)));
+    let mut bytes = packed.iter().map(|&b| usize::from(b));
+    while let Some(control) = bytes.next() {
+        if control < 32 {
+            for _ in 0..=control {
+                out.push(bytes.next()? as u8);
+            }
+        } else {
+            let more = if control >> 5 == 7 { bytes.next()? } else { 0 };
+            let count = (control >> 5) + more + 2;
+            let back = ((control & 31) << 8 | bytes.next()?) + 1;
+            let from = out.len().checked_sub(back)?;
+            for k in 0..count {
+                out.push(out[from + k]);
+            }
+        }
+        if out.len() > length {
+            return None;
+        }
+    }
+    (out.len() == length).then_some(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn repeats_are_unpacked_and_damage_is_refused() {
+        // "abc" as it is, then six bytes from three back: abcabcabc.
+        let packed = [2, b'a', b'b', b'c', 4 << 5, 2];
+        assert_eq!(unpack(&packed, 9).unwrap(), b"abcabcabc");
+        // A long repeat: 7 + 3 + 2 bytes from one back.
+        assert_eq!(unpack(&[0, b'z', 7 << 5, 3, 0], 13).unwrap(), [b'z'; 13]);
+        for (bad, length) in [(&packed[..], 8), (&packed[..5], 9), (&[4 << 5, 2][..], 6)] {
+            assert!(unpack(bad, length).is_none());
+        }
+    }
+}

@@ -1,0 +1,103 @@
+//! In: a height map or cloud of another sensor, and what its user states about it. Out: a scan folder on which `find` works, with where
+//! it came from.
+//! Frame and unit: the file's own frame, which the folder calls map; mm.
+
+use super::scan::products;
+use super::scan::report::{FORMAT, Imported, ScanReport, Spent};
+use super::scan::scan_folder;
+use super::scan::seen::Seen;
+use crate::fault::{Fault, Result};
+use crate::files::Lock;
+use crate::geometry::Vec3;
+use crate::recording::Motion;
+use crate::rig::hash_text;
+use crate::scan::{CloudWriter, Extraction, Format, GridOptions, Stated, lines, read_foreign};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::time::Instant;
+
+/// Frame of imported points.
+const FRAME: &str = "map";
+/// Stands for the calibrations of a rig, which nobody here knows.
+const NO_RIG: &str = "imported";
+/// Longest file, bytes: 64 million points of 36 bytes.
+const MOST_BYTES: u64 = 36 << 26;
+
+/// Makes a scan folder of a file; `light` is the picture of the light that came with a picture of heights.
+///
+/// # Errors
+/// Files that are not read, what must be stated and is not, a folder that holds a scan of a rig.
+pub fn import_map(file: &Path, light: Option<&Path>, stated: &Stated, out: &Path) -> Result<ScanReport> {
+    let begun = Instant::now();
+    if out.join("scan.json").exists() && super::load_report(out)?.imported.is_none() {
+        return Err(Fault::usage(format!("{}: holds a scan", out.display()))
+            .cause("an imported map would replace it")
+            .next("give another --out"));
+    }
+    let read = |path: &Path| {
+        let bytes = crate::files::read(path, MOST_BYTES)?;
+        Ok((read_foreign(&bytes).map_err(|e: Fault| e.at(path.display()))?, hash_text(&bytes)))
+    };
+    let (raw, sha256) = read(file)?;
+    let light = light.map(read).transpose()?;
+    let made = lines(&raw, light.as_ref().map(|l| &l.0), stated).map_err(|e| e.at(file.display()))?;
+    scan_folder::make(out)?;
+    let _lock = Lock::take(out, "scan", "scan")?;
+    let folder = scan_folder::together(out);
+    folder.settle_locked()?;
+    let part = folder.begin()?;
+    let cloud_path = part.join("cloud.ply");
+    let mut cloud = CloudWriter::create_in(&cloud_path, FRAME)?;
+    cloud.append(&made.points)?;
+    let points = cloud.finish()?;
+    let (height_map, files) = products::write(&part, &cloud_path, points, &GridOptions::default(), Vec3::z(), None)?;
+    let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let report = ScanReport {
+        format: FORMAT,
+        program: format!("sheetlight {}", env!("CARGO_PKG_VERSION")),
+        created: jiff::Timestamp::now().to_string(),
+        units: "mm".into(),
+        frame: FRAME.into(),
+        motion: Motion::default(),
+        recording: name.clone(),
+        rig_fingerprint: NO_RIG.into(),
+        working_volume: None,
+        ran_on: "nothing: imported".into(),
+        image: Format { width: made.size[1] as u32, height: made.size[0] as u32, bits: 16 },
+        shots: made.size[0],
+        points,
+        median_sigma_mm: Some(made.sigma_mm),
+        stripe: None,
+        seen: Seen::default(),
+        peaks: BTreeMap::new(),
+        dark_shots: vec![],
+        camera: None,
+        delay: None,
+        skipped: vec![],
+        seconds: begun.elapsed().as_secs_f64(),
+        shots_per_second: 0.0,
+        spent: Spent::default(),
+        settings: Extraction::default(),
+        height_map,
+        remarks: made.notes.into_iter().chain([NO_BUDGET.to_owned()]).collect(),
+        files,
+        imported: Some(Imported {
+            file: name,
+            sha256,
+            light_sha256: light.map(|l| l.1),
+            unit_mm: stated.unit_mm.unwrap_or(f64::NAN),
+            spacing_mm: stated.spacing_mm,
+            offset_mm: stated.offset_mm,
+            missing: stated.missing.flatten(),
+            rows_up: stated.rows_up,
+            sigma_mm: made.sigma_mm,
+        }),
+    };
+    let text = serde_json::to_string_pretty(&report).expect("plain data");
+    crate::files::write(&part.join("scan.json"), text.as_bytes())?;
+    folder.commit()?;
+    Ok(report)
+}
+
+const NO_BUDGET: &str =
+    "imported: the other sensor's calibration is in no error budget, and no robot knows where its frame stands";

@@ -1,0 +1,14 @@
+//! In: drawn pictures, real photographs and height maps (SHEETLIGHT_REFERENCE). Out: judgement on `match`, `teach --region`,
+//! `import-map`, `find --all`, ranges and regions.
+//! Frame and unit: pixels, degrees, mm.
+
+mod common;
+
+#[path = "matching/command.rs"]
+mod command;
+#[path = "matching/foreign.rs"]
+mod foreign;
+#[path = "matching/limits.rs"]
+mod limits;
+#[path = "matching/scenes.rs"]
+mod scenes;
