@@ -145,12 +145,17 @@ fn a_turned_connector_is_found() {
 fn circles_of_any_size_are_found() {
     let Some(circle) = scene("matching/shape_photos/case0/templ/circle.png") else { return };
     let model = ShapeModel::from_region(&circle, whole(&circle), None, &ModelOptions::default()).unwrap();
-    // A road sign, an iris, the two largest discs of a pattern: centre and radius by eye.
-    let expected: [(&str, &[[f64; 3]]); 3] = [
-        ("1.jpg", &[[314.5, 189.5, 41.0]]),
-        ("3.png", &[[228.0, 153.0, 74.0]]),
-        ("4.png", &[[306.0, 112.0, 56.0], [197.0, 249.0, 44.0]]),
+    // A road sign, an iris (columns 158 to 257, rows 90 to 185), discs and rings of a pattern: centre and radius by eye.
+    let pattern = [
+        [306.0, 112.0, 56.0],
+        [197.0, 249.0, 44.0],
+        [193.0, 135.0, 45.0],
+        [124.0, 278.0, 43.5],
+        [94.0, 186.0, 51.5],
+        [308.0, 242.0, 51.0],
     ];
+    let expected: [(&str, &[[f64; 3]]); 3] =
+        [("1.jpg", &[[314.5, 189.5, 41.0]]), ("3.png", &[[208.0, 137.5, 49.0]]), ("4.png", &pattern)];
     for (name, circles) in expected {
         let test = scene(&format!("matching/shape_photos/case0/{name}")).unwrap();
         let options = SearchOptions {

@@ -4,7 +4,9 @@
 use crate::scenes::{H, Picture, W, bracket, draw, taught};
 use rand::SeedableRng;
 use rand_pcg::Pcg64;
-use sheetlight::find::{Area, Pose, SearchOptions, find, find_in};
+use sheetlight::find::{
+    Area, Kind, Layer, ModelOptions, Pose, Region, Scene, SearchOptions, ShapeModel, find, find_in,
+};
 
 #[test]
 fn ranges_limit_what_is_returned() {
@@ -32,6 +34,32 @@ fn ranges_limit_what_is_returned() {
     let (_, s) = found(20.0, 1.08, [-180.0, 180.0], [0.9, 1.1], &mut rng).expect("in the range of scales");
     assert!((s - 1.08).abs() < 0.005, "{s}");
     assert_eq!(found(20.0, 1.08, [-180.0, 180.0], [0.95, 1.03], &mut rng), None, "1.08 is none of 0.95 to 1.03");
+}
+
+/// Two layers that show the same edges are not independent: they state no smaller sigma than one of them, and a finite one.
+#[test]
+fn a_second_layer_of_the_same_edges_halves_nothing() {
+    let mut rng = Pcg64::seed_from_u64(5);
+    let mut seen = |noise: f64, x: f64| {
+        let pose = Pose { x, y: 120.6, angle: 0.2, scale: 1.0 };
+        let parts = vec![(bracket as fn(f64, f64) -> f64, pose, 170.0)];
+        draw(&Picture { parts, back: 60.0, noise }, &mut rng).layers.remove(0).values
+    };
+    let (clean, noisy) = (seen(0.0, 150.3), seen(4.0, 158.8));
+    let all = ModelOptions { max_points: 5000, ..ModelOptions::default() };
+    let sigma = |kinds: &[Kind]| {
+        let scene = |values: &[f32]| {
+            let layer = |k: &Kind| Layer::new(*k, W, H, values.to_vec()).unwrap();
+            Scene::new(kinds.iter().map(layer).collect(), None).unwrap()
+        };
+        let region = Region { x0: 98, y0: 68, x1: 203, y1: 173 };
+        let model = ShapeModel::from_region(&scene(&clean), region, None, &all).unwrap();
+        let found = find(&scene(&noisy), &model, &SearchOptions::default()).unwrap();
+        let m = found.first().expect("in plain sight");
+        [m.sigma_px[0], m.sigma_px[1], m.sigma_deg]
+    };
+    let (one, two) = (sigma(&[Kind::Intensity]), sigma(&[Kind::Intensity, Kind::Height]));
+    assert!(one.iter().zip(&two).all(|(one, two)| (0.999 * one..1.2 * one).contains(two)), "{one:?} and {two:?}");
 }
 
 #[test]

@@ -35,8 +35,9 @@ pub struct ShapeModel {
     pub half_size: [f64; 2],
     /// Centre of that box from the reference point, px.
     pub centre: [f64; 2],
-    /// Median distance of an edge place of level 0 from its neighbour, px.
-    pub spacing: f64,
+    /// How many edge places of level 0 hold what one of them alone would tell, 1 or more: neighbours along an edge see the same
+    /// noise, layers that show the same edge see the same edge.
+    pub redundancy: f64,
 }
 
 /// How a model is made.
@@ -183,20 +184,31 @@ impl ShapeModel {
         }
         levels.truncate(keep);
         let radius = levels[0].iter().map(|p| p.x.hypot(p.y)).fold(0.0, f64::max);
-        let spacing = spacing(&levels[0]);
-        Ok(ShapeModel { spacing, levels, radius, half_size, centre: [0.5 * (x0 + x1), 0.5 * (y0 + y1)] })
+        let redundancy = redundancy(&levels[0]);
+        Ok(ShapeModel { redundancy, levels, radius, half_size, centre: [0.5 * (x0 + x1), 0.5 * (y0 + y1)] })
     }
 }
 
-/// Median distance to the nearest other place.
-fn spacing(points: &[ModelPoint]) -> f64 {
-    let nearest = |i: usize| {
-        let others = points.iter().enumerate().filter(|o| o.0 != i);
-        others.map(|(_, o)| (o.x - points[i].x).hypot(o.y - points[i].y)).fold(f64::MAX, f64::min)
+/// Square of the distance beyond which two places share no noise, px²: exp(-d²/4) is below a thousandth.
+const APART_SQUARED: f64 = 28.0;
+
+/// Sum of a place's correlations with all places, itself included, mean over the places: by how much the variance of what they tell
+/// together exceeds that of as many independent ones. exp(-d²/4) is the correlation that the 5x5 plane fit (sigma 1 px) leaves at a
+/// distance of d px. Places of several layers count alike: what moves an edge in one (the sheet's width, the raster of pixels, a
+/// chamfer) moves it in the others, so a second layer guards against gaps but does not halve the variance.
+fn redundancy(points: &[ModelPoint]) -> f64 {
+    let shared = |p: &ModelPoint, o: &ModelPoint| {
+        let d2 = (o.x - p.x).powi(2) + (o.y - p.y).powi(2);
+        if d2 > APART_SQUARED {
+            return 0.0;
+        }
+        let cosine = o.gx * p.gx + o.gy * p.gy;
+        // Light may fall where height rises; within a layer edges that face each other are two.
+        let alike = if o.kind == p.kind && !p.either { cosine.max(0.0) } else { cosine.abs() };
+        alike * (-0.25 * d2).exp()
     };
-    let mut d: Vec<f64> = (0..points.len()).map(nearest).collect();
-    let middle = d.len() / 2;
-    *d.select_nth_unstable_by(middle, f64::total_cmp).1
+    let sum: f64 = points.iter().map(|p| points.iter().map(|o| shared(p, o)).sum::<f64>()).sum();
+    (sum / points.len() as f64).max(1.0)
 }
 
 /// An edge place of a field with its sub-pixel position.

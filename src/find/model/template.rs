@@ -95,15 +95,18 @@ fn check(model: &ShapeModel) -> std::result::Result<(), String> {
             return Err(format!("an edge at {}, {} with direction {}, {}", p.x, p.y, p.gx, p.gy));
         }
     }
-    let sizes = model.half_size.iter().chain([&model.radius, &model.spacing]);
+    let sizes = model.half_size.iter().chain([&model.radius]);
     if sizes.clone().any(|v| !(*v >= 0.0 && *v <= FARTHEST_PX))
         || model.centre.iter().any(|v| !(v.abs() <= FARTHEST_PX))
     {
         return Err("sizes that no picture gives".into());
     }
     let reach = model.levels[0].iter().map(|p| p.x.hypot(p.y)).fold(0.0, f64::max);
-    if (reach - model.radius).abs() > 1e-3 || !(model.spacing > 0.0) {
+    if (reach - model.radius).abs() > 1e-3 {
         return Err(format!("a radius of {} px, its edges reach {reach:.3} px", model.radius));
+    }
+    if !(1.0..=MOST_PLACES as f64).contains(&model.redundancy) {
+        return Err(format!("a redundancy of {}, wanted 1 to {MOST_PLACES}", model.redundancy));
     }
     Ok(())
 }
@@ -126,6 +129,7 @@ mod tests {
             ("\"format\":1", "\"format\":2"),
             ("\"radius\":", "\"radius\":1e9,\"radiu\":"),
             ("\"gx\":", "\"gx\":3.0,\"g\":"),
+            ("\"redundancy\":", "\"redundancy\":0.5,\"redundanc\":"),
         ] {
             assert!(Template::parse(&text.replacen(from, to, 1)).is_err(), "{to}");
         }

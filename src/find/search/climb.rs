@@ -174,7 +174,7 @@ pub(in crate::find) fn climb(
 ) -> Candidate {
     const ROUNDS: usize = 12;
     let px = (1u64 << level) as f64;
-    let turn = 1.0 / (radius / px).max(4.0);
+    let turn = 1.0 / (from.pose.scale * radius / px).max(4.0);
     let ignore = options.ignore_polarity;
     let turned = |pose: &Pose, by: i32| Pose { angle: pose.angle + f64::from(by) * turn, ..*pose };
     // A step out of the range is not taken.

@@ -20,6 +20,9 @@ use rayon::prelude::*;
 /// turns and memory grow with its reach.
 const MOST_ACROSS: f64 = 4.0;
 
+/// Rounding moves what is held at a limit of its range by less (rad, share of the scale): the limit itself lies inside.
+const HAIR: f64 = 1e-9;
+
 /// A found instance.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Match {
@@ -128,12 +131,16 @@ fn search(
                 .collect()
         })
         .collect();
-    let mut candidates = coarse_candidates(&levels[most], model, most, options, accelerator);
+    let mut candidates = Vec::new();
     for level in (0..=most).rev() {
+        let begin = sizes_from(model, level, most, options.scales)
+            .map_or(vec![], |sizes| coarse_candidates(&levels[level], model, level, sizes, options, accelerator));
+        let came = std::mem::take(&mut candidates).into_iter().map(|c| (c, false));
+        let all: Vec<(Candidate, bool)> = came.chain(begin.into_iter().map(|c| (c, true))).collect();
         let keep = if level == 0 { options.candidates.min(4 * options.max_matches + 100) } else { options.candidates };
-        candidates = candidates
+        candidates = all
             .into_par_iter()
-            .map(|c| climb(&levels[level], &model.levels[level], level, c, model.radius, options, level == most))
+            .map(|(c, first)| climb(&levels[level], &model.levels[level], level, c, model.radius, options, first))
             .collect();
         let limit = options.min_score - if level == 0 { 0.05 } else { 0.12 };
         candidates.retain(|c| c.score >= limit);
@@ -154,14 +161,26 @@ fn automatic(field: &Field) -> f32 {
     (3.0 * field.noise()).min(0.2 * strong).max(1e-3 * strong).max(1e-6)
 }
 
-fn turns(model: &ShapeModel, level: usize, options: &SearchOptions) -> Vec<Turn> {
+/// Smaller than this (half diagonal, px of the level) a part has too few cells to be told from anything else.
+const SMALLEST: f64 = 10.0;
+
+/// Of a range of scales those that are first looked for on this level: the coarsest that shows a part of their size.
+fn sizes_from(model: &ShapeModel, level: usize, most: usize, [s0, s1]: [f64; 2]) -> Option<[f64; 2]> {
+    let half = model.half_size[0].hypot(model.half_size[1]);
+    let shown = |level: usize| SMALLEST * (1u64 << level) as f64 / half;
+    let least = if level == 0 { 0.0 } else { shown(level) };
+    let end = if level == most { f64::INFINITY } else { shown(level + 1) };
+    let (low, high) = (s0.max(least), s1.min(end));
+    (low < high || (low == high && high < end)).then_some([low, high])
+}
+
+fn turns(model: &ShapeModel, level: usize, [s0, s1]: [f64; 2], options: &SearchOptions) -> Vec<Turn> {
     // Half the spread window at the rim of the model.
-    let rim = (model.radius / (1u64 << level) as f64).max(4.0);
+    let rim = (s1 * model.radius / (1u64 << level) as f64).max(4.0);
     let step = (STRIDE as f64 * 0.4) / rim;
     let [a0, a1] = options.angles_deg.map(f64::to_radians);
     let full = a1 - a0 > std::f64::consts::TAU - step;
     let n = ((a1 - a0) / step).ceil() as usize + usize::from(!full);
-    let [s0, s1] = options.scales;
     let scale_step = 1.0 + step;
     let m = ((s1 / s0).ln() / scale_step.ln()).ceil() as usize + 1;
     let mut out = Vec::with_capacity(n * m);
@@ -179,15 +198,16 @@ fn coarse_candidates(
     layers: &[Directions],
     model: &ShapeModel,
     level: usize,
+    sizes: [f64; 2],
     options: &SearchOptions,
     accelerator: Option<&Accelerator>,
 ) -> Vec<Candidate> {
     let px = (1u64 << level) as f64;
-    let turns = turns(model, level, options);
+    let turns = turns(model, level, sizes, options);
     let inputs: Vec<(Kind, &Field, f32)> = layers.iter().map(|d| (d.kind, &d.field, d.threshold)).collect();
     let ignore = options.ignore_polarity || model.levels[level].iter().all(|p| p.either);
     let coarse = Level::new(&inputs, ignore, (0.5 * model.radius / px) as usize);
-    let apart = 2.0 * (STRIDE as f64 * 0.5) / (model.radius / px).max(4.0);
+    let apart = 2.0 * (STRIDE as f64 * 0.5) / (sizes[1] * model.radius / px).max(4.0);
     // Spreading only raises a score, quantising costs up to a quarter of it.
     let limit = (0.75 * (options.min_score - 0.1)).max(0.2) as f32;
     let query = Query { model: &model.levels[level], turns: &turns, px, limit, most: options.candidates, apart };
@@ -220,6 +240,7 @@ fn distinct(mut candidates: Vec<Candidate>, px: f64, radius: f64, most: usize) -
 
 /// True where two poses differ by less than `px` anywhere on the model.
 fn same(a: &Pose, b: &Pose, px: f64, radius: f64) -> bool {
+    let radius = radius * a.scale.max(b.scale);
     (a.x - b.x).hypot(a.y - b.y) < px
         && turn_between(a.angle, b.angle) * radius < 1.5 * px
         && (a.scale / b.scale).ln().abs() * radius < 1.5 * px
@@ -245,7 +266,7 @@ fn finish(
                 return None;
             }
             // The range limits what is returned, not where the search begins.
-            let slack = |k: usize| 3.0 * r.covariance[(k, k)].max(0.0).sqrt();
+            let slack = |k: usize| HAIR + 3.0 * r.covariance[(k, k)].max(0.0).sqrt();
             if !options.holds_angle(r.pose.angle, slack(2)) || !options.holds_scale(r.pose.scale, slack(3)) {
                 return None;
             }

@@ -59,8 +59,9 @@ impl SearchOptions {
     /// Whether a turn (rad) lies in the range, or outside by no more than `slack` (rad).
     pub(super) fn holds_angle(&self, angle: f64, slack: f64) -> bool {
         let [first, last] = self.angles_deg.map(f64::to_radians);
-        let beyond = (angle - first + slack).rem_euclid(std::f64::consts::TAU);
-        beyond <= last - first + 2.0 * slack
+        // So much slack that every turn is held, infinite where nothing tells the turn.
+        let width = last - first + 2.0 * slack;
+        width >= std::f64::consts::TAU || (angle - first + slack).rem_euclid(std::f64::consts::TAU) <= width
     }
 
     /// Whether a scale lies in the range, or outside by no more than `slack`.

@@ -59,10 +59,6 @@ const TUKEY: f64 = 4.0;
 /// Sigma never falls below this: the interpolation error of one edge, px.
 const FLOOR_PX: f64 = 0.02;
 
-/// Noise is correlated along an edge by the 5x5 plane fit (sigma 1 px): this many px of edge hold one
-/// independent measurement, the sum of exp(-d^2/4) over all d.
-const CORRELATION_PX: f64 = 3.545;
-
 /// Refines by at most `rounds` rounds of matching and solving. `None` where fewer edges than unknowns
 /// remain or the geometry leaves a motion free.
 pub fn refine(
@@ -74,7 +70,6 @@ pub fn refine(
     rounds: usize,
 ) -> Option<Refined> {
     let points = &model.levels[0];
-    let inflation = (CORRELATION_PX / model.spacing).max(1.0);
     let mut pose = start;
     let mut last = None;
     for _ in 0..rounds {
@@ -89,7 +84,7 @@ pub fn refine(
         pose.y += step.y;
         pose.angle += step.z;
         pose.scale *= 1.0 + step.w;
-        last = Some(Refined { pose, covariance: covariance * inflation, used: rows.len(), rms_px: sigma });
+        last = Some(Refined { pose, covariance: covariance * model.redundancy, used: rows.len(), rms_px: sigma });
         if step.x.abs() + step.y.abs() + model.radius * (step.z.abs() + step.w.abs()) < 1e-3 {
             break;
         }
