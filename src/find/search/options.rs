@@ -107,3 +107,22 @@ impl SearchOptions {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_hold_their_limits_and_what_nothing_tells() {
+        let range = |a: f64, b: f64| SearchOptions { angles_deg: [a, b], ..SearchOptions::default() };
+        let holds = |o: &SearchOptions, degrees: f64, slack: f64| o.holds_angle(degrees.to_radians(), slack);
+        let five = range(-5.0, 5.0);
+        assert!([-5.0, 5.0, 355.0, 725.0].iter().all(|&d| holds(&five, d, 1e-9)));
+        assert!([-5.1, 5.1, 180.0].iter().all(|&d| !holds(&five, d, 1e-9)) && holds(&five, 5.1, 0.002));
+        assert!(holds(&range(170.0, 190.0), -175.0, 0.0) && holds(&range(30.0, 30.0), 390.0, 1e-9));
+        // A round part: its turn is anything, which is no reason not to have found it.
+        assert!(holds(&five, 180.0, f64::INFINITY) && holds(&five, 90.0, 3.5) && !holds(&five, 90.0, 1.0));
+        let small = SearchOptions { scales: [0.9, 1.1], ..SearchOptions::default() };
+        assert!(small.holds_scale(1.1, 1e-9) && !small.holds_scale(1.2, 0.05) && small.holds_scale(3.0, f64::INFINITY));
+    }
+}
