@@ -45,7 +45,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
     let whole = h.points.saturating_mul(record);
     match h.data.as_str() {
         "ascii" => {
-            let text = std::str::from_utf8(body).map_err(|e| strange(e))?;
+            let text = std::str::from_utf8(body).map_err(strange)?;
             let columns = starts(&h.counts);
             let wanted = Wanted { xyz: wanted.xyz.map(|k| columns[k]), light: wanted.light.map(|k| columns[k]) };
             let mut records = text.lines().filter(|l| !l.trim().is_empty());
@@ -94,7 +94,7 @@ fn header(bytes: &[u8]) -> Result<(Header, usize)> {
     while h.data.is_empty() {
         let rest = &bytes[at..bytes.len().min(MOST_HEADER)];
         let end = rest.iter().position(|&b| b == b'\n').ok_or_else(|| strange("its header has no end"))?;
-        let line = std::str::from_utf8(&rest[..end]).map_err(|e| strange(e))?;
+        let line = std::str::from_utf8(&rest[..end]).map_err(strange)?;
         at += end + 1;
         let mut words = line.split_ascii_whitespace();
         let key = words.next().unwrap_or("");

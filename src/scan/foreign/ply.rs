@@ -43,7 +43,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
     let mut found = Points::default();
     match layout {
         Layout::Text => {
-            let text = std::str::from_utf8(body).map_err(|e| strange(e))?;
+            let text = std::str::from_utf8(body).map_err(strange)?;
             let skip: usize = before.iter().map(|e| e.count).sum();
             let mut records = text.lines().filter(|l| !l.trim().is_empty()).skip(skip);
             let mut words = Vec::new();
@@ -82,7 +82,7 @@ fn header(bytes: &[u8]) -> Result<(Layout, Vec<Element>, usize)> {
     let head = &bytes[..bytes.len().min(MOST_HEADER)];
     let end = head.windows(END.len()).position(|w| w == END).ok_or_else(|| strange("its header has no end"))?;
     let line = head[end..].iter().position(|&b| b == b'\n').ok_or_else(|| strange("its header has no end"))?;
-    let text = std::str::from_utf8(&head[..end]).map_err(|e| strange(e))?;
+    let text = std::str::from_utf8(&head[..end]).map_err(strange)?;
     let (mut layout, mut elements) = (None, Vec::<Element>::new());
     for l in text.lines() {
         let words: Vec<&str> = l.split_ascii_whitespace().collect();
