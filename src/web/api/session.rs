@@ -113,14 +113,15 @@ pub async fn events(
     let name: String = who.tab.chars().filter(char::is_ascii_alphanumeric).take(32).collect();
     let tab = if name.is_empty() { asks } else { Tab { tab: name, ..asks } };
     Ok(upgrade.on_upgrade(async move |socket| {
-        let hears = |text: &str| {
+        let (told, here, who) = (screen.clone(), screen.clone(), tab.clone());
+        let hears = move |text: &str| {
             let Some(("held", grant)) = text.split_once(' ') else { return };
             // Who holds the button operates.
-            if screen.desk.held(&tab, grant) && screen.leases.need(&tab).is_err() {
-                screen.desk.let_go(&tab, "the operator's lease was lost");
+            if here.desk.held(&who, grant) && here.leases.need(&who).is_err() {
+                here.desk.let_go(&who, "the operator's lease was lost");
             }
         };
-        stream(socket, hub, seat, || screen.state(), hears).await;
+        stream(socket, hub, seat, move || told.state(), hears).await;
         screen.desk.let_go(&tab, "the screen that held the button is gone");
     }))
 }

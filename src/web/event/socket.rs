@@ -17,19 +17,20 @@ const PATIENCE: Duration = Duration::from_secs(20);
 /// Rows of the growing map are sent this often at most.
 const PICTURE: Duration = Duration::from_millis(100);
 
-/// Serves one viewer until it goes. `state` is asked for at first and whenever events were missed; `hears` gets what it says: at once,
-/// however slowly it takes what it is sent, because a button that is held must be heard.
+/// Serves one viewer until it goes. `state` is asked for at first and whenever events were missed, beside the server's own threads: it
+/// looks at the disk. `hears` gets what the viewer says, in a task of its own: however long telling takes, a button that is held is heard.
 pub async fn stream(
     socket: WebSocket,
     hub: Arc<Hub>,
     (_seat, events): (Seat, Receiver<Arc<str>>),
-    state: impl Fn() -> Event + Send,
-    hears: impl Fn(&str) + Send,
+    state: impl Fn() -> Event + Send + Sync + 'static,
+    hears: impl Fn(&str) + Send + 'static,
 ) {
     let (sink, said) = socket.split();
+    let mut hearing = tokio::spawn(heard(said, hears));
     tokio::select! {
-        () = told(sink, &hub, events, state) => {}
-        () = heard(said, hears) => {}
+        () = told(sink, &hub, events, Arc::new(state)) => hearing.abort(),
+        _ = &mut hearing => {}
     }
 }
 
@@ -38,12 +39,12 @@ async fn told(
     mut viewer: SplitSink<WebSocket, Message>,
     hub: &Hub,
     mut events: Receiver<Arc<str>>,
-    state: impl Fn() -> Event + Send,
+    state: Arc<impl Fn() -> Event + Send + Sync + 'static>,
 ) {
     let mut pictures = interval(PICTURE);
     pictures.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut shown = (0, 0);
-    let mut next = Some(Message::text(text(&state())));
+    let mut next = whole(&state).await;
     loop {
         if let Some(message) = next.take() {
             match timeout(PATIENCE, viewer.send(message)).await {
@@ -54,7 +55,7 @@ async fn told(
         tokio::select! {
             event = events.recv() => next = match event {
                 Ok(event) => Some(Message::text(event.to_string())),
-                Err(RecvError::Lagged(_)) => Some(Message::text(text(&state()))),
+                Err(RecvError::Lagged(_)) => whole(&state).await,
                 Err(RecvError::Closed) => return,
             },
             _ = pictures.tick() => next = rows(hub, &mut shown),
@@ -73,8 +74,11 @@ async fn heard(mut viewer: SplitStream<WebSocket>, hears: impl Fn(&str) + Send) 
     }
 }
 
-fn text(event: &Event) -> String {
-    serde_json::to_string(event).expect("plain data")
+/// The state as a message; `None` where the server ends.
+async fn whole(state: &Arc<impl Fn() -> Event + Send + Sync + 'static>) -> Option<Message> {
+    let state = state.clone();
+    let text = move || serde_json::to_string(&state()).expect("plain data");
+    tokio::task::spawn_blocking(text).await.ok().map(Message::text)
 }
 
 /// What this viewer has not seen of the growing map.
