@@ -8,7 +8,9 @@ import { t } from "../base/text.js";
 export function livePicture(place) {
   const canvas = h("canvas", { class: "live", width: 320, height: 240, role: "img", "aria-label": t("The camera's newest picture") });
   fill(place, canvas);
-  let over = false, number = 0;
+  // Drawn by the processor, as in map.js.
+  const g = canvas.getContext("2d", { willReadFrequently: true });
+  let over = false, number = 0, image = null;
   (async () => {
     while (!over) {
       const b = await bytes(`/camera/newest?after=${number}`).catch(() => null);
@@ -16,14 +18,18 @@ export function livePicture(place) {
       if (!b || b.byteLength < 20) { await new Promise((go) => setTimeout(go, b ? 0 : 1000)); continue; }
       const [n, width, height, many] = new Uint32Array(b, 0, 4), grey = new Uint8Array(b, 20 + 12 * many);
       number = n;
-      const g = canvas.getContext("2d"), image = new ImageData(width, height), out = new Uint32Array(image.data.buffer);
+      const begun = performance.now();
+      if (image?.width !== width || image.height !== height) {
+        image = new ImageData(width, height);
+        [canvas.width, canvas.height] = [width, height];
+      }
+      const out = new Uint32Array(image.data.buffer);
       for (let i = 0; i < out.length; i++) out[i] = 0xff000000 | (grey[i] * 0x010101);
-      canvas.width = width;
-      canvas.height = height;
       g.putImageData(image, 0, 0);
       canvas.dataset.number = String(n);
       // A glance: what else the page does, a held button above all, comes first.
-      await new Promise((go) => setTimeout(go, 150));
+      await new Promise(requestAnimationFrame);
+      await new Promise((go) => setTimeout(go, Math.max(150, Math.min(2000, 3 * (performance.now() - begun)))));
     }
   })();
   return () => (over = true);
