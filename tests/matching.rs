@@ -1,5 +1,5 @@
 //! In: drawn pictures, real photographs and height maps (SHEETLIGHT_REFERENCE). Out: judgement on `match`, `teach --region`,
-//! `import-map`, `find --all`, ranges and regions.
+//! `import-map`, `find --all`, ranges and regions, and on what of a part is found when the rest is hidden.
 //! Frame and unit: pixels, degrees, mm.
 
 mod common;
@@ -10,5 +10,7 @@ mod command;
 mod foreign;
 #[path = "matching/limits.rs"]
 mod limits;
+#[path = "matching/recall.rs"]
+mod recall;
 #[path = "matching/scenes.rs"]
 mod scenes;

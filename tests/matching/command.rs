@@ -17,7 +17,7 @@ fn text(path: &Path) -> &str {
 fn save(path: &Path, poses: &[Pose]) {
     let mut rng = Pcg64::seed_from_u64(4);
     let parts = poses.iter().map(|p| (bracket as fn(f64, f64) -> f64, *p, 170.0)).collect();
-    let scene = draw(&Picture { parts, back: 60.0, noise: 3.0 }, &mut rng);
+    let scene = draw(&Picture { parts, back: 60.0, under: vec![], over: vec![], noise: 3.0 }, &mut rng);
     let pixels = scene.layers[0].values.iter().map(|&v| v as u8).collect();
     save_png(&Image::from_u8(scene.width() as u32, scene.height() as u32, pixels), path).unwrap();
 }

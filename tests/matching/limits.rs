@@ -15,7 +15,7 @@ fn ranges_limit_what_is_returned() {
     let found = |degrees: f64, size: f64, angles_deg: [f64; 2], scales: [f64; 2], rng: &mut Pcg64| {
         let pose = Pose { x: 150.3, y: 120.6, angle: at + degrees.to_radians(), scale: size };
         let parts = vec![(bracket as fn(f64, f64) -> f64, pose, 170.0)];
-        let scene = draw(&Picture { parts, back: 60.0, noise: 3.0 }, rng);
+        let scene = draw(&Picture { parts, back: 60.0, under: vec![], over: vec![], noise: 3.0 }, rng);
         let options = SearchOptions { angles_deg, scales, ..SearchOptions::default() };
         find(&scene, &model, &options).unwrap().into_iter().next().map(|m| (m.pose.angle.to_degrees(), m.pose.scale))
     };
@@ -43,7 +43,7 @@ fn a_second_layer_of_the_same_edges_halves_nothing() {
     let mut seen = |noise: f64, x: f64| {
         let pose = Pose { x, y: 120.6, angle: 0.2, scale: 1.0 };
         let parts = vec![(bracket as fn(f64, f64) -> f64, pose, 170.0)];
-        draw(&Picture { parts, back: 60.0, noise }, &mut rng).layers.remove(0).values
+        draw(&Picture { parts, back: 60.0, under: vec![], over: vec![], noise }, &mut rng).layers.remove(0).values
     };
     let (clean, noisy) = (seen(0.0, 150.3), seen(4.0, 158.8));
     let all = ModelOptions { max_points: 5000, ..ModelOptions::default() };
@@ -69,7 +69,7 @@ fn a_region_gives_what_the_whole_picture_gives_there() {
     let pose = |x: f64, y: f64, angle: f64| Pose { x, y, angle: at + angle, scale: 0.8 };
     let poses = [pose(60.2, 60.7, 0.3), pose(250.4, 190.1, 2.0)];
     let parts = poses.iter().map(|p| (bracket as fn(f64, f64) -> f64, *p, 170.0)).collect();
-    let scene = draw(&Picture { parts, back: 60.0, noise: 3.0 }, &mut rng);
+    let scene = draw(&Picture { parts, back: 60.0, under: vec![], over: vec![], noise: 3.0 }, &mut rng);
     let options = SearchOptions { max_matches: 10, ..SearchOptions::default() };
     assert_eq!(find(&scene, &model, &options).unwrap().len(), 2);
     let right = Area::rectangle([W as f64 / 2.0, 0.0, W as f64 / 2.0, H as f64]).unwrap();
