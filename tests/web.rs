@@ -62,12 +62,17 @@ fn python(script: &str, args: &[&str]) -> bool {
     false
 }
 
-const PROGRAM: &str = env!("CARGO_BIN_EXE_sheetlight");
+/// The program under test: this build, or the one that `SHEETLIGHT_BIN` names, such as a release build for the long forms.
+fn program() -> &'static str {
+    static NAMED: OnceLock<String> = OnceLock::new();
+    NAMED
+        .get_or_init(|| std::env::var("SHEETLIGHT_BIN").unwrap_or_else(|_| env!("CARGO_BIN_EXE_sheetlight").to_owned()))
+}
 
 #[test]
 fn nobody_gets_in_and_no_job_is_lost() {
     let dir = copy();
-    python("tests/web/doors.py", &[PROGRAM, dir.path().to_str().unwrap()]);
+    python("tests/web/doors.py", &[program(), dir.path().to_str().unwrap()]);
 }
 
 #[test]
@@ -75,7 +80,7 @@ fn an_operator_goes_from_scan_to_position_through_the_pages() {
     let pictures = std::env::var_os("SHEETLIGHT_WRITE").is_some();
     let dir = if pictures { station(true) } else { copy() };
     let (folder, images) = (dir.path().to_str().unwrap(), source("docs/images"));
-    let mut args = vec![PROGRAM, folder];
+    let mut args = vec![program(), folder];
     args.extend(images.to_str().filter(|_| pictures));
     python("tests/web/pages.py", &args);
 }
@@ -83,7 +88,7 @@ fn an_operator_goes_from_scan_to_position_through_the_pages() {
 #[test]
 fn other_machines_need_the_password_and_speak_tls() {
     let dir = copy();
-    python("tests/web/secured.py", &[PROGRAM, dir.path().to_str().unwrap()]);
+    python("tests/web/secured.py", &[program(), dir.path().to_str().unwrap()]);
 }
 
 /// Whether the long forms run.
@@ -97,7 +102,7 @@ fn components_are_inserted_through_the_pages_in_the_simulated_cell() {
     let (folder, images) = (dir.path().to_str().unwrap(), source("docs/images"));
     // The long form at the cell's own pace, as an operator goes; the short one in a hurry, over a part of the field.
     let (parts, speed, sweep) = if long() { ("led,osc,flash,dimm", "1", "0") } else { ("osc", "20", "30") };
-    let mut args = vec![PROGRAM, folder, parts, speed, sweep];
+    let mut args = vec![program(), folder, parts, speed, sweep];
     args.extend(images.to_str().filter(|_| std::env::var_os("SHEETLIGHT_WRITE").is_some()));
     python("tests/web/insert.py", &args);
 }
@@ -110,7 +115,7 @@ fn measured(script: &str, width: &str, shots: &str) {
         sheetlight(&[
             "--quiet", "simulate", "--out", folder, "--set", "scan", "--seed", "3", "--width", width, "--shots", shots,
         ]);
-        python(script, &[PROGRAM, folder]);
+        python(script, &[program(), folder]);
     }
 }
 
@@ -127,7 +132,7 @@ fn a_million_points_turn() {
 #[test]
 fn nothing_moves_that_nobody_holds_the_button_for() {
     let [dir, second] = [0; 2].map(|_| tempfile::tempdir().unwrap());
-    python("tests/web/motion.py", &[PROGRAM, dir.path().to_str().unwrap(), second.path().to_str().unwrap()]);
+    python("tests/web/motion.py", &[program(), dir.path().to_str().unwrap(), second.path().to_str().unwrap()]);
 }
 
 #[test]
@@ -135,7 +140,7 @@ fn a_rig_is_calibrated_from_nothing_through_the_pages() {
     if long() {
         let dir = tempfile::tempdir().unwrap();
         let (folder, images) = (dir.path().to_str().unwrap(), source("docs/images"));
-        let mut args = vec![PROGRAM, folder];
+        let mut args = vec![program(), folder];
         args.extend(images.to_str().filter(|_| std::env::var_os("SHEETLIGHT_WRITE").is_some()));
         python("tests/web/calibrate.py", &args);
     }
@@ -146,14 +151,14 @@ fn a_program_drives_a_scan_as_the_documents_show() {
     let dir = copy();
     python(
         "tests/web/example.py",
-        &[PROGRAM, dir.path().to_str().unwrap(), source("examples/scan_by_api.py").to_str().unwrap()],
+        &[program(), dir.path().to_str().unwrap(), source("examples/scan_by_api.py").to_str().unwrap()],
     );
 }
 
 #[test]
 fn a_live_picture_is_the_newest_with_its_peaks_and_all_others_are_counted() {
     let dir = copy();
-    python("tests/web/live.py", &[PROGRAM, dir.path().to_str().unwrap()]);
+    python("tests/web/live.py", &[program(), dir.path().to_str().unwrap()]);
 }
 
 /// Compares a document with what the program says of itself; writes it under `SHEETLIGHT_WRITE`.

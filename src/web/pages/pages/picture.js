@@ -55,7 +55,7 @@ export async function show(place) {
       await new Promise(requestAnimationFrame);
       // Drawing takes its share of this machine, not what a scan needs: where it is slow, fewer pictures are shown, each the newest.
       const took = performance.now() - begun;
-      if (took > FLUENT) await new Promise((go) => setTimeout(go, Math.min(1000, took * (store.bar?.running ? 3 : 1))));
+      if (took > FLUENT) await new Promise((go) => setTimeout(go, Math.min(1000, took * (store.bar?.running ? 10 : 1))));
     }
   }
   let counted = 0;
