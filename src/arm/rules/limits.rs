@@ -18,8 +18,11 @@ pub struct Space {
 }
 
 impl Space {
-    /// How far a place is outside, mm; 0 inside.
+    /// How far a place is outside, mm; 0 inside, infinite where a number is none: `max` passes such numbers over.
     pub fn outside(&self, p: &Vec3) -> f64 {
+        if p.iter().any(|x| x.is_nan()) {
+            return f64::INFINITY;
+        }
         (0..3).map(|k| (self.from_mm[k] - p[k]).max(p[k] - self.to_mm[k]).max(0.0)).fold(0.0, f64::max)
     }
 
