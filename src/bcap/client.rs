@@ -95,7 +95,13 @@ impl Client {
 
     fn silent(&self, call: Call) -> Fault {
         let (at, patience) = (self.link.address(), self.options.patience.as_millis());
-        Fault::device(format!("{at}: no answer to {} within {patience} ms", call.name()))
+        let silent = Fault::device(format!("{at}: no answer to {} within {patience} ms", call.name()));
+        if call == Call::ServiceStart {
+            return silent
+                .cause("what listens there does not speak b-CAP, or the controller hangs")
+                .next("check the address and the port (b-CAP: 5007)");
+        }
+        silent
             .cause("the cable is out, the controller hangs, or the call takes longer and sends no interim replies")
             .next("look at the robot: what it does now is not known; then connect again")
     }

@@ -4,7 +4,7 @@
 use super::session::Session;
 use super::words::{Code, MOST_BYTES, Wrong, no};
 use std::io::{ErrorKind, Read, Write};
-use std::net::{TcpListener, TcpStream};
+use std::net::{Shutdown, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -123,13 +123,24 @@ fn too_long() -> Wrong {
 fn ended(mut stream: &TcpStream, wrong: &Wrong) -> String {
     let answer = no(wrong);
     let _ = stream.write_all(format!("{answer}\n").as_bytes());
+    let_it_be_read(stream);
     answer
 }
 
-/// Whoever has come while another is served.
+/// A connection closed with bytes unread is reset, and a reset overtakes what was said [rfc1122 4.2.2.13]: the rest is read,
+/// for a moment.
+fn let_it_be_read(mut stream: &TcpStream) {
+    let (begun, mut rest) = (Instant::now(), [0u8; 1024]);
+    let _ = stream.shutdown(Shutdown::Write);
+    let _ = stream.set_read_timeout(Some(LOOK));
+    while begun.elapsed() < 2 * LOOK && stream.read(&mut rest).is_ok_and(|n| n > 0) {}
+}
+
+/// Whoever has come while another is served; one at a time: the other is being waited on.
 fn turn_away(listener: &TcpListener) {
-    while let Ok((mut stream, _)) = listener.accept() {
+    if let Ok((mut stream, _)) = listener.accept() {
         let _ = stream.set_write_timeout(Some(LOOK));
         let _ = stream.write_all(format!("{}\n", no(&Wrong::new(Code::Busy, "another robot is connected"))).as_bytes());
+        let_it_be_read(&stream);
     }
 }
