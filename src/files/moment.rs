@@ -25,6 +25,10 @@ pub fn moment() -> Result<()> {
     Ok(())
 }
 
+/// Nothing: builds for use are not stopped.
+///
+/// # Errors
+/// None.
 #[cfg(not(debug_assertions))]
 #[inline(always)]
 pub fn moment() -> Result<()> {
