@@ -1,4 +1,4 @@
-//! In: a picture. Out: which blocks of 8 x 8 pixels may hold a lit pixel, and the least sum that a window around any of
+//! In: a band of a picture. Out: which blocks of 8 x 8 pixels may hold a lit pixel, and the least sum that a window around any of
 //! their pixels can come to; all others are proven dark.
 //! Frame and unit: blocks of pixels, four of them a tile; 256ths of full scale. docs/math.md, Stripe stages.
 
@@ -24,11 +24,15 @@ struct Row {
     column: Vec<u16>,
 }
 
-/// The rows of blocks of a picture, with `margin` blocks of its repeated border around them.
+/// Rows of blocks of a band of a picture, with `margin` rows and columns around them; beyond the picture its border repeats.
 #[derive(Clone, Default)]
 pub struct Blocks {
     rows: Vec<Row>,
     margin: usize,
+    /// Number of the band's first row in the picture.
+    first: usize,
+    /// Rows that are there, from the top of the margin.
+    done: usize,
 }
 
 /// How the windows of all pixels of a block lie over the blocks, along one axis: blocks up to `full` away are covered
@@ -66,32 +70,36 @@ pub struct Proof {
 }
 
 impl Blocks {
-    /// Makes room for pictures of a frame.
-    pub fn fit(&mut self, f: &Frame) {
-        self.margin = Cover::new(f.size).reach as usize;
-        let (across, down) = (FOUR * f.tiles_x as usize + 2 * self.margin, f.tiles_y as usize + 2 * self.margin);
-        let of = || vec![0; across];
+    /// Room for bands of so many rows.
+    pub fn new(f: &Frame, rows: usize) -> Blocks {
+        let margin = Cover::new(f.size).reach as usize;
+        let of = || vec![0; FOUR * f.tiles_x as usize + 2 * margin];
         let row = || Row { sum: of(), largest: of(), smallest: of(), row: of(), column: of() };
-        self.rows = (0..down).map(|_| row()).collect();
+        Blocks { rows: (0..rows + 2 * margin).map(|_| row()).collect(), margin, first: 0, done: 0 }
     }
 
-    /// Takes the statistics of a picture, its rows of blocks divided among the threads that are free.
-    pub fn gather<T: Sample>(&mut self, px: &[T], f: &Frame) {
-        use rayon::prelude::*;
-        let (margin, down) = (self.margin, f.tiles_y as usize);
-        let rows = &mut self.rows[margin..margin + down];
-        let least = super::share::rows_at_least(f.width);
-        rows.par_iter_mut().enumerate().with_min_len(least).for_each(|(y, row)| {
-            statistics(px, f, y, margin, row);
-            row.repeat_sides(margin);
-        });
-        let (top, bottom) = (self.rows[margin].beyond(), self.rows[margin + down - 1].beyond());
-        self.rows[..margin].iter_mut().for_each(|r| r.clone_from(&top));
-        self.rows[margin + down..].iter_mut().for_each(|r| r.clone_from(&bottom));
+    /// A band that begins with this row.
+    pub fn begin(&mut self, first: usize) {
+        (self.first, self.done) = (first, 0);
     }
 
-    /// What row `y` of blocks may hold.
-    pub fn prove(&self, f: &Frame, y: usize, out: &mut Proof) {
+    /// Takes the statistics of the picture down to all that row `y` needs: what is proven next is then still at hand.
+    fn gather<T: Sample>(&mut self, px: &[T], f: &Frame, y: usize) {
+        let last = f.tiles_y as isize - 1;
+        while self.done <= y - self.first + 2 * self.margin {
+            let at = (self.first + self.done) as isize - self.margin as isize;
+            let row = &mut self.rows[self.done];
+            statistics(px, f, at.clamp(0, last) as usize, self.margin, row);
+            row.repeat_sides(self.margin);
+            if !(0..=last).contains(&at) {
+                *row = row.beyond();
+            }
+            self.done += 1;
+        }
+    }
+
+    /// What row `y` of blocks may hold; the rows of a band in their order.
+    pub fn prove<T: Sample>(&mut self, px: &[T], f: &Frame, y: usize, out: &mut Proof) {
         let across = FOUR * f.tiles_x as usize;
         out.lit.resize(across, 0);
         out.least.resize(across, 0);
@@ -100,8 +108,10 @@ impl Blocks {
             out.lit.fill(1);
             return;
         }
-        bound(self, f, y + self.margin, out);
-        passing(f, &self.rows[y + self.margin].largest[self.margin..], out);
+        self.gather(px, f, y);
+        let at = y - self.first + self.margin;
+        bound(self, f, at, out);
+        passing(f, &self.rows[at].largest[self.margin..], out);
     }
 }
 

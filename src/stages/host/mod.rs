@@ -5,7 +5,7 @@
 use super::chain::config::ChainConfig;
 use super::chain::measure::Measure;
 use super::frame::{ALL_TILES, Frame, HAS_ROI};
-use super::host::share::rows_at_least;
+use super::host::share::rows_of_band;
 use super::peak::found::Peak;
 use super::peak::{self, PeakFrame};
 use super::stripe::choose::Lines;
@@ -56,7 +56,7 @@ pub struct Found {
 /// What is remembered from picture to picture.
 #[derive(Default)]
 struct Work {
-    blocks: Blocks,
+    bands: Vec<Band>,
     lit: Tiles,
     thin: Tiles,
     /// Places of the tiles with a lit pixel, in the order of the skeleton's list.
@@ -65,6 +65,14 @@ struct Work {
     added: Vec<(i32, i32)>,
     /// What is kept of the skeleton, in the order of the list.
     kept: Vec<Tile>,
+}
+
+/// Rows of tiles that one thread goes through from above to below.
+struct Band {
+    blocks: Blocks,
+    proof: Proof,
+    /// Places of its tiles with a lit pixel.
+    list: Vec<u32>,
 }
 
 impl Host {
@@ -141,23 +149,25 @@ impl Host {
 
     fn find<T: Sample>(&self, px: &[T], ends: bool, work: &mut Work) {
         let f = &self.frame;
-        work.blocks.gather(px, f);
-        let (stride, blocks) = (work.lit.stride, &work.blocks);
+        let (stride, tiles, tall) = (work.lit.stride, f.tiles_x as usize, rows_of_band(f.width));
         let view = View { px, f, p: self.threshold, weights: &self.weights };
-        let tiles = f.tiles_x as usize;
-        let row = |(proof, sums): &mut (Proof, Sums<T::Wide>), (ty, out): (usize, &mut [Tile])| -> Vec<u32> {
-            blocks.prove(f, ty, proof);
-            let region = self.region.as_ref().map(|r| &r[ty * tiles..(ty + 1) * tiles]);
-            let out = &mut out[1..=tiles];
-            light::row(view, ty, proof, region, sums, out);
-            let first = ((ty + 1) * stride + 1) as u32;
-            (first..).zip(&*out).filter(|(_, t)| **t != [0; 8]).map(|(at, _)| at).collect()
+        let band = |sums: &mut Sums<T::Wide>, (b, (out, band)): (usize, (&mut [Tile], &mut Band))| {
+            band.list.clear();
+            band.blocks.begin(b * tall);
+            for (ty, out) in (b * tall..).zip(out.chunks_exact_mut(stride)) {
+                band.blocks.prove(px, f, ty, &mut band.proof);
+                let region = self.region.as_ref().map(|r| &r[ty * tiles..(ty + 1) * tiles]);
+                let out = &mut out[1..=tiles];
+                light::row(view, ty, &band.proof, region, sums, out);
+                let first = ((ty + 1) * stride + 1) as u32;
+                band.list.extend((first..).zip(&*out).filter(|(_, t)| **t != [0; 8]).map(|(at, _)| at));
+            }
         };
-        let rows = work.lit.words[stride..].par_chunks_exact_mut(stride).take(f.tiles_y as usize);
-        let lists: Vec<Vec<u32>> =
-            rows.enumerate().with_min_len(rows_at_least(f.width)).map_init(Default::default, row).collect();
+        let inside = stride..stride * (f.tiles_y as usize + 1);
+        let rows = work.lit.words[inside].par_chunks_mut(stride * tall).zip(&mut work.bands);
+        rows.enumerate().for_each_init(Sums::default, band);
         work.list.clear();
-        lists.iter().for_each(|l| work.list.extend_from_slice(l));
+        work.bands.iter().for_each(|b| work.list.extend_from_slice(&b.list));
         for &at in &work.list {
             work.thin.words[at as usize] = work.lit.words[at as usize];
         }
@@ -227,10 +237,10 @@ impl Host {
 
 impl Work {
     fn new(f: &Frame) -> Work {
-        let tiles = Tiles::new(f.tiles_x, f.tiles_y);
-        let mut work = Work { lit: tiles.clone(), thin: tiles, ..Work::default() };
-        work.blocks.fit(f);
-        work
+        let (tiles, tall) = (Tiles::new(f.tiles_x, f.tiles_y), rows_of_band(f.width));
+        let band = || Band { blocks: Blocks::new(f, tall), proof: Proof::default(), list: Vec::new() };
+        let bands = (0..f.tiles_y.div_ceil(tall as u32)).map(|_| band()).collect();
+        Work { bands, lit: tiles.clone(), thin: tiles, ..Work::default() }
     }
 
     fn pixels(&self) -> Vec<u32> {
