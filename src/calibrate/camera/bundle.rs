@@ -1,11 +1,11 @@
 //! In: boards' features in pictures. Out: the least-squares problem of camera and boards' poses, and its solution.
 //! Frame and unit: camera_from_board, mm, rad; px (docs/math.md, Camera calibration).
 
+use super::repeat::{repeat, widened};
 use crate::calibrate::projection::project;
 use crate::camera::{Intrinsics, PARAMETERS, ParameterCovariance, Parameters};
 use crate::geometry::{Board, Camera, LeftStep, Rigid, Vec2, Vec3};
 use crate::solve::{Blocks, LmOptions, Loss, Problem, Residuals, Solution, lm};
-use nalgebra::DMatrix;
 use nalgebra::Matrix2x6;
 
 pub(in crate::calibrate) type State = (Parameters, Vec<Rigid<Camera, Board>>);
@@ -99,9 +99,18 @@ impl Fit<'_> {
     pub fn camera(&self, solution: &Solution<State>) -> Intrinsics {
         self.like.with_parameters(&solution.state.0)
     }
-    /// Of the intrinsic parameters.
+    /// Of the intrinsic parameters, as the pictures repeat.
     pub fn covariance(&self, solution: &Solution<State>) -> Option<ParameterCovariance> {
-        let of = |c: DMatrix<f64>| c.fixed_view::<PARAMETERS, PARAMETERS>(0, 0).into();
-        solution.scaled_covariance().map(of)
+        self.belief(solution).map(|b| b.0)
+    }
+    /// The same, and the factors on the standard deviations that are in it ([`repeat`]).
+    pub fn belief(&self, solution: &Solution<State>) -> Option<(ParameterCovariance, Parameters)> {
+        let whole = solution.scaled_covariance()?;
+        let mut covariance: ParameterCovariance = whole.fixed_view::<PARAMETERS, PARAMETERS>(0, 0).into();
+        let free = (0..PARAMETERS).filter(|&i| covariance[(i, i)] > 0.0).collect();
+        let bundle = Bundle { pictures: self.corners, like: self.like, free };
+        let factors = repeat(&bundle, solution).unwrap_or(Parameters::repeat(1.0));
+        widened(&mut covariance, &factors);
+        Some((covariance, factors))
     }
 }

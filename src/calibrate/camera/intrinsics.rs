@@ -9,7 +9,7 @@ use super::zhang::{Seen, first_camera};
 use crate::calibrate::boards::BoardView;
 use crate::calibrate::homography::homography;
 use crate::calibrate::pose::pose_from_homography;
-use crate::camera::{Intrinsics, LENS, PARAMETERS, ParameterCovariance, SKEW};
+use crate::camera::{Intrinsics, LENS, PARAMETERS, ParameterCovariance, Parameters, SKEW};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Board, Camera, Mat3, Rigid, Vec2, Vec3};
 use crate::solve::{LmOptions, Loss, Solution, Stop};
@@ -52,8 +52,11 @@ pub struct Solved {
     /// One a picture.
     pub camera_from_board: Vec<Rigid<Camera, Board>>,
     /// Of the intrinsic parameters (order: [`crate::camera::NAMES`]), zero rows for held ones; the residuals'
-    /// own scale is in it. `None` where something is not determined.
+    /// own scale is in it, and how the pictures repeat. `None` where something is not determined.
     pub covariance: Option<ParameterCovariance>,
+    /// By how much more the parameters scatter from picture to picture than corners that err by themselves would make them:
+    /// factors on the standard deviations, in the covariance already; 1 and more.
+    pub repeat: Parameters,
     /// Held at their value, indices into [`crate::camera::NAMES`].
     pub held: Vec<usize>,
     /// Residuals (seen minus predicted) in px and robust weight, picture by picture.
@@ -148,10 +151,12 @@ fn finish(fit: &Fit<'_>, solution: Solution<State>, held: Vec<usize>) -> Solved 
                 .collect()
         })
         .collect();
+    let belief = fit.belief(&solution);
     Solved {
         intrinsics: camera,
         camera_from_board: solution.state.1.clone(),
-        covariance: fit.covariance(&solution),
+        covariance: belief.map(|b| b.0),
+        repeat: belief.map_or(Parameters::repeat(1.0), |b| b.1),
         held,
         residuals,
         rms_px: (sum / count.max(1) as f64).sqrt(),

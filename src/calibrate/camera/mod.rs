@@ -9,5 +9,6 @@ mod pictures;
 pub mod procedure;
 pub mod quality;
 pub mod ray_error;
+mod repeat;
 pub mod report;
 pub mod zhang;

@@ -266,6 +266,7 @@ fn judge(
     let mut figures = BTreeMap::from([
         ("rms_px".to_string(), solved.rms_px),
         ("corner_noise_ratio".into(), solved.sigma0),
+        ("largest_scatter_from_picture_to_picture".into(), solved.repeat.max()),
         ("expected_ray_error_px".into(), expected),
         ("expected_error_at_working_distance_mm".into(), expected * mm_per_px),
         ("working_distance_mm".into(), working),
