@@ -8,8 +8,8 @@ import { t } from "../base/text.js";
 import { span } from "./colour.js";
 
 const FIRST = 150000, MOST = 2000000;
-/** A frame that takes longer than this has too many points, ms. */
-const FRAME = 30;
+/** A frame that takes longer than this has too many points, ms: of 33 the page needs its part. */
+const FRAME = 22;
 
 const VERTEX = `#version 300 es
 in vec3 place; in float sigma; in float light;
