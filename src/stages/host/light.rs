@@ -72,7 +72,7 @@ pub fn row<T: Sample>(
             let question = in_question(v, tx, ty, four, &proof.least[4 * tx..4 * tx + 4]);
             let count: u32 = question.iter().map(|w| w.count_ones()).sum();
             if count <= FEW && v.f.flags & GAUSSIAN == 0 {
-                out[tx] = one_by_one(v, tx, ty, &question);
+                out[tx] = one_by_one(v, tx, ty, &question, &mut sums.columns);
             }
             count > FEW || v.f.flags & GAUSSIAN != 0 && count > 0
         };
@@ -117,7 +117,7 @@ fn bits(of: impl Fn(usize) -> bool) -> u32 {
     (0..WIDE).fold(0, |word, i| word | u32::from(of(i)) << i)
 }
 
-fn one_by_one<T: Sample>(v: View<T>, tx: usize, ty: usize, question: &Tile) -> Tile {
+fn one_by_one<T: Sample>(v: View<T>, tx: usize, ty: usize, question: &Tile, columns: &mut Vec<T::Wide>) -> Tile {
     let mut tile = [0; 8];
     for r in 0..8 {
         let mut left = question[r];
@@ -126,49 +126,31 @@ fn one_by_one<T: Sample>(v: View<T>, tx: usize, ty: usize, question: &Tile) -> T
             left &= left - 1;
             let (x, y) = (WIDE * tx + i as usize, EDGE * ty + r);
             let value = T::number(v.row(y as isize)[x].wide());
-            tile[r] |= u32::from(passes_mean(value, window(v, x, y), &v.p)) << i;
+            tile[r] |= u32::from(passes_mean(value, window(v, x, y, columns), &v.p)) << i;
         }
     }
     tile
 }
 
-/// The sum of the window around a pixel: its columns first, 32 beside each other, so that a row of them is one addition.
-// Counted loops: adaptors are not compiled for wide registers where they are not put in place, and then take ten times as long.
-#[allow(clippy::needless_range_loop)]
+/// The sum of the window around a pixel: its columns first, which for a row is one addition of all. `columns` is memory that is
+/// used again: what lies on the stack is taken apart into single numbers.
 #[multiversion(targets = "simd")]
-fn window<T: Sample>(v: View<T>, x: usize, y: usize) -> u32 {
+fn window<T: Sample>(v: View<T>, x: usize, y: usize, columns: &mut Vec<T::Wide>) -> u32 {
     let (w, r) = (v.f.width as usize, (v.f.size / 2) as usize);
     let (from, to) = (x.saturating_sub(r), (x + r + 1).min(w));
     let (left, right) = ((r - (x - from)) as u32, (x + r + 1 - to) as u32);
-    let rows = y as isize - r as isize..=(y + r) as isize;
+    // Whole registers: some columns more, which are left out in the end.
+    let n = (to - from).next_multiple_of(WIDE).min(w);
+    let first = from.min(w - n);
+    columns.clear();
+    columns.resize(n, T::Wide::default());
     let mut sum = 0;
-    for first in (from..to).step_by(WIDE) {
-        let mut columns = [T::Wide::default(); WIDE];
-        // The picture's last columns are read with some before them.
-        let at = first.min(w.saturating_sub(WIDE));
-        for y in rows.clone() {
-            let row = &v.row(y)[at..];
-            if let Some(row) = row.first_chunk::<WIDE>() {
-                for i in 0..WIDE {
-                    columns[i] += row[i].wide();
-                }
-            } else {
-                for i in 0..row.len() {
-                    columns[i] += row[i].wide();
-                }
-            }
-        }
-        for &column in &columns[first - at..(first + WIDE).min(to) - at] {
-            sum += T::number(column);
-        }
+    for y in y as isize - r as isize..=(y + r) as isize {
+        let row = v.row(y);
+        columns.iter_mut().zip(&row[first..first + n]).for_each(|(c, &v)| *c += v.wide());
+        sum += left * T::number(row[0].wide()) + right * T::number(row[w - 1].wide());
     }
-    if left + right > 0 {
-        for y in rows {
-            let row = v.row(y);
-            sum += left * T::number(row[0].wide()) + right * T::number(row[w - 1].wide());
-        }
-    }
-    sum
+    sum + columns[from - first..to - first].iter().map(|&c| T::number(c)).sum::<u32>()
 }
 
 /// A run of tiles, every pixel of them.
