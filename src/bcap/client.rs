@@ -95,15 +95,18 @@ impl Client {
 
     fn silent(&self, call: Call) -> Fault {
         let (at, patience) = (self.link.address(), self.options.patience.as_millis());
-        let silent = Fault::device(format!("{at}: no answer to {} within {patience} ms", call.name()));
-        if call == Call::ServiceStart {
-            return silent
-                .cause("what listens there does not speak b-CAP, or the controller hangs")
-                .next("check the address and the port (b-CAP: 5007)");
-        }
-        silent
-            .cause("the cable is out, the controller hangs, or the call takes longer and sends no interim replies")
-            .next("look at the robot: what it does now is not known; then connect again")
+        let (cause, next) = if call == Call::ServiceStart {
+            (
+                "what listens there does not speak b-CAP, or the controller hangs",
+                "check the address and the port (b-CAP: 5007)",
+            )
+        } else {
+            (
+                "the cable is out, the controller hangs, or the call takes longer and sends no interim replies",
+                "look at the robot: what it does now is not known; then connect again",
+            )
+        };
+        Fault::device(format!("{at}: no answer to {} within {patience} ms", call.name())).cause(cause).next(next)
     }
 
     /// Makes a call that must succeed; a refusal is a fault with the controller's code and what it means.
