@@ -1,11 +1,10 @@
-//! In: boards' features in pictures. Out: the least-squares problem of camera and boards' poses, and its solution.
+//! In: boards' features in pictures. Out: the least-squares problem of camera and boards' poses.
 //! Frame and unit: camera_from_board, mm, rad; px (docs/math.md, Camera calibration).
 
-use super::repeat::{repeat, widened};
 use crate::calibrate::projection::project;
-use crate::camera::{Intrinsics, PARAMETERS, ParameterCovariance, Parameters};
+use crate::camera::{Intrinsics, PARAMETERS, Parameters};
 use crate::geometry::{Board, Camera, LeftStep, Rigid, Vec2, Vec3};
-use crate::solve::{Blocks, LmOptions, Loss, Problem, Residuals, Solution, lm};
+use crate::solve::{Blocks, Problem, Residuals};
 use nalgebra::Matrix2x6;
 
 pub(in crate::calibrate) type State = (Parameters, Vec<Rigid<Camera, Board>>);
@@ -73,44 +72,5 @@ impl Problem for Bundle<'_> {
             }
         }
         Some(())
-    }
-}
-
-/// The corners with what stays the same from one choice of lens terms to the next.
-pub(in crate::calibrate) struct Fit<'a> {
-    pub corners: &'a [Vec<Corner>],
-    pub like: &'a Intrinsics,
-    pub loss: Loss,
-}
-
-impl Fit<'_> {
-    fn bundle(&self, held: &[usize]) -> Bundle<'_> {
-        let free = (0..PARAMETERS).filter(|i| !held.contains(i)).collect();
-        Bundle { pictures: self.corners, like: self.like, free }
-    }
-    pub fn with(&self, held: &[usize], from: State, options: LmOptions) -> Solution<State> {
-        lm(&self.bundle(held), from, &LmOptions { hold: held.to_vec(), ..options })
-    }
-    /// The optimum with these parameters held.
-    pub fn fine(&self, held: &[usize], from: State) -> Solution<State> {
-        let estimate_scale = self.loss != Loss::Squares;
-        self.with(held, from, LmOptions { loss: self.loss, estimate_scale, ..LmOptions::default() })
-    }
-    pub fn camera(&self, solution: &Solution<State>) -> Intrinsics {
-        self.like.with_parameters(&solution.state.0)
-    }
-    /// Of the intrinsic parameters, as the pictures repeat.
-    pub fn covariance(&self, solution: &Solution<State>) -> Option<ParameterCovariance> {
-        self.belief(solution).map(|b| b.0)
-    }
-    /// The same, and the factors on the standard deviations that are in it ([`repeat`]).
-    pub fn belief(&self, solution: &Solution<State>) -> Option<(ParameterCovariance, Parameters)> {
-        let whole = solution.scaled_covariance()?;
-        let mut covariance: ParameterCovariance = whole.fixed_view::<PARAMETERS, PARAMETERS>(0, 0).into();
-        let free = (0..PARAMETERS).filter(|&i| covariance[(i, i)] > 0.0).collect();
-        let bundle = Bundle { pictures: self.corners, like: self.like, free };
-        let factors = repeat(&bundle, solution).unwrap_or(Parameters::repeat(1.0));
-        widened(&mut covariance, &factors);
-        Some((covariance, factors))
     }
 }

@@ -1,7 +1,8 @@
 //! In: a camera solved with every term. Out: the terms that the pictures give reason for; the others held at zero.
 //! Frame and unit: the lens's own.
 
-use super::bundle::{Fit, State};
+use super::bundle::State;
+use super::fit::Fit;
 use super::ray_error::expected_ray_error;
 use crate::solve::Solution;
 use nalgebra::DMatrix;

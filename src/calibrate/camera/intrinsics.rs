@@ -2,8 +2,9 @@
 //! residuals (\[zhang00\] section 3.2 and 3.3; docs/math.md, Camera calibration (7)).
 //! Frame and unit: pixels; board and camera frames in mm.
 
-use super::bundle::{Corner, Fit, State};
+use super::bundle::{Corner, State};
 use super::evidence::by_evidence;
+use super::fit::Fit;
 use super::lens::Lens;
 use super::zhang::{Seen, first_camera};
 use crate::calibrate::boards::BoardView;
