@@ -95,7 +95,7 @@ fn judged(part: Part, size: f64, scenes: u64) -> Said {
         alarms: cases.iter().filter(|c| alarm(c) >= default).count(),
         px: rms(above.iter().map(|h| h.1)),
         deg: rms(above.iter().map(|h| h.2)),
-        over: [rms(above.iter().map(|h| of_place(h))), rms(above.iter().map(|h| h.2 / h.0.sigma_deg))],
+        over: [rms(above.iter().map(of_place)), rms(above.iter().map(|h| h.2 / h.0.sigma_deg))],
     }
 }
 
