@@ -364,10 +364,14 @@ impl<'a> Session<'a> {
         if self.stuck.is_multiple_of(BACK) { self.home() } else { Ok(()) }
     }
 
-    /// Back to where it began: straight, or from the last place before from which that can be done. A straight way that was gone can be
-    /// gone back.
+    /// Back to where it began: straight, or over the places that it came by. A straight way that was gone can mostly be gone back;
+    /// where it cannot, because the arm stands a little beside it, an earlier place may be reached.
+    ///
+    /// # Errors
+    /// The arm's own; it stands elsewhere and none of those places is reached straight.
     fn home(&mut self) -> Result<()> {
         let began = self.trail[0];
+        let mut there = true;
         while self.trail.len() > 1 {
             if self.cell.may(&began)?
                 && let Went::There(_) = self.cell.go(&began)?
@@ -377,11 +381,14 @@ impl<'a> Session<'a> {
             }
             self.trail.pop();
             let before = *self.trail.last().expect("the beginning stays");
-            if let Went::NotBegun(_) = self.cell.go(&before)? {
-                return Ok(());
-            }
+            there = matches!(self.cell.go(&before)?, Went::There(_));
         }
-        Ok(())
+        if there {
+            return Ok(());
+        }
+        Err(Fault::refused("none of the places that it came by is reached straight from where it stands")
+            .cause("a joint's limit or a stretched arm on the way")
+            .next("jog the arm back joint by joint"))
     }
 
     /// A stop's features, its stripe told from reflections by the sheet of some stops before.
