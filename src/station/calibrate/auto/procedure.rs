@@ -364,8 +364,9 @@ impl<'a> Session<'a> {
         if self.stuck.is_multiple_of(BACK) { self.home() } else { Ok(()) }
     }
 
-    /// Back to where it began: straight, or over the places that it came by. A straight way that was gone can mostly be gone back;
-    /// where it cannot, because the arm stands a little beside it, an earlier place may be reached.
+    /// Back to where it began over the places that it came by: so the joints unwind as they were wound. Straight back would lead to the
+    /// same pose with a joint a turn further, from where the next motion may be out of the joint's range. Where a way cannot be gone
+    /// back, because the arm stands a little beside it, the way straight back or an earlier place is tried.
     ///
     /// # Errors
     /// The arm's own; it stands elsewhere and none of those places is reached straight.
@@ -373,15 +374,16 @@ impl<'a> Session<'a> {
         let began = self.trail[0];
         let mut there = true;
         while self.trail.len() > 1 {
-            if self.cell.may(&began)?
+            self.trail.pop();
+            let before = *self.trail.last().expect("the beginning stays");
+            there = matches!(self.cell.go(&before)?, Went::There(_));
+            if !there
+                && self.cell.may(&began)?
                 && let Went::There(_) = self.cell.go(&began)?
             {
                 self.trail.truncate(1);
                 return Ok(());
             }
-            self.trail.pop();
-            let before = *self.trail.last().expect("the beginning stays");
-            there = matches!(self.cell.go(&before)?, Went::There(_));
         }
         if there {
             return Ok(());
