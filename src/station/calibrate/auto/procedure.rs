@@ -163,9 +163,13 @@ pub fn calibrate_auto(cell: &mut dyn Cell, rig: &Rig, run: &AutoRun, told: &dyn 
     let joint = calibrate_joint(&session.book.recordings(), rig, &run.joint, &|_, _| {})?;
     let check = session.check(&joint)?;
     // What was calibrated stays so where the arm does not come back.
-    let stranded = session.home().err();
+    let stranded = match session.home() {
+        Ok(true) => None,
+        Ok(false) => Some("none of the places that it came by is reached straight: jog it back joint by joint".into()),
+        Err(e) => Some(e.what),
+    };
     let mut result = AutoResult { joint, expected_mm: expected, stops, ended, check };
-    result.judge(run, stranded.map(|e| e.what));
+    result.judge(run, stranded);
     Ok(result)
 }
 
@@ -361,16 +365,14 @@ impl<'a> Session<'a> {
                 .cause("straight ways from here lead through places that the arm cannot pass")
                 .next("jog the robot to where its wrist is bent, the board in view, and begin again"));
         }
-        if self.stuck.is_multiple_of(BACK) { self.home() } else { Ok(()) }
+        if self.stuck.is_multiple_of(BACK) { self.home().map(drop) } else { Ok(()) }
     }
 
     /// Back to where it began over the places that it came by: so the joints unwind as they were wound. Straight back would lead to the
     /// same pose with a joint a turn further, from where the next motion may be out of the joint's range. Where a way cannot be gone
-    /// back, because the arm stands a little beside it, the way straight back or an earlier place is tried.
-    ///
-    /// # Errors
-    /// The arm's own; it stands elsewhere and none of those places is reached straight.
-    fn home(&mut self) -> Result<()> {
+    /// back, because the arm stands a little beside it, the way straight back or an earlier place is tried. False where none of them is
+    /// reached: it goes on from where it stands.
+    fn home(&mut self) -> Result<bool> {
         let began = self.trail[0];
         let mut there = true;
         while self.trail.len() > 1 {
@@ -382,15 +384,10 @@ impl<'a> Session<'a> {
                 && let Went::There(_) = self.cell.go(&began)?
             {
                 self.trail.truncate(1);
-                return Ok(());
+                return Ok(true);
             }
         }
-        if there {
-            return Ok(());
-        }
-        Err(Fault::refused("none of the places that it came by is reached straight from where it stands")
-            .cause("a joint's limit or a stretched arm on the way")
-            .next("jog the arm back joint by joint"))
+        Ok(there)
     }
 
     /// A stop's features, its stripe told from reflections by the sheet of some stops before.
