@@ -143,29 +143,33 @@ fn on_the_same_corners_the_solve_equals_opencv() {
     }
 }
 
-#[test]
-fn all_photographs_hold_their_board_and_fit_better_than_opencvs_best_corners() {
-    let Some(reference) = reference() else { return };
+/// One side's real photographs, their boards found by us.
+fn photographs(reference: &std::path::Path, side: &str) -> Vec<Observation> {
     let board =
         BoardSpec::Chessboard { inner_corners: [9, 6], square_mm: 1.0, border_mm: 0.0, first_square: "black".into() };
     let features = Arc::new(board.features());
+    let photograph = |g: Observation| {
+        let path = reference.join("camera/opencv_chessboard").join(&g.name);
+        let image = sheetlight::raster::load(&path, Channel::Luma, 8).unwrap();
+        let view = find(&image, &board, &FindOptions::default()).unwrap_or_else(|e| panic!("{}: {e}", g.name));
+        Observation { name: g.name, features: features.clone(), view }
+    };
+    golden(side).0.into_par_iter().map(photograph).collect()
+}
+
+#[test]
+fn all_photographs_hold_their_board_and_fit_better_than_opencvs_best_corners() {
+    let Some(reference) = reference() else { return };
     for (side, bar) in [("left", 0.195), ("right", 0.207)] {
-        let (golden, _) = golden(side);
-        let pictures: Vec<Observation> = golden
-            .iter()
-            .map(|g| {
-                let path = reference.join("camera/opencv_chessboard").join(&g.name);
-                let image = sheetlight::raster::load(&path, Channel::Luma, 8).unwrap();
-                let view = find(&image, &board, &FindOptions::default()).unwrap_or_else(|e| panic!("{}: {e}", g.name));
-                // The same board as OpenCV's, not another one in the background.
-                let all = || view.points.iter().zip(&g.view.points);
-                let far = all().map(|(a, b)| (a.pixel - b.pixel).norm()).fold(0.0, f64::max);
-                let turned = view.points.iter().zip(g.view.points.iter().rev());
-                let far_turned = turned.map(|(a, b)| (a.pixel - b.pixel).norm()).fold(0.0, f64::max);
-                assert!(far.min(far_turned) < 2.0, "{}: {far} {far_turned} px", g.name);
-                Observation { name: g.name.clone(), features: features.clone(), view }
-            })
-            .collect();
+        let pictures = photographs(&reference, side);
+        for (seen, g) in pictures.iter().zip(golden(side).0) {
+            // The same board as OpenCV's, not another one in the background.
+            let all = || seen.view.points.iter().zip(&g.view.points);
+            let far = all().map(|(a, b)| (a.pixel - b.pixel).norm()).fold(0.0, f64::max);
+            let turned = seen.view.points.iter().zip(g.view.points.iter().rev());
+            let far_turned = turned.map(|(a, b)| (a.pixel - b.pixel).norm()).fold(0.0, f64::max);
+            assert!(far.min(far_turned) < 2.0, "{}: {far} {far_turned} px", g.name);
+        }
         assert_eq!(pictures.len(), 13);
         for (name, options) in [("as OpenCV", as_opencv()), ("default", SolveOptions::default())] {
             let solved = solve(&pictures, 640, 480, &options).unwrap();
@@ -183,19 +187,7 @@ fn all_photographs_hold_their_board_and_fit_better_than_opencvs_best_corners() {
 #[test]
 fn halves_of_real_photographs_differ_by_what_is_stated() {
     let Some(reference) = reference() else { return };
-    let board =
-        BoardSpec::Chessboard { inner_corners: [9, 6], square_mm: 1.0, border_mm: 0.0, first_square: "black".into() };
-    let features = Arc::new(board.features());
-    let seen = ["left", "right"].map(|side| {
-        let names: Vec<String> = golden(side).0.into_iter().map(|g| g.name).collect();
-        let seen = names.into_par_iter().map(|name| {
-            let path = reference.join("camera/opencv_chessboard").join(&name);
-            let image = sheetlight::raster::load(&path, Channel::Luma, 8).unwrap();
-            let view = find(&image, &board, &FindOptions::default()).unwrap();
-            Observation { name, features: features.clone(), view }
-        });
-        seen.collect::<Vec<_>>()
-    });
+    let seen = ["left", "right"].map(|side| photographs(&reference, side));
     for lens in [Lens::Five, Lens::Evidence] {
         let mut rng = rand_pcg::Pcg64::seed_from_u64(1);
         // Squares over the stated sigma's and over that of corners that err by themselves; pairs.
