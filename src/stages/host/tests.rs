@@ -130,6 +130,31 @@ fn masks_and_skeletons_of_random_pictures_are_those_of_the_twins() {
     }
 }
 
+/// Rows of a band are worked out as they are needed, over those of the picture before: none of that may be taken for this one's.
+#[test]
+fn what_a_picture_left_behind_says_nothing_of_the_next() {
+    let (w, h) = (320, 700);
+    let bright = drawn(w, h, 8, |x, y| 230 + (x * 31 + y * 17) % 9);
+    // Bright above and dark below, another edge every 40 rows, and beneath each a faint line: there a window is darkest at
+    // its lower end, which is what is worked out last.
+    let edges = |shift: u32| {
+        drawn(w, h, 8, move |x, y| match (y + shift) % 40 {
+            0..20 => 120 + (x * 31 + y * 17) % 3,
+            d @ 20..28 => 10 + 14 * (d - 20) + x % 2,
+            _ => 10,
+        })
+    };
+    for size in [9, 15, 31, 101] {
+        let threshold = ThresholdParams { size, ..ThresholdParams::default() };
+        let config = ChainConfig { threshold, ..ChainConfig::new(w, h, 8) };
+        let host = Host::new(&config).unwrap();
+        for shift in (1..40).step_by(4) {
+            same("bright", &host, &bright, &config);
+            same(&format!("edges moved by {shift}"), &host, &edges(shift), &config);
+        }
+    }
+}
+
 /// A picture so large that it is divided among threads, with a second stripe where none was expected.
 #[test]
 fn a_second_stripe_anywhere_in_a_large_picture_is_found() {
