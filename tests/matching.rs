@@ -14,3 +14,5 @@ mod limits;
 mod recall;
 #[path = "matching/scenes.rs"]
 mod scenes;
+#[path = "matching/shadows.rs"]
+mod shadows;

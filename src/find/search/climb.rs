@@ -17,7 +17,7 @@ pub(in crate::find) struct Directions {
     ux: Vec<f32>,
     uy: Vec<f32>,
     /// False where every cell but those of the border is seen.
-    gaps: bool,
+    pub gaps: bool,
 }
 
 /// Cells at the border of a complete layer that have no slope.
@@ -160,6 +160,35 @@ impl<const ROWS: usize, const LANES: usize> Around<ROWS, LANES> {
         }
         best
     }
+}
+
+/// Other hills near a pose, by whole cells at its turn: beside a step of height lies a shadow, whose cells count half, so a
+/// pose as far off as a shadow is wide stands on a hill of its own, and climbing from the coarser level may end on that one.
+pub(in crate::find) fn hills(
+    layers: &[Directions],
+    points: &[ModelPoint],
+    level: usize,
+    from: &Candidate,
+    ignore: bool,
+) -> Vec<Candidate> {
+    /// Half width of the area, cells, and its width.
+    const REACH: usize = 6;
+    const WIDTH: usize = 2 * REACH + 1;
+    let around = Around::<WIDTH, 16>::new(layers, points, level, &from.pose, ignore);
+    let px = (1u64 << level) as f64;
+    let mut out = Vec::new();
+    for r in 1..WIDTH - 1 {
+        for l in (1..WIDTH - 1).filter(|&l| (r, l) != (REACH, REACH)) {
+            let score = around.score(r, l);
+            let top = (r - 1..=r + 1).all(|r| (l - 1..=l + 1).all(|l| around.score(r, l) <= score));
+            if top {
+                let by = |k: usize| (k as f64 - REACH as f64) * px;
+                let pose = Pose { x: from.pose.x + by(l), y: from.pose.y + by(r), ..from.pose };
+                out.push(Candidate { pose, score });
+            }
+        }
+    }
+    out
 }
 
 /// Climbs to the best pose around a candidate.

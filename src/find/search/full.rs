@@ -4,7 +4,7 @@
 
 use super::accelerator::Accelerator;
 use super::area::Area;
-use super::climb::{Candidate, Directions, climb, score};
+use super::climb::{Candidate, Directions, climb, hills, score};
 use super::coarse::{Query, Turn, turn_between};
 use super::level::Level;
 use super::options::SearchOptions;
@@ -145,8 +145,31 @@ fn search(
         let limit = options.min_score - if level == 0 { 0.05 } else { 0.12 };
         candidates.retain(|c| c.score >= limit);
         candidates = distinct(candidates, (1 << level) as f64, model.radius, keep);
+        if levels[level].iter().any(|d| d.gaps) {
+            candidates.extend(beside_shadows(&levels[level], model, level, &candidates, options));
+            candidates.retain(|c| c.score >= limit);
+            candidates = distinct(candidates, (1 << level) as f64, model.radius, keep);
+        }
     }
     Ok(finish(scene, &levels[0], model, candidates, options, inside))
+}
+
+/// The best candidates' rivals across a shadow, each climbed to its top.
+fn beside_shadows(
+    layers: &[Directions],
+    model: &ShapeModel,
+    level: usize,
+    candidates: &[Candidate],
+    options: &SearchOptions,
+) -> Vec<Candidate> {
+    /// So many candidates are looked around at: more than the turns at which most parts look nearly alike.
+    const LEADING: usize = 8;
+    let points = &model.levels[level];
+    let leading = candidates[..candidates.len().min(LEADING)].par_iter();
+    leading
+        .flat_map_iter(|c| hills(layers, points, level, c, options.ignore_polarity))
+        .map(|c| climb(layers, points, level, c, model.radius, options, false))
+        .collect()
 }
 
 /// Three times the noise, but not below a thousandth of the layer's strong slopes: a noise-free picture

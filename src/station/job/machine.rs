@@ -16,11 +16,10 @@ use crate::fault::{Fault, Gate, Result};
 use crate::find::insert::picture;
 use crate::find::{LocateOptions, Recipe, Report, locate};
 use crate::geometry::{Base, Flange, Mat3, Rigid, Vec3};
-use crate::recording::{Beam, Recording};
+use crate::recording::Beam;
 use crate::rig::Rig;
 use crate::robot::Convention;
 use crate::scan::Where;
-use crate::station::range::{RangeReport, RangeRun, measure_range};
 use crate::station::scan::recorded::scan_recording;
 use crate::station::scan::report::{cloud_of, load_report};
 use crate::station::scan::run::ScanOptions;
@@ -53,25 +52,20 @@ pub struct JobOptions {
 
 /// A job that is under way.
 pub struct Job<'a> {
-    options: &'a JobOptions,
-    settings: Settings,
-    rig: Rig,
+    pub(super) options: &'a JobOptions,
+    pub(super) settings: Settings,
+    pub(super) rig: Rig,
     recipe: Recipe,
-    guard: &'a mut Guard,
-    eye: Eye,
-    operator: &'a mut dyn Operator,
-    state: JobState,
+    pub(super) guard: &'a mut Guard,
+    pub(super) eye: Eye,
+    pub(super) operator: &'a mut dyn Operator,
+    pub(super) state: JobState,
     found: Option<Report>,
     since: Instant,
 }
 
-/// Touches of one board lie about its plane by less than this share of the view's distance: a board's thickness is more.
-const ONE_PLANE: f64 = 0.002;
 /// A known part lies so near to the picture's middle, as a share of the field's short side.
 const ASIDE: f64 = 1.0 / 8.0;
-/// A touched board whose points scatter more than this about their plane, as a share of the view's distance, is none.
-const FLAT: f64 = 0.01;
-
 impl<'a> Job<'a> {
     /// Begins the job of a folder, or goes on with the one that stands there.
     ///
@@ -206,12 +200,12 @@ impl<'a> Job<'a> {
         self.options.speed_mm_s.unwrap_or(of_station)
     }
 
-    fn leg(&self, to: Rigid<Base, Flange>) -> Motion {
+    pub(super) fn leg(&self, to: Rigid<Base, Flange>) -> Motion {
         Motion { to, way: Way::Straight, speed_mm_s: self.speed() }
     }
 
     /// Proposes, asks, writes down that something moves, moves, writes down that it has ended.
-    fn go(
+    pub(super) fn go(
         &mut self,
         step: &'static str,
         says: Vec<String>,
@@ -256,93 +250,9 @@ impl<'a> Job<'a> {
         }
     }
 
-    fn plan(&self, name: &str, why: String, legs: Vec<Motion>, evidence: Evidence) -> Plan {
+    pub(super) fn plan(&self, name: &str, why: String, legs: Vec<Motion>, evidence: Evidence) -> Plan {
         let tool_at = self.settings.tool.map(|t| t.flange_from_tool.translation);
         Plan { name: name.into(), why, legs, tool_at, evidence }
-    }
-
-    /// The pointer on the board: once from where the arm stands, then from places around it.
-    fn touch(&mut self) -> Result<Phase> {
-        let hand_eye = self.rig.need_hand_eye()?.value;
-        let (first, at) = self.first_touch()?;
-        let then = volume::view(&self.settings, &self.rig)?.middle();
-        let camera = self.rig.need_camera()?.value;
-        let half = [f64::from(camera.width) / camera.fx, f64::from(camera.height) / camera.fy]
-            .map(|share| 0.28 * share * then);
-        let pointer = self.rig.need_pointer()?.value;
-        let poses = places::touches(&(at * hand_eye), &hand_eye, &pointer, [first, then], half);
-        let count = poses.len();
-        let legs = poses.into_iter().map(|p| self.leg(p)).collect();
-        let says = vec![format!(
-            "the board is {first:.1} mm from the camera; the pointer touches it at {count} places, from {then:.0} mm"
-        )];
-        let plan = self.plan("touch", format!("touch the board at {count} places"), legs, Evidence::default());
-        let folder = self.options.out.join("touch");
-        let mut record = Record::begin(&folder, "touch", Beam::Pointer, self.eye.format())?;
-        self.go("touch", says, "is the way free?", plan, &mut |eye, arm, _| {
-            shoot(eye, arm, &mut record, Some(Beam::Pointer))
-        })?;
-        let touched = self.board(record.end()?, then)?;
-        let surface = touched.surface.as_ref().expect("asked for");
-        if !(surface.rms_mm <= FLAT * then) {
-            return Err(Fault::refused(format!(
-                "the touched points lie {:.2} mm about their plane, limit {:.2}",
-                surface.rms_mm,
-                FLAT * then
-            ))
-            .cause("the pointer met parts or the table instead of the board")
-            .next("jog the arm so that more of the bare board is in view, then begin again"));
-        }
-        let [normal, centre] = [surface.normal, surface.centre_mm].map(Vec3::from);
-        self.operator.tell(&format!(
-            "normal {:.4} {:.4} {:.4}, good to {:.3} degrees; points to {:.3} mm",
-            normal.x, normal.y, normal.z, surface.tilt_sigma_deg[0], surface.rms_mm
-        ));
-        self.state.surface = Some([centre, normal]);
-        Ok(Phase::Scan)
-    }
-
-    /// The plane of the touches that lie on one: others met a part, or what lies beside the board.
-    fn board(&self, mut touches: Recording, distance: f64) -> Result<RangeReport> {
-        let all = measure_range(&touches, &self.rig, &RangeRun::default())?;
-        let at: Vec<(&str, Vec3)> =
-            all.distances.iter().filter_map(|d| Some((d.picture.as_str(), Vec3::from(d.point_base_mm?)))).collect();
-        let points: Vec<Vec3> = at.iter().map(|a| a.1).collect();
-        let on = places::on_one_plane(&points, ONE_PLANE * distance);
-        if on.len() < 4 {
-            return Err(Fault::refused(format!(
-                "{} of {} touches lie on one plane within {:.2} mm, more than half are needed",
-                on.len(),
-                points.len(),
-                ONE_PLANE * distance
-            ))
-            .cause("the pointer met parts or the table instead of the board")
-            .next("jog the arm so that more of the bare board is in view, then begin again"));
-        }
-        let counted: Vec<&str> = on.iter().map(|&i| at[i].0).collect();
-        touches.meta.frames.retain(|f| f.laser.as_deref().is_some_and(|name| counted.contains(&name)));
-        measure_range(&touches, &self.rig, &RangeRun { one_surface: true, ..RangeRun::default() })
-    }
-
-    /// How far the board is, and where the flange stood; nothing moves.
-    fn first_touch(&mut self) -> Result<(f64, Rigid<Base, Flange>)> {
-        let mut record =
-            Record::begin(&self.options.out.join("first"), "first touch", Beam::Pointer, self.eye.format())?;
-        let link = self.guard.link();
-        shoot(&mut self.eye, link, &mut record, Some(Beam::Pointer))?;
-        let at = link.pose()?.base_from_flange;
-        let seen = measure_range(&record.end()?, &self.rig, &RangeRun::default());
-        let missing = |what: String| {
-            Fault::refused(format!("the pointer's spot is not in the first picture: {what}"))
-                .cause("the board is out of view or out of the pointer's range, or the pointer is not switched by its output")
-                .next("jog the arm until the board is in view, look whether the pointer is lit, then begin again")
-        };
-        let seen = seen.map_err(|e| missing(e.what))?;
-        let first = seen
-            .distances
-            .first()
-            .ok_or_else(|| missing(seen.missing.first().map_or_else(String::new, |m| m.1.clone())))?;
-        Ok((first.along_axis_mm, at))
     }
 
     /// Looks squarely at the board, and sweeps the line over it.

@@ -11,6 +11,7 @@ mod record;
 mod report;
 mod shoot;
 mod state;
+mod touch;
 
 pub use eye::Eye;
 pub use machine::{Job, JobOptions};

@@ -9,18 +9,19 @@ use crate::geometry::{Base, Camera, Flange, Plane, Ray, Rigid, Vec2, Vec3};
 const TOUCHES: [[f64; 2]; 8] =
     [[-1.0, -0.5], [-0.5, -1.0], [0.5, -1.0], [1.0, -0.5], [1.0, 0.5], [0.5, 1.0], [-0.5, 1.0], [-1.0, 0.5]];
 
-/// Flange poses from which the pointer's spots lie around the foot of the camera's axis, `half` mm to each side. The camera stands
-/// `now` from the board along its axis, and goes to `then`.
+/// Flange poses from which the pointer's spots lie around `middle`, `half` mm to each side: a place of the board in the frame of the
+/// camera as it stands now. The camera goes to `then` from the board.
 pub fn touches(
     base_from_camera: &Rigid<Base, Camera>,
     flange_from_camera: &Rigid<Flange, Camera>,
     pointer: &Ray<Camera>,
-    [now, then]: [f64; 2],
+    middle: &Vec3,
+    then: f64,
     half: [f64; 2],
 ) -> Vec<Rigid<Base, Flange>> {
     let spot = pointer.at((then - pointer.origin.z) / pointer.direction.z);
     let place = |[x, y]: &[f64; 2]| {
-        let shift = Vec3::new(x * half[0] - spot.x, y * half[1] - spot.y, now - then);
+        let shift = middle + Vec3::new(x * half[0] - spot.x, y * half[1] - spot.y, -then);
         *base_from_camera * Rigid::<Camera, Camera>::from_vectors(&Vec3::zeros(), shift) * flange_from_camera.inverse()
     };
     TOUCHES.iter().map(place).collect()
@@ -28,24 +29,34 @@ pub fn touches(
 
 /// Indices of the touches that lie within `gate` mm of one plane, the most that do; empty where that is not more than half of them.
 pub fn on_one_plane(points: &[Vec3], gate: f64) -> Vec<usize> {
+    let most = planes(points, gate).max_by(|a, b| a.0.len().cmp(&b.0.len()).then(b.1.total_cmp(&a.1)));
+    most.map(|m| m.0).filter(|on| 2 * on.len() > points.len()).unwrap_or_default()
+}
+
+/// Middle of the touches, in the camera's frame, that lie within `gate` mm of one plane: of the most, of as many the ones nearest to the
+/// camera, for a board lies on a table. `None` where no four do; three always lie on a plane.
+pub fn most_on_one_plane(points: &[Vec3], gate: f64) -> Option<Vec3> {
+    let middle = |on: &[usize]| on.iter().map(|&i| points[i]).sum::<Vec3>() / on.len() as f64;
+    let four = planes(points, gate).filter(|p| p.0.len() >= 4).map(|p| (p.0.len(), middle(&p.0)));
+    four.max_by(|a, b| a.0.cmp(&b.0).then(b.1.z.total_cmp(&a.1.z))).map(|m| m.1)
+}
+
+/// The planes through three touches each: which touches lie within `gate` mm of one, and the sum of their squared distances.
+fn planes(points: &[Vec3], gate: f64) -> impl Iterator<Item = (Vec<usize>, f64)> {
     let n = points.len();
-    let through = |i: usize, j: usize, k: usize| {
+    let through = move |(i, j, k): (usize, usize, usize)| {
         let normal = (points[j] - points[i]).cross(&(points[k] - points[i]));
         let size = (points[j] - points[i]).norm() * (points[k] - points[i]).norm();
         // Three in a row have no plane.
         (normal.norm() > 0.1 * size).then(|| (normal.normalize(), points[i]))
     };
-    let mut best = (Vec::new(), f64::INFINITY);
-    for (i, j, k) in (0..n).flat_map(|i| (0..i).flat_map(move |j| (0..j).map(move |k| (i, j, k)))) {
-        let Some((normal, at)) = through(i, j, k) else { continue };
+    let three = (0..n).flat_map(|i| (0..i).flat_map(move |j| (0..j).map(move |k| (i, j, k))));
+    three.filter_map(through).map(move |(normal, at)| {
         let off = |p: &Vec3| normal.dot(&(p - at)).abs();
         let on: Vec<usize> = (0..n).filter(|&m| off(&points[m]) <= gate).collect();
         let rest = on.iter().map(|&m| off(&points[m]).powi(2)).sum::<f64>();
-        if on.len() > best.0.len() || (on.len() == best.0.len() && rest < best.1) {
-            best = (on, rest);
-        }
-    }
-    if 2 * best.0.len() > n { best.0 } else { Vec::new() }
+        (on, rest)
+    })
 }
 
 /// Flange poses of a sweep: the camera looks as it does at `square`, `depth` from the board, and goes along the direction across
@@ -89,6 +100,12 @@ mod tests {
         // Half of it is: two planes of four, and nobody knows which is the board.
         [4, 7].into_iter().for_each(|i| low[i].z -= 6.0);
         assert!(on_one_plane(&low, 0.3).is_empty());
+        // The nearer of them says where to look for more, from a camera 300 mm above.
+        let from_camera = |p: &Vec3| Vec3::new(p.x, -p.y, 300.0 - p.z);
+        let seen: Vec<Vec3> = low.iter().map(from_camera).collect();
+        let near = from_camera(&(board[..4].iter().sum::<Vec3>() / 4.0));
+        assert!((most_on_one_plane(&seen, 0.3).unwrap() - near).norm() < 1e-9);
+        assert!(most_on_one_plane(&seen[1..4], 0.3).is_none());
         // Two sides have a part on them, one touch each.
         let mut part = board.clone();
         [3, 7].into_iter().for_each(|i| part[i].z += 8.0);
@@ -108,7 +125,8 @@ mod tests {
         );
         let pointer = Ray::new(Vec3::new(41.0, 9.0, 12.0), Vec3::new(-41.0, -6.0, 178.0)).unwrap();
         let floor = Plane::<Base>::new(Vec3::z(), 0.0).unwrap();
-        for (flange, [x, y]) in touches(&camera, &hand_eye, &pointer, [310.0, 155.0], [45.0, 34.0]).iter().zip(TOUCHES)
+        for (flange, [x, y]) in
+            touches(&camera, &hand_eye, &pointer, &Vec3::new(0.0, 0.0, 310.0), 155.0, [45.0, 34.0]).iter().zip(TOUCHES)
         {
             let at = *flange * hand_eye;
             let spot =

@@ -1,0 +1,153 @@
+//! In: a job's arm, camera and pointer. Out: the board's plane, from touches around the picture's middle; where they meet several
+//! surfaces, from touches around those of them that lie on one.
+//! Frame and unit: base frame; mm, degrees.
+
+use super::machine::Job;
+use super::places;
+use super::record::Record;
+use super::shoot::shoot;
+use super::state::Phase;
+use crate::arm::rules::Evidence;
+use crate::fault::{Fault, Result};
+use crate::geometry::{Base, Camera, Flange, Rigid, Vec3};
+use crate::recording::{Beam, Recording};
+use crate::station::range::{RangeReport, RangeRun, measure_range};
+use crate::station::volume;
+
+/// Touches of one board lie about its plane by less than this share of the view's distance: a board's thickness is more.
+const ONE_PLANE: f64 = 0.002;
+/// A touched board whose points scatter more than this about their plane, as a share of the view's distance, is none.
+const FLAT: f64 = 0.01;
+/// Touches around those that met one surface lie within this share of the first ones' spread.
+const AGAIN: f64 = 0.5;
+
+/// Where touches are to lie.
+struct Around {
+    /// In the frame of the camera as it stood first, mm.
+    middle: Vec3,
+    /// Share of the first touches' spread.
+    spread: f64,
+    /// Folder of the pictures, and what it is called.
+    name: &'static str,
+}
+
+impl Job<'_> {
+    /// The pointer on the board: once from where the arm stands, then from places around it.
+    pub(super) fn touch(&mut self) -> Result<Phase> {
+        let (first, at) = self.first_touch()?;
+        let base_from_camera = at * self.rig.need_hand_eye()?.value;
+        let then = volume::view(&self.settings, &self.rig)?.middle();
+        let around = Around { middle: Vec3::new(0.0, 0.0, first), spread: 1.0, name: "touch" };
+        let touches = self.touch_around(&base_from_camera, &around, then)?;
+        let (points, on) = self.on_one_plane(&touches, then)?;
+        let touched = match on.len() {
+            // The board ends in the picture, or parts stand on it: those that met one surface say where to look for more.
+            0 => {
+                let camera: Vec<Vec3> = points.iter().map(|p| base_from_camera.inverse().point(&p.1)).collect();
+                let middle = places::most_on_one_plane(&camera, ONE_PLANE * then);
+                self.operator.tell(&format!(
+                    "the {} touches met several surfaces; once more, around {}",
+                    points.len(),
+                    if middle.is_some() { "those that met the same one" } else { "the picture's middle" }
+                ));
+                let again = Around { middle: middle.unwrap_or(around.middle), spread: AGAIN, name: "touch-again" };
+                self.touch_around(&base_from_camera, &again, then)?
+            }
+            _ => touches,
+        };
+        let touched = self.board(touched, then)?;
+        let surface = touched.surface.as_ref().expect("asked for");
+        if !(surface.rms_mm <= FLAT * then) {
+            return Err(Fault::refused(format!(
+                "the touched points lie {:.2} mm about their plane, limit {:.2}",
+                surface.rms_mm,
+                FLAT * then
+            ))
+            .cause("the pointer met parts or the table instead of the board")
+            .next("jog the arm so that more of the bare board is in view, then begin again"));
+        }
+        let [normal, centre] = [surface.normal, surface.centre_mm].map(Vec3::from);
+        self.operator.tell(&format!(
+            "normal {:.4} {:.4} {:.4}, good to {:.3} degrees; points to {:.3} mm",
+            normal.x, normal.y, normal.z, surface.tilt_sigma_deg[0], surface.rms_mm
+        ));
+        self.state.surface = Some([centre, normal]);
+        Ok(Phase::Scan)
+    }
+
+    /// Goes to places around a middle and takes a picture of the pointer's spot at each.
+    fn touch_around(
+        &mut self,
+        base_from_camera: &Rigid<Base, Camera>,
+        around: &Around,
+        then: f64,
+    ) -> Result<Recording> {
+        let camera = self.rig.need_camera()?.value;
+        let half = [f64::from(camera.width) / camera.fx, f64::from(camera.height) / camera.fy]
+            .map(|share| 0.28 * share * then * around.spread);
+        let (hand_eye, pointer) = (self.rig.need_hand_eye()?.value, self.rig.need_pointer()?.value);
+        let poses = places::touches(base_from_camera, &hand_eye, &pointer, &around.middle, then, half);
+        let count = poses.len();
+        let legs = poses.into_iter().map(|p| self.leg(p)).collect();
+        let says = vec![format!(
+            "the board is {:.1} mm from the camera; the pointer touches it at {count} places, from {then:.0} mm",
+            around.middle.z
+        )];
+        let plan = self.plan(around.name, format!("touch the board at {count} places"), legs, Evidence::default());
+        let folder = self.options.out.join(around.name);
+        let mut record = Record::begin(&folder, around.name, Beam::Pointer, self.eye.format())?;
+        self.go(around.name, says, "is the way free?", plan, &mut |eye, arm, _| {
+            shoot(eye, arm, &mut record, Some(Beam::Pointer))
+        })?;
+        record.end()
+    }
+
+    /// The touched points by their pictures, and those of them that lie on one plane; none where that is not more than half.
+    fn on_one_plane(&self, touches: &Recording, distance: f64) -> Result<(Vec<(String, Vec3)>, Vec<usize>)> {
+        let all = measure_range(touches, &self.rig, &RangeRun::default())?;
+        let points: Vec<(String, Vec3)> =
+            all.distances.into_iter().filter_map(|d| Some((d.picture, Vec3::from(d.point_base_mm?)))).collect();
+        let at: Vec<Vec3> = points.iter().map(|p| p.1).collect();
+        let on = places::on_one_plane(&at, ONE_PLANE * distance);
+        // Three lie on one plane always.
+        Ok((points, if on.len() < 4 { Vec::new() } else { on }))
+    }
+
+    /// The plane of the touches that lie on one: others met a part, or what lies beside the board.
+    fn board(&self, mut touches: Recording, distance: f64) -> Result<RangeReport> {
+        let (points, on) = self.on_one_plane(&touches, distance)?;
+        if on.is_empty() {
+            return Err(Fault::refused(format!(
+                "of {} touches no more than half lie on one plane within {:.2} mm",
+                points.len(),
+                ONE_PLANE * distance
+            ))
+            .cause("the pointer met parts or the table instead of the board")
+            .next("jog the arm so that more of the bare board is in view, then begin again"));
+        }
+        let counted: Vec<&str> = on.iter().map(|&i| points[i].0.as_str()).collect();
+        touches.meta.frames.retain(|f| f.laser.as_deref().is_some_and(|name| counted.contains(&name)));
+        measure_range(&touches, &self.rig, &RangeRun { one_surface: true, ..RangeRun::default() })
+    }
+
+    /// How far the board is, and where the flange stood; nothing moves.
+    fn first_touch(&mut self) -> Result<(f64, Rigid<Base, Flange>)> {
+        let mut record =
+            Record::begin(&self.options.out.join("first"), "first touch", Beam::Pointer, self.eye.format())?;
+        let link = self.guard.link();
+        shoot(&mut self.eye, link, &mut record, Some(Beam::Pointer))?;
+        let at = link.pose()?.base_from_flange;
+        let seen = measure_range(&record.end()?, &self.rig, &RangeRun::default());
+        let missing = |what: String| {
+            Fault::refused(format!("the pointer's spot is not in the first picture: {what}"))
+                .cause("the board is out of view or out of the pointer's range, or the pointer is not switched by its output")
+                .next("jog the arm until the board is in view, look whether the pointer is lit, then begin again")
+        };
+        let seen = seen.map_err(|e| missing(e.what))?;
+        let first = seen
+            .distances
+            .first()
+            .ok_or_else(|| missing(seen.missing.first().map_or_else(String::new, |m| m.1.clone())))?;
+        Ok((first.along_axis_mm, at))
+    }
+}
