@@ -91,15 +91,18 @@ impl SimMotion {
     /// A scene that cannot be read; numbers out of range.
     pub fn new(spec: &SimSpec) -> Result<SimMotion> {
         let [w, h] = spec.size;
-        let sound = (64..=8192).contains(&w)
-            && (64..=8192).contains(&h)
-            && (0.0..=1000.0).contains(&spec.rate_hz)
-            && (1e-3..=1e4).contains(&spec.speed)
-            && spec.delay_ms.abs() <= 1e3
-            && (1.0..=1e6).contains(&spec.exposure_us);
-        if !sound {
-            return Err(Fault::usage(format!("a simulated camera of {spec:?}"))
-                .next("sizes of 64 to 8192 px, rates up to 1000, speeds of 0.001 to 10,000, delays up to 1000 ms, exposures of 1 to 1e6 us"));
+        let ranges = [
+            ("size", f64::from(w), 64.0..=8192.0),
+            ("size", f64::from(h), 64.0..=8192.0),
+            ("rate", spec.rate_hz, 0.0..=1e3),
+            ("speed", spec.speed, 1e-3..=1e4),
+            ("delay_ms", spec.delay_ms, -1e3..=1e3),
+            ("exposure_us", spec.exposure_us, 1.0..=1e6),
+        ];
+        if let Some((name, value, range)) = ranges.iter().find(|(_, value, range)| !range.contains(value)) {
+            let (least, most) = (range.start(), range.end());
+            return Err(Fault::usage(format!("sim:{}: {name} is {value:e}, wanted {least} to {most}", spec.seed))
+                .next("correct the camera's address (docs/live.md)"));
         }
         let station = Station::random(spec.seed).with_size(w, h);
         let scene = match &spec.scene {
