@@ -220,7 +220,13 @@ fn factor(seen: &Look) -> f64 {
     match &seen.stripe {
         // Nothing is known of what lies above full scale.
         Some(s) if s.saturated > 0.2 => 0.4,
-        Some(s) if s.saturated > MOST_SATURATED => (CAREFUL / s.peak).min(0.95),
+        Some(s) if s.saturated > MOST_SATURATED => {
+            if 0.95 * s.peak > CAREFUL {
+                CAREFUL / s.peak
+            } else {
+                0.8
+            }
+        }
         Some(s) => (middle / s.peak).clamp(0.2, 5.0),
         None if seen.saturated > 0.01 => 0.3,
         None => 4.0,

@@ -62,7 +62,7 @@ const RAMP: f64 = 0.1;
 /// Steps that a turn, or a way, of an axis is told in; only their ends are used.
 const STEPS: usize = 200;
 /// Rays a pixel's side of pictures in room light; how bright a board's fields are, as paper and toner.
-const RAYS: u32 = 2;
+const RAYS: u32 = 3;
 const WHITE: f64 = 0.85;
 const BLACK: f64 = 0.06;
 
