@@ -201,8 +201,8 @@ fn an_axis_before_a_running_camera_scans_as_accurately_as_a_robot() {
         );
     };
     judge(&want, "robot");
-    // A turntable's direction is known well once the board has gone round (which `calibrate axis` advises where it has not).
-    let axes = [("linear", "20", "4", "26"), ("turntable", "100", "110", "44")];
+    // A direction is known well once the board has gone far, or round (which `calibrate axis` advises where it has not).
+    let axes = [("linear", "20", "12", "26"), ("turntable", "100", "110", "44")];
     let long = std::env::var("SHEETLIGHT_LONG").is_ok();
     for (motion, speed, past, shots) in &axes[..if long { 2 } else { 1 }] {
         let axis = live(motion);
