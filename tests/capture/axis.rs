@@ -82,7 +82,7 @@ impl Live<'_> {
 
     /// Scans while it moves, and looks at the points and at each picture's pairing.
     fn scan(&self, out: &str, speed: &str, shots: &str) -> Found {
-        let camera = self.camera("12", speed, "");
+        let camera = self.camera("24", speed, "");
         let (station, truth, to) = (self.path("station"), self.path("scan/truth.json"), self.path(out));
         let kept = self.path(&format!("{out} kept"));
         let source = ["--camera", &camera, "--pair", "clock", "--pose-stream", "sim:4", "--shots", shots];
@@ -138,7 +138,7 @@ impl Live<'_> {
 
     /// A board that rides past is recorded, and the axis calibrated from it.
     fn calibrate(&self, speed: &str) -> Value {
-        let camera = self.camera("5", speed, "&shows=board");
+        let camera = self.camera("10", speed, "&shows=board");
         let (board, to) = (text(&self.at.join("board")), self.path("board rides"));
         sheetlight(&["board", "chessboard", "9x6", "--square-mm", "6", "--border-mm", "5", "--out", &board, "--quiet"]);
         let board = format!("{board}.json");
@@ -155,7 +155,7 @@ impl Live<'_> {
             "--board",
             &board,
             "--shots",
-            "16",
+            "32",
             "--out",
             &to,
             "--quiet",
@@ -190,7 +190,7 @@ fn an_axis_before_a_running_camera_scans_as_accurately_as_a_robot() {
     let live = |motion| Live { at: dir.path(), motion, scene: text(&dir.path().join("wedges.toml")) };
     let robot = live("robot");
     robot.simulate("2");
-    let want = robot.scan("out", "20", "26");
+    let want = robot.scan("out", "20", "65");
     let judge = |is: &Found, what: &str| {
         assert!(is.off[0] < PAIRED, "{what}: pictures are paired {:.4} mm off", is.off[0]);
         assert!(
@@ -202,7 +202,7 @@ fn an_axis_before_a_running_camera_scans_as_accurately_as_a_robot() {
     };
     judge(&want, "robot");
     // A direction is known well once the board has gone far, or round (which `calibrate axis` advises where it has not).
-    let axes = [("linear", "20", "12", "26"), ("turntable", "100", "110", "44")];
+    let axes = [("linear", "20", "12", "65"), ("turntable", "100", "110", "100")];
     let long = std::env::var("SHEETLIGHT_LONG").is_ok();
     for (motion, speed, past, shots) in &axes[..if long { 2 } else { 1 }] {
         let axis = live(motion);
