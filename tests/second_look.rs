@@ -1,11 +1,13 @@
 //! In: simulated stations with known truth, a part seen from two sides, and stations or recordings made wrong by one edit.
 //! Out: judgement on the second look: no wrong pose passes, right ones do, sigmas are honest, one look says that it was not
-//! cross-checked. Points come from rays of the scene, not from pictures. Frame and unit: base frame; mm, degrees.
+//! cross-checked. Peaks are the engine's, from rendered pictures; noise is drawn. Frame and unit: base frame; mm, degrees.
 //! SHEETLIGHT_LONG: ten stations of as many designs, thirty right draws each.
 
 mod common;
 #[path = "second_look/edits.rs"]
 mod edits;
+#[path = "second_look/pictures.rs"]
+mod pictures;
 #[path = "second_look/world.rs"]
 mod world;
 
@@ -104,10 +106,17 @@ struct Right {
     worse: bool,
 }
 
-fn right(world: &World, draw: u64) -> Right {
+/// `None` where a look was refused.
+fn right(world: &World, draw: u64) -> Option<Right> {
     let believed = world.believed(&mut world.station.rng("right", draw));
     let looks = world.recorded(&mut world.station.rng("right", 1000 + draw));
-    let (alone, both) = world.look(&believed, &looks).unwrap();
+    let (alone, both) = match world.look(&believed, &looks) {
+        Ok(found) => found,
+        Err(what) => {
+            println!("{}, draw {draw}: refused: {what}", world.station.rig.name);
+            return None;
+        }
+    };
     let off = |r: &Report| Off::of(&r.base_from_part, &world.truth);
     let squares = |r: &Report| [0, 1, 2].map(|k| (off(r).by[k] / r.sigma_mm[k]).powi(2));
     if !both.passed {
@@ -118,7 +127,7 @@ fn right(world: &World, draw: u64) -> Right {
         println!("    {:?}", l.explained_by.iter().map(|e| (e.name, e.share, &e.off_by)).collect::<Vec<_>>());
     }
     let worse = off(&both).in_plane() > off(&alone[0]).in_plane();
-    Right { passed: both.passed, one: squares(&alone[0]), two: squares(&both), worse }
+    Some(Right { passed: both.passed, one: squares(&alone[0]), two: squares(&both), worse })
 }
 
 #[test]
@@ -130,7 +139,7 @@ fn right_stations_pass_two_looks_and_the_pose_is_as_good_as_it_says() {
     };
     for index in 0..worlds() {
         let world = World::new(index);
-        let here: Vec<Right> = (0..draws).into_par_iter().map(|draw| right(&world, draw)).collect();
+        let here: Vec<Right> = (0..draws).into_par_iter().filter_map(|draw| right(&world, draw)).collect();
         println!(
             "{}: {} of {draws} pass; error over stated sigma {:.2?} of one look, {:.2?} of two",
             world.station.rig.name,
@@ -140,7 +149,7 @@ fn right_stations_pass_two_looks_and_the_pose_is_as_good_as_it_says() {
         );
         all.extend(here);
     }
-    let (n, passed) = (all.len(), all.iter().filter(|r| r.passed).count());
+    let (n, passed) = (worlds() * draws as usize, all.iter().filter(|r| r.passed).count());
     let (one, two) = (rms(&all, &|r| r.one), rms(&all, &|r| r.two));
     let worse = all.iter().filter(|r| r.worse).count();
     println!(

@@ -1,11 +1,7 @@
-//! In: a picture of a stripe. Out: its levels, and along the stripe how bright, how wide and how dark it is; the exposure that suits it.
-//! Frame and unit: px; shares of full scale and of the stripe's length; exposure in us.
+//! In: pictures of a stripe. Out: their levels, and along the stripe how bright, how wide and how dark it is.
+//! Frame and unit: px; shares of full scale and of the stripe's length.
 
-use super::feature::{Range, Value};
-use super::picture::{Event, PictureSource};
-use crate::fault::{Fault, Result};
 use crate::raster::Image;
-use std::time::{Duration, Instant};
 
 /// Levels of a picture and its stripe.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
@@ -49,10 +45,21 @@ const LEAST: f64 = 0.03;
 
 /// Looks at a picture.
 pub fn look(image: &Image) -> Look {
-    let full = f64::from(image.full_scale());
-    let mut counts = vec![0u64; usize::from(image.full_scale()) + 1];
-    (0..image.height).for_each(|y| (0..image.width).for_each(|x| counts[usize::from(image.get(x, y))] += 1));
-    let total = image.pixel_count() as u64;
+    look_at(std::slice::from_ref(image))
+}
+
+/// Looks at pictures of the same size and depth as at one: more peaks tell shares of a few per mille better.
+///
+/// # Panics
+/// Without a picture.
+pub fn look_at(images: &[Image]) -> Look {
+    let full = usize::from(images[0].full_scale());
+    let mut counts = vec![0u64; full + 1];
+    let mut count = |i: &Image| {
+        (0..i.height).for_each(|y| (0..i.width).for_each(|x| counts[usize::from(i.get(x, y)).min(full)] += 1));
+    };
+    images.iter().for_each(&mut count);
+    let total: u64 = counts.iter().sum();
     let level = |share: f64| {
         let mut left = (share * (total - 1) as f64) as u64;
         let at = counts.iter().position(|n| {
@@ -66,76 +73,84 @@ pub fn look(image: &Image) -> Look {
     counts.iter().enumerate().for_each(|(l, n)| histogram[l * 16 / counts.len()] += n);
     let saturated = *counts.last().expect("a level") as f64 / total as f64;
     let levels = [level(0.0), level(0.5), level(0.99), level(1.0)];
-    let [lying, upright] = [true, false].map(|lying| across(image, lying, full));
+    let [lying, upright] = [true, false].map(|lying| {
+        let mut seen = Across::default();
+        images.iter().for_each(|image| seen.add(image, lying));
+        seen.stripe(lying)
+    });
     // The right way to look at a stripe shows it in more lines, and narrower.
     let score = |s: &Option<StripeLook>| s.as_ref().map_or(0.0, |s| (1.0 - s.dark) / s.width_px.max(1.0));
     let stripe = if score(&lying) >= score(&upright) { lying } else { upright };
     Look { levels, saturated, histogram, stripe }
 }
 
-fn across(image: &Image, lying: bool, full: f64) -> Option<StripeLook> {
-    let (lines, length) = if lying { (image.width, image.height) } else { (image.height, image.width) };
-    let (mut peaks, mut widths, mut contrasts, mut saturated) = (Vec::new(), Vec::new(), Vec::new(), 0u32);
-    let mut along = [(0.0, 0u32); 8];
-    let mut line = vec![0u16; length as usize];
-    for k in 0..lines {
-        line.iter_mut().zip(0..).for_each(|(l, i)| *l = if lying { image.get(k, i) } else { image.get(i, k) });
-        let (at, top) = line.iter().copied().enumerate().max_by_key(|(_, l)| *l)?;
-        let mut sorted = line.clone();
-        sorted.sort_unstable();
-        let part = |share: f64| f64::from(sorted[(share * (sorted.len() - 1) as f64) as usize]);
-        let (ground, scatter) = (part(0.5), (part(0.84) - part(0.5)).max(0.5));
-        let rises = f64::from(top) - ground;
-        if rises < STANDS_OUT * scatter || rises < LEAST * full {
-            continue;
+/// What the lines of pictures show, looked at across the stripe.
+#[derive(Default)]
+struct Across {
+    lines: usize,
+    peaks: Vec<f64>,
+    widths: Vec<f64>,
+    contrasts: Vec<f64>,
+    saturated: u32,
+    along: [(f64, u32); 8],
+}
+
+impl Across {
+    fn add(&mut self, image: &Image, lying: bool) {
+        let full = f64::from(image.full_scale());
+        let (lines, length) = if lying { (image.width, image.height) } else { (image.height, image.width) };
+        self.lines += lines as usize;
+        let mut line = vec![0u16; length as usize];
+        for k in 0..lines {
+            line.iter_mut().zip(0..).for_each(|(l, i)| *l = if lying { image.get(k, i) } else { image.get(i, k) });
+            let Some((at, top)) = line.iter().copied().enumerate().max_by_key(|(_, l)| *l) else { continue };
+            let mut sorted = line.clone();
+            sorted.sort_unstable();
+            let part = |share: f64| f64::from(sorted[(share * (sorted.len() - 1) as f64) as usize]);
+            let (ground, scatter) = (part(0.5), (part(0.84) - part(0.5)).max(0.5));
+            let rises = f64::from(top) - ground;
+            if rises < STANDS_OUT * scatter || rises < LEAST * full {
+                continue;
+            }
+            let half = ground + 0.5 * rises;
+            let above = |l: &u16| f64::from(*l) > half;
+            let after = line[at..].iter().take_while(|l| above(l)).count();
+            let before = line[..at].iter().rev().take_while(|l| above(l)).count();
+            self.peaks.push(f64::from(top) / full);
+            self.widths.push((after + before) as f64);
+            self.contrasts.push(f64::from(top) / ground.max(1.0));
+            self.saturated += u32::from(top == image.full_scale());
+            let eighth = &mut self.along[(k * 8 / lines) as usize];
+            *eighth = (eighth.0 + f64::from(top) / full, eighth.1 + 1);
         }
-        let half = ground + 0.5 * rises;
-        let above = |l: &u16| f64::from(*l) > half;
-        let after = line[at..].iter().take_while(|l| above(l)).count();
-        let before = line[..at].iter().rev().take_while(|l| above(l)).count();
-        peaks.push(f64::from(top) / full);
-        widths.push((after + before) as f64);
-        contrasts.push(f64::from(top) / ground.max(1.0));
-        saturated += u32::from(top == image.full_scale());
-        let eighth = &mut along[(k * 8 / lines) as usize];
-        *eighth = (eighth.0 + f64::from(top) / full, eighth.1 + 1);
     }
-    let shown = peaks.len();
-    if shown * 50 < lines as usize {
-        return None;
+
+    /// None where hardly a line shows one.
+    fn stripe(mut self, lying: bool) -> Option<StripeLook> {
+        let shown = self.peaks.len();
+        if shown == 0 || shown * 50 < self.lines {
+            return None;
+        }
+        let at = |v: &mut Vec<f64>, share: f64| {
+            v.sort_by(f64::total_cmp);
+            v[(share * (v.len() - 1) as f64) as usize]
+        };
+        Some(StripeLook {
+            lying,
+            peak: at(&mut self.peaks, 0.95),
+            saturated: f64::from(self.saturated) / shown as f64,
+            width_px: at(&mut self.widths, 0.5),
+            contrast: at(&mut self.contrasts, 0.5),
+            dark: 1.0 - shown as f64 / self.lines as f64,
+            along: self.along.map(|(sum, n)| if n > 0 { sum / f64::from(n) } else { 0.0 }),
+        })
     }
-    let at = |v: &mut Vec<f64>, share: f64| {
-        v.sort_by(f64::total_cmp);
-        v[(share * (v.len() - 1) as f64) as usize]
-    };
-    Some(StripeLook {
-        lying,
-        peak: at(&mut peaks, 0.95),
-        saturated: f64::from(saturated) / shown as f64,
-        width_px: at(&mut widths, 0.5),
-        contrast: at(&mut contrasts, 0.5),
-        dark: 1.0 - shown as f64 / f64::from(lines),
-        along: along.map(|(sum, n)| if n > 0 { sum / f64::from(n) } else { 0.0 }),
-    })
 }
 
 impl Look {
     /// Whether the exposure is right.
     pub fn right(&self) -> bool {
         self.stripe.as_ref().is_some_and(|s| (WANTED[0]..=WANTED[1]).contains(&s.peak) && s.saturated <= MOST_SATURATED)
-    }
-
-    /// By how much the exposure is to be multiplied.
-    fn factor(&self) -> f64 {
-        let middle = 0.5 * (WANTED[0] + WANTED[1]);
-        match &self.stripe {
-            // Nothing is known of what lies above full scale.
-            Some(s) if s.saturated > 0.2 => 0.4,
-            Some(s) if s.saturated > MOST_SATURATED => (middle / s.peak).min(0.9),
-            Some(s) => (middle / s.peak).clamp(0.2, 5.0),
-            None if self.saturated > 0.01 => 0.3,
-            None => 4.0,
-        }
     }
 }
 
@@ -161,82 +176,6 @@ impl std::fmt::Display for Look {
             along.join(" ")
         )
     }
-}
-
-/// Pictures that were exposed before a setting took effect.
-const STALE: usize = 2;
-const TRIES: usize = 15;
-/// An exposure of seconds, and cameras that begin slowly.
-const PATIENCE: Duration = Duration::from_secs(30);
-
-/// The next picture that was taken after now.
-///
-/// # Errors
-/// None comes within `patience`; the camera is gone.
-pub fn fresh(source: &mut dyn PictureSource, patience: Duration) -> Result<Image> {
-    let until = Instant::now() + patience;
-    let mut stale = STALE;
-    while Instant::now() < until {
-        match source.next(Duration::from_millis(100)) {
-            Event::Picture(_) if stale > 0 => stale -= 1,
-            Event::Picture(picture) => return Ok(picture.image),
-            Event::Lost(fault) => return Err(fault),
-            Event::Ended => break,
-            Event::Quiet | Event::Incomplete { .. } => {}
-        }
-    }
-    Err(Fault::input(format!("{}: no picture within {:.0} s", source.name(), patience.as_secs_f64()))
-        .cause("it waits for a trigger, or its packets do not come through (packet size, firewall)")
-        .next("see TriggerMode: sheetlight camera show; or try gige://...?packet=1500"))
-}
-
-/// What tuning came to.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct Tuned {
-    /// us.
-    pub exposure_us: f64,
-    /// What pictures look like at it.
-    pub look: Look,
-}
-
-/// Finds the exposure at which the stripe's peak is right, and leaves it set.
-///
-/// # Errors
-/// A source without ExposureTime; no stripe at any exposure; a stripe too bright or too dark at the ends of its range.
-pub fn tune(source: &mut dyn PictureSource, mut tried: impl FnMut(f64, &Look)) -> Result<Tuned> {
-    let features = source.features()?;
-    let names = ["ExposureTime", "ExposureTimeAbs"];
-    let feature = names.iter().find_map(|n| features.iter().find(|f| f.name == *n)).ok_or_else(|| {
-        Fault::usage(format!("{}: has no ExposureTime to set", source.name()))
-            .cause("a pipe, a folder, a file, or a camera whose exposure is set elsewhere")
-            .next("set the exposure there; sheetlight camera snap says how the stripe looks")
-    })?;
-    let (low, high) = if let Range::Between(low, high) = feature.range { (low.max(1.0), high) } else { (1.0, 1e6) };
-    let mut exposure_us = match feature.value {
-        Some(Value::Float(v)) => v,
-        Some(Value::Integer(v)) => v as f64,
-        _ => 1000.0,
-    };
-    for _ in 0..TRIES {
-        let look = look(&fresh(source, PATIENCE)?);
-        tried(exposure_us, &look);
-        if look.right() {
-            return Ok(Tuned { exposure_us, look });
-        }
-        let next = (exposure_us * look.factor()).clamp(low, high);
-        if (next - exposure_us).abs() < 1e-3 * exposure_us {
-            return Err(Fault::refused(format!(
-                "at {exposure_us:.0} us, the end of its range ({low:.0} to {high:.0}), {look}"
-            ))
-            .cause("laser, lens aperture or gain do not suit")
-            .next("change the aperture, the laser's power or the gain, then tune again"));
-        }
-        exposure_us = next;
-        source.set(&feature.name, &format!("{exposure_us}"))?;
-    }
-    Err(Fault::refused(format!("no exposure suits after {TRIES} tries, the last was {exposure_us:.0} us"))
-        .cause("the light changes: a laser that is switched, room light, something that moves")
-        .next("hold everything still and tune again"))
 }
 
 #[cfg(test)]
@@ -266,7 +205,7 @@ mod tests {
             assert!((stripe.dark - 16.0 / if lying { 200.0 } else { 160.0 }).abs() < 0.01 && seen.right(), "{seen}");
         }
         let bright = look(&picture(500.0, true));
-        assert!(bright.stripe.as_ref().unwrap().saturated > 0.9 && !bright.right() && bright.factor() < 1.0);
+        assert!(bright.stripe.as_ref().unwrap().saturated > 0.9 && !bright.right());
         assert!(look(&picture(0.0, true)).stripe.is_none());
     }
 }

@@ -15,6 +15,7 @@ mod picture;
 pub mod record;
 pub mod source;
 mod stream;
+mod tune;
 mod uri;
 pub mod wire;
 
@@ -25,7 +26,8 @@ pub use feature::{Feature, Range, Value};
 pub use feed::{Fate, Fed, Feed, FeedOptions, Mode};
 pub use format::{Format, RawFormat, RawFrames};
 pub use latency::Latency;
-pub use look::{Look, StripeLook, Tuned, fresh, look, tune};
+pub use look::{Look, StripeLook, look, look_at};
 pub use picture::{Event, Picture, PictureSource};
 pub use stream::{Stream, Streamed};
+pub use tune::{Tuned, fresh, tune};
 pub use uri::CameraUri;

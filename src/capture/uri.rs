@@ -112,6 +112,7 @@ impl std::str::FromStr for CameraUri {
                 }
                 Ok(CameraUri::Ffmpeg { arguments, bits: depth(bits)? })
             }
+            "folder" | "play" if place.is_empty() => Err(format!("'{s}' names no folder: folder:PATH, play:RECORDING")),
             "folder" => {
                 let [bits, wait] = options(query, ["bits", "wait"])?;
                 let (bits, wait_s) = (depth(bits)?, number("wait", wait, 60.0)?.clamp(0.0, 1e6));
@@ -237,6 +238,8 @@ mod tests {
             ("cell://c:1?fps=3", "unknown option 'fps': rate"),
             ("play:a?rate=fast", "no number"),
             ("usb0", "names no camera"),
+            ("folder:", "names no folder"),
+            ("play:?rate=2", "names no folder"),
             ("ffmpeg:-f v4l2", "what ffmpeg is to open"),
             ("folder:a?bits=7", "8 to 16"),
             ("sim:one", "no seed"),

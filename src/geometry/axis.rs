@@ -86,6 +86,9 @@ pub struct Riding {
     pub pitch: f64,
 }
 
+/// Cosine from which a direction leads along another rather than across it.
+const ALONG: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
 impl Axis {
     /// The axis frame by the board that rode at count 0 there (docs/conventions.md): its z leads out of the board's face, on
     /// a turntable to the side that the camera stands on.
@@ -93,8 +96,9 @@ impl Axis {
         let at = camera_from_board.translation;
         let column = |k: usize| -> Vec3 { camera_from_board.rotation.column(k).into() };
         let across = |v: Vec3, along: &Vec3| v - along * along.dot(&v);
-        // Of two, the one more across: a board may stand upright.
-        let cleaner = |a: Vec3, b: Vec3, along: &Vec3| if a.dot(along).abs() <= b.dot(along).abs() { a } else { b };
+        // The second only where the first leads along: a board may stand upright. Which of two lies more across would be chance, and the
+        // frame would be another one after the next calibration.
+        let cleaner = |a: Vec3, b: Vec3, along: &Vec3| if a.dot(along).abs() < ALONG { a } else { b };
         let forward = r.pitch >= 0.0;
         let (rotation, origin, pitch) = match r.kind {
             AxisKind::Linear => {
@@ -198,6 +202,22 @@ mod tests {
             };
             assert!((there - want).norm() < 1e-9, "{there}");
             assert!((a.count_of(&a.axis_from_camera(250.0)) - 250.0).abs() < 1e-7);
+        }
+    }
+
+    /// A board that lies tilted by as much about its x as about its y, measured a little wrong each time: the same frame.
+    #[test]
+    fn the_frame_is_the_same_after_the_next_calibration() {
+        for kind in [AxisKind::Linear, AxisKind::Turntable] {
+            let unit = CountUnit::Count;
+            let direction = if kind == AxisKind::Linear { Vec3::new(0.7, 0.714, 0.0) } else { -Vec3::z() };
+            let riding = Riding { kind, unit, direction, point: Vec3::zeros(), pitch: 0.01 };
+            let frame = |by: f64| {
+                let lies = exp(&Vec3::new(0.1 + by, 0.1 - by, 0.0));
+                Axis::from_board(&riding, &Rigid::new(lies, Vec3::new(3.0, 2.0, 300.0))).camera_from_axis
+            };
+            let (rad, _) = frame(1e-4).difference(&frame(-1e-4));
+            assert!(rad < 1e-3, "{kind:?}: turned by {rad} rad");
         }
     }
 

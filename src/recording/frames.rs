@@ -4,7 +4,7 @@
 use super::frame::FrameRef;
 use crate::fault::{Fault, Result};
 use std::io::{BufRead, BufReader};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Longest line that is read, bytes; a recorder's have some hundred.
 const LONGEST: usize = 1 << 16;
@@ -28,5 +28,42 @@ pub(super) fn load(path: &Path) -> Result<Vec<FrameRef>> {
                 .next("correct the line, or leave it out")
         })?;
         frames.push(frame);
+    }
+}
+
+/// Frames of a file that a recorder is still writing, read in order.
+pub struct FollowedFrames {
+    path: PathBuf,
+    reader: BufReader<std::fs::File>,
+    next: usize,
+    line: Vec<u8>,
+}
+
+impl FollowedFrames {
+    /// Opens `frames.jsonl`.
+    ///
+    /// # Errors
+    /// There is none.
+    pub fn open(path: &Path) -> Result<FollowedFrames> {
+        let file = std::fs::File::open(path).map_err(|e| Fault::read(path, e))?;
+        Ok(FollowedFrames { path: path.to_owned(), reader: BufReader::new(file), next: 0, line: Vec::new() })
+    }
+
+    /// Frame `index`, which the recorder has written; after the one that was asked for before.
+    ///
+    /// # Errors
+    /// The disk does not give it back.
+    pub fn frame(&mut self, index: usize) -> Result<FrameRef> {
+        while self.next <= index {
+            self.line.clear();
+            let read = std::io::Read::take(&mut self.reader, LONGEST as u64).read_until(b'\n', &mut self.line);
+            read.map_err(|e| Fault::read(&self.path, e))?;
+            self.next += 1;
+        }
+        serde_json::from_slice(&self.line).map_err(|e| {
+            Fault::input(format!("{}: line {} is no frame: {e}", self.path.display(), index + 1))
+                .cause("another program writes into the recording, or the disk failed")
+                .next("see the disk; what was recorded before can be scanned")
+        })
     }
 }

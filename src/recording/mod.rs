@@ -18,6 +18,7 @@ mod taken;
 pub use board::BoardSpec;
 pub use board_poses::load_board_poses;
 pub use frame::FrameRef;
+pub use frames::FollowedFrames;
 pub use markers::Markers;
 pub use meta::{AmbientRef, Beam, ImageSpec, Meta, Sources};
 pub use motion::{Carries, Motion, MotionKind};

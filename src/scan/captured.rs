@@ -2,13 +2,11 @@
 //! Frame and unit: as [`super::Shot`].
 
 use super::source::{BadShot, Shot, Source};
-use crate::capture::record::{Backlog, RecordReport, Recorded};
+use crate::capture::record::{Backlog, RecordReport, Recorded, Waits};
 use crate::capture::{Account, Fate, Format, Stream, Streamed};
 use crate::fault::{Fault, Result};
-use crate::raster::Image;
-use crate::recording::{Recording, Stand};
+use crate::recording::{FollowedFrames, FrameRef, Recording, Stand};
 use std::path::PathBuf;
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -88,38 +86,46 @@ impl Source for StreamSource {
     }
 }
 
-/// What a recorder on another thread hands on, scanned while it goes on recording. Pictures that have to wait are read from its disk again.
+/// What a recorder on another thread hands on, scanned while it goes on recording. Shots that have to wait are read from its disk again.
 pub struct RecordedSource {
     format: Format,
     recording: Recording,
-    shots: Receiver<Recorded>,
     backlog: Backlog,
+    frames: Option<FollowedFrames>,
+    next: usize,
     /// What the recording came to, once it has ended.
     report: Arc<Mutex<Option<Result<RecordReport>>>>,
 }
 
 impl RecordedSource {
-    /// `meta` is what the recorder writes into `folder`; `report` is filled before the channel closes.
+    /// `meta` is what the recorder writes into `folder`; `report` is filled before the backlog's other end is dropped.
     pub fn new(
         folder: PathBuf,
         meta: crate::recording::Meta,
-        shots: Receiver<Recorded>,
         backlog: Backlog,
         report: Arc<Mutex<Option<Result<RecordReport>>>>,
     ) -> RecordedSource {
         let format = Format { width: meta.image.width, height: meta.image.height, bits: meta.image.bits };
         let recording = Recording { folder, meta, channel: Default::default(), outside: false };
-        RecordedSource { format, recording, shots, backlog, report }
+        RecordedSource { format, recording, backlog, frames: None, next: 0, report }
     }
 
-    fn image(&self, shot: &mut Recorded) -> Result<Image> {
-        match shot.image.take() {
-            Some(image) => {
-                self.backlog.taken();
-                Ok(image)
+    /// A shot as the recorder wrote it.
+    fn read(&mut self, index: usize) -> Result<Recorded> {
+        let frames = match &mut self.frames {
+            Some(frames) => frames,
+            none => {
+                let name = self.recording.meta.frames_file.as_deref().unwrap_or_default();
+                none.insert(FollowedFrames::open(&self.recording.folder.join(name))?)
             }
-            None => self.recording.picture(&shot.kept.name),
-        }
+        };
+        let FrameRef { laser, count, taken, .. } = frames.frame(index)?;
+        let name = laser.unwrap_or_default();
+        let image = self.recording.picture(&name)?;
+        let flange = taken.as_ref().and_then(|t| t.base_from_flange);
+        let stand = flange.map(Stand::Robot).or(count.map(Stand::Count));
+        let (slip, here_ns) = taken.map_or((None, 0), |t| (t.slip(), t.host_ns));
+        Ok(Recorded { name, index, image, stand, slip, here_ns })
     }
 }
 
@@ -137,18 +143,23 @@ impl Source for RecordedSource {
     }
 
     fn next(&mut self) -> Option<std::result::Result<Shot, BadShot>> {
-        let mut shot = loop {
-            match self.shots.recv_timeout(GLANCE) {
-                Ok(shot) => break shot,
-                Err(RecvTimeoutError::Timeout) => {}
-                Err(RecvTimeoutError::Disconnected) => return None,
+        let at = self.next;
+        let found = loop {
+            match self.backlog.shot(at, GLANCE) {
+                Waits::InMemory(shot) => break Ok(*shot),
+                Waits::OnDisk => break self.read(at),
+                Waits::Nowhere => {}
+                Waits::Never => return None,
             }
         };
-        let (index, name) = (shot.kept.index as u32, shot.kept.name.clone());
-        let Some(stand): Option<Stand> = shot.stand else { return Some(Err(without_stand(index, &name))) };
-        Some(match self.image(&mut shot) {
-            Ok(image) => Ok(Shot { index, name, image, stand, slip: shot.slip, here_ns: Some(shot.here_ns) }),
-            Err(fault) => Err(BadShot { index, name, fault, last: false }),
+        self.next += 1;
+        let index = at as u32;
+        Some(match found {
+            Ok(Recorded { name, stand: None, .. }) => Err(without_stand(index, &name)),
+            Ok(Recorded { name, image, stand: Some(stand), slip, here_ns, .. }) => {
+                Ok(Shot { index, name, image, stand, slip, here_ns: Some(here_ns) })
+            }
+            Err(fault) => Err(BadShot { index, name: format!("shot {at}"), fault, last: false }),
         })
     }
 

@@ -33,7 +33,7 @@ fn take_away(path: &Path) {
 
 /// A file that is read (`{}` stands for the bench's folder), and the command that reads it; where the file may be missing,
 /// or is read past, the command may succeed.
-const READ: [(&str, &str, bool); 25] = [
+const READ: [(&str, &str, bool); 31] = [
     ("x", "scan {}/recording --station {}/station --out {}/o --ambient {}/x --on cpu", false),
     ("x.json", "scan --raw 320x240:gray8 --poses {}/x.json --station {}/station --out {}/o --on cpu", false),
     ("x", "scan {}/recording --station {}/station --out {}/o --truth {}/x --on cpu", false),
@@ -67,6 +67,16 @@ const READ: [(&str, &str, bool); 25] = [
         "calibrate profile-hand-eye {}/p.csv --poses {}/recording/poses.json --ball-diameter-mm 20 --evaluate {}/x.json",
         false,
     ),
+    ("x.png", "match {}/x.png {}/recording/1.png", false),
+    ("x.png", "import-map {}/x.png --unit-mm 0.02 --spacing-mm 0.2,0.2 --missing 0 --out {}/o", false),
+    (
+        "x.png",
+        "import-map {}/recording/1.png --unit-mm 0.02 --spacing-mm 0.2,0.2 --missing 0 --light {}/x.png --out {}/o",
+        false,
+    ),
+    ("recording/meta.json", "record --camera play:{}/recording --out {}/o --shots 2", false),
+    ("x", "record --camera play:{}/x --out {}/o --shots 2", false),
+    ("x", "record --camera sim:1?scene={}/x --out {}/o --shots 2", false),
 ];
 
 #[test]

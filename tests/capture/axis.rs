@@ -1,11 +1,15 @@
 //! In: simulated parts on a linear axis and a turntable, and under a robot, seen by a running camera; a board that rides past it. Out: whether
-//! scans of it are as accurate as the robot's, with the true axis and with one calibrated from the pictures of the board.
+//! each picture is paired with where things truly stood, and scans are as accurate as the robot's, with the true axis and a calibrated one.
 //! Frame and unit: mm; counts.
 
 use super::{json, text};
 use crate::common::sheetlight;
 use serde_json::Value;
+use sheetlight::capture::CameraUri;
+use sheetlight::capture::source::sim::SimMotion;
 use sheetlight::geometry::Vec3;
+use sheetlight::recording::{Recording, Stand};
+use sheetlight::simulate::Truth;
 use std::path::Path;
 
 /// A block with wedges that rise and fall each way.
@@ -13,6 +17,36 @@ const SCENE: &str = "name = 'wedges'\nregion_mm = [-15, -9, 15, 9]\n\
     [[solid]]\nshape = { block = { size_mm = [60, 60, 5] } }\nat_mm = [0, 0, 0]\n\
     [[solid]]\nshape = { wedge = { size_mm = [12, 12, 9], drop_mm = 7 } }\nat_mm = [-6, 0, 7]\nturn_deg = 70\n\
     [[solid]]\nshape = { wedge = { size_mm = [12, 12, 9], drop_mm = 7 } }\nat_mm = [7, 0, 7]\nturn_deg = 250\n";
+
+/// Middle, turn and half a side of the plate and the wedges. The figures are of what lies this far from their edges: there half of a stripe is on
+/// another face, and how many pictures fall there is chance.
+const BLOCKS: [([f64; 2], f64, f64); 3] = [([0.0, 0.0], 0.0, 30.0), ([-6.0, 0.0], 70.0, 6.0), ([7.0, 0.0], 250.0, 6.0)];
+const APART: f64 = 0.8;
+/// The plate's corners from a turntable's axis, mm.
+const RIM: f64 = 42.0;
+
+/// What a scan came to.
+struct Found {
+    /// Rms of the points on faces about the truth, mm.
+    faces: f64,
+    points: usize,
+    /// Rms and largest way between where a picture was paired and where things truly stood, mm.
+    off: [f64; 2],
+}
+
+fn rms(values: &[f64]) -> f64 {
+    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
+}
+
+/// Whether a point of the scene lies on a face, apart from its edges.
+fn on_a_face(p: &Vec3) -> bool {
+    BLOCKS.iter().all(|([x, y], turn, half)| {
+        let (sin, cos) = turn.to_radians().sin_cos();
+        let (dx, dy) = (p.x - x, p.y - y);
+        let out = (cos * dx + sin * dy).abs().max((cos * dy - sin * dx).abs());
+        (out - half).abs() > APART
+    })
+}
 
 struct Live<'a> {
     at: &'a Path,
@@ -29,7 +63,7 @@ impl Live<'_> {
         if self.motion == "robot" { String::new() } else { format!("&axis={}", self.motion) }
     }
 
-    /// The station, the truth of the scene and, where it has more than two shots, a recording to compare with.
+    /// The station and the truth of the scene.
     fn simulate(&self, shots: &str) {
         let out = text(&self.at.join(self.motion));
         let args =
@@ -41,53 +75,70 @@ impl Live<'_> {
         }
     }
 
-    /// Rms of the points about the truth, mm, and their number.
-    fn scan(&self, out: &str, speed: &str, shots: &str) -> (f64, u64) {
-        let camera = format!("sim:4?rate=12&speed={speed}&size=320x240&scene={}{}", self.scene, self.axis());
+    /// The axis is where the scene is scanned from: of the board too.
+    fn camera(&self, rate: &str, speed: &str, more: &str) -> String {
+        format!("sim:4?rate={rate}&speed={speed}&size=320x240&scene={}{}{more}", self.scene, self.axis())
+    }
+
+    /// Scans while it moves, and looks at the points and at each picture's pairing.
+    fn scan(&self, out: &str, speed: &str, shots: &str) -> Found {
+        let camera = self.camera("24", speed, "");
         let (station, truth, to) = (self.path("station"), self.path("scan/truth.json"), self.path(out));
-        sheetlight(&[
-            "scan",
-            "--camera",
-            &camera,
-            "--pair",
-            "clock",
-            "--pose-stream",
-            "sim:4",
-            "--station",
-            &station,
-            "--truth",
-            &truth,
-            "--shots",
-            shots,
-            "--out",
-            &to,
-            "--on",
-            "cpu",
-            "--overlays",
-            "0",
-            "--quiet",
-        ]);
+        let kept = self.path(&format!("{out} kept"));
+        let source = ["--camera", &camera, "--pair", "clock", "--pose-stream", "sim:4", "--shots", shots];
+        let made = ["--station", &station, "--truth", &truth, "--out", &to, "--record", &kept];
+        sheetlight(&[&["scan"][..], &source, &made, &["--on", "cpu", "--overlays", "0", "--quiet"]].concat());
         let report = json(&Path::new(&to).join("scan.json"));
         let account: sheetlight::capture::Account = serde_json::from_value(report["camera"].clone()).unwrap();
         assert_eq!(account.unexplained(), 0, "{account}");
-        let rms = json(&Path::new(&to).join("errors.json"))["cloud"]["rms_without_outliers_mm"].as_f64().unwrap();
-        println!("{} live, {out}: rms {rms:.4} mm, {} points, {account}", self.motion, report["points"]);
-        (rms, report["points"].as_u64().unwrap())
+        let truth = Truth::load(Path::new(&truth)).unwrap();
+        let scene_from_base = truth.file.base_from_scene.unwrap().inverse();
+        let cloud = sheetlight::scan::read_cloud(&Path::new(&to).join("cloud.ply")).unwrap();
+        let points: Vec<Vec3> = cloud.iter().map(|p| Vec3::from(p.position.map(f64::from))).collect();
+        let on_faces = points.iter().filter(|p| on_a_face(&scene_from_base.point(p)));
+        let distances: Vec<f64> = on_faces.map(|p| truth.distance(p)).collect();
+        let all = json(&Path::new(&to).join("errors.json"))["cloud"]["rms_without_outliers_mm"].as_f64().unwrap();
+        let off = self.off(&camera, &kept);
+        let found = Found { faces: rms(&distances), points: points.len(), off };
+        println!(
+            "{} live, {out}: {:.4} mm on {} points of faces, {all:.4} mm on all {}; pairing off by {:.4} mm rms, {:.4} at most; {account}",
+            self.motion,
+            found.faces,
+            distances.len(),
+            found.points,
+            off[0],
+            off[1]
+        );
+        found
     }
 
-    /// The same of the simulated recording.
-    fn recorded(&self) -> f64 {
-        let [from, station, truth, to] = ["scan", "station", "scan/truth.json", "file"].map(|name| self.path(name));
-        let args = ["scan", &from, "--station", &station, "--truth", &truth, "--out", &to, "--on", "cpu"];
-        sheetlight(&[&args[..], &["--overlays", "0", "--quiet"]].concat());
-        let rms = json(&Path::new(&to).join("errors.json"))["cloud"]["rms_without_outliers_mm"].as_f64().unwrap();
-        println!("{}, its recording: rms {rms:.4} mm", self.motion);
-        rms
+    /// How far each picture of a recording was paired from where things truly stood in the middle of its exposure.
+    fn off(&self, camera: &str, kept: &str) -> [f64; 2] {
+        let Ok(CameraUri::Sim(spec)) = camera.parse() else { panic!("{camera}") };
+        let truly = SimMotion::new(&spec).unwrap();
+        let recording = Recording::open(Path::new(kept)).unwrap();
+        let way = |frame: &sheetlight::recording::FrameRef| {
+            let taken = frame.taken.as_ref().unwrap();
+            let stood = truly.stand(taken.device_ns.unwrap() + taken.exposure_ns.unwrap() / 2);
+            match (stood, taken.base_from_flange, frame.count) {
+                (Stand::Robot(stood), Some(is), _) => (is.translation - stood.translation).norm(),
+                (Stand::Count(stood), _, Some(is)) => (is - stood).abs() * self.mm_a_count(),
+                other => panic!("{other:?}"),
+            }
+        };
+        let ways: Vec<f64> = recording.meta.frames.iter().map(way).collect();
+        [rms(&ways), ways.iter().copied().fold(0.0, f64::max)]
+    }
+
+    /// What a count is, mm; of a turntable at the rim.
+    fn mm_a_count(&self) -> f64 {
+        let truth = json(Path::new(&self.path("scan/truth.json")));
+        truth["axis"]["pitch"].as_f64().unwrap() * if self.motion == "turntable" { RIM } else { 1.0 }
     }
 
     /// A board that rides past is recorded, and the axis calibrated from it.
     fn calibrate(&self, speed: &str) -> Value {
-        let camera = format!("sim:4?rate=5&speed={speed}&size=320x240&shows=board{}", self.axis());
+        let camera = self.camera("10", speed, "&shows=board");
         let (board, to) = (text(&self.at.join("board")), self.path("board rides"));
         sheetlight(&["board", "chessboard", "9x6", "--square-mm", "6", "--border-mm", "5", "--out", &board, "--quiet"]);
         let board = format!("{board}.json");
@@ -104,7 +155,7 @@ impl Live<'_> {
             "--board",
             &board,
             "--shots",
-            "16",
+            "32",
             "--out",
             &to,
             "--quiet",
@@ -127,27 +178,37 @@ fn direction(axis: &Value) -> Vec3 {
     Vec3::new(at(0), at(1), at(2))
 }
 
+/// Time errors, not counts: a millisecond at 20 mm/s. Poses come every few milliseconds, or every 20 on a loaded machine; where it turns back
+/// a straight way between two of them is off by an eighth of the acceleration (200 mm/s2) times their distance squared.
+const PAIRED: f64 = 0.02;
+
 /// Short: the linear axis. `SHEETLIGHT_LONG`: the turntable too.
 #[test]
-#[ignore = "red once in four beside other work: 0.0349 mm where 0.0333 is asked, by the clocks of a loaded machine"]
 fn an_axis_before_a_running_camera_scans_as_accurately_as_a_robot() {
     let dir = tempfile::tempdir().unwrap();
     std::fs::write(dir.path().join("wedges.toml"), SCENE).unwrap();
     let live = |motion| Live { at: dir.path(), motion, scene: text(&dir.path().join("wedges.toml")) };
     let robot = live("robot");
     robot.simulate("2");
-    let (want, _) = robot.scan("out", "20", "26");
-    let axes = [("linear", "20", "4", "26"), ("turntable", "100", "20", "44")];
+    let want = robot.scan("out", "20", "65");
+    let judge = |is: &Found, what: &str| {
+        assert!(is.off[0] < PAIRED, "{what}: pictures are paired {:.4} mm off", is.off[0]);
+        assert!(
+            is.points > 1000 && is.faces < 1.15 * want.faces,
+            "{what}: {:.4} mm, {:.4} robot",
+            is.faces,
+            want.faces
+        );
+    };
+    judge(&want, "robot");
+    // A direction is known well once the board has gone far, or round (which `calibrate axis` advises where it has not).
+    let axes = [("linear", "20", "12", "65"), ("turntable", "100", "110", "100")];
     let long = std::env::var("SHEETLIGHT_LONG").is_ok();
     for (motion, speed, past, shots) in &axes[..if long { 2 } else { 1 }] {
         let axis = live(motion);
-        // A turntable shows steep sides from all around, which the robot passes: its own recording is its measure.
-        let table = *motion == "turntable";
-        axis.simulate(if table { shots } else { "2" });
-        let want = if table { axis.recorded() } else { want };
+        axis.simulate("2");
         let truth = axis.axis_file();
-        let (exact, points) = axis.scan("true", speed, shots);
-        assert!(points > 1000 && exact < 1.15 * want, "{motion}, true axis: {exact:.4} mm, measured by {want:.4}");
+        judge(&axis.scan("true", speed, shots), "true axis");
         let found = axis.calibrate(past);
         let (of, is) = (direction(&truth), direction(&found));
         let turned = of.angle(&is).to_degrees();
@@ -160,7 +221,6 @@ fn an_axis_before_a_running_camera_scans_as_accurately_as_a_robot() {
         assert!(turned < 0.1 && (pitch / true_pitch - 1.0).abs() < 1e-3, "{found}");
         assert!(["good", "usable"].contains(&found["quality"]["verdict"].as_str().unwrap()), "{}", found["quality"]);
         assert!(found["covariance"]["matrix"].as_array().is_some_and(|v| !v.is_empty()), "{}", found["covariance"]);
-        let (own, _) = axis.scan("own", speed, shots);
-        assert!(own < 1.15 * want, "{motion}, calibrated: {own:.4} mm, measured by {want:.4}");
+        judge(&axis.scan("own", speed, shots), "calibrated axis");
     }
 }

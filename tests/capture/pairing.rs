@@ -22,6 +22,8 @@ const MS: u64 = 1_000_000;
 struct Prepared {
     pictures: Vec<(Image, u64)>,
     next: usize,
+    /// From the begin of an exposure to the picture's last byte.
+    under_way: u64,
 }
 
 impl PictureSource for Prepared {
@@ -32,7 +34,7 @@ impl PictureSource for Prepared {
         let Some((image, ns)) = self.pictures.get(self.next).cloned() else { return Event::Ended };
         self.next += 1;
         let (id, device_ns) = (self.next as u64, Some(ns));
-        let (host_ns, exposure_ns) = (ns + 3 * MS, Some(MS));
+        let (host_ns, exposure_ns) = (ns + self.under_way, Some(MS));
         Event::Picture(Box::new(Picture { image, id, device_ns, host_ns, exposure_ns, count: None, stand: None }))
     }
     fn clock(&mut self) -> Result<Option<RoundTrip>> {
@@ -49,7 +51,12 @@ impl PictureSource for Prepared {
 const BEGUN: u64 = 1_700_000_000_000_000_000;
 
 fn stream(pictures: Vec<(Image, u64)>, way: Way) -> Stream {
-    Stream::new(Feed::start(Box::new(Prepared { pictures, next: 0 }), FeedOptions::default()).unwrap(), way)
+    arriving(pictures, 3 * MS, way)
+}
+
+fn arriving(pictures: Vec<(Image, u64)>, under_way: u64, way: Way) -> Stream {
+    let source = Prepared { pictures, next: 0, under_way };
+    Stream::new(Feed::start(Box::new(source), FeedOptions::default()).unwrap(), way)
 }
 
 fn plain(n: u64, step_ns: u64) -> Vec<(Image, u64)> {
@@ -202,6 +209,15 @@ fn still_is_still_and_numbers_are_not_made_up() {
     );
     // The first two have no pose before them.
     assert_eq!(outcomes(stream(plain(50, 20 * MS), still)).0, (3..=50).collect::<Vec<_>>());
+    // It moves from 1000 ms on. Pictures that are long under way were exposed before.
+    let moves_on = Way::Step(
+        PoseFeed::of(samples(|k, s| {
+            s.stand = pose(0.16 * k.saturating_sub(125) as f64);
+            true
+        })),
+        Still::default(),
+    );
+    assert_eq!(outcomes(arriving(plain(90, 20 * MS), 80 * MS, moves_on)).0, (3..=49).collect::<Vec<_>>());
     let table = Table::Rows((0..30).map(|k| (k != 7).then(|| pose(f64::from(k)))).collect());
     let (paired, left) = outcomes(stream(plain(32, 20 * MS), Way::Count(table)));
     assert_eq!((paired.len(), left.iter().map(|l| l.0).collect::<Vec<_>>()), (29, vec![8, 31, 32]));

@@ -4,7 +4,7 @@
 use rand::{Rng, SeedableRng};
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64;
-use sheetlight::find::{Kind, Layer, ModelOptions, Recipe, Scene, SearchOptions, ShapeModel, find};
+use sheetlight::find::{Kind, Layer, Recipe, Scene, SearchOptions, ShapeModel, find};
 use std::f64::consts::PI;
 use std::path::Path;
 
@@ -12,7 +12,13 @@ const CELL_MM: f64 = 0.45;
 const W: usize = 110;
 const H: usize = 150;
 
-/// Whether data/recipes/led.toml has material at a place of the part, mm.
+/// Whether data/recipes/led.toml has a contact's funnel at a place of the part, mm; hardly any of its light comes back.
+fn funnel(x: f64, y: f64) -> bool {
+    let (dx, dy) = ((x / 2.54).floor() * 2.54 + 1.27 - x, y.abs() - 7.62);
+    x.abs() < 15.24 && dx.hypot(dy) < 0.8
+}
+
+/// Whether it has material there.
 fn body(x: f64, y: f64) -> bool {
     let window = (x.abs() - 7.12).abs() < 5.52 && y.abs() < 6.2;
     x.abs() < 15.24 && y.abs() < 8.89 && !window && (x + 15.24).hypot(y) > 1.5
@@ -21,15 +27,22 @@ fn body(x: f64, y: f64) -> bool {
 /// A map of the part at a place (cells) and turn; `shadow` mm beside whatever stands 4.2 mm high are missing, towards larger x.
 fn map(x: f64, y: f64, turn: f64, shadow: f64, rng: &mut Pcg64) -> Scene {
     let (s, c) = turn.sin_cos();
-    let high = |u: f64, v: f64| {
+    let place = |u: f64, v: f64| {
         let (dx, dy) = ((u - x) * CELL_MM, (v - y) * CELL_MM);
-        body(c * dx + s * dy, c * dy - s * dx)
+        (c * dx + s * dy, c * dy - s * dx)
     };
+    let high = |u: f64, v: f64| {
+        let (x, y) = place(u, v);
+        body(x, y)
+    };
+    let dark: Vec<bool> = (0..W * H).map(|_| rng.random_bool(0.6)).collect();
     let noise = Normal::new(0.0, 0.02).unwrap();
     let cell = |i: usize| {
         let (u, v) = ((i % W) as f64, (i / W) as f64);
         let steps = (shadow / CELL_MM / 0.25) as i32;
+        let (px, py) = place(u, v);
         match high(u, v) {
+            true if funnel(px, py) => if dark[i] { f64::NAN } else { 3.4 },
             true => 4.2,
             false if (1..=steps).any(|k| high(u - 0.25 * f64::from(k), v)) => f64::NAN,
             false => 0.0,
@@ -43,7 +56,7 @@ fn map(x: f64, y: f64, turn: f64, shadow: f64, rng: &mut Pcg64) -> Scene {
 #[test]
 fn a_part_is_found_where_it_stands_and_not_a_shadow_beside() {
     let recipe = Recipe::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join("data/recipes/led.toml")).unwrap();
-    let model = ShapeModel::from_drawing(&recipe.drawing(), CELL_MM, Kind::Height, &ModelOptions::default()).unwrap();
+    let model = ShapeModel::from_drawing(&recipe.drawing(), CELL_MM, Kind::Height, &recipe.model).unwrap();
     let mut rng = Pcg64::seed_from_u64(5);
     let options = SearchOptions { min_score: 0.5, max_matches: 3, ..SearchOptions::default() };
     let mut wrong = Vec::new();

@@ -1,18 +1,18 @@
 //! In: designs of stations, a part before them. Out: what a program gets of two looks at it, with known truth, and the station that it
-//! believes in. Points come from rays of the scene, not from pictures. Frame and unit: base frame; mm, px.
+//! believes in. Peaks are the engine's, from rendered pictures. Frame and unit: base frame; mm, px.
 
+use super::pictures::{Peak, peaks};
 use nalgebra::{DMatrix, DVector};
 use rand::Rng;
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
-use rayon::prelude::*;
 use sheetlight::find::look::looks::other_side;
 use sheetlight::find::{LocateOptions, Recipe, Report, agree, locate};
 use sheetlight::geometry::{Base, Camera, Flange, Mat3, Part, Plane, Rigid, Vec2, Vec3, exp};
 use sheetlight::rig::{Calibration, Covariance, Kind, Quality, Rig, Verdict};
 use sheetlight::robot::Convention;
 use sheetlight::scan::CloudPoint;
-use sheetlight::simulate::{InScene, RigSpec, Scene, SceneSpec, Station, base_from_scene, part_pose, scan};
+use sheetlight::simulate::{InScene, RigSpec, Scene, SceneSpec, Station, base_from_scene, flange, part_pose, scan};
 use std::path::PathBuf;
 
 /// Errors of the calibrations, one standard deviation, as good stations of the paper's size have them; lengths of other designs
@@ -24,6 +24,8 @@ pub const PLANE_MM: f64 = 0.015;
 /// Of a pose's reading.
 pub const ROBOT_MM: f64 = 0.007;
 pub const PEAK_PX: f64 = 0.06;
+/// Of a peak's light, as a share: what speckle leaves of it over the pixels that it is fitted to.
+pub const LIGHT: f64 = 0.04;
 /// Shots of a look.
 pub const SHOTS: usize = 130;
 /// Designs of the long form; the first is the short form's. Stripes lie, stand and lean.
@@ -55,71 +57,6 @@ pub struct World {
     pub looks: [Recorded; 2],
 }
 
-/// A peak: where it is seen and how much of the sheet's light it sends back, 0 to 1.
-#[derive(Clone, Copy)]
-pub struct Peak {
-    pub px: Vec2,
-    pub share: f64,
-}
-
-/// Beams across the sheet, whose light a peak is the middle of.
-pub const ACROSS: i32 = 7;
-
-/// Rays of the sheet from one camera pose: the peaks of what it lights and the camera sees, one a column. At an edge a part of
-/// the light falls elsewhere: the peak is the middle of what is left.
-pub fn peaks(station: &Station, scene: &Scene, from_camera: &Rigid<InScene, Camera>, reach: f64) -> Vec<Peak> {
-    let laser = &station.laser;
-    let across = across(station);
-    let along_x = across.y.abs() >= across.x.abs();
-    let along = |p: &Vec2| if along_x { p.x } else { p.y };
-    let (width, height) = (f64::from(station.camera.width), f64::from(station.camera.height));
-    // A third of a pixel apart.
-    let range = station.working_distance - laser.source.z;
-    let beams_over = (2.0 * reach * range / station.working_distance * station.camera.fx * 3.0).ceil() as u32;
-    let source = from_camera.point(&laser.source);
-    let [axis, normal] = [laser.axis, laser.normal].map(|d| from_camera.direction(&d));
-    let side = normal.cross(&axis);
-    let (eye, to_camera) = (from_camera.translation, from_camera.inverse());
-    // Where a beam's light is seen, and its share by Lambert: a wall that is seen at grazing angles sends back next to nothing.
-    let seen = |start: &Vec3, direction: &Vec3| -> Option<(Vec2, f64)> {
-        let hit = scene.hit(start, direction, 2000.0)?;
-        let lifted = hit.point + hit.normal * 1e-6;
-        let shown = hit.normal.dot(&(eye - hit.point).normalize());
-        let faces = shown > 0.0 && scene.clear(&lifted, &eye);
-        faces.then(|| Some((station.camera.pixel_from_point(&to_camera.point(&hit.point))?, shown))).flatten()
-    };
-    let mut columns = std::collections::BTreeMap::<i64, Peak>::new();
-    for i in 0..beams_over {
-        let slope = reach * (2.0 * (f64::from(i) + 0.5) / f64::from(beams_over) - 1.0);
-        let direction = (axis + side * slope).normalize();
-        let radius = laser.radius(station.working_distance);
-        let beams: Vec<(Vec2, f64)> = (-ACROSS..=ACROSS)
-            .filter_map(|k| {
-                let x = 1.5 * f64::from(k) / f64::from(ACROSS);
-                let (px, shown) = seen(&(source + normal * (x * radius)), &direction)?;
-                Some((px, shown * (-2.0 * x * x).exp()))
-            })
-            .collect();
-        // Neighbouring beams whose images are far apart lie on two surfaces: two peaks, of which the stronger is taken.
-        let all: f64 =
-            (-ACROSS..=ACROSS).map(|k| (-2.0 * (1.5 * f64::from(k) / f64::from(ACROSS)).powi(2)).exp()).sum();
-        let pieces = beams.chunk_by(|a, b| (a.0 - b.0).dot(&across).abs() < 1.0);
-        let peak = pieces.map(|piece| {
-            let light: f64 = piece.iter().map(|b| b.1).sum();
-            let px = piece.iter().map(|b| b.0 * b.1).sum::<Vec2>() / light;
-            Peak { px, share: light / all }
-        });
-        let Some(peak) = peak.max_by(|a, b| a.share.total_cmp(&b.share)).filter(|p| p.share > 0.3) else { continue };
-        let slot = along(&peak.px).round() as i64;
-        let inside = peak.px.x > 0.0 && peak.px.y > 0.0 && peak.px.x < width - 1.0 && peak.px.y < height - 1.0;
-        let better = |old: &Peak| (along(&peak.px) - slot as f64).abs() < (along(&old.px) - slot as f64).abs();
-        if inside && columns.get(&slot).is_none_or(better) {
-            columns.insert(slot, peak);
-        }
-    }
-    columns.into_values().collect()
-}
-
 /// Direction in the picture in which the stripe moves with depth.
 pub fn across(station: &Station) -> Vec2 {
     let (sin, cos) = station.rig.laser.side_deg.to_radians().sin_cos();
@@ -134,8 +71,8 @@ pub fn looked_at(rig: &RigSpec, name: &str) -> (SceneSpec, Recipe) {
         (spec, Recipe::load(&root.join("data/recipes/led.toml")).unwrap(), [20.0, 13.0], "led")
     } else {
         let u = rig.scale();
-        // Steps of a scan of the plate alone, turned and tilted.
-        let shots = (SHOTS as f64 * 32.0 / 30.0) as usize;
+        // Steps of a scan of the plate alone, turned and tilted; finer ones than the rig's own do not make the map's cells finer.
+        let shots = ((SHOTS as f64 * 32.0 / 30.0) as usize).min(rig.shots());
         (rig.scene(), Recipe::parse(&rig.recipe(shots)).unwrap(), [21.0 * u, 14.5 * u], "notched")
     };
     let part = spec.part.iter().find(|p| p.name == part).unwrap().clone();
@@ -144,25 +81,35 @@ pub fn looked_at(rig: &RigSpec, name: &str) -> (SceneSpec, Recipe) {
     (spec, recipe)
 }
 
+/// The same camera with larger pixels: what a larger sensor would cost is time.
+fn small(mut rig: RigSpec) -> RigSpec {
+    const WIDTH: f64 = 800.0;
+    let c = &mut rig.camera;
+    let by = (WIDTH / f64::from(c.width_px)).min(1.0);
+    (c.width_px, c.height_px) = ((f64::from(c.width_px) * by) as u32, (f64::from(c.height_px) * by) as u32);
+    c.pixel_um /= by;
+    rig.sensor.blur_px *= by;
+    rig
+}
+
 impl World {
     pub fn new(index: usize) -> World {
         let name = DESIGNS[index];
         let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(format!("data/rigs/{name}.toml"));
-        let rig = RigSpec::load(&path).unwrap();
-        let (w, h) = (rig.camera.width_px, rig.camera.height_px);
-        // What a larger sensor would cost is time.
-        let width = w.min(800);
-        let station = Station::of(&rig, 100 + index as u64).with_size(width, width * h / w);
+        let rig = small(RigSpec::load(&path).unwrap());
+        let station = Station::of(&rig, 100 + index as u64);
         let unit = rig.scale();
         let (spec, mut recipe) = looked_at(&rig, name);
         // What is judged is the measurement: the robot that inserts is exact.
         (recipe.robot.sigma_mm, recipe.robot.sigma_deg) = (0.0, 0.0);
         recipe.gates.second_look = true;
         recipe.gates.max_unseen_height_mm *= unit.max(1.0);
+        // A turn of the hand-eye counts by the distance, whatever the field is.
+        recipe.gates.max_sigma_mm = recipe.gates.max_sigma_mm.max(4.0 * HAND_EYE_RAD * station.working_distance);
         let part = spec.part.iter().find(|p| p.name == recipe.name).unwrap();
         let in_scene: Rigid<InScene, Part> = part_pose(part);
         let [x0, _, x1, _] = spec.region_mm;
-        let reach = 0.72 * (x1 - x0) / (station.working_distance - station.laser.source.z);
+        let reach = 1.0 * (x1 - x0) / (station.working_distance - station.laser.source.z);
         let scene = Scene::new(spec).unwrap();
         let placed = base_from_scene(&station);
         let truth = placed * in_scene;
@@ -170,13 +117,10 @@ impl World {
         let path = scan(&station, &scene, SHOTS);
         let other = other_side(&truth, 150.0 + rng.random_range(0.0..60.0), 15.0 + rng.random_range(0.0..10.0));
         let looks = [None, Some(other)].map(|side| {
-            let shots = path.par_iter().map(|in_scene| {
-                let here = placed * *in_scene;
-                let camera = side.map_or(here, |s| s * here);
-                let seen = peaks(&station, &scene, &(placed.inverse() * camera), reach);
-                (seen, camera * station.flange_from_camera.inverse())
-            });
-            let (peaks, poses) = shots.unzip();
+            let seen: Vec<_> =
+                path.iter().map(|here| side.map_or(*here, |s| placed.inverse() * s * placed * *here)).collect();
+            let poses = seen.iter().map(|at| flange(&station, &(placed * *at))).collect();
+            let peaks = peaks(&station, &scene, &placed, &seen, reach);
             Recorded { peaks, poses }
         });
         World { station, unit, recipe, truth, looks }
@@ -192,6 +136,7 @@ impl World {
             }
             for peak in look.peaks.iter_mut().flatten() {
                 peak.px += across * (PEAK_PX * rng.sample::<f64, _>(StandardNormal));
+                peak.light *= 1.0 + LIGHT * rng.sample::<f64, _>(StandardNormal);
             }
         }
         looks
@@ -229,7 +174,7 @@ impl World {
                 out.push(CloudPoint {
                     position: [q.x as f32, q.y as f32, q.z as f32],
                     sigma_mm: (0.02 * self.unit) as f32,
-                    intensity: (150.0 * p.share) as f32,
+                    intensity: p.light as f32,
                     quality: 1.0,
                     shot: shot as u32,
                     u: p.px.x as f32,

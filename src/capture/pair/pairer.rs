@@ -123,11 +123,13 @@ impl Pairer {
                 Some(table.at(number, picture.count).map(|s| plain(Some(Pairing::Count), Some(s))))
             }
             Way::Step(poses, still) => {
-                // A picture may be long under way: where the device has a clock, its exposure began when that says.
+                // A picture may be long under way: where the device has a clock, its exposure was when that says.
                 let exposed = picture.exposure_ns.unwrap_or(0);
-                let told = picture.device_ns.and_then(|ns| clock.host(ns)).map(|m| (m.ns - m.sigma_ns).max(0.0) as u64);
-                let begun = told.unwrap_or(u64::MAX).min(picture.host_ns.saturating_sub(exposed));
-                let (from, to) = (begun.saturating_sub(BEFORE), picture.host_ns);
+                let told = picture.device_ns.and_then(|ns| clock.host(ns));
+                let begun = told.map_or(u64::MAX, |m| (m.ns - m.sigma_ns).max(0.0) as u64);
+                let ended = told.map_or(u64::MAX, |m| (m.ns + m.sigma_ns) as u64 + exposed + AROUND);
+                let from = begun.min(picture.host_ns.saturating_sub(exposed)).saturating_sub(AROUND);
+                let to = ended.min(picture.host_ns);
                 let (before, after) = match (poses.at(from), poses.at(to)) {
                     (Some(Ok(a)), Some(Ok(b))) => (a.stand, b.stand),
                     (Some(Err(why)), _) | (_, Some(Err(why))) => return Some(Err(why)),
@@ -161,8 +163,8 @@ impl Pairer {
     }
 }
 
-/// Something that stands still stood still this long before the picture too, ns.
-const BEFORE: u64 = 20_000_000;
+/// Something that stands still stood still this long before the picture too, and after it, or until it was here; ns.
+const AROUND: u64 = 20_000_000;
 
 struct Standing {
     pairing: Option<Pairing>,

@@ -5,28 +5,11 @@ use super::super::account::Account;
 use super::super::feed::Fate;
 use super::super::pair::LeftOut;
 use super::super::stream::{Stream, Streamed};
+use super::backlog::{Handing, Recorded};
 use super::recorder::{Kept, Recorder};
 use super::space::Space;
 use crate::fault::{Fault, Result};
-use crate::raster::Image;
-use crate::recording::{Slip, Stand};
-use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
-
-/// A shot that has been recorded.
-pub struct Recorded {
-    /// Where it lies.
-    pub kept: Kept,
-    /// The picture, where few wait to be read: the others are read from the disk again.
-    pub image: Option<Image>,
-    /// Where what moves stood.
-    pub stand: Option<Stand>,
-    /// How far that may be off.
-    pub slip: Option<Slip>,
-    /// When its last byte was here, ns of the host's clock.
-    pub here_ns: u64,
-}
 
 /// What a recording came to.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -41,26 +24,7 @@ pub struct Recording {
     pub left_out: Vec<LeftOut>,
 }
 
-/// Pictures that are handed on beside being written; more wait on the disk.
-const HANDED: usize = 16;
 const GLANCE: Duration = Duration::from_millis(200);
-
-/// Pictures handed on and not yet taken.
-#[derive(Clone, Default)]
-pub struct Backlog(Arc<Mutex<usize>>);
-
-impl Backlog {
-    fn add(&self) -> bool {
-        let mut n = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let room = *n < HANDED;
-        *n += usize::from(room);
-        room
-    }
-    /// A picture that was handed on was taken.
-    pub fn taken(&self) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) -= 1;
-    }
-}
 
 /// Records until the stream ends. `say` is told what a person should hear, and the account now and then. With `on` each shot is handed on.
 ///
@@ -69,7 +33,7 @@ impl Backlog {
 pub fn record(
     stream: &mut Stream,
     mut recorder: Recorder,
-    on: Option<(Sender<Recorded>, Backlog)>,
+    on: Option<&Handing>,
     mut say: impl FnMut(&Stream, Option<String>),
 ) -> Result<Recording> {
     let mut space = Space::of(recorder.folder());
@@ -93,11 +57,10 @@ pub fn record(
         match recorder.add(&shot.picture.image, shot.stand.as_ref(), shot.taken, stream.feed().fill()) {
             Ok(kept) => {
                 stream.fate(Fate::Used);
-                if let Some((send, backlog)) = &on {
-                    let here_ns = shot.picture.host_ns;
-                    let image = backlog.add().then_some(shot.picture.image);
-                    // Nobody reads any more: recording goes on.
-                    let _ = send.send(Recorded { kept, image, stand: shot.stand, slip, here_ns });
+                if let Some(handing) = on {
+                    let (image, here_ns) = (shot.picture.image, shot.picture.host_ns);
+                    let Kept { name, index } = kept;
+                    handing.hand(Recorded { name, index, image, stand: shot.stand, slip, here_ns });
                 }
             }
             Err(fault) => {
@@ -119,10 +82,4 @@ pub fn record(
     }
     let shots = finished?;
     Ok(Recording { shots, bytes, account: stream.account(), left_out })
-}
-
-/// [`record`] on a thread of its own; the shots come through the channel.
-pub fn handing_on() -> (Sender<Recorded>, Receiver<Recorded>, Backlog) {
-    let (send, receive) = channel();
-    (send, receive, Backlog::default())
 }

@@ -62,7 +62,7 @@ const RAMP: f64 = 0.1;
 /// Steps that a turn, or a way, of an axis is told in; only their ends are used.
 const STEPS: usize = 200;
 /// Rays a pixel's side of pictures in room light; how bright a board's fields are, as paper and toner.
-const RAYS: u32 = 2;
+const RAYS: u32 = 3;
 const WHITE: f64 = 0.85;
 const BLACK: f64 = 0.06;
 
@@ -91,15 +91,18 @@ impl SimMotion {
     /// A scene that cannot be read; numbers out of range.
     pub fn new(spec: &SimSpec) -> Result<SimMotion> {
         let [w, h] = spec.size;
-        let sound = (64..=8192).contains(&w)
-            && (64..=8192).contains(&h)
-            && (0.0..=1000.0).contains(&spec.rate_hz)
-            && (1e-3..=1e4).contains(&spec.speed)
-            && spec.delay_ms.abs() <= 1e3
-            && (1.0..=1e6).contains(&spec.exposure_us);
-        if !sound {
-            return Err(Fault::usage(format!("a simulated camera of {spec:?}"))
-                .next("sizes of 64 to 8192 px, rates up to 1000, speeds of 0.001 to 10,000, delays up to 1000 ms, exposures of 1 to 1e6 us"));
+        let ranges = [
+            ("size", f64::from(w), 64.0..=8192.0),
+            ("size", f64::from(h), 64.0..=8192.0),
+            ("rate", spec.rate_hz, 0.0..=1e3),
+            ("speed", spec.speed, 1e-3..=1e4),
+            ("delay_ms", spec.delay_ms, -1e3..=1e3),
+            ("exposure_us", spec.exposure_us, 1.0..=1e6),
+        ];
+        if let Some((name, value, range)) = ranges.iter().find(|(_, value, range)| !range.contains(value)) {
+            let (least, most) = (range.start(), range.end());
+            return Err(Fault::usage(format!("sim:{}: {name} is {value:e}, wanted {least} to {most}", spec.seed))
+                .next("correct the camera's address (docs/live.md)"));
         }
         let station = Station::random(spec.seed).with_size(w, h);
         let scene = match &spec.scene {
@@ -197,6 +200,8 @@ pub struct SimCamera {
     hot: Vec<(usize, f32)>,
     start: u64,
     next: u64,
+    /// Pictures that began before this moment of the host's have this exposure, us.
+    former: (u64, f64),
 }
 
 impl SimCamera {
@@ -207,15 +212,21 @@ impl SimCamera {
         let station = &motion.station;
         let pixels = station.camera.width as usize * station.camera.height as usize;
         let hot = hot_pixels(&station.sensor, pixels, &mut station.rng("hot", 0));
-        Ok(SimCamera { motion, spec: spec.clone(), hot, start: now_ns(), next: 0 })
+        Ok(SimCamera { motion, spec: spec.clone(), hot, start: now_ns(), next: 0, former: (0, 0.0) })
     }
 
-    fn render(&self, scene_from_camera: Rigid<InScene, Camera>) -> Image {
+    /// Of a picture that begins then, ns: a setting holds for what begins after it.
+    fn exposure(&self, begun: u64) -> u64 {
+        let (until, former) = self.former;
+        (1e3 * if begun < until { former } else { self.spec.exposure_us }) as u64
+    }
+
+    fn render(&self, scene_from_camera: Rigid<InScene, Camera>, exposure: u64) -> Image {
         let station = &*self.motion.station;
         let view = View { station, scene: &self.motion.scene, scene_from_camera };
         let (w, h) = (station.camera.width, station.camera.height);
         // The sensor's figures are those of a millisecond.
-        let longer = (1e-3 * self.spec.exposure_us) as f32;
+        let longer = (1e-6 * exposure as f64) as f32;
         let (mut light, leak) = (Canvas::new(w, h), station.sensor.ambient_leak);
         let (room, gain) = if self.motion.board {
             (view.ambient(RAYS), station.sensor.ambient_white as f32)
@@ -237,10 +248,10 @@ impl PictureSource for SimCamera {
 
     fn next(&mut self, within: Duration) -> Event {
         let period = if self.spec.rate_hz > 0.0 { (1e9 / self.spec.rate_hz) as u64 } else { 0 };
-        let exposure = (1e3 * self.spec.exposure_us) as u64;
         let now = now_ns();
         if period > 0 {
             let due = self.start + self.next * period;
+            let exposure = self.exposure(due);
             if due + exposure > now {
                 std::thread::sleep(Duration::from_nanos(due + exposure - now).min(within));
                 if due + exposure > now_ns() {
@@ -251,8 +262,9 @@ impl PictureSource for SimCamera {
             self.next = self.next.max((now_ns() - exposure - self.start) / period);
         }
         let begun = if period > 0 { self.start + self.next * period } else { now };
+        let exposure = self.exposure(begun);
         let (scene_from_camera, stand) = self.motion.at(begun + exposure / 2);
-        let image = self.render(scene_from_camera);
+        let image = self.render(scene_from_camera, exposure);
         let delay = (1e6 * self.spec.delay_ms) as i64;
         let id = self.next;
         self.next += 1;
@@ -300,7 +312,7 @@ impl PictureSource for SimCamera {
             return Err(Fault::usage(format!("{name} = {value}: allowed is {low} to {high}")).next("set it within"));
         }
         if name == "ExposureTime" {
-            self.spec.exposure_us = v;
+            (self.former, self.spec.exposure_us) = ((now_ns(), self.spec.exposure_us), v);
         } else {
             (self.spec.rate_hz, self.start, self.next) = (v, now_ns(), 0);
         }

@@ -78,7 +78,9 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Tune(named) => {
             let mut source = named.open()?;
             let tuned = tune(source.as_mut(), |us, seen| console.say(format!("{us:.0} us: {seen}")))?;
-            console.result(&tuned, &format!("ExposureTime is {:.0} us\n{}", tuned.exposure_us, tuned.look));
+            let remark =
+                tuned.remark.as_ref().map_or(String::new(), |said| format!("no exposure is quite right: {said}\n"));
+            console.result(&tuned, &format!("ExposureTime is {:.0} us\n{remark}{}", tuned.exposure_us, tuned.look));
             Ok(())
         }
     }
@@ -97,9 +99,11 @@ fn list(console: &Console) -> Result<()> {
     let videos: Vec<String> = (0..16).map(|k| format!("/dev/video{k}")).filter(|p| Path::new(p).exists()).collect();
     videos.iter().for_each(|v| text += &format!("ffmpeg:-f v4l2 -i {v}  a video device\n"));
     if text.is_empty() {
-        text = "no camera answered: asked were all interfaces by GigE Vision's broadcast (UDP 3956), and /dev/video*; \
-                a firewall that drops UDP hides cameras\n"
-            .into();
+        text = format!(
+            "no camera answered: asked were {} by GigE Vision's broadcast (UDP 3956), and /dev/video*; \
+             a firewall that drops UDP hides cameras\n",
+            crate::capture::source::gige::interfaces()
+        );
     }
     console.result(&serde_json::json!({ "gige": found, "video": videos }), &text);
     Ok(())

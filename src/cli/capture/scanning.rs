@@ -2,7 +2,7 @@
 //! Frame and unit: as `sheetlight scan`.
 
 use super::options::{Capture, Teller};
-use crate::capture::record::{RecordReport, Recorder, RecorderOptions, handing_on, record};
+use crate::capture::record::{Backlog, RecordReport, Recorder, RecorderOptions, record};
 use crate::capture::{Mode, RawFormat};
 use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
@@ -52,18 +52,18 @@ pub fn scan_camera(
     };
     let recorder = Recorder::create(keep, stream.format(), options_of(motion, capture.sources(stream.feed())))?;
     let meta = recorder.meta();
-    let (send, receive, backlog) = handing_on();
+    let (handing, backlog) = Backlog::new();
     let report: Arc<Mutex<Option<Result<RecordReport>>>> = Arc::default();
-    let (theirs, handed, mut hear): (_, _, Teller) = (report.clone(), backlog.clone(), teller.clone());
+    let (theirs, mut hear): (_, Teller) = (report.clone(), teller.clone());
     let recording = move || {
-        let done = record(&mut stream, recorder, Some((send.clone(), handed)), |s, said| hear.hear(s, said));
+        let done = record(&mut stream, recorder, Some(&handing), |s, said| hear.hear(s, said));
         hear.account(&stream);
         *theirs.lock().unwrap_or_else(std::sync::PoisonError::into_inner) = Some(done);
-        drop(send);
+        drop(handing);
     };
     let thread = std::thread::Builder::new().name("recorder".into()).spawn(recording);
     let thread = thread.map_err(|e| Fault::threads(&e))?;
-    let source = RecordedSource::new(keep.to_owned(), meta, receive, backlog, report.clone());
+    let source = RecordedSource::new(keep.to_owned(), meta, backlog, report.clone());
     let scanned =
         crate::station::scan("camera", &name, |_| Ok(Box::new(source) as Box<dyn Source>), rig, options, progress);
     // Where the scan failed, recording goes on until the stream ends: pictures cannot be taken again.

@@ -14,7 +14,7 @@ use crate::find::look::size_check::SizeCheck;
 use crate::find::measure::construct::{Built, build, features};
 use crate::find::measure::points::{Ordered, localise};
 use crate::find::measure::pose::{Measured, measure};
-use crate::find::measure::slide::{long_axis, slide};
+use crate::find::measure::slide::{long_axis, settle, slide};
 use crate::find::model::mirror::own_mirror_image;
 use crate::find::model::shape_model::ShapeModel;
 use crate::find::scene::{Kind, Layer, Scene};
@@ -245,9 +245,16 @@ fn best_hypothesis(
     let mut kept: Option<(f64, Judged)> = None;
     let mut trouble = None;
     let searched = std::iter::once(best.clone()).chain(rivals).chain(matches.iter().skip(1).cloned()).take(MOST);
-    let starts = expected.map(|e| (best.clone(), *e)).into_iter();
-    for (found, start) in starts.chain(searched.map(|m| (m.clone(), lift(&m.pose, map, points, recipe)))) {
-        let start = slide(points, &drawing, start, &recipe.measure);
+    let slid = |(m, start): (Match, Rigid<Base, Part>)| (m, slide(points, &drawing, start, &recipe.measure));
+    let starts = expected.map(|e| slid((best.clone(), *e))).into_iter();
+    // Before its rivals the best match itself, where the points say that it lies.
+    let settled = std::iter::once_with(|| {
+        let start = settle(points, &drawing, lift(&best.pose, map, points, recipe), &recipe.measure);
+        (best.clone(), start)
+    });
+    let mut searched = searched.map(|m| (m.clone(), lift(&m.pose, map, points, recipe))).map(slid);
+    let first = searched.next();
+    for (found, start) in starts.chain(first).chain(settled).chain(searched) {
         let measured = match measure(points, &drawing, start, &recipe.measure) {
             Ok(measured) => measured,
             Err(e) => {

@@ -59,8 +59,11 @@ pub fn lines(raw: &Raw, light: Option<&Raw>, stated: &Stated) -> Result<Lines> {
         return Err(Fault::usage(format!("the unit is {unit} mm, wanted {} to {}", UNITS_MM.start(), UNITS_MM.end()))
             .next("correct --unit-mm"));
     }
-    if stated.spacing_mm.is_some_and(|s| s.iter().any(|v| !(UNITS_MM.contains(v)))) {
-        return Err(Fault::usage("the spacing is not above 0 mm").next("correct --spacing-mm"));
+    if let Some(wrong) = stated.spacing_mm.iter().flatten().find(|v| !UNITS_MM.contains(v)) {
+        let (least, most) = (UNITS_MM.start(), UNITS_MM.end());
+        return Err(
+            Fault::usage(format!("a spacing of {wrong:e} mm, wanted {least} to {most}")).next("correct --spacing-mm")
+        );
     }
     if !(stated.offset_mm.abs() <= FARTHEST_MM) || stated.sigma_mm.is_some_and(|s| !(s > 0.0 && s < 100.0)) {
         return Err(Fault::usage("offset or sigma out of range")
@@ -125,6 +128,9 @@ fn picture(
         let place = [x as f64 * dx, sign * y as f64 * dy, stated.offset_mm + unit * f64::from(v)];
         (y as u32, x as u32, place, light.map_or(1.0, |l| l[i]))
     };
+    if let Some(level) = missing.filter(|level| !levels.iter().any(|v| f64::from(*v) == *level)) {
+        notes.push(format!("no pixel has the level {level:?} that --missing names: every pixel counts as measured"));
+    }
     let there = |v: f32| v.is_finite() && missing != Some(f64::from(v));
     Ok(levels.iter().enumerate().filter(|(_, v)| there(**v)).map(|(i, v)| at(i, *v)).collect())
 }

@@ -17,7 +17,7 @@ use crate::find::insert::picture;
 use crate::find::{LocateOptions, Recipe, Report, locate};
 use crate::geometry::{Base, Flange, Mat3, Rigid, Vec3};
 use crate::recording::Beam;
-use crate::rig::Rig;
+use crate::rig::{Rig, hash_file, hash_text};
 use crate::robot::Convention;
 use crate::scan::Where;
 use crate::station::scan::recorded::scan_recording;
@@ -104,9 +104,13 @@ impl<'a> Job<'a> {
                 .next("write [tool] with flange_from_tool = [16 numbers] (docs/robots.md)"));
         }
         crate::files::make_folder(&options.out)?;
+        let made_from = hash_text(format!("{} {}", hash_file(&options.recipe)?, rig.fingerprint()).as_bytes());
         let state = match JobState::load(&options.out)? {
-            Some(state) => state,
-            None => JobState::new(guard.link().pose()?.base_from_flange),
+            Some(state) => {
+                state.goes_on_with(&made_from).map_err(|e| e.at(options.out.display()))?;
+                state
+            }
+            None => JobState { made_from, ..JobState::new(guard.link().pose()?.base_from_flange) },
         };
         let eye = Eye::new(camera, settings.outputs.unwrap_or_default());
         Ok(Job { options, settings, rig, recipe, guard, eye, operator, state, found: None, since: Instant::now() })

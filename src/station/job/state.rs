@@ -3,6 +3,7 @@
 
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid, Vec3};
+use crate::rig::{sealed, unsealed};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -34,6 +35,9 @@ pub enum Phase {
 pub struct JobState {
     /// Version of this file: 1.
     pub format: u32,
+    /// Of the recipe's text and the station's calibrations: its poses are good with these only.
+    #[serde(default)]
+    pub made_from: String,
     /// What is done next.
     pub phase: Phase,
     /// A motion was begun and its end was not written down: nobody knows where the arm is.
@@ -64,12 +68,14 @@ pub struct JobState {
 }
 
 const NAME: &str = "job.json";
+const ANEW: &str = "look at the robot, then begin a new job in another folder";
 
 impl JobState {
     /// A job that begins where the arm stands.
     pub fn new(start: Rigid<Base, Flange>) -> JobState {
         JobState {
             format: 1,
+            made_from: String::new(),
             phase: Phase::Touch,
             moving: false,
             start,
@@ -89,26 +95,41 @@ impl JobState {
     /// The job in a folder; `None` where none was begun there.
     ///
     /// # Errors
-    /// A job.json that cannot be read.
+    /// A job.json that cannot be read, or that is not as it was written: the arm is moved by what it says.
     pub fn load(folder: &Path) -> Result<Option<JobState>> {
         let path = folder.join(NAME);
         let Some(text) = crate::files::read_text_if_there(&path)? else { return Ok(None) };
-        let state: JobState = serde_json::from_str(&text).map_err(|e| {
-            Fault::input(format!("{}: is not a job: {e}", path.display()))
-                .cause("it was edited, or another version wrote it")
-                .next("look at the robot, then begin a new job in another folder")
-        })?;
+        let state: JobState = unsealed(&text, &path.display().to_string()).map_err(|e| e.next(ANEW))?;
         if state.format != 1 {
             return Err(Fault::input(format!("{}: format {}, 1 is read", path.display(), state.format))
                 .cause("another version wrote it")
-                .next("begin a new job in another folder"));
+                .next(ANEW));
         }
         Ok(Some(state))
     }
 
+    /// Goes on only with the recipe and the calibrations that its poses were made from; back up it may go with any.
+    ///
+    /// # Errors
+    /// Another recipe or other calibrations.
+    pub fn goes_on_with(&self, made_from: &str) -> Result<()> {
+        let way_up = matches!(self.phase, Phase::Retract | Phase::Done | Phase::Stopped)
+            || (self.moving && matches!(self.phase, Phase::Approach | Phase::Insert));
+        if way_up || self.made_from == made_from {
+            return Ok(());
+        }
+        let name = |hash: &str| if hash.is_empty() { "none".into() } else { format!("{hash:.12}") };
+        Err(Fault::input(format!(
+            "the job was begun with another recipe or other calibrations: {}, now {}",
+            name(&self.made_from),
+            name(made_from)
+        ))
+        .cause("another --recipe or --station, or one of them was changed since")
+        .next("put them back, or begin a new job in another folder"))
+    }
+
     /// Writes it down.
     pub fn store(&self, folder: &Path) -> Result<()> {
-        let text = serde_json::to_string_pretty(self).expect("plain data");
-        crate::files::write(&folder.join(NAME), text.as_bytes())
+        crate::files::write(&folder.join(NAME), sealed(self).as_bytes())
     }
 }

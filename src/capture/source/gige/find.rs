@@ -89,8 +89,8 @@ pub fn find(word: &str) -> Result<DeviceInfo> {
     }
 }
 
-/// The interfaces that were asked, as far as the system tells.
-fn interfaces() -> String {
+/// The interfaces that are asked, as far as the system tells.
+pub fn interfaces() -> String {
     let names = std::fs::read_dir("/sys/class/net")
         .map_or(Vec::new(), |all| all.flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect());
     if names.is_empty() { "all interfaces".into() } else { names.join(", ") }

@@ -7,5 +7,5 @@ mod numbers;
 mod pixels;
 
 pub use camera::GigeCamera;
-pub use find::{Found, find, found};
+pub use find::{Found, find, found, interfaces};
 pub use pixels::{depth, unpack};

@@ -1,0 +1,354 @@
+//! In: a camera whose pictures show a stripe. Out: pictures that were exposed after a moment; the exposure that suits the stripe.
+//! Frame and unit: exposure in us; shares of full scale; the device's time in ns.
+
+use super::feature::{Range, Value};
+use super::look::{Look, MOST_SATURATED, WANTED, look, look_at};
+use super::picture::{Event, PictureSource};
+use crate::fault::{Fault, Result};
+use crate::raster::Image;
+use std::time::{Duration, Instant};
+
+/// A sensor that is read while it is exposed takes up a setting a picture later.
+const PIPELINE: usize = 1;
+/// The same where nobody says when a picture was exposed, after those that waited already.
+const UNDATED: usize = 2;
+/// More pictures than any camera's driver keeps waiting.
+const WAITING: usize = 256;
+/// A picture's time and its camera's clock that are farther apart, ns, are not of one clock.
+const ONE_CLOCK: u64 = 60_000_000_000;
+/// An exposure of seconds, and cameras that begin slowly.
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// Pictures that were exposed after a moment, however long others were under way.
+struct Fresh<'a> {
+    source: &'a mut dyn PictureSource,
+    /// That moment by the device's own clock, where it has one.
+    since: Option<u64>,
+    skip: usize,
+    patience: Duration,
+}
+
+impl<'a> Fresh<'a> {
+    fn now(source: &'a mut dyn PictureSource, patience: Duration) -> Fresh<'a> {
+        let since = source.clock().ok().flatten().map(|trip| trip.there_ns);
+        if since.is_none() {
+            (0..WAITING).take_while(|_| matches!(source.next(Duration::ZERO), Event::Picture(_))).for_each(drop);
+        }
+        let skip = if since.is_some() { PIPELINE } else { UNDATED };
+        Fresh { source, since, skip, patience }
+    }
+
+    fn former(&self, begun: Option<u64>) -> bool {
+        let before = |(since, begun): (u64, u64)| begun < since && since - begun < ONE_CLOCK;
+        self.since.zip(begun).is_some_and(before)
+    }
+
+    fn next(&mut self) -> Result<Image> {
+        let until = Instant::now() + self.patience;
+        while Instant::now() < until {
+            match self.source.next(Duration::from_millis(100)) {
+                Event::Picture(picture) if self.former(picture.device_ns) => {}
+                Event::Picture(_) if self.skip > 0 => self.skip -= 1,
+                Event::Picture(picture) => return Ok(picture.image),
+                Event::Lost(fault) => return Err(fault),
+                Event::Ended => break,
+                Event::Quiet | Event::Incomplete { .. } => {}
+            }
+        }
+        Err(Fault::input(format!("{}: no picture within {:.0} s", self.source.name(), self.patience.as_secs_f64()))
+            .cause("it waits for a trigger, or its packets do not come through (packet size, firewall)")
+            .next("see TriggerMode: sheetlight camera show; or try gige://...?packet=1500"))
+    }
+}
+
+/// The next picture that was taken after now.
+///
+/// # Errors
+/// None comes within `patience`; the camera is gone.
+pub fn fresh(source: &mut dyn PictureSource, patience: Duration) -> Result<Image> {
+    Fresh::now(source, patience).next()
+}
+
+/// What tuning came to.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Tuned {
+    /// us.
+    pub exposure_us: f64,
+    /// What pictures look like at it.
+    pub look: Look,
+    /// Where no exposure is right: why this one is the best.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub remark: Option<String>,
+}
+
+const TRIES: usize = 20;
+/// Peaks that are needed to tell a share of half a hundredth, and pictures that they are gathered from at most.
+const PEAKS: usize = 1000;
+const PICTURES: usize = 8;
+/// Too dark and too bright so near each other: nothing between them is right.
+const NARROW: f64 = 1.04;
+/// Peaks below half of full scale are too dark for the sake of a few glints.
+const DIMMEST: f64 = 0.5;
+/// Where saturation is the limit, peaks are to stand just inside their range.
+const CAREFUL: f64 = WANTED[0] + 0.02;
+
+/// Finds the exposure at which the stripe's peak is right, and leaves it set.
+///
+/// # Errors
+/// A source without ExposureTime; no stripe at any exposure; a stripe too bright or too dark at the ends of its range; one whose glints
+/// saturate while the rest is dark.
+pub fn tune(source: &mut dyn PictureSource, mut tried: impl FnMut(f64, &Look)) -> Result<Tuned> {
+    let (name, [low, high], mut exposure_us) = exposure(source)?;
+    let mut bounds = Bounds::default();
+    for _ in 0..TRIES {
+        let seen = judged(source)?;
+        tried(exposure_us, &seen);
+        if seen.right() {
+            return Ok(Tuned { exposure_us, look: seen, remark: None });
+        }
+        let Some(wish) = bounds.next(exposure_us, &seen) else { return settle(source, &name, &bounds, tried) };
+        let next = wish.clamp(low, high);
+        if (next - exposure_us).abs() < 1e-3 * exposure_us {
+            return Err(Fault::refused(format!(
+                "at {exposure_us:.0} us, the end of its range ({low:.0} to {high:.0}), {seen}"
+            ))
+            .cause("laser, lens aperture or gain do not suit")
+            .next("change the aperture, the laser's power or the gain, then tune again"));
+        }
+        exposure_us = next;
+        source.set(&name, &format!("{exposure_us}"))?;
+    }
+    Err(Fault::refused(format!("no exposure suits after {TRIES} tries, the last was {exposure_us:.0} us"))
+        .cause("the light changes: a laser that is switched, room light, something that moves")
+        .next("hold everything still and tune again"))
+}
+
+/// The feature's name, its range, its value.
+fn exposure(source: &mut dyn PictureSource) -> Result<(String, [f64; 2], f64)> {
+    let features = source.features()?;
+    let names = ["ExposureTime", "ExposureTimeAbs"];
+    let feature = names.iter().find_map(|n| features.iter().find(|f| f.name == *n)).ok_or_else(|| {
+        Fault::usage(format!("{}: has no ExposureTime to set", source.name()))
+            .cause("a pipe, a folder, a file, or a camera whose exposure is set elsewhere")
+            .next("set the exposure there; sheetlight camera snap says how the stripe looks")
+    })?;
+    let range = if let Range::Between(low, high) = feature.range { [low.max(1.0), high] } else { [1.0, 1e6] };
+    let value = match feature.value {
+        Some(Value::Float(v)) => v,
+        Some(Value::Integer(v)) => v as f64,
+        _ => 1000.0,
+    };
+    Ok((feature.name.clone(), range, value))
+}
+
+/// What pictures of now look like: where they may be right, of as many as a few per mille are told from.
+fn judged(source: &mut dyn PictureSource) -> Result<Look> {
+    let mut fresh = Fresh::now(source, PATIENCE);
+    let mut images = vec![fresh.next()?];
+    let first = look(&images[0]);
+    let Some(stripe) = first.stripe.as_ref().filter(|s| s.peak > DIMMEST && s.saturated < 10.0 * MOST_SATURATED) else {
+        return Ok(first);
+    };
+    let lines = if stripe.lying { images[0].width } else { images[0].height };
+    let wanted = PEAKS.div_ceil(lines as usize).min(PICTURES);
+    while images.len() < wanted {
+        images.push(fresh.next()?);
+    }
+    Ok(look_at(&images))
+}
+
+/// Neither side is right: the brightest exposure that saturates nothing.
+fn settle(
+    source: &mut dyn PictureSource,
+    name: &str,
+    bounds: &Bounds,
+    mut tried: impl FnMut(f64, &Look),
+) -> Result<Tuned> {
+    let (dark, bright) = (bounds.dark.unwrap_or(1.0), bounds.bright.unwrap_or(1.0));
+    source.set(name, &format!("{dark}"))?;
+    let seen = judged(source)?;
+    tried(dark, &seen);
+    let Some(peak) = seen.stripe.as_ref().map(|s| s.peak) else {
+        return Err(Fault::refused(format!("no stripe at {dark:.0} us, and at {bright:.0} us too much light; {seen}"))
+            .cause("the laser is off or out of view, or room light is brighter than it")
+            .next("switch the laser on and the room light off, look with sheetlight camera snap, then tune again"));
+    };
+    let most = 100.0 * MOST_SATURATED;
+    let said = format!(
+        "peaks stand at {:.0} % of full scale at {dark:.0} us, and at {bright:.0} us more than {most} % of them are saturated",
+        100.0 * peak
+    );
+    if peak < DIMMEST {
+        return Err(Fault::refused(said)
+            .cause("glints: a part that shines in places and is dark in others")
+            .next("turn or matt the part, or set an exposure by hand: sheetlight camera set ExposureTime US"));
+    }
+    Ok(Tuned { exposure_us: dark, look: seen, remark: Some(said) })
+}
+
+/// The longest exposure that was too dark, the shortest that was too bright.
+#[derive(Default)]
+struct Bounds {
+    dark: Option<f64>,
+    bright: Option<f64>,
+}
+
+impl Bounds {
+    /// What to try after an exposure that is not right; none where nothing between the two sides can be.
+    fn next(&mut self, exposure_us: f64, seen: &Look) -> Option<f64> {
+        let factor = factor(seen);
+        if factor < 1.0 {
+            self.bright = Some(exposure_us);
+        } else {
+            self.dark = Some(exposure_us);
+        }
+        let aim = exposure_us * factor;
+        let (Some(dark), Some(bright)) = (self.dark, self.bright) else { return Some(aim) };
+        if dark >= bright {
+            // The light changed: what was known of the other side is not true any more.
+            *self = Bounds::default();
+            return Some(aim);
+        }
+        let within = aim > dark && aim < bright;
+        (bright > NARROW * dark).then(|| if within { aim } else { (dark * bright).sqrt() })
+    }
+}
+
+/// By how much an exposure that is not right is to be multiplied.
+fn factor(seen: &Look) -> f64 {
+    let middle = 0.5 * (WANTED[0] + WANTED[1]);
+    match &seen.stripe {
+        // Nothing is known of what lies above full scale.
+        Some(s) if s.saturated > 0.2 => 0.4,
+        Some(s) if s.saturated > MOST_SATURATED => {
+            if 0.95 * s.peak > CAREFUL {
+                CAREFUL / s.peak
+            } else {
+                0.8
+            }
+        }
+        Some(s) => (middle / s.peak).clamp(0.2, 5.0),
+        None if seen.saturated > 0.01 => 0.3,
+        None => 4.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::capture::feature::Feature;
+    use crate::capture::{Format, Picture, RoundTrip};
+    use std::collections::VecDeque;
+
+    /// Pictures of 100x80 at 50 a second by its own clock; `waiting` of them are always under way, so that those that come after a setting
+    /// were exposed long before it. One line of `glint` shines `glints` times as bright.
+    struct Late {
+        exposure_us: f64,
+        ns: u64,
+        dated: bool,
+        glint: u32,
+        glints: f64,
+        waiting: VecDeque<(u64, f64)>,
+        set: Vec<f64>,
+    }
+
+    impl Late {
+        fn new(exposure_us: f64, dated: bool, glint: u32) -> Late {
+            Late {
+                exposure_us,
+                ns: 7_000_000_000,
+                dated,
+                glint,
+                glints: 10.0,
+                waiting: VecDeque::new(),
+                set: Vec::new(),
+            }
+        }
+
+        fn fill(&mut self, most: usize) {
+            while self.waiting.len() < most {
+                self.waiting.push_back((self.ns, self.exposure_us));
+                self.ns += 20_000_000;
+            }
+        }
+    }
+
+    impl PictureSource for Late {
+        fn format(&self) -> Format {
+            Format { width: 100, height: 80, bits: 8 }
+        }
+        fn next(&mut self, within: Duration) -> Event {
+            if within.is_zero() && self.waiting.is_empty() {
+                return Event::Quiet;
+            }
+            if !within.is_zero() {
+                self.fill(1);
+            }
+            let (ns, exposure_us) = self.waiting.pop_front().expect("filled");
+            let level = |x: u32, y: u32| {
+                let glint = if self.glint > 0 && x.is_multiple_of(self.glint) { self.glints } else { 1.0 };
+                let across = f64::from(y) - 40.0;
+                (2.0 + 0.1 * exposure_us * glint * (-0.5 * across * across / 2.25).exp()).min(255.0) as u8
+            };
+            let levels = (0..80).flat_map(|y| (0..100).map(move |x| (x, y))).map(|(x, y)| level(x, y)).collect();
+            Event::Picture(Box::new(Picture {
+                image: Image::from_u8(100, 80, levels),
+                id: ns / 20_000_000,
+                device_ns: self.dated.then_some(ns),
+                host_ns: ns,
+                exposure_ns: None,
+                count: None,
+                stand: None,
+            }))
+        }
+        fn clock(&mut self) -> Result<Option<RoundTrip>> {
+            let ns = self.ns;
+            Ok(self.dated.then_some(RoundTrip { before_ns: ns, there_ns: ns, after_ns: ns }))
+        }
+        fn features(&mut self) -> Result<Vec<Feature>> {
+            let value = Some(Value::Float(self.exposure_us));
+            let range = Range::Between(1.0, 1e5);
+            Ok(vec![Feature { name: "ExposureTime".into(), value, unit: "us".into(), range, writable: true }])
+        }
+        fn set(&mut self, _: &str, value: &str) -> Result<()> {
+            // What is under way was exposed before.
+            self.fill(6);
+            self.exposure_us = value.parse().expect("a number");
+            self.set.push(self.exposure_us);
+            Ok(())
+        }
+        fn name(&self) -> String {
+            "late".into()
+        }
+    }
+
+    #[test]
+    fn pictures_of_the_former_exposure_are_not_judged_however_many_are_under_way() {
+        for dated in [true, false] {
+            for from in [50.0, 30_000.0] {
+                let mut camera = Late::new(from, dated, 0);
+                let tuned = tune(&mut camera, |_, _| {}).unwrap();
+                let peak = (2.0 + 0.1 * tuned.exposure_us) / 255.0;
+                assert!((WANTED[0]..=WANTED[1]).contains(&peak) && tuned.remark.is_none(), "{tuned:?}");
+                // Each step is one that its own pictures ask for: at 0.1 levels a us, none is taken twice.
+                assert!(camera.set.len() <= 9, "dated {dated}: {:?}", camera.set);
+                assert!(camera.set.is_sorted() == (from < 100.0), "it turned back: {:?}", camera.set);
+            }
+        }
+    }
+
+    #[test]
+    fn where_a_few_glints_saturate_it_settles_on_what_is_best_or_says_so() {
+        // One line in fifty shines: two peaks in a hundred are saturated before the others are half as bright.
+        let fault = tune(&mut Late::new(1000.0, true, 50), |_, _| {}).unwrap_err();
+        assert!(fault.what.contains("are saturated") && fault.next.contains("camera set ExposureTime"), "{fault}");
+        // As bright again as the others: these are at 60 % where it saturates.
+        let tuned = tune(&mut Late { glints: 1.6, ..Late::new(1000.0, true, 50) }, |_, _| {}).unwrap();
+        let stripe = tuned.look.stripe.as_ref().unwrap();
+        assert!((0.58..0.66).contains(&stripe.peak) && stripe.saturated <= MOST_SATURATED, "{tuned:?}");
+        assert!(tuned.remark.is_some_and(|said| said.contains("are saturated")));
+        // No laser, room light.
+        let fault = tune(&mut Late { glints: 0.0, ..Late::new(1000.0, true, 1) }, |_, _| {}).unwrap_err();
+        assert!(fault.what.contains("no stripe"), "{fault}");
+    }
+}
