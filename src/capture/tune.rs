@@ -118,9 +118,13 @@ pub fn tune(source: &mut dyn PictureSource, mut tried: impl FnMut(f64, &Look)) -
         exposure_us = next;
         source.set(&name, &format!("{exposure_us}"))?;
     }
-    Err(Fault::refused(format!("no exposure suits after {TRIES} tries, the last was {exposure_us:.0} us"))
+    Err(changes(format!("no exposure suits after {TRIES} tries, the last was {exposure_us:.0} us")))
+}
+
+fn changes(what: String) -> Fault {
+    Fault::refused(what)
         .cause("the light changes: a laser that is switched, room light, something that moves")
-        .next("hold everything still and tune again"))
+        .next("hold everything still and tune again")
 }
 
 /// The feature's name, its range, its value.
@@ -168,7 +172,7 @@ fn settle(
     source.set(name, &format!("{dark}"))?;
     let seen = judged(source)?;
     tried(dark, &seen);
-    let Some(peak) = seen.stripe.as_ref().map(|s| s.peak) else {
+    let Some((peak, saturated)) = seen.stripe.as_ref().map(|s| (s.peak, s.saturated)) else {
         return Err(Fault::refused(format!("no stripe at {dark:.0} us, and at {bright:.0} us too much light; {seen}"))
             .cause("the laser is off or out of view, or room light is brighter than it")
             .next("switch the laser on and the room light off, look with sheetlight camera snap, then tune again"));
@@ -178,6 +182,9 @@ fn settle(
         "peaks stand at {:.0} % of full scale at {dark:.0} us, and at {bright:.0} us more than {most} % of them are saturated",
         100.0 * peak
     );
+    if saturated > MOST_SATURATED {
+        return Err(changes(format!("at {dark:.0} us, where it was too dark before, {seen}")));
+    }
     if peak < DIMMEST {
         return Err(Fault::refused(said)
             .cause("glints: a part that shines in places and is dark in others")
