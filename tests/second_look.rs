@@ -15,6 +15,7 @@ use common::pose::Off;
 use edits::EDITS;
 use rayon::prelude::*;
 use sheetlight::find::Report;
+use std::sync::OnceLock;
 use world::{Believed, DESIGNS, Recorded, World};
 
 /// Stations that are looked at, and right draws of each.
@@ -23,6 +24,11 @@ fn long() -> bool {
 }
 fn worlds() -> usize {
     if long() { DESIGNS.len() } else { 1 }
+}
+/// Rendered once for both tests.
+fn world(index: usize) -> &'static World {
+    static MADE: [OnceLock<World>; DESIGNS.len()] = [const { OnceLock::new() }; DESIGNS.len()];
+    MADE[index].get_or_init(|| World::new(index))
 }
 
 /// Wrong by more than it says and by more than can be borne.
@@ -83,8 +89,8 @@ fn tried(world: &World, name: &str, edit: fn(&mut Believed, &mut [Recorded; 2]))
 fn no_edit_of_a_station_or_recording_passes_two_looks_with_a_wrong_pose() {
     let (mut alone, mut both) = (0, 0);
     for index in 0..worlds() {
-        let world = World::new(index);
-        let passed: Vec<Passed> = EDITS.par_iter().map(|(name, edit)| tried(&world, name, *edit)).collect();
+        let world = world(index);
+        let passed: Vec<Passed> = EDITS.par_iter().map(|(name, edit)| tried(world, name, *edit)).collect();
         let count = |f: fn(&Passed) -> bool| passed.iter().filter(|p| f(p)).count();
         let (one, two) = (count(|p| p.one), count(|p| p.two));
         println!("{}: {one} wrong poses pass one look, {two} two, of {}", world.station.rig.name, EDITS.len());
@@ -138,8 +144,8 @@ fn right_stations_pass_two_looks_and_the_pose_is_as_good_as_it_says() {
         [0, 1, 2].map(|k| (of.iter().map(|r| f(r)[k]).sum::<f64>() / of.len() as f64).sqrt())
     };
     for index in 0..worlds() {
-        let world = World::new(index);
-        let here: Vec<Right> = (0..draws).into_par_iter().filter_map(|draw| right(&world, draw)).collect();
+        let world = world(index);
+        let here: Vec<Right> = (0..draws).into_par_iter().filter_map(|draw| right(world, draw)).collect();
         println!(
             "{}: {} of {draws} pass; error over stated sigma {:.2?} of one look, {:.2?} of two",
             world.station.rig.name,
