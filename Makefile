@@ -5,16 +5,18 @@
 
 CARGO ?= cargo
 VENV := .venv
+# Where cargo puts what it builds: a person may have set another folder.
+TARGET := $(or $(CARGO_TARGET_DIR),target)
 export XDG_RUNTIME_DIR ?= $(shell mktemp -d /tmp/sheetlight-run.XXXXXX)
 
 .PHONY: station browser demo lint test bench bench-peers vulkan python cameras build clean
 
 demo: vulkan build
-	target/release/sheetlight demo --out demo
+	$(TARGET)/release/sheetlight demo --out demo
 
 # Prints the address to open in a browser; Ctrl-C ends it.
 station: vulkan build
-	target/release/sheetlight station serve --simulate --station demo-cell
+	$(TARGET)/release/sheetlight station serve --simulate --station demo-cell
 
 build:
 	$(CARGO) build --release --locked
@@ -31,11 +33,11 @@ lint:
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
 
 bench: vulkan build
-	target/release/sheetlight bench
+	$(TARGET)/release/sheetlight bench
 
 bench-peers: vulkan build
 	tools/python-env.sh $(VENV) peers
-	$(VENV)/bin/python benches/peers/run.py
+	$(VENV)/bin/python benches/peers/run.py --sheetlight $(TARGET)/release/sheetlight
 	$(VENV)/bin/python benches/peers/find.py --cargo $(CARGO)
 	$(CARGO) bench --locked --bench calibration
 	$(VENV)/bin/python benches/peers/calibration.py

@@ -10,6 +10,8 @@ import cv2
 import numpy as np
 
 ROOT = os.path.normpath(os.path.join(os.path.dirname(os.path.abspath(__file__)), "../.."))
+# Where cargo puts what it builds.
+TARGET = os.path.join(ROOT, os.environ.get("CARGO_TARGET_DIR", "target"))
 NAMES = ["picture 1280x1024", "height map 2000x2000"]
 
 
@@ -69,7 +71,7 @@ def linemod(scene, template, mask, fill, step):
 def ours(cargo):
     subprocess.run([cargo, "bench", "--locked", "--bench", "find"], cwd=ROOT, check=True)
     times = {}
-    for path in glob.glob(os.path.join(ROOT, "target/criterion/find/*/new/sample.json")):
+    for path in glob.glob(os.path.join(TARGET, "criterion/find/*/new/sample.json")):
         with open(path) as f, open(os.path.join(os.path.dirname(path), "benchmark.json")) as g:
             sample = json.load(f)
             # The best run, as for OpenCV.
