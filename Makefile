@@ -29,7 +29,7 @@ lint:
 	if $(CARGO) clippy --version >/dev/null 2>&1; then \
 		$(CARGO) clippy --locked --all-targets -- -D warnings; \
 	else echo "clippy is not installed: skipped"; fi
-	$(CARGO) check --locked --lib --no-default-features
+	$(CARGO) check --locked --package outside
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --locked --no-deps
 
 bench: vulkan build

@@ -6,8 +6,7 @@ use sheetlight::fault::{Fault, Result};
 use sheetlight::raster::Image;
 use sheetlight::recording::Recording;
 use sheetlight::rig::{Rig, Volume};
-use sheetlight::scan::{Engine, Optical, RecordingSource, Source, Where, camera_for};
-use sheetlight::stages::stripe::point::pose_words;
+use sheetlight::scan::{Engine, Optical, Place, RecordingSource, Source, Where, camera_for};
 use sheetlight::station::{Settings, load_report};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -67,13 +66,13 @@ fn measure(folder: &Path, station: &Path, rounds: usize) -> Result<()> {
     };
     let mut engine = Engine::new(format, &optical, &settings.extraction, None, Where::Gpu.open()?);
     let first: Vec<&Image> = images.iter().take(MEASURED).collect();
-    let stripe = engine.measure(&first).ok_or_else(|| Fault::input("no stripe in the first pictures"))?;
-    engine.set_stripe(&stripe)?;
-    let pose = pose_words(&rig.need_hand_eye()?.value);
+    let seen = engine.measure(&first).ok_or_else(|| Fault::input("no stripe in the first pictures"))?;
+    engine.set_stripe(&seen.stripe)?;
+    let place = Place::camera();
     let mut chain = |images: Vec<Image>| -> Result<usize> {
         let mut done = 0;
         for (i, image) in (0..).zip(images) {
-            engine.submit(i, image, pose)?;
+            engine.submit(i, image, place)?;
             done += engine.collect(false)?.len();
         }
         Ok(done + engine.collect(true)?.len())

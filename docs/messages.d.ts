@@ -124,7 +124,7 @@ cause: string,
  */
 next: string, };
 
-export type Target = "camera" | "hand_eye" | "laser_plane" | "pointer";
+export type Target = "camera" | "hand_eye" | "laser_plane" | "pointer" | "axis";
 
 export type TeachOrder = { 
 /**
@@ -187,6 +187,66 @@ skip_bad: boolean,
  * Settings other than the station's: keys of [extraction] in station.toml, with dots, and their values.
  */
 settings: Record<string, unknown>, };
+
+export type Filter = { "filter": "sigma", 
+/**
+ * mm.
+ */
+most_mm: number, } | { "filter": "heights", 
+/**
+ * mm.
+ */
+low_mm: number, 
+/**
+ * mm.
+ */
+high_mm: number, } | { "filter": "cut", 
+/**
+ * Two opposite corners: x0 y0 x1 y1, mm.
+ */
+corners: [number, number, number, number], } | { "filter": "keep", 
+/**
+ * Two opposite corners: x0 y0 x1 y1, mm.
+ */
+corners: [number, number, number, number], } | { "filter": "islands", 
+/**
+ * Fewer than so many go.
+ */
+least_cells: number, 
+/**
+ * Neighbours that differ by more are of two pieces, mm.
+ */
+step_mm: number, };
+
+export type Filters = { 
+/**
+ * In their order.
+ */
+filters: Array<Filter>, };
+
+export type Filtered = { 
+/**
+ * In their order.
+ */
+filters: Array<Filter>, 
+/**
+ * Cells that each takes.
+ */
+cells: Array<number>, 
+/**
+ * Cells that are left.
+ */
+left: number, };
+
+export type FilterOrder = { 
+/**
+ * The job that scanned.
+ */
+scan: string, 
+/**
+ * In their order.
+ */
+filters: Array<Filter>, };
 
 export type FindOrder = { 
 /**
@@ -260,7 +320,7 @@ speed_mm_s?: number | null,
  */
 back_out: boolean, };
 
-export type Order = { "procedure": "check" } & Plain | { "procedure": "scan" } & ScanOrder | { "procedure": "find" } & FindOrder | { "procedure": "teach" } & TeachOrder | { "procedure": "touch" } & TouchOrder | { "procedure": "calibrate" } & CalibrateOrder | { "procedure": "joint" } & JointOrder | { "procedure": "auto" } & AutoOrder | { "procedure": "insert" } & InsertOrder | { "procedure": "benchmark" } & Plain;
+export type Order = { "procedure": "check" } & Plain | { "procedure": "scan" } & ScanOrder | { "procedure": "filter" } & FilterOrder | { "procedure": "find" } & FindOrder | { "procedure": "teach" } & TeachOrder | { "procedure": "touch" } & TouchOrder | { "procedure": "tune" } & Plain | { "procedure": "calibrate" } & CalibrateOrder | { "procedure": "joint" } & JointOrder | { "procedure": "auto" } & AutoOrder | { "procedure": "insert" } & InsertOrder | { "procedure": "benchmark" } & Plain;
 
 export type CheckLine = { 
 /**
@@ -530,6 +590,32 @@ tilt_deg: number,
  */
 left_out: string | null, };
 
+export type SquareProposed = { 
+/**
+ * How far the tool leant at the last shot, degrees.
+ */
+tilt_deg: number, 
+/**
+ * One standard deviation of that.
+ */
+tilt_sigma_deg: number, 
+/**
+ * How the robot writes poses.
+ */
+convention: string, 
+/**
+ * Names of the numbers.
+ */
+labels: Array<string>, 
+/**
+ * Where the flange goes, base frame.
+ */
+flange: Array<number>, 
+/**
+ * Where the tool is then, base frame.
+ */
+tool: Array<number>, };
+
 export type Touched = { 
 /**
  * Picture, distance from the camera along its axis and its standard deviation, mm.
@@ -539,6 +625,10 @@ spots: Array<[string, number, number]>,
  * The plane through them.
  */
 surface: SurfaceTouched | null, 
+/**
+ * How to stand square to it; null without a surface or without the station's tool.
+ */
+square: SquareProposed | null, 
 /**
  * Pictures without a distance: name and reason.
  */
@@ -608,6 +698,118 @@ confirmations: number,
  */
 found: Position | null, };
 
+export type StripeSeen = { 
+/**
+ * It lies: it is looked at column by column.
+ */
+lying: boolean, 
+/**
+ * Level that a twentieth of its peaks are above, share of full scale.
+ */
+peak: number, 
+/**
+ * Where that is to stand.
+ */
+wanted: [number, number], 
+/**
+ * Share of its peaks that are saturated.
+ */
+saturated: number, 
+/**
+ * Full width at half height, px, median.
+ */
+width_px: number, 
+/**
+ * Its peak against the level beside it, median.
+ */
+contrast: number, 
+/**
+ * Share of the lines without a stripe.
+ */
+dark: number, 
+/**
+ * Exposure is right.
+ */
+right: boolean, 
+/**
+ * The same in pieces along it, from the left or the top: peak, width in px, contrast, dark share; the first three are 0 where it is dark.
+ */
+pieces: Array<[number, number, number, number]>, };
+
+export type PictureLook = { 
+/**
+ * Lowest, median, 99th percentile, highest level.
+ */
+levels: [number, number, number, number], 
+/**
+ * Share of saturated pixels.
+ */
+saturated: number, 
+/**
+ * Null where no line of the picture shows a stripe.
+ */
+stripe: StripeSeen | null, };
+
+export type ExposureSet = { 
+/**
+ * us; it is set.
+ */
+exposure_us: number, 
+/**
+ * What was tried: us, and where the stripe's peaks stood, share of full scale; null: no stripe.
+ */
+tried: Array<[number, number | null]>, 
+/**
+ * What pictures show now.
+ */
+look: PictureLook, 
+/**
+ * Where no exposure is quite right: why this one is the best.
+ */
+remark: string | null, };
+
+export type CameraFeature = { 
+/**
+ * By the naming convention.
+ */
+name: string, 
+/**
+ * What it is; null where it cannot be read.
+ */
+value: number | boolean | string | null, 
+/**
+ * us, dB, px, Hz; empty where it has none.
+ */
+unit: string, 
+/**
+ * Lowest and highest; null: none that is known.
+ */
+range: [number, number] | null, 
+/**
+ * One of these; empty: not a list.
+ */
+words: Array<string>, 
+/**
+ * Whether it can be set now.
+ */
+writable: boolean, };
+
+export type CameraState = { 
+/**
+ * What it can be set to; empty where nothing can, or while it is not there.
+ */
+features: Array<CameraFeature>, };
+
+export type SetFeature = { 
+/**
+ * By the naming convention, e.g. ExposureTime.
+ */
+name: string, 
+/**
+ * As text.
+ */
+value: string, };
+
 export type BenchRow = { 
 /**
  * What it ran on.
@@ -638,11 +840,15 @@ recipe: string,
 /**
  * Found on its own scan.
  */
-proof: Position, } | { "procedure": "touch" } & Touched | { "procedure": "calibrate" } & CalibrationFigures | { "procedure": "joint" } & CalibrationFigures | { "procedure": "auto" } & CalibrationFigures | { "procedure": "insert" } & Inserted | { "procedure": "benchmark", 
+proof: Position, } | { "procedure": "touch" } & Touched | { "procedure": "tune" } & ExposureSet | { "procedure": "calibrate" } & CalibrationFigures | { "procedure": "joint" } & CalibrationFigures | { "procedure": "auto" } & CalibrationFigures | { "procedure": "insert" } & Inserted | { "procedure": "benchmark", 
 /**
  * One a size and processor.
  */
-rows: Array<BenchRow>, };
+rows: Array<BenchRow>, 
+/**
+ * The same of other machines, as they were recorded.
+ */
+recorded: Array<BenchRow>, };
 
 export type Job = { 
 /**
@@ -908,6 +1114,24 @@ days: number,
  */
 expected_mm: number | null, };
 
+export type FrameInfo = { 
+/**
+ * tool or camera.
+ */
+name: string, 
+/**
+ * flange or base.
+ */
+on: string, 
+/**
+ * Names of the numbers.
+ */
+labels: Array<string>, 
+/**
+ * mm, degrees or as the notation has them.
+ */
+numbers: Array<number>, };
+
 export type StationInfo = { 
 /**
  * Its name.
@@ -934,6 +1158,14 @@ tolerance_mm: number | null,
  */
 volume_mm: [number, number] | null, 
 /**
+ * Frame of scans and of the poses that are found in them: base, axis or camera.
+ */
+work_frame: string, 
+/**
+ * Frames that are fixed to others, in the robot's notation.
+ */
+frames: Array<FrameInfo>, 
+/**
  * One a calibration that there is.
  */
 calibrations: Array<CalibrationState>, 
@@ -945,6 +1177,78 @@ problem: Problem | null,
  * Names of all settings of the extraction, with dots, and the station's values.
  */
 extraction: Record<string, unknown>, };
+
+export type BackupInfo = { 
+/**
+ * Its file.
+ */
+name: string, 
+/**
+ * When it was made.
+ */
+created: string, 
+/**
+ * Files of the station in it.
+ */
+files: number, 
+/**
+ * Bytes.
+ */
+bytes: number, };
+
+export type SettingsState = { 
+/**
+ * station.toml as it lies there.
+ */
+text: string, 
+/**
+ * SHA-256 of it: a change names the text that it was made from.
+ */
+sha256: string, 
+/**
+ * Its settings by their names with dots; empty where the text cannot be read.
+ */
+values: Record<string, unknown>, 
+/**
+ * Notations that poses can be written in.
+ */
+notations: Array<string>, 
+/**
+ * The station's folder on the machine that serves the screen.
+ */
+folder: string, 
+/**
+ * The folder below which recordings lie.
+ */
+recordings: string, 
+/**
+ * Other machines may open the screen, with the password.
+ */
+secured: boolean, 
+/**
+ * Newest first.
+ */
+backups: Array<BackupInfo>, };
+
+export type SettingsAsk = { 
+/**
+ * SHA-256 of the text that this was made from.
+ */
+sha256: string, 
+/**
+ * A new station.toml.
+ */
+text?: string | null, 
+/**
+ * Settings by their names with dots; null takes one out. Comments and all else stay.
+ */
+changes: Record<string, unknown>, };
+
+export type OutputAsk = { 
+/**
+ * line, pointer or room: lit for a moment; open or close: the gripper.
+ */
+output: string, };
 
 export type RecordingInfo = { 
 /**
@@ -1004,7 +1308,32 @@ height: number,
 /**
  * The corners that were found, u and v, px.
  */
-corners: Array<[number, number]>, };
+corners: Array<[number, number]>, 
+/**
+ * How far the board's normal leans away from the camera's axis, to the right and downwards in the picture, degrees, by the
+ * station's camera or else one as long as its picture is wide; null where too little of the board was found.
+ */
+lean_deg: [number, number] | null, 
+/**
+ * Where the axis stood that the board rides on, counts; null without one, or where it is not known.
+ */
+count: number | null, };
+
+export type ViewRef = { 
+/**
+ * The recording.
+ */
+recording: string, 
+/**
+ * Its frame, from 0.
+ */
+frame: number, };
+
+export type SupportAsk = { 
+/**
+ * Somebody ticked it.
+ */
+pictures: boolean, };
 
 export type PictureRef = { 
 /**
@@ -1042,6 +1371,86 @@ shipped: boolean,
  */
 text: string, };
 
+export type PointsOf = { 
+/**
+ * TOML.
+ */
+text: string, };
+
+export type RecipePoint = { 
+/**
+ * By which constructions and the insertion name it.
+ */
+name: string, 
+/**
+ * In the part's frame, as drawn, mm.
+ */
+at: [number, number], 
+/**
+ * shape, grid, or the construction's: midpoint, line, intersection, offset, lattice.
+ */
+kind: string, 
+/**
+ * The tool goes there.
+ */
+chosen: boolean, };
+
+export type DrawingAsk = { 
+/**
+ * What the recipe is called.
+ */
+name: string, 
+/**
+ * ASCII DXF.
+ */
+text: string, 
+/**
+ * mm, inch, cm, m, um, mil or foot, where the drawing names none; null: the one it names.
+ */
+unit?: string | null, 
+/**
+ * Layers that hold the part's edges; none: all that are shown.
+ */
+layers: Array<string>, 
+/**
+ * The insertion datum in the drawing, in its unit; null: the middle of the largest outline's box.
+ */
+origin?: [number, number] | null, 
+/**
+ * How many turns make the part look nearly alike.
+ */
+alike_turns: number, 
+/**
+ * Edge of a cell of the map that is searched, mm.
+ */
+cell_mm: number, 
+/**
+ * What the insertion bears in the plane, mm.
+ */
+tolerance_mm: number, 
+/**
+ * What it bears as a turn, degrees.
+ */
+tolerance_deg: number, 
+/**
+ * The tool's way above the insertion pose before and after, mm.
+ */
+approach_mm: number, };
+
+export type DrawingRead = { 
+/**
+ * The recipe, stored.
+ */
+recipe: RecipeText, 
+/**
+ * Width and height of what was drawn, mm.
+ */
+size_mm: [number, number], 
+/**
+ * What was passed over, and what to look at.
+ */
+notes: Array<string>, };
+
 export type MapHead = { 
 /**
  * Columns.
@@ -1071,6 +1480,30 @@ sigma_mm: [number, number],
  * The same of the stripe's amplitude, grey levels.
  */
 intensity: [number, number], };
+
+export type Outlines = { 
+/**
+ * The scan's: base, axis, flange or map.
+ */
+frame: string, 
+/**
+ * One a shape, x y z in that frame, mm; closed ones end where they begin.
+ */
+lines: Array<Array<[number, number, number]>>, };
+
+export type Ghost = { 
+/**
+ * The picture over which they belong.
+ */
+number: number, 
+/**
+ * u and v, px; lines end where they leave what the lens shows.
+ */
+lines: Array<Array<[number, number]>>, 
+/**
+ * So far the arm moved them between the readings of its pose before and after the picture, px; 0: it stood.
+ */
+moved_px: number, };
 
 export type SectionAsk = { 
 /**

@@ -4,11 +4,9 @@
 //!   cargo run --example picture_to_points -- PICTURE STATION
 
 use sheetlight::fault::{Fault, Result};
-use sheetlight::geometry::{Camera, Rigid};
 use sheetlight::raster::{Channel, load};
 use sheetlight::rig::Rig;
-use sheetlight::scan::{Engine, Extraction, Format, Optical, Where};
-use sheetlight::stages::stripe::point::pose_words;
+use sheetlight::scan::{Engine, Extraction, Format, Optical, Place, Where};
 use std::path::PathBuf;
 
 fn main() -> Result<()> {
@@ -25,11 +23,11 @@ fn main() -> Result<()> {
         depth_mm: [1.0, f64::INFINITY],
     };
     let mut engine = Engine::new(format, &optical, &Extraction::default(), None, Where::Auto.open()?);
-    let Some(stripe) = engine.measure(&[&image]) else {
+    let Some(seen) = engine.measure(&[&image]) else {
         return Err(Fault::input("no stripe is seen").next("look at exposure and laser"));
     };
-    engine.set_stripe(&stripe)?;
-    engine.submit(0, image, pose_words(&Rigid::<Camera, Camera>::identity()))?;
+    engine.set_stripe(&seen.stripe)?;
+    engine.submit(0, image, Place::camera())?;
     println!("u_px,v_px,x_mm,y_mm,z_mm,sigma_mm");
     for shot in engine.collect(true)? {
         for (k, p) in shot.peaks.iter().zip(&shot.points).filter(|(k, _)| k.kept()) {

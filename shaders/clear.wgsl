@@ -10,7 +10,7 @@
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x < listing[3] {
+    if id.x < listing[COUNT] {
         let at = tile_index(list[id.x]);
         let none = vec4(0u);
         mask[2u * at] = none;

@@ -10,7 +10,7 @@
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x < all[3] {
+    if id.x < all[COUNT] {
         let tile = list[id.x];
         if latest(tile) > frame.step {
             let at = atomicAdd(&listing.count, 1u);

@@ -12,7 +12,7 @@
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x < listing[3] {
+    if id.x < listing[COUNT] {
         let tile = list[id.x].x;
         let columns = min(frame.width - 32u * tile_x(tile), 32u);
         var any_lit = 0u;
@@ -23,7 +23,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             }
             bits &= 0xffffffffu >> (32u - columns);
             bits = select(0u, bits, 8u * tile_y(tile) + row < frame.height);
-            if (frame.flags & 2u) != 0u {
+            if (frame.flags & HAS_ROI) != 0u {
                 bits &= roi[8u * (tile_y(tile) * frame.tiles_x + tile_x(tile)) + row];
             }
             mask[mask_index(tile, row)] = bits;

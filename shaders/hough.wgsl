@@ -11,15 +11,15 @@ struct HoughFrame {
 }
 @group(0) @binding(0) var<uniform> frame: HoughFrame;
 @group(0) @binding(1) var<storage, read> header: array<u32>;
-@group(0) @binding(2) var<storage, read> points: array<vec2<u32>>;
+@group(0) @binding(2) var<storage, read> pixels: array<vec2<u32>>;
 // Cosine and sine of every angle in 1 / 16384.
 @group(0) @binding(3) var<storage, read> table: array<vec2<i32>>;
 @group(0) @binding(4) var<storage, read_write> votes: array<atomic<u32>>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x < header[3] {
-        let point = points[id.x];
+    if id.x < header[COUNT] {
+        let point = pixels[id.x];
         let x = i32(point.x & 0xffffu) - frame.middle_x;
         let y = i32(point.x >> 16u) - frame.middle_y;
         let first = point.y * frame.angles;

@@ -66,7 +66,7 @@ fn ends(above: Rows, r: Rows, below: Rows) -> vec4<u32> {
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let w = i32(frame.width);
     let h = i32(frame.height);
-    if id.x < listing[3] {
+    if id.x < listing[COUNT] {
         let tile = list[id.x];
         let shot = tile_shot(tile);
         let tx = tile_x(tile);

@@ -4,7 +4,7 @@
 @group(0) @binding(0) var<uniform> frame: PeakFrame;
 @group(0) @binding(1) var<storage, read> image: array<u32>;
 @group(0) @binding(2) var<storage, read> header: array<u32>;
-@group(0) @binding(3) var<storage, read> points: array<vec2<u32>>;
+@group(0) @binding(3) var<storage, read> pixels: array<vec2<u32>>;
 @group(0) @binding(4) var<storage, read_write> peaks: array<Peak>;
 @group(0) @binding(5) var<storage, read_write> strongest: array<atomic<u32>>;
 
@@ -13,7 +13,6 @@ override px_log2: u32 = 2u;
 // 0 Gaussian, 1 centroid, 2 derivative, 3 the pixel itself.
 override peak_method: u32 = 0u;
 
-const SATURATED = 256u;
 // Samples for which the noise model counts.
 const BELIEF = 10.0;
 // Grey levels that are no light, but whose square is no denormal number: those take a CPU many times as long.
@@ -438,21 +437,21 @@ fn itself(at: vec2<i32>) -> Peak {
     return finish(at, n, 0.0, max(here - base, 1.0), frame.s0, EVEN, here >= frame.full_scale);
 }
 
-// The first test that fails names the reason; the numbers are those of `Reject`.
+// The first test that fails names the reason.
 fn alone(k: Peak) -> u32 {
     let across = k.normal_u * frame.across_u + k.normal_v * frame.across_v;
     var why = 0u;
-    why = select(why, 6u, abs(across) < frame.upright);
-    why = select(why, 5u, !(k.sigma_px <= frame.uncertain));
-    why = select(why, 4u, k.width_px > frame.widest);
-    why = select(why, 3u, k.width_px < frame.narrowest);
-    return select(why, 2u, k.amplitude < frame.faintest);
+    why = select(why, STEEP, abs(across) < frame.upright);
+    why = select(why, UNCERTAIN, !(k.sigma_px <= frame.uncertain));
+    why = select(why, WIDE, k.width_px > frame.widest);
+    why = select(why, NARROW, k.width_px < frame.narrowest);
+    return select(why, FAINT, k.amplitude < frame.faintest);
 }
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x < header[3] {
-        let point = points[id.x];
+    if id.x < header[COUNT] {
+        let point = pixels[id.x];
         let at = vec2(i32(point.x & 0xffffu), i32(point.x >> 16u));
         first = point.y * frame.shot_words;
         var peak: Peak;

@@ -49,14 +49,11 @@ struct PointFrame {
 @group(0) @binding(2) var<storage, read> poses: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read> strongest: array<u32>;
 @group(0) @binding(4) var<storage, read_write> peaks: array<Peak>;
-@group(0) @binding(5) var<storage, read_write> spots: array<vec4<f32>>;
+@group(0) @binding(5) var<storage, read_write> points: array<vec4<f32>>;
 
 // 1: the lens has terms beside Brown-Conrady's five, or its sensor is tilted.
 override full_lens: u32 = 0u;
 
-const NARROW = 3u;
-const ECHO = 7u;
-const NO_POINT = 9u;
 const NEWTON = 5u;
 
 // The reason against a peak beside the strongest of the lines nearby.
@@ -79,7 +76,7 @@ fn row(r: vec4<f32>, p: vec3<f32>) -> f32 {
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x < header[3] {
+    if id.x < header[COUNT] {
         let k = peaks[id.x];
         let yv = (k.v - frame.cy) / frame.fy;
         let xv = (k.u - frame.cx - frame.skew * yv) / frame.fx;
@@ -147,10 +144,10 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let p = vec3(x * z, y * z, z);
         let spot = vec4(row(poses[3u * k.shot], p), row(poses[3u * k.shot + 1u], p), row(poses[3u * k.shot + 2u], p), sigma);
         // The first reason stays.
-        let alone = k.flags & 255u;
+        let alone = k.flags & REASON;
         let compared = select(alone, beside(k), alone == 0u);
         let why = select(compared, NO_POINT, compared == 0u && !there);
-        spots[id.x] = select(vec4(bitcast<f32>(frame.none)), spot, why == 0u);
+        points[id.x] = select(vec4(bitcast<f32>(frame.none)), spot, why == 0u);
         peaks[id.x].flags = k.flags | why;
     }
 }

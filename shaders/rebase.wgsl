@@ -6,7 +6,7 @@
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x < listing[3] {
+    if id.x < listing[COUNT] {
         stamps[tile_index(list[id.x])] = 0u;
     }
 }

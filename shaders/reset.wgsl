@@ -1,5 +1,5 @@
 // In: the lists' headers of the former batch. Out: empty lists; at a further round of thinning (step 1)
-// the lists of tiles that may be lit, and of those that are, stay. Entries are 64 words apart. Each of those
+// the lists of tiles that may be lit, and of those that are, stay. Headers are HEADER_WORDS apart. Each of those
 // has a buffer of its own: no buffer can be both read for the size of a dispatch and written by it.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read_write> first: array<u32>;
@@ -12,14 +12,14 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let empty = vec4(0u, 1u, 1u, 0u);
     if id.x < 4u && frame.step == 0u {
         first[id.x] = empty[id.x];
-        first[64u + id.x] = empty[id.x];
+        first[HEADER_WORDS + id.x] = empty[id.x];
         runs[id.x] = empty[id.x];
         lit_first[id.x] = empty[id.x];
     }
-    if 64u * id.x < arrayLength(&others) {
-        others[64u * id.x] = 0u;
-        others[64u * id.x + 1u] = 1u;
-        others[64u * id.x + 2u] = 1u;
-        others[64u * id.x + 3u] = 0u;
+    if HEADER_WORDS * id.x < arrayLength(&others) {
+        others[HEADER_WORDS * id.x + GROUPS] = 0u;
+        others[HEADER_WORDS * id.x + GROUPS_Y] = 1u;
+        others[HEADER_WORDS * id.x + GROUPS_Z] = 1u;
+        others[HEADER_WORDS * id.x + COUNT] = 0u;
     }
 }

@@ -34,7 +34,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
                     }
                 }
                 if highest <= value {
-                    let place = atomicAdd(&header[3], 1u);
+                    let place = atomicAdd(&header[COUNT], 1u);
                     if place < frame.capacity {
                         hits[place] = vec2<u32>(id.y | (value << 24u), (column + k) | (row << 16u));
                     }

@@ -7,7 +7,7 @@
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x < listing[3] {
+    if id.x < listing[COUNT] {
         let at = tile_index(list[id.x]);
         long[2u * at] = mask[2u * at];
         long[2u * at + 1u] = mask[2u * at + 1u];

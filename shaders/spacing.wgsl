@@ -39,7 +39,7 @@ fn kept(shot: u32, x: i32, y: i32) -> bool {
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x < listing[3] {
+    if id.x < listing[COUNT] {
         let tile = list[id.x];
         for (var row = 0u; row < 8u; row++) {
             let all = mask[mask_index(tile, row)];

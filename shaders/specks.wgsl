@@ -51,7 +51,7 @@ fn candidates(own: u32, top: i32, brightness: i32) -> Candidates {
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x < listing[3] {
+    if id.x < listing[COUNT] {
         let single = list[id.x];
         let tile = single.x;
         let pitch = frame.pitch / 4u;
@@ -91,7 +91,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         // One alone lies in the picture: beyond its border the same pixel repeats, in the same tile.
         var passes = count == 1u && i32(area) * (i32(value) - frame.offset) > i32(sum + (area - 1u) / 2u);
         let bit = 1u << column;
-        if (frame.flags & 2u) != 0u {
+        if (frame.flags & HAS_ROI) != 0u {
             passes = passes && (roi[mask_word(0u, u32(x), u32(y))] & bit) != 0u;
         }
         if passes {

@@ -32,7 +32,6 @@ struct Neighbourhood {
 @group(0) @binding(4) var<storage, read> peaks: array<Peak>;
 @group(0) @binding(5) var<storage, read_write> flags: array<u32>;
 
-const UNSUPPORTED = 8u;
 const FAR = 32768;
 
 @compute @workgroup_size(64)
@@ -69,7 +68,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let right = k.sigma_px <= frame.sure && k.width_px >= frame.right_low && k.width_px <= frame.right_high;
         let hazy = k.background - shots[shot].usual > frame.haze * k.amplitude;
         let need = select(select(shots[shot].doubtful, shots[shot].clean, right), shots[shot].hazy, hazy);
-        let refused = (k.flags & 255u) == 0u && found < need;
+        let refused = (k.flags & REASON) == 0u && found < need;
         flags[id.x] = select(k.flags, k.flags | UNSUPPORTED, refused);
     }
 }

@@ -73,7 +73,7 @@ fn gone_of(p2: vec4<u32>, p3: vec4<u32>, p4: vec4<u32>, p5: vec4<u32>, p6: vec4<
 
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    if id.x < listing[3] {
+    if id.x < listing[COUNT] {
         let tile = list[id.x];
         let at = tile_index(tile);
         let x = tile_x(tile);

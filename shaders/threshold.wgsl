@@ -71,7 +71,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     // n^2 (value - offset) > sum + (n^2 - 1) / 2: the mean rounded to a whole level, without a division.
     let area = i32(frame.size * frame.size);
     let r = i32(radius);
-    if id.x < listing[3] {
+    if id.x < listing[COUNT] {
         let run = list[id.x];
         let x = tile_x(run.x);
         let shot = tile_shot(run.x);
@@ -109,7 +109,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
                 lower = select(lower, vec4(bits), vec4(k) == vec4(4, 5, 6, 7));
                 pass_row(picture + u32(clamp(top + k - r, 0, last_row)) * pitch, first, loads(), 0xffffffffu);
             }
-            if (frame.flags & 2u) != 0u {
+            if (frame.flags & HAS_ROI) != 0u {
                 let at = ty * frame.tiles_x + x;
                 upper &= roi[2u * at];
                 lower &= roi[2u * at + 1u];

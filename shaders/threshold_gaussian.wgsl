@@ -20,7 +20,7 @@ fn blurred(first: u32, x: i32, r: i32) -> vec4<f32> {
 @compute @workgroup_size(64)
 fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let r = i32(frame.size / 2u);
-    if id.x < listing[3] {
+    if id.x < listing[COUNT] {
         let tile = list[id.x].x;
         let shot = tile_shot(tile);
         let top = i32(8u * tile_y(tile));

@@ -218,11 +218,11 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let least = min(sum_left, sum_right);
         var lit = passes(vec4(s0.x, s1.x, s2.x, s3.x), sum_left) | passes(vec4(s0.z, s1.z, s2.z, s3.z), sum_right);
         // The plain path rests on no bound.
-        let all = (frame.flags & 1u) != 0u;
+        let all = (frame.flags & ALL_TILES) != 0u;
         lit |= vec4(all);
         lit &= vec4(i32(y)) + ROWS <= vec4(last);
         var left = places_of(lit);
-        if (frame.flags & 2u) != 0u {
+        if (frame.flags & HAS_ROI) != 0u {
             var wanted = vec4(false);
             for (var k = 0u; k < 4u; k++) {
                 let at = 2u * (u32(rows[k]) * frame.tiles_x + x);

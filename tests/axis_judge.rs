@@ -16,7 +16,7 @@ use sheetlight::calibrate::axis::report::judge;
 use sheetlight::calibrate::axis::solve::{AxisOptions, solve};
 use sheetlight::calibrate::limits::Asked;
 use sheetlight::calibrate::measured_pose::{SeenBoard, measure};
-use sheetlight::camera::{Intrinsics, ParameterCovariance, Parameters};
+use sheetlight::camera::{CameraCovariance, Intrinsics, Parameters};
 use sheetlight::geometry::{Axis, AxisKind, Board, Camera, CountUnit, Riding, Rigid, Vec3, exp};
 use sheetlight::recording::BoardSpec;
 use sheetlight::rig::{Verdict, Volume};
@@ -265,7 +265,7 @@ fn call(seed: u64, kind: AxisKind, flaw: Flaw) -> Called {
     let count = rng.random_range(3..=16);
     let s = set(rng, &r, count, flaw, &r.camera);
     let refused = Called { kind, flaw, count, seed, verdict: None, error: 0.0, sigma: [0.0; 2], says: Vec::new() };
-    let known = ParameterCovariance::zeros();
+    let known = CameraCovariance::exact();
     let Ok(fit) = solve(&s.stops, kind, CountUnit::Count, &known, &AxisOptions::default()) else { return refused };
     let stood = Volume::new(r.depth, r.depth, "where the boards stood");
     let quality = judge(&fit, &Asked::default().limits(&stood, |z| r.camera.view_mm(z)), "square_mm");
@@ -347,7 +347,7 @@ fn a_slipped_board_is_named() {
             let bad = seed as usize % 12;
             let pose = &mut s.stops[bad].pose.camera_from_board;
             pose.translation += gauss3(rng, 1.0).normalize() * 30.0 * r.pixel_mm;
-            let known = ParameterCovariance::zeros();
+            let known = CameraCovariance::exact();
             let fit = solve(&s.stops, kind, CountUnit::Count, &known, &AxisOptions::default()).unwrap();
             let out: Vec<usize> = (0..12).filter(|&i| !fit.stops[i].used).collect();
             assert_eq!(out, [bad], "{kind:?} seed {seed}");
@@ -362,7 +362,6 @@ fn the_cameras_uncertainty_reaches_the_report() {
     let sigma = Parameters::from([
         0.5, 0.5, 0.4, 0.4, 1e-3, 1e-3, 1e-4, 1e-4, 1e-3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0,
     ]);
-    let covariance = ParameterCovariance::from_diagonal(&sigma.map(|s| s * s));
     for kind in [AxisKind::Linear, AxisKind::Turntable] {
         let over: Vec<[f64; 2]> = (0..40u64)
             .into_par_iter()
@@ -371,14 +370,21 @@ fn the_cameras_uncertainty_reaches_the_report() {
                 let r = Rig { corner_px: 0.02, ..rig(rng, kind) };
                 let scale = f64::from(r.camera.width.max(r.camera.height)) / 640.0;
                 let mut off = Parameters::from_fn(|i, _| gauss(rng, sigma[i]));
-                let mut c = covariance;
+                let mut sigma = sigma;
                 for i in 0..4 {
                     off[i] *= scale;
-                    c[(i, i)] *= scale * scale;
+                    sigma[i] *= scale;
                 }
                 let believed = r.camera.changed(&off);
                 let s = set(rng, &r, 14, Flaw::None, &believed);
-                let fit = solve(&s.stops, kind, CountUnit::Count, &c, &AxisOptions::default()).unwrap();
+                let fit = solve(
+                    &s.stops,
+                    kind,
+                    CountUnit::Count,
+                    &CameraCovariance::independent(&sigma).unwrap(),
+                    &AxisOptions::default(),
+                )
+                .unwrap();
                 let e = error(&r, &s, &fit, Flaw::None, 1.0).0;
                 [e / fit.expected_error(&fit.covariance)[0], e / fit.expected_error(&fit.covariance_camera_exact)[0]]
             })
@@ -395,7 +401,7 @@ fn what_determines_no_axis_is_refused() {
     let rng = &mut Pcg64::seed_from_u64(3);
     let r = rig(rng, AxisKind::Linear);
     let s = set(rng, &r, 8, Flaw::None, &r.camera);
-    let known = ParameterCovariance::zeros();
+    let known = CameraCovariance::exact();
     let run = |stops: &[Stop]| {
         solve(stops, AxisKind::Linear, CountUnit::Count, &known, &AxisOptions::default()).map(|_| ()).unwrap_err().what
     };

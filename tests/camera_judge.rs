@@ -14,7 +14,7 @@ use sheetlight::calibrate::camera::intrinsics::{Observation, SolveOptions, solve
 use sheetlight::calibrate::camera::lens::Lens;
 use sheetlight::calibrate::camera::procedure::{CameraOptions, from_observations};
 use sheetlight::calibrate::projection::project;
-use sheetlight::camera::{Intrinsics, NAMES, ParameterCovariance};
+use sheetlight::camera::{Intrinsics, NAMES, ParameterMatrix};
 use sheetlight::geometry::{Board, Camera, LeftStep, Rigid, Vec2, Vec3, exp};
 use sheetlight::recording::BoardSpec;
 use sheetlight::rig::Verdict;
@@ -23,7 +23,7 @@ use std::sync::Arc;
 /// fx fy cx cy k1 k2 p1 p2 k3: what `Lens::Five` estimates.
 const FIVE: usize = 9;
 
-fn dense(c: &ParameterCovariance) -> DMatrix<f64> {
+fn dense(c: &ParameterMatrix) -> DMatrix<f64> {
     DMatrix::from_fn(FIVE, FIVE, |i, j| c[(i, j)])
 }
 

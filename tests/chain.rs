@@ -44,7 +44,7 @@ fn check(device: &Device, name: &str, config: &ChainConfig, images: &[Image]) ->
         listed += batch.listed_tiles;
         for (i, image) in batches[done].iter().enumerate() {
             let (_, list) = expected(image, config);
-            assert!(batch.pixels(i).eq(list.iter().copied()), "{name}, batch {done}, shot {i}: points");
+            assert!(batch.pixels_of(i).eq(list.iter().copied()), "{name}, batch {done}, shot {i}: points");
         }
         done += 1;
     }
@@ -108,7 +108,7 @@ fn without_a_fit_every_skeleton_pixel_gives_the_point_of_its_middle() {
         assert!(chain.collect_into(true, &mut batch).unwrap());
         for (i, image) in images.iter().enumerate() {
             let part = batch.starts[i] as usize..batch.starts[i + 1] as usize;
-            let (peaks, spots) = (&batch.peaks[part.clone()], &batch.spots[part]);
+            let (peaks, spots) = (&batch.peaks[part.clone()], &batch.points[part]);
             let pixels: Vec<u32> = peaks.iter().map(|k| k.pixel).collect();
             assert!(pixels.len() > 600 && pixels == expected(image, &config).1, "{bits} bits, shot {i}: pixels");
             for (k, p) in peaks.iter().zip(spots) {
@@ -217,7 +217,7 @@ fn ambient_light_is_subtracted() {
     config.ambient = Some(ambient);
     let mut chain = Chain::new(&device, &config).unwrap();
     chain.submit(0, &[&sum]).unwrap();
-    assert!(chain.collect(true).unwrap().unwrap().pixels(0).eq(list));
+    assert!(chain.collect(true).unwrap().unwrap().pixels_of(0).eq(list));
 }
 
 #[test]
@@ -235,7 +235,7 @@ fn ambient_light_is_subtracted_once_however_often_a_batch_starts_over() {
         chain.submit(n, &[&drawn(400, 300, 8, |_, _| 130)]).unwrap();
     }
     for _ in 0..3 {
-        assert!(chain.collect(true).unwrap().unwrap().pixels(0).eq(list.iter().copied()));
+        assert!(chain.collect(true).unwrap().unwrap().pixels_of(0).eq(list.iter().copied()));
     }
 }
 
@@ -259,7 +259,7 @@ fn a_device_with_memory_of_its_own_gives_the_same() {
     let mut chain = Chain::new(&device, &ChainConfig { slots: 1, ..config }).unwrap();
     chain.submit(7, &images[..4].iter().collect::<Vec<_>>()).unwrap();
     let first = chain.collect(true).unwrap().unwrap();
-    assert!(8 * first.points.len() > 1 << 20, "{} points need no larger buffer to come back", first.points.len());
+    assert!(8 * first.pixels.len() > 1 << 20, "{} points need no larger buffer to come back", first.pixels.len());
     chain.submit_again(7, 4).unwrap();
     assert_eq!(chain.collect(true).unwrap().unwrap(), first, "the same pictures once more");
 }

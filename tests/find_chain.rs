@@ -5,6 +5,7 @@
 mod common;
 
 use common::pose::{Off, truth};
+use common::sheetlight;
 use sheetlight::geometry::{Base, Part, Rigid};
 use std::path::Path;
 
@@ -65,4 +66,22 @@ fn insertion_from_pictures_and_noisy_poses_alone() {
         );
         assert!(worst.0 <= REACHED_MM && worst.1 <= REACHED_DEG, "{worst:?}");
     }
+}
+
+/// Beside each wall of the socket lies a shadow with an edge as straight as the wall's: the map fits there nearly as well, the points do not.
+#[test]
+fn a_place_as_far_off_as_a_shadow_is_no_rival_of_the_part() {
+    let (root, dir) = (Path::new(env!("CARGO_MANIFEST_DIR")), tempfile::tempdir().unwrap());
+    let at = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    let own = |name: &str| root.join(name).to_str().unwrap().to_owned();
+    let rig = [own("data/rigs/upright.toml"), own("data/scenes/board.toml"), own("data/recipes/led.toml")];
+    let size = ["--set", "scan", "--shots", "260", "--width", "640", "--seed", "4", "--quiet"];
+    sheetlight(&[&["simulate", "--rig", &rig[0], "--scene", &rig[1], "--out", &at("sim")], &size[..]].concat());
+    sheetlight(&["scan", &at("sim/scan"), "--station", &at("sim/station"), "--out", &at("scan"), "--overlays", "0"]);
+    sheetlight(&["find", &at("scan"), "--station", &at("sim/station"), "--recipe", &rig[2], "--out", &at("led.json")]);
+    let report = read(&dir.path().join("led.json"));
+    let gates = report["gates"].as_array().unwrap();
+    let value = |name: &str| gates.iter().find(|g| g["name"] == name).unwrap()["value"].as_f64().unwrap();
+    println!("margin {:.3}, agreement {:.3}", value("margin"), value("agreement"));
+    assert!(report["found"]["rivals"].as_array().unwrap().len() > 1, "without rivals this shows nothing");
 }

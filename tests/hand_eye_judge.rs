@@ -20,11 +20,11 @@ use sheetlight::calibrate::hand_eye::options::Mount;
 use sheetlight::calibrate::hand_eye::solve::solve;
 use sheetlight::calibrate::hand_eye::turns::{read_with, resolve};
 use sheetlight::calibrate::measured_pose::MeasuredPose;
-use sheetlight::camera::{ParameterCovariance, Parameters};
+use sheetlight::camera::{CameraCovariance, ParameterMatrix, Parameters};
 use sheetlight::geometry::{Board, Camera, Rigid, Vec3, exp};
 use sheetlight::recording::BoardSpec;
 
-fn run(s: &Station, pairs: &[Pair], camera_covariance: &ParameterCovariance) -> sheetlight::fault::Result<HandEyeFit> {
+fn run(s: &Station, pairs: &[Pair], camera_covariance: &CameraCovariance) -> sheetlight::fault::Result<HandEyeFit> {
     solve(pairs, s.mount, camera_covariance, &s.camera, &HandEyeOptions::default())
 }
 
@@ -44,7 +44,7 @@ fn error(found: &Chain, truth: &Chain) -> DVector<f64> {
 
 /// Cramer-Rao bound of the whole joint problem (12 unknowns, nine of the camera where it is not exact, and six for
 /// every robot pose), from numerical derivatives of the pixels: shares nothing with the solver.
-fn bound(s: &Station, noise: Noise, camera: Option<&ParameterCovariance>) -> DMatrix<f64> {
+fn bound(s: &Station, noise: Noise, camera: Option<&CameraCovariance>) -> DMatrix<f64> {
     let mut information = DMatrix::<f64>::zeros(21, 21);
     let v = |d: &[f64; 27], i: usize| Vec3::new(d[i], d[i + 1], d[i + 2]);
     for pose in &s.poses {
@@ -141,7 +141,7 @@ fn errors_are_what_the_report_says_and_near_the_bound() {
             (s, b, LEVELS[level])
         };
         judge(&format!("hand-eye, {mount:?}"), &NAMES, LEVELS.len(), make, |(s, bound, noise), rng| {
-            let found = run(s, &pairs(rng, s, *noise, &s.camera), &ParameterCovariance::zeros()).unwrap();
+            let found = run(s, &pairs(rng, s, *noise, &s.camera), &CameraCovariance::exact()).unwrap();
             assert!(found.pairs.iter().filter(|p| !p.used).count() <= 1, "good pairs were left out");
             Trial::new(error(&found.chain, &s.truth), &found.covariance, bound)
         });
@@ -152,23 +152,23 @@ fn errors_are_what_the_report_says_and_near_the_bound() {
 const CAMERA_SIGMAS: [f64; 9] = [0.6, 0.6, 0.4, 0.4, 2e-3, 1e-3, 1e-4, 1e-4, 1e-3];
 
 /// A station, the Cramer-Rao bound of its hand-eye, its noise, the camera's covariance and a root of it.
-type Uncertain = (Station, DMatrix<f64>, Noise, ParameterCovariance, ParameterCovariance);
+type Uncertain = (Station, DMatrix<f64>, Noise, CameraCovariance, ParameterMatrix);
 
 /// A station with a camera that is known to a covariance whose parameters hang together, as a calibration's do.
 fn uncertain(k: u64, level: usize) -> Uncertain {
     let rng = &mut Pcg64::seed_from_u64(5000 + k);
     let s = station(rng, Mount::EyeInHand, 13);
     let sigma = Parameters::from_fn(|i, _| CAMERA_SIGMAS.get(i).copied().unwrap_or(0.0));
-    let mut mix = ParameterCovariance::identity();
+    let mut mix = ParameterMatrix::identity();
     (mix[(1, 0)], mix[(5, 4)], mix[(8, 5)]) = (0.9, -0.9, -0.9);
-    let root = ParameterCovariance::from_diagonal(&sigma) * mix;
-    let covariance = root * root.transpose();
+    let root = ParameterMatrix::from_diagonal(&sigma) * mix;
+    let covariance = CameraCovariance::new(root * root.transpose()).unwrap();
     let b = bound(&s, LEVELS[level], Some(&covariance));
     (s, b, LEVELS[level], covariance, root)
 }
 
 /// The camera as its calibration gave it.
-fn believed(s: &Station, root: &ParameterCovariance, rng: &mut Pcg64) -> sheetlight::camera::Intrinsics {
+fn believed(s: &Station, root: &ParameterMatrix, rng: &mut Pcg64) -> sheetlight::camera::Intrinsics {
     s.camera.changed(&(root * Parameters::from_fn(|_, _| gauss(rng, 1.0))))
 }
 
@@ -195,7 +195,7 @@ fn the_cameras_uncertainty_reaches_the_report() {
         let p = pairs(rng, &s, noise, &given);
         let found = solve(&p, s.mount, &covariance, &given, &HandEyeOptions::default()).unwrap();
         // Taken as exact, such a camera looks like a robot that scatters.
-        let trusting = solve(&p, s.mount, &ParameterCovariance::zeros(), &given, &HandEyeOptions::default()).unwrap();
+        let trusting = solve(&p, s.mount, &CameraCovariance::exact(), &given, &HandEyeOptions::default()).unwrap();
         let share = |f: &HandEyeFit| {
             let e = error(&f.chain, &s.truth);
             (0..12).map(|i| e[i] * e[i] / f.covariance[(i, i)]).sum::<f64>() / 1200.0
@@ -264,9 +264,9 @@ fn pull(mount: Mount, sets: u64, noise: Noise, solved: impl Fn(&Station, &[Pair]
 fn a_noisy_robot_gets_its_transform_with_an_honest_sigma() {
     let sets = if std::env::var_os("SHEETLIGHT_LONG").is_some() { 600 } else { 102 };
     for mount in [Mount::EyeInHand, Mount::EyeToHand] {
-        let with_pixels = pull(mount, sets, NOISY, |s, p| run(s, p, &ParameterCovariance::zeros()).unwrap());
+        let with_pixels = pull(mount, sets, NOISY, |s, p| run(s, p, &CameraCovariance::exact()).unwrap());
         let as_poses =
-            pull(mount, sets, NOISY, |s, p| run(s, &poses_alone(p, None), &ParameterCovariance::zeros()).unwrap());
+            pull(mount, sets, NOISY, |s, p| run(s, &poses_alone(p, None), &CameraCovariance::exact()).unwrap());
         println!("{mount:?}, {sets} sets: error over sigma {with_pixels:.3}, poses alone {as_poses:.3}");
         for x in [with_pixels, as_poses] {
             assert!((0.8..=1.25).contains(&x), "{mount:?}: {with_pixels:.3} {as_poses:.3}");
@@ -289,7 +289,7 @@ fn a_noisy_robot_is_not_taken_for_shuffled_pairs() {
         shuffled.push(chance(&p.iter().collect::<Vec<_>>(), 1));
         // What would explain them is searched for, which takes its time.
         if k % 10 == 0 {
-            assert!(run(&s, &p, &ParameterCovariance::zeros()).is_err(), "seed {k}: shuffled pairs were taken");
+            assert!(run(&s, &p, &CameraCovariance::exact()).is_err(), "seed {k}: shuffled pairs were taken");
         }
     }
     noisy.sort_by(f64::total_cmp);
@@ -324,7 +324,7 @@ fn turned_readings_are_told_by_the_whole_set() {
         for _ in 0..2 {
             let chosen = resolve(&seen, &turns, 1).unwrap();
             let one: Vec<Pair> = seen.iter().zip(&chosen).map(|(p, k)| read_with(p, &turns[*k])).collect();
-            let found = run(&s, &one, &ParameterCovariance::zeros()).unwrap();
+            let found = run(&s, &one, &CameraCovariance::exact()).unwrap();
             let wrong: Vec<bool> = found.pairs.iter().map(|p| !p.used).collect();
             assert_eq!(wrong.iter().filter(|w| **w).count(), 2, "seed {k}: {wrong:?}");
             let e = error(&found.chain, &s.truth);
@@ -379,7 +379,7 @@ fn a_fifth_of_wrong_pairs_is_found_and_named() {
         let kept = p[a].near_from_far;
         (p[a].near_from_far, p[b].near_from_far) = (p[b].near_from_far, p[c].near_from_far);
         p[c].near_from_far = kept;
-        let found = run(&s, &p, &ParameterCovariance::zeros()).unwrap();
+        let found = run(&s, &p, &CameraCovariance::exact()).unwrap();
         let mut wrong: Vec<usize> = (0..p.len()).filter(|&i| !found.pairs[i].used).collect();
         let mut expected = vec![a, b, c];
         expected.sort_unstable();
@@ -398,10 +398,10 @@ fn the_order_of_the_samples_does_not_matter() {
     let rng = &mut Pcg64::seed_from_u64(1);
     let s = station(rng, Mount::EyeInHand, 13);
     let mut p = pairs(rng, &s, LEVELS[1], &s.camera);
-    let first = run(&s, &p, &ParameterCovariance::zeros()).unwrap();
+    let first = run(&s, &p, &CameraCovariance::exact()).unwrap();
     for _ in 0..5 {
         p.shuffle(rng);
-        let again = run(&s, &p, &ParameterCovariance::zeros()).unwrap();
+        let again = run(&s, &p, &CameraCovariance::exact()).unwrap();
         let e = error(&again.chain, &first.chain);
         assert!(e.amax() < 1e-6, "{e}");
     }
@@ -409,7 +409,7 @@ fn the_order_of_the_samples_does_not_matter() {
 
 /// What is wrong must be said in words: the fault's text holds `word`.
 fn refused(s: &Station, p: &[Pair], word: &str) {
-    match run(s, p, &ParameterCovariance::zeros()) {
+    match run(s, p, &CameraCovariance::exact()) {
         Ok(f) => panic!("accepted; the robot scatters by {:?}", f.noise),
         Err(e) => assert!(e.to_string().contains(word), "'{word}' is not in: {e}"),
     }

@@ -17,7 +17,7 @@ use sheetlight::calibrate::laser_plane::views::StripePeak;
 use sheetlight::calibrate::laser_plane::views::StripeView;
 use sheetlight::calibrate::limits::Asked;
 use sheetlight::calibrate::measured_pose::{SeenBoard, measure, pooled_factor};
-use sheetlight::camera::{Intrinsics, ParameterCovariance, Parameters};
+use sheetlight::camera::{CameraCovariance, Intrinsics, Parameters};
 use sheetlight::geometry::{Board, Camera, Plane, Rigid, Vec2, Vec3, exp};
 use sheetlight::recording::BoardSpec;
 use sheetlight::rig::{Verdict, Volume};
@@ -108,7 +108,7 @@ fn views(rng: &mut Pcg64, s: &Station, believed: &Intrinsics, corner_px: f64, pe
 fn run(
     s: &Station,
     v: &[StripeView],
-    covariance: &ParameterCovariance,
+    covariance: &CameraCovariance,
     corner_px: f64,
 ) -> sheetlight::fault::Result<LaserPlaneFit> {
     solve(v, &s.camera, covariance, corner_px, &LaserPlaneOptions::default())
@@ -203,12 +203,12 @@ fn errors_are_what_the_report_says_and_near_the_bound() {
         let rng = &mut Pcg64::seed_from_u64(100 + k);
         let s = station(rng, 10);
         let exact = views(rng, &s, &s.camera, 1e-6, 1e-6);
-        let used = run(&s, &exact, &ParameterCovariance::zeros(), 1e-6).unwrap();
+        let used = run(&s, &exact, &CameraCovariance::exact(), 1e-6).unwrap();
         let b = bound(&s, &used, corner, peak);
         (s, b, corner, peak)
     };
     judge("laser plane", &["tilt_1", "tilt_2", "offset_mm"], levels.len(), make, |(s, bound, corner, peak), rng| {
-        let found = run(s, &views(rng, s, &s.camera, *corner, *peak), &ParameterCovariance::zeros(), *corner).unwrap();
+        let found = run(s, &views(rng, s, &s.camera, *corner, *peak), &CameraCovariance::exact(), *corner).unwrap();
         assert!(found.views.iter().all(|v| v.used), "good pictures were left out");
         let c = three(&s.plane) * &found.covariance * three(&s.plane).transpose();
         Trial::new(error(&found.plane, &s.plane), &c, bound)
@@ -221,7 +221,7 @@ fn the_cameras_uncertainty_reaches_the_report() {
     let sigma = Parameters::from([
         0.3, 0.3, 0.2, 0.2, 1e-3, 1e-3, 1e-4, 1e-4, 1e-3, 5e-4, 0.0, 0.0, 1e-4, 0.0, 0.0, 0.0, 1e-3, 1e-3, 0.0,
     ]);
-    let covariance = ParameterCovariance::from_diagonal(&sigma.map(|s| s * s));
+    let covariance = CameraCovariance::independent(&sigma).unwrap();
     let (mut over, mut exact) = ([0.0; 3], [0.0; 3]);
     for k in 0..100 {
         let rng = &mut Pcg64::seed_from_u64(900 + k);
@@ -256,7 +256,7 @@ fn a_board_that_moved_between_its_two_pictures_is_named() {
             .into_iter()
             .map(|p| StripePeak { pixel: p + Vec2::new(0.0, gauss(rng, 0.05)), sigma_px: 0.05, width_px: 1.3 })
             .collect();
-        let found = run(&s, &v, &ParameterCovariance::zeros(), 0.03).unwrap();
+        let found = run(&s, &v, &CameraCovariance::exact(), 0.03).unwrap();
         let out: Vec<usize> = (0..10).filter(|&i| !found.views[i].used).collect();
         assert_eq!(out, [bad], "seed {k}");
         let e = error(&found.plane, &s.plane);
@@ -270,7 +270,7 @@ fn reflections_on_and_beside_the_board_do_not_enter() {
     let rng = &mut Pcg64::seed_from_u64(5);
     let s = station(rng, 8);
     let mut v = views(rng, &s, &s.camera, 0.03, 0.05);
-    let clean = run(&s, &v, &ParameterCovariance::zeros(), 0.03).unwrap();
+    let clean = run(&s, &v, &CameraCovariance::exact(), 0.03).unwrap();
     for view in &mut v {
         let wrong: Vec<StripePeak> = (0..80)
             .map(|_| StripePeak {
@@ -281,7 +281,7 @@ fn reflections_on_and_beside_the_board_do_not_enter() {
             .collect();
         view.peaks.extend(wrong);
     }
-    let found = run(&s, &v, &ParameterCovariance::zeros(), 0.03).unwrap();
+    let found = run(&s, &v, &CameraCovariance::exact(), 0.03).unwrap();
     assert!(found.views.iter().all(|v| v.used));
     let e = error(&found.plane, &clean.plane);
     let c = three(&s.plane) * &clean.covariance * three(&s.plane).transpose();
@@ -295,7 +295,7 @@ fn stripes_on_one_line_are_refused() {
     let one = s.boards[0];
     s.boards.iter_mut().for_each(|b| *b = one);
     let v = views(rng, &s, &s.camera, 0.03, 0.05);
-    match run(&s, &v, &ParameterCovariance::zeros(), 0.03) {
+    match run(&s, &v, &CameraCovariance::exact(), 0.03) {
         Err(_) => {}
         Ok(f) => assert!(f.depth_spread < 0.5 && f.board_spread < 0.01, "depth {} mm", f.depth_spread),
     }
@@ -319,7 +319,7 @@ fn call(seed: u64, flaw: Flaw) -> Called {
     let views = set(rng, &s, flaw);
     let refused = Called { flaw, count, seed, verdict: None, error: 0.0, sigma: 0.0, says: Vec::new() };
     let factor = pooled_factor(views.iter().map(|v| &v.pose)).unwrap_or(f64::NAN);
-    let Ok(fit) = solve(&views, &s.camera, &ParameterCovariance::zeros(), factor, &LaserPlaneOptions::default()) else {
+    let Ok(fit) = solve(&views, &s.camera, &CameraCovariance::exact(), factor, &LaserPlaneOptions::default()) else {
         return refused;
     };
     let lit = Volume::new(fit.reach[0], fit.reach[1], "where the boards were lit");

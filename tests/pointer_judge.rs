@@ -17,7 +17,7 @@ use sheetlight::calibrate::pointer::range::{
 };
 use sheetlight::calibrate::pointer::report::judge as judge_pointer;
 use sheetlight::calibrate::pointer::solve::{PointerOptions, SpotView, solve};
-use sheetlight::camera::{Intrinsics, ParameterCovariance, Parameters};
+use sheetlight::camera::{CameraCovariance, Intrinsics, Parameters};
 use sheetlight::geometry::{Base, Board, Camera, Flange, Plane, Ray, Rigid, Vec2, Vec3, exp};
 use sheetlight::rig::{Verdict, Volume};
 
@@ -156,7 +156,7 @@ fn errors_are_what_the_report_says_and_near_the_bound() {
     let names = ["x_at_120_mm", "y_at_120_mm", "x_at_280_mm", "y_at_280_mm"];
     judge("pointer", &names, levels.len(), make, |(s, bound, (corner, px)), rng| {
         let v = views(rng, s, &s.camera, *corner, *px);
-        let found = solve(&v, &s.camera, &ParameterCovariance::zeros(), 1.0, &PointerOptions::default()).unwrap();
+        let found = solve(&v, &s.camera, &CameraCovariance::exact(), 1.0, &PointerOptions::default()).unwrap();
         let j = four_by_beam(&found.beam);
         let c = &j * found.covariance.view((0, 0), (6, 6)) * j.transpose();
         Trial::new(four(&found.beam) - four(&s.beam), &c, bound)
@@ -170,7 +170,7 @@ fn distances_come_with_their_true_sigmas() {
     let sigma = Parameters::from([
         0.3, 0.3, 0.2, 0.2, 1e-3, 1e-3, 1e-4, 1e-4, 1e-3, 5e-4, 0.0, 0.0, 1e-4, 0.0, 0.0, 0.0, 1e-3, 1e-3, 0.0,
     ]);
-    let covariance = ParameterCovariance::from_diagonal(&sigma.map(|s| s * s));
+    let covariance = CameraCovariance::independent(&sigma).unwrap();
     let depths = [80.0, 120.0, 180.0, 240.0, 290.0];
     let mut over = [0.0; 5];
     for k in 0..200 {
@@ -200,7 +200,7 @@ fn a_wrong_spot_is_named() {
         let mut v = views(rng, &s, &s.camera, 0.03, 0.03);
         let bad = k as usize % 9;
         v[bad].pixel += if k % 2 == 0 { Vec2::new(25.0, -8.0) } else { Vec2::new(0.5, 0.5) };
-        let found = solve(&v, &s.camera, &ParameterCovariance::zeros(), 1.0, &PointerOptions::default()).unwrap();
+        let found = solve(&v, &s.camera, &CameraCovariance::exact(), 1.0, &PointerOptions::default()).unwrap();
         let out: Vec<usize> = (0..9).filter(|&i| !found.spots[i].used).collect();
         assert_eq!(out, [bad], "seed {k}: {:?}", found.spots.iter().map(|s| s.distance2).collect::<Vec<_>>());
     }
@@ -214,7 +214,7 @@ fn spots_in_one_place_are_refused() {
         b.translation.z += 200.0 - b.point(&Vec3::new(40.0, 25.0, 0.0)).z;
     }
     let v = views(rng, &s, &s.camera, 0.03, 0.03);
-    let e = solve(&v, &s.camera, &ParameterCovariance::zeros(), 1.0, &PointerOptions::default()).unwrap_err();
+    let e = solve(&v, &s.camera, &CameraCovariance::exact(), 1.0, &PointerOptions::default()).unwrap_err();
     assert!(e.what.contains("are needed"), "{e}");
 }
 
@@ -225,7 +225,7 @@ fn a_surfaces_normal_comes_with_its_true_sigma() {
         let rng = &mut Pcg64::seed_from_u64(9000 + k);
         let s = station(rng, 9);
         let v = views(rng, &s, &s.camera, 0.03, 0.03);
-        let found = solve(&v, &s.camera, &ParameterCovariance::zeros(), 1.0, &PointerOptions::default()).unwrap();
+        let found = solve(&v, &s.camera, &CameraCovariance::exact(), 1.0, &PointerOptions::default()).unwrap();
         let joint = RigCovariance::from_fn(|i, j| found.covariance[(i, j)]);
         let hand_eye: Rigid<Flange, Camera> = Rigid::from_vectors(&gauss3(rng, 1.0), gauss3(rng, 60.0));
         let mut shared = SharedCovariance::zeros();
@@ -373,7 +373,7 @@ fn judged(seed: u64, wrong: Wrong, count: usize) -> Judged {
         }
     }
     let factor = pooled_factor(v.iter().map(|v| &v.pose)).unwrap_or(f64::NAN);
-    let Ok(fit) = solve(&v, &s.camera, &ParameterCovariance::zeros(), factor, &PointerOptions::default()) else {
+    let Ok(fit) = solve(&v, &s.camera, &CameraCovariance::exact(), factor, &PointerOptions::default()) else {
         return (None, 0.0, 0.0, vec![]);
     };
     let lay = Volume::new(fit.reach[0], fit.reach[1], "where the spots lay");

@@ -49,6 +49,59 @@ fn every_shader_is_what_its_stage_says() {
     }
 }
 
+/// Scalar constants of a shader's text: name, value.
+fn constants(text: &str) -> Vec<(String, f64)> {
+    let lines = text.lines().filter_map(|l| l.split("//").next()?.trim().strip_prefix("const "));
+    let one = |line: &str| -> Option<(String, f64)> {
+        let (name, value) = line.trim_end_matches(';').split_once(" = ")?;
+        let value = value.trim();
+        let number = match value.strip_prefix("0x") {
+            Some(hex) => i64::from_str_radix(hex.trim_end_matches(['u', 'i']), 16).ok()? as f64,
+            None => value.trim_end_matches(['u', 'i', 'f']).parse().ok()?,
+        };
+        Some((name.split(':').next()?.trim().into(), number))
+    };
+    lines.filter_map(one).collect()
+}
+
+/// Words that are read by a number instead of a name: `header[3]`, and reasons that are numbers.
+fn literals(text: &str) -> Vec<String> {
+    let read = |name: &'static str| {
+        text.match_indices(name).filter(move |(at, found)| {
+            let whole = !text[..*at].ends_with(|c: char| c.is_alphanumeric() || c == '_');
+            whole && text[at + found.len()..].starts_with(|c: char| c.is_ascii_digit())
+        })
+    };
+    let all = ["header[", "listing[", "all[", "shortened[", "others[", "first[", "select(why, ", "flags & "];
+    all.iter().flat_map(|name| read(name)).map(|(at, _)| text[at..].chars().take(24).collect()).collect()
+}
+
+#[test]
+fn numbers_of_both_sides_are_one_and_have_names() {
+    let mut seen = BTreeSet::new();
+    for entry in stages::all() {
+        let (stage, text) = (entry.stage.name, entry.stage.source());
+        assert_eq!(literals(&text), [""; 0], "{stage}: name these words, in shaders/shared and src/stages/numbers.rs");
+        for (name, value) in constants(&text) {
+            let place = stages::NUMBERS.iter().position(|n| n.1 == name && [stage, ""].contains(&n.0));
+            let at = place.unwrap_or_else(|| panic!("{stage}: {name} stands in no line of src/stages/numbers.rs"));
+            assert_eq!(value as f32, stages::NUMBERS[at].2 as f32, "{stage}: {name}");
+            seen.insert(at);
+        }
+    }
+    let unused: Vec<_> = (0..stages::NUMBERS.len()).filter(|i| !seen.contains(i)).collect();
+    assert!(unused.is_empty(), "no shader names these: {unused:?}");
+}
+
+#[test]
+fn literals_and_constants_are_read_in_every_form() {
+    let text =
+        "const A = 3u;\nconst B: i32 = 0x10; // const C = 4u;\nconst D = vec4(1u);\nlet x = header[COUNT] + header[4];";
+    assert_eq!(constants(text), [("A".to_string(), 3.0), ("B".to_string(), 16.0)]);
+    assert_eq!(literals(text), ["header[4];"]);
+    assert_eq!(literals("my_header[4] + select(why, 6u, x)").len(), 1);
+}
+
 fn valid(name: &str, source: &str) -> naga::Module {
     let module =
         naga::front::wgsl::parse_str(source).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(source)));

@@ -84,7 +84,7 @@ fn the_chain_of_twins_is_the_plain_definition() {
             let list = skeleton::twin(&chosen);
             let header = &walk.buffers["header"];
             let (from, to) = (header[skeleton::HEADER + i] as usize, header[skeleton::HEADER + 1 + i] as usize);
-            let points = &walk.buffers["points"][2 * from..2 * to];
+            let points = &walk.buffers["pixels"][2 * from..2 * to];
             assert!(points.iter().step_by(2).copied().eq(list), "{}, shot {i}: points", scene.name);
             assert!(points.iter().skip(1).step_by(2).all(|&s| s == i as u32));
         }

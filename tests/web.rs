@@ -22,7 +22,8 @@ fn station(whole: bool) -> tempfile::TempDir {
     let small = text.replace("region_mm = [-52, -38, 52, 38]", "region_mm = [-52, 0, 4, 28]");
     assert_ne!(text, small, "the scene is another one");
     std::fs::write(&scene, if whole { text } else { small }).unwrap();
-    let (shots, sets) = if whole { ("200", "scan,surface,intrinsics,laserplane") } else { ("70", "scan,surface") };
+    let (shots, sets) =
+        if whole { ("200", "scan,surface,intrinsics,laserplane") } else { ("70", "scan,surface,intrinsics") };
     let scene = scene.to_str().unwrap();
     sheetlight(&[
         "--quiet", "simulate", "--out", out, "--set", sets, "--seed", "3", "--shots", shots, "--scene", scene,
@@ -159,6 +160,18 @@ fn a_program_drives_a_scan_as_the_documents_show() {
 fn a_live_picture_is_the_newest_with_its_peaks_and_all_others_are_counted() {
     let dir = copy();
     python("tests/web/live.py", &[program(), dir.path().to_str().unwrap()]);
+}
+
+#[test]
+fn exposure_and_region_are_set_from_the_picture() {
+    let dir = copy();
+    python("tests/web/picture.py", &[program(), dir.path().to_str().unwrap()]);
+}
+
+#[test]
+fn touch_checks_layers_drawings_points_and_support_do_what_an_operator_expects() {
+    let dir = copy();
+    python("tests/web/station.py", &[program(), dir.path().to_str().unwrap()]);
 }
 
 /// Compares a document with what the program says of itself; writes it under `SHEETLIGHT_WRITE`.

@@ -15,7 +15,7 @@ struct Frame {
     size: u32,
     offset: i32,
     minimum: u32,
-    // Bit 0: list every tile (the plain path). Bit 1: a region of interest is given. Bit 2: Gaussian window.
+    // ALL_TILES, HAS_ROI, GAUSSIAN.
     flags: u32,
     // Number of thinning's sub-iteration.
     step: u32,
@@ -27,6 +27,11 @@ struct Frame {
     // Pixels from one of a run across the stripe to the next, and from bit 16 on 1 where runs lie along rows; 0 keeps all.
     spacing: u32,
 }
+
+// Bits of flags: every tile is listed (the plain path), a region of interest is given, the window is Gaussian.
+const ALL_TILES = 1u;
+const HAS_ROI = 2u;
+const GAUSSIAN = 4u;
 
 // Pixels a word as a power of two: 2 for 8-bit pictures, 1 for 9 to 16 bits.
 override px_log2: u32 = 2u;

@@ -55,3 +55,15 @@ struct Peak {
     pixel: u32,
     shot: u32,
 }
+
+// Flags of a peak: in the lowest byte why it was refused, 0 where it was not; a bit where one of its pixels is clipped.
+const REASON = 255u;
+const FAINT = 2u;
+const NARROW = 3u;
+const WIDE = 4u;
+const UNCERTAIN = 5u;
+const STEEP = 6u;
+const ECHO = 7u;
+const UNSUPPORTED = 8u;
+const NO_POINT = 9u;
+const SATURATED = 256u;

@@ -3,6 +3,7 @@
 
 mod machine;
 mod peer;
+mod recorded;
 mod rows;
 mod run;
 mod scaling;
@@ -13,6 +14,7 @@ mod ways;
 
 pub use machine::{Ceilings, cpu_seconds, peak_memory_bytes};
 pub use peer::serve;
+pub use recorded::recorded;
 pub use rows::{Latency, Row, Soak, Stage};
 pub use run::{BenchOptions, Report, run};
 pub use scaling::Scaling;

@@ -142,8 +142,8 @@ pub fn serve(device: &Device, mut input: impl BufRead, mut output: impl Write) -
                 single.submit_posed(0, &[&images[i]], &[STILL])?;
                 let mut batch = Batch::default();
                 single.collect_into(true, &mut batch)?;
-                writeln!(output, "{}", serde_json::json!({"points": batch.spots.len()})).map_err(lost)?;
-                for (k, p) in batch.peaks.iter().zip(&batch.spots) {
+                writeln!(output, "{}", serde_json::json!({"points": batch.points.len()})).map_err(lost)?;
+                for (k, p) in batch.peaks.iter().zip(&batch.points) {
                     let [x, y, z] = p.position;
                     let row = [(k.pixel & 0xffff) as f32, (k.pixel >> 16) as f32, x, y, z];
                     output.write_all(&row.map(f32::to_le_bytes).concat()).map_err(lost)?;
@@ -180,12 +180,12 @@ fn run(chain: &mut Chain, images: &[Image], times: usize) -> Result<usize> {
     let (mut points, mut done) = (0, Batch::default());
     for batch in order.chunks(chain.frame.shots as usize) {
         if !chain.has_room() && chain.collect_into(true, &mut done)? {
-            points += done.spots.len();
+            points += done.points.len();
         }
         chain.submit_posed(0, batch, &[STILL].repeat(batch.len()))?;
     }
     while chain.collect_into(true, &mut done)? {
-        points += done.spots.len();
+        points += done.points.len();
     }
     Ok(points)
 }

@@ -30,10 +30,11 @@ pub struct WayTime {
     pub cpu_ms_per_shot: Option<f64>,
 }
 
-const SIZES: [(u32, u32); 2] = [(640, 480), (2048, 1536)];
+/// A picture, the same at twice the resolution, and a large one.
+pub(super) const SIZES: [(u32, u32); 3] = [(640, 480), (1280, 960), (2048, 1536)];
 const TURNS: usize = 5;
 
-/// Both ways at two sizes, one clean stripe.
+/// Both ways at three sizes, one clean stripe.
 pub fn way_times(device: Option<&Device>) -> Result<Vec<WayTime>> {
     let mut found = Vec::new();
     for (width, height) in SIZES {

@@ -5,7 +5,7 @@
 use super::boards::BoardView;
 use super::pose::board_pose;
 use super::projection::project;
-use crate::camera::{Intrinsics, NAMES, PARAMETERS, ParameterCovariance, Parameters};
+use crate::camera::{CameraCovariance, Intrinsics, NAMES, PARAMETERS, ParameterMatrix, Parameters};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Board, Camera, Mat3, Rigid, Twist, Vec2, Vec3, skew};
 use crate::recording::BoardSpec;
@@ -20,7 +20,7 @@ pub type ByIntrinsics = SMatrix<f64, 6, PARAMETERS>;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AboutCamera {
     /// A.
-    pub information: ParameterCovariance,
+    pub information: ParameterMatrix,
     /// g.
     pub gradient: Parameters,
 }
@@ -28,7 +28,7 @@ pub struct AboutCamera {
 impl AboutCamera {
     /// Says nothing.
     pub fn silent() -> AboutCamera {
-        AboutCamera { information: ParameterCovariance::zeros(), gradient: Parameters::zeros() }
+        AboutCamera { information: ParameterMatrix::zeros(), gradient: Parameters::zeros() }
     }
 }
 
@@ -266,7 +266,10 @@ pub fn pooled_factor<'a>(poses: impl Iterator<Item = &'a MeasuredPose>) -> Optio
     (freedom > 0.0).then(|| f64::sqrt(sum / freedom))
 }
 
-/// The camera's covariance in the order of [`NAMES`]; parameters that the file does not name count as known.
-pub fn intrinsic_covariance(covariance: &crate::rig::Covariance) -> ParameterCovariance {
-    covariance.of(NAMES)
+/// What a file says of the camera's errors; parameters that it does not name count as known.
+///
+/// # Errors
+/// Numbers that are no covariance.
+pub fn intrinsic_covariance(covariance: &crate::rig::Covariance) -> Result<CameraCovariance> {
+    CameraCovariance::new(covariance.of(NAMES))
 }

@@ -1,15 +1,15 @@
 //! In: a pinhole camera with its lens. Out: pixels of points, rays of pixels, the parameters by name.
 //! Frame and unit: camera frame (x right, y down, z forward), mm; an integer pixel is a pixel centre.
 
+mod covariance;
 mod distortion;
 mod intrinsics;
 mod parameters;
 
+pub use covariance::{CameraCovariance, named};
 pub use distortion::{Distortion, TERMS};
 pub use intrinsics::Intrinsics;
-pub use parameters::{
-    ALWAYS_NAMED, LENS, NAMES, PARAMETERS, ParameterCovariance, Parameters, SKEW, difference_step, named,
-};
+pub use parameters::{ALWAYS_NAMED, LENS, NAMES, PARAMETERS, ParameterMatrix, Parameters, SKEW, difference_step};
 
 #[cfg(test)]
 #[path = "tests.rs"]

@@ -40,8 +40,8 @@ pub const ALWAYS_NAMED: usize = 9;
 
 /// A camera's numbers in the order of [`NAMES`], each in the unit that its name ends with.
 pub type Parameters = SVector<f64, PARAMETERS>;
-/// Their covariance: rows and columns in the order of [`NAMES`], units multiplied.
-pub type ParameterCovariance = SMatrix<f64, PARAMETERS, PARAMETERS>;
+/// A square of them: rows and columns in the order of [`NAMES`]. What is known to be a covariance is a [`super::CameraCovariance`].
+pub type ParameterMatrix = SMatrix<f64, PARAMETERS, PARAMETERS>;
 
 impl Intrinsics {
     /// Its numbers in the order of [`NAMES`].
@@ -74,9 +74,4 @@ impl Intrinsics {
 /// Step for derivatives by differences: a thousandth of what matters.
 pub fn difference_step(parameter: usize) -> f64 {
     if (LENS..SKEW).contains(&parameter) { 1e-4 } else { 0.05 }
-}
-
-/// Indices of the parameters that a file names: the first nine, and those whose variance is not zero.
-pub fn named(covariance: &ParameterCovariance) -> Vec<usize> {
-    (0..PARAMETERS).filter(|&i| i < ALWAYS_NAMED || covariance[(i, i)] != 0.0).collect()
 }

@@ -33,7 +33,25 @@ pub struct StripeLook {
     pub dark: f64,
     /// Peak (share of full scale) in eight parts along it; 0 where dark.
     pub along: [f64; 8],
+    /// The same looks in as many pieces of the same length, from the left or the top.
+    pub pieces: Vec<Piece>,
 }
+
+/// A piece of the picture along the stripe.
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Piece {
+    /// Median peak, share of full scale; 0 where dark.
+    pub peak: f64,
+    /// Full width at half height, px, median; 0 where dark.
+    pub width_px: f64,
+    /// Peak against the level beside it, median; 0 where dark.
+    pub contrast: f64,
+    /// Share of its lines without a stripe.
+    pub dark: f64,
+}
+
+/// Pieces that a stripe is looked at in.
+const PIECES: usize = 32;
 
 /// Where the peak is to stand, and how many may be saturated.
 pub const WANTED: [f64; 2] = [0.70, 0.85];
@@ -93,6 +111,31 @@ struct Across {
     contrasts: Vec<f64>,
     saturated: u32,
     along: [(f64, u32); 8],
+    pieces: Vec<InPiece>,
+}
+
+/// What the lines of a piece show: how many there are, peaks, widths and contrasts of those that show something.
+#[derive(Clone, Default)]
+struct InPiece {
+    lines: usize,
+    seen: [Vec<f64>; 3],
+}
+
+impl InPiece {
+    fn piece(mut self) -> Piece {
+        let shown = self.seen[0].len();
+        if shown == 0 {
+            return Piece { dark: 1.0, ..Piece::default() };
+        }
+        let [peak, width_px, contrast] = [0, 1, 2].map(|i| share(&mut self.seen[i], 0.5));
+        Piece { peak, width_px, contrast, dark: 1.0 - shown as f64 / self.lines as f64 }
+    }
+}
+
+/// The value that this share of the others does not exceed.
+fn share(values: &mut [f64], share: f64) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[(share * (values.len() - 1) as f64) as usize]
 }
 
 impl Across {
@@ -100,8 +143,11 @@ impl Across {
         let full = f64::from(image.full_scale());
         let (lines, length) = if lying { (image.width, image.height) } else { (image.height, image.width) };
         self.lines += lines as usize;
+        self.pieces.resize(PIECES, InPiece::default());
         let mut line = vec![0u16; length as usize];
         for k in 0..lines {
+            let piece = &mut self.pieces[k as usize * PIECES / lines as usize];
+            piece.lines += 1;
             line.iter_mut().zip(0..).for_each(|(l, i)| *l = if lying { image.get(k, i) } else { image.get(i, k) });
             let Some((at, top)) = line.iter().copied().enumerate().max_by_key(|(_, l)| *l) else { continue };
             let mut sorted = line.clone();
@@ -116,9 +162,12 @@ impl Across {
             let above = |l: &u16| f64::from(*l) > half;
             let after = line[at..].iter().take_while(|l| above(l)).count();
             let before = line[..at].iter().rev().take_while(|l| above(l)).count();
-            self.peaks.push(f64::from(top) / full);
-            self.widths.push((after + before) as f64);
-            self.contrasts.push(f64::from(top) / ground.max(1.0));
+            let seen = [f64::from(top) / full, (after + before) as f64, f64::from(top) / ground.max(1.0)];
+            piece.seen.iter_mut().zip(seen).for_each(|(all, v)| all.push(v));
+            let [peak, width, contrast] = seen;
+            self.peaks.push(peak);
+            self.widths.push(width);
+            self.contrasts.push(contrast);
             self.saturated += u32::from(top == image.full_scale());
             let eighth = &mut self.along[(k * 8 / lines) as usize];
             *eighth = (eighth.0 + f64::from(top) / full, eighth.1 + 1);
@@ -131,18 +180,15 @@ impl Across {
         if shown == 0 || shown * 50 < self.lines {
             return None;
         }
-        let at = |v: &mut Vec<f64>, share: f64| {
-            v.sort_by(f64::total_cmp);
-            v[(share * (v.len() - 1) as f64) as usize]
-        };
         Some(StripeLook {
             lying,
-            peak: at(&mut self.peaks, 0.95),
+            peak: share(&mut self.peaks, 0.95),
             saturated: f64::from(self.saturated) / shown as f64,
-            width_px: at(&mut self.widths, 0.5),
-            contrast: at(&mut self.contrasts, 0.5),
+            width_px: share(&mut self.widths, 0.5),
+            contrast: share(&mut self.contrasts, 0.5),
             dark: 1.0 - shown as f64 / self.lines as f64,
             along: self.along.map(|(sum, n)| if n > 0 { sum / f64::from(n) } else { 0.0 }),
+            pieces: self.pieces.into_iter().map(InPiece::piece).collect(),
         })
     }
 }
@@ -203,6 +249,15 @@ mod tests {
             assert_eq!(stripe.lying, lying);
             assert!((stripe.width_px - 4.7).abs() < 1.0 && (stripe.peak - 0.79).abs() < 0.03, "{seen}");
             assert!((stripe.dark - 16.0 / if lying { 200.0 } else { 160.0 }).abs() < 0.01 && seen.right(), "{seen}");
+            // The shadow lies at the beginning, and only there.
+            let dark: f64 = stripe.pieces.iter().map(|p| p.dark).sum::<f64>() / stripe.pieces.len() as f64;
+            assert!(
+                stripe.pieces[0].dark == 1.0 && stripe.pieces[8..].iter().all(|p| p.dark == 0.0),
+                "{:?}",
+                stripe.pieces
+            );
+            assert!((dark - stripe.dark).abs() < 0.02, "{dark}");
+            assert!(stripe.pieces[8..].iter().all(|p| (p.width_px - 4.7).abs() < 1.4 && (p.peak - 0.79).abs() < 0.05));
         }
         let bright = look(&picture(500.0, true));
         assert!(bright.stripe.as_ref().unwrap().saturated > 0.9 && !bright.right());

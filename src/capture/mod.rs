@@ -26,7 +26,7 @@ pub use feature::{Feature, Range, Value};
 pub use feed::{Fate, Fed, Feed, FeedOptions, Mode};
 pub use format::{Format, RawFormat, RawFrames};
 pub use latency::Latency;
-pub use look::{Look, StripeLook, look, look_at};
+pub use look::{Look, Piece, StripeLook, WANTED, look, look_at};
 pub use picture::{Event, Picture, PictureSource};
 pub use stream::{Stream, Streamed};
 pub use tune::{Tuned, fresh, tune};

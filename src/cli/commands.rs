@@ -3,7 +3,7 @@
 
 use super::capture::{camera, record};
 use super::doctor::command as doctor;
-use super::find::{import_map, locate as find, matching, model, program, second_look, teach};
+use super::find::{filter, ghost, import_map, locate as find, matching, model, program, second_look, teach};
 use super::insert::{guide, job, robot};
 use super::terminal::console::Console;
 use super::terminal::threads;
@@ -51,7 +51,9 @@ enum Command {
     Cell(cell::Command),
     Demo(demo::Args),
     Doctor(doctor::Args),
+    Filter(filter::Args),
     Find(find::Args),
+    Ghost(ghost::Args),
     Guide(guide::Args),
     ImportMap(import_map::Args),
     Job(job::Args),
@@ -61,7 +63,7 @@ enum Command {
     Program(program::Args),
     Range(range::Args),
     Record(record::Args),
-    /// Answer a robot that drives itself
+    /// Answer a robot that drives itself, try the outputs of one that is linked
     #[command(subcommand)]
     Robot(robot::Command),
     Scan(scan::Args),
@@ -85,7 +87,9 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Cell(c) => cell::run(c, console),
         Command::Demo(a) => demo::run(a, console),
         Command::Doctor(a) => doctor::run(a, console),
+        Command::Filter(a) => filter::run(a, console),
         Command::Find(a) => find::run(a, console),
+        Command::Ghost(a) => ghost::run(a, console),
         Command::Guide(a) => guide::run(a, console),
         Command::ImportMap(a) => import_map::run(a, console),
         Command::Job(a) => job::run(a, console),

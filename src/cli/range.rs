@@ -13,7 +13,8 @@ use std::path::PathBuf;
 ///
 /// Prints for each picture the distance along the beam and along the optical axis with its standard
 /// deviation; with robot poses and a hand-eye calibration also the point in the base frame. With
-/// --surface the shots are taken to be of one plane: its normal and the tool pose square to it follow.
+/// --surface the shots are taken to be of one plane: its normal and the tool pose square to it follow,
+/// and where station.toml has a [tool], how it leant at the last shot and how the flange stands when it is square there.
 #[derive(clap::Args)]
 #[command(after_help = "Example:
   sheetlight range recordings/pointer --station cell3 --json > distances.json")]
@@ -34,7 +35,12 @@ pub struct Args {
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let recording = Recording::open(&args.recording)?;
     let (settings, rig) = (Settings::load(&args.station)?, Rig::load(&args.station)?);
-    let run = RangeRun { poses: args.poses.clone(), one_surface: args.surface, ..RangeRun::default() };
+    let run = RangeRun {
+        poses: args.poses.clone(),
+        one_surface: args.surface,
+        tool: settings.tool.map(|t| t.flange_from_tool),
+        ..RangeRun::default()
+    };
     let report = measure_range(&recording, &rig, &run)?;
     console.result(&report, &table(&report, settings.robot.unwrap_or(Convention::Matrix)));
     Ok(())
@@ -68,13 +74,20 @@ fn table(r: &RangeReport, robot: Convention) -> String {
         if let Some(name) = &f.left_out {
             s += &format!("{name} was left out of it: its spot does not lie on the plane of the others\n");
         }
-        let pose: Vec<String> = robot
-            .labels()
-            .iter()
-            .zip(robot.write(&f.base_from_tool))
-            .map(|(label, v)| format!("{label} {v:.4}"))
-            .collect();
-        s += &format!("tool square to it ({}): {}\n", robot.name(), pose.join(", "));
+        s += &format!("tool square to it ({}): {}\n", robot.name(), written(robot, robot.write(&f.base_from_tool)));
+    }
+    if let Some(q) = &r.square {
+        s += &format!(
+            "the tool leant {:.4} ± {:.4} degrees at the last shot; square there, by turning about its origin: flange {}\n",
+            q.tilt_deg,
+            q.tilt_sigma_deg,
+            written(robot, robot.write(&q.base_from_flange))
+        );
     }
     s
+}
+
+fn written(robot: Convention, numbers: Vec<f64>) -> String {
+    let labelled = robot.labels().iter().zip(numbers).map(|(label, v)| format!("{label} {v:.4}"));
+    labelled.collect::<Vec<_>>().join(", ")
 }

@@ -3,6 +3,7 @@
 //! Frame and unit: named in the type; millimetres, radians, f64.
 
 mod axis;
+mod covariance;
 mod frame;
 mod plane;
 mod rigid;
@@ -10,6 +11,7 @@ mod rotation;
 mod step;
 
 pub use axis::{Axis, AxisKind, CountUnit, Riding};
+pub use covariance::not_a_covariance;
 pub use frame::{Base, Board, Camera, Flange, Frame, Grid, Part, Ride, Sensor, Tool};
 pub use plane::{Plane, Ray, fit_plane};
 pub use rigid::Rigid;

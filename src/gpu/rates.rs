@@ -78,10 +78,11 @@ impl Device {
                 seconds.push(last.elapsed().as_secs_f64());
                 last = Instant::now();
             }
-            let at = ring.fill(&parts, &|i, put| {
+            let part = |i: usize, put: &mut dyn FnMut(usize, &[u8])| {
                 put(0, picture.chunks(PART).nth(i).expect("as many as parts"));
                 Ok(())
-            })?;
+            };
+            let at = ring.fill(&parts, &part, ())?;
             ring.run(at, &mut replay, &[&nothing], true)?;
         }
         self.wait(None)?;

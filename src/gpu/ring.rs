@@ -54,15 +54,16 @@ impl Returned<'_> {
     }
 }
 
-/// Batches in flight, oldest first; no buffer is made after the start, but where results need more room than ever before.
-pub struct Ring {
+/// Batches in flight, oldest first, each with what its owner wants back with it; no buffer is made after the start, but where
+/// results need more room than ever before.
+pub struct Ring<T> {
     device: Device,
     /// Copy a batch, and what comes back, together where the device works for itself.
     copiers: Option<ThreadPool>,
     /// All places, by the number that `fill` and `keep` return.
     pub slots: Vec<Slot>,
     free: VecDeque<usize>,
-    busy: VecDeque<usize>,
+    busy: VecDeque<(usize, T)>,
 }
 
 /// Sizes of a ring in bytes.
@@ -100,9 +101,9 @@ fn copiers(device: &Device) -> Result<Option<ThreadPool>> {
     })
 }
 
-impl Ring {
+impl<T> Ring<T> {
     /// Makes every buffer; `Err` where one is larger than the adapter allows, or the device is lost.
-    pub fn new(device: &Device, sizes: RingSizes) -> Result<Ring> {
+    pub fn new(device: &Device, sizes: RingSizes) -> Result<Ring<T>> {
         let unified = device.info.unified_memory;
         let mut slots = Vec::new();
         for _ in 0..sizes.slots {
@@ -164,8 +165,8 @@ impl Ring {
 
     /// Fills the next free place, which is divided into parts of so many bytes; panics when there is no room. `fill` is given
     /// the number of a part and a writer (byte offset in the part, bytes), by several threads where they do not take the
-    /// stages' time. Returns the place, whose work is started with `run`.
-    pub fn fill(&mut self, parts: &[usize], fill: &Fill) -> Result<usize> {
+    /// stages' time. Returns the place, whose work is started with `run`; `cargo` comes back with `finish`.
+    pub fn fill(&mut self, parts: &[usize], fill: &Fill, cargo: T) -> Result<usize> {
         self.device.alive()?;
         let (at, _) = self.next()?;
         let slot = &mut self.slots[at];
@@ -175,18 +176,18 @@ impl Ring {
             return Err(e);
         }
         self.free.pop_front();
-        self.busy.push_back(at);
+        self.busy.push_back((at, cargo));
         Ok(at)
     }
 
     /// As `fill` with what lies in the next free place since it was last filled.
-    pub fn keep(&mut self) -> Result<usize> {
+    pub fn keep(&mut self, cargo: T) -> Result<usize> {
         let (at, open) = self.next()?;
         if open {
             self.slots[at].upload.raw.unmap();
         }
         self.free.pop_front();
-        self.busy.push_back(at);
+        self.busy.push_back((at, cargo));
         Ok(at)
     }
 
@@ -205,9 +206,9 @@ impl Ring {
         Ok(())
     }
 
-    /// The oldest place whose work is done, its header written into `header`; waits for it if asked.
-    pub fn oldest(&mut self, wait: bool, header: &mut [u32]) -> Result<Option<usize>> {
-        let Some(&at) = self.busy.front() else { return Ok(None) };
+    /// The oldest place whose work is done and its cargo, its header written into `header`; waits for it if asked.
+    pub fn oldest(&mut self, wait: bool, header: &mut [u32]) -> Result<Option<(usize, &mut T)>> {
+        let Some(at) = self.busy.front().map(|b| b.0) else { return Ok(None) };
         self.device.poll()?;
         while !self.slots[at].mapping.as_ref().is_some_and(Mapping::ready) {
             if !wait {
@@ -220,12 +221,12 @@ impl Ring {
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(header);
         bytes.copy_from_slice(&slot.header_staging.view(0..bytes.len() as u64)?);
         slot.header_staging.raw.unmap();
-        Ok(Some(at))
+        Ok(self.busy.front_mut().map(|(at, cargo)| (*at, cargo)))
     }
 
-    /// Gives the first `bytes[i]` bytes of each output of the oldest place to `read` and frees the place.
-    pub fn finish(&mut self, bytes: &[u64], mut read: impl FnMut(usize, Returned)) -> Result<()> {
-        let at = self.busy.pop_front().expect("a place is busy");
+    /// Gives the first `bytes[i]` bytes of each output of the oldest place to `read`, frees the place and gives its cargo back.
+    pub fn finish(&mut self, bytes: &[u64], mut read: impl FnMut(usize, Returned)) -> Result<T> {
+        let (at, cargo) = self.busy.pop_front().expect("a place is busy");
         let (device, copiers, slot) = (&self.device, self.copiers.as_ref(), &mut self.slots[at]);
         let mut read = |i, bytes: &[u8]| read(i, Returned { bytes, copiers });
         for (i, (output, &bytes)) in slot.outputs.iter_mut().zip(bytes).enumerate() {
@@ -267,6 +268,6 @@ impl Ring {
         slot.mapping = slot.upload.open();
         device.poll()?;
         self.free.push_back(at);
-        Ok(())
+        Ok(cargo)
     }
 }

@@ -3,6 +3,7 @@
 
 use super::Kind;
 use crate::fault::{Fault, Result};
+use crate::geometry::not_a_covariance;
 use nalgebra::{DMatrix, SMatrix};
 
 /// Covariance of named parameters; `matrix[i][j]` belongs to `parameters[i]`, `parameters[j]`.
@@ -15,9 +16,6 @@ pub struct Covariance {
     /// Square and symmetric, row by row.
     pub matrix: Vec<Vec<f64>>,
 }
-
-/// What rounding may leave of symmetry and of eigenvalues below zero, in correlations.
-const ROUNDING: f64 = 1e-6;
 
 impl Covariance {
     /// `matrix` has a row and a column a name; anything else is a panic.
@@ -76,38 +74,7 @@ impl Covariance {
             let rows = self.matrix.iter().map(Vec::len).max().unwrap_or(0);
             return bad(format!("is {}x{rows}, its {n} parameters need {n}x{n}", self.matrix.len()));
         }
-        let c = self.to_matrix();
-        if c.iter().any(|x| !x.is_finite()) {
-            return bad("holds a number that is not finite".into());
-        }
-        for (i, name) in self.parameters.iter().enumerate() {
-            if c[(i, i)] < 0.0 {
-                return bad(format!("has the variance {:.3e} for {name}; none is below 0", c[(i, i)]));
-            }
-        }
-        // In correlations, so that millimetres and radians weigh alike.
-        let correlation = DMatrix::from_fn(n, n, |i, j| {
-            let scale = (c[(i, i)] * c[(j, j)]).sqrt();
-            if scale > 0.0 { c[(i, j)] / scale } else { if c[(i, j)] == 0.0 { 0.0 } else { f64::INFINITY } }
-        });
-        let crooked = |i: usize, j: usize| {
-            let d = correlation[(i, j)] - correlation[(j, i)];
-            !(d.abs() <= ROUNDING && correlation[(i, j)].abs() <= 1.0 + ROUNDING)
-        };
-        if let Some((i, j)) = (0..n).flat_map(|i| (0..i).map(move |j| (i, j))).find(|&(i, j)| crooked(i, j)) {
-            return bad(format!(
-                "has {:.3e} and {:.3e} between {} and {}: not symmetric, or beyond their variances",
-                c[(i, j)],
-                c[(j, i)],
-                self.parameters[i],
-                self.parameters[j]
-            ));
-        }
-        let least = if n > 0 { correlation.symmetric_eigenvalues().min() } else { 0.0 };
-        if least < -ROUNDING * n as f64 {
-            return bad(format!("has the eigenvalue {least:.3e} (of correlations); none is below 0"));
-        }
-        Ok(())
+        not_a_covariance(&self.parameters, &self.to_matrix()).map_or(Ok(()), bad)
     }
 }
 

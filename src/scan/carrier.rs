@@ -18,6 +18,13 @@ pub struct Place {
     pub covariance: Option<Matrix6<f64>>,
 }
 
+impl Place {
+    /// The cloud's frame is the camera's.
+    pub fn camera() -> Place {
+        Place { from_camera: Rigid::identity(), covariance: None }
+    }
+}
+
 /// Turns where the motion stood into where the camera was.
 #[derive(Clone, Debug)]
 pub struct Carrier {

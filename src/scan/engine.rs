@@ -2,7 +2,7 @@
 //! or on this machine's processor, with the same results.
 //! Frame and unit: peaks in pixels and grey levels, points in the poses' frame, mm.
 
-use super::{Ambient, Extraction, Format, Processor, Why};
+use super::{Ambient, Extraction, Format, Place, Processor, Why};
 use crate::camera::Intrinsics;
 use crate::fault::Result;
 use crate::geometry::{Camera, Plane};
@@ -14,27 +14,27 @@ use crate::stages::host::Host;
 use crate::stages::peak::found::Peak;
 use crate::stages::peak::{self, Stripe};
 use crate::stages::stripe::ambient;
-use crate::stages::stripe::point::{Optics, Point, plane_in_view};
+use crate::stages::stripe::point::{Optics, Point, plane_in_view, pose_words};
 use rayon::prelude::*;
 use std::borrow::Cow;
-use std::collections::VecDeque;
 
 /// The peaks of one shot and their points, entry by entry.
 pub struct Measured {
     /// Number of the shot, as it was submitted.
     pub shot: u32,
+    /// Where the camera stood, as it was submitted.
+    pub place: Place,
     /// Every peak, the rejected ones too; px and grey levels.
     pub peaks: Vec<Peak>,
-    /// In the frame of the submitted pose, mm; not a number where the peak was refused.
+    /// In the cloud's frame, mm; not a number where the peak was refused.
     pub points: Vec<Point>,
 }
 
 /// One picture to work on.
 struct Job {
     shot: u32,
+    place: Place,
     image: Image,
-    /// base_from_camera as [`crate::stages::stripe::point::pose_words`].
-    pose: [f32; 12],
 }
 
 /// What the engine needs to know of the rig: where in the picture the laser can be, and where its points lie.
@@ -47,9 +47,24 @@ pub struct Optical {
     pub depth_mm: [f64; 2],
 }
 
+/// What a batch carries through the chain: of each picture the number and where the camera stood.
+type Posed = (u32, Place);
+
+/// What some pictures say of the stripe.
+pub struct StripeSeen {
+    /// Medians over the pictures.
+    pub stripe: Stripe,
+    /// Half of the pictures show a long piece of it.
+    pub enough: bool,
+}
+
+/// A piece of the stripe that tells its width is at least this share of what crosses the picture: beside a part a scan sees
+/// splinters of light at its edges.
+const LONG_PIECE: f32 = 0.1;
+
 /// What does the work, built when the stripe is known, because its sizes follow from the stripe.
 enum Way {
-    Gpu(Box<Chain>),
+    Gpu(Box<Chain<Vec<Posed>>>),
     Host(Box<Host>),
 }
 
@@ -59,6 +74,8 @@ pub struct Engine {
     region: Mask,
     ambient: Option<Ambient>,
     optics: Optics,
+    /// As asked for, and made for the stripe.
+    asked: Extraction,
     extraction: Extraction,
     width_px: f32,
     pending: Vec<Job>,
@@ -68,10 +85,8 @@ pub struct Engine {
     way: Option<Way>,
     /// Pictures that are started together, and batches under way; `None` is what the size asks for.
     at_once: Option<(u32, usize)>,
-    /// Shots of the batches under way, oldest first.
-    batches: VecDeque<Vec<u32>>,
     /// The batch that was collected last; its memory is used again.
-    batch: Batch,
+    batch: Batch<Vec<Posed>>,
     done: Vec<Measured>,
     cut: u64,
 }
@@ -96,16 +111,16 @@ impl Engine {
         };
         Engine {
             format,
-            region: region(format, optical),
+            region: believed(format, optical, extraction),
             ambient,
             optics: Optics::new(&optical.camera, &optical.laser),
             width_px: extraction.peak.width_px,
+            asked: extraction.clone(),
             extraction: extraction.clone(),
             pending: Vec::new(),
             device,
             why,
             way: None,
-            batches: VecDeque::new(),
             at_once: None,
             batch: Batch::default(),
             done: Vec::new(),
@@ -142,8 +157,9 @@ impl Engine {
         self.device.as_ref()
     }
 
-    /// Noise, width and speckle of the stripe, the median over some pictures; `None` where none shows enough of it.
-    pub fn measure(&self, images: &[&Image]) -> Option<Stripe> {
+    /// Noise, width and speckle of the stripe, the median over some pictures; `None` where none shows enough of it. Pictures that show
+    /// a long piece count alone where there are any: light that falls over an edge is narrower than the stripe.
+    pub fn measure(&self, images: &[&Image]) -> Option<StripeSeen> {
         let few = self.format.width * self.format.height > LARGE_PIXELS && images.len() > 3;
         let step = if few { images.len() / 3 } else { 1 };
         let images: Vec<_> = images.iter().step_by(step).collect();
@@ -151,13 +167,17 @@ impl Engine {
         let mut noise: Vec<f32> = images.par_iter().map(|image| peak::noise(image)).collect();
         noise.sort_by(f32::total_cmp);
         let noise = *noise.get(noise.len() / 2)?;
-        let seen = self.extraction.clone().in_noise(noise);
+        let seen = self.asked.clone().in_noise(noise);
         let host = Host::new(&ChainConfig { ambient: None, measure: None, ..self.config(&seen) }).ok()?;
+        let long = LONG_PIECE * self.along_px();
         let stripe = |image: &Cow<Image>| {
             let pixels = host.run(0, image, &[0.0; 12]).ok()?.pixels;
-            peak::measure(image, &pixels, &seen.peak, self.optics.across())
+            let stripe = peak::measure(image, &pixels, &seen.peak, self.optics.across())?;
+            Some((pixels.len() as f32 >= long, stripe))
         };
-        let mut found: Vec<Stripe> = images.par_iter().filter_map(stripe).collect();
+        let found: Vec<(bool, Stripe)> = images.par_iter().filter_map(stripe).collect();
+        let telling = found.iter().filter(|f| f.0).count();
+        let mut found: Vec<Stripe> = found.into_iter().filter(|f| f.0 || telling == 0).map(|f| f.1).collect();
         let middle = found.len() / 2;
         let mut median = |of: fn(&Stripe) -> f32| {
             found.sort_by(|a, b| of(a).total_cmp(&of(b)));
@@ -166,14 +186,22 @@ impl Engine {
         let width_px = median(|s| s.width_px)?;
         let speckle = median(|s| s.speckle)?;
         let [read_noise, gain] = [median(|s| s.read_noise.unwrap_or(0.0)), median(|s| s.gain.unwrap_or(0.0))];
-        Some(Stripe { width_px, speckle, noise, read_noise, gain })
+        let stripe = Stripe { width_px, speckle, noise, read_noise, gain };
+        Some(StripeSeen { stripe, enough: 2 * telling >= images.len() })
+    }
+
+    /// Length of a stripe that crosses the region which is looked at, px.
+    fn along_px(&self) -> f32 {
+        let [x, y] = self.optics.across();
+        let [left, top, right, bottom] = self.asked.region_px(self.format);
+        (right - left) as f32 * y.abs() + (bottom - top) as f32 * x.abs()
     }
 
     /// Takes over a stripe: the sizes of the fit, the least window of the threshold, limits above the noise; builds the GPU's
-    /// chain or the processor's.
+    /// chain or the processor's. What is under way is collected before.
     pub fn set_stripe(&mut self, stripe: &Stripe) -> Result<()> {
         self.width_px = stripe.width_px;
-        self.extraction = self.extraction.clone().for_stripe(stripe);
+        self.extraction = self.asked.clone().for_stripe(stripe);
         self.extraction.peak.check()?;
         self.build()
     }
@@ -201,9 +229,9 @@ impl Engine {
         Ok(())
     }
 
-    /// Takes a picture; `pose` is base_from_camera as [`crate::stages::stripe::point::pose_words`].
-    pub fn submit(&mut self, shot: u32, image: Image, pose: [f32; 12]) -> Result<()> {
-        self.pending.push(Job { shot, image, pose });
+    /// Takes a picture, and where the camera stood.
+    pub fn submit(&mut self, shot: u32, image: Image, place: Place) -> Result<()> {
+        self.pending.push(Job { shot, place, image });
         let usual = match &self.way {
             Some(Way::Gpu(chain)) => chain.frame.shots as usize,
             _ => rayon::current_num_threads().max(HOST_BATCH),
@@ -234,8 +262,8 @@ impl Engine {
         match self.way.as_mut().expect("it was built") {
             Way::Host(host) => {
                 let one = |job: &Job| -> Result<Measured> {
-                    let found = host.run(job.shot, &job.image, &job.pose)?;
-                    Ok(Measured { shot: job.shot, peaks: found.peaks, points: found.points })
+                    let found = host.run(job.shot, &job.image, &pose_words(&job.place.from_camera))?;
+                    Ok(Measured { shot: job.shot, place: job.place, peaks: found.peaks, points: found.points })
                 };
                 let done: Result<Vec<_>> = jobs.par_iter().map(one).collect();
                 self.done.extend(done?);
@@ -243,9 +271,9 @@ impl Engine {
             Way::Gpu(chain) => {
                 let waited = !chain.has_room() && chain.collect_into(true, &mut self.batch)?;
                 let images: Vec<_> = jobs.iter().map(|j| &j.image).collect();
-                let poses: Vec<_> = jobs.iter().map(|j| j.pose).collect();
-                chain.submit_posed(u64::from(jobs[0].shot), &images, &poses)?;
-                self.batches.push_back(jobs.iter().map(|j| j.shot).collect());
+                let poses: Vec<_> = jobs.iter().map(|j| pose_words(&j.place.from_camera)).collect();
+                let posed = jobs.iter().map(|j| (j.shot, j.place)).collect();
+                chain.submit_posed(posed, &images, &poses)?;
                 if waited {
                     self.take();
                 }
@@ -257,14 +285,13 @@ impl Engine {
     /// Splits the batch that was collected last into its shots.
     fn take(&mut self) {
         let batch = &self.batch;
-        let shots = self.batches.pop_front().expect("one list a batch");
         self.cut += u64::from(batch.found) - batch.peaks.len() as u64;
-        for (i, shot) in shots.into_iter().enumerate() {
+        for (i, &(shot, place)) in batch.tag.iter().enumerate() {
             let part = batch.starts[i] as usize..batch.starts[i + 1] as usize;
             let mut peaks = batch.peaks[part.clone()].to_vec();
             // The GPU counts within the batch.
             peaks.iter_mut().for_each(|k| k.shot = shot);
-            self.done.push(Measured { shot, peaks, points: batch.spots[part].to_vec() });
+            self.done.push(Measured { shot, place, peaks, points: batch.points[part].to_vec() });
         }
     }
 
@@ -279,6 +306,17 @@ const BLOCK: (u32, u32) = (32, 16);
 /// How far the corners' depths must be from a limit for the whole block to be on their side of it, a share of the limit.
 /// One over depth is linear over the picture but for the lens, which bends it by far less than this within a block.
 const CLEAR: f64 = 1e-3;
+
+/// Pixels that are looked at: where the laser plane lies within the believed depths, in the region that a person chose.
+fn believed(format: Format, o: &Optical, extraction: &Extraction) -> Mask {
+    let mut mask = region(format, o);
+    let [left, top, right, bottom] = extraction.region_px(format);
+    if [left, top, right, bottom] != [0, 0, format.width, format.height] {
+        let inside = |x: u32, y: u32| (left..right).contains(&x) && (top..bottom).contains(&y);
+        mask.intersect(&Mask::from_fn(format.width, format.height, inside));
+    }
+    mask
+}
 
 /// Pixels at which the laser plane lies within the believed depths; others are neither processed nor believed.
 fn region(format: Format, o: &Optical) -> Mask {

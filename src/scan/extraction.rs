@@ -46,6 +46,9 @@ pub struct Extraction {
     /// threshold and the sizes of the fit from them, and raise the limits of light above the noise. Off: the numbers below are
     /// used as they stand.
     pub measure_stripe: bool,
+    /// Where in the picture the stripe is looked for: left, top, right and bottom as shares of its width and height, 0..=1. A tool that
+    /// stands in the picture, or a place that always shines, is left out so; places in the picture stay what they are.
+    pub region: [f64; 4],
     /// Offset and minimum in grey levels of an 8-bit picture; deeper ones scale them.
     pub threshold: ThresholdParams,
     /// The thinning's rule; `auto` takes the one for the direction in which the rig sees its stripe ([`Thinning::across`]).
@@ -67,6 +70,7 @@ impl Default for Extraction {
     fn default() -> Extraction {
         Extraction {
             measure_stripe: true,
+            region: WHOLE,
             // A peak fainter than 8 levels is not believed, so a pixel darker than that need not be looked at.
             threshold: ThresholdParams { minimum: 8, ..ThresholdParams::default() },
             thinning: Rule::default(),
@@ -78,6 +82,11 @@ impl Default for Extraction {
         }
     }
 }
+
+/// The whole picture.
+const WHOLE: [f64; 4] = [0.0, 0.0, 1.0, 1.0];
+/// Least width and height of the region, share of the picture: a slip of the finger is no region.
+const LEAST_REGION: f64 = 0.02;
 
 /// Least window of the threshold in stripe sigmas: the stripe fills a sixth of it, so the mean stays that
 /// of the surroundings and the flanks stay lit.
@@ -110,6 +119,13 @@ impl Extraction {
         e
     }
 
+    /// The region's pixels, those whose middle lies in it: first and last column and row behind the last, at this size of pictures.
+    pub fn region_px(&self, format: Format) -> [u32; 4] {
+        let edge = |share: f64, size: u32| (share * f64::from(size) - 0.5).ceil().clamp(0.0, f64::from(size)) as u32;
+        let ([left, top, right, bottom], (w, h)) = (self.region, (format.width, format.height));
+        [edge(left, w), edge(top, h), edge(right, w), edge(bottom, h)]
+    }
+
     /// What a chain is built for: `scan`, `bench` and the peers run the same. Ends of lines are carried on by widths of `width_px`.
     pub fn chain(&self, format: Format, optics: Optics, width_px: f32) -> ChainConfig {
         let shift = format.bits - 8;
@@ -132,6 +148,15 @@ impl Extraction {
 
     /// Refuses settings outside their ranges.
     pub fn check(&self) -> Result<()> {
+        let [left, top, right, bottom] = self.region;
+        let lies = |low: f64, high: f64| low >= 0.0 && high <= 1.0 && high - low >= LEAST_REGION;
+        if !lies(left, right) || !lies(top, bottom) {
+            return Err(Fault::usage(format!(
+                "the region is {left}, {top} to {right}, {bottom}; left and top come before right and bottom, all of them in 0..=1, \
+                 {LEAST_REGION} apart at least"
+            ))
+            .next("correct region of [extraction] in station.toml; [0, 0, 1, 1] is the whole picture"));
+        }
         self.threshold.check()?;
         if !(-255..=255).contains(&self.threshold.offset) || self.threshold.minimum > 255 {
             return Err(Fault::usage(format!(

@@ -2,12 +2,10 @@
 //! Frame and unit: camera frame, mm.
 
 use super::engine::{Engine, Measured, Optical};
-use super::{Extraction, Format, Processor, Where, camera_for};
+use super::{Extraction, Format, Place, Processor, Where, camera_for};
 use crate::fault::Result;
-use crate::geometry::{Camera, Rigid};
 use crate::raster::Image;
 use crate::rig::{Rig, Volume};
-use crate::stages::stripe::point::pose_words;
 
 /// The stripe chain for one picture at a time.
 pub struct Live {
@@ -42,11 +40,11 @@ impl Live {
     /// Peaks and points of one picture, camera frame; `None` until a picture has shown the stripe.
     pub fn measure(&mut self, frame: u32, image: Image) -> Result<Option<Measured>> {
         if !self.ready {
-            let Some(stripe) = self.engine.measure(&[&image]) else { return Ok(None) };
-            self.engine.set_stripe(&stripe)?;
+            let Some(seen) = self.engine.measure(&[&image]) else { return Ok(None) };
+            self.engine.set_stripe(&seen.stripe)?;
             self.ready = true;
         }
-        self.engine.submit(frame, image, pose_words(&Rigid::<Camera, Camera>::identity()))?;
+        self.engine.submit(frame, image, Place::camera())?;
         Ok(self.engine.collect(true)?.pop())
     }
 }

@@ -2,7 +2,7 @@
 //! points with their standard deviation.
 //! Frame and unit: points in the carrier's frame (mostly the robot's base), mm (docs/math.md, Stripe peak; the paper's eq. 5 and 6).
 
-use super::engine::{Engine, Measured, Optical};
+use super::engine::{Engine, Measured, Optical, StripeSeen};
 use super::{Ambient, Carrier, CloudPoint, Extraction, Format, Place, Processor, Shot};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
@@ -13,7 +13,6 @@ use crate::rig::{Rig, Volume};
 use crate::stages::peak::Stripe;
 use crate::stages::peak::found::{Peak, SATURATED};
 use crate::stages::peak::params::PeakParams;
-use crate::stages::stripe::point;
 use crate::stages::stripe::point::Optics;
 use crate::stages::support::{self, Support};
 
@@ -30,6 +29,10 @@ pub struct Profile {
 
 /// Shots looked at for the stripe's width before the first profile leaves.
 const MEASURED_SHOTS: usize = 8;
+/// A scan that begins beside the part waits for its stripe: at most so many shots, and so many bytes of pictures where those are
+/// more than [`MEASURED_SHOTS`] shots. Dark ones before are measured with the width that was assumed.
+const HELD_SHOTS: usize = 64;
+const HELD_BYTES: usize = 256 << 20;
 /// Places of the picture, each way, at which is looked for where the sheet is seen.
 const SEEN_PLACES: u32 = 16;
 
@@ -45,11 +48,11 @@ pub struct Scanner {
     /// Held until the stripe is measured.
     waiting: Vec<Shot>,
     stripe: Option<Stripe>,
-    support: Option<Support>,
-    /// Places of shots that the engine or their neighbours' judgement still works on, oldest first.
-    places: std::collections::VecDeque<(u32, Place)>,
-    /// How many of them the engine has given back.
-    measured: usize,
+    /// What the engine is built for: the stripe, or while all was dark the assumed one.
+    built: Option<Stripe>,
+    support: Option<Support<Place>>,
+    /// Done before the engine was built anew.
+    early: Vec<Profile>,
     up: Vec3,
     /// Where the scan's first shot was taken.
     first: Option<Rigid<Base, Camera>>,
@@ -83,9 +86,9 @@ impl Scanner {
             extraction: extraction.clone(),
             waiting: Vec::new(),
             stripe: None,
+            built: None,
             support: None,
-            places: Default::default(),
-            measured: 0,
+            early: Vec::new(),
             up: Vec3::z(),
             first: None,
         })
@@ -107,11 +110,53 @@ impl Scanner {
         if self.first.is_none() {
             self.first = Some(self.carrier.place(&shot.stand, shot.slip.as_ref(), &self.anchor)?.from_camera);
         }
-        self.waiting.push(shot);
-        if self.stripe.is_some() || self.waiting.len() >= MEASURED_SHOTS || !self.extraction.measure_stripe {
-            self.release()?;
+        if self.built.is_none()
+            && self.waiting.is_empty()
+            && let Some(ambient) = &self.ambient
+        {
+            ambient.suits(&shot.image, &shot.name)?;
         }
-        Ok(())
+        self.waiting.push(shot);
+        if let Some(stripe) = self.stripe {
+            return self.release(stripe);
+        }
+        if !self.extraction.measure_stripe {
+            return self.settle(self.assumed());
+        }
+        // Looked at again only when there are twice as many.
+        let held = self.waiting.len();
+        let full = held >= self.most_held();
+        if held < MEASURED_SHOTS || !held.is_power_of_two() && !full {
+            return Ok(());
+        }
+        match self.look() {
+            Some(seen) if seen.enough || full => self.settle(seen.stripe),
+            None if full || self.built.is_some() => self.release(self.assumed()),
+            _ => Ok(()),
+        }
+    }
+
+    /// What the shots that wait say of the stripe.
+    fn look(&self) -> Option<StripeSeen> {
+        let images: Vec<_> = self.waiting.iter().map(|s| &s.image).collect();
+        self.engine.measure(&images)
+    }
+
+    fn settle(&mut self, stripe: Stripe) -> Result<()> {
+        self.stripe = Some(stripe);
+        self.release(stripe)
+    }
+
+    fn assumed(&self) -> Stripe {
+        let PeakParams { width_px, speckle, .. } = self.extraction.peak;
+        Stripe { width_px, speckle, ..Stripe::default() }
+    }
+
+    /// Shots that may wait for a stripe.
+    fn most_held(&self) -> usize {
+        let bytes =
+            self.waiting.first().map_or(1, |s| s.image.pixel_count().max(1) * usize::from(s.image.bits.div_ceil(8)));
+        (HELD_BYTES / bytes).clamp(MEASURED_SHOTS, HELD_SHOTS)
     }
 
     /// Profiles that are done, in order.
@@ -121,7 +166,11 @@ impl Scanner {
 
     /// All that is still under way, after the last shot.
     pub fn finish(&mut self) -> Result<Vec<Profile>> {
-        self.release()?;
+        if !self.waiting.is_empty() {
+            let stripe = self.stripe.or_else(|| self.look().map(|s| s.stripe)).unwrap_or(self.assumed());
+            self.settle(stripe)?;
+        }
+        self.stripe = self.stripe.or(self.built);
         self.collect(true)
     }
 
@@ -150,40 +199,31 @@ impl Scanner {
         self.engine.ran_on()
     }
 
-    fn release(&mut self) -> Result<()> {
-        if self.waiting.is_empty() {
-            return Ok(());
-        }
-        if self.support.is_none() {
-            if let Some(ambient) = &self.ambient {
-                ambient.suits(&self.waiting[0].image, &self.waiting[0].name)?;
-            }
-            let PeakParams { width_px, speckle, .. } = self.extraction.peak;
-            let assumed = Stripe { width_px, speckle, ..Stripe::default() };
-            let stripe = match self.stripe {
-                Some(s) => s,
-                None if self.extraction.measure_stripe => {
-                    let images: Vec<_> = self.waiting.iter().map(|s| &s.image).collect();
-                    self.engine.measure(&images).unwrap_or(assumed)
-                }
-                None => assumed,
-            };
-            self.stripe = Some(stripe);
-            self.engine.set_stripe(&stripe)?;
-            let base_from_camera = self.first.expect("a shot was taken");
-            let towards = -base_from_camera.direction(&Vec3::z());
-            // Seen from the camera a turntable's part turns: its map lies over the table.
-            self.up = if self.carrier.turns() { Vec3::z() * towards.z.signum() } else { towards };
-            let axis = base_from_camera.direction(&self.along());
-            let device = self.device();
-            let field = self.pitch() * self.engine.width() as f32;
-            self.support = Some(Support::new(self.extraction.support, stripe.width_px, field, &axis, device)?);
+    /// Hands what waits to the engine, built for this stripe.
+    fn release(&mut self, stripe: Stripe) -> Result<()> {
+        if self.built != Some(stripe) {
+            self.build(stripe)?;
         }
         for shot in std::mem::take(&mut self.waiting) {
             let place = self.carrier.place(&shot.stand, shot.slip.as_ref(), &self.anchor)?;
-            self.places.push_back((shot.index, place));
-            self.engine.submit(shot.index, shot.image, point::pose_words(&place.from_camera))?;
+            self.engine.submit(shot.index, shot.image, place)?;
         }
+        Ok(())
+    }
+
+    fn build(&mut self, stripe: Stripe) -> Result<()> {
+        if self.built.is_some() {
+            self.early = self.collect(true)?;
+        }
+        self.engine.set_stripe(&stripe)?;
+        self.built = Some(stripe);
+        let base_from_camera = self.first.expect("a shot was taken");
+        let towards = -base_from_camera.direction(&Vec3::z());
+        // Seen from the camera a turntable's part turns: its map lies over the table.
+        self.up = if self.carrier.turns() { Vec3::z() * towards.z.signum() } else { towards };
+        let axis = base_from_camera.direction(&self.along());
+        let field = self.pitch() * self.engine.width() as f32;
+        self.support = Some(Support::new(self.extraction.support, stripe.width_px, field, &axis, self.device())?);
         Ok(())
     }
 
@@ -210,26 +250,22 @@ impl Scanner {
     fn collect(&mut self, all: bool) -> Result<Vec<Profile>> {
         let pitch = self.pitch();
         let mut measured = Vec::new();
-        for Measured { shot, peaks, points } in self.engine.collect(all)? {
-            let (index, place) = &self.places[self.measured];
-            assert_eq!(*index, shot, "the engine keeps the order");
-            self.measured += 1;
+        for Measured { shot, place, peaks, points } in self.engine.collect(all)? {
             let anchors = self.anchors().map(|a| place.from_camera.point(&a));
-            measured.push(support::Profile { shot, peaks, points, anchors, pitch });
+            measured.push(support::Profile { shot, cargo: place, peaks, points, anchors, pitch });
         }
         let judged = match &mut self.support {
             Some(support) => support.take(measured, all)?,
             None => Vec::new(),
         };
-        Ok(judged.into_iter().map(|p| self.profile(p)).collect())
+        let mut done = std::mem::take(&mut self.early);
+        done.extend(judged.into_iter().map(|p| self.profile(p)));
+        Ok(done)
     }
 
-    fn profile(&mut self, judged: support::Profile) -> Profile {
-        let (index, place) = self.places.pop_front().expect("one place a shot submitted");
-        assert_eq!(index, judged.shot, "shots are judged in order");
-        self.measured -= 1;
-
-        let width = self.stripe.map_or(1.0, |s| s.width_px);
+    fn profile(&self, judged: support::Profile<Place>) -> Profile {
+        let place = &judged.cargo;
+        let width = self.built.map_or(1.0, |s| s.width_px);
         let limit = self.extraction.choose.uncertain * width;
         let points = judged
             .peaks
@@ -238,7 +274,7 @@ impl Scanner {
             .filter(|(k, _)| k.kept())
             .map(|(k, p)| CloudPoint {
                 position: p.position,
-                sigma_mm: with_place(p.sigma_mm, &p.position, &place),
+                sigma_mm: with_place(p.sigma_mm, &p.position, place),
                 intensity: k.amplitude,
                 quality: quality(k, limit),
                 shot: judged.shot,

@@ -3,6 +3,7 @@
 //! Frame and unit: scene, base, flange, camera, part; mm. Independent of the scanner: it never reads a peak.
 
 mod light;
+mod options;
 mod pattern;
 mod picture;
 mod plan;
@@ -17,6 +18,7 @@ mod truth;
 mod write;
 
 pub use light::{Canvas, InScene, LitPoint, View};
+pub use options::{DEFAULT_SCENE, Set, SimulateOptions};
 pub use pattern::Pattern;
 pub use picture::{expose, hot_pixels};
 pub use plan::{Views, above, base_from_scene, board_views, flange, reported, scan};
@@ -26,4 +28,4 @@ pub use scene::{CutSpec, Hit, Material, PartSpec, Scene, SceneSpec, ShapeSpec, S
 pub use sensor::Sensor;
 pub use station::{LineLaser, Pointer, Station, TRUE_VALUES};
 pub use truth::{CloudErrors, PartTruth, PointerTruth, Truth, TruthFile};
-pub use write::{DEFAULT_SCENE, Set, SimulateOptions, Simulated, riding_board, scene_from_board, simulate};
+pub use write::{Simulated, riding_board, scene_from_board, simulate};

@@ -3,12 +3,12 @@
 //! Frame and unit: the recording format of docs/file-formats.md, mm.
 
 use super::light::{Canvas, InScene, View};
+use super::options::{DEFAULT_SCENE, Set, SimulateOptions};
 use super::picture::{expose, hot_pixels};
 use super::plan::{self, Views};
 use super::ride::Ride;
 use super::rig::{RigSpec, three_digits};
 use super::scene::{Scene, SceneSpec};
-use super::sensor::Sensor;
 use super::station::{Station, TRUE_VALUES};
 use super::truth::TruthFile;
 use crate::fault::{Fault, Result};
@@ -18,167 +18,6 @@ use crate::recording::{AmbientRef, Beam, BoardSpec, FrameRef, ImageSpec, Meta, M
 use crate::rig::{Calibration, Covariance, Kind, Quality, Rig, Verdict};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
-
-/// One kind of recording.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Set {
-    /// The sheet passed over the scene.
-    Scan,
-    /// A chessboard in many poses, for the camera.
-    Intrinsics,
-    /// A chessboard fixed in the base frame, seen from many robot poses.
-    Handeye,
-    /// The stripe on two chessboards in many poses.
-    Laserplane,
-    /// The pointer's spot on a chessboard in many poses.
-    PointerCal,
-    /// The pointer's spot on a plate across the optical axis, through its range.
-    Pointer,
-    /// The pointer's spot on the scene from several robot poses, for the surface normal.
-    Surface,
-    /// A chessboard that rides on the axis, at several of its stops.
-    Axis,
-}
-
-impl Set {
-    /// Those of a robot's station; one with an axis has [`Set::Axis`] beside them.
-    pub const ALL: [Set; 7] =
-        [Set::Scan, Set::Intrinsics, Set::Handeye, Set::Laserplane, Set::PointerCal, Set::Pointer, Set::Surface];
-    /// As options, folders and files write it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Set::Scan => "scan",
-            Set::Intrinsics => "intrinsics",
-            Set::Handeye => "handeye",
-            Set::Laserplane => "laserplane",
-            Set::PointerCal => "pointer_cal",
-            Set::Pointer => "pointer",
-            Set::Surface => "surface",
-            Set::Axis => "axis",
-        }
-    }
-}
-
-impl std::str::FromStr for Set {
-    type Err = String;
-    fn from_str(s: &str) -> std::result::Result<Set, String> {
-        let mut known = Set::ALL.into_iter().chain([Set::Axis]);
-        known
-            .find(|x| x.name() == s)
-            .ok_or_else(|| format!("unknown set '{s}': {}, axis, all", Set::ALL.map(Set::name).join(", ")))
-    }
-}
-
-/// The scene that is simulated when no other is named: a circuit board with parts.
-pub const DEFAULT_SCENE: &str = include_str!("../../data/scenes/board.toml");
-
-/// What to simulate.
-#[derive(Clone, Debug)]
-pub struct SimulateOptions {
-    /// What to record, 1..=100 of them.
-    pub sets: Vec<Set>,
-    /// The design that stations are built after; the paper's when not given.
-    pub rig: Option<RigSpec>,
-    /// A scene file; when not given the built-in board with parts, or for a named rig what fits into its field.
-    pub scene: Option<PathBuf>,
-    /// The calibration board of all sets that show one; chessboards of our own choice when not given.
-    pub board: Option<BoardSpec>,
-    /// 0 is the design itself, every other number another specimen, scene pose and noise.
-    pub seed: u64,
-    /// Sensor size, px, 64..=8192 each.
-    pub width: u32,
-    /// Rows, px.
-    pub height: u32,
-    /// What turns light into grey levels.
-    pub sensor: Sensor,
-    /// Shots of a scan, 2..=100000.
-    pub shots: usize,
-    /// An axis moves the parts past the sensor, which stands still; `None`: a robot moves the sensor.
-    pub motion: Option<AxisKind>,
-    /// Where the robot stands for each shot of a scan or of the pointer on the scene, instead of places of our choice.
-    pub poses: Option<Vec<Rigid<Base, Flange>>>,
-    /// Errors of the reported robot poses, 1 sigma per axis, mm 0..=10 and degrees 0..=5.
-    pub pose_noise_mm: f64,
-    /// Orientation, 1 sigma per axis, degrees, 0..=5.
-    pub pose_noise_deg: f64,
-}
-
-impl Default for SimulateOptions {
-    fn default() -> Self {
-        SimulateOptions { rig: None, shots: 200, ..SimulateOptions::of(RigSpec::paper()) }
-    }
-}
-
-impl SimulateOptions {
-    /// A scan by a rig as it was designed.
-    pub fn of(rig: RigSpec) -> SimulateOptions {
-        SimulateOptions {
-            sets: vec![Set::Scan],
-            scene: None,
-            board: None,
-            seed: 1,
-            width: rig.camera.width_px,
-            height: rig.camera.height_px,
-            sensor: rig.sensor,
-            shots: rig.shots(),
-            motion: None,
-            poses: None,
-            rig: Some(rig),
-            pose_noise_mm: 0.0,
-            pose_noise_deg: 0.0,
-        }
-    }
-
-    /// Refuses values out of the ranges that the fields state, and options that do not go together.
-    pub fn check(&self) -> Result<()> {
-        self.sensor.check()?;
-        let limits = [
-            ("width", f64::from(self.width), 64.0, 8192.0),
-            ("height", f64::from(self.height), 64.0, 8192.0),
-            ("shots", self.poses.as_ref().map_or(self.shots, Vec::len) as f64, 2.0, 1e5),
-            ("pose noise in mm", self.pose_noise_mm, 0.0, 10.0),
-            ("pose noise in degrees", self.pose_noise_deg, 0.0, 5.0),
-            ("the number of sets", self.sets.len() as f64, 1.0, 100.0),
-        ];
-        if self.motion.is_none() && self.sets.contains(&Set::Axis) {
-            return Err(Fault::usage("the set axis shows a board on an axis, and no axis is simulated")
-                .next("name one: --motion linear or --motion turntable"));
-        }
-        if self.poses.is_some() && !matches!(self.sets[..], [Set::Scan] | [Set::Surface]) {
-            return Err(Fault::usage("poses were given for something else than one scan or one set surface")
-                .next("simulate scan or surface alone, or leave the poses out"));
-        }
-        match limits.iter().find(|(_, v, low, high)| !(*low..=*high).contains(v)) {
-            Some((name, v, low, high)) => {
-                Err(Fault::usage(format!("{name} is {v}, allowed {low}..={high}")).next("correct the option"))
-            }
-            None => Ok(()),
-        }
-    }
-
-    /// The design: the named rig, or the paper's.
-    pub fn design(&self) -> RigSpec {
-        self.rig.clone().unwrap_or_else(RigSpec::paper)
-    }
-
-    /// The specimen that these options describe.
-    pub fn station(&self) -> Station {
-        let mut station = Station::of(&self.design(), self.seed);
-        station.sensor = self.sensor;
-        station.with_size(self.width, self.height)
-    }
-
-    /// Scales every source of noise: 0 is a noiseless sensor, 1 the default, 2 twice the noise.
-    pub fn with_noise(mut self, factor: f64) -> SimulateOptions {
-        let s = &mut self.sensor;
-        s.read_noise_e *= factor;
-        s.speckle *= factor;
-        s.hot_per_million *= factor;
-        s.full_well_e = (s.full_well_e / (factor * factor).max(1e-6)).clamp(500.0, 1e6);
-        self
-    }
-}
 
 /// What was written.
 #[derive(Clone, Debug, serde::Serialize)]

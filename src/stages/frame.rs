@@ -67,7 +67,8 @@ pub(crate) use uniform_fields;
 pub const UNIFORM: (&str, &[Field], usize) = uniform_fields!(Frame: width, height, pitch, shot_words, tiles_x,
     tiles_y, shots, size, offset, minimum, flags, step, capacity, full_scale, lengthen, spacing);
 
-pub(crate) const SHARED: &str = include_str!("../../shaders/shared/frame.wgsl");
+pub(crate) const SHARED: &str =
+    concat!(include_str!("../../shaders/shared/frame.wgsl"), include_str!("../../shaders/shared/listing.wgsl"));
 pub(crate) const COLUMNS: &str = include_str!("../../shaders/shared/columns.wgsl");
 pub(crate) const PIXELS: &str = include_str!("../../shaders/shared/pixels.wgsl");
 pub(crate) const ACTIVITY: &str = include_str!("../../shaders/shared/activity.wgsl");

@@ -85,7 +85,7 @@ pub const COUNT_MOST: u32 = 65_535;
 pub const RECORD: usize = 9;
 /// Magnitudes from here on (32 m) are outside of every grid; so are points that far from the origin, whose
 /// coordinates could leave 32 bits.
-const BEYOND: i32 = 0x2000_0000;
+pub(in crate::stages) const BEYOND: i32 = 0x2000_0000;
 
 /// Sums of the points of one surface in one cell.
 #[repr(C)]

@@ -1,11 +1,17 @@
 //! In: lists of tiles and what became of them. Out: emptied, shortened, restarted lists: the stages
 //! reset, clear, compact and rebase. Frame and unit: tiles of 32 x 8 pixels.
 
-use super::frame::{self, ACTIVITY, Frame, PX_LOG2, SHARED, frame_of, tile_unpack};
+use super::frame::{self, ACTIVITY, Frame, PX_LOG2, frame_of, tile_unpack};
 use crate::gpu::{Access::*, Binding, Stage};
 use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
 
+/// WGSL names of the words below.
+pub(crate) const SHARED: &str = include_str!("../../shaders/shared/listing.wgsl");
+/// Word of a list's header: workgroups of 64 entries, the first of three arguments of a dispatch.
+pub const GROUPS: usize = 0;
+/// Word of a list's header: entries.
+pub const COUNT: usize = 3;
 /// Words between the headers of two lists: 256 bytes, which every adapter can bind.
 pub const HEADER_WORDS: u32 = 64;
 
@@ -13,7 +19,7 @@ pub const HEADER_WORDS: u32 = 64;
 pub const RESET: Stage = Stage {
     name: "reset",
     wgsl: include_str!("../../shaders/reset.wgsl"),
-    shared: &[SHARED],
+    shared: &[frame::SHARED],
     workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
@@ -65,7 +71,7 @@ pub const CLEARING: Step = Step {
 pub const COMPACT: Stage = Stage {
     name: "compact",
     wgsl: include_str!("../../shaders/compact.wgsl"),
-    shared: &[SHARED, ACTIVITY],
+    shared: &[frame::SHARED, ACTIVITY],
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "all", access: Read },
@@ -108,11 +114,11 @@ pub const REBASING: Step = Step {
     same: Same::Words,
 };
 
-/// Adds an entry, a tile or a run of them: word 3 of the header counts, word 0 is the number of workgroups of 64 entries.
+/// Adds an entry, a tile or a run of them: [`COUNT`] of the header counts, [`GROUPS`] is the number of workgroups of 64 entries.
 pub fn append<const N: usize>(listing: &mut [u32], list: &mut [u32], entry: [u32; N]) {
-    list[N * listing[3] as usize..][..N].copy_from_slice(&entry);
-    listing[0] += u32::from(listing[3].is_multiple_of(64));
-    listing[3] += 1;
+    list[N * listing[COUNT] as usize..][..N].copy_from_slice(&entry);
+    listing[GROUPS] += u32::from(listing[COUNT].is_multiple_of(64));
+    listing[COUNT] += 1;
 }
 
 /// Place of a tile in arrays that hold every tile.
@@ -149,7 +155,7 @@ pub(crate) fn reset_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
 pub(crate) fn clear_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, listing, list, mask, other, lit, stamps, counts] = b else { unreachable!() };
-    for &tile in &list[..listing[3] as usize] {
+    for &tile in &list[..listing[COUNT] as usize] {
         for row in 0..8 {
             mask[mask_index(&f, tile, row)] = 0;
             other[mask_index(&f, tile, row)] = 0;
@@ -163,7 +169,7 @@ pub(crate) fn clear_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
 pub(crate) fn compact_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, all, list, stamps, listing, active] = b else { unreachable!() };
-    for &tile in list[..all[3] as usize].iter().filter(|&&t| latest(&f, stamps, t) > f.step) {
+    for &tile in list[..all[COUNT] as usize].iter().filter(|&&t| latest(&f, stamps, t) > f.step) {
         append(listing, active, [tile]);
     }
 }
@@ -171,7 +177,7 @@ pub(crate) fn compact_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
 pub(crate) fn rebase_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, listing, list, stamps] = b else { unreachable!() };
-    for &tile in &list[..listing[3] as usize] {
+    for &tile in &list[..listing[COUNT] as usize] {
         stamps[tile_index(&f, tile)] = 0;
     }
 }

@@ -3,8 +3,8 @@
 //! Frame and unit: base axes; mm, rad. docs/math.md, Second look (7).
 
 use super::range::{RangeRun, Touched, touched};
+use crate::calibrate::pointer::beam::BEAM_NAMES;
 use crate::calibrate::pointer::range::{BasePoint, RIG, SharedCovariance};
-use crate::calibrate::pointer::solve::BEAM_NAMES;
 use crate::fault::{Fault, Result};
 use crate::find::look::levers::Lever;
 use crate::find::look::looks::Witness;

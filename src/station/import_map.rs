@@ -92,6 +92,7 @@ pub fn import_map(file: &Path, light: Option<&Path>, stated: &Stated, out: &Path
             rows_up: stated.rows_up,
             sigma_mm: made.sigma_mm,
         }),
+        filtered: None,
     };
     let text = serde_json::to_string_pretty(&report).expect("plain data");
     crate::files::write(&part.join("scan.json"), text.as_bytes())?;

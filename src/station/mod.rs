@@ -1,13 +1,18 @@
 //! In: a station folder, recordings, options. Out: the product's procedures from top to bottom.
 //! Frame and unit: millimetres; each file names its frames.
 
+mod backup;
 mod calibrate;
+mod edit;
+mod filter;
 mod find;
+mod ghost;
 mod guide;
 mod height_witness;
 mod import_map;
 pub mod job;
 mod judge;
+mod output;
 mod range;
 mod scan;
 mod settings;
@@ -16,10 +21,13 @@ mod values;
 mod verify;
 pub mod volume;
 
+pub use backup::{Backup, back_up_here, backups, settle_restore};
 pub use calibrate::auto::arm::ArmCell;
 pub use calibrate::auto::cell::{Cell, Light, Went};
 pub use calibrate::auto::check::SelfCheck;
-pub use calibrate::auto::procedure::{AutoResult, AutoRun, Ended, calibrate_auto};
+pub use calibrate::auto::options::AutoRun;
+pub use calibrate::auto::procedure::calibrate_auto;
+pub use calibrate::auto::result::{AutoResult, Ended};
 pub use calibrate::axis::{AxisRun, calibrate_axis};
 pub use calibrate::ball::{calibrate_profile_hand_eye, evaluate_profile_hand_eye};
 pub use calibrate::board_views::{Boards, FrameBoard, boards};
@@ -30,16 +38,21 @@ pub use calibrate::joint::run::{JointResult, JointRun, calibrate_joint, store_jo
 pub use calibrate::laser_plane::{LaserPlaneRun, calibrate_laser_plane};
 pub use calibrate::latency::{LatencyFound, calibrate_latency};
 pub use calibrate::pointer::{PointerRun, calibrate_pointer};
+pub use edit::edited;
+pub use filter::{filter_map, filter_scan, left};
 pub use find::{Looked, SecondLook, find_part, find_part_in_all, second_look, teach_part};
+pub use ghost::{Lies, ghost};
 pub use guide::{GuideOptions, Guided, Step, guide};
 pub use import_map::import_map;
 pub use judge::figures::Judged;
+pub use judge::page::base64;
 pub use judge::parts::{FoundPart, judge_parts};
 pub use judge::points::judge;
-pub use range::{Distance, RangeReport, RangeRun, SurfaceFound, measure_range};
+pub use output::{Output, try_output};
+pub use range::{Distance, RangeReport, RangeRun, Square, SurfaceFound, measure_range};
 pub use scan::progress::Checkpoint;
 pub use scan::recorded::scan_recording;
-pub use scan::report::{HeightMapFigures, Imported, ScanReport, Spent, cloud_of, load_report};
+pub use scan::report::{Filtered, HeightMapFigures, Imported, ScanReport, Spent, cloud_of, load_report};
 pub use scan::run::{ScanOptions, scan, scan_on};
 pub use scan::scan_folder::of_a_scan;
 pub use scan::seen::Seen;

@@ -9,7 +9,7 @@ use crate::calibrate::pointer::range::{
 };
 use crate::calibrate::pointer::spot::{Spot, SpotOptions, SpotPicture, find_spots, hot_pixels};
 use crate::fault::{Fault, Result};
-use crate::geometry::{Mat3, Rigid, Tool, Vec3};
+use crate::geometry::{Base, Flange, Mat3, Rigid, Tool, Vec3};
 use crate::raster::Light;
 use crate::recording::{Beam, Recording};
 use crate::rig::Rig;
@@ -25,11 +25,13 @@ pub struct RangeRun {
     pub max_off_beam: f64,
     /// The shots are all of one plane surface: work out its normal.
     pub one_surface: bool,
+    /// Where the tool is on the flange: its tilt against the surface, and how to stand square to it.
+    pub tool: Option<Rigid<Flange, Tool>>,
 }
 
 impl Default for RangeRun {
     fn default() -> Self {
-        RangeRun { spots: SpotOptions::default(), poses: None, max_off_beam: 12.0, one_surface: false }
+        RangeRun { spots: SpotOptions::default(), poses: None, max_off_beam: 12.0, one_surface: false, tool: None }
     }
 }
 
@@ -88,6 +90,21 @@ pub struct SurfaceFound {
     pub base_from_tool: Rigid<crate::geometry::Base, Tool>,
 }
 
+/// How the tool stood to the surface at the last shot, and how it stands square to it.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Square {
+    /// Angle of the tool's z against the normal at the last shot, degrees.
+    pub tilt_deg: f64,
+    /// One standard deviation of that, with the robot's own: of a tilt that is smaller, only its size is known.
+    pub tilt_sigma_deg: f64,
+    /// The tool turned about its own origin by that tilt and no more.
+    #[serde(rename = "base_T_tool")]
+    pub base_from_tool: Rigid<Base, Tool>,
+    /// The flange there.
+    #[serde(rename = "base_T_flange")]
+    pub base_from_flange: Rigid<Base, Flange>,
+}
+
 /// What [`measure_range`] found.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct RangeReport {
@@ -96,6 +113,9 @@ pub struct RangeReport {
     /// `None` unless [`RangeRun::one_surface`] asks for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub surface: Option<SurfaceFound>,
+    /// `None` without a surface or without [`RangeRun::tool`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub square: Option<Square>,
     /// Pictures without a distance, with the reason.
     pub missing: Vec<(String, String)>,
     /// What the calibrations' own files say against them, and what is not in the sigmas.
@@ -109,16 +129,19 @@ pub(super) struct Touched {
     pub points: Vec<(String, BasePoint)>,
     pub shared: SharedCovariance,
     first_x: Option<Vec3>,
+    /// Where the flange stood at the last shot, and how far its turn is not known, rad.
+    last: Option<(Rigid<Base, Flange>, f64)>,
 }
 
 /// Measures a distance in every frame that has a `laser` picture.
 pub fn measure_range(recording: &Recording, rig: &Rig, run: &RangeRun) -> Result<RangeReport> {
-    let Touched { report: mut out, points, shared, first_x } = touched(recording, rig, run)?;
+    let Touched { report: mut out, points, shared, first_x, last } = touched(recording, rig, run)?;
     if run.one_surface {
         let points: Vec<BasePoint> = points.into_iter().map(|p| p.1).collect();
         let s = surface(&points, &shared, &first_x.unwrap_or(Vec3::x()))?;
         let left_out = s.left_out.map(|i| out.distances[i].picture.clone());
         out.surface = Some(describe(&s, left_out));
+        out.square = run.tool.zip(last).map(|(tool, (flange, rad))| square(&s, &tool, &flange, rad));
     }
     Ok(out)
 }
@@ -161,9 +184,9 @@ pub(super) fn touched(recording: &Recording, rig: &Rig, run: &RangeRun) -> Resul
     let hot = hot_pixels(&images.iter().collect::<Vec<_>>());
     let asked: Vec<SpotPicture<'_>> =
         frames.iter().zip(&images).map(|(f, laser)| SpotPicture { name: f.1, laser, ambient: None }).collect();
-    let mut out = RangeReport { distances: Vec::new(), surface: None, missing: Vec::new(), remarks };
+    let mut out = RangeReport { distances: Vec::new(), surface: None, square: None, missing: Vec::new(), remarks };
     let mut points: Vec<(String, BasePoint)> = Vec::new();
-    let mut first_x = None;
+    let (mut first_x, mut last) = (None, None);
     for ((index, name), spot) in frames.iter().zip(find_spots(&asked, &hot, &run.spots)?) {
         let found = spot.and_then(|s| {
             let r = range(&s.pixel, &s.covariance, &camera.value, &pointer.value, &joint)?;
@@ -180,6 +203,7 @@ pub(super) fn touched(recording: &Recording, rig: &Rig, run: &RangeRun) -> Resul
         if let Some((poses, hand_eye)) = base {
             let pose = recording.pose_of(*index, poses).map_err(|e| e.at(name))?;
             first_x.get_or_insert(Vec3::from(pose.rotation.column(0)));
+            last = Some((*pose, robot.rad));
             let p = to_base(&ranged, pose, &hand_eye.value, &shared, &robot);
             in_base = Some(p.clone());
             points.push((name.to_string(), p));
@@ -197,7 +221,26 @@ pub(super) fn touched(recording: &Recording, rig: &Rig, run: &RangeRun) -> Resul
             _ => fault,
         });
     }
-    Ok(Touched { report: out, points, shared, first_x })
+    Ok(Touched { report: out, points, shared, first_x, last })
+}
+
+/// Turns the tool by the least turn that brings its z onto the normal.
+fn square(s: &Surface, flange_from_tool: &Rigid<Flange, Tool>, flange: &Rigid<Base, Flange>, rad: f64) -> Square {
+    let tool = *flange * *flange_from_tool;
+    let z = tool.direction(&Vec3::z());
+    let tilt = z.angle(&s.normal);
+    let across = z.cross(&s.normal);
+    // A tool that points away from the surface is turned about its own x.
+    let axis = if across.norm() > 1e-12 { across.normalize() } else { tool.direction(&Vec3::x()) };
+    let turn = Rigid::<Base, Base>::from_vectors(&(axis * tilt), Vec3::zeros());
+    let base_from_tool = Rigid::new(turn.rotation * tool.rotation, tool.translation);
+    let sigma = s.tilt_sigma[0].max(s.tilt_sigma[1]).hypot(rad);
+    Square {
+        tilt_deg: tilt.to_degrees(),
+        tilt_sigma_deg: sigma.to_degrees(),
+        base_from_tool,
+        base_from_flange: base_from_tool * flange_from_tool.inverse(),
+    }
 }
 
 fn on_beam(r: &Ranged, limit: f64) -> Result<()> {

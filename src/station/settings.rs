@@ -50,7 +50,7 @@ pub struct ToolSpec {
 pub struct WorkingVolume {
     /// Nearest depth along the optical axis, mm, > 0.
     pub near_mm: f64,
-    /// Farthest depth, mm, > near. Points outside are rejected with reason "region".
+    /// Farthest depth, mm, > near. Pixels that see the sheet nearer or farther are not looked at.
     pub far_mm: f64,
 }
 

@@ -2,14 +2,18 @@
 //! Frame and unit: poses base_from_flange, mm.
 
 use super::message::RobotState;
-use crate::arm::{Mode, State, open};
+use super::track::Track;
+use crate::arm::{Arm, Mode, RobotUri, State, open};
+use crate::capture::now_ns;
 use crate::fault::{Fault, Result};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
-/// The state is read so often.
-const READ: Duration = Duration::from_millis(500);
+/// The pose is read so often.
+const READ: Duration = Duration::from_millis(100);
+/// The state is read with every so many of them.
+const STATE: u32 = 5;
 /// A link that broke is opened again after so long.
 const AGAIN: Duration = Duration::from_secs(2);
 
@@ -25,24 +29,32 @@ pub struct Seen {
 /// A robot that is looked at, over a link of its own; it is moved from [`super::motion`].
 pub struct Robot {
     seen: Arc<Mutex<Seen>>,
+    track: Arc<Mutex<Track>>,
     ended: Arc<AtomicBool>,
 }
 
 impl Robot {
     /// Begins to look. The robot need not be there yet.
     pub fn watch(uri: &str) -> Result<Robot> {
-        uri.parse::<crate::arm::RobotUri>()?;
+        // Poses of a file have no times: none of them is that of a picture.
+        let timed = !matches!(uri.parse::<RobotUri>()?, RobotUri::File(_));
         let (seen, ended) = (Arc::new(Mutex::new(Seen::default())), Arc::new(AtomicBool::new(false)));
-        let (uri, tell, end) = (uri.to_owned(), seen.clone(), ended.clone());
+        let track = Arc::new(Mutex::new(Track::default()));
+        let (uri, tell, end, tracks) = (uri.to_owned(), seen.clone(), ended.clone(), track.clone());
         let body = move || {
             while !end.load(Ordering::Relaxed) {
-                let Err(fault) = look(&uri, &tell, &end) else { return };
+                let Err(fault) = look(&uri, &tell, timed.then_some(&*tracks), &end) else { return };
                 *tell.lock().unwrap_or_else(|e| e.into_inner()) = Seen { state: None, wrong: Some(fault.what) };
                 std::thread::sleep(AGAIN);
             }
         };
         std::thread::Builder::new().name("robot".into()).spawn(body).map_err(|e| Fault::threads(&e))?;
-        Ok(Robot { seen, ended })
+        Ok(Robot { seen, track, ended })
+    }
+
+    /// Where the flange was.
+    pub fn track(&self) -> MutexGuard<'_, Track> {
+        self.track.lock().unwrap_or_else(|e| e.into_inner())
     }
 
     /// What was seen last.
@@ -57,22 +69,38 @@ impl Drop for Robot {
     }
 }
 
-fn look(uri: &str, tell: &Mutex<Seen>, end: &AtomicBool) -> Result<()> {
+fn look(uri: &str, tell: &Mutex<Seen>, track: Option<&Mutex<Track>>, end: &AtomicBool) -> Result<()> {
     let mut arm = open(uri)?;
-    while !end.load(Ordering::Relaxed) {
-        let state = arm.state()?;
-        let mut wrong: Vec<String> =
-            state.errors.iter().map(|e| format!("controller error {:X}: {}", e.code, e.text)).collect();
-        if state.emergency_stop == Some(true) {
-            wrong.push("emergency stop is pressed".into());
+    for turn in 0u32.. {
+        if end.load(Ordering::Relaxed) {
+            break;
         }
-        if matches!(state.mode, Mode::Manual | Mode::Teach) {
-            wrong.push("the controller is not in automatic mode".into());
+        if let Some(track) = track {
+            let (asked, pose) = (now_ns(), arm.pose()?);
+            let at = asked + (now_ns() - asked) / 2;
+            track.lock().unwrap_or_else(|e| e.into_inner()).add(at, pose.base_from_flange);
         }
-        let wrong = (!wrong.is_empty()).then(|| wrong.join("; "));
-        *tell.lock().unwrap_or_else(|e| e.into_inner()) = Seen { state: Some(state), wrong };
+        if turn % STATE == 0 {
+            state(&mut *arm, tell)?;
+        }
         std::thread::sleep(READ);
     }
+    Ok(())
+}
+
+/// Reads the state and tells it.
+fn state(arm: &mut dyn Arm, tell: &Mutex<Seen>) -> Result<()> {
+    let state = arm.state()?;
+    let mut wrong: Vec<String> =
+        state.errors.iter().map(|e| format!("controller error {:X}: {}", e.code, e.text)).collect();
+    if state.emergency_stop == Some(true) {
+        wrong.push("emergency stop is pressed".into());
+    }
+    if matches!(state.mode, Mode::Manual | Mode::Teach) {
+        wrong.push("the controller is not in automatic mode".into());
+    }
+    let wrong = (!wrong.is_empty()).then(|| wrong.join("; "));
+    *tell.lock().unwrap_or_else(|e| e.into_inner()) = Seen { state: Some(state), wrong };
     Ok(())
 }
 

@@ -3,17 +3,19 @@
 
 use super::camera::Camera;
 use super::event::Hub;
+use super::found_part::FoundParts;
 use super::guard::{Leases, Sessions};
 use super::message::{Bar, CalibrationAge, Event, JobState};
 use super::motion::Desk;
 use super::robot::Robot;
+use super::surface::{Looked, Maps};
 use super::work::{Jobs, Place, Views, scan_of};
 use super::{disk, station};
 use crate::fault::Result;
 use crate::gpu::adapters;
 use crate::rig::Rig;
-use crate::scan::HeightMap;
-use crate::station::{Settings, load_report};
+use crate::station::Settings;
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, OnceLock};
 use std::time::{Duration, Instant};
 
@@ -42,24 +44,16 @@ pub struct Screen {
     pub password: Option<String>,
     /// Name of the cookie.
     pub cookie: String,
-    /// The robot, where one was named.
-    pub robot: Option<Robot>,
     /// Corners in calibrations' pictures.
     pub views: Views,
+    /// Parts that are drawn over the camera's pictures.
+    pub found: FoundParts,
+    /// Height maps as they are looked at.
+    pub maps: Maps,
     /// When the program started.
     pub started: Instant,
     adapter: OnceLock<(String, bool)>,
     read: Mutex<Option<Read>>,
-    map: Mutex<Option<(String, Arc<HeightMap>)>>,
-}
-
-/// What a screen has beside its station.
-#[derive(Default)]
-pub struct Linked {
-    /// Argon2 hash, where others than this machine may ask.
-    pub password: Option<String>,
-    /// A robot's controller.
-    pub robot: Option<Robot>,
 }
 
 /// What the bar shows of the disk.
@@ -74,7 +68,7 @@ struct Read {
 
 impl Screen {
     /// Nothing is read from the disk yet.
-    pub fn new(jobs: Arc<Jobs>, sessions: Arc<Sessions>, cookie: String, linked: Linked) -> Screen {
+    pub fn new(jobs: Arc<Jobs>, sessions: Arc<Sessions>, cookie: String, password: Option<String>) -> Screen {
         Screen {
             place: jobs.place.clone(),
             hub: jobs.hub.clone(),
@@ -82,20 +76,25 @@ impl Screen {
             jobs,
             sessions,
             leases: Leases::default(),
-            password: linked.password,
+            password,
             cookie,
-            robot: linked.robot,
             views: Views::default(),
+            found: FoundParts::default(),
             started: Instant::now(),
             adapter: OnceLock::new(),
             read: Mutex::default(),
-            map: Mutex::default(),
+            maps: Maps::default(),
         }
     }
 
     /// The camera, where one was named.
     pub fn camera(&self) -> Option<&Arc<Camera>> {
         self.desk.links.camera.as_ref()
+    }
+
+    /// The robot, where one was named.
+    pub fn robot(&self) -> Option<&Arc<Robot>> {
+        self.desk.links.watched.as_ref()
     }
 
     /// Asks the system for its adapters, once; the first time takes a moment.
@@ -128,6 +127,7 @@ impl Screen {
     /// What was read of the station is read again: something was stored.
     pub fn forget(&self) {
         *self.read.lock().unwrap_or_else(|e| e.into_inner()) = None;
+        self.camera().inspect(|c| c.renew());
     }
 
     /// The bar as it stands.
@@ -140,7 +140,7 @@ impl Screen {
         }
         let camera = self.camera().map(|c| c.seen());
         alarms.extend(camera.as_ref().and_then(|c| c.2.clone()));
-        let robot = self.robot.as_ref().map(Robot::seen).unwrap_or_default();
+        let robot = self.robot().map(|r| r.seen()).unwrap_or_default();
         alarms.extend(robot.wrong.clone());
         let motion = self.desk.state();
         alarms.extend(motion.look.iter().map(|why| format!("look at the robot: {why}")));
@@ -174,18 +174,13 @@ impl Screen {
         Event::State { bar: self.bar(), jobs: self.jobs.list(JOBS), motion: Box::new(self.desk.state()) }
     }
 
-    /// The height map of a scan; the last one that was asked for is kept in memory.
-    pub fn map(&self, id: &str) -> Result<Arc<HeightMap>> {
-        if let Some((name, map)) = &*self.map.lock().unwrap_or_else(|e| e.into_inner())
-            && name == id
-        {
-            return Ok(map.clone());
-        }
-        let folder = scan_of(&self.place.jobs(), &self.jobs.get(id)?)?;
-        // Ends what a stopped process has begun in it, before files are read.
-        load_report(&folder)?;
-        let map = Arc::new(HeightMap::load(&folder)?);
-        *self.map.lock().unwrap_or_else(|e| e.into_inner()) = Some((id.to_owned(), map.clone()));
-        Ok(map)
+    /// The height map of a scan through the filters that it is looked at with.
+    pub fn look(&self, id: &str) -> Result<Looked> {
+        self.maps.look(&self.scan(id)?)
+    }
+
+    /// The folder of a finished scan.
+    pub fn scan(&self, id: &str) -> Result<PathBuf> {
+        scan_of(&self.place.jobs(), &self.jobs.get(id)?)
     }
 }

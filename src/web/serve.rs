@@ -8,11 +8,12 @@ use super::guard::{Door, Doorway, Sessions, door, tls, verify};
 use super::message::Event;
 use super::motion::{Desk, Links, SimulatedRobot};
 use super::robot::Robot;
-use super::screen::{Linked, Screen};
+use super::screen::Screen;
 use super::work::{Jobs, Place, Worker};
 use crate::capture::RawFormat;
 use crate::fault::{Fault, Result};
 use crate::files::Lock;
+use crate::station::settle_restore;
 use crate::web::message::Mode;
 use axum::middleware::from_fn_with_state;
 use std::net::{IpAddr, SocketAddr};
@@ -81,6 +82,7 @@ pub fn serve(
 ) -> Result<()> {
     check(options)?;
     let place = Place { station: options.station.clone(), recordings: options.recordings.clone(), mode: options.mode };
+    settle_restore(&place.station)?;
     crate::files::make_folder(&place.jobs())?;
     let _lock = Lock::take(&place.jobs(), "serve", "screen")?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
@@ -92,7 +94,9 @@ pub fn serve(
     let hub = Arc::new(Hub::default());
     let camera = options.camera.as_ref();
     let camera = camera.map(|(uri, raw)| Camera::watch(uri, *raw, &options.station)).transpose()?.map(Arc::new);
+    let robot = options.robot.as_deref().map(Robot::watch).transpose()?.map(Arc::new);
     let links = Links {
+        watched: robot.clone(),
         station: options.station.clone(),
         robot: options.robot.clone(),
         may_move: options.may_move,
@@ -145,9 +149,8 @@ async fn run(
     let scheme = if acceptor.is_some() { "https" } else { "http" };
     let guard =
         Arc::new(Door { hosts: hosts(options, address), scheme, sessions: sessions.clone(), cookie: cookie.clone() });
-    let robot = options.robot.as_deref().map(Robot::watch).transpose()?;
     let password = options.secured.as_ref().map(|s| s.password.clone());
-    let screen = Arc::new(Screen::new(jobs, sessions, cookie, Linked { password, robot }));
+    let screen = Arc::new(Screen::new(jobs, sessions, cookie, password));
     let app = router(screen.clone()).layer(from_fn_with_state(guard, door));
     let doorway = Doorway::new(listener, acceptor).map_err(lost)?;
     let first = screen.clone();

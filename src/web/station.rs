@@ -1,9 +1,10 @@
 //! In: a station's folder. Out: what pages say of it: settings, calibrations with their age and what they make expect.
 //! Frame and unit: mm, days.
 
-use super::message::{CalibrationAge, CalibrationState, Problem, StationInfo};
+use super::message::{CalibrationAge, CalibrationState, FrameInfo, Problem, StationInfo};
 use super::work::Place;
 use crate::rig::{Calibration, Quality, Rig, Verdict};
+use crate::robot::Convention;
 use crate::station::Settings;
 use jiff::{Timestamp, Unit};
 use serde_json::Value;
@@ -70,6 +71,7 @@ pub fn info(place: &Place) -> StationInfo {
     let problem =
         problem.or_else(|| rig.as_ref().ok().and_then(|r| r.belong_together().err()).as_ref().map(Problem::from));
     let settings = settings.unwrap_or_default();
+    let frames = rig.as_ref().map(|rig| frames(&settings, rig)).unwrap_or_default();
     let mut extraction = BTreeMap::new();
     flatten("", &serde_json::to_value(&settings.extraction).expect("plain data"), &mut extraction);
     StationInfo {
@@ -79,14 +81,42 @@ pub fn info(place: &Place) -> StationInfo {
         robot: settings.robot.map(|r| r.name().to_owned()),
         tolerance_mm: settings.tolerance_mm,
         volume_mm: settings.working_volume.map(|v| [v.near_mm, v.far_mm]),
+        work_frame: rig.as_ref().map_or("base", work_frame).into(),
+        frames,
         calibrations: rig.as_ref().map(calibrations).unwrap_or_default(),
         problem,
         extraction,
     }
 }
 
+/// Frame of what is scanned.
+fn work_frame(rig: &Rig) -> &'static str {
+    if rig.hand_eye.is_some() || rig.base_camera.is_some() {
+        "base"
+    } else if rig.linear_axis.is_some() || rig.turntable.is_some() {
+        "axis"
+    } else {
+        "camera"
+    }
+}
+
+/// Tool and camera where they are fixed.
+fn frames(settings: &Settings, rig: &Rig) -> Vec<FrameInfo> {
+    let robot = settings.robot.unwrap_or(Convention::Matrix);
+    let info = |name: &str, on: &str, numbers: Vec<f64>| FrameInfo {
+        name: name.into(),
+        on: on.into(),
+        labels: robot.labels().iter().map(|l| (*l).to_owned()).collect(),
+        numbers,
+    };
+    let tool = settings.tool.map(|t| info("tool", "flange", robot.write(&t.flange_from_tool)));
+    let riding = rig.hand_eye.as_ref().map(|h| info("camera", "flange", robot.write(&h.value)));
+    let standing = rig.base_camera.as_ref().map(|c| info("camera", "base", robot.write(&c.value)));
+    [tool, riding, standing].into_iter().flatten().collect()
+}
+
 /// Groups of settings as names with dots.
-fn flatten(before: &str, value: &Value, out: &mut BTreeMap<String, Value>) {
+pub(super) fn flatten(before: &str, value: &Value, out: &mut BTreeMap<String, Value>) {
     match value {
         Value::Object(map) => {
             for (key, value) in map {

@@ -106,6 +106,9 @@ impl World {
         recipe.gates.max_unseen_height_mm *= unit.max(1.0);
         // A turn of the hand-eye counts by the distance, whatever the field is.
         recipe.gates.max_sigma_mm = recipe.gates.max_sigma_mm.max(4.0 * HAND_EYE_RAD * station.working_distance);
+        // Nor can it bear less than five of those: what two looks leave unseen of it comes to nearly five.
+        recipe.insertion.tolerance_mm =
+            recipe.insertion.tolerance_mm.max(5.0 * HAND_EYE_RAD * station.working_distance);
         let part = spec.part.iter().find(|p| p.name == recipe.name).unwrap();
         let in_scene: Rigid<InScene, Part> = part_pose(part);
         let [x0, _, x1, _] = spec.region_mm;

@@ -8,6 +8,8 @@ import sys
 import tempfile
 import time
 
+import ghost
+import settings
 from browser import Browser
 from server import Server, events
 from shots import quiet, shot
@@ -87,7 +89,12 @@ def insert(s, b, part):
     step(b, "touch")
     if part == "osc":
         shot(b, pictures, "ask")
-    silence = [held(s, b, "approach"), held(s, b, "insert")]
+    silence = [held(s, b, "approach")]
+    asks = ghost.lies_on_the_part(s, b)
+    if part == "osc":
+        shot(b, pictures, "ghost")
+    ghost.as_on_the_command_line(program, folder if os.path.isdir(os.path.join(folder, "jobs")) else os.path.join(folder, "station"), asks)
+    silence.append(held(s, b, "insert"))
     time.sleep(0.3)
     log = events(folder)[before:]
     to_position = [e for e in log if e["what"] == "arrived"][-1]["t_s"] - log[0]["t_s"]
@@ -128,6 +135,7 @@ def main():
             b.run(PULSES)
             for part in parts.split(","):
                 insert(s, b, part)
+            settings.outputs(s, b, lambda: events(folder))
         finally:
             b.close()
             print("".join(s.said)[-2000:])

@@ -3,8 +3,10 @@ the one shown, twice, too early, from another tab, with a former start's token; 
 STOP do not halt it; where a killed server says that something is done that is not.
 Frame and unit: s."""
 
+import contextlib
 import json
 import os
+import socket
 import subprocess
 import sys
 import threading
@@ -73,6 +75,24 @@ class Operator:
         status, _, body = self.post("/motion/go", {"grant": grant, "what": what})
         assert status == 200, (status, body)
         return grant
+
+    @contextlib.contextmanager
+    def holding(self, grant):
+        """The button stays down while something else is asked: a busy machine may take longer than the button may be silent."""
+        over = threading.Event()
+
+        def talk():
+            while not over.wait(0.1):
+                say(self.socket, f"held {grant}")
+
+        talker = threading.Thread(target=talk, daemon=True)
+        talker.start()
+        try:
+            yield
+        finally:
+            over.set()
+            talker.join()
+            say(self.socket, f"held {grant}")
 
     def hold(self, grant, until, seconds=120):
         end = time.time() + seconds
@@ -173,6 +193,8 @@ def halts(s):
         threading.Thread(target=talk, daemon=True).start()
 
     def gone(grant):
+        # A socket that is closed while its listener waits in it says nothing to the server until the next event comes.
+        a.socket.shutdown(socket.SHUT_RDWR)
         a.socket.close()
 
     def taken_over(grant):
@@ -192,8 +214,9 @@ def halts(s):
         what = a.asked("touch")
         grant = a.go(what)
         a.hold(grant, lambda: moving(s))
-        refused("the same again", a.post("/motion/go", {"grant": grant, "what": what}))
-        refused("a press while it moves", a.post("/motion/press", what))
+        with a.holding(grant):
+            refused("the same again", a.post("/motion/go", {"grant": grant, "what": what}))
+            refused("a press while it moves", a.post("/motion/press", what))
         begun = time.time()
         how(grant)
         while count("halt") == before:

@@ -10,6 +10,9 @@ import sys
 import tempfile
 import time
 
+import boards
+import filters
+import settings
 import shots
 from browser import Browser
 from server import Server
@@ -81,6 +84,9 @@ def insertion(s, b):
     approach = job["outcome"]["poses"]["approach"]
     assert all(abs(a - v) < 1e-3 for a, v in zip(shown, approach)) and len(shown) == 6, (shown, approach)
     b.click("[data-goal=insertion]")
+    b.click("#three")
+    b.until("the part over the points", "const d = document.querySelector('[data-shown]')?.dataset; return Number(d?.outlines) > 3 && Number(d?.shown) > 1000", 20)
+    shot(b, "position-cloud")
     with open(os.path.join(folder, "scan", "truth.json")) as f:
         part = next(p["base_T_part"] for p in json.load(f)["parts"] if p["name"] == "led")
     found = job["outcome"]["part"]
@@ -244,6 +250,19 @@ def replay(s, b):
     b.click("#again")
     b.until("a difference", "return /cells in both/.test(document.getElementById('main').innerText)", 60)
     shot(b, "replay")
+    # A batch: the recording scanned and searched again with the other setting; how far the places lie apart, as reckoned here.
+    finds = lambda: [j for j in s.json("GET", "/jobs") if j["order"]["procedure"] == "find" and j["state"] == "done" and not j["order"].get("pins") and j["outcome"]["recipe"] == "led"]
+    before = len(finds())
+    b.run("const e = [...document.querySelectorAll('select')].find((x) => [...x.options].some((o) => o.value === 'led')); e.value = 'led'; e.dispatchEvent(new Event('change'))")
+    b.click("#run-batch")
+    b.until("one place more", "return Number(document.querySelector('[data-repeats]')?.dataset.repeats) === arguments[0]", 90, before + 1)
+    x = [j["outcome"]["part"][3] for j in finds()]
+    mean = sum(x) / len(x)
+    scatter = (sum((v - mean) ** 2 for v in x) / (len(x) - 1)) ** 0.5
+    shown = float(b.run("return document.querySelector('[data-repeats] tbody td:nth-child(3)').innerText").split()[0])
+    assert abs(shown - scatter) < 1e-3, (shown, scatter)
+    assert b.run("return document.querySelectorAll('.histogram rect').length") == 60
+    print(f"batch: {len(x)} places of one part, {scatter:.4f} mm scatter along x")
     quiet(b, "replay")
 
 
@@ -252,7 +271,7 @@ def rest(s, b):
     b.click("#touch")
     b.until("a normal", "return /normal, towards the camera/.test(document.getElementById('main').innerText)", 30)
     shot(b, "touch")
-    for page in ("station", "picture", "scan", "calibrate", "health", "settings"):
+    for page in ("station", "picture", "scan", "health", "settings"):
         b.page(page)
         time.sleep(0.3)
         shot(b, page)
@@ -305,12 +324,15 @@ def main():
         try:
             insertion(s, b)
             surface(s, b)
+            filters.filtered(program, s, b, shot)
             teach(s, b)
             pins(s, b)
             copied(s, b)
             replay(s, b)
             rest(s, b)
+            boards.boards(s, b, folder, shot)
             legible(b)
+            settings.settings(program, s, b, shot)
             lost(s, b)
         finally:
             b.close()

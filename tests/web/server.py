@@ -19,6 +19,7 @@ class Server:
     def __init__(self, program, folder, *more, stdin=None):
         """With --simulate the folder gets its station; else it holds one."""
         station = folder if "--simulate" in more else os.path.join(folder, "station")
+        self.station = station
         command = [program, "--json", "station", "serve", "--station", station, "--port", "0", *more]
         self.process = subprocess.Popen(command, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         # A test that fails leaves nobody serving.

@@ -8,7 +8,7 @@ use super::terms::{self, Seen, fitted};
 use super::{noise, start};
 use crate::calibrate::measured_pose::pooled_factor;
 use crate::calibrate::scatter::inflation;
-use crate::camera::ParameterCovariance;
+use crate::camera::CameraCovariance;
 use crate::fault::{Fault, Result};
 use crate::geometry::{AxisKind, CountUnit};
 
@@ -42,7 +42,7 @@ pub fn solve(
     stops: &[Stop],
     kind: AxisKind,
     unit: CountUnit,
-    camera_covariance: &ParameterCovariance,
+    camera_covariance: &CameraCovariance,
     o: &AxisOptions,
 ) -> Result<AxisFit> {
     if !(12.0..=1000.0).contains(&o.gate) {
@@ -99,7 +99,7 @@ pub fn solve(
     let inflation = inflation(chi2.max(1.0) + share, few) / (1.0 + share);
     let exact = &fit.covariance * inflation;
     let by = terms::by_camera(&chosen, &fit, &scatter);
-    let follows = &by * camera_covariance * by.transpose();
+    let follows = &by * camera_covariance.matrix() * by.transpose();
     let axis = state.axis(unit);
     let to = state.to_parameters(&axis);
     let covariance = &to * (&exact + follows) * to.transpose();

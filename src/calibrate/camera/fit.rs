@@ -4,7 +4,7 @@
 
 use super::bundle::{Bundle, Corner, State};
 use super::repeat::{repeat, widened};
-use crate::camera::{Intrinsics, PARAMETERS, ParameterCovariance, Parameters};
+use crate::camera::{Intrinsics, PARAMETERS, ParameterMatrix, Parameters};
 use crate::solve::{LmOptions, Loss, Solution, lm};
 
 /// The corners with what stays the same from one choice of lens terms to the next.
@@ -31,13 +31,13 @@ impl Fit<'_> {
         self.like.with_parameters(&solution.state.0)
     }
     /// Of the intrinsic parameters, as the pictures repeat.
-    pub fn covariance(&self, solution: &Solution<State>) -> Option<ParameterCovariance> {
+    pub fn covariance(&self, solution: &Solution<State>) -> Option<ParameterMatrix> {
         self.belief(solution).map(|b| b.0)
     }
     /// The same, and the factors on the standard deviations that are in it ([`repeat`]).
-    pub fn belief(&self, solution: &Solution<State>) -> Option<(ParameterCovariance, Parameters)> {
+    pub fn belief(&self, solution: &Solution<State>) -> Option<(ParameterMatrix, Parameters)> {
         let whole = solution.scaled_covariance()?;
-        let mut covariance: ParameterCovariance = whole.fixed_view::<PARAMETERS, PARAMETERS>(0, 0).into();
+        let mut covariance: ParameterMatrix = whole.fixed_view::<PARAMETERS, PARAMETERS>(0, 0).into();
         let free = (0..PARAMETERS).filter(|&i| covariance[(i, i)] > 0.0).collect();
         let bundle = Bundle { pictures: self.corners, like: self.like, free };
         let factors = repeat(&bundle, solution).unwrap_or(Parameters::repeat(1.0));

@@ -10,7 +10,7 @@ use super::zhang::{Seen, first_camera};
 use crate::calibrate::boards::BoardView;
 use crate::calibrate::homography::homography;
 use crate::calibrate::pose::pose_from_homography;
-use crate::camera::{Intrinsics, LENS, PARAMETERS, ParameterCovariance, Parameters, SKEW};
+use crate::camera::{Intrinsics, LENS, PARAMETERS, ParameterMatrix, Parameters, SKEW};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Board, Camera, Mat3, Rigid, Vec2, Vec3};
 use crate::solve::{LmOptions, Loss, Solution, Stop};
@@ -54,7 +54,7 @@ pub struct Solved {
     pub camera_from_board: Vec<Rigid<Camera, Board>>,
     /// Of the intrinsic parameters (order: [`crate::camera::NAMES`]), zero rows for held ones; the residuals'
     /// own scale is in it, and how the pictures repeat. `None` where something is not determined.
-    pub covariance: Option<ParameterCovariance>,
+    pub covariance: Option<ParameterMatrix>,
     /// By how much more the parameters scatter from picture to picture than corners that err by themselves would make them:
     /// factors on the standard deviations, in the covariance already; 1 and more.
     pub repeat: Parameters,

@@ -6,7 +6,7 @@ use super::intrinsics::{Observation, SolveOptions, Solved, solve};
 use super::ray_error::expected_ray_error;
 use crate::calibrate::boards::BoardView;
 use crate::calibrate::projection::project;
-use crate::camera::{Intrinsics, PARAMETERS, ParameterCovariance};
+use crate::camera::{Intrinsics, PARAMETERS, ParameterMatrix};
 use crate::geometry::{Board, Camera, LeftStep, Rigid, Vec2, Vec3, exp};
 use nalgebra::{DMatrix, Matrix2, Matrix6, SMatrix};
 
@@ -93,7 +93,7 @@ pub fn next_picture(solved: &Solved, features: &[Vec3], typical_distance: f64, s
                 let Some(gain) = picture_information(k, features, &pose, sigma_px) else { continue };
                 let with = &information + DMatrix::from_fn(free.len(), free.len(), |a, b| gain[(free[a], free[b])]);
                 let Some(c) = with.try_inverse() else { continue };
-                let mut whole = ParameterCovariance::zeros();
+                let mut whole = ParameterMatrix::zeros();
                 for (a, &i) in free.iter().enumerate() {
                     for (b, &j) in free.iter().enumerate() {
                         whole[(i, j)] = c[(a, b)];
@@ -136,8 +136,8 @@ fn picture_information(
     features: &[Vec3],
     pose: &Rigid<Camera, Board>,
     sigma_px: f64,
-) -> Option<ParameterCovariance> {
-    let mut kk = ParameterCovariance::zeros();
+) -> Option<ParameterMatrix> {
+    let mut kk = ParameterMatrix::zeros();
     let mut kp = SMatrix::<f64, PARAMETERS, 6>::zeros();
     let mut pp = Matrix6::<f64>::zeros();
     let mut inside = 0;

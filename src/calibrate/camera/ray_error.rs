@@ -2,7 +2,7 @@
 //! Frame and unit: px.
 
 use crate::calibrate::projection::project;
-use crate::camera::{Intrinsics, PARAMETERS, ParameterCovariance};
+use crate::camera::{Intrinsics, PARAMETERS, ParameterMatrix};
 use crate::geometry::{Vec2, Vec3, skew};
 use nalgebra::DMatrix;
 
@@ -34,7 +34,7 @@ fn ray_jacobian(k: &Intrinsics) -> DMatrix<f64> {
 
 /// Expected rms displacement of the viewing rays over the image, px, after the best rotation, from
 /// the covariance of the camera's parameters.
-pub fn expected_ray_error(k: &Intrinsics, covariance: &ParameterCovariance) -> f64 {
+pub fn expected_ray_error(k: &Intrinsics, covariance: &ParameterMatrix) -> f64 {
     let j = ray_jacobian(k);
     let sum: f64 = (&j * covariance).component_mul(&j).sum();
     (sum / (j.nrows() as f64 / 2.0)).max(0.0).sqrt()

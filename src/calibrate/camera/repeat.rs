@@ -80,7 +80,7 @@ fn each(bundle: &Bundle<'_>, solution: &Solution<State>) -> Option<Vec<Told>> {
 }
 
 /// Standard deviations of a covariance times these.
-pub(super) fn widened(covariance: &mut crate::camera::ParameterCovariance, by: &Parameters) {
+pub(super) fn widened(covariance: &mut crate::camera::ParameterMatrix, by: &Parameters) {
     for i in 0..PARAMETERS {
         for j in 0..PARAMETERS {
             covariance[(i, j)] *= by[i] * by[j];

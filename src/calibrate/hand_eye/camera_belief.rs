@@ -4,7 +4,7 @@
 
 use super::closed::Pair;
 use crate::calibrate::camera::ray_error::expected_ray_error;
-use crate::camera::{Intrinsics, ParameterCovariance, Parameters};
+use crate::camera::{CameraCovariance, Intrinsics, ParameterMatrix, Parameters};
 
 /// Change of the camera's parameters from those that the boards were measured with: mean + root z, z ~ N(0, I).
 /// The root has no inverse where a parameter counts as known.
@@ -13,7 +13,7 @@ pub struct CameraBelief {
     /// Expected change, in the order and units of [`crate::camera::NAMES`].
     pub mean: Parameters,
     /// A root of the change's covariance: z has the columns, the parameters have the rows.
-    pub root: ParameterCovariance,
+    pub root: ParameterMatrix,
 }
 
 /// A belief after pictures were seen.
@@ -21,7 +21,7 @@ pub struct Sharpened {
     /// What is believed now.
     pub belief: CameraBelief,
     /// New z by the old one: how the belief follows the camera that was given.
-    pub by_given: ParameterCovariance,
+    pub by_given: ParameterMatrix,
     /// Squared Mahalanobis distance of what the pictures say from what was given, and its degrees of freedom.
     pub surprise: f64,
     /// Directions of z that the pictures say something about.
@@ -30,15 +30,14 @@ pub struct Sharpened {
 
 impl CameraBelief {
     /// A camera that is right on average.
-    pub fn given(covariance: &ParameterCovariance) -> CameraBelief {
+    pub fn given(covariance: &CameraCovariance) -> CameraBelief {
         // Correlations: the parameters' units differ by orders of magnitude.
         let sigma = Parameters::from_fn(|i, _| covariance[(i, i)].max(0.0).sqrt());
         let inverse = sigma.map(|s| if s > 0.0 { 1.0 / s } else { 0.0 });
-        let correlation = ParameterCovariance::from_fn(|i, j| covariance[(i, j)] * inverse[i] * inverse[j]);
+        let correlation = ParameterMatrix::from_fn(|i, j| covariance[(i, j)] * inverse[i] * inverse[j]);
         let e = correlation.symmetric_eigen();
         let length = e.eigenvalues.map(|l| l.max(0.0).sqrt());
-        let root =
-            ParameterCovariance::from_diagonal(&sigma) * e.eigenvectors * ParameterCovariance::from_diagonal(&length);
+        let root = ParameterMatrix::from_diagonal(&sigma) * e.eigenvectors * ParameterMatrix::from_diagonal(&length);
         CameraBelief { mean: Parameters::zeros(), root }
     }
 
@@ -48,13 +47,13 @@ impl CameraBelief {
     }
 
     /// Of the change of the camera's parameters.
-    pub fn covariance(&self) -> ParameterCovariance {
+    pub fn covariance(&self) -> ParameterMatrix {
         self.root * self.root.transpose()
     }
 
     /// With what these pictures say, the features' sigmas being `factor` times the stated ones.
     pub fn after(&self, pairs: &[&Pair], factor: f64) -> Option<Sharpened> {
-        let (mut information, mut gradient) = (ParameterCovariance::zeros(), Parameters::zeros());
+        let (mut information, mut gradient) = (ParameterMatrix::zeros(), Parameters::zeros());
         for pair in pairs {
             let said = &pair.seen.about_camera;
             information += said.information / (factor * factor);
@@ -62,7 +61,7 @@ impl CameraBelief {
         }
         gradient += information * self.mean;
         let learnt = self.root.transpose() * information * self.root;
-        let cholesky = (ParameterCovariance::identity() + learnt).cholesky()?;
+        let cholesky = (ParameterMatrix::identity() + learnt).cholesky()?;
         let z = -cholesky.solve(&(self.root.transpose() * gradient));
         let by_given = cholesky.l().try_inverse()?;
         // The pictures alone place z with information `learnt`; given and said differ by (1 + 1/learnt) in each
@@ -81,7 +80,7 @@ impl CameraBelief {
 
 /// What a covariance of the parameters, or the square of one change of them, means for the viewing rays: px rms over
 /// the image, after the rotation that a hand-eye transform makes up for.
-pub fn ray_error_px(camera: &Intrinsics, covariance: &ParameterCovariance) -> f64 {
+pub fn ray_error_px(camera: &Intrinsics, covariance: &ParameterMatrix) -> f64 {
     expected_ray_error(camera, covariance)
 }
 
@@ -91,14 +90,14 @@ mod tests {
 
     #[test]
     fn a_root_is_a_root_also_where_parameters_are_known() {
-        let mut c = ParameterCovariance::zeros();
+        let mut c = ParameterMatrix::zeros();
         for i in 0..8 {
             for j in 0..8 {
                 let scale = |k: usize| if k < 4 { 0.5 } else { 1e-3 };
                 c[(i, j)] = scale(i) * scale(j) * if i == j { 1.0 } else { 0.9 };
             }
         }
-        let back = CameraBelief::given(&c).covariance();
+        let back = CameraBelief::given(&CameraCovariance::new(c).unwrap()).covariance();
         assert!((back - c).iter().zip(c.iter()).all(|(d, c)| d.abs() <= 1e-12 * c.abs().max(1e-3)), "{back}");
     }
 }

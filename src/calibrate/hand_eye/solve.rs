@@ -10,7 +10,7 @@ use super::noise::{Fitted, fit};
 use super::options::{HandEyeOptions, Mount, Noise};
 use super::terms::{Refined, UNKNOWNS, refine, step_covariance, with_camera};
 use crate::calibrate::measured_pose::pooled_factor;
-use crate::camera::{Intrinsics, PARAMETERS, ParameterCovariance};
+use crate::camera::{CameraCovariance, Intrinsics, PARAMETERS};
 use crate::fault::{Fault, Result};
 use crate::geometry::Twist;
 use nalgebra::{DMatrix, Matrix6, SMatrix};
@@ -37,7 +37,7 @@ fn distance2(fit: &Fitted, mount: Mount, pair: &Pair, used: bool) -> f64 {
 pub fn solve(
     pairs: &[Pair],
     mount: Mount,
-    camera: &ParameterCovariance,
+    camera: &CameraCovariance,
     model: &Intrinsics,
     o: &HandEyeOptions,
 ) -> Result<HandEyeFit> {

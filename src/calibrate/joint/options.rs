@@ -2,7 +2,7 @@
 //! Frame and unit: mm, degrees where the name says so.
 
 use crate::calibrate::hand_eye::options::Mount;
-use crate::camera::{ALWAYS_NAMED, ParameterCovariance, Parameters};
+use crate::camera::{ALWAYS_NAMED, CameraCovariance, Parameters};
 use crate::fault::{Fault, Result};
 
 /// What each source scatters by.
@@ -41,7 +41,7 @@ pub struct CameraPrior {
     /// Its values, in the order of [`crate::camera::NAMES`].
     pub mean: Parameters,
     /// Their covariance.
-    pub covariance: ParameterCovariance,
+    pub covariance: CameraCovariance,
 }
 
 /// Settings of [`super::solve::solve`].

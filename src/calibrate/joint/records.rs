@@ -10,8 +10,8 @@ use crate::calibrate::hand_eye::report::HAND_EYE_NAMES;
 use crate::calibrate::laser_plane::report::PLANE_NAMES;
 use crate::calibrate::laser_plane::terms::basis as plane_basis;
 use crate::calibrate::limits::Limits;
-use crate::calibrate::pointer::solve::{BEAM_NAMES, basis as beam_basis};
-use crate::camera::{ALWAYS_NAMED, NAMES, PARAMETERS, ParameterCovariance};
+use crate::calibrate::pointer::beam::{BEAM_NAMES, basis as beam_basis};
+use crate::camera::{ALWAYS_NAMED, CameraCovariance, NAMES, PARAMETERS};
 use crate::geometry::{Camera, Plane};
 use crate::rig::{Covariance, JointCovariance, Kind, Quality, Verdict};
 use nalgebra::DMatrix;
@@ -94,7 +94,7 @@ pub fn together(fit: &JointFit, hand_eye: Kind, of: BTreeMap<Kind, String>) -> J
 /// The covariance of the shared unknowns as separate calibrations state it: each for itself, nothing between them.
 pub fn separately(
     l: &Layout,
-    camera: &ParameterCovariance,
+    camera: &CameraCovariance,
     hand_eye: Option<&DMatrix<f64>>,
     plane: Option<(&Plane<Camera>, &DMatrix<f64>)>,
 ) -> DMatrix<f64> {

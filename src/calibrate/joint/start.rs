@@ -12,7 +12,7 @@ use crate::calibrate::laser_plane::agree::majority;
 use crate::calibrate::laser_plane::options::LaserPlaneOptions;
 use crate::calibrate::laser_plane::terms::{Seen, look, on_board};
 use crate::calibrate::measured_pose::{MeasuredPose, SeenBoard, measure};
-use crate::calibrate::pointer::solve::robust_line;
+use crate::calibrate::pointer::beam::robust_line;
 use crate::calibrate::pose::pose_of_points;
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};

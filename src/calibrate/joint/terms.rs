@@ -8,7 +8,7 @@ use crate::calibrate::hand_eye::closed::{Far, Near};
 use crate::calibrate::hand_eye::options::Mount;
 use crate::calibrate::laser_plane::terms::{look, mm_per_px, on_board, row};
 use crate::calibrate::laser_plane::views::StripePeak;
-use crate::calibrate::pointer::solve::across;
+use crate::calibrate::pointer::beam::across;
 use crate::calibrate::projection::project;
 use crate::camera::{Intrinsics, PARAMETERS};
 use crate::geometry::{Base, Board, Camera, Flange, Mat3, Rigid, Twist, Vec2, Vec3, log, skew};

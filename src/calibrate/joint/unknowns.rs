@@ -3,7 +3,7 @@
 
 use crate::calibrate::hand_eye::closed::{Far, Near};
 use crate::calibrate::laser_plane::terms::stepped;
-use crate::calibrate::pointer::solve::moved_beam;
+use crate::calibrate::pointer::beam::moved_beam;
 use crate::camera::{Intrinsics, Parameters};
 use crate::geometry::{Board, Camera, LeftStep, Plane, Ray, Rigid, Twist, Vec3};
 

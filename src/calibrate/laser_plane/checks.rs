@@ -4,7 +4,7 @@
 
 use super::terms::{ByCamera, Data, Says, State, on_board, says, stepped, tangents};
 use crate::calibrate::scatter;
-use crate::camera::{Intrinsics, PARAMETERS, ParameterCovariance};
+use crate::camera::{CameraCovariance, Intrinsics, PARAMETERS};
 use crate::geometry::{Camera, Plane, Vec3};
 use crate::rig::Volume;
 use nalgebra::{DMatrix, Matrix3, SMatrix};
@@ -33,12 +33,12 @@ pub(in crate::calibrate) fn from_camera(
     state: &State,
     factor: f64,
     by: &ByCamera,
-    camera_covariance: &ParameterCovariance,
+    camera_covariance: &CameraCovariance,
 ) -> f64 {
     let one = |(v, gradient): (usize, &Option<SMatrix<f64, 2, PARAMETERS>>)| {
         let s = says(data, state, v, factor)?;
         let off = s.information.try_inverse()? * (*gradient)? + s.by_plane * by.plane;
-        Some((camera_covariance * off.transpose() * s.information * off).trace())
+        Some((camera_covariance.matrix() * off.transpose() * s.information * off).trace())
     };
     by.gradients.iter().enumerate().filter_map(one).sum()
 }

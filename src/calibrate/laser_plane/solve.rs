@@ -11,7 +11,7 @@ use super::views::StripeView;
 use crate::calibrate::boards::extent::{inside, to_print_edge};
 use crate::calibrate::measured_pose::MeasuredPose;
 use crate::calibrate::scatter::inflation;
-use crate::camera::{Intrinsics, ParameterCovariance, named};
+use crate::camera::{CameraCovariance, Intrinsics};
 use crate::fault::Result;
 use crate::geometry::{Board, Camera, Plane, Rigid};
 use crate::solve::Loss;
@@ -99,7 +99,7 @@ pub struct LaserPlaneFit {
 pub fn solve(
     views: &[StripeView],
     camera: &Intrinsics,
-    camera_covariance: &ParameterCovariance,
+    camera_covariance: &CameraCovariance,
     feature_factor: f64,
     o: &LaserPlaneOptions,
 ) -> Result<LaserPlaneFit> {
@@ -173,7 +173,7 @@ pub fn solve(
         uses[p.view][p.index] = PeakUse::Used;
     }
     let basis = basis(&state.plane);
-    let by_camera = by_camera(&data, &state, views, camera, &named(camera_covariance), factor)
+    let by_camera = by_camera(&data, &state, views, camera, &camera_covariance.named(), factor)
         .ok_or_else(|| refused("the laser plane is not determined by these stripes".into()))?;
     let mut checks = consistency(&data, &state, factor);
     if checks.freedom > 0.0 {
@@ -182,7 +182,7 @@ pub fn solve(
     }
     let inflation = inflation(checks.scatter2, checks.freedom);
     let exact = &basis * &local * basis.transpose() * inflation;
-    let follows = by_camera.plane * camera_covariance * by_camera.plane.transpose();
+    let follows = by_camera.plane * camera_covariance.matrix() * by_camera.plane.transpose();
     let covariance = &exact + &basis * DMatrix::from_column_slice(3, 3, follows.as_slice()) * basis.transpose();
     let rest: Vec<Seen> = all.iter().filter(|p| uses[p.view][p.index] != PeakUse::Used).copied().collect();
     let second = second_plane(&rest, &data, &state, views, camera, o);

@@ -2,7 +2,7 @@
 //! their sigmas; from three or more points the surface's normal and a tool pose square to it.
 //! Frame and unit: camera and base frame, mm, rad (docs/math.md, Pointer (6) to (9); the paper's eq. 3, 4).
 
-use super::solve::BEAM_NAMES;
+use super::beam::BEAM_NAMES;
 use crate::camera::{Intrinsics, NAMES, PARAMETERS, difference_step};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Camera, Flange, Mat3, Ray, Rigid, Tool, Vec2, Vec3, fit_plane, skew};

@@ -2,19 +2,20 @@
 //! person reads; fit and verification apart.
 //! Frame and unit: camera frame; mm, degrees, px.
 
+use super::beam::BEAM_NAMES;
 use super::range::{RigCovariance, range};
-use super::solve::{BEAM_NAMES, PointerFit, PointerOptions};
+use super::solve::{PointerFit, PointerOptions};
 use crate::calibrate::limits::{Limits, rms};
 use crate::calibrate::report::{Page, bars};
 use crate::calibrate::scatter::overrule;
-use crate::camera::{Intrinsics, NAMES, PARAMETERS, ParameterCovariance, named};
+use crate::camera::{Intrinsics, NAMES, PARAMETERS, ParameterMatrix, named};
 use crate::rig::{Covariance, Quality, Verdict};
 use nalgebra::Matrix2;
 use std::collections::BTreeMap;
 
 /// Of the beam and the camera it was found with, under the names that the pointer's file has.
 pub fn covariance(fit: &PointerFit) -> Covariance {
-    let camera: ParameterCovariance = fit.covariance.fixed_view::<PARAMETERS, PARAMETERS>(6, 6).into();
+    let camera: ParameterMatrix = fit.covariance.fixed_view::<PARAMETERS, PARAMETERS>(6, 6).into();
     let kept: Vec<usize> = (0..6).chain(named(&camera).into_iter().map(|i| 6 + i)).collect();
     let names: Vec<&str> = kept.iter().map(|&i| if i < 6 { BEAM_NAMES[i] } else { NAMES[i - 6] }).collect();
     Covariance::new(&names, &fit.covariance.select_rows(&kept).select_columns(&kept))

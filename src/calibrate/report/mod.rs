@@ -96,7 +96,7 @@ td:first-child,th:first-child{text-align:left}figure{margin:1.4rem 0}figcaption{
 svg{max-width:100%;height:auto;background:#fbfcfd;border:1px solid #dde3e8}footer{margin-top:3rem;color:#8895a1;font-size:.8rem}";
 
 /// Text made safe inside HTML and SVG.
-pub(super) fn escape(text: &str) -> String {
+pub fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 

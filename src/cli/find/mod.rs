@@ -1,6 +1,8 @@
 //! In: the command line's words about parts. Out: models, recipes, found poses, second looks.
 //! Frame and unit: base frame, mm.
 
+pub mod filter;
+pub mod ghost;
 pub mod import_map;
 pub mod locate;
 pub mod matching;

@@ -1,14 +1,15 @@
 //! In: a station, a camera, recipes, an address. Out: what a robot's own program asks for over TCP, answered until Ctrl-C.
 //! Frame and unit: poses in the robot's own notation.
 
+use crate::arm::rules::{Guard, MotionLog};
 use crate::capture::CameraUri;
 use crate::cli::terminal::console::Console;
 use crate::cli::terminal::interrupt;
 use crate::fault::{Fault, Result};
 use crate::robot::Convention;
 use crate::scan::Where;
-use crate::station::Settings;
 use crate::station::socket::{Patience, Session, SocketOptions, serve};
+use crate::station::{Output, Settings, try_output};
 use std::net::TcpListener;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -16,6 +17,36 @@ use std::time::Duration;
 #[derive(clap::Subcommand)]
 pub enum Command {
     Serve(Serve),
+    Output(TryOutput),
+}
+
+/// Try an output of a linked controller: lasers and lamp light for a second and a half, the gripper opens or closes; nothing moves
+#[derive(clap::Args)]
+#[command(after_help = "Example:
+  sheetlight robot output line --station cell3 --robot bcap://192.168.0.1:5007 --allow-motion")]
+pub struct TryOutput {
+    /// line, pointer, room, open or close
+    #[arg(value_parser = crate::cli::terminal::arguments::parse::<Output>)]
+    output: Output,
+    /// Station folder; [outputs] of its station.toml says what hangs where
+    #[arg(long)]
+    station: PathBuf,
+    /// The robot: bcap://HOST[:5007]
+    #[arg(long)]
+    robot: String,
+    /// The arm may be taken; somebody stands beside the cell
+    #[arg(long)]
+    allow_motion: bool,
+}
+
+fn output(args: &TryOutput, console: &Console) -> Result<()> {
+    let settings = Settings::load(&args.station)?;
+    let log = MotionLog::file(&args.station.join("motions.jsonl"));
+    let mut guard = Guard::new(crate::arm::open(&args.robot)?, settings.motion.clone(), log);
+    guard.arm(args.allow_motion)?;
+    let number = try_output(guard.link(), &settings.outputs.unwrap_or_default(), args.output)?;
+    console.result(&number, &format!("output {number} was switched"));
+    Ok(())
 }
 
 /// Answer a robot's own program over a TCP socket: it scans, asks for a part, gets poses in its notation
@@ -55,7 +86,10 @@ pub struct Serve {
 }
 
 pub fn run(command: &Command, console: &Console) -> Result<()> {
-    let Command::Serve(args) = command;
+    let args = match command {
+        Command::Serve(args) => args,
+        Command::Output(args) => return output(args, console),
+    };
     if !(1.0..=86_400.0).contains(&args.patience) {
         return Err(
             Fault::usage(format!("--patience {}, 1 to 86400 s are allowed", args.patience)).next("correct the option")

@@ -1,7 +1,7 @@
 //! In: a station folder. Out: a new one, a summary of one, or values moved in and out of it.
 //! Frame and unit: camera and flange frames, mm.
 
-use super::serve;
+use super::{keep, serve};
 use crate::camera::{Intrinsics, LENS, NAMES};
 use crate::cli::calibrate::store::stale;
 use crate::cli::terminal::console::Console;
@@ -25,6 +25,9 @@ pub enum Command {
     Import(Import),
     /// Write a station's values as one JSON file, in the keys that import reads
     Export(Export),
+    Set(keep::Set),
+    Backup(keep::BackUp),
+    Restore(keep::Restore),
     Serve(Box<serve::Serve>),
     Password(serve::Password),
     /// Vouch for a calibration file that is refused: one of a former version, edited, or of another camera
@@ -99,6 +102,9 @@ pub struct Export {
 
 pub fn run(command: &Command, console: &Console) -> Result<()> {
     match command {
+        Command::Set(a) => return keep::set(a, console),
+        Command::Backup(a) => return keep::back_up(a, console),
+        Command::Restore(a) => return keep::restore(a, console),
         Command::Serve(a) => return serve::run(a, console),
         Command::Password(a) => return serve::password(a, console),
         Command::New(a) => {

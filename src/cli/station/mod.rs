@@ -2,6 +2,7 @@
 //! Frame and unit: camera and flange frames, mm.
 
 mod command;
+mod keep;
 mod serve;
 
 pub use command::{Command, run};

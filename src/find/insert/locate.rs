@@ -3,6 +3,7 @@
 //! Frame and unit: base frame; mm, degrees; sigmas along the part's own axes.
 
 use super::budget::{Budget, budget};
+use super::hypothesis::{Judged, best_hypothesis, lead};
 use super::places::{Place, places};
 use super::recipe::{Gates, Recipe};
 use super::verdict::{Agreement, TurnVote, judge, vote};
@@ -12,17 +13,15 @@ use crate::find::look::looks::{self, Agreed, Disagreement, Look, Witness};
 use crate::find::look::part_seen::towards_camera;
 use crate::find::look::size_check::SizeCheck;
 use crate::find::measure::construct::{Built, build, features};
-use crate::find::measure::points::{Ordered, localise};
+use crate::find::measure::points::Ordered;
 use crate::find::measure::pose::{Measured, measure};
-use crate::find::measure::slide::{long_axis, settle, slide};
 use crate::find::model::mirror::own_mirror_image;
 use crate::find::model::shape_model::ShapeModel;
 use crate::find::scene::{Kind, Layer, Scene};
 use crate::find::search::accelerator::Accelerator;
 use crate::find::search::full::{Match, find_on};
 use crate::find::search::options::SearchOptions;
-use crate::find::search::refine::Pose;
-use crate::geometry::{Base, Grid, Part, Rigid, Tool, Vec3};
+use crate::geometry::{Base, Part, Rigid, Tool, Vec3};
 use crate::rig::Rig;
 use crate::robot::Convention;
 use crate::scan::{CloudPoint, GridOptions, HeightMap, grid};
@@ -218,71 +217,6 @@ pub fn locate(cloud: &[CloudPoint], recipe: &Recipe, rig: Option<&Rig>, options:
     Ok(Report { all, ..report })
 }
 
-struct Judged {
-    found: Match,
-    measured: Measured,
-}
-
-/// Measures at the best match and, where the points do not agree with the drawing there, at its rivals
-/// and at the other matches: a long part shifted along itself scores nearly as well in the search, but
-/// its surfaces do not end where they should.
-fn best_hypothesis(
-    points: &Ordered,
-    map: &HeightMap,
-    recipe: &Recipe,
-    expected: Option<&Rigid<Base, Part>>,
-    best: &Match,
-    matches: &[Match],
-) -> Result<Judged> {
-    const MOST: usize = 12;
-    let drawing = recipe.drawing();
-    let rivals = best.rivals.iter().filter(|r| r.1 > 0.6 * best.score).map(|&(pose, score)| {
-        let second_score = best.score;
-        let rivals =
-            std::iter::once((best.pose, best.score)).chain(best.rivals.iter().copied().filter(|r| r.0 != pose));
-        Match { pose, score, second_score, rivals: rivals.collect(), ..best.clone() }
-    });
-    let mut kept: Option<(f64, Judged)> = None;
-    let mut trouble = None;
-    let searched = std::iter::once(best.clone()).chain(rivals).chain(matches.iter().skip(1).cloned()).take(MOST);
-    let slid = |(m, start): (Match, Rigid<Base, Part>)| (m, slide(points, &drawing, start, &recipe.measure));
-    let starts = expected.map(|e| slid((best.clone(), *e))).into_iter();
-    // Before its rivals the best match itself, where the points say that it lies.
-    let settled = std::iter::once_with(|| {
-        let start = settle(points, &drawing, lift(&best.pose, map, points, recipe), &recipe.measure);
-        (best.clone(), start)
-    });
-    let mut searched = searched.map(|m| (m.clone(), lift(&m.pose, map, points, recipe))).map(slid);
-    let first = searched.next();
-    for (found, start) in starts.chain(first).chain(settled).chain(searched) {
-        let measured = match measure(points, &drawing, start, &recipe.measure) {
-            Ok(measured) => measured,
-            Err(e) => {
-                trouble.get_or_insert_with(|| {
-                    e.at(format!(
-                        "match at {:.1} {:.1} mm of the map, turned by {:.1} degrees, score {:.3}",
-                        (found.pose.x + 0.5) * map.cell,
-                        (found.pose.y + 0.5) * map.cell,
-                        found.pose.angle.to_degrees(),
-                        found.score
-                    ))
-                });
-                continue;
-            }
-        };
-        let a = judge(points, &drawing, &measured, &recipe.measure);
-        let value = a.agreement * a.edges * found.score;
-        let good = a.agreement >= recipe.gates.min_agreement && a.edges >= 0.5 && a.crossed <= recipe.gates.max_crossed;
-        if kept.as_ref().is_none_or(|k| value > k.0) {
-            kept = Some((value, Judged { found, measured }));
-        }
-        if good {
-            break;
-        }
-    }
-    kept.map(|k| k.1).ok_or_else(|| trouble.expect("every hypothesis failed, and there was one"))
-}
-
 /// The layers of a height map that a recipe wants.
 pub fn scene_of(map: &HeightMap, layers: &[Kind]) -> Result<Scene> {
     let (w, h) = (map.width as usize, map.height as usize);
@@ -309,30 +243,6 @@ fn model_of(recipe: &Recipe, scene: &Scene) -> Result<ShapeModel> {
     Ok(model)
 }
 
-/// A match in the map as a pose in the base frame: its height is the most frequent one of the points on
-/// the drawing's first face.
-fn lift(pose: &Pose, map: &HeightMap, points: &Ordered, recipe: &Recipe) -> Rigid<Base, Part> {
-    let bin = 0.5 * recipe.measure.height_gate_mm;
-    let flat: Rigid<Grid, Part> = Rigid::from_vectors(
-        &Vec3::new(0.0, 0.0, pose.angle),
-        Vec3::new((pose.x + 0.5) * map.cell, (pose.y + 0.5) * map.cell, 0.0),
-    );
-    let base_from_part = map.base_from_grid * flat;
-    let drawing = recipe.drawing();
-    let faces = drawing.faces();
-    let face = &faces[0];
-    let mut bins = std::collections::BTreeMap::<i64, usize>::new();
-    for q in localise(points, &drawing, &base_from_part, &recipe.measure).iter().flatten() {
-        if face.material(q.x, q.y) {
-            *bins.entry(((q.z - face.z) / bin).floor() as i64).or_default() += 1;
-        }
-    }
-    // Three neighbouring bins, so that a tilted face is not split.
-    let weight = |k: i64| (k - 1..=k + 1).filter_map(|b| bins.get(&b)).sum::<usize>();
-    let best = bins.keys().copied().max_by_key(|&k| weight(k)).unwrap_or(0);
-    base_from_part * Rigid::from_vectors(&Vec3::zeros(), Vec3::new(0.0, 0.0, (best as f64 + 0.5) * bin))
-}
-
 #[allow(clippy::too_many_arguments)]
 fn conclude(
     recipe: &Recipe,
@@ -355,7 +265,8 @@ fn conclude(
     let disagreement_mm = named(&spec.two_pin)
         .zip(named(&spec.lattice))
         .map(|(a, b)| (a.deviation_mm[0] - b.deviation_mm[0]).hypot(a.deviation_mm[1] - b.deviation_mm[1]));
-    let mut gates = gates(&recipe.gates, &found, recipe, &budget, &agreement, &turns, disagreement_mm);
+    let lead = lead(points, &map, recipe, &found, &measured.base_from_part, &agreement);
+    let mut gates = gates(&recipe.gates, found.score, lead, &budget, &agreement, &turns, disagreement_mm);
     // Where another look says where the part lies, no other place is in question: the looks have to agree.
     gates.retain(|g| options.expected.is_none() || g.name != "margin");
     gates.extend(sizes.as_ref().map(|s| s.gate(&recipe.gates)));
@@ -492,18 +403,17 @@ fn missed(gates: &[Gate]) -> impl Iterator<Item = String> {
 
 fn gates(
     g: &Gates,
-    found: &Match,
-    recipe: &Recipe,
+    score: f64,
+    lead: f64,
     budget: &Budget,
     agreement: &Agreement,
     turns: &[TurnVote],
     disagreement: Option<f64>,
 ) -> Vec<Gate> {
     let (least, most) = (Gate::least, Gate::most);
-    let margin = 1.0 - rival_score(found, recipe) / found.score.max(1e-9);
     let mut out = vec![
-        least("score", found.score, g.min_score),
-        least("margin", margin, g.min_margin),
+        least("score", score, g.min_score),
+        least("margin", lead, g.min_margin),
         least("coverage", agreement.coverage, g.min_coverage),
         least("agreement", agreement.agreement, g.min_agreement),
         least("edges seen", agreement.edges, g.min_edges),
@@ -521,24 +431,4 @@ fn gates(
         out.push(least(LOOKS, 1.0, 2.0));
     }
     out
-}
-
-/// The best rival that is neither one of the part's alike turns nor, for a long part, a shift along
-/// itself: those are told apart by the points.
-fn rival_score(found: &Match, recipe: &Recipe) -> f64 {
-    let long = long_axis(&recipe.drawing());
-    let alike = |pose: &Pose| {
-        (0..recipe.alike_turns).any(|k| {
-            let turn = std::f64::consts::TAU * f64::from(k) / f64::from(recipe.alike_turns);
-            let d = crate::find::search::coarse::turn_between(pose.angle - found.pose.angle, turn);
-            let (s, c) = found.pose.angle.sin_cos();
-            let (dx, dy) = ((pose.x - found.pose.x) * recipe.cell_mm, (pose.y - found.pose.y) * recipe.cell_mm);
-            let (along, across) = (c * dx + s * dy, c * dy - s * dx);
-            let free = |axis: usize, shift: f64| long == Some(axis) || shift.abs() < 1.0;
-            // A shift of a long part swings its middle aside by what the turn is off.
-            let swing = if long.is_some() { 3.0 } else { 1.0 };
-            d < 3f64.to_radians() && free(0, along / swing) && free(1, across / swing)
-        })
-    };
-    found.rivals.iter().filter(|r| !alike(&r.0)).map(|r| r.1).fold(0.0, f64::max)
 }

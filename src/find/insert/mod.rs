@@ -3,6 +3,7 @@
 
 pub mod budget;
 mod from_drawing;
+mod hypothesis;
 pub mod locate;
 pub mod picture;
 mod places;

@@ -126,18 +126,26 @@ pub fn features(
     out
 }
 
-/// Refuses constructions that refer to nothing, have too few inputs, or cannot be built.
-pub fn check(list: &[Construction], drawing: &Drawing) -> Result<()> {
+/// Constructions as the drawing has them: measured and nominal are the same.
+///
+/// # Errors
+/// One that refers to nothing, has too few inputs, or cannot be built.
+pub fn nominal(list: &[Construction], drawing: &Drawing) -> Result<Vec<Built>> {
     let measured = drawing.shape.iter().enumerate().flat_map(|(shape, s)| {
         let n = s.elements();
         (0..n).map(move |element| ((shape, element), Feature { offset: [0.0, 0.0], sigma: 0.0 }))
     });
+    build(list, drawing, &measured.collect(), &MeasureOptions::default())
+}
+
+/// Refuses constructions that refer to nothing, have too few inputs, or cannot be built.
+pub fn check(list: &[Construction], drawing: &Drawing) -> Result<()> {
     for (i, c) in list.iter().enumerate() {
         if list[..i].iter().any(|o| o.name == c.name) || drawing.named(&c.name).is_ok() || c.name == "pose" {
             return Err(Fault::input(format!("the name '{}' is used twice", c.name)).next("rename one of them"));
         }
     }
-    build(list, drawing, &measured.collect(), &MeasureOptions::default()).map(|_| ())
+    nominal(list, drawing).map(|_| ())
 }
 
 /// Evaluates the constructions on measured shapes, in their order.

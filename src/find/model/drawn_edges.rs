@@ -6,6 +6,7 @@ use super::drawing::Drawing;
 use super::face::Face;
 use super::outline::{bounds, diameter};
 use super::shape::{Form, Grid, Inside};
+use crate::geometry::Vec3;
 
 /// A polyline with what it bounds.
 #[derive(Clone, Debug)]
@@ -136,6 +137,15 @@ impl Drawing {
     /// The polylines of the drawing, for pictures: points and whether closed.
     pub fn polylines(&self) -> Vec<(Vec<[f64; 2]>, bool)> {
         self.contours().into_iter().map(|c| (c.points, c.closed)).collect()
+    }
+
+    /// All outlines at the heights of their shapes, part frame, mm; closed ones end where they begin.
+    pub fn outlines(&self) -> Vec<Vec<Vec3>> {
+        let line = |c: Contour| {
+            let again = c.points.first().copied().filter(|_| c.closed);
+            c.points.iter().chain(&again).map(|p| Vec3::new(p[0], p[1], c.z)).collect()
+        };
+        self.contours().into_iter().map(line).collect()
     }
 
     fn contours(&self) -> Vec<Contour> {

@@ -8,7 +8,7 @@ use super::climb::{Candidate, Directions, climb, hills, score};
 use super::coarse::{Query, Turn, turn_between};
 use super::level::Level;
 use super::options::SearchOptions;
-use super::refine::{Pose, refine};
+use super::refine::{Pose, Refined, refine};
 use crate::fault::{Fault, Result};
 use crate::find::model::gradient::{Field, slopes};
 use crate::find::model::shape_model::ShapeModel;
@@ -277,31 +277,24 @@ fn finish(
     options: &SearchOptions,
     inside: &(dyn Fn(&Pose) -> bool + Sync),
 ) -> Vec<Match> {
-    let points = &model.levels[0];
     let fields: Vec<(Kind, &Field, f32)> = layers.iter().map(|d| (d.kind, &d.field, d.threshold)).collect();
-    let free = options.free();
-    let refined: Vec<_> = candidates
+    let stood: Vec<_> = candidates
         .par_iter()
         .filter_map(|c| {
-            let r = refine(&fields, model, c.pose, free, options.ignore_polarity, 8)?;
-            // A refinement that walks away was not standing on the edges that it was sent to.
-            if !same(&r.pose, &c.pose, 4.0, model.radius) {
-                return None;
-            }
+            let (r, s, coverage) = refined(layers, &fields, model, c, options)?;
             // The range limits what is returned, not where the search begins.
             let slack = |k: usize| HAIR + 3.0 * r.covariance[(k, k)].max(0.0).sqrt();
             if !options.holds_angle(r.pose.angle, slack(2)) || !options.holds_scale(r.pose.scale, slack(3)) {
                 return None;
             }
-            let (s, coverage) = score(layers, points, 0, &r.pose, options.ignore_polarity);
             Some((r, s.max(c.score), coverage))
         })
         .collect();
-    let mut order: Vec<usize> = (0..refined.len()).collect();
-    order.sort_by(|&a, &b| refined[b].1.total_cmp(&refined[a].1));
+    let mut order: Vec<usize> = (0..stood.len()).collect();
+    order.sort_by(|&a, &b| stood[b].1.total_cmp(&stood[a].1));
     let mut out: Vec<(usize, Match)> = Vec::new();
     for &i in &order {
-        let (r, s, coverage) = &refined[i];
+        let (r, s, coverage) = &stood[i];
         if *s < options.min_score || out.len() == options.max_matches {
             break;
         }
@@ -310,7 +303,7 @@ fn finish(
         }
         let mut rivals: Vec<(Pose, f64)> = Vec::new();
         for &k in &order {
-            let (o, score, _) = &refined[k];
+            let (o, score, _) = &stood[k];
             let elsewhere = rivals.iter().map(|r| &r.0).chain([&r.pose]).all(|p| !same(p, &o.pose, 3.0, model.radius));
             if rivals.len() < 8 && elsewhere && overlap(model, &o.pose, &r.pose) > options.max_overlap.max(0.2) {
                 rivals.push((o.pose, *score));
@@ -345,6 +338,24 @@ fn finish(
         ));
     }
     out.into_iter().map(|m| m.1).collect()
+}
+
+/// A candidate refined, with the score and the coverage there. Where cells are missing few edges hold a pose, and later rounds may
+/// walk along them onto a shadow's: then the round that scores best is taken.
+fn refined(
+    layers: &[Directions],
+    fields: &[(Kind, &Field, f32)],
+    model: &ShapeModel,
+    candidate: &Candidate,
+    options: &SearchOptions,
+) -> Option<(Refined, f64, f64)> {
+    const ROUNDS: usize = 8;
+    let after = |rounds: usize| {
+        let r = refine(fields, model, candidate.pose, options.free(), options.ignore_polarity, rounds)?;
+        let (score, coverage) = score(layers, &model.levels[0], 0, &r.pose, options.ignore_polarity);
+        same(&r.pose, &candidate.pose, 4.0, model.radius).then_some((r, score, coverage))
+    };
+    after(ROUNDS).or_else(|| (1..ROUNDS).filter_map(after).max_by(|a, b| a.1.total_cmp(&b.1)))
 }
 
 /// Share of the smaller box that two turned boxes share, by sampling a 9x9 grid of one in the other.

@@ -3,6 +3,7 @@
 
 pub(super) mod files;
 mod filling;
+pub(super) mod filter;
 pub(super) mod grid;
 pub(super) mod heightmap;
 pub(super) mod picture;

@@ -4,6 +4,7 @@
 use super::scenes::scenes;
 use super::walk::Walk;
 use crate::stages::entry::Case;
+use crate::stages::listing;
 use crate::stages::stripe::hough::{HoughFrame, HoughParams};
 
 /// Skeletons of the stripe scenes.
@@ -21,11 +22,11 @@ pub fn cases() -> Vec<Case> {
             Case {
                 name: scene.name.into(),
                 overrides: Vec::new(),
-                groups: [header[3].div_ceil(64).max(1), 1, 1],
+                groups: [header[listing::COUNT].div_ceil(64).max(1), 1, 1],
                 bindings: vec![
                     bytemuck::cast_slice(&[frame]).to_vec(),
                     header,
-                    walk.buffers["points"].clone(),
+                    walk.buffers["pixels"].clone(),
                     table,
                     vec![0; (f.shots * frame.angles * frame.cells) as usize],
                 ],

@@ -4,8 +4,10 @@
 use super::scenes::{Scene, drawn, optics, pose, tilted};
 use super::walk::Walk;
 use crate::stages::frame::{self, px_log2};
+use crate::stages::listing;
 use crate::stages::noise::Noise;
 use crate::stages::peak::params::{Method, PeakParams};
+use crate::stages::stripe::optics::PointFrame;
 use crate::stages::stripe::point::Optics;
 use crate::stages::stripe::{choose, point};
 use crate::stages::{Case, Thinning, ThresholdParams, peak};
@@ -112,7 +114,7 @@ fn cases(name: &str, scene: &Scene, told: &Told, methods: &[Method], wanted: &st
         let frame = peak::PeakFrame::new((f.width, f.height, bits), f.shots, &p, &choice, told.optics.across());
         let quads = f64::from(frame.quads());
         let header = walk.buffers["header"].clone();
-        let n = header[3] as usize;
+        let n = header[listing::COUNT] as usize;
         let groups = [(n as u32).div_ceil(64).max(1), 1, 1];
         let frame_words = bytemuck::cast_slice::<peak::PeakFrame, u32>(&[frame]).to_vec();
         let mut step = |stage: &crate::gpu::Stage,
@@ -132,16 +134,16 @@ fn cases(name: &str, scene: &Scene, told: &Told, methods: &[Method], wanted: &st
             }
             twin(bindings, &overrides);
         };
-        let (image, points) = (walk.buffers["image"].clone(), walk.buffers["points"][..2 * n.max(1)].to_vec());
+        let (image, points) = (walk.buffers["image"].clone(), walk.buffers["pixels"][..2 * n.max(1)].to_vec());
         let mut b = vec![frame_words.clone(), vec![7; frame.entries as usize]];
         step(&choose::LINES, choose::lines_twin, &mut b, choose::lines_groups(&frame));
         let lines = b.pop().expect("the lines");
         let mut b = vec![frame_words, image, header.clone(), points, vec![0; 12 * n.max(1)], lines];
         step(&peak::STAGE, peak::stage_twin, &mut b, groups);
         let (strongest, peaks) = (b.pop().expect("the strongest"), b.pop().expect("the peaks"));
-        let rig = point::PointFrame::new(&told.optics, &choose::Lines::new(&frame, &choice));
+        let rig = PointFrame::new(&told.optics, &choose::Lines::new(&frame, &choice));
         let poses = (0..f.shots).flat_map(|i| pose(i).map(f32::to_bits)).collect();
-        let words = bytemuck::cast_slice::<point::PointFrame, u32>(&[rig]).to_vec();
+        let words = bytemuck::cast_slice::<PointFrame, u32>(&[rig]).to_vec();
         let mut b = vec![words, header, poses, strongest, peaks, vec![0; 4 * n.max(1)]];
         step(&point::STAGE, point::stage_twin, &mut b, groups);
     }

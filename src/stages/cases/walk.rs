@@ -50,7 +50,7 @@ impl<'a> Walk<'a> {
             ("roi", (0..region).map(|i| if i % 5 < 3 { 0x00ff_fff0 } else { 0 }).collect()),
             ("weights", threshold::gaussian_weights(f.size).iter().map(|w| w.to_bits()).collect()),
             ("header", vec![0; skeleton::HEADER + f.shots as usize + 1]),
-            ("points", vec![0; 2 * f.capacity as usize]),
+            ("pixels", vec![0; 2 * f.capacity as usize]),
         ]);
         Walk { scene, frame: f, buffers, captured: Vec::new(), wanted: "" }
     }

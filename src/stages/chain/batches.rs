@@ -12,32 +12,35 @@ use crate::stages::frame::{ALL_TILES, HAS_ROI};
 use crate::stages::peak::found::Peak;
 use crate::stages::stripe::point::Point;
 use crate::stages::stripe::skeleton;
-use std::collections::VecDeque;
 
-/// The chain on one GPU for one kind of picture.
-pub struct Chain {
+/// The chain on one GPU for one kind of picture. `T` is what its owner wants back with a batch.
+pub struct Chain<T = u64> {
     /// Layout and settings of a batch.
     pub frame: Frame,
     device: Device,
-    ring: Ring,
+    ring: Ring<InFlight<T>>,
     replay: Replay,
     runs: Runs,
     /// Sections that were needed so far; 0 before the first batch, which gets a whole round.
     needed: usize,
     /// Further whole rounds that every batch gets; grows when stripes are wider than they reach.
     rounds: usize,
-    /// Sections of the first round that each batch under way was given.
-    given: VecDeque<usize>,
     /// The header of the batch that was collected last.
     header: Vec<u32>,
-    tags: VecDeque<u64>,
-    shots_in: VecDeque<u32>,
     recorded: Recorded,
     /// Where the poses begin in the input, if points are wanted.
     poses: Option<usize>,
     /// Rows of a picture that are written at a time, and the input's bytes in such parts.
     band: u32,
     parts: Vec<usize>,
+}
+
+/// A batch under way.
+struct InFlight<T> {
+    tag: T,
+    shots: u32,
+    /// Sections of the first round of thinning that it was given.
+    sections: usize,
 }
 
 /// The chain's work in pieces.
@@ -69,33 +72,33 @@ impl Runs {
 
 /// What one batch came to.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Batch {
-    /// The tag given at submission.
-    pub tag: u64,
+pub struct Batch<T = u64> {
+    /// What was given at submission.
+    pub tag: T,
     /// Skeleton pixels x | y << 16, and the shot within the batch; empty where peaks are measured.
-    pub points: Vec<[u32; 2]>,
+    pub pixels: Vec<[u32; 2]>,
     /// One peak a skeleton pixel, and its point, where peaks are measured.
     pub peaks: Vec<Peak>,
     /// The peaks' points, entry by entry, mm in the poses' frame; not a number where the peak was refused.
-    pub spots: Vec<Point>,
-    /// First point of every shot, and the end.
+    pub points: Vec<Point>,
+    /// First skeleton pixel of every shot, and the end; its peak and point stand there too.
     pub starts: Vec<u32>,
-    /// Skeleton pixels found; more than `points` holds when the list was full.
+    /// Skeleton pixels found; more than `pixels` or `peaks` holds when the list was full.
     pub found: u32,
     /// Tiles that were looked at closely.
     pub listed_tiles: u32,
 }
 
-impl Batch {
+impl<T> Batch<T> {
     /// Skeleton pixels of one shot.
-    pub fn pixels(&self, shot: usize) -> impl Iterator<Item = u32> {
-        self.points[self.starts[shot] as usize..self.starts[shot + 1] as usize].iter().map(|p| p[0])
+    pub fn pixels_of(&self, shot: usize) -> impl Iterator<Item = u32> {
+        self.pixels[self.starts[shot] as usize..self.starts[shot + 1] as usize].iter().map(|p| p[0])
     }
 }
 
-impl Chain {
+impl<T> Chain<T> {
     /// Compiles the stages and makes every buffer; `Err` on settings out of range or too large for the device.
-    pub fn new(device: &Device, config: &ChainConfig) -> Result<Chain> {
+    pub fn new(device: &Device, config: &ChainConfig) -> Result<Chain<T>> {
         if !(1..=64).contains(&config.shots) || !(1..=8).contains(&config.slots) {
             return Err(Fault::usage(format!(
                 "{} shots a batch and {} batches in flight; 1 to 64 and 1 to 8 are possible",
@@ -138,7 +141,7 @@ impl Chain {
         };
         for slot in &ring.slots {
             let pixels = measuring.as_ref().map_or(&slot.outputs[0].buffer, |m| &m.pixels);
-            let own = [("image", &slot.input), ("header", &slot.header), ("points", pixels)];
+            let own = [("image", &slot.input), ("header", &slot.header), ("pixels", pixels)];
             runs.prepare.push(recorded.prepare(device, &frame, &own));
             runs.front.push(recorded.front(device, &frame, &own));
             let mut back = recorded.back(device, &frame, &own);
@@ -157,10 +160,7 @@ impl Chain {
             runs,
             needed: 0,
             rounds: 0,
-            given: VecDeque::new(),
             header: vec![0; skeleton::HEADER + frame.shots as usize + 1],
-            tags: VecDeque::new(),
-            shots_in: VecDeque::new(),
             recorded,
             poses: measuring.is_some().then_some(poses as usize),
             band,
@@ -181,19 +181,19 @@ impl Chain {
         self.ring.in_flight()
     }
     /// Starts a batch of 1 to `shots` pictures. Call `collect` first when there is no room.
-    pub fn submit(&mut self, tag: u64, images: &[&Image]) -> Result<()> {
+    pub fn submit(&mut self, tag: T, images: &[&Image]) -> Result<()> {
         self.submit_posed(tag, images, &[])
     }
 
     /// As `submit`, with the shots' poses ([`crate::stages::stripe::point::pose_words`]), which a chain that measures needs.
-    pub fn submit_posed(&mut self, tag: u64, images: &[&Image], poses: &[[f32; 12]]) -> Result<()> {
+    pub fn submit_posed(&mut self, tag: T, images: &[&Image], poses: &[[f32; 12]]) -> Result<()> {
         assert!(self.poses.is_none() || poses.len() == images.len(), "one pose a picture");
         assert!((1..=self.frame.shots as usize).contains(&images.len()), "1 to {} pictures a batch", self.frame.shots);
         let (frame, band, parts) = (self.frame, self.band, &self.parts);
         // From the last picture's end to the poses.
         let gap = self.poses.map(|at| at - frame.image_bytes() * frame.shots as usize);
         let bands = frame.height.div_ceil(band) as usize;
-        let at = self.ring.fill(parts, &|i, put| {
+        let fill = |i: usize, put: &mut dyn FnMut(usize, &[u8])| {
             let top = (i % bands) as u32 * band;
             match images.get(i / bands) {
                 _ if i == parts.len() - 1 => {
@@ -211,70 +211,66 @@ impl Chain {
                 }
             }
             Ok(())
-        })?;
-        self.start(at, tag, images.len() as u32, true)
+        };
+        let flight = InFlight { tag, shots: images.len() as u32, sections: self.sections() };
+        let sections = flight.sections;
+        let at = self.ring.fill(parts, &fill, flight)?;
+        self.run(at, true, sections)
     }
 
     /// As `submit_posed` with the pictures and poses that lie in the next place since it was last filled: work without an
     /// upload, to measure what the device does by itself. The ambient light is not subtracted a second time.
-    pub fn submit_again(&mut self, tag: u64, shots: u32) -> Result<()> {
-        let at = self.ring.keep()?;
-        self.start(at, tag, shots, false)
-    }
-
-    fn start(&mut self, at: usize, tag: u64, shots: u32, upload: bool) -> Result<()> {
+    pub fn submit_again(&mut self, tag: T, shots: u32) -> Result<()> {
         let sections = self.sections();
-        self.run(at, upload, sections)?;
-        self.given.push_back(sections);
-        self.tags.push_back(tag);
-        self.shots_in.push_back(shots);
-        Ok(())
+        let at = self.ring.keep(InFlight { tag, shots, sections })?;
+        self.run(at, false, sections)
     }
 
     /// The oldest batch if it is done; waits for it if asked. `None` when nothing is under way, or not done.
-    pub fn collect(&mut self, wait: bool) -> Result<Option<Batch>> {
+    pub fn collect(&mut self, wait: bool) -> Result<Option<Batch<T>>>
+    where
+        T: Default,
+    {
         let mut batch = Batch::default();
         Ok(self.collect_into(wait, &mut batch)?.then_some(batch))
     }
 
     /// As `collect`, into a batch whose memory is used again: the steady state asks for none. False when there is none.
-    pub fn collect_into(&mut self, wait: bool, batch: &mut Batch) -> Result<bool> {
-        loop {
-            let Some(at) = self.ring.oldest(wait, &mut self.header)? else { return Ok(false) };
-            let (left, given) = (self.header[6] as usize, self.given[0]);
+    pub fn collect_into(&mut self, wait: bool, batch: &mut Batch<T>) -> Result<bool> {
+        let shots = loop {
+            let Some((at, flight)) = self.ring.oldest(wait, &mut self.header)? else { return Ok(false) };
+            let (left, given) = (self.header[skeleton::LEFT] as usize, flight.sections);
             if left < given {
                 self.needed = self.needed.max(left + 1);
-                break;
+                break flight.shots as usize;
             }
             // Some stripe takes more sub-iterations than were done. Another batch may have used the masks since:
             // this one starts over with more of them, and so do all that follow.
             self.needed = self.runs.thinning.len();
+            flight.sections = self.needed;
             if given == self.runs.thinning.len() {
                 self.rounds = 2 * self.rounds + 1;
             }
-            self.given[0] = self.needed;
             self.run(at, false, self.needed)?;
-        }
-        self.given.pop_front();
-        let shots = self.shots_in.pop_front().expect("as many as batches") as usize;
+        };
         let header = &self.header;
-        batch.tag = self.tags.pop_front().expect("as many as batches");
         batch.starts.clear();
         batch.starts.extend_from_slice(&header[skeleton::HEADER..=skeleton::HEADER + shots]);
-        (batch.found, batch.listed_tiles) = (header[4], header[5]);
+        (batch.found, batch.listed_tiles) = (header[skeleton::FOUND], header[skeleton::LISTED]);
         let n = u64::from(header[skeleton::HEADER + shots]);
-        if self.poses.is_some() {
-            batch.points.clear();
+        let flight = if self.poses.is_some() {
+            batch.pixels.clear();
             let bytes = [n * size_of::<Peak>() as u64, n * size_of::<Point>() as u64];
             self.ring.finish(&bytes, |i, bytes| match i {
                 0 => bytes.refill(&mut batch.peaks),
-                _ => bytes.refill(&mut batch.spots),
-            })?;
+                _ => bytes.refill(&mut batch.points),
+            })?
         } else {
             batch.peaks.clear();
-            batch.spots.clear();
-            self.ring.finish(&[8 * n], |_, bytes| bytes.refill(&mut batch.points))?;
-        }
+            batch.points.clear();
+            self.ring.finish(&[8 * n], |_, bytes| bytes.refill(&mut batch.pixels))?
+        };
+        batch.tag = flight.tag;
         Ok(true)
     }
 

@@ -9,7 +9,8 @@ use crate::stages::frame::{PX_LOG2, px_log2};
 use crate::stages::peak::PeakFrame;
 use crate::stages::peak::found::Peak;
 use crate::stages::stripe::choose::Lines;
-use crate::stages::stripe::point::{Point, PointFrame};
+use crate::stages::stripe::optics::PointFrame;
+use crate::stages::stripe::point::Point;
 use crate::stages::stripe::{choose, point};
 use crate::stages::{Frame, peak};
 

@@ -60,6 +60,8 @@ impl Reject {
 
 /// A bit of `Peak::flags`: at least one pixel of the fit was saturated.
 pub const SATURATED: u32 = 1 << 8;
+/// Of [`Peak::flags`]: where the number of its [`Reject`] stands.
+pub const REASON: u32 = 0xff;
 
 /// One peak, 12 words, the same layout on the GPU.
 #[repr(C)]
@@ -94,11 +96,11 @@ pub struct Peak {
 impl Peak {
     /// No test has refused it.
     pub fn kept(&self) -> bool {
-        self.flags & 0xff == 0
+        self.flags & REASON == 0
     }
     /// Why it was refused; [`Reject::Kept`] where it was not.
     pub fn reject(&self) -> Reject {
-        Reject::ALL[(self.flags & 0xff).min(9) as usize]
+        Reject::ALL[(self.flags & REASON).min(9) as usize]
     }
     /// Sets the reason, unless one is set already: the first test that fails names it.
     pub fn refuse(&mut self, why: Reject) {

@@ -6,7 +6,7 @@ use super::fit::{Seen, background, finish, look};
 use super::found::Peak;
 use super::grey::{Grey, Place};
 use super::lanes::{Lanes, exponential};
-use super::profile::{Profiles, number, share};
+use super::profile::{Profiles, clipped_within, number, share};
 
 /// Centre of gravity of the light above the background, within three widths of a first guess.
 #[inline(always)]
@@ -35,7 +35,7 @@ pub(super) fn centroids<G: Grey>(
             moment[side] = moment[side] + d * light;
             second[side] = second[side] + (d * d) * light;
             top = top.max(light);
-            clipped = clipped.max(lost.with(inside, |lost, inside| if inside > 0.0 { lost } else { 0.0 }));
+            clipped = clipped.max(clipped_within(lost, inside));
             let (e, lit) = (inside * (Lanes::all(d) - z), light.max(Lanes::ZERO));
             noise[side] = noise[side] + (e * e) * (quiet + s.gain * light + s.speckle2 * (lit * lit));
         }
@@ -110,7 +110,7 @@ fn derivative<G: Grey>(image: G, (x, y): (i32, i32), m0: f32, Seen { n, base }: 
 }
 
 /// A pixel's position where nothing says in which part of it the centre lies: the standard deviation of an even distribution.
-const EVEN: f32 = 0.288_675_13;
+pub(in crate::stages) const EVEN: f32 = 0.288_675_13;
 
 /// The pixel itself, on a stripe that lies as it should and is as wide as expected.
 #[inline(always)]

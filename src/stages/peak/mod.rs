@@ -8,13 +8,13 @@ pub mod frame;
 pub mod grey;
 mod lanes;
 mod measure;
-mod methods;
+pub(in crate::stages) mod methods;
 mod noise;
 pub mod params;
 mod profile;
-mod scoring;
+pub(in crate::stages) mod scoring;
 mod stage;
-mod turn;
+pub(in crate::stages) mod turn;
 mod twin;
 
 pub use found::{Peak, Reject, SATURATED};

@@ -52,6 +52,12 @@ pub(super) fn share(k: f32, (from, to): (Lanes, Lanes)) -> Lanes {
     ((k - from).min(to - k) + Lanes::all(0.5)).clamp(Lanes::ZERO, Lanes::all(1.0))
 }
 
+/// The share of clipped pixels in a sample of which `inside` takes part; 0 in one of which nothing does.
+#[inline(always)]
+pub(super) fn clipped_within(lost: Lanes, inside: Lanes) -> Lanes {
+    lost.with(inside, |lost, inside| if inside > 0.0 { lost } else { 0.0 })
+}
+
 /// The window of a profile: a counts along the image axis that the stripe is nearer to, b across it.
 struct Window {
     columns: bool,

@@ -3,16 +3,16 @@
 
 use super::PeakFrame;
 use super::lanes::{LANES, Lanes, exponential};
-use super::profile::{Profiles, number, share};
+use super::profile::{Profiles, clipped_within, number, share};
 
 /// Samples for which the noise model counts.
-const BELIEF: f32 = 10.0;
+pub(in crate::stages) const BELIEF: f32 = 10.0;
 /// Grey levels that are no light, but whose square is no denormal number: those take a CPU many times as long.
-const DARK: f32 = 1e-9;
+pub(in crate::stages) const DARK: f32 = 1e-9;
 /// Share of a number's information that is left at least where another number explains it: what f32 can tell from nothing.
-const LEAST: f32 = 1e-5;
+pub(in crate::stages) const LEAST: f32 = 1e-5;
 /// Share of the ceiling over which clipped pixels fall silent: at once, and rounding would decide.
-const SOFT: f32 = 0.05;
+pub(in crate::stages) const SOFT: f32 = 0.05;
 const ONE: Lanes = Lanes::all(1.0);
 
 /// One Gaussian a lane.
@@ -219,8 +219,7 @@ impl Scoring<'_> {
         let mut most = Lanes::ZERO;
         for side in 0..2 {
             for (j, &lost) in self.profiles.clipped[side][..self.profiles.half].iter().enumerate() {
-                let inside = share(number(side, j), self.near);
-                most = most.max(lost.with(inside, |lost, inside| if inside > 0.0 { lost } else { 0.0 }));
+                most = most.max(clipped_within(lost, share(number(side, j), self.near)));
             }
         }
         most

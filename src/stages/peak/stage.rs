@@ -12,6 +12,7 @@ use super::twin::measured;
 use crate::gpu::Access::*;
 use crate::gpu::{Binding, Stage};
 use crate::stages::frame::PX_LOG2;
+use crate::stages::listing;
 use crate::stages::stripe::choose;
 use rayon::prelude::*;
 
@@ -27,13 +28,13 @@ const PROFILE: &str = include_str!("../../../shaders/shared/profile.wgsl");
 pub const STAGE: Stage = Stage {
     name: "peak",
     wgsl: include_str!("../../../shaders/peak.wgsl"),
-    shared: &[SHARED, PROFILE, choose::LINE_OF],
+    shared: &[SHARED, PROFILE, choose::LINE_OF, listing::SHARED],
     workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "image", access: Texels },
         Binding { name: "header", access: Read },
-        Binding { name: "points", access: Texels },
+        Binding { name: "pixels", access: Texels },
         Binding { name: "peaks", access: ReadWrite },
         Binding { name: "strongest", access: ReadWrite },
     ],
@@ -89,7 +90,7 @@ pub fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
         let image = Packed { words, pitch: f.pitch as i32, width: f.width, height: f.height, px_log2 };
         Place { image, pixel: p[0], shot: p[1] }
     };
-    let mut found: Vec<Peak> = points[..2 * header[3] as usize]
+    let mut found: Vec<Peak> = points[..2 * header[listing::COUNT] as usize]
         .par_chunks(2 * LANES)
         .flat_map_iter(|some| {
             let places: Vec<_> = some.chunks_exact(2).map(place).collect();

@@ -47,9 +47,9 @@ pub(super) fn turn<const N: usize>(s0: f32, lattice: (i32, i32), k: [f64; N], up
 
 /// Weights (1 - r² / 16)² of the gradients in 64ths: of the rows two above and two below the pixel, of its own, and of those one
 /// step away along both axes.
-pub(super) const EVEN_ROW: [i32; 3] = [16, 36, 16];
-pub(super) const MIDDLE_ROW: [i32; 3] = [36, 64, 36];
-pub(super) const DIAGONAL: i32 = 49;
+pub(in crate::stages) const EVEN_ROW: [i32; 3] = [16, 36, 16];
+pub(in crate::stages) const MIDDLE_ROW: [i32; 3] = [36, 64, 36];
+pub(in crate::stages) const DIAGONAL: i32 = 49;
 
 /// Places of the gradients and their weights: every other one of a lattice, because a gradient looks at its four neighbours, which
 /// lie on the other colour of the board.

@@ -5,6 +5,7 @@
 use super::frame::{SHARED, ShapeFrame, UNIFORM};
 use crate::gpu::Access::*;
 use crate::gpu::{Binding, Stage};
+use crate::stages::listing;
 
 /// Sums of all features at every strided place and turn; one invocation for four places of one turn.
 pub const SCORE: Stage = Stage {
@@ -26,7 +27,7 @@ pub const SCORE: Stage = Stage {
 pub const PEAKS: Stage = Stage {
     name: "shape_peaks",
     wgsl: include_str!("../../../shaders/shape_peaks.wgsl"),
-    shared: &[SHARED],
+    shared: &[SHARED, listing::SHARED],
     workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
@@ -108,10 +109,10 @@ pub(crate) fn peaks_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     for (turn, sums) in sums.chunks_exact(4 * frame.plane()).take(frame.turns as usize).enumerate() {
         let (stride, columns, rows) = (4 * frame.words as usize, frame.columns as usize, frame.rows as usize);
         for peak in peaks(sums, stride, columns, rows, least, turn as u32) {
-            if header[3] < frame.capacity {
-                hits[2 * header[3] as usize..][..2].copy_from_slice(&peak.pack());
+            if header[listing::COUNT] < frame.capacity {
+                hits[2 * header[listing::COUNT] as usize..][..2].copy_from_slice(&peak.pack());
             }
-            header[3] += 1;
+            header[listing::COUNT] += 1;
         }
     }
 }

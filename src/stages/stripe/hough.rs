@@ -4,17 +4,18 @@
 use crate::fault::{Fault, Result};
 use crate::gpu::Access::*;
 use crate::gpu::{Binding, Device, Stage, Workload, run_once};
+use crate::stages::listing;
 
 /// Votes of skeleton pixels for the lines through them; one invocation a pixel.
 pub const STAGE: Stage = Stage {
     name: "hough",
     wgsl: include_str!("../../../shaders/hough.wgsl"),
-    shared: &[],
+    shared: &[listing::SHARED],
     workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
         Binding { name: "header", access: Read },
-        Binding { name: "points", access: Texels },
+        Binding { name: "pixels", access: Texels },
         Binding { name: "table", access: Read },
         Binding { name: "votes", access: ReadWrite },
     ],
@@ -240,7 +241,7 @@ pub(crate) fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let frame: HoughFrame = *bytemuck::from_bytes(bytemuck::cast_slice(&b[0]));
     let [_, header, points, table, votes] = b else { unreachable!() };
     let table: &[[i32; 2]] = bytemuck::cast_slice(table);
-    for point in points.chunks_exact(2).take(header[3] as usize) {
+    for point in points.chunks_exact(2).take(header[listing::COUNT] as usize) {
         for (k, &t) in table.iter().enumerate() {
             votes[(point[1] * frame.angles * frame.cells) as usize + frame.cell(point[0], k, t)] += 1;
         }

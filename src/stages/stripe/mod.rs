@@ -8,6 +8,7 @@ pub mod choose;
 pub mod choose_params;
 pub mod hough;
 pub mod lines;
+pub mod optics;
 pub mod point;
 pub mod skeleton;
 pub(in crate::stages) mod specks;

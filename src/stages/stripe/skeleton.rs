@@ -6,7 +6,7 @@ use crate::gpu::{Binding, Stage};
 use crate::raster::Mask;
 use crate::stages::frame;
 use crate::stages::frame::{Frame, PX_LOG2, SHARED, frame_of, tile_unpack};
-use crate::stages::listing::{HEADER_WORDS, mask_index, tile_index};
+use crate::stages::listing::{self, HEADER_WORDS, mask_index, tile_index};
 use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
 
@@ -142,7 +142,7 @@ pub const STAGE: Stage = Stage {
         Binding { name: "starts", access: Texels },
         Binding { name: "row_starts", access: Texels },
         Binding { name: "header", access: Read },
-        Binding { name: "points", access: ReadWrite },
+        Binding { name: "pixels", access: ReadWrite },
     ],
     ..COUNT
 };
@@ -151,12 +151,20 @@ pub const STAGE: Stage = Stage {
 pub const STEP: Step = Step {
     stage: &STAGE,
     twin: stage_twin,
-    binds: &["frame", "lit header", "lit list", "long", "starts", "row starts", "header", "points"],
+    binds: &["frame", "lit header", "lit list", "long", "starts", "row starts", "header", "pixels"],
     groups: Groups::Listed("lit header"),
     same: Same::Words,
 };
 
-/// Words of the point list's header before the shots' first points.
+/// Word of the pixel list's header: pixels found, [`crate::stages::listing::COUNT`] of which are listed.
+pub const FOUND: usize = 4;
+/// Word of the pixel list's header: tiles that were looked at closely.
+pub const LISTED: usize = 5;
+/// Word of the pixel list's header: shortened lists of thinning that still held a tile.
+pub const LEFT: usize = 6;
+/// Word of the pixel list's header: pictures of the batch.
+pub const SHOTS: usize = 7;
+/// Words of the pixel list's header before the shots' first pixels.
 pub const HEADER: usize = 8;
 
 pub(crate) fn rows_groups(f: &Frame) -> [u32; 3] {
@@ -169,7 +177,7 @@ pub(crate) fn shots_groups(f: &Frame) -> [u32; 3] {
 pub(crate) fn count_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, listing, list, mask, counts] = b else { unreachable!() };
-    for &tile in &list[..listing[3] as usize] {
+    for &tile in &list[..listing[listing::COUNT] as usize] {
         counts[tile_index(&f, tile)] = (0..8).map(|r| mask[mask_index(&f, tile, r)].count_ones()).sum();
     }
 }
@@ -209,15 +217,15 @@ pub(crate) fn head_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
         sum += total;
     }
     let kept = sum.min(f.capacity);
-    let left = shortened.chunks(HEADER_WORDS as usize).filter(|list| list[3] > 0).count() as u32;
-    header[..8].copy_from_slice(&[kept.div_ceil(64), 1, 1, kept, sum, listing[3], left, f.shots]);
+    let left = shortened.chunks(HEADER_WORDS as usize).filter(|list| list[listing::COUNT] > 0).count() as u32;
+    header[..HEADER].copy_from_slice(&[kept.div_ceil(64), 1, 1, kept, sum, listing[listing::COUNT], left, f.shots]);
     header[HEADER + f.shots as usize] = kept;
 }
 
 pub(crate) fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, listing, list, mask, starts, row_starts, header, points] = b else { unreachable!() };
-    for &tile in &list[..listing[3] as usize] {
+    for &tile in &list[..listing[listing::COUNT] as usize] {
         let (tx, ty, shot) = tile_unpack(tile);
         let row_start = header[HEADER + shot as usize] + row_starts[(shot * f.tiles_y + ty) as usize];
         let mut at = (row_start + starts[tile_index(&f, tile)]) as usize;

@@ -8,7 +8,7 @@ use super::threshold::passes_mean;
 use crate::gpu::Access::*;
 use crate::gpu::{Binding, Stage};
 use crate::stages::frame::{Frame, HAS_ROI, frame_of, tile_unpack};
-use crate::stages::listing::{append, mask_index};
+use crate::stages::listing::{self, append, mask_index};
 use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
 
@@ -61,7 +61,7 @@ fn passing(f: &Frame, least_sum: u32) -> i32 {
 pub fn twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, image, listing, list, roi, mask, lit, lit_listing, lit_list, run_listing, runs] = b else { unreachable!() };
-    for single in list.chunks_exact(2).take(listing[3] as usize) {
+    for single in list.chunks_exact(2).take(listing[listing::COUNT] as usize) {
         let (tile, least) = (single[0], passing(&f, single[1]).max(f.minimum as i32));
         let (tx, ty, shot) = tile_unpack(tile);
         let pixel = |x: i32, y: i32| {

@@ -6,7 +6,7 @@ use crate::gpu::{Binding, Stage};
 use crate::raster::Mask;
 use crate::stages::frame;
 use crate::stages::frame::{PX_LOG2, SHARED, frame_of, tile_unpack};
-use crate::stages::listing::{mask_index, tile_index};
+use crate::stages::listing::{self, mask_index, tile_index};
 use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
 
@@ -197,7 +197,7 @@ pub(crate) fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) 
     // A row of the mask as words; beyond the last tile there is none, but it is never asked for: y + 1 < height.
     let line =
         |shot: u32, y: u32| -> Vec<u32> { (0..f.tiles_x).map(|i| before[f.mask_word(shot, 32 * i, y)]).collect() };
-    for &tile in &list[..listing[3] as usize] {
+    for &tile in &list[..listing[listing::COUNT] as usize] {
         let (tx, ty, shot) = tile_unpack(tile);
         for row in 0..8 {
             let y = 8 * ty + row;

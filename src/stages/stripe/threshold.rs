@@ -8,6 +8,7 @@ use crate::gpu::{Binding, Stage};
 use crate::raster::{Image, Mask};
 use crate::stages::frame;
 use crate::stages::frame::{COLUMNS, Frame, PIXELS, PX_LOG2, SHARED, frame_of, tile_unpack};
+use crate::stages::listing;
 use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
 
@@ -240,7 +241,7 @@ pub(crate) fn mean_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) {
     let p = f.threshold();
     let masks: Vec<Mask> = (0..f.shots).map(|s| twin(&padded_shot(&f, &b[1], overrides[0].1 as u32, s), &p)).collect();
     let [_, _, listing, list, roi, mask, lit, lit_listing, lit_list] = b else { unreachable!() };
-    for run in list.chunks_exact(2).take(listing[3] as usize) {
+    for run in list.chunks_exact(2).take(listing[listing::COUNT] as usize) {
         let (tx, first, shot) = tile_unpack(run[0]);
         for ty in first..first + run[1] {
             let bits = |row: u32| {
@@ -288,7 +289,7 @@ pub(crate) fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) 
 pub(crate) fn gather_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, listing, list, quads, roi, mask, kept, lit_listing, lit_list] = b else { unreachable!() };
-    for slot in 0..listing[3] as usize {
+    for slot in 0..listing[listing::COUNT] as usize {
         let tile = list[2 * slot];
         let (tx, ty, _) = tile_unpack(tile);
         let bits = |row: u32| {

@@ -9,7 +9,7 @@ use crate::gpu::Access::*;
 use crate::gpu::{Binding, Stage};
 use crate::stages::frame;
 use crate::stages::frame::{ALL_TILES, Frame, GAUSSIAN, HAS_ROI, PX_LOG2, SHARED, frame_of, tile_pack};
-use crate::stages::listing::append;
+use crate::stages::listing::{self, append};
 use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
 
@@ -98,7 +98,7 @@ pub(crate) fn twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
                     }
                     _ => append(run_listing, runs, [tile, length]),
                 }
-                listing[3] += length;
+                listing[listing::COUNT] += length;
                 y += length.max(1);
             }
         }

@@ -10,7 +10,7 @@ use crate::geometry::Vec3;
 use crate::gpu::Device;
 mod gpu;
 pub mod params;
-mod stage;
+pub(in crate::stages) mod stage;
 
 pub use stage::{STAGE, cases, stage_twin};
 
@@ -19,9 +19,11 @@ use stage::{Neighbourhood, Site, SupportFrame, whole};
 
 /// One shot: peaks and their points, entry by entry.
 #[derive(Clone, Debug)]
-pub struct Profile {
+pub struct Profile<T = ()> {
     /// Number of the shot in its scan.
     pub shot: u32,
+    /// What comes back with it.
+    pub cargo: T,
     /// Of all skeleton pixels, refused ones too.
     pub peaks: Vec<Peak>,
     /// One a peak, base frame, mm; not a number where the peak was refused.
@@ -34,8 +36,8 @@ pub struct Profile {
 }
 
 /// A shot that waits for the one after it.
-struct Held {
-    profile: Profile,
+struct Held<T> {
+    profile: Profile<T>,
     /// One a peak, whatever its fate.
     places: Vec<Site>,
     /// Kept points, sorted along the line.
@@ -43,7 +45,7 @@ struct Held {
 }
 
 /// Holds three shots at a time, whatever the length of the scan.
-pub struct Support {
+pub struct Support<T = ()> {
     params: SupportParams,
     /// Half of the chord, mm.
     radius: f32,
@@ -52,11 +54,11 @@ pub struct Support {
     axis: Vec3,
     /// Anchors and sites of the last judged shot.
     before: Option<([Vec3; 3], Vec<Site>)>,
-    now: Option<Held>,
+    now: Option<Held<T>>,
     gpu: Option<OnGpu>,
 }
 
-impl Support {
+impl<T> Support<T> {
     /// `axis`: unit vector along the laser line, base frame; `width_px`: the stripe's Gaussian sigma; `field_mm`: width of the
     /// picture where the sheet meets the optical axis. Without a device the twin judges, with the same result.
     pub fn new(
@@ -65,7 +67,7 @@ impl Support {
         field_mm: f32,
         axis: &Vec3,
         device: Option<&Device>,
-    ) -> Result<Support> {
+    ) -> Result<Support<T>> {
         let gpu = device.map(OnGpu::new).transpose()?;
         let radius = params.radius_mm.unwrap_or(field_mm / 540.0);
         Ok(Support {
@@ -81,8 +83,8 @@ impl Support {
 
     /// Takes shots in order and gives those that are judged: all but the last, which waits for its neighbour, or with
     /// `end` all.
-    pub fn take(&mut self, profiles: Vec<Profile>, end: bool) -> Result<Vec<Profile>> {
-        let mut run: Vec<Held> = self.now.take().into_iter().collect();
+    pub fn take(&mut self, profiles: Vec<Profile<T>>, end: bool) -> Result<Vec<Profile<T>>> {
+        let mut run: Vec<Held<T>> = self.now.take().into_iter().collect();
         run.extend(profiles.into_iter().map(|p| self.held(p)));
         if !end {
             self.now = run.pop();
@@ -96,7 +98,7 @@ impl Support {
         Ok(run.into_iter().map(|h| h.profile).collect())
     }
 
-    fn held(&self, profile: Profile) -> Held {
+    fn held(&self, profile: Profile<T>) -> Held<T> {
         let place = |(k, p): (&Peak, &Point)| {
             if !k.kept() {
                 return [0; 4];
@@ -112,7 +114,7 @@ impl Support {
     }
 
     /// Judges every shot of a run by its two neighbours; the one behind the last is `now`.
-    fn judge(&mut self, run: &mut [Held]) -> Result<()> {
+    fn judge(&mut self, run: &mut [Held<T>]) -> Result<()> {
         let beside = self.before.iter().map(|(anchors, sites)| (anchors, sites));
         let beside = beside.chain(run.iter().chain(&self.now).map(|h| (&h.profile.anchors, &h.sites)));
         let (mut sites, mut ranges): (Vec<Site>, Vec<([Vec3; 3], u32, u32)>) = Default::default();
@@ -149,7 +151,7 @@ impl Support {
         Ok(())
     }
 
-    fn neighbourhood(&self, profile: &Profile, beside: [Option<&([Vec3; 3], u32, u32)>; 2]) -> Neighbourhood {
+    fn neighbourhood(&self, profile: &Profile<T>, beside: [Option<&([Vec3; 3], u32, u32)>; 2]) -> Neighbourhood {
         let p = &self.params;
         let mut out = Neighbourhood { usual: usual_background(&profile.peaks), ..Neighbourhood::default() };
         let mut expected = 0.0;
@@ -191,7 +193,14 @@ mod tests {
             peaks.push(peaks[10]);
             points.push(Point { position: [2.5, 0.35 * index as f32, 3.0], sigma_mm: 0.02 });
         }
-        Profile { shot: index, peaks, points, anchors: [Vec3::new(0.0, 0.35 * f64::from(index), 0.0); 3], pitch: 0.25 }
+        Profile {
+            shot: index,
+            cargo: (),
+            peaks,
+            points,
+            anchors: [Vec3::new(0.0, 0.35 * f64::from(index), 0.0); 3],
+            pitch: 0.25,
+        }
     }
     fn scan(width_px: f32, strays: &[u32]) -> Vec<Profile> {
         let mut support = Support::new(SupportParams::default(), 1.0, 162.0, &Vec3::x(), None).unwrap();

@@ -80,7 +80,7 @@ pub struct Neighbourhood {
 pub type Site = [i32; 4];
 
 /// Largest difference of two coordinates whose square counts, after the dropped bits.
-const FAR: i32 = 1 << 15;
+pub(in crate::stages) const FAR: i32 = 1 << 15;
 
 /// Whole 2⁻¹⁴ mm; what is farther than 32 m stays there.
 pub fn whole(mm: f64) -> i32 {

@@ -58,7 +58,7 @@ pub fn calibrate_axis(
     }
     let notes = one_origin(&mut found);
     let stops: Vec<Stop> = found.iter().map(|(count, b)| Stop { count: *count, pose: b.pose.clone() }).collect();
-    let fit = solve(&stops, moved, unit, &intrinsic_covariance(&camera.covariance), &run.solver)?;
+    let fit = solve(&stops, moved, unit, &intrinsic_covariance(&camera.covariance)?, &run.solver)?;
     let depths = Volume::spanned(stops.iter().map(|s| s.pose.centre().z), "where the boards stood");
     let limits = run.asked.limits(&depths.expect("three stops or more"), |z| camera.value.view_mm(z));
     let mut quality = judge(&fit, &limits, &format!("{} in meta.json", board.length_key()));

@@ -12,7 +12,7 @@ use crate::calibrate::hand_eye::turns::{read_with, resolve};
 use crate::calibrate::limits::Asked;
 use crate::calibrate::measured_pose::{AboutCamera, MeasuredPose, intrinsic_covariance};
 use crate::calibrate::report::Page;
-use crate::camera::{Distortion, Intrinsics, ParameterCovariance};
+use crate::camera::{CameraCovariance, Distortion, Intrinsics};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Board, Camera, Flange, Rigid};
 use crate::recording::{Recording, load_board_poses, load_poses};
@@ -115,7 +115,7 @@ pub fn calibrate_hand_eye(
     let board_length = format!("{} in meta.json", seen.found[0].board.length_key());
     let gathered = Gathered { pairs, camera: Some(camera), inputs, missing: seen.missing, notes, board_length };
     let view = |z: f64| camera.value.view_mm(z);
-    concluded(gathered, &intrinsic_covariance(&camera.covariance), &camera.value, rig, view, run)
+    concluded(gathered, &intrinsic_covariance(&camera.covariance)?, &camera.value, rig, view, run)
 }
 
 /// The same from robot poses and board poses that another program measured, without pictures: no camera is needed.
@@ -158,7 +158,7 @@ pub fn calibrate_hand_eye_from_poses(files: &PosePairs, rig: &Rig, run: &HandEye
         height: 1,
     };
     let view = |z: f64| rig.camera.as_ref().map_or(USUAL_VIEW * z, |c| c.value.view_mm(z));
-    concluded(gathered, &ParameterCovariance::zeros(), &tangents, rig, view, run)
+    concluded(gathered, &CameraCovariance::exact(), &tangents, rig, view, run)
 }
 
 /// The pair of a board and a robot pose.
@@ -173,7 +173,7 @@ fn paired(mount: Mount, pose: &Rigid<Base, Flange>, seen: MeasuredPose) -> Pair 
 /// `view` is how wide the camera sees at a depth, mm.
 fn concluded(
     g: Gathered<'_>,
-    covariance_of_camera: &ParameterCovariance,
+    covariance_of_camera: &CameraCovariance,
     camera: &Intrinsics,
     rig: &Rig,
     view: impl Fn(f64) -> f64,

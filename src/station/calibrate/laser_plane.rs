@@ -12,14 +12,13 @@ use crate::calibrate::laser_plane::solve::{LaserPlaneFit, solve};
 use crate::calibrate::laser_plane::views::{StripePeak, StripeView};
 use crate::calibrate::limits::Asked;
 use crate::calibrate::measured_pose::{intrinsic_covariance, pooled_factor};
-use crate::camera::{Intrinsics, ParameterCovariance};
+use crate::camera::{CameraCovariance, Intrinsics};
 use crate::fault::{Fault, Result};
-use crate::geometry::{Camera, Plane, Rigid, Vec2, Vec3};
+use crate::geometry::{Camera, Plane, Vec2, Vec3};
 use crate::raster::Image;
 use crate::recording::{Beam, Recording};
 use crate::rig::{Calibration, Kind, Rig, Volume, hash_file};
-use crate::scan::{Engine, Extraction, Format, Optical, Processor, Where};
-use crate::stages::stripe::point;
+use crate::scan::{Engine, Extraction, Format, Optical, Place, Processor, Where};
 
 /// How [`calibrate_laser_plane`] is run.
 #[derive(Clone, Debug)]
@@ -66,7 +65,7 @@ pub fn calibrate_laser_plane(
             .cause("boards were not found, or the frames name no laser pictures")
             .next("record an ambient and a laser picture of each board pose"));
     }
-    let c = intrinsic_covariance(&camera.covariance);
+    let c = intrinsic_covariance(&camera.covariance)?;
     let (views, fit) = sheet_on_boards(&seen, &images, &camera.value, &c, run)
         .map_err(|fault| lit(recording, &names[names.len() / 2], fault))?;
     let lit = Volume::new(fit.reach[0], fit.reach[1], "where the boards were lit");
@@ -91,7 +90,7 @@ pub(super) fn sheet_on_boards(
     seen: &[FrameBoard],
     images: &[Image],
     camera: &Intrinsics,
-    c: &ParameterCovariance,
+    c: &CameraCovariance,
     run: &LaserPlaneRun,
 ) -> Result<(Vec<StripeView>, LaserPlaneFit)> {
     let factor = pooled_factor(seen.iter().map(|s| &s.pose)).unwrap_or(f64::NAN);
@@ -138,13 +137,12 @@ fn stripes(
     let optical = Optical { camera: *camera, laser: *laser, depth_mm };
     let mut engine = Engine::new(format, &optical, &run.extraction, None, processor.clone());
     if run.extraction.measure_stripe
-        && let Some(stripe) = engine.measure(&images.iter().collect::<Vec<_>>())
+        && let Some(seen) = engine.measure(&images.iter().collect::<Vec<_>>())
     {
-        engine.set_stripe(&stripe)?;
+        engine.set_stripe(&seen.stripe)?;
     }
-    let camera_frame = point::pose_words(&Rigid::<crate::geometry::Camera, crate::geometry::Camera>::identity());
     for (i, image) in images.iter().enumerate() {
-        engine.submit(i as u32, image.clone(), camera_frame)?;
+        engine.submit(i as u32, image.clone(), Place::camera())?;
     }
     let mut out = vec![Vec::new(); images.len()];
     for measured in engine.collect(true)? {

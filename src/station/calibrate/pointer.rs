@@ -66,7 +66,7 @@ pub fn calibrate_pointer(
         }
     }
     let factor = pooled_factor(views.iter().map(|v| &v.pose)).unwrap_or(f64::NAN);
-    let c = intrinsic_covariance(&camera.covariance);
+    let c = intrinsic_covariance(&camera.covariance)?;
     let fit = solve(&views, &camera.value, &c, factor, &run.solver).map_err(|mut fault| {
         if let Some((name, why)) = missing.first() {
             fault.cause = format!("{}; {name}: {}", fault.cause, first_line(why));

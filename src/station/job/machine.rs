@@ -322,7 +322,7 @@ impl<'a> Job<'a> {
         let cloud = cloud_of(&folder)?;
         let options = LocateOptions { up: Some(normal), robot: self.options.robot, ..LocateOptions::default() };
         let report = locate(&cloud, &self.recipe, Some(&self.rig), &options)?;
-        picture::draw(&report, &self.recipe.drawing()).save_png(&self.options.out.join("found.png"))?;
+        self.keep(&report)?;
         let tilt = report.base_from_part.direction(&Vec3::z()).dot(&normal).clamp(-1.0, 1.0).acos().to_degrees();
         let (poses, reasons) = (report.poses.clone(), report.reasons.join("; "));
         self.operator.tell(&format!(
@@ -344,6 +344,18 @@ impl<'a> Job<'a> {
         let tool = self.settings.tool.expect("asked for").flange_from_tool.inverse();
         self.state.poses = Some([&poses.approach, &poses.insertion, &poses.retract].map(|p| p.base_from_tool * tool));
         Ok(Phase::Approach)
+    }
+
+    /// What was found, for those who look: the report, its picture, and what the camera sees of the part in the room's light.
+    fn keep(&mut self, report: &Report) -> Result<()> {
+        let text = serde_json::to_string_pretty(report).expect("plain data");
+        let png = picture::draw(report, &self.recipe.drawing()).to_png();
+        let out = &self.options.out;
+        crate::files::write_beside((&out.join("found.json"), text.as_bytes()), &[(&out.join("found.png"), &png)])?;
+        if let Err(fault) = self.eye.picture(self.guard.link(), None) {
+            self.operator.tell(&format!("no picture of the part: {}", fault.what));
+        }
+        Ok(())
     }
 
     /// What a motion towards the part rests on.

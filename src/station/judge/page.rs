@@ -4,6 +4,7 @@
 
 use super::figures::{HISTOGRAM_STEP, Judged};
 use super::parts::FoundPart;
+use crate::calibrate::report::escape;
 use crate::fault::Result;
 use crate::geometry::Vec3;
 use crate::scan::{CloudFile, HeightMap, PointSource};
@@ -241,6 +242,11 @@ fn machine(body: &mut String, r: &ScanReport) {
     body.push_str("</table><p class=\"small\">Beside this page: cloud.ply, cloud.pcd (points), height.tif, height.png + height.json (heights), scan.json (every figure).</p></section>");
 }
 
+/// Bytes as text that a page or a JSON file carries.
+pub fn base64(bytes: &[u8]) -> String {
+    BASE64_STANDARD.encode(bytes)
+}
+
 /// A picture as part of the page.
 fn picture(folder: &Path, name: &str, caption: &str) -> Result<String> {
     let path = folder.join(name);
@@ -248,7 +254,7 @@ fn picture(folder: &Path, name: &str, caption: &str) -> Result<String> {
     Ok(format!(
         "<figure><img alt=\"{0}\" src=\"data:image/png;base64,{1}\"><figcaption>{0}</figcaption></figure>",
         escape(caption),
-        BASE64_STANDARD.encode(&bytes)
+        base64(&bytes)
     ))
 }
 
@@ -279,7 +285,7 @@ fn view(body: &mut String, scan: &Path, map: &HeightMap) -> Result<()> {
          <script>const B=\"{}\",LOW={low},HIGH={high},MAP={};{VIEWER}</script>",
         thousands(bytes.len() as u64 / 6),
         thousands(cloud.count()),
-        BASE64_STANDARD.encode(&bytes),
+        base64(&bytes),
         serde_json::to_string(&stops).expect("numbers")
     );
     Ok(())
@@ -317,10 +323,6 @@ fn thousands(n: u64) -> String {
         out.push(c);
     }
     out
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use crate::fault::Result;
 use crate::geometry::Vec3;
 use crate::gpu::Device;
 use crate::rig::hash_file;
-use crate::scan::{CloudFile, GridOptions, grid_on, write_pcd};
+use crate::scan::{CloudFile, GridOptions, HeightMap, grid_on, write_pcd};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -21,9 +21,8 @@ pub fn write(
     up: Vec3,
     device: Option<&Device>,
 ) -> Result<(Option<HeightMapFigures>, BTreeMap<String, String>)> {
-    let hash = |name: &str| Ok((name.to_owned(), hash_file(&out.join(name))?));
     if points < 100 {
-        return Ok((None, BTreeMap::from([hash("cloud.ply")?])));
+        return Ok((None, BTreeMap::from([hash(out, "cloud.ply")?])));
     }
     let source = CloudFile::open(cloud)?;
     let heights = || {
@@ -33,18 +32,40 @@ pub fn write(
     };
     let ((map, pcd), of_cloud) = rayon::join(
         || rayon::join(heights, || write_pcd(&out.join("cloud.pcd"), &source, points)),
-        || hash("cloud.ply"),
+        || hash(out, "cloud.ply"),
     );
     let map = pcd.and(map)?;
-    let files = BTreeMap::from([of_cloud?, hash("height.tif")?, hash("height.json")?]);
+    Ok((Some(figures(&map)), hashes(out, of_cloud?)?))
+}
+
+/// The same around a map that is there already, in the cloud's own grid.
+pub fn of_map(
+    out: &Path,
+    cloud: &Path,
+    points: u64,
+    map: &HeightMap,
+) -> Result<(HeightMapFigures, BTreeMap<String, String>)> {
+    map.save(out)?;
+    write_pcd(&out.join("cloud.pcd"), &CloudFile::open(cloud)?, points)?;
+    Ok((figures(map), hashes(out, hash(out, "cloud.ply")?)?))
+}
+
+fn hash(out: &Path, name: &str) -> Result<(String, String)> {
+    Ok((name.to_owned(), hash_file(&out.join(name))?))
+}
+
+fn hashes(out: &Path, of_cloud: (String, String)) -> Result<BTreeMap<String, String>> {
+    Ok(BTreeMap::from([of_cloud, hash(out, "height.tif")?, hash(out, "height.json")?]))
+}
+
+fn figures(map: &HeightMap) -> HeightMapFigures {
     let (low, high) = map.quantiles(0.01, 0.99).unwrap_or((0.0, 0.0));
-    let figures = HeightMapFigures {
+    HeightMapFigures {
         width: map.width,
         height: map.height,
         cell_mm: map.cell,
         coverage: map.coverage(),
         z_low_mm: f64::from(low),
         z_high_mm: f64::from(high),
-    };
-    Ok((Some(figures), files))
+    }
 }

@@ -7,7 +7,7 @@ use crate::capture::{Account, Delay};
 use crate::fault::{Fault, Result};
 use crate::recording::Motion;
 use crate::rig::{Volume, hash_file};
-use crate::scan::{CloudFile, CloudPoint, Extraction, Format, read_cloud};
+use crate::scan::{CloudFile, CloudPoint, Extraction, Filter, Format, read_cloud};
 use crate::stages::peak::Stripe;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -79,6 +79,23 @@ pub struct ScanReport {
     /// Where the points came from that no rig of this program measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub imported: Option<Imported>,
+    /// What was taken away of a former scan.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub filtered: Option<Filtered>,
+}
+
+/// Which scan was filtered, and how.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Filtered {
+    /// Its folder's name.
+    pub scan: String,
+    /// SHA-256 of its scan.json.
+    pub sha256: String,
+    /// In the order in which they were applied.
+    pub filters: Vec<Filter>,
+    /// Cells that each took.
+    pub cells: Vec<usize>,
 }
 
 /// What an imported file was, and what its user stated about it.

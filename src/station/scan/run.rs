@@ -188,6 +188,7 @@ pub fn scan_on(
         remarks: rig.remarks().into_iter().chain(source.remarks()).chain(stopped).collect(),
         files,
         imported: None,
+        filtered: None,
     };
     let text = serde_json::to_string_pretty(&report).expect("plain data");
     crate::files::write(&part.join("scan.json"), text.as_bytes())?;

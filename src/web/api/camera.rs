@@ -1,13 +1,20 @@
-//! In: the number of the picture that a page shows. Out: the newest other one with its peaks, as soon as there is one.
+//! In: the number of the picture that a page shows. Out: the newest other one with its peaks, as soon as there is one; a part over it.
 //! Frame and unit: px, grey levels of 8 bits, ms; numbers little endian.
 
-use super::answer::Answer;
-use crate::fault::Fault;
-use crate::web::camera::Looked;
+use super::answer::{Answer, body, json, operates};
+use super::place::recorded;
+use crate::capture::look;
+use crate::fault::{Fault, Result};
+use crate::web::camera::{Camera, Looked};
+use crate::web::ghost as parts;
+use crate::web::guard::Tab;
+use crate::web::message::{CameraState, Ghost, Outlines, PictureLook, PictureRef, SetFeature};
 use crate::web::screen::Screen;
-use axum::extract::{Query, State};
+use axum::body::Bytes;
+use axum::extract::{Path, Query, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
+use axum::{Extension, Json};
 use serde::Deserialize;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -25,14 +32,48 @@ pub struct After {
     after: u64,
 }
 
+fn camera(screen: &Screen) -> Result<&Arc<Camera>> {
+    screen.camera().ok_or_else(|| {
+        Fault::input("no camera: the screen was served without --camera").next("start it with --camera URI")
+    })
+}
+
+/// GET /camera
+pub async fn state(State(screen): State<Arc<Screen>>) -> Answer<Json<CameraState>> {
+    json(screen, |s| camera(s).map(|c| c.features())).await
+}
+
+/// PUT /camera/features
+pub async fn set(
+    State(screen): State<Arc<Screen>>,
+    Extension(tab): Extension<Tab>,
+    bytes: Bytes,
+) -> Answer<Json<CameraState>> {
+    operates(&screen, &tab)?;
+    let ask: SetFeature = body(&bytes)?;
+    json(screen, move |s| camera(s)?.set(&ask)).await
+}
+
+/// GET /camera/look: what the newest picture shows.
+pub async fn look_now(State(screen): State<Arc<Screen>>) -> Answer<Json<PictureLook>> {
+    json(screen, |s| {
+        let newest = camera(s)?.other_than(0).ok_or_else(|| {
+            Fault::input("the camera has sent no picture yet").next("see what alarms say of the camera")
+        })?;
+        Ok(PictureLook::from(&look(&newest.image)))
+    })
+    .await
+}
+
+/// GET /look?recording=&frame=&light=
+pub async fn look_back(State(screen): State<Arc<Screen>>, Query(ask): Query<PictureRef>) -> Answer<Json<PictureLook>> {
+    json(screen, move |s| recorded(s, &ask).map(|image| PictureLook::from(&look(&image)))).await
+}
+
 /// GET /camera/newest?after=: number, columns, rows, number of peaks (u32), delay in ms (float), then u, v (float) and fate (u32) of
 /// each peak, then the grey levels; 204 where none came within a second.
 pub async fn newest(State(screen): State<Arc<Screen>>, Query(ask): Query<After>) -> Answer<Response> {
-    let Some(camera) = screen.camera() else {
-        return Err(Fault::input("no camera: the screen was served without --camera")
-            .next("start it with --camera URI")
-            .into());
-    };
+    let camera = camera(&screen)?;
     let begun = Instant::now();
     loop {
         if let Some(looked) = camera.other_than(ask.after) {
@@ -45,14 +86,40 @@ pub async fn newest(State(screen): State<Arc<Screen>>, Query(ask): Query<After>)
     }
 }
 
+/// Over which picture.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Number {
+    number: u64,
+}
+
+/// GET /jobs/{id}/outlines
+pub async fn outlines(State(screen): State<Arc<Screen>>, Path(id): Path<String>) -> Answer<Json<Outlines>> {
+    json(screen, move |s| parts::outlines(s, &id)).await
+}
+
+/// GET /jobs/{id}/ghost?number=: waits until the robot's pose after the picture has been read.
+pub async fn ghost(
+    State(screen): State<Arc<Screen>>,
+    Path(id): Path<String>,
+    Query(ask): Query<Number>,
+) -> Answer<Json<Ghost>> {
+    let (at_ns, begun) = (parts::moment(&screen, ask.number)?, Instant::now());
+    while !parts::known(&screen, at_ns) && begun.elapsed() < LONGEST {
+        tokio::time::sleep(OFTEN).await;
+    }
+    json(screen, move |s| parts::over(s, &id, ask.number, at_ns)).await
+}
+
 fn bytes(l: &Looked) -> Vec<u8> {
-    let mut out = Vec::with_capacity(20 + 12 * l.peaks.len() + l.grey.len());
-    for word in [l.number as u32, l.width, l.height, l.peaks.len() as u32, l.delay_ms.to_bits()] {
+    let mut out = Vec::with_capacity(20 + 12 * l.peaks.len() + l.image.width as usize * l.image.height as usize);
+    let grey = l.image.to_u8();
+    for word in [l.number as u32, l.image.width, l.image.height, l.peaks.len() as u32, l.delay_ms.to_bits()] {
         out.extend(word.to_le_bytes());
     }
     for (u, v, fate) in &l.peaks {
         out.extend([u.to_bits(), v.to_bits(), *fate].iter().flat_map(|w| w.to_le_bytes()));
     }
-    out.extend(&l.grey);
+    out.extend(&grey);
     out
 }

@@ -10,6 +10,8 @@ mod place;
 mod router;
 mod routes;
 mod session;
+mod settings;
+mod support;
 mod surface;
 
 pub use openapi::openapi;

@@ -6,7 +6,10 @@ use crate::fault::{Fault, Result};
 use crate::raster::{Image, png};
 use crate::recording::{Beam, MotionKind, Recording};
 use crate::web::guard::{Tab, resolve};
-use crate::web::message::{Bar, PictureRef, Problem, RecipeText, RecordingInfo, StationInfo};
+use crate::web::message::{
+    Bar, BoardView, DrawingAsk, DrawingRead, PictureRef, PointsOf, Problem, RecipePoint, RecipeText, RecordingInfo,
+    StationInfo, ViewRef,
+};
 use crate::web::screen::Screen;
 use crate::web::{station, work};
 use axum::body::Bytes;
@@ -93,26 +96,32 @@ fn info(folder: &Path, name: &str) -> RecordingInfo {
     }
 }
 
+/// A picture of a recording, as it was taken.
+pub(super) fn recorded(screen: &Screen, ask: &PictureRef) -> Result<Image> {
+    let recording = Recording::open(&resolve(&screen.place.recordings, &ask.recording)?)?;
+    let frame = recording.meta.frames.get(ask.frame).ok_or_else(|| {
+        Fault::input(format!("frame {} of {} was asked for", ask.frame, recording.meta.frames.len()))
+            .next("reload the page")
+    })?;
+    let name = match ask.light.as_deref() {
+        Some("ambient") => frame.ambient.as_ref(),
+        Some("laser") => frame.laser.as_ref(),
+        _ => frame.laser.as_ref().or(frame.ambient.as_ref()),
+    };
+    let name =
+        name.ok_or_else(|| Fault::input(format!("frame {} has no such picture", ask.frame)).next("choose another"))?;
+    recording.picture(name)
+}
+
 /// GET /picture?recording=&frame=&light=&width=
 pub async fn picture(State(screen): State<Arc<Screen>>, Query(ask): Query<PictureRef>) -> Answer<impl IntoResponse> {
-    let bytes = beside(screen, move |s| {
-        let recording = Recording::open(&resolve(&s.place.recordings, &ask.recording)?)?;
-        let frame = recording.meta.frames.get(ask.frame).ok_or_else(|| {
-            Fault::input(format!("frame {} of {} was asked for", ask.frame, recording.meta.frames.len()))
-                .next("reload the page")
-        })?;
-        let name = match ask.light.as_deref() {
-            Some("ambient") => frame.ambient.as_ref(),
-            Some("laser") => frame.laser.as_ref(),
-            _ => frame.laser.as_ref().or(frame.ambient.as_ref()),
-        };
-        let name = name
-            .ok_or_else(|| Fault::input(format!("frame {} has no such picture", ask.frame)).next("choose another"))?;
-        let image = recording.picture(name)?;
-        Ok(png(&smaller(&image, ask.width)))
-    })
-    .await?;
+    let bytes = beside(screen, move |s| Ok(png(&smaller(&recorded(s, &ask)?, ask.width)))).await?;
     Ok(([(header::CONTENT_TYPE, "image/png"), (header::CACHE_CONTROL, "private, max-age=300")], bytes))
+}
+
+/// GET /view?recording=&frame=
+pub async fn view(State(screen): State<Arc<Screen>>, Query(ask): Query<ViewRef>) -> Answer<Json<BoardView>> {
+    json(screen, move |s| s.views.of_recording(&s.place, &ask.recording, ask.frame)).await
 }
 
 /// 8 bits, each pixel the brightest of those that it stands for: a stripe is thinner than a thumbnail's pixel.
@@ -152,6 +161,23 @@ pub async fn save_recipe(
     json(screen, move |s| work::save_recipe(&s.place, &recipe).map(|()| recipe)).await
 }
 
+/// POST /drawings
+pub async fn drawing(
+    State(screen): State<Arc<Screen>>,
+    Extension(tab): Extension<Tab>,
+    bytes: Bytes,
+) -> Answer<Json<DrawingRead>> {
+    operates(&screen, &tab)?;
+    let ask: DrawingAsk = body(&bytes)?;
+    json(screen, move |s| work::from_drawing(&s.place, &ask)).await
+}
+
+/// POST /points: of a recipe that need not be stored.
+pub async fn points(State(screen): State<Arc<Screen>>, bytes: Bytes) -> Answer<Json<Vec<RecipePoint>>> {
+    let ask: PointsOf = body(&bytes)?;
+    json(screen, move |_| work::points(&ask.text)).await
+}
+
 /// DELETE /recipes/{name}
 pub async fn remove_recipe(
     State(screen): State<Arc<Screen>>,
@@ -170,25 +196,6 @@ pub async fn remove_recipe(
         Ok(serde_json::json!({}))
     })
     .await
-}
-
-/// GET /support: what somebody who helps needs to see; no pictures, no secrets.
-pub async fn support(State(screen): State<Arc<Screen>>) -> Answer<impl IntoResponse> {
-    let text = beside(screen, |s| {
-        let report = serde_json::json!({
-            "station": station::info(&s.place),
-            "bar": s.bar(),
-            "jobs": s.jobs.list(crate::web::screen::JOBS),
-            "adapters": crate::gpu::adapters(),
-            "threads": rayon::current_num_threads(),
-            "system": [std::env::consts::OS, std::env::consts::ARCH],
-            "seconds": s.started.elapsed().as_secs_f64(),
-        });
-        Ok(serde_json::to_string_pretty(&report).expect("plain data"))
-    })
-    .await?;
-    let name = "attachment; filename=\"sheetlight-support.json\"";
-    Ok(([(header::CONTENT_TYPE, "application/json"), (header::CONTENT_DISPOSITION, name)], text))
 }
 
 #[cfg(test)]

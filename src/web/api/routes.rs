@@ -1,7 +1,7 @@
 //! In: nothing. Out: every route of the API, in one table: the server, its description and the tests read it.
 //! Frame and unit: none.
 
-use super::{camera, jobs, motion, place, session, surface};
+use super::{camera, jobs, motion, place, session, settings, support, surface};
 use crate::web::screen::Screen;
 use axum::routing::{MethodRouter, delete, get, post, put};
 use std::sync::Arc;
@@ -67,6 +67,28 @@ pub fn routes() -> Vec<Route> {
             get(session::events),
         ),
         route(("GET", "/station"), "Settings and calibrations", ("", "StationInfo"), get(place::station)),
+        route(("GET", "/settings"), "Settings and backups", ("", "SettingsState"), get(settings::state)),
+        route(
+            ("PUT", "/settings"),
+            "Change settings; the former ones are backed up",
+            ("SettingsAsk", "SettingsState"),
+            put(settings::change),
+        )
+        .leased(),
+        route(("POST", "/backups"), "Back the station up", ("", "SettingsState"), post(settings::back_up)).leased(),
+        route(
+            ("GET", "/backups/{name}"),
+            "A backup to keep elsewhere",
+            ("", "application/json"),
+            get(settings::backup),
+        ),
+        route(
+            ("POST", "/backups/{name}/restore"),
+            "Put the station into the state of a backup",
+            ("", "SettingsState"),
+            post(settings::restore),
+        )
+        .leased(),
         route(("GET", "/bar"), "What the bar shows", ("", "Bar"), get(place::bar)),
         route(
             ("GET", "/recordings"),
@@ -75,6 +97,32 @@ pub fn routes() -> Vec<Route> {
             get(place::recordings),
         ),
         route(("GET", "/picture"), "A picture of a recording", ("?PictureRef", "image/png"), get(place::picture)),
+        route(
+            ("GET", "/view"),
+            "The board in a picture of a recording: its corners, how it leans",
+            ("?ViewRef", "BoardView"),
+            get(place::view),
+        ),
+        route(
+            ("GET", "/look"),
+            "What a picture of a recording shows: levels, and the stripe along its length",
+            ("?PictureRef", "PictureLook"),
+            get(camera::look_back),
+        ),
+        route(("GET", "/camera"), "What the camera can be set to", ("", "CameraState"), get(camera::state)),
+        route(
+            ("PUT", "/camera/features"),
+            "Set the camera; what was set from here is set again where it forgets it",
+            ("SetFeature", "CameraState"),
+            put(camera::set),
+        )
+        .leased(),
+        route(
+            ("GET", "/camera/look"),
+            "What the camera's newest picture shows: levels, and the stripe along its length",
+            ("", "PictureLook"),
+            get(camera::look_now),
+        ),
         route(
             ("GET", "/camera/newest"),
             "The camera's newest picture other than the one of number after=, with its peaks; 204: none yet",
@@ -101,6 +149,19 @@ pub fn routes() -> Vec<Route> {
             delete(place::remove_recipe),
         )
         .leased(),
+        route(
+            ("POST", "/points"),
+            "Shapes and constructed points of a recipe's text, where the drawing has them",
+            ("PointsOf", "RecipePoint[]"),
+            post(place::points),
+        ),
+        route(
+            ("POST", "/drawings"),
+            "Make a recipe of a drawing (DXF) and store it",
+            ("DrawingAsk", "DrawingRead"),
+            post(place::drawing),
+        )
+        .leased(),
         route(("GET", "/jobs"), "Jobs, newest first", ("", "Job[]"), get(jobs::list)),
         route(("POST", "/jobs"), "Order a procedure", ("Order", "Job"), post(jobs::order)).leased(),
         route(("GET", "/jobs/{id}"), "One job", ("", "Job"), get(jobs::get)),
@@ -118,6 +179,18 @@ pub fn routes() -> Vec<Route> {
             ("", "BoardView[]"),
             get(jobs::views),
         ),
+        route(
+            ("GET", "/jobs/{id}/outlines"),
+            "Outlines of the part that a job found, in three dimensions",
+            ("", "Outlines"),
+            get(camera::outlines),
+        ),
+        route(
+            ("GET", "/jobs/{id}/ghost"),
+            "The same over the camera's picture of number=",
+            ("", "Ghost"),
+            get(camera::ghost),
+        ),
         route(("GET", "/jobs/{id}/files/{*name}"), "A file that a job left", ("", BYTES), get(jobs::file)),
         route(
             ("GET", "/scans/{id}/map"),
@@ -125,6 +198,19 @@ pub fn routes() -> Vec<Route> {
             ("", "MapHead"),
             get(surface::head),
         ),
+        route(
+            ("GET", "/scans/{id}/filters"),
+            "Filters through which a scan is looked at",
+            ("", "Filtered"),
+            get(surface::filters),
+        ),
+        route(
+            ("PUT", "/scans/{id}/filters"),
+            "Look at a scan through these filters; fewer of them undo",
+            ("Filters", "Filtered"),
+            put(surface::filter),
+        )
+        .leased(),
         route(
             ("GET", "/scans/{id}/map/{layer}"),
             "height, sigma or intensity of each cell",
@@ -150,6 +236,13 @@ pub fn routes() -> Vec<Route> {
             "Arm the robot from this tab, or give it back",
             ("Arming", "MotionState"),
             post(motion::arm),
+        )
+        .leased(),
+        route(
+            ("POST", "/robot/output"),
+            "Try an output of the controller: a laser or lamp for a moment, the gripper",
+            ("OutputAsk", ""),
+            post(settings::output),
         )
         .leased(),
         route(
@@ -192,9 +285,9 @@ pub fn routes() -> Vec<Route> {
         route(("GET", "/boards"), "Names of the station's calibration boards", ("", ""), get(place::boards)),
         route(
             ("GET", "/support"),
-            "Settings, jobs and machine for somebody who helps",
-            ("", "application/json"),
-            get(place::support),
+            "Settings, jobs and machine for somebody who helps; pictures=true: the newest ones too",
+            ("?SupportAsk", "application/json"),
+            get(support::support),
         ),
     ]
 }

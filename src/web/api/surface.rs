@@ -1,19 +1,19 @@
 //! In: questions about a finished scan's surface. Out: its map's layers, sections, measures, points to look at.
 //! Frame and unit: grid frame, points in the cloud's; mm. Numbers of layers and points are little-endian floats.
 
-use super::answer::{Answer, beside, body, json};
+use super::answer::{Answer, beside, body, json, operates};
 use crate::fault::{Fault, Result};
 use crate::scan::{CloudFile, HeightMap};
-use crate::station::load_report;
-use crate::web::message::{MapHead, Measure, MeasureAnswer, Section, SectionAsk};
+use crate::station::left;
+use crate::web::guard::Tab;
+use crate::web::message::{Filtered, Filters, MapHead, Measure, MeasureAnswer, Section, SectionAsk};
 use crate::web::screen::Screen;
 use crate::web::surface::{measure, section, view};
-use crate::web::work::scan_of;
-use axum::Json;
 use axum::body::Bytes;
 use axum::extract::{Path as UrlPath, Query, State};
 use axum::http::header;
 use axum::response::IntoResponse;
+use axum::{Extension, Json};
 use serde::Deserialize;
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ type Shared = State<Arc<Screen>>;
 /// GET /scans/{id}/map
 pub async fn head(State(screen): Shared, UrlPath(id): UrlPath<String>) -> Answer<Json<MapHead>> {
     json(screen, move |s| {
-        let map = s.map(&id)?;
+        let map = s.look(&id)?.map;
         Ok(MapHead {
             width: map.width,
             height: map.height,
@@ -34,6 +34,23 @@ pub async fn head(State(screen): Shared, UrlPath(id): UrlPath<String>) -> Answer
         })
     })
     .await
+}
+
+/// GET /scans/{id}/filters
+pub async fn filters(State(screen): Shared, UrlPath(id): UrlPath<String>) -> Answer<Json<Filtered>> {
+    json(screen, move |s| Ok(s.look(&id)?.filtered)).await
+}
+
+/// PUT /scans/{id}/filters
+pub async fn filter(
+    State(screen): Shared,
+    Extension(tab): Extension<Tab>,
+    UrlPath(id): UrlPath<String>,
+    bytes: Bytes,
+) -> Answer<Json<Filtered>> {
+    operates(&screen, &tab)?;
+    let ask: Filters = body(&bytes)?;
+    json(screen, move |s| s.maps.set(&s.scan(&id)?, ask)).await
 }
 
 /// Between which 99 % of the finite values lie.
@@ -51,7 +68,7 @@ pub async fn layer(
     UrlPath((id, layer)): UrlPath<(String, String)>,
 ) -> Answer<impl IntoResponse> {
     let bytes = beside(screen, move |s| {
-        let map = s.map(&id)?;
+        let map = s.look(&id)?.map;
         Ok(floats(values(&map, &layer)?))
     })
     .await?;
@@ -74,7 +91,7 @@ fn floats(values: &[f32]) -> Vec<u8> {
 /// POST /scans/{id}/section
 pub async fn along(State(screen): Shared, UrlPath(id): UrlPath<String>, bytes: Bytes) -> Answer<Json<Section>> {
     let ask: SectionAsk = body(&bytes)?;
-    json(screen, move |s| section(&*s.map(&id)?, &ask)).await
+    json(screen, move |s| section(&s.look(&id)?.map, &ask)).await
 }
 
 /// POST /scans/{id}/measure
@@ -84,7 +101,7 @@ pub async fn measured(
     bytes: Bytes,
 ) -> Answer<Json<MeasureAnswer>> {
     let what: Measure = body(&bytes)?;
-    json(screen, move |s| measure(&*s.map(&id)?, &what)).await
+    json(screen, move |s| measure(&s.look(&id)?.map, &what)).await
 }
 
 /// Points of a view.
@@ -110,10 +127,10 @@ pub async fn points(
     Query(ask): Query<Most>,
 ) -> Answer<impl IntoResponse> {
     let bytes = beside(screen, move |s| {
-        let folder = scan_of(&s.place.jobs(), &s.jobs.get(&id)?)?;
-        load_report(&folder)?;
-        let cloud = CloudFile::open(&folder.join("cloud.ply"))?;
-        let view = view(&cloud, cloud.count(), ask.most.clamp(1, MOST_POINTS))?;
+        let looked = s.look(&id)?;
+        let cloud = CloudFile::open(&s.scan(&id)?.join("cloud.ply"))?;
+        let stays = left(&looked.whole, &looked.map);
+        let view = view(&cloud, cloud.count(), ask.most.clamp(1, MOST_POINTS), &stays)?;
         let mut bytes = Vec::with_capacity(32 + 20 * view.points.len());
         bytes.extend((view.all.min(u64::from(u32::MAX)) as u32).to_le_bytes());
         bytes.extend((view.points.len() as u32).to_le_bytes());

@@ -2,17 +2,24 @@
 //! Frame and unit: lengths in mm, angles in degrees, times in UTC, RFC 3339; each name shows another unit.
 
 mod bar;
+mod camera;
 mod door;
+mod drawing;
+mod filter;
 mod job;
 mod motion;
 mod order;
 mod outcome;
 mod place;
+mod settings;
 mod surface;
 mod typescript;
 
 pub use bar::{Bar, CalibrationAge, Frames, Lease, Mode, RobotState};
+pub use camera::{CameraFeature, CameraState, ExposureSet, PictureLook, SetFeature, StripeSeen};
 pub use door::{Confirmed, Grant, Knock, Redeem, Session, TakeLease};
+pub use drawing::{DrawingAsk, DrawingRead, PointsOf, RecipePoint};
+pub use filter::{Filter, FilterOrder, Filtered, Filters};
 pub use job::{Event, Job, JobState, Problem};
 pub use motion::{Arming, Asked, InTheCell, MotionState, SimulatedCell};
 pub use order::{
@@ -21,10 +28,14 @@ pub use order::{
 };
 pub use outcome::{
     BenchRow, CalibrationFigures, CheckLine, GateLight, Inserted, Notation, Outcome, Position, RobotPoses, ScanFigures,
-    SurfaceTouched, Term, Touched,
+    SquareProposed, SurfaceTouched, Term, Touched,
 };
-pub use place::{BoardView, CalibrationState, PictureRef, RecipeText, RecordingInfo, StationInfo};
+pub use place::{
+    BoardView, CalibrationState, FrameInfo, PictureRef, RecipeText, RecordingInfo, StationInfo, SupportAsk, ViewRef,
+};
+pub use settings::{BackupInfo, OutputAsk, SettingsAsk, SettingsState};
 pub use surface::{
-    Distance, Fit, MapHead, Measure, MeasureAnswer, PlaneAsk, PointsAsk, Section, SectionAsk, SectionPoint,
+    Distance, Fit, Ghost, MapHead, Measure, MeasureAnswer, Outlines, PlaneAsk, PointsAsk, Section, SectionAsk,
+    SectionPoint,
 };
 pub use typescript::declarations;

@@ -1,6 +1,7 @@
 //! In: nothing. Out: what an operator can order, as the API takes it and job.json keeps it.
 //! Frame and unit: mm, degrees; places in a height map's grid.
 
+use super::FilterOrder;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use ts_rs::TS;
@@ -13,12 +14,16 @@ pub enum Order {
     Check(Plain),
     /// A recording to cloud and height map.
     Scan(ScanOrder),
+    /// A finished scan less what filters take away, as a scan of its own.
+    Filter(FilterOrder),
     /// A recipe's part in finished scans: several are looks at the same part.
     Find(FindOrder),
     /// A recipe from a finished scan.
     Teach(TeachOrder),
     /// The pointer's spots on a surface: distances, plane, normal.
     Touch(TouchOrder),
+    /// The exposure that suits the stripe in the camera's picture; it stays set.
+    Tune(Plain),
     /// A calibration from a recording; it is stored when it is accepted.
     Calibrate(CalibrateOrder),
     /// Camera, hand-eye, laser plane and pointer from any recordings of boards, in one solve; stored when it is accepted.
@@ -147,6 +152,8 @@ pub enum Target {
     LaserPlane,
     /// The pointer's beam.
     Pointer,
+    /// A linear axis or turntable that moves parts before a camera that stands still.
+    Axis,
 }
 
 /// A part, by a few places in a height map.
@@ -187,9 +194,11 @@ impl Order {
         match self {
             Order::Check(_) => "check",
             Order::Scan(_) => "scan",
+            Order::Filter(_) => "filter",
             Order::Find(_) => "find",
             Order::Teach(_) => "teach",
             Order::Touch(_) => "touch",
+            Order::Tune(_) => "tune",
             Order::Calibrate(_) => "calibrate",
             Order::Joint(_) => "joint",
             Order::Auto(_) => "auto",

@@ -1,6 +1,7 @@
 //! In: nothing. Out: what each procedure came to, as pages show it and job.json keeps it.
 //! Frame and unit: mm, degrees, px; poses in the scan's frame.
 
+use super::ExposureSet;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use ts_rs::TS;
@@ -27,6 +28,8 @@ pub enum Outcome {
     },
     /// The surface that the pointer touched.
     Touch(Box<Touched>),
+    /// The exposure that was set.
+    Tune(Box<ExposureSet>),
     /// A calibration to be accepted.
     Calibrate(Box<CalibrationFigures>),
     /// All calibrations of a rig together, to be accepted.
@@ -39,6 +42,9 @@ pub enum Outcome {
     Benchmark {
         /// One a size and processor.
         rows: Vec<BenchRow>,
+        /// The same of other machines, as they were recorded.
+        #[serde(default)]
+        recorded: Vec<BenchRow>,
     },
 }
 
@@ -215,6 +221,23 @@ pub struct Inserted {
     pub found: Option<Position>,
 }
 
+/// A pose in which the tool stands square to what was touched, at the place where it stood at the last shot.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+pub struct SquareProposed {
+    /// How far the tool leant at the last shot, degrees.
+    pub tilt_deg: f64,
+    /// One standard deviation of that.
+    pub tilt_sigma_deg: f64,
+    /// How the robot writes poses.
+    pub convention: String,
+    /// Names of the numbers.
+    pub labels: Vec<String>,
+    /// Where the flange goes, base frame.
+    pub flange: Vec<f64>,
+    /// Where the tool is then, base frame.
+    pub tool: Vec<f64>,
+}
+
 /// What the pointer touched.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 pub struct Touched {
@@ -222,6 +245,9 @@ pub struct Touched {
     pub spots: Vec<(String, f64, f64)>,
     /// The plane through them.
     pub surface: Option<SurfaceTouched>,
+    /// How to stand square to it; null without a surface or without the station's tool.
+    #[serde(default)]
+    pub square: Option<SquareProposed>,
     /// Pictures without a distance: name and reason.
     pub missing: Vec<(String, String)>,
     /// What a reader must know.

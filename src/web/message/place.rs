@@ -20,6 +20,10 @@ pub struct StationInfo {
     pub tolerance_mm: Option<f64>,
     /// Camera depths at which points are believed, mm.
     pub volume_mm: Option<[f64; 2]>,
+    /// Frame of scans and of the poses that are found in them: base, axis or camera.
+    pub work_frame: String,
+    /// Frames that are fixed to others, in the robot's notation.
+    pub frames: Vec<FrameInfo>,
     /// One a calibration that there is.
     pub calibrations: Vec<CalibrationState>,
     /// What is wrong with it; null: nothing.
@@ -27,6 +31,28 @@ pub struct StationInfo {
     /// Names of all settings of the extraction, with dots, and the station's values.
     #[ts(type = "Record<string, unknown>")]
     pub extraction: std::collections::BTreeMap<String, serde_json::Value>,
+}
+
+/// Where a frame is.
+#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+pub struct FrameInfo {
+    /// tool or camera.
+    pub name: String,
+    /// flange or base.
+    pub on: String,
+    /// Names of the numbers.
+    pub labels: Vec<String>,
+    /// mm, degrees or as the notation has them.
+    pub numbers: Vec<f64>,
+}
+
+/// Whether the support file has pictures.
+#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[serde(deny_unknown_fields)]
+pub struct SupportAsk {
+    /// Somebody ticked it.
+    #[serde(default)]
+    pub pictures: bool,
 }
 
 /// A calibration of the station.
@@ -82,6 +108,21 @@ pub struct BoardView {
     pub height: u32,
     /// The corners that were found, u and v, px.
     pub corners: Vec<[f64; 2]>,
+    /// How far the board's normal leans away from the camera's axis, to the right and downwards in the picture, degrees, by the
+    /// station's camera or else one as long as its picture is wide; null where too little of the board was found.
+    pub lean_deg: Option<[f64; 2]>,
+    /// Where the axis stood that the board rides on, counts; null without one, or where it is not known.
+    pub count: Option<f64>,
+}
+
+/// Which picture of a recording of boards.
+#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[serde(deny_unknown_fields)]
+pub struct ViewRef {
+    /// The recording.
+    pub recording: String,
+    /// Its frame, from 0.
+    pub frame: usize,
 }
 
 /// Which picture of a recording.

@@ -23,6 +23,27 @@ pub struct MapHead {
     pub intensity: [f64; 2],
 }
 
+/// The outlines of a part that was found.
+#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+pub struct Outlines {
+    /// The scan's: base, axis, flange or map.
+    pub frame: String,
+    /// One a shape, x y z in that frame, mm; closed ones end where they begin.
+    pub lines: Vec<Vec<[f64; 3]>>,
+}
+
+/// The same as the camera on the gripper sees them.
+#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+pub struct Ghost {
+    /// The picture over which they belong.
+    #[ts(type = "number")]
+    pub number: u64,
+    /// u and v, px; lines end where they leave what the lens shows.
+    pub lines: Vec<Vec<[f64; 2]>>,
+    /// So far the arm moved them between the readings of its pose before and after the picture, px; 0: it stood.
+    pub moved_px: f64,
+}
+
 /// A line over the map.
 #[derive(Clone, Debug, PartialEq, Deserialize, TS)]
 #[serde(deny_unknown_fields)]

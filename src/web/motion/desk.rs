@@ -6,11 +6,12 @@ use super::grants::Grants;
 use super::simulated::SimulatedRobot;
 use crate::arm::rules::{Guard, MotionLog, StopButton};
 use crate::fault::{Fault, Result};
-use crate::station::Settings;
+use crate::station::{Output, Settings, try_output};
 use crate::web::camera::Camera;
 use crate::web::event::Hub;
 use crate::web::guard::Tab;
 use crate::web::message::{Asked, Confirmed, Event, MotionState};
+use crate::web::robot::Robot;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard};
@@ -30,6 +31,8 @@ pub struct Links {
     pub robot: Option<String>,
     /// It may be moved.
     pub may_move: bool,
+    /// What that robot says, read over and over.
+    pub watched: Option<Arc<Robot>>,
     /// The camera.
     pub camera: Option<Arc<Camera>>,
     /// The cell that robot and camera are of, where it is one of ours.
@@ -173,6 +176,33 @@ impl Desk {
         drop(at);
         drop(guard);
         Ok(state)
+    }
+
+    /// Some tab has armed the robot.
+    pub fn armed(&self) -> bool {
+        self.at().button.is_some()
+    }
+
+    /// Tries an output of the controller, from the tab that armed it, while no job has it; its number.
+    pub fn try_output(&self, tab: &Tab, what: Output) -> Result<u16> {
+        let mut at = self.at();
+        if at.armed.as_ref() != Some(tab) {
+            return Err(Fault::refused("the robot is not armed from this screen")
+                .cause("outputs are switched by who stands beside the cell")
+                .next("press Arm first"));
+        }
+        let Some(mut guard) = at.guard.take() else {
+            return Err(Fault::refused("the robot is in use").cause("a job has it").next("wait until it has ended"));
+        };
+        drop(at);
+        let outputs = Settings::load(&self.links.station).map(|s| s.outputs.unwrap_or_default());
+        let tried = outputs.and_then(|o| try_output(guard.link(), &o, what));
+        let mut at = self.at();
+        // Given back meanwhile: it stays given back.
+        if at.button.is_some() {
+            at.guard = Some(guard);
+        }
+        tried
     }
 
     /// Somebody has looked at the robot after a motion that was stopped: motions may be proposed again.

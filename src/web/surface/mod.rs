@@ -2,11 +2,13 @@
 //! Frame and unit: grid frame, mm; each number with its standard deviation.
 
 mod fit;
+mod look;
 mod measure;
 mod pins;
 mod section;
 mod view;
 
+pub use look::{Looked, Maps};
 pub use measure::measure;
 pub use pins::between_pins;
 pub use section::section;

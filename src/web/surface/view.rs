@@ -14,15 +14,15 @@ pub struct CloudView {
     pub points: Vec<[f32; 5]>,
 }
 
-/// Takes at most `most` points. They are spread by a golden step over the scan, so that every share of them from the start on
+/// Takes at most `most` points, of those that `stays` lets stay. They are spread by a golden step over the scan, so that every share of them from the start on
 /// covers all of it: a page that shows the first tenth shows the whole part, coarsely.
-pub fn view(cloud: &impl PointSource, all: u64, most: usize) -> Result<CloudView> {
+pub fn view(cloud: &impl PointSource, all: u64, most: usize, stays: &dyn Fn(&[f32; 3]) -> bool) -> Result<CloudView> {
     let every = all.div_ceil(most.max(1) as u64).max(1);
     let mut taken: Vec<CloudPoint> = Vec::with_capacity((all / every) as usize + 1);
     let mut index = 0u64;
     cloud.for_each_chunk(&mut |chunk| {
         for p in chunk {
-            if index.is_multiple_of(every) {
+            if index.is_multiple_of(every) && stays(&p.position) {
                 taken.push(*p);
             }
             index += 1;
@@ -59,7 +59,7 @@ mod tests {
     fn every_share_of_a_view_covers_the_scan() {
         let cloud: Vec<CloudPoint> =
             (0..10_000).map(|i| CloudPoint { position: [i as f32, 0.0, 5.0], ..CloudPoint::default() }).collect();
-        let view = view(&cloud, 10_000, 1000).unwrap();
+        let view = view(&cloud, 10_000, 1000, &|_| true).unwrap();
         assert_eq!((view.all, view.points.len()), (10_000, 1000));
         let mut seen: Vec<f32> = view.points.iter().map(|p| p[0]).collect();
         let mut first: Vec<f32> = seen[..50].to_vec();
@@ -69,6 +69,6 @@ mod tests {
         seen.sort_by(f32::total_cmp);
         seen.dedup();
         assert_eq!(seen.len(), 1000, "each point once");
-        assert!(super::view(&Vec::<CloudPoint>::new(), 0, 10).unwrap().points.is_empty());
+        assert!(super::view(&Vec::<CloudPoint>::new(), 0, 10, &|_| true).unwrap().points.is_empty());
     }
 }

@@ -6,7 +6,9 @@ use super::run::Run;
 use crate::fault::{Fault, Result};
 use crate::rig::Rig;
 use crate::station::Settings;
+use crate::web::camera::Camera;
 use crate::web::message::{CheckLine, Outcome};
+use crate::web::robot::Robot;
 use std::io::Read;
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
@@ -23,6 +25,11 @@ pub(super) fn check(this: &Run) -> Result<Outcome> {
         this.progress(lines.len(), None);
     };
     station(this, &mut add);
+    let links = &this.jobs.desk.links;
+    let calibrated =
+        Rig::load(&this.jobs.place.station).ok().and_then(|r| r.camera).map(|c| [c.value.width, c.value.height]);
+    camera(links.camera.as_deref(), calibrated, &mut add);
+    robot(links.watched.as_deref(), &mut add);
     match crate::web::disk::left_gb(&this.jobs.place.station) {
         Some(gb) => add("disk", "space", if gb < LITTLE_DISK { "poor" } else { "good" }, format!("{gb:.1} GB left")),
         None => add("disk", "space", "poor", "the system does not say".into()),
@@ -60,6 +67,62 @@ fn station(this: &Run, add: &mut impl FnMut(&str, &str, &str, String)) {
     match rig.belong_together() {
         Ok(()) => add("station", "one rig", "good", "all calibrations rest on the same camera".into()),
         Err(fault) => add("station", "one rig", "bad", fault.what),
+    }
+}
+
+/// What the camera sends, against the size that it was calibrated at.
+fn camera(camera: Option<&Camera>, calibrated: Option<[u32; 2]>, add: &mut impl FnMut(&str, &str, &str, String)) {
+    let Some(camera) = camera else {
+        return add("camera", "camera", "absent", "the screen was served without --camera".into());
+    };
+    let (frames, delay, wrong) = camera.seen();
+    let Some(newest) = camera.other_than(0) else {
+        let why = wrong.unwrap_or_else(|| "it has sent no picture yet".into());
+        return add("camera", "camera", "bad", why);
+    };
+    let (w, h) = (newest.image.width, newest.image.height);
+    let delay = delay.map_or(String::new(), |[p50, p99]| format!(", delay p50 {p50:.0} ms, p99 {p99:.0} ms"));
+    let sent = format!("pictures of {w}x{h}, {} came, {} measured{delay}", frames.seen, frames.measured);
+    add("camera", "camera", if wrong.is_some() { "poor" } else { "good" }, wrong.unwrap_or(sent));
+    match calibrated {
+        // The same lens at another resolution has the same shape of picture.
+        Some([cw, ch]) if u64::from(w) * u64::from(ch) != u64::from(h) * u64::from(cw) => {
+            add("camera", "picture size", "bad", format!("pictures are {w}x{h}, it was calibrated at {cw}x{ch}"));
+        }
+        Some([cw, ch]) => add("camera", "picture size", "good", format!("{w}x{h}, calibrated at {cw}x{ch}")),
+        None => add("camera", "picture size", "absent", "the camera is not calibrated".into()),
+    }
+}
+
+/// What the controller says of itself; its reported pose is that of the flange in the base, or poses mean something else.
+fn robot(robot: Option<&Robot>, add: &mut impl FnMut(&str, &str, &str, String)) {
+    let Some(robot) = robot else {
+        return add("robot", "robot", "absent", "the screen was served without --robot".into());
+    };
+    let seen = robot.seen();
+    let Some(state) = &seen.state else {
+        return add("robot", "robot", "bad", seen.wrong.unwrap_or_else(|| "no link yet".into()));
+    };
+    let motors = match state.motor {
+        Some(true) => ", motors on",
+        Some(false) => ", motors off",
+        None => "",
+    };
+    let says =
+        seen.wrong.clone().unwrap_or_else(|| format!("{}, mode {:?}{motors}", state.model, state.mode).to_lowercase());
+    add("robot", "robot", if seen.wrong.is_some() { "poor" } else { "good" }, says);
+    let others = [("tool frame", state.tool, "the flange"), ("work frame", state.work, "the base")];
+    for (name, number, zero) in others {
+        match number {
+            Some(0) => add("robot", name, "good", format!("0: poses are of {zero}")),
+            Some(n) => add(
+                "robot",
+                name,
+                "poor",
+                format!("{n} is chosen on the controller; poses are read by number 0, {zero}"),
+            ),
+            None => add("robot", name, "absent", "the controller does not say".into()),
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! In: finished scans, a recipe or a few places of a part. Out: where the tool goes, as the page Position shows it.
 //! Frame and unit: the scan's frame, outlines in the height map's grid; mm, degrees.
 
+use super::found::{FOUND, RECIPE};
 use super::recipes::{load, save_recipe};
 use super::run::Run;
 use super::store::scan_of;
@@ -33,7 +34,7 @@ pub(super) fn find(this: &Run, ask: &FindOrder) -> Result<Outcome> {
         (report, picture) = find_part_in_all(&looked, &recipe, Some(&place.station), &options)?;
         report.notes.insert(0, format!("the tool goes where the middle of {of} says"));
     }
-    keep(this, &report, &picture)?;
+    keep(this, &report, &recipe, &picture)?;
     Ok(Outcome::Find(Box::new(position(&report, &recipe, convention))))
 }
 
@@ -54,7 +55,7 @@ pub(super) fn teach(this: &Run, order: &TeachOrder) -> Result<Outcome> {
     };
     let (recipe, proof, picture) = teach_part(&folders[0], &options)?;
     let text = toml::to_string(&recipe).expect("plain data");
-    keep(this, &proof, &picture)?;
+    keep(this, &proof, &recipe, &picture)?;
     save_recipe(place, &RecipeText { name: order.name.clone(), title: String::new(), shipped: false, text })?;
     let convention = Settings::load(&place.station)?.robot.unwrap_or(Convention::Matrix);
     let proof = Box::new(position(&proof, &recipe, convention));
@@ -68,10 +69,12 @@ fn scan_folders(this: &Run, scans: &[String]) -> Result<Vec<PathBuf>> {
     scans.iter().map(|id| scan_of(&this.jobs.place.jobs(), &this.jobs.get(id)?)).collect()
 }
 
-fn keep(this: &Run, report: &Report, picture: &RgbImage) -> Result<()> {
+/// Report, picture and the recipe as it was then: what is edited later changes nothing in them.
+fn keep(this: &Run, report: &Report, recipe: &Recipe, picture: &RgbImage) -> Result<()> {
     let text = serde_json::to_string_pretty(report).expect("plain data");
-    let (json, png) = (this.folder.join("found.json"), this.folder.join("found.png"));
-    crate::files::write_beside((&json, text.as_bytes()), &[(&png, &picture.to_png())])
+    let recipe = toml::to_string(recipe).expect("plain data");
+    let [json, png, toml] = [FOUND, "found.png", RECIPE].map(|name| this.folder.join(name));
+    crate::files::write_beside((&json, text.as_bytes()), &[(&png, &picture.to_png()), (&toml, recipe.as_bytes())])
 }
 
 /// The report as the page shows it.
@@ -122,7 +125,7 @@ pub(super) fn position(r: &Report, recipe: &Recipe, convention: Convention) -> P
     }
 }
 
-fn labels(c: Convention) -> Vec<String> {
+pub(super) fn labels(c: Convention) -> Vec<String> {
     c.labels().iter().map(|l| (*l).to_owned()).collect()
 }
 

@@ -2,6 +2,7 @@
 //! Frame and unit: base frame; mm, s.
 
 use super::find::position;
+use super::found::RECIPE;
 use super::recipes::load;
 use super::resumes::INSERTION;
 use super::run::Run;
@@ -25,8 +26,7 @@ pub(super) fn insert(this: &Run, order: &InsertOrder) -> Result<Outcome> {
     let camera = desk.links.camera.as_ref().ok_or_else(|| {
         Fault::refused("no camera: the screen was served without --camera").next("start it with --camera URI")
     })?;
-    // The job's own copy: what is edited meanwhile changes nothing in it.
-    let path = this.folder.join("recipe.toml");
+    let path = this.folder.join(RECIPE);
     if !this.again || !path.is_file() {
         crate::files::write(&path, toml::to_string(&recipe).expect("plain data").as_bytes())?;
     }

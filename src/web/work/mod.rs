@@ -4,6 +4,7 @@
 mod calibrate;
 mod check;
 mod find;
+mod found;
 mod insert;
 mod jobs;
 mod place;
@@ -13,11 +14,13 @@ mod resumes;
 mod run;
 mod scan;
 mod store;
+mod tune;
 mod worker;
 
 pub use calibrate::{Views, accept, boards};
+pub use found::{lies, report_of};
 pub use jobs::Jobs;
 pub use place::Place;
-pub use recipes::{recipe_path, recipes, save_recipe};
+pub use recipes::{from_drawing, points, recipe_path, recipes, save_recipe};
 pub use store::scan_of;
 pub use worker::Worker;

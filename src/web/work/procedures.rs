@@ -1,26 +1,30 @@
 //! In: an order. Out: the procedure of `station` that carries it out, and what it came to.
 //! Frame and unit: as the procedures.
 
+use super::find::labels;
 use super::run::Run;
-use super::{calibrate, check, find, insert, scan};
-use crate::bench::way_times;
+use super::{calibrate, check, find, insert, scan, tune};
+use crate::bench::{WayTime, recorded, way_times};
 use crate::fault::Result;
 use crate::geometry::Vec3;
 use crate::gpu::Device;
 use crate::recording::Recording;
 use crate::rig::Rig;
-use crate::station::{RangeRun, measure_range};
+use crate::robot::Convention;
+use crate::station::{RangeRun, Settings, measure_range};
 use crate::web::guard::resolve;
-use crate::web::message::{BenchRow, Order, Outcome, SurfaceTouched, Touched};
+use crate::web::message::{BenchRow, Order, Outcome, SquareProposed, SurfaceTouched, Touched};
 
 /// Carries an order out.
 pub(super) fn run(this: &Run, order: &Order) -> Result<Outcome> {
     match order {
         Order::Check(_) => check::check(this),
         Order::Scan(ask) => scan::scan(this, ask),
+        Order::Filter(ask) => scan::filter(this, ask),
         Order::Find(ask) => find::find(this, ask),
         Order::Teach(ask) => find::teach(this, ask),
         Order::Touch(ask) => touch(this, &ask.recording),
+        Order::Tune(_) => tune::tune(this),
         Order::Calibrate(ask) => calibrate::calibrate(this, ask.target, &ask.recording, &ask.leave_out),
         Order::Joint(ask) => calibrate::joint(this, ask),
         Order::Auto(ask) => calibrate::auto(this, ask),
@@ -32,7 +36,8 @@ pub(super) fn run(this: &Run, order: &Order) -> Result<Outcome> {
 fn touch(this: &Run, recording: &str) -> Result<Outcome> {
     let place = &this.jobs.place;
     let recording = Recording::open(&resolve(&place.recordings, recording)?)?;
-    let run = RangeRun { one_surface: true, ..RangeRun::default() };
+    let settings = Settings::load(&place.station)?;
+    let run = RangeRun { one_surface: true, tool: settings.tool.map(|t| t.flange_from_tool), ..RangeRun::default() };
     let report = measure_range(&recording, &Rig::load(&place.station)?, &run)?;
     let surface = report.surface.map(|s| SurfaceTouched {
         normal: s.normal,
@@ -42,14 +47,22 @@ fn touch(this: &Run, recording: &str) -> Result<Outcome> {
         tilt_deg: Vec3::from(s.normal).angle(&Vec3::z()).to_degrees(),
         left_out: s.left_out,
     });
+    let convention = settings.robot.unwrap_or(Convention::Matrix);
+    let square = report.square.map(|q| SquareProposed {
+        tilt_deg: q.tilt_deg,
+        tilt_sigma_deg: q.tilt_sigma_deg,
+        convention: convention.name().into(),
+        labels: labels(convention),
+        flange: convention.write(&q.base_from_flange),
+        tool: convention.write(&q.base_from_tool),
+    });
     let spots = report.distances.into_iter().map(|d| (d.picture, d.along_axis_mm, d.along_axis_sigma_mm)).collect();
-    Ok(Outcome::Touch(Box::new(Touched { spots, surface, missing: report.missing, remarks: report.remarks })))
+    Ok(Outcome::Touch(Box::new(Touched { spots, surface, square, missing: report.missing, remarks: report.remarks })))
 }
 
 fn benchmark() -> Result<Outcome> {
     let device = Device::open().ok();
-    let rows = way_times(device.as_ref())?;
-    let rows =
-        rows.into_iter().map(|w| BenchRow { on: w.on, width: w.width, height: w.height, ms_per_shot: w.ms_per_shot });
-    Ok(Outcome::Benchmark { rows: rows.collect() })
+    let row = |w: WayTime| BenchRow { on: w.on, width: w.width, height: w.height, ms_per_shot: w.ms_per_shot };
+    let rows = way_times(device.as_ref())?.into_iter().map(row).collect();
+    Ok(Outcome::Benchmark { rows, recorded: recorded().into_iter().map(row).collect() })
 }

@@ -2,13 +2,14 @@
 //! Frame and unit: mm.
 
 use super::run::Run;
+use super::store::scan_of;
 use crate::fault::{Fault, Result};
 use crate::recording::Recording;
 use crate::rig::Rig;
 use crate::scan::{Extraction, GridOptions, Where};
-use crate::station::{ScanOptions, ScanReport, Settings, Watch, scan_recording};
+use crate::station::{ScanOptions, ScanReport, Settings, Watch, filter_scan, scan_recording};
 use crate::web::guard::resolve;
-use crate::web::message::{Frames, Outcome, ScanFigures, ScanOrder};
+use crate::web::message::{FilterOrder, Frames, Outcome, ScanFigures, ScanOrder};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
@@ -45,6 +46,13 @@ pub(super) fn scan(this: &Run, asked: &ScanOrder) -> Result<Outcome> {
     drop(frames);
     report.has_points()?;
     Ok(Outcome::Scan(Box::new(figures(report))))
+}
+
+/// A scan less what filters take away, in a job of its own.
+pub(super) fn filter(this: &Run, asked: &FilterOrder) -> Result<Outcome> {
+    let scan = scan_of(&this.jobs.place.jobs(), &this.jobs.get(&asked.scan)?)?;
+    let filters: Vec<_> = asked.filters.iter().map(|f| (*f).into()).collect();
+    Ok(Outcome::Scan(Box::new(figures(filter_scan(&scan, &filters, &this.folder.join("scan"))?))))
 }
 
 /// Counts frames and lets the pages' height map grow.

@@ -7,7 +7,7 @@ use crate::gpu::{Binding, Stage};
 use crate::raster::{Image, Mask};
 use crate::stages::frame;
 use crate::stages::frame::{PIXELS, PX_LOG2, SHARED, frame_of, tile_unpack};
-use crate::stages::listing::mask_index;
+use crate::stages::listing::{self, mask_index};
 use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
 
@@ -184,7 +184,7 @@ pub const STEP: Step = Step {
 pub(crate) fn copy_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, listing, list, mask, long] = b else { unreachable!() };
-    for &tile in &list[..listing[3] as usize] {
+    for &tile in &list[..listing[listing::COUNT] as usize] {
         for row in 0..8 {
             long[mask_index(&f, tile, row)] = mask[mask_index(&f, tile, row)];
         }
@@ -195,7 +195,7 @@ pub(crate) fn stage_twin(b: &mut [Vec<u32>], overrides: &[(&'static str, f64)]) 
     let f = frame_of(b);
     let px_log2 = overrides.iter().find(|o| o.0 == PX_LOG2).map_or(2, |o| o.1 as u32);
     let [_, image, listing, list, mask, lit, long] = b else { unreachable!() };
-    for &tile in &list[..listing[3] as usize] {
+    for &tile in &list[..listing[listing::COUNT] as usize] {
         let (tx, ty, shot) = tile_unpack(tile);
         let place = |x: i32, y: i32| (f.mask_word(shot, x as u32, y as u32), x as u32 % 32);
         let bit = |words: &[u32], x: i32, y: i32| {

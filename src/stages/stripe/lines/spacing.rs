@@ -7,12 +7,12 @@ use crate::gpu::{Binding, Stage};
 use crate::raster::Mask;
 use crate::stages::frame;
 use crate::stages::frame::{PX_LOG2, SHARED, frame_of, tile_unpack};
-use crate::stages::listing::mask_index;
+use crate::stages::listing::{self, mask_index};
 use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
 
 /// A run that goes on for longer has no middle that can be found from here: its pixels are counted from the picture's border.
-const FAR: i32 = 32;
+pub(in crate::stages) const FAR: i32 = 32;
 
 /// Up to here a skeleton hardly winds: 1.00 to 1.02 points a column.
 const NARROW_PX: f32 = 2.0;
@@ -90,7 +90,7 @@ pub const STEP: Step = Step {
 pub(crate) fn stage_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);
     let [_, listing, list, lit, mask, spaced] = b else { unreachable!() };
-    for &tile in &list[..listing[3] as usize] {
+    for &tile in &list[..listing[listing::COUNT] as usize] {
         let (tx, ty, shot) = tile_unpack(tile);
         let get = |x: i32, y: i32| {
             let inside = (0..f.width as i32).contains(&x) && (0..f.height as i32).contains(&y);

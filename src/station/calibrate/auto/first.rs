@@ -8,7 +8,7 @@ use crate::calibrate::hand_eye::closed::{Pair, agree};
 use crate::calibrate::hand_eye::options::Mount;
 use crate::calibrate::joint::start::{board, near_from_far};
 use crate::calibrate::measured_pose::SeenBoard;
-use crate::camera::{Distortion, Intrinsics, ParameterCovariance};
+use crate::camera::{CameraCovariance, Distortion, Intrinsics, Parameters};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid, Vec3};
 use crate::station::calibrate::joint::gather::Stop;
@@ -112,10 +112,9 @@ pub fn camera(stops: &[Stop], size: [u32; 2]) -> Result<Intrinsics> {
 
 /// What is known of any camera beforehand, so that few pictures do not run away: a principal point near the middle, a lens
 /// that bends moderately.
-pub fn usual(k: &Intrinsics) -> ParameterCovariance {
-    let mut c = ParameterCovariance::zeros();
+pub fn usual(k: &Intrinsics) -> CameraCovariance {
     let (w, h) = (f64::from(k.width), f64::from(k.height));
     let sigmas = [0.2 * k.fx, 0.2 * k.fx, 0.05 * w, 0.05 * h, 0.3, 0.5, 0.005, 0.005, 0.5];
-    sigmas.iter().enumerate().for_each(|(i, s)| c[(i, i)] = s * s);
-    c
+    let sigma = Parameters::from_fn(|i, _| sigmas.get(i).copied().unwrap_or(0.0));
+    CameraCovariance::independent(&sigma).expect("a camera's numbers are finite")
 }

@@ -7,4 +7,6 @@ pub(in crate::station) mod cell;
 pub(in crate::station) mod check;
 mod first;
 mod notebook;
+pub(in crate::station) mod options;
 pub(in crate::station) mod procedure;
+pub(in crate::station) mod result;

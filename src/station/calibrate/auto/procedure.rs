@@ -3,11 +3,13 @@
 //! Frame and unit: mm, rad, px (docs/math.md, Joint calibration (9), (10)).
 
 use super::super::joint::measure::{Finders, unjudged};
-use super::super::joint::run::{FirstCamera, JointResult, JointRun, calibrate_joint};
+use super::super::joint::run::{FirstCamera, JointResult, calibrate_joint};
 use super::cell::{Cell, Went};
 use super::check::{SelfCheck, check};
 use super::first;
 use super::notebook::Notebook;
+use super::options::AutoRun;
+use super::result::{AutoResult, Ended};
 use crate::calibrate::hand_eye::options::Mount;
 use crate::calibrate::joint::choose::{Belief, Looks, candidates, next};
 use crate::calibrate::joint::moved::moved;
@@ -18,34 +20,11 @@ use crate::calibrate::joint::start::{board, start};
 use crate::calibrate::joint::terms::flange;
 use crate::calibrate::joint::volume::places;
 use crate::calibrate::measured_pose::intrinsic_covariance;
-use crate::camera::{ALWAYS_NAMED, named};
+use crate::camera::ALWAYS_NAMED;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Board, Camera, Flange, Rigid};
 use crate::recording::BoardSpec;
-use crate::rig::{Rig, Verdict};
-use std::path::PathBuf;
-
-/// How [`calibrate_auto`] is run.
-#[derive(Clone, Debug)]
-pub struct AutoRun {
-    /// How pictures are measured and the result is judged.
-    pub joint: JointRun,
-    /// The board below the robot.
-    pub board: BoardSpec,
-    /// Where the recordings go: a folder that is new or empty.
-    pub out: PathBuf,
-    /// Expected error of a scanned point at which it is enough, mm rms; above 0.
-    pub target_mm: f64,
-    /// Poses at which pictures are taken at most, those of the check and those from which the board is not found included; 20..=200.
-    pub most: usize,
-    /// Depths between which points will be scanned, mm; where nobody states them a fifth to both sides of the board as it is
-    /// first seen.
-    pub working: Option<[f64; 2]>,
-    /// Poses among which each next one is chosen; 20..=2000.
-    pub candidates: usize,
-    /// Same seed, same poses.
-    pub seed: u64,
-}
+use crate::rig::Rig;
 
 /// Stops that no solve sees.
 const CHECKS: usize = 5;
@@ -65,34 +44,6 @@ const STUCK: usize = 12;
 const LIGHTS: usize = 10;
 /// It does not fall any more where so many stops have gained less than 2 %.
 const STALLED: usize = 8;
-
-/// Why no further stop was made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Ended {
-    /// The expected error is below the target.
-    Target,
-    /// The expected error does not fall any more.
-    Stalled,
-    /// As many stops as are allowed.
-    Most,
-    /// No pose from which the board can be seen may be gone to.
-    NoPose,
-}
-
-/// What [`calibrate_auto`] made.
-pub struct AutoResult {
-    /// The rig.
-    pub joint: JointResult,
-    /// Expected error of a scanned point after each stop of the solve, mm rms; the first is after the small moves.
-    pub expected_mm: Vec<f64>,
-    /// Stops that went into the solve.
-    pub stops: usize,
-    /// Why it ended.
-    pub ended: Ended,
-    /// On poses that no solve saw; `None` where none could be gone to.
-    pub check: Option<SelfCheck>,
-}
 
 /// The state between two stops.
 struct Session<'a> {
@@ -114,25 +65,6 @@ struct Session<'a> {
     /// Where the controller would not begin to go, and how many of these came one after the other.
     refused: Vec<Rigid<Base, Flange>>,
     stuck: usize,
-}
-
-impl AutoRun {
-    /// Refuses values out of the ranges that the fields state.
-    pub fn check(&self) -> Result<()> {
-        self.joint.asked.check()?;
-        let ranges = [
-            ("target_mm", self.target_mm, 1e-6, 1e3),
-            ("most", self.most as f64, 20.0, 200.0),
-            ("candidates", self.candidates as f64, 20.0, 2000.0),
-        ];
-        match ranges.iter().find(|(_, v, low, high)| !(low..=high).contains(&v)) {
-            Some((name, v, low, high)) => {
-                Err(Fault::usage(format!("{name} is {v}, {low} to {high} is allowed"))
-                    .next("choose a value in that range"))
-            }
-            None => Ok(()),
-        }
-    }
 }
 
 /// Calibrates camera, hand-eye, laser plane and pointer by itself. `told` hears of every stop: how many, and the error that is
@@ -171,42 +103,6 @@ pub fn calibrate_auto(cell: &mut dyn Cell, rig: &Rig, run: &AutoRun, told: &dyn 
     let mut result = AutoResult { joint, expected_mm: expected, stops, ended, check };
     result.judge(run, stranded);
     Ok(result)
-}
-
-impl AutoResult {
-    /// What the check and the end say goes into every record.
-    fn judge(&mut self, run: &AutoRun, stranded: Option<String>) {
-        let mut reasons: Vec<String> =
-            stranded.into_iter().map(|why| format!("the arm did not go back to where it began: {why}")).collect();
-        let mut worst = Verdict::Good;
-        let last = self.expected_mm.last().copied().unwrap_or(f64::INFINITY);
-        if last > run.target_mm {
-            let why = match self.ended {
-                Ended::Stalled => "more stops lower it no further",
-                Ended::NoPose => "no other pose from which the board is seen may be gone to",
-                _ => "no more stops are allowed",
-            };
-            reasons.push(format!("the target of {} mm is not reached ({last:.4} mm): {why}", run.target_mm));
-            worst = Verdict::Usable;
-        }
-        match &self.check {
-            Some(c) => {
-                reasons.push(format!(
-                    "{} poses that no solve saw: points lie {:.4} mm from the board (rms), {:.4} mm were expected",
-                    c.stops, c.off_mm, c.expected_mm
-                ));
-                if c.off_mm > 2.0 * c.expected_mm {
-                    worst = Verdict::Usable;
-                    reasons.push("that is more than twice what was expected: something is not in the model".into());
-                }
-            }
-            None => {
-                worst = Verdict::Usable;
-                reasons.push("it is not checked: no further pose may be gone to".into());
-            }
-        }
-        self.joint.remark(worst, &reasons);
-    }
 }
 
 impl<'a> Session<'a> {
@@ -514,16 +410,14 @@ fn solved(
 fn first_camera(book: &Notebook, size: [u32; 2], rig: &Rig) -> Result<FirstCamera> {
     let known = rig.camera.as_ref().filter(|c| [c.value.width, c.value.height] == size);
     let (value, covariance) = match known {
-        Some(c) if !named(&intrinsic_covariance(&c.covariance)).is_empty() => {
-            (c.value, intrinsic_covariance(&c.covariance))
-        }
-        _ => {
+        Some(c) => (c.value, intrinsic_covariance(&c.covariance)?),
+        None => {
             let value = first::camera(&book.stops, size)?;
             (value, first::usual(&value))
         }
     };
     let free: Vec<usize> =
-        (0..ALWAYS_NAMED).chain(named(&covariance).into_iter().filter(|i| *i >= ALWAYS_NAMED)).collect();
+        (0..ALWAYS_NAMED).chain(covariance.named().into_iter().filter(|i| *i >= ALWAYS_NAMED)).collect();
     let prior = Some(CameraPrior { mean: value.parameters(), covariance });
     Ok(FirstCamera { value, covariance, free, prior })
 }

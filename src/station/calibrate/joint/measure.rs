@@ -21,7 +21,7 @@ use crate::calibrate::laser_plane::views::StripePeak;
 use crate::calibrate::measured_pose::{MeasuredPose, SeenBoard, measure_view, pooled_factor};
 use crate::calibrate::pointer::solve::{PointerFit, SpotView, solve as solve_pointer};
 use crate::calibrate::pointer::spot::{SpotPicture, find_spots, hot_pixels};
-use crate::camera::{Intrinsics, ParameterCovariance};
+use crate::camera::{CameraCovariance, Intrinsics};
 use crate::fault::{Kind, Result};
 use crate::raster::Image;
 use crate::recording::Recording;
@@ -57,7 +57,7 @@ pub struct Finders<'a> {
     /// The camera that is roughly right.
     pub camera: &'a Intrinsics,
     /// Of its parameters.
-    pub covariance: &'a ParameterCovariance,
+    pub covariance: &'a CameraCovariance,
     /// Of the stripe.
     pub line: &'a LaserPlaneRun,
     /// Of the spot.

@@ -23,7 +23,7 @@ use crate::calibrate::measured_pose::intrinsic_covariance;
 use crate::calibrate::pointer::solve::PointerOptions;
 use crate::calibrate::pointer::spot::SpotOptions;
 use crate::calibrate::report::Page;
-use crate::camera::{Intrinsics, PARAMETERS, ParameterCovariance, named};
+use crate::camera::{CameraCovariance, Intrinsics, PARAMETERS};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Camera, Plane, Ray, Rigid, Vec3};
 use crate::recording::Recording;
@@ -117,7 +117,7 @@ impl JointResult {
 #[derive(Clone)]
 pub(in crate::station) struct FirstCamera {
     pub value: Intrinsics,
-    pub covariance: ParameterCovariance,
+    pub covariance: CameraCovariance,
     pub free: Vec<usize>,
     pub prior: Option<CameraPrior>,
 }
@@ -134,14 +134,13 @@ pub(in crate::station) fn first_camera(
         let pictures = || c.inputs.iter().filter(|(name, _)| !name.ends_with("meta.json"));
         (c.value.width, c.value.height) == (size[0], size[1]) && !pictures().any(|(_, hash)| ours.contains(hash))
     };
-    let given = rig.camera.as_ref().filter(other).and_then(|c| {
-        let covariance = intrinsic_covariance(&c.covariance);
-        let free = named(&covariance);
-        let known = free.iter().all(|&i| covariance[(i, i)] > 0.0);
-        known.then(|| CameraPrior { mean: c.value.parameters(), covariance }).map(|prior| (c.value, free, prior))
-    });
-    if let Some((value, free, prior)) = given {
-        return Ok(FirstCamera { value, covariance: prior.covariance, free, prior: Some(prior) });
+    if let Some(c) = rig.camera.as_ref().filter(other) {
+        let covariance = intrinsic_covariance(&c.covariance)?;
+        let free = covariance.named();
+        if free.iter().all(|&i| covariance[(i, i)] > 0.0) {
+            let prior = Some(CameraPrior { mean: c.value.parameters(), covariance });
+            return Ok(FirstCamera { value: c.value, covariance, free, prior });
+        }
     }
     let observe = |s: &super::gather::Stop| Observation {
         name: s.name.clone(),
@@ -156,7 +155,7 @@ pub(in crate::station) fn first_camera(
             .next("add a recording of boards that are tilted by 20 to 40 degrees and reach into the picture's corners")
     })?;
     let free = (0..PARAMETERS).filter(|i| !found.held.contains(i)).collect();
-    Ok(FirstCamera { value: found.intrinsics, covariance, free, prior: None })
+    Ok(FirstCamera { value: found.intrinsics, covariance: CameraCovariance::new(covariance)?, free, prior: None })
 }
 
 /// Solves for everything that the recordings show, in any order, as many as there are. `progress` is told (pictures done,

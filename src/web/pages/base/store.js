@@ -29,6 +29,8 @@ export function jobs(keep = () => true) {
   return [...store.jobs.values()].filter(keep).sort((a, b) => (a.id < b.id ? 1 : -1));
 }
 export const done = (procedure) => jobs((j) => j.order.procedure === procedure && j.state === "done");
+/** Finished scans, filtered ones too. */
+export const scans = () => jobs((j) => ["scan", "filter"].includes(j.order.procedure) && j.state === "done");
 export const busy = () => jobs((j) => j.state === "running" || j.state === "queued").length > 0;
 
 export function take(event) {

@@ -1,22 +1,27 @@
 // Calibrate: a target, a recording, or everything at once by moves of the robot; residuals a picture; old against new; accept.
 
-import { picture, post, url } from "../base/api.js";
-import { fill, h, num } from "../base/dom.js";
+import { get, picture, post, url } from "../base/api.js";
+import { fill, h, num, svg } from "../base/dom.js";
 import { jobs, store } from "../base/store.js";
 import { t } from "../base/text.js";
 import { operate, operating } from "../widgets/bar.js";
 import { byTheRobot } from "../widgets/auto.js";
+import { axisGauge } from "../widgets/axisgauge.js";
+import { gauges } from "../widgets/boards.js";
+import { livePicture } from "../widgets/live.js";
 import { attempt } from "../widgets/problem.js";
 import { choice, follow, order, panel, recordings, table } from "../widgets/parts.js";
 
-const TARGETS = { auto: "All at once, by the robot", joint: "All at once", camera: "Camera", hand_eye: "Hand-eye", laser_plane: "Laser plane", pointer: "Pointer" };
-const SUITS = { joint: (r) => r.board, camera: (r) => r.board, hand_eye: (r) => r.board && !r.beam, laser_plane: (r) => r.board && r.beam !== "pointer", pointer: (r) => r.board && r.beam !== "line" };
+const TARGETS = { auto: "All at once, by the robot", joint: "All at once", camera: "Camera", hand_eye: "Hand-eye", laser_plane: "Laser plane", pointer: "Pointer", axis: "Axis" };
+const SUITS = { joint: (r) => r.board, camera: (r) => r.board, hand_eye: (r) => r.board && !r.beam, laser_plane: (r) => r.board && r.beam !== "pointer", pointer: (r) => r.board && r.beam !== "line", axis: (r) => r.board && r.motion !== "robot" };
 
 export async function show(place, query) {
   const all = await recordings((r) => r.board);
   const named = store.jobs.get(query.get("job"));
   let target = query.get("target") ?? named?.order.target ?? { auto: "auto", joint: "joint" }[named?.order.procedure] ?? "camera", name = named?.order.recording, out = new Set(named?.order.leave_out ?? []);
-  const problem = h("div"), progress = h("div"), pictures = h("div"), verdict = h("div"), head = h("div", { class: "head" });
+  const problem = h("div"), progress = h("div"), pictures = h("div"), verdict = h("div", { class: "stack" }), held = h("div", { class: "stack" }), stops = h("div"), live = h("div"), head = h("div", { class: "head" });
+  const seen = gauges(held), ridden = axisGauge(stops);
+  let looks = 0;
   let follows = () => {}, result = null;
   const body = h("div", { class: "split" });
   let leave = () => {};
@@ -63,9 +68,23 @@ export async function show(place, query) {
           h("img", { src: picture(r.name, i, 200, r.beam ? undefined : "ambient"), alt: "", loading: "lazy" }),
           h("span", { class: v !== undefined && v === worst ? "poor-ink" : "" }, v === undefined ? `${i}` : `${i} · ${num(v, 4)}`));
       })));
+    corners(r);
+  }
+  /** Which corners were found in each picture, one after the other; gauges of what they cover. */
+  async function corners(r) {
+    const mine = ++looks;
+    seen.clear();
+    ridden.clear();
+    for (let i = 0; i < r.frames && mine === looks; i++) {
+      const v = await get(`/view?recording=${encodeURIComponent(r.name)}&frame=${i}`).catch(() => null);
+      if (!v || mine !== looks) continue;
+      if (!out.has(i)) { seen.add(v); ridden.add(v); }
+      pictures.querySelectorAll(".thumb")[i]?.append(svg("svg", { class: "over", viewBox: `0 0 ${v.width} ${v.height}`, preserveAspectRatio: "xMidYMid slice", "data-corners": v.corners.length, "aria-hidden": "true" }, v.corners.map(([x, y]) => svg("circle", { cx: x + 0.5, cy: y + 0.5, r: v.width / 110, class: "corner" }))));
+    }
   }
   const latest = () => {
     fill(verdict);
+    looks++;
     heads();
     leave();
     leave = () => {};
@@ -73,12 +92,15 @@ export async function show(place, query) {
       const moving = h("div", { class: "stack" });
       fill(body, moving, h("div", { class: "stack" }, verdict));
       leave = byTheRobot(moving, (j) => shown(j));
-    } else fill(body, panel(t("Pictures"), pictures), h("div", { class: "stack" }, verdict));
+    } else {
+      fill(body, panel(t("Pictures"), pictures), h("div", { class: "stack" }, target === "axis" ? panel(t("Stops of the axis"), stops) : target !== "joint" && panel(t("What the boards cover"), held), target !== "joint" && store.bar?.camera && panel(t("Camera"), live), verdict));
+      if (target !== "joint" && store.bar?.camera) leave = livePicture(live, undefined, seen.mark);
+    }
     const same = (j) => (target === "auto" || target === "joint" ? j.order.procedure === target : j.order.target === target && j.order.recording === name);
     const last = jobs((j) => j.state === "done" && same(j))[0];
     last ? shown(last) : thumbs();
   };
   fill(place, head, problem, progress, body);
   latest();
-  return () => { follows(); leave(); };
+  return () => { looks++; follows(); leave(); };
 }

@@ -1,12 +1,16 @@
 // Picture: the camera's newest picture with its peaks by fate, or a recording's, to the pixel; levels and how much of them is
-// saturated; the light along the stripe.
+// saturated; the stripe along its length; region and exposure by handle.
 
-import { bytes, picture } from "../base/api.js";
+import { bytes, get, picture } from "../base/api.js";
 import { fill, h, num, svg } from "../base/dom.js";
 import { store } from "../base/store.js";
 import { t } from "../base/text.js";
+import { exposure } from "../widgets/exposure.js";
 import { map } from "../widgets/map.js";
 import { choice, figures, panel, recordings } from "../widgets/parts.js";
+import { attempt } from "../widgets/problem.js";
+import { region } from "../widgets/region.js";
+import { stripe } from "../widgets/stripe.js";
 
 /** Fates of peaks by number (src/stages/peak/found.rs): word and colour. */
 const FATES = [["kept", "#3ddc84"], ["outside the working volume", "#5aa9ff"], ["faint", "#b0b0b0"], ["narrow", "#ff5ac8"], ["wide", "#ffb02e"], ["uncertain", "#c78bff"], ["steep", "#ff8a5a"], ["echo", "#ff5252"], ["without neighbour", "#ffe14d"], ["no point", "#7fd6d6"]];
@@ -19,12 +23,14 @@ export async function show(place) {
   const camera = store.bar?.camera;
   if (!list.length && !camera) return void fill(place, h("h1", {}, t("Picture")), h("p", { class: "quiet" }, t("There is no recording.")));
   let r = camera ? null : list.find((x) => x.name === sessionStorage.getItem("recording")) ?? list[0], frame = r ? Math.floor(r.frames / 2) : 0, turn = 0;
-  const box = h("div"), figs = h("div"), fates = h("div"), hist = h("div"), along = h("div"), head = h("div", { class: "head" });
+  const box = h("div"), figs = h("div"), fates = h("div"), hist = h("div"), along = h("div"), head = h("div", { class: "head" }), seen = h("div"), problem = h("div"), progress = h("div"), handles = h("div", { class: "stack" });
   const view = map(box, t("Picture"));
+  const area = await region(box, view, problem);
+  const light = camera ? await exposure(handles, progress, problem) : null;
   const slider = h("input", { type: "range", min: "0", "aria-label": t("Frame"), class: "grow", oninput: () => { frame = Number(slider.value); load(); } });
   const choices = [...(camera ? [["", t("Camera")]] : []), ...list.map((x) => [x.name, x.name])];
   const choose = (v) => { r = list.find((x) => x.name === v) ?? null; frame = r ? Math.floor(r.frames / 2) : 0; view.marks([]); fill(fates); heads(); r ? load() : live(); };
-  const heads = () => { slider.max = String((r?.frames ?? 1) - 1); slider.value = String(frame); slider.hidden = !r; fill(head, h("h1", {}, t("Picture")), choice(t("Recording"), choices, r?.name ?? "", choose), slider); };
+  const heads = () => { slider.max = String((r?.frames ?? 1) - 1); slider.value = String(frame); slider.hidden = !r; fill(head, h("h1", {}, t("Picture")), choice(t("Recording"), choices, r?.name ?? "", choose), slider, h("span", { class: "tools" }, h("button", { onclick: () => view.zoom(2), "aria-label": t("Enlarge") }, "+"), h("button", { onclick: () => view.zoom(0.5), "aria-label": t("Reduce") }, "−"), h("button", { onclick: () => view.fit() }, t("All")), ...area.tools), camera && h("button", { class: "main", id: "set-exposure", disabled: Boolean(r), onclick: () => light.tune() }, t("Set exposure"))); };
   async function load() {
     const mine = ++turn, image = new Image();
     image.src = picture(r.name, frame);
@@ -35,6 +41,8 @@ export async function show(place) {
     const px = g.getImageData(0, 0, width, height).data, grey = new Uint8Array(width * height);
     for (let i = 0; i < grey.length; i++) grey[i] = px[4 * i];
     show_(grey, width, height);
+    const ask = new URLSearchParams({ recording: r.name, frame: String(frame) });
+    await attempt(async () => { const look = await get(`/look?${ask}`); if (mine === turn) stripe(seen, look); }, problem);
   }
   /** The newest picture, again and again; one that is slow gets fewer. */
   async function live() {
@@ -58,6 +66,12 @@ export async function show(place) {
       if (took > FLUENT) await new Promise((go) => setTimeout(go, Math.min(1000, took * (store.bar?.running ? 10 : 1))));
     }
   }
+  /** What the newest picture shows is reckoned where the pictures are: once in a while is enough for people. */
+  const looks = setInterval(async () => {
+    if (r || !camera || document.hidden || store.bar?.running) return;
+    const look = await get("/camera/look").catch(() => null);
+    if (look && !r) stripe(seen, look);
+  }, 1500);
   let counted = 0;
   function show_(grey, width, height) {
     const reads = (p) => { const [u, v] = [Math.floor(p[0]), height - 1 - Math.floor(p[1])]; return `u ${u}  v ${v}  ${u >= 0 && v >= 0 && u < width && v < height ? grey[v * width + u] : "–"}`; };
@@ -82,8 +96,8 @@ export async function show(place) {
     fill(along, svg("svg", { class: "plot", viewBox: `0 0 ${width} 255`, preserveAspectRatio: "none", role: "img", "aria-label": t("Brightest level in each column") }, svg("polyline", { class: "curve", "vector-effect": "non-scaling-stroke", points: Array.from(peaks, (v, x) => `${x},${255 - v}`).join(" ") })));
   }
   place.classList.add("fit");
-  fill(place, head, h("div", { class: "split" }, h("section", { class: "panel fill" }, box), h("div", { class: "stack" }, panel(t("Levels"), figs), fates, panel(t("Histogram (logarithmic)"), hist), panel(t("Brightest level in each column"), along))));
+  fill(place, head, problem, progress, h("div", { class: "split" }, h("section", { class: "panel fill" }, box), h("div", { class: "stack" }, panel(t("Levels"), figs), fates, panel(t("Along the stripe"), seen), camera && panel(t("Camera"), handles), panel(t("Histogram (logarithmic)"), hist), panel(t("Brightest level in each column"), along))));
   heads();
   r ? await load() : live();
-  return () => { turn++; view.end(); };
+  return () => { turn++; clearInterval(looks); light?.end(); area.end(); view.end(); };
 }

@@ -10,6 +10,7 @@ import { arming, ask, gate, inTheCell } from "../widgets/ask.js";
 import { attempt, fault } from "../widgets/problem.js";
 import { choice, figure, figures, follow, nothing, order, panel, table } from "../widgets/parts.js";
 import { scanMap } from "../widgets/scanmap.js";
+import { cloud } from "../widgets/cloud.js";
 import { livePicture } from "../widgets/live.js";
 
 const moves = (j) => j.order.procedure === "insert";
@@ -19,26 +20,43 @@ const found = (j) => (j.state === "done" && j.order.procedure === "find" ? j.out
 export async function show(place, query) {
   const list = jobs(found), named = store.jobs.get(query.get("job"));
   const job = list.find((j) => j.id === named?.id) ?? list[0];
-  const drive = store.motion?.robot ? await insertion(named) : { ends: [] };
+  const drive = store.motion?.robot ? await insertion(named, job) : { ends: [] };
   const numbers = h("div", { class: "stack" }), picture = h("div", { class: "stack grow" });
   fill(place, h("div", { class: "head" }, h("h1", {}, t("Position")), job && choice(t("Found"), list.map((j) => [j.id, words(j)]), job.id, (id) => (location.hash = `#/position?job=${id}`))),
     drive.panel, job ? numbers : !drive.panel && nothing(t("No part was looked for yet."), "part", t("Part")));
   let view = null;
   if (job) {
     pose(numbers, job, picture);
-    if (job.order.procedure === "find") {
-      view = await scanMap(picture, job.order.scans[0]).catch((e) => void fill(picture, fault(e)));
-      const p = found(job);
-      view?.marks(p.outline.map((points) => ({ kind: "line", points, colour: p.passed ? "#ffffff" : "#ff5ac8", wide: 1.5 })));
-    } else fill(picture, h("img", { class: "wide", src: `/api/v1/jobs/${job.id}/files/insertion/found.png`, alt: t("The part as it was found") }));
+    if (job.order.procedure === "find") view = await seen(picture, job);
+    else fill(picture, h("img", { class: "wide", src: `/api/v1/jobs/${job.id}/files/insertion/found.png`, alt: t("The part as it was found") }));
   }
   return () => { view?.end(); drive.ends.forEach((end) => end()); };
 }
 
+/** The found part over its scan, from above or in three dimensions. */
+async function seen(place, job) {
+  const flat = h("div", { class: "stack grow" }), deep = h("div", { class: "stack grow", hidden: true }), p = found(job);
+  let map = null, solid = null;
+  const mode = async (three) => {
+    flat.hidden = three;
+    deep.hidden = !three;
+    for (const [i, b] of [...tools.children].entries()) b.setAttribute("aria-pressed", String(three === (i === 1)));
+    if (three) solid ??= await attempt(async () => cloud(deep, job.order.scans[0], (await get(`/jobs/${job.id}/outlines`)).lines));
+  };
+  const tools = h("div", { class: "tools", role: "group", "aria-label": t("Found") }, h("button", { "aria-pressed": "true", onclick: () => mode(false) }, t("Map")), h("button", { id: "three", "aria-pressed": "false", onclick: () => mode(true) }, "3-D"));
+  fill(place, tools, flat, deep);
+  map = await scanMap(flat, job.order.scans[0]).catch((e) => void fill(flat, fault(e)));
+  map?.marks(p.outline.map((points) => ({ kind: "line", points, colour: p.passed ? "#ffffff" : "#ff5ac8", wide: 1.5 })));
+  return { end() { map?.end(); solid?.end(); } };
+}
+
+/** The job whose part is drawn over the live picture: the one that asks for a motion at the part, else the one whose position is shown. */
+const drawn = (shown) => (["approach", "insert", "retract"].includes(store.motion?.asked?.step) ? store.motion.asked.job : store.bar?.running ? null : shown?.id ?? null);
+
 const words = (j) => `${j.id} · ${j.order.recipe}${j.order.scans ? ` · ${j.order.scans.join(" + ")}` : ""}${found(j).passed ? "" : ` · ${t("refused")}`}`;
 
 /** Recipe, arming, start; what waits; how far the job is. */
-async function insertion(named) {
+async function insertion(named, job) {
   const recipes = await get("/recipes"), simulated = store.motion.simulated;
   let name = simulated?.holds ?? sessionStorage.getItem("recipe") ?? recipes[0]?.name;
   const problem = h("div"), progress = h("div"), armed = h("div", { class: "stack" }), asked = h("div", { class: "stack ask" }), cell = h("div"), live = h("div"), start = h("div", { class: "stack" });
@@ -62,7 +80,7 @@ async function insertion(named) {
   let before = null;
   const again = () => { const state = JSON.stringify([store.motion.armed, store.bar?.running]); if (state !== before) { before = state; draw(); } };
   again();
-  const ends = [arming(armed), ask(asked), on("motion", again), on("bar", again), () => follows(), livePicture(live)];
+  const ends = [arming(armed), ask(asked), on("motion", again), on("bar", again), () => follows(), livePicture(live, () => drawn(job))];
   if (simulated) ends.push(inTheCell(cell, false, (s) => (name = s.holds)));
   const last = named && moves(named) ? named : jobs((j) => moves(j) && j.state !== "done")[0];
   if (last && (last.state !== "done" || named)) watch(last.id);

@@ -2,8 +2,9 @@
 
 import { bytes, get, post, remove } from "../base/api.js";
 import { fill, h, num, thousands } from "../base/dom.js";
-import { done, jobs, on } from "../base/store.js";
+import { jobs, on, scans as finished } from "../base/store.js";
 import { t } from "../base/text.js";
+import { batch } from "../widgets/batch.js";
 import { operate, operating, pageOf } from "../widgets/bar.js";
 import { span } from "../widgets/colour.js";
 import { map } from "../widgets/map.js";
@@ -12,7 +13,7 @@ import { choice, field, follow, order, panel } from "../widgets/parts.js";
 
 export async function show(place) {
   const info = await get("/station");
-  const problem = h("div"), progress = h("div"), list = h("div"), compared = h("div", { class: "stack" }), set = h("div", { class: "stack" });
+  const problem = h("div"), progress = h("div"), list = h("div"), compared = h("div", { class: "stack" }), set = h("div", { class: "stack" }), repeats = h("div", { class: "stack" });
   const ends = [];
   let follows = () => {};
   const changes = {};
@@ -33,16 +34,18 @@ export async function show(place) {
     fill(set, h("div", { class: "row" }, key, value, h("button", { onclick: add }, t("Add"))), h("div", { class: "row" }, Object.entries(changes).map(([k, v]) => h("button", { class: "plain", "aria-label": `${t("Undo")} ${k}`, onclick: () => { delete changes[k]; setting(); } }, `${k} = ${JSON.stringify(v)} ×`))));
   };
   setting();
-  const scans = done("scan");
+  const scans = finished();
   let [a, b] = [scans[1]?.id ?? scans[0]?.id, scans[0]?.id];
   const again = () => attempt(async () => {
-    const from = jobs((j) => j.id === b)[0];
+    let from = jobs((j) => j.id === b)[0];
+    // A filtered scan comes from one of a recording.
+    while (from?.order.procedure === "filter") from = jobs((j) => j.id === from.order.scan)[0];
     const job = await order({ ...from.order, settings: { ...from.order.settings, ...changes } });
     follows();
     follows = follow(progress, job.id, () => { const now = jobs((j) => j.id === job.id)[0]; a = from.id; b = now.id; chooser(); compare(); });
   }, problem);
   const pickers = h("div", { class: "row" });
-  const chooser = () => { const list = done("scan").map((j) => [j.id, `${j.id} · ${j.order.recording}${Object.keys(j.order.settings).length ? ` · ${Object.entries(j.order.settings).map(([k, v]) => `${k}=${v}`).join(", ")}` : ""}`]); fill(pickers, choice("A", list, a, (v) => (a = v)), choice("B", list, b, (v) => (b = v)), h("button", { id: "compare", onclick: compare }, t("Compare"))); };
+  const chooser = () => { const list = finished().map((j) => [j.id, `${j.id} · ${source(j)}${Object.keys(j.order.settings ?? {}).length ? ` · ${Object.entries(j.order.settings).map(([k, v]) => `${k}=${v}`).join(", ")}` : ""}`]); fill(pickers, choice("A", list, a, (v) => (a = v)), choice("B", list, b, (v) => (b = v)), h("button", { id: "compare", onclick: compare }, t("Compare"))); };
 
   async function compare() {
     ends.splice(0).forEach((end) => end());
@@ -63,7 +66,7 @@ export async function show(place) {
   }
 
   const csv = () => {
-    const cells = (j) => [j.id, j.order.procedure, source(j), j.state, j.seconds.toFixed(3), ...(j.order.procedure === "scan" && j.outcome ? [j.outcome.points, j.outcome.median_sigma_mm, j.outcome.coverage] : ["", "", ""]), ...(j.order.procedure === "find" && j.outcome ? [j.outcome.passed, j.outcome.score, ...j.outcome.sigma_mm, ...(j.outcome.poses?.insertion ?? [])] : [])];
+    const cells = (j) => [j.id, j.order.procedure, source(j), j.state, j.seconds.toFixed(3), ...(["scan", "filter"].includes(j.order.procedure) && j.outcome ? [j.outcome.points, j.outcome.median_sigma_mm, j.outcome.coverage] : ["", "", ""]), ...(j.order.procedure === "find" && j.outcome ? [j.outcome.passed, j.outcome.score, ...j.outcome.sigma_mm, ...(j.outcome.poses?.insertion ?? [])] : [])];
     const quote = (v) => { const s = String(v ?? ""); return /[",\n]/.test(s) || /^[=+@-]/.test(s) && Number.isNaN(Number(s)) ? `"${s.replaceAll('"', '""')}"` : s; };
     const text = [["job", "procedure", "from", "state", "seconds", "points", "median_sigma_mm", "coverage", "passed", "score", "sigma_x_mm", "sigma_y_mm", "sigma_z_mm", "pose"], ...jobs().map(cells)].map((r) => r.map(quote).join(",")).join("\r\n");
     const link = h("a", { href: URL.createObjectURL(new Blob([text], { type: "text/csv" })), download: "jobs.csv" });
@@ -73,12 +76,12 @@ export async function show(place) {
   fill(place, h("div", { class: "head" }, h("h1", {}, t("Replay")), h("span", { class: "grow" }), h("button", { onclick: csv }, "CSV"), h("button", { class: "main", id: "again", disabled: !scans.length, onclick: again }, t("Scan B again"))),
     problem, progress,
     scans.length > 0 && h("div", { class: "even" }, panel(t("Compare"), pickers), panel(t("Other settings for the next run"), set)),
-    compared, panel(t("Jobs"), list));
+    compared, panel(t("Batch and repeats"), repeats), panel(t("Jobs"), list));
   rows();
   chooser();
   if (scans.length > 1) compare();
-  const off = on("jobs", rows);
-  return () => { off(); follows(); ends.forEach((end) => end()); };
+  const off = on("jobs", rows), stop = await batch(repeats, () => changes, problem);
+  return () => { off(); stop(); follows(); ends.forEach((end) => end()); };
 }
 
 const source = (j) => j.order.recording ?? j.order.scans?.join(" + ") ?? j.order.scan ?? "";
@@ -86,7 +89,7 @@ const source = (j) => j.order.recording ?? j.order.scans?.join(" + ") ?? j.order
 function result(j) {
   const o = j.outcome;
   if (!o) return j.problem?.what ?? "";
-  if (j.order.procedure === "scan") return `${thousands(o.points)} ${t("points")}, σ ${num(o.median_sigma_mm, 4, "mm")}`;
+  if (["scan", "filter"].includes(j.order.procedure)) return `${thousands(o.points)} ${t("points")}, σ ${num(o.median_sigma_mm, 4, "mm")}`;
   if (j.order.procedure === "find") return `${o.recipe}: ${t(o.passed ? "found" : "refused")}, ${t("score")} ${num(o.score, 3)}`;
   return o.verdict ? t(o.verdict) : o.recipe ?? "";
 }

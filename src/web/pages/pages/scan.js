@@ -20,7 +20,9 @@ export async function show(place, query) {
   const watch = (id) => { follows(); fill(result); follows = follow(progress, id, ended); };
   const ended = (j) => fill(result, h("div", { class: "panel stack" }, h("h2", {}, `${j.id} · ${j.order.recording}`), scanFigures(j.outcome),
     j.outcome.remarks.map((r) => h("p", { class: "note small" }, r)),
-    h("div", { class: "row" }, h("a", { href: `#/surface?job=${j.id}`, id: "to-surface" }, t("Look at the surface")), h("a", { href: `#/part?job=${j.id}`, id: "to-part" }, t("Find a part")))));
+    h("div", { class: "row" }, h("a", { href: `#/surface?job=${j.id}`, id: "to-surface" }, t("Look at the surface")), h("a", { href: `#/part?job=${j.id}`, id: "to-part" }, t("Find a part")), j.order.procedure === "scan" && h("button", { id: "repeat", onclick: () => repeat(j) }, t("Repeat")))));
+  /** The same recording with the same settings once more. */
+  const repeat = (j) => attempt(async () => { const again = await order(j.order); sessionStorage.setItem("scan", again.id); watch(again.id); }, problem);
   const start = () => attempt(async () => {
     const mm = Number(cell.querySelector("input").value);
     const job = await order({ procedure: "scan", recording: chosen, on: on_, ...(mm > 0 ? { cell_mm: mm } : {}) });

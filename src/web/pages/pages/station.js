@@ -33,8 +33,11 @@ export async function show(place) {
         panel(t("Station"), table([t("Setting"), t("Value")], [
           [t("Poses are written as"), info.robot ?? "matrix"],
           [t("The work tolerates"), num(info.tolerance_mm, 3, "mm")],
+          [t("Scans and poses are in the frame"), t(info.work_frame)],
+          ...info.frames.map((f) => [`${t(f.name)} ${t("fixed to")} ${t(f.on)}`, h("span", { "data-frame": f.name }, f.numbers.map((v, i) => `${f.labels[i]} ${num(v, 3)}`).join("  "))]),
+          !info.frames.some((f) => f.name === "tool") && [t("tool"), t("not stated: [tool] in Settings")],
           [t("Working volume, camera depth"), info.volume_mm ? `${num(info.volume_mm[0], 0)} … ${num(info.volume_mm[1], 0, "mm")}` : t("where the boards of the laser plane stood")],
-        ]))),
+        ].filter(Boolean)))),
       panel(t("Checks"), checks)));
   list();
   const off = on("jobs", list);

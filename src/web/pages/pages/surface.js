@@ -4,6 +4,7 @@ import { post, url } from "../base/api.js";
 import { fill, h, num, withSigma } from "../base/dom.js";
 import { t } from "../base/text.js";
 import { cloud } from "../widgets/cloud.js";
+import { filters } from "../widgets/filters.js";
 import { section } from "../widgets/plot.js";
 import { attempt } from "../widgets/problem.js";
 import { nothing, panel, scanChoice, scanFigures, table } from "../widgets/parts.js";
@@ -15,7 +16,7 @@ export async function show(place, query) {
   const go = (id) => (location.hash = `#/surface?job=${id}`);
   const [choose, job] = scanChoice(query, go);
   if (!job) return void fill(place, h("h1", {}, t("Surface")), nothing(t("Nothing was scanned yet."), "scan", t("Scan")));
-  const picture = h("div", { class: "stack grow" }), solid = h("div", { hidden: true, class: "stack grow" }), line = h("div"), said = h("div"), problem = h("div");
+  const picture = h("div", { class: "stack grow" }), solid = h("div", { hidden: true, class: "stack grow" }), line = h("div"), said = h("div"), sieve = h("div", { class: "stack sieve" }), problem = h("div");
   const tools = h("div", { class: "tools", role: "group", "aria-label": t("Tools") });
   let view3 = null;
   const flat = h("button", { "aria-pressed": "true", onclick: () => mode(false) }, t("Map"));
@@ -26,12 +27,24 @@ export async function show(place, query) {
     problem,
     h("div", { class: "split" },
       h("section", { class: "panel fill stack" }, tools, picture, solid, line),
-      h("div", { class: "stack" }, panel(t("Measured"), said), panel(t("Figures"), scanFigures(job.outcome)),
+      h("div", { class: "stack" }, panel(t("Measured"), said), panel(t("Filters"), sieve), panel(t("Figures"), scanFigures(job.outcome)),
         panel(t("Take away"), h("div", { class: "row" }, FILES.map(([f, n]) => h("a", { href: url(`/jobs/${job.id}/files/${f}`), download: `${job.id}-${f.split("/")[1]}` }, n)))))));
   const view = await scanMap(picture, job.id);
   picture.lastChild.classList.add("map");
   fill(said, h("p", { class: "quiet small" }, t("Choose a tool above the map, then drag or click.")));
 
+  const kept = await filters(sieve, job.id, view.head, {
+    problem, saved: (j) => { sessionStorage.setItem("scan", j.id); go(j.id); },
+    changed: async () => {
+      await view.again();
+      // What was measured through other filters is not measured through these.
+      results.length = 0;
+      list();
+      view3?.end();
+      view3 = null;
+      if (!solid.hidden) await mode(true);
+    },
+  });
   const results = [];
   const keep = (words, detail, marks) => {
     results.unshift({ words, detail, marks });
@@ -79,8 +92,10 @@ export async function show(place, query) {
         measure({ measure: "point_to_plane", point: p, plane: [...a, ...b] }, [{ kind: "box", points: [a, b], colour: "#5ad1ff" }, { kind: "point", points: [p] }], t("Above the plane"));
       } });
     } },
+    cut: kept.cut,
+    keep: kept.keep,
   };
-  const words = { move: "Move", section: "Section", points: "Two points", plane: "Point to plane" };
+  const words = { move: "Move", section: "Section", points: "Two points", plane: "Point to plane", cut: "Cut out", keep: "Keep" };
   const select = (name) => {
     for (const b of tools.querySelectorAll("[data-tool]")) b.setAttribute("aria-pressed", String(b.dataset.tool === name));
     view.tool(choices[name]);
@@ -97,5 +112,5 @@ export async function show(place, query) {
     if (three && !view3) view3 = await attempt(() => cloud(solid, job.id), problem);
   }
   if (query.get("view") === "3d") await mode(true);
-  return () => { view.end(); view3?.end(); };
+  return () => { view.end(); view3?.end(); kept.end(); };
 }

@@ -30,8 +30,13 @@ void main() {
 }`;
 const FRAGMENT = `#version 300 es
 precision mediump float; in vec3 colour; out vec4 ink; void main() { ink = vec4(colour, 1.0); }`;
+const LINE = `#version 300 es
+in vec3 place; uniform mat4 view; void main() { gl_Position = view * vec4(place, 1.0); }`;
+const INK = `#version 300 es
+precision mediump float; uniform vec4 ink; out vec4 seen; void main() { seen = ink; }`;
 
-export async function cloud(place, id) {
+/** `lines`: outlines in the cloud's frame, mm, that lie over the points. */
+export async function cloud(place, id, lines = []) {
   const canvas = h("canvas", { tabindex: "0", role: "img", "aria-label": t("Points in three dimensions; arrows turn, + and − enlarge") });
   const read = h("div", { class: "read" }), box = h("div", { class: "map" }, canvas, read), tools = h("div", { class: "tools" });
   fill(place, tools, box);
@@ -43,7 +48,7 @@ export async function cloud(place, id) {
   let data = await load(id, FIRST);
   const g = (await get(`/scans/${id}/map`)).base_from_grid, up = [g[2], g[6], g[10]];
   const c = { yaw: 0.6, pitch: 0.9, far: 0, at: [0, 0, 0], by: 0, picked: null, budget: data.n, moving: false };
-  const program = link(gl), buffer = gl.createBuffer();
+  const program = link(gl, VERTEX, FRAGMENT), buffer = gl.createBuffer(), over = outlines(gl, lines, data.origin);
   const where = Object.fromEntries(["view", "up", "range", "size", "by"].map((n) => [n, gl.getUniformLocation(program, n)]));
   gl.useProgram(program);
   gl.enable(gl.DEPTH_TEST);
@@ -55,6 +60,10 @@ export async function cloud(place, id) {
   const upload = () => {
     gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
     gl.bufferData(gl.ARRAY_BUFFER, data.f, gl.STATIC_DRAW);
+    points();
+  };
+  const points = () => {
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
     [["place", 3, 0], ["sigma", 1, 12], ["light", 1, 16]].forEach(([name, n, offset]) => {
       const a = gl.getAttribLocation(program, name);
       if (a < 0) return;
@@ -88,17 +97,20 @@ export async function cloud(place, id) {
     const begun = performance.now(), n = c.moving ? Math.min(c.budget, data.n) : data.n;
     gl.viewport(0, 0, canvas.width, canvas.height);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.useProgram(program);
     gl.uniformMatrix4fv(where.view, false, matrix());
     gl.uniform3f(where.up, ...up);
     gl.uniform2f(where.range, ...range[c.by]);
     gl.uniform1i(where.by, c.by);
     gl.uniform1f(where.size, Math.max(1.5, Math.min(5, (canvas.height / Math.sqrt(n)) * 1.6 * (1.35 * size / c.far))));
     gl.drawArrays(gl.POINTS, 0, n);
+    if (over) { over.draw(matrix()); points(); }
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, new Uint8Array(4));
     const took = performance.now() - begun;
     if (c.moving) c.budget = Math.max(5000, Math.min(data.n, Math.round(c.budget * Math.max(0.5, Math.min(1.5, FRAME / took)))));
     else c.budget = Math.max(5000, Math.min(data.n, Math.round(n * Math.min(1, FRAME / took))));
     box.dataset.shown = String(n);
+    box.dataset.outlines = String(lines.length);
     box.dataset.drawn = String(Number(box.dataset.drawn ?? 0) + 1);
     const p = c.picked;
     read.textContent = `${thousands(n)} ${t("of")} ${thousands(data.all)} ${t("points")}` + (p === null ? "" : `\nx ${num(data.origin[0] + data.f[5 * p], 3)}  y ${num(data.origin[1] + data.f[5 * p + 1], 3)}  z ${num(data.origin[2] + data.f[5 * p + 2], 3)} mm  σ ${num(data.f[5 * p + 3], 4)} mm`);
@@ -156,9 +168,33 @@ async function load(id, most) {
   return { all, n, origin: [8, 16, 24].map((k) => head.getFloat64(k, true)), f: new Float32Array(b, 32, 5 * n) };
 }
 
-function link(gl) {
+/** Lines over the points: where points hide them they show faintly, because a found part lies in its own surface. */
+function outlines(gl, lines, origin) {
+  const ends = lines.flatMap((line) => line.slice(1).flatMap((p, i) => [...line[i], ...p].map((v, k) => v - origin[k % 3])));
+  if (!ends.length) return null;
+  const program = link(gl, LINE, INK), buffer = gl.createBuffer(), place = gl.getAttribLocation(program, "place");
+  gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+  gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(ends), gl.STATIC_DRAW);
+  return {
+    draw(view) {
+      gl.useProgram(program);
+      gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+      gl.enableVertexAttribArray(place);
+      gl.vertexAttribPointer(place, 3, gl.FLOAT, false, 12, 0);
+      gl.uniformMatrix4fv(gl.getUniformLocation(program, "view"), false, view);
+      for (const [hides, ink] of [[false, [0, 0.42, 0.47, 1]], [true, [0, 0.9, 1, 1]]]) {
+        hides ? gl.enable(gl.DEPTH_TEST) : gl.disable(gl.DEPTH_TEST);
+        gl.uniform4f(gl.getUniformLocation(program, "ink"), ...ink);
+        gl.drawArrays(gl.LINES, 0, ends.length / 3);
+      }
+      gl.enable(gl.DEPTH_TEST);
+    },
+  };
+}
+
+function link(gl, vertex, fragment) {
   const program = gl.createProgram();
-  for (const [kind, text] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
+  for (const [kind, text] of [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]]) {
     const s = gl.createShader(kind);
     gl.shaderSource(s, text);
     gl.compileShader(s);

@@ -14,8 +14,9 @@ function table(stops) {
 
 export const SCALES = { ordered: table(ORDERED), diverging: table(DIVERGING), grey: table([[18, 18, 18], [245, 245, 245]]) };
 
-/** Colours a field of numbers; NaN is the ground. With `cell` heights are shaded by light from the upper left. */
-export function paint(values, width, height, [low, high], scale, cell) {
+/** Colours a field of numbers; NaN is the ground. With `cell` heights are shaded by light from the upper left; with `lit`, a share of full light
+ * for each cell, by that. */
+export function paint(values, width, height, [low, high], scale, cell, lit) {
   const image = new ImageData(width, height), px = image.data, table = SCALES[scale];
   const by = 255 / (high - low || 1);
   for (let y = 0; y < height; y++) {
@@ -26,7 +27,7 @@ export function paint(values, width, height, [low, high], scale, cell) {
       px[to + 3] = 255;
       if (v !== v) { px[to] = 24; px[to + 1] = 27; px[to + 2] = 33; continue; }
       const k = 3 * Math.max(0, Math.min(255, ((v - low) * by) | 0));
-      const light = cell ? shade(values, i, x, y, width, height, cell) : 1;
+      const light = lit ? lit(i) : cell ? shade(values, i, x, y, width, height, cell) : 1;
       px[to] = table[k] * light; px[to + 1] = table[k + 1] * light; px[to + 2] = table[k + 2] * light;
     }
   }

@@ -48,6 +48,7 @@ export function map(place, label) {
     length.style.width = `${(mm * m.view.s) / ratio()}px`;
     length.textContent = `${mm} mm`;
     tell();
+    m.after?.();
   }
 
   function stroke({ kind, points, colour = "#fff", label: text, wide = 2 }) {
@@ -173,14 +174,14 @@ export function map(place, label) {
 
   return {
     /** Shows a layer: `head` has width, height and cell_mm; `colours` is ordered, grey or diverging. */
-    show(head, values, { range, unit = "mm", digits = 2, colours = "ordered", shaded = false, reads }) {
+    show(head, values, { range, unit = "mm", digits = 2, colours = "ordered", shaded = false, lit, reads }) {
       const same = m.head && m.head.width === head.width && m.head.height === head.height;
       Object.assign(m, { head, values, reads: reads ?? ((p) => { const v = m.values[index(p)]; return v === v && v !== undefined ? `x ${num(p[0], 2)}  y ${num(p[1], 2)}  ${num(v, digits + 1)} ${unit}` : `x ${num(p[0], 2)}  y ${num(p[1], 2)}  –`; }) });
       if (!same) m.view = null;
       off.width = head.width; off.height = head.height;
       m.pixels = null;
       const drawn = range[1] > range[0] ? range : [range[0], range[0] + 1];
-      off.getContext("2d", { willReadFrequently: true }).putImageData(paint(values, head.width, head.height, drawn, colours, shaded ? head.cell_mm : 0), 0, 0);
+      off.getContext("2d", { willReadFrequently: true }).putImageData(paint(values, head.width, head.height, drawn, colours, shaded ? head.cell_mm : 0, lit), 0, 0);
       legend(scale, drawn, unit, digits, colours);
       redraw();
     },
@@ -205,7 +206,9 @@ export function map(place, label) {
     tool(tool) { m.tool = tool; m.from = m.to = null; redraw(); },
     fit() { if (m.head) { fit(); redraw(); } },
     zoom(by) { if (m.view) zoom(by, canvas.width / 2, canvas.height / 2); },
-    index, toView: (p) => toView(p).map((v) => v / ratio()), canvas,
+    /** Called when the map has been drawn: what lies over it in elements of its own is put into place. */
+    after(put) { m.after = put; redraw(); },
+    index, toView: (p) => toView(p).map((v) => v / ratio()), toGrid: ([x, y]) => toGrid(x * ratio(), y * ratio()), head: () => m.head, ready: () => Boolean(m.view), canvas,
     end() { size.disconnect(); },
   };
 }

@@ -2,7 +2,7 @@
 
 import { get, picture, post } from "../base/api.js";
 import { fill, h, num, thousands } from "../base/dom.js";
-import { done, on, store } from "../base/store.js";
+import { on, scans, store } from "../base/store.js";
 import { t } from "../base/text.js";
 import { operate, operating } from "./bar.js";
 import { fault } from "./problem.js";
@@ -33,11 +33,11 @@ export function field(name, props, unit = "") {
 
 /** Finished scans, newest first; the one that the address names, else the newest. */
 export function scanChoice(query, changed) {
-  const list = done("scan");
+  const list = scans();
   const named = query.get("job") ?? sessionStorage.getItem("scan");
   const current = list.find((j) => j.id === named) ?? list[0];
   if (current) sessionStorage.setItem("scan", current.id);
-  const say = (j) => `${j.id} · ${j.order.recording} · ${thousands(j.outcome.points)} ${t("points")}`;
+  const say = (j) => `${j.id} · ${j.order.recording ?? `${j.order.scan}, ${t("filtered")}`} · ${thousands(j.outcome.points)} ${t("points")}`;
   return [choice(t("Scan"), list.map((j) => [j.id, say(j)]), current?.id, (id) => { sessionStorage.setItem("scan", id); changed(id); }), current];
 }
 export const nothing = (what, page, words) => h("div", { class: "panel" }, h("p", {}, what), h("a", { href: `#/${page}` }, words));

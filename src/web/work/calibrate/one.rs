@@ -15,8 +15,8 @@ use crate::rig::{Calibration, Kind, Measured, Quality, Rig, Verdict};
 use crate::scan::Where;
 use crate::station::volume::asked;
 use crate::station::{
-    HandEyeResult, HandEyeRun, LaserPlaneRun, PointerRun, Settings, calibrate_hand_eye, calibrate_laser_plane,
-    calibrate_pointer,
+    AxisRun, HandEyeResult, HandEyeRun, LaserPlaneRun, PointerRun, Settings, calibrate_axis, calibrate_hand_eye,
+    calibrate_laser_plane, calibrate_pointer,
 };
 use crate::web::guard::resolve;
 use crate::web::message::{CalibrationFigures, Job, JobState, Order, Outcome, Target};
@@ -57,6 +57,11 @@ pub(in crate::web::work) fn calibrate(this: &Run, target: Target, name: &str, le
             let run =
                 PointerRun { spots: Default::default(), solver: Default::default(), asked: asked(&settings, None) };
             let c = calibrate_pointer(&recording, &rig, &run, &progress)?;
+            keep(this, &c.calibration, &c.page, c.missing)
+        }
+        Target::Axis => {
+            let run = AxisRun { asked: asked(&settings, None), ..AxisRun::default() };
+            let c = calibrate_axis(&recording, &rig, &run, &progress)?;
             keep(this, &c.calibration, &c.page, c.missing)
         }
         Target::Camera | Target::HandEye => {
@@ -142,6 +147,7 @@ pub fn accept(jobs: &Jobs, job: &Job) -> Result<Job> {
         Some(Target::Camera) => store::<crate::camera::Intrinsics>(&folder, station)?,
         Some(Target::HandEye) => store::<crate::rig::HandEye>(&folder, station)?,
         Some(Target::LaserPlane) => store::<crate::geometry::Plane<crate::geometry::Camera>>(&folder, station)?,
+        Some(Target::Axis) => store::<crate::geometry::Axis>(&folder, station)?,
         Some(Target::Pointer) => store::<crate::geometry::Ray<crate::geometry::Camera>>(&folder, station)?,
     }
     jobs.put(&job)?;

@@ -2,18 +2,17 @@
 //! meanwhile are passed over and counted. A job that moves the robot borrows the camera: its pictures are shown then.
 //! Frame and unit: px of the picture, grey levels of 8 bits, ms.
 
-use super::message::Frames;
-use crate::capture::{
-    Account, CameraUri, Event, Fate, Fed, Feed, FeedOptions, Format, Mode, PictureSource, RawFormat, RoundTrip, now_ns,
-};
+use super::lent::Lent;
+use super::state::{Looked, State, Use, lock};
+use crate::capture::{CameraUri, Fate, Fed, Feed, FeedOptions, Format, Mode, PictureSource, RawFormat, now_ns};
 use crate::fault::{Fault, Result};
 use crate::rig::Rig;
 use crate::scan::{Live, Where};
 use crate::station::{Settings, volume};
-use std::collections::VecDeque;
+use crate::web::message::Frames;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 /// Waited for a picture at most so long before is looked whether to end.
@@ -25,51 +24,12 @@ const GIVEN_UP: Duration = Duration::from_secs(5);
 /// Delays that p50 and p99 are of.
 const DELAYS: usize = 512;
 
-/// A picture to look at.
-pub struct Looked {
-    /// Counts up with every picture that was measured.
-    pub number: u64,
-    /// Grey levels, 8 bits.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// Row by row from the top.
-    pub grey: Vec<u8>,
-    /// u, v and fate (0: kept) of each peak.
-    pub peaks: Vec<(f32, f32, u32)>,
-    /// From its last byte to its points, ms.
-    pub delay_ms: f32,
-}
-
-#[derive(Default)]
-struct State {
-    newest: Option<Arc<Looked>>,
-    account: Account,
-    measured: u64,
-    without_stripe: u64,
-    delays: VecDeque<f64>,
-    wrong: Option<String>,
-}
-
 /// A camera that is looked at.
 pub struct Camera {
     uri: CameraUri,
-    state: Arc<Mutex<State>>,
+    pub(super) state: Arc<Mutex<State>>,
     ended: Arc<AtomicBool>,
     use_: Arc<Use>,
-}
-
-/// Who has the camera.
-#[derive(Default)]
-struct Use {
-    /// A job wants it, or has it.
-    lent: AtomicBool,
-    /// It is looked at: its connection is open.
-    open: AtomicBool,
-}
-
-fn lock(state: &Mutex<State>) -> MutexGuard<'_, State> {
-    state.lock().unwrap_or_else(|e| e.into_inner())
 }
 
 impl Camera {
@@ -90,7 +50,7 @@ impl Camera {
                 }
                 uses.open.store(true, Ordering::SeqCst);
                 let ends = || end.load(Ordering::Relaxed) || uses.lent.load(Ordering::SeqCst);
-                let why = look(&parsed, raw, &station, &tell, &ends);
+                let why = open(&parsed, raw, &tell).and_then(|source| look(source, &station, &tell, &uses, &ends));
                 uses.open.store(false, Ordering::SeqCst);
                 if ends() {
                     continue;
@@ -108,34 +68,58 @@ impl Camera {
         Ok(Camera { uri, state, ended, use_ })
     }
 
-    /// The camera for a job, until what is given back is dropped; nobody else looks through it meanwhile, what it takes is shown.
+    /// The camera for a job that asks for each picture, until what is given back is dropped; nobody else looks through it meanwhile,
+    /// what it takes is shown.
     ///
     /// # Errors
     /// It is not there, is lent already, or is a pipe.
     pub fn lend(&self) -> Result<Box<dyn PictureSource>> {
+        let uri = match self.uri.clone() {
+            CameraUri::Cell { address, .. } => CameraUri::Cell { address, rate_hz: -1.0 },
+            uri => uri,
+        };
+        Ok(Box::new(self.borrowed(&uri, Arc::default())?))
+    }
+
+    /// The camera at its own pace, to be set; it is lost to who has it once `stop` is set.
+    ///
+    /// # Errors
+    /// Those of [`Camera::lend`].
+    pub fn lend_running(&self, stop: &Arc<AtomicBool>) -> Result<Box<dyn PictureSource>> {
+        Ok(Box::new(self.borrowed(&self.uri, stop.clone())?))
+    }
+
+    fn borrowed(&self, uri: &CameraUri, stop: Arc<AtomicBool>) -> Result<Lent> {
         if self.uri == CameraUri::Input {
-            return Err(Fault::refused("pictures of a pipe cannot be asked for when the arm stands")
+            return Err(Fault::refused("a pipe can neither be set nor asked for a picture")
                 .next("serve the screen with a camera that has an address"));
         }
         if self.use_.lent.swap(true, Ordering::SeqCst) {
             return Err(Fault::refused("another job has the camera").next("wait until it has ended"));
         }
-        let mut lent = Lent { inner: None, state: self.state.clone(), use_: self.use_.clone() };
+        // Whatever fails from here on gives it back.
+        let mut lent = Lent { inner: None, state: self.state.clone(), use_: self.use_.clone(), stop, set: false };
         let give_up = Instant::now() + GIVEN_UP;
         while self.use_.open.load(Ordering::SeqCst) && Instant::now() < give_up {
             std::thread::sleep(Duration::from_millis(5));
         }
-        let uri = match self.uri.clone() {
-            CameraUri::Cell { address, .. } => CameraUri::Cell { address, rate_hz: -1.0 },
-            uri => uri,
-        };
-        lent.inner = Some(uri.open(None)?);
-        Ok(Box::new(lent))
+        lent.inner = Some(open(uri, None, &self.state)?);
+        Ok(lent)
+    }
+
+    /// The station's settings or calibrations are other ones: the next picture is measured by them.
+    pub fn renew(&self) {
+        self.use_.renewed.store(true, Ordering::SeqCst);
     }
 
     /// The newest picture, if it is not the one of this number.
     pub fn other_than(&self, number: u64) -> Option<Arc<Looked>> {
         lock(&self.state).newest.as_ref().filter(|l| l.number != number).cloned()
+    }
+
+    /// When a picture's last byte came, ns of the host's clock; `None`: it is long gone.
+    pub fn moment(&self, number: u64) -> Option<u64> {
+        lock(&self.state).moments.iter().find(|(n, _)| *n == number).map(|(_, at)| *at)
     }
 
     /// Frames by what became of them, delays p50 and p99 in ms, what is wrong.
@@ -166,66 +150,45 @@ impl Drop for Camera {
     }
 }
 
-/// A camera that a job has.
-struct Lent {
-    inner: Option<Box<dyn PictureSource>>,
-    state: Arc<Mutex<State>>,
-    use_: Arc<Use>,
-}
-
-impl Lent {
-    fn source(&mut self) -> &mut dyn PictureSource {
-        &mut **self.inner.as_mut().expect("opened")
-    }
-}
-
-impl PictureSource for Lent {
-    fn format(&self) -> Format {
-        self.inner.as_ref().expect("opened").format()
-    }
-    fn name(&self) -> String {
-        self.inner.as_ref().expect("opened").name()
-    }
-    fn next(&mut self, within: Duration) -> Event {
-        let event = self.source().next(within);
-        if let Event::Picture(p) = &event {
-            let mut state = lock(&self.state);
-            let number = state.newest.as_ref().map_or(0, |l| l.number) + 1;
-            let (width, height, grey) = (p.image.width, p.image.height, p.image.to_u8());
-            state.newest = Some(Arc::new(Looked { number, width, height, grey, peaks: vec![], delay_ms: 0.0 }));
+/// Opens the camera, set as it was set from here.
+fn open(uri: &CameraUri, raw: Option<RawFormat>, state: &Mutex<State>) -> Result<Box<dyn PictureSource>> {
+    let mut source = uri.open(raw)?;
+    let (kept, known) = {
+        let state = lock(state);
+        (state.kept.clone(), state.features.is_some())
+    };
+    for (name, value) in kept {
+        if let Err(fault) = source.set(&name, &value) {
+            // Another camera by now, or one that is set elsewhere: it is looked through as it is.
+            let mut state = lock(state);
+            state.kept.retain(|(n, _)| *n != name);
+            state.wrong = Some(fault.what);
         }
-        event
     }
-    fn trigger(&mut self) -> Result<bool> {
-        self.source().trigger()
+    if !known {
+        let features = source.features().unwrap_or_default();
+        lock(state).features = Some(features);
     }
-    fn clock(&mut self) -> Result<Option<RoundTrip>> {
-        self.source().clock()
-    }
-}
-
-impl Drop for Lent {
-    fn drop(&mut self) {
-        self.inner = None;
-        self.use_.lent.store(false, Ordering::SeqCst);
-    }
+    Ok(source)
 }
 
 /// Measures the newest picture, and the next newest, until the source ends.
 fn look(
-    uri: &CameraUri,
-    raw: Option<RawFormat>,
+    source: Box<dyn PictureSource>,
     station: &Path,
     tell: &Mutex<State>,
+    uses: &Use,
     ends: &dyn Fn() -> bool,
 ) -> Result<()> {
-    let feed = Feed::start(uri.open(raw)?, FeedOptions { mode: Mode::Newest, ..FeedOptions::default() })?;
-    let mut live = begin(station, feed.format());
-    if let Err(fault) = &live {
-        lock(tell).wrong = Some(fault.what.clone());
-    }
+    let feed = Feed::start(source, FeedOptions { mode: Mode::Newest, ..FeedOptions::default() })?;
+    uses.renewed.store(true, Ordering::SeqCst);
+    let mut live = Err(Fault::input("no picture was measured yet").next("wait for the next picture"));
     let mut number = lock(tell).newest.as_ref().map_or(0, |l| l.number);
     while !ends() {
+        if uses.renewed.swap(false, Ordering::SeqCst) {
+            live = begin(station, feed.format());
+            lock(tell).wrong = live.as_ref().err().map(|fault| fault.what.clone());
+        }
         let picture = match feed.next(WITHIN) {
             Fed::Picture(picture) => picture,
             Fed::Quiet => continue,
@@ -236,8 +199,7 @@ fn look(
         };
         number += 1;
         let (image, came_ns) = (picture.image, picture.host_ns);
-        let (width, height, grey) = (image.width, image.height, image.to_u8());
-        let measured = live.as_mut().ok().map(|l| l.measure(number as u32, image)).transpose()?.flatten();
+        let measured = live.as_mut().ok().map(|l| l.measure(number as u32, image.clone())).transpose()?.flatten();
         feed.fate(Fate::Used);
         let peaks: Vec<_> = measured.iter().flat_map(|m| &m.peaks).map(|p| (p.u, p.v, p.flags & 0xff)).collect();
         let delay_ms = now_ns().saturating_sub(came_ns) as f64 * 1e-6;
@@ -247,7 +209,8 @@ fn look(
         } else {
             state.measured += 1;
         }
-        state.newest = Some(Arc::new(Looked { number, width, height, grey, peaks, delay_ms: delay_ms as f32 }));
+        state.taken(number, came_ns);
+        state.newest = Some(Arc::new(Looked { number, image, peaks, delay_ms: delay_ms as f32 }));
         state.delays.push_back(delay_ms);
         if state.delays.len() > DELAYS {
             state.delays.pop_front();

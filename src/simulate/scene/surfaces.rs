@@ -1,193 +1,17 @@
-//! In: a scene file (TOML) of blocks, cylinders, balls, boards and parts. Out: what rays hit and with
-//! which material, and how far a measured point is from the nearest surface.
-//! Frame and unit: scene frame, z up, mm; the file's keys are in docs/file-formats.md, Scene file.
+//! In: a scene file's content, or a board. Out: what rays hit and with which material, and how far a measured point is from the
+//! nearest surface.
+//! Frame and unit: scene frame, z up, mm.
 
-use super::pattern::Pattern;
-use super::solid::{Body, Cut, Shape};
+use super::spec::{FARTHEST, Material, PartSpec, SceneSpec, SolidSpec};
 use crate::fault::{Fault, Result};
-use crate::geometry::{Part, Rigid, Vec3};
+use crate::geometry::{Mat3, Part, Rigid, Vec3};
 use crate::recording::BoardSpec;
-use std::path::Path;
-
-/// Content of a scene file.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SceneSpec {
-    /// Shown in reports and written to truth.json.
-    pub name: String,
-    /// What the scan covers: x0, y0, x1, y1, mm.
-    pub region_mm: [f64; 4],
-    /// Height that the sheet meets on the optical axis, mm: the middle of the part's heights.
-    #[serde(default)]
-    pub focus_height_mm: f64,
-    /// Solids in the scene's own frame.
-    #[serde(default)]
-    pub solid: Vec<SolidSpec>,
-    /// Groups of solids, each in a frame of its own.
-    #[serde(default)]
-    pub part: Vec<PartSpec>,
-}
-
-/// Solids that belong together, in a frame of their own that truth.json reports.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PartSpec {
-    /// As truth.json reports it.
-    pub name: String,
-    /// The part's origin in the scene, mm.
-    pub at_mm: [f64; 3],
-    /// Turn about z, degrees.
-    #[serde(default)]
-    pub turn_deg: f64,
-    /// Then tilts about the scene's x and y, degrees.
-    #[serde(default)]
-    pub tilt_deg: [f64; 2],
-    /// Solids in the part's frame.
-    #[serde(default)]
-    pub solid: Vec<SolidSpec>,
-}
-
-/// A convex shape with cut-outs. `at_mm` is the middle of its top face.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SolidSpec {
-    /// Its outer shape.
-    pub shape: ShapeSpec,
-    /// Middle of the top face in the scene, or in the part that it belongs to, mm.
-    pub at_mm: [f64; 3],
-    /// Turn about z, degrees.
-    #[serde(default)]
-    pub turn_deg: f64,
-    /// Of all its faces, cut-outs included.
-    #[serde(default)]
-    pub material: Material,
-    /// Holes and pockets; none unless stated.
-    #[serde(default)]
-    pub cut: Vec<CutSpec>,
-    /// Copies [along x, along y] ...
-    #[serde(default = "one")]
-    pub repeat: [u32; 2],
-    /// ... this far apart, centred on `at_mm`.
-    #[serde(default)]
-    pub pitch_mm: [f64; 2],
-}
-
-/// A cut-out; `at_mm` is the middle of its opening in the solid's frame.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CutSpec {
-    /// Shape of what is taken away.
-    pub shape: ShapeSpec,
-    /// Middle of the opening, origin in the middle of the solid's top face, mm; that middle unless stated.
-    #[serde(default)]
-    pub at_mm: [f64; 3],
-    /// Turn about z, degrees.
-    #[serde(default)]
-    pub turn_deg: f64,
-    /// Copies [along x, along y]; one unless stated.
-    #[serde(default = "one")]
-    pub repeat: [u32; 2],
-    /// Distance of the copies [along x, along y], mm; they are centred on `at_mm`.
-    #[serde(default)]
-    pub pitch_mm: [f64; 2],
-}
-
-fn one() -> [u32; 2] {
-    [1, 1]
-}
-
-/// A shape; sizes are 0.001..=100000 mm, and it lies below its top face at z = 0.
-#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum ShapeSpec {
-    /// Size x, y, z.
-    Block {
-        /// Size along x, y, z, mm.
-        size_mm: [f64; 3],
-    },
-    /// A block whose top falls by `drop_mm` from its -x to its +x side.
-    Wedge {
-        /// Size along x, y, z, mm; z at the high side.
-        size_mm: [f64; 3],
-        /// How far the top falls, mm; less than the size along z.
-        drop_mm: f64,
-    },
-    /// An upright cylinder.
-    Cylinder {
-        /// Across, mm.
-        diameter_mm: f64,
-        /// From top to bottom, mm.
-        depth_mm: f64,
-    },
-    /// A frustum: a funnel as a cut-out.
-    Cone {
-        /// Diameter of the top, mm.
-        top_mm: f64,
-        /// Diameter of the bottom, mm.
-        bottom_mm: f64,
-        /// From top to bottom, mm.
-        depth_mm: f64,
-    },
-    /// A ball that touches z = 0 from below.
-    Ball {
-        /// Across, mm.
-        diameter_mm: f64,
-    },
-}
-
-/// How a surface throws light back.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Material {
-    /// Diffuse share, 0..=1.
-    pub albedo: f64,
-    /// Share thrown back as by a mirror, 0..=1; gives false stripes on what stands beside it.
-    pub mirror: f64,
-    /// Strength of the gloss seen by the camera, 0..=20, relative to a white matte surface ...
-    pub gloss: f64,
-    /// ... and its Phong exponent, 1..=500: larger is narrower.
-    pub gloss_exponent: f64,
-}
-
-impl Default for Material {
-    fn default() -> Self {
-        Material { albedo: 0.6, mirror: 0.0, gloss: 0.0, gloss_exponent: 40.0 }
-    }
-}
-
-impl ShapeSpec {
-    fn build(&self) -> Result<Shape> {
-        let block =
-            |s: [f64; 3], drop| (Shape::Block { half: [s[0] / 2.0, s[1] / 2.0], depth: s[2], drop }, s.to_vec());
-        let (shape, sizes) = match *self {
-            ShapeSpec::Block { size_mm } => block(size_mm, 0.0),
-            ShapeSpec::Wedge { size_mm, drop_mm } => {
-                let (shape, mut sizes) = block(size_mm, drop_mm);
-                sizes.extend([drop_mm, size_mm[2] - drop_mm]);
-                (shape, sizes)
-            }
-            ShapeSpec::Cylinder { diameter_mm: d, depth_mm: depth } => {
-                (Shape::Cone { top: d / 2.0, bottom: d / 2.0, depth }, vec![d, depth])
-            }
-            ShapeSpec::Cone { top_mm, bottom_mm, depth_mm: depth } => {
-                (Shape::Cone { top: top_mm / 2.0, bottom: bottom_mm / 2.0, depth }, vec![top_mm, bottom_mm, depth])
-            }
-            ShapeSpec::Ball { diameter_mm: d } => (Shape::Ball { radius: d / 2.0 }, vec![d]),
-        };
-        match sizes.iter().find(|s| !(1e-3..=1e5).contains(*s)) {
-            Some(bad) => Err(Fault::input(format!("a {self:?} has a size of {bad} mm, allowed 0.001..=100000"))
-                .cause("a missing or negative size in the scene file")
-                .next("correct the shape")),
-            None => Ok(shape),
-        }
-    }
-}
+use crate::simulate::pattern::Pattern;
+use crate::simulate::solid::{Body, Cut, Shape};
 
 /// Most copies of one solid, or cuts in it; most of both in a scene.
 const MOST_COPIES: u64 = 10_000;
 const MOST_BODIES: u64 = 100_000;
-/// Largest coordinate, mm, and turn, degrees.
-const FARTHEST: f64 = 1e5;
 
 /// Places of the copies, centred on the origin.
 fn copies(repeat: [u32; 2], pitch: [f64; 2]) -> impl Iterator<Item = Vec3> {
@@ -200,7 +24,7 @@ fn copies(repeat: [u32; 2], pitch: [f64; 2]) -> impl Iterator<Item = Vec3> {
 struct Placed {
     body: Body,
     /// Scene from body.
-    rotation: crate::geometry::Mat3,
+    rotation: Mat3,
     at: Vec3,
     centre: Vec3,
     radius: f64,
@@ -240,46 +64,11 @@ pub struct Scene {
     bodies: Vec<Placed>,
 }
 
-impl SceneSpec {
-    /// Reads and checks a scene file.
-    pub fn load(path: &Path) -> Result<SceneSpec> {
-        let text = crate::files::read_text(path)?;
-        SceneSpec::parse(&text).map_err(|e| e.at(path.display()))
-    }
-    /// Reads and checks a scene file's text; the solids are checked by [`Scene::new`].
-    pub fn parse(text: &str) -> Result<SceneSpec> {
-        let spec: SceneSpec = toml::from_str(text).map_err(|e| {
-            Fault::input(format!("is not a scene file: {e}"))
-                .cause(crate::files::slip_at(text, e.span().map_or(0, |s| s.start), "a misspelt key or a missing size"))
-                .next("compare it with docs/file-formats.md, Scene file")
-        })?;
-        let [x0, y0, x1, y1] = spec.region_mm;
-        let span = |low: f64, high: f64| (0.1..=FARTHEST).contains(&(high - low));
-        if !(span(x0, x1) && span(y0, y1)) {
-            return Err(Fault::input(format!(
-                "region_mm {:?} spans less than 0.1 or more than {FARTHEST} mm",
-                spec.region_mm
-            ))
-            .next("give x0, y0, x1, y1 with x0 < x1 and y0 < y1"));
-        }
-        Ok(spec)
-    }
-}
-
-impl PartSpec {
-    /// Rotation and translation, mm: part frame to scene frame.
-    pub fn scene_from_part(&self) -> (crate::geometry::Mat3, Vec3) {
-        let axis = |v: Vec3, deg: f64| crate::geometry::exp(&(v * deg.to_radians()));
-        let r = axis(Vec3::y(), self.tilt_deg[1]) * axis(Vec3::x(), self.tilt_deg[0]) * axis(Vec3::z(), self.turn_deg);
-        (r, Vec3::from(self.at_mm))
-    }
-}
-
 impl Scene {
     /// Refuses senseless sizes and materials, too many solids, and a scene that holds nothing.
     pub fn new(spec: SceneSpec) -> Result<Scene> {
         let mut bodies = Vec::new();
-        let world = (crate::geometry::Mat3::identity(), Vec3::zeros());
+        let world = (Mat3::identity(), Vec3::zeros());
         for solid in &spec.solid {
             place(&mut bodies, solid, &world, None)?;
         }
@@ -313,7 +102,7 @@ impl Scene {
         let at = Vec3::new(middle[0], -middle[1], 0.0);
         let placed = Placed {
             body: Body { shape: Shape::Block { half, depth: 3.0, drop: 0.0 }, cuts: vec![] },
-            rotation: crate::geometry::Mat3::identity(),
+            rotation: Mat3::identity(),
             at,
             centre: at,
             radius: half[0].hypot(half[1]) + 3.0,
@@ -365,13 +154,13 @@ impl Scene {
     pub fn with_board(
         mut self,
         board: &BoardSpec,
-        rotation: &crate::geometry::Mat3,
+        rotation: &Mat3,
         at: &Vec3,
         white: f64,
         black: f64,
     ) -> Result<Scene> {
         // The board's own scene has its z out of the board.
-        let out_of_board = crate::geometry::Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0));
+        let out_of_board = Mat3::from_diagonal(&Vec3::new(1.0, -1.0, -1.0));
         for mut placed in Scene::of_board(board, white, black)?.bodies {
             placed.rotation = rotation * out_of_board * placed.rotation;
             for place in [&mut placed.at, &mut placed.centre] {
@@ -389,12 +178,7 @@ impl Scene {
     }
 }
 
-fn place(
-    out: &mut Vec<Placed>,
-    solid: &SolidSpec,
-    frame: &(crate::geometry::Mat3, Vec3),
-    part: Option<usize>,
-) -> Result<()> {
+fn place(out: &mut Vec<Placed>, solid: &SolidSpec, frame: &(Mat3, Vec3), part: Option<usize>) -> Result<()> {
     let m = solid.material;
     let ranges = [(m.albedo, 1.0), (m.mirror, 1.0), (m.gloss, 20.0), (m.gloss_exponent, 500.0)];
     if let Some((value, most)) = ranges.iter().find(|(v, most)| !(0.0..=*most).contains(v)) {

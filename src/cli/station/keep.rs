@@ -1,0 +1,91 @@
+//! In: a station. Out: its settings changed by name, all that was chosen and measured of it in one file, and the way back.
+//! Frame and unit: as docs/file-formats.md says of each setting.
+
+use crate::cli::terminal::console::Console;
+use crate::cli::terminal::outputs;
+use crate::cli::terminal::outputs::Inputs;
+use crate::fault::{Fault, Result};
+use crate::station::{Backup, back_up_here, edited};
+use serde_json::Value;
+use std::path::PathBuf;
+
+/// Change settings of station.toml by their names; comments and all else in it stay
+///
+/// Names with dots: robot, tolerance_mm, working_volume.near_mm, motion.speed_mm_s, extraction.threshold.minimum. A name with nothing
+/// behind the = takes the setting out. What a station cannot have is refused, and nothing is changed then.
+#[derive(clap::Args)]
+#[command(after_help = "Example:
+  sheetlight station set robot=ur tolerance_mm=0.05 motion.speed_mm_s=40 --station cell3")]
+pub struct Set {
+    /// NAME=VALUE, several times
+    #[arg(required = true)]
+    settings: Vec<String>,
+    /// Station folder
+    #[arg(long)]
+    station: PathBuf,
+}
+
+/// Write settings, calibrations, recipes and boards of a station into one file
+#[derive(clap::Args)]
+#[command(after_help = "Example:
+  sheetlight station backup --station cell3 --out cell3.json")]
+pub struct BackUp {
+    /// Station folder
+    #[arg(long)]
+    station: PathBuf,
+    /// File for the backup (JSON)
+    #[arg(long)]
+    out: PathBuf,
+}
+
+/// Put a station into the state of a backup; jobs stay, and the present state is backed up into its folder backups
+#[derive(clap::Args)]
+#[command(after_help = "Example:
+  sheetlight station restore cell3.json --station cell3")]
+pub struct Restore {
+    /// File that sheetlight station backup wrote
+    backup: PathBuf,
+    /// Station folder; made where there is none
+    #[arg(long)]
+    station: PathBuf,
+}
+
+pub fn set(args: &Set, console: &Console) -> Result<()> {
+    let path = args.station.join("station.toml");
+    let text = crate::files::read_text(&path)?;
+    let changes = args.settings.iter().map(|s| {
+        let (name, value) = s.split_once('=').ok_or_else(|| {
+            Fault::usage(format!("'{s}' has no =")).next("write NAME=VALUE, for example tolerance_mm=0.05")
+        })?;
+        let text = || Value::String(value.to_owned());
+        let value = if value.is_empty() { Value::Null } else { serde_json::from_str(value).unwrap_or_else(|_| text()) };
+        Ok((name.trim().to_owned(), value))
+    });
+    let new = edited(&text, &changes.collect::<Result<_>>()?).map_err(|e| e.at(path.display()))?;
+    crate::files::write(&path, new.as_bytes())?;
+    console.result(&args.settings, &format!("{}: changed", path.display()));
+    Ok(())
+}
+
+pub fn back_up(args: &BackUp, console: &Console) -> Result<()> {
+    outputs::check(&[&args.out], &Inputs { station: Some(&args.station), ..Inputs::default() })?;
+    let backup = Backup::of(&args.station)?;
+    backup.store(&args.out)?;
+    let names: Vec<&String> = backup.files.keys().collect();
+    console.result(&names, &format!("{}: {} files of '{}'", args.out.display(), names.len(), backup.station));
+    Ok(())
+}
+
+pub fn restore(args: &Restore, console: &Console) -> Result<()> {
+    let backup = Backup::load(&args.backup)?;
+    if args.station.join("station.toml").exists() {
+        let name = back_up_here(&args.station, "before-restore")?;
+        console.say(format!("the present state is in {}", args.station.join("backups").join(name).display()));
+    }
+    backup.restore(&args.station)?;
+    console.result(
+        &backup.files.keys().collect::<Vec<_>>(),
+        &format!("{}: as it was at {}", args.station.display(), backup.created),
+    );
+    Ok(())
+}

@@ -1,0 +1,222 @@
+//! In: camera, laser plane, lines across the stripe. Out: them in f32 as the stage that makes points uses them, and its uniform block.
+//! Frame and unit: camera frame, px, mm; each field says.
+
+use super::choose::Lines;
+use crate::camera::{Distortion, Intrinsics};
+use crate::geometry::{Camera, Plane};
+
+/// Camera and laser plane as the stage uses them: f32, the camera's frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Optics {
+    /// fx, fy, cx, cy, skew; px.
+    pub pinhole: [f32; 5],
+    /// k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4.
+    pub distortion: [f32; 12],
+    /// From the tilted sensor back to the plane that the lens draws on, rows one below the other.
+    pub untilt: [f32; 9],
+    /// normal · X = offset, mm; the offset is positive.
+    pub normal: [f32; 3],
+    /// Distance of the plane from the camera's centre, mm.
+    pub offset: f32,
+}
+
+impl Optics {
+    /// Rounded to f32; the plane's normal is turned so that its offset is positive.
+    pub fn new(camera: &Intrinsics, laser: &Plane<Camera>) -> Optics {
+        let laser = if laser.offset < 0.0 { laser.flipped() } else { *laser };
+        Optics {
+            pinhole: [camera.fx, camera.fy, camera.cx, camera.cy, camera.skew].map(|v| v as f32),
+            distortion: std::array::from_fn(|i| camera.distortion[i] as f32),
+            untilt: untilt(&camera.distortion),
+            normal: [laser.normal.x as f32, laser.normal.y as f32, laser.normal.z as f32],
+            offset: laser.offset as f32,
+        }
+    }
+    /// Brown-Conrady's five terms say all about the lens: the stage leaves the others out.
+    #[inline]
+    pub fn plain(&self) -> bool {
+        self.distortion[5..].iter().all(|t| *t == 0.0) && self.untilt == FLAT
+    }
+    /// The value of the override [`super::point::FULL_LENS`].
+    pub fn full_lens(&self) -> f64 {
+        f64::from(u8::from(!self.plain()))
+    }
+    /// Unit image direction in which the stripe moves with depth: the plane's normal without its z component.
+    pub fn across(&self) -> [f32; 2] {
+        let [x, y, _] = self.normal;
+        let l = (x * x + y * y).sqrt();
+        if l > 1e-6 { [x / l, y / l] } else { [0.0, 1.0] }
+    }
+}
+
+/// No tilt.
+pub const FLAT: [f32; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+
+fn untilt(lens: &Distortion) -> [f32; 9] {
+    let back = lens.tilt().and_then(|t| t[0].try_inverse());
+    // Row 3 column 3 near 1: the map is one of rays, its scale is free.
+    back.map_or(FLAT, |t| std::array::from_fn(|i| (t[(i / 3, i % 3)] / t.m33) as f32))
+}
+
+/// The uniform block of the stage; the WGSL struct of the same name, shaders/point.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct PointFrame {
+    /// Focal length along the rows, px.
+    pub fx: f32,
+    /// Focal length along the columns, px.
+    pub fy: f32,
+    /// Principal point, px from the middle of the left column.
+    pub cx: f32,
+    /// Principal point, px from the middle of the top row.
+    pub cy: f32,
+    /// Shear of the pixel grid: u grows by so many px as y grows by 1 on the plane z = 1.
+    pub skew: f32,
+    /// Radial distortion, numerator: r².
+    pub k1: f32,
+    /// Radial distortion, numerator: r⁴.
+    pub k2: f32,
+    /// Tangential distortion: 2 xy along the rows, r² + 2 y² along the columns.
+    pub p1: f32,
+    /// Tangential distortion: r² + 2 x² along the rows, 2 xy along the columns.
+    pub p2: f32,
+    /// Radial distortion, numerator: r⁶.
+    pub k3: f32,
+    /// Radial distortion, denominator: r².
+    pub k4: f32,
+    /// Radial distortion, denominator: r⁴.
+    pub k5: f32,
+    /// Radial distortion, denominator: r⁶.
+    pub k6: f32,
+    /// Thin prism along the rows: r².
+    pub s1: f32,
+    /// Thin prism along the rows: r⁴.
+    pub s2: f32,
+    /// Thin prism along the columns: r².
+    pub s3: f32,
+    /// Thin prism along the columns: r⁴.
+    pub s4: f32,
+    /// Rows of [`Optics::untilt`].
+    pub t0: f32,
+    /// Row 1, column 2.
+    pub t1: f32,
+    /// Row 1, column 3.
+    pub t2: f32,
+    /// Row 2, column 1.
+    pub t3: f32,
+    /// Row 2, column 2.
+    pub t4: f32,
+    /// Row 2, column 3.
+    pub t5: f32,
+    /// Row 3, column 1.
+    pub t6: f32,
+    /// Row 3, column 2.
+    pub t7: f32,
+    /// Row 3, column 3.
+    pub t8: f32,
+    /// The laser plane's unit normal, camera frame: x.
+    pub normal_x: f32,
+    /// The laser plane's unit normal, camera frame: y.
+    pub normal_y: f32,
+    /// The laser plane's unit normal, camera frame: z.
+    pub normal_z: f32,
+    /// Distance of the laser plane from the camera's centre, mm.
+    pub offset: f32,
+    /// Bits of the number that stands for no point; a shader cannot write them down.
+    pub none: u32,
+    /// As in [`Lines`].
+    pub lines: u32,
+    /// As in [`Lines`].
+    pub columns: u32,
+    /// As in [`Lines`], px.
+    pub line_px: u32,
+    /// [`Lines::reach`], lines.
+    pub echo_reach: i32,
+    /// As in [`Lines`], 0..=1.
+    pub echo: f32,
+    /// As in [`Lines`], px.
+    pub cut_width: f32,
+    /// As in [`Lines`], 0..=1.
+    pub cut_amplitude: f32,
+    /// Always 0: fills the block to a multiple of 16 bytes.
+    pub reserved_1: u32,
+    /// Always 0, as well.
+    pub reserved_2: u32,
+}
+
+impl PointFrame {
+    /// The rig and the lines in one block.
+    pub fn new(o: &Optics, l: &Lines) -> PointFrame {
+        let ([fx, fy, cx, cy, skew], [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4]) = (o.pinhole, o.distortion);
+        let [t0, t1, t2, t3, t4, t5, t6, t7, t8] = o.untilt;
+        let [normal_x, normal_y, normal_z] = o.normal;
+        let none = f32::NAN.to_bits();
+        PointFrame {
+            fx,
+            fy,
+            cx,
+            cy,
+            skew,
+            k1,
+            k2,
+            p1,
+            p2,
+            k3,
+            k4,
+            k5,
+            k6,
+            s1,
+            s2,
+            s3,
+            s4,
+            t0,
+            t1,
+            t2,
+            t3,
+            t4,
+            t5,
+            t6,
+            t7,
+            t8,
+            normal_x,
+            normal_y,
+            normal_z,
+            offset: o.offset,
+            none,
+            lines: l.lines,
+            columns: l.columns,
+            line_px: l.line_px,
+            echo_reach: l.reach,
+            echo: l.echo,
+            cut_width: l.cut_width,
+            cut_amplitude: l.cut_amplitude,
+            reserved_1: 0,
+            reserved_2: 0,
+        }
+    }
+    /// Camera and laser plane that it was made from.
+    pub fn optics(&self) -> Optics {
+        Optics {
+            pinhole: [self.fx, self.fy, self.cx, self.cy, self.skew],
+            distortion: [
+                self.k1, self.k2, self.p1, self.p2, self.k3, self.k4, self.k5, self.k6, self.s1, self.s2, self.s3,
+                self.s4,
+            ],
+            untilt: [self.t0, self.t1, self.t2, self.t3, self.t4, self.t5, self.t6, self.t7, self.t8],
+            normal: [self.normal_x, self.normal_y, self.normal_z],
+            offset: self.offset,
+        }
+    }
+    /// Lines that it was made from.
+    pub fn lines(&self) -> Lines {
+        Lines {
+            lines: self.lines,
+            columns: self.columns,
+            line_px: self.line_px,
+            reach: self.echo_reach,
+            echo: self.echo,
+            cut_width: self.cut_width,
+            cut_amplitude: self.cut_amplitude,
+        }
+    }
+}

@@ -1,0 +1,244 @@
+//! In: a station. Out: all that a person chose and measured of it in one file, and the way back; jobs and recordings are none of it.
+//! Frame and unit: texts, as they lie in the station.
+
+use super::settings::Settings;
+use crate::fault::{Fault, Result};
+use crate::files::{Lock, Together, remove};
+use crate::rig::{Rig, hash_text};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Version of the file.
+const FORMAT: u32 = 1;
+/// What a station is made of: its settings, and folders of texts.
+const SETTINGS: &str = "station.toml";
+const FOLDERS: [&str; 3] = ["calibration", "recipes", "boards"];
+/// Files of a backup at most.
+const MOST_FILES: usize = 2000;
+
+/// A station in one file.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Backup {
+    /// 1.
+    pub format: u32,
+    /// Name and version of the program that made it.
+    pub program: String,
+    /// When, UTC, RFC 3339.
+    pub created: String,
+    /// The station's name.
+    pub station: String,
+    /// SHA-256 over all names and texts.
+    pub seal: String,
+    /// Texts by their path in the station.
+    pub files: BTreeMap<String, String>,
+}
+
+fn seal(files: &BTreeMap<String, String>) -> String {
+    hash_text(&serde_json::to_vec(files).expect("plain data"))
+}
+
+impl Backup {
+    /// Reads the station as it stands.
+    ///
+    /// # Errors
+    /// No station, a file in it that is no text.
+    pub fn of(station: &Path) -> Result<Backup> {
+        let mut files = BTreeMap::new();
+        let mut add = |name: String, path: &Path| -> Result<()> {
+            files.insert(name, crate::files::read_text(path)?);
+            Ok(())
+        };
+        add(SETTINGS.into(), &station.join(SETTINGS))?;
+        for folder in FOLDERS {
+            for entry in std::fs::read_dir(station.join(folder)).into_iter().flatten().flatten() {
+                let name = entry.file_name().to_string_lossy().into_owned();
+                // Locks, what a killed process left, and links are nothing that was chosen or measured.
+                if known(&name) && entry.file_type().is_ok_and(|t| t.is_file()) {
+                    add(format!("{folder}/{name}"), &entry.path())?;
+                }
+            }
+        }
+        Ok(Backup {
+            format: FORMAT,
+            program: format!("sheetlight {}", env!("CARGO_PKG_VERSION")),
+            created: jiff::Timestamp::now().to_string(),
+            station: Settings::load(station).map(|s| s.name).unwrap_or_default(),
+            seal: seal(&files),
+            files,
+        })
+    }
+
+    /// Reads a file of [`Backup::store`].
+    ///
+    /// # Errors
+    /// Another file, another version, one that was changed.
+    pub fn load(path: &Path) -> Result<Backup> {
+        Backup::parse(&crate::files::read_text(path)?).map_err(|e| e.at(path.display()))
+    }
+
+    fn parse(text: &str) -> Result<Backup> {
+        let strange = |what: String| {
+            Fault::input(what)
+                .cause("another file, edited, or cut off")
+                .next("give a file that sheetlight station backup wrote")
+        };
+        let b: Backup = serde_json::from_str(text).map_err(|e| strange(format!("is no backup of a station: {e}")))?;
+        if b.format != FORMAT {
+            return Err(strange(format!("is of format {}, this version reads {FORMAT}", b.format)));
+        }
+        if b.seal != seal(&b.files) {
+            return Err(strange("its texts are not those that were backed up".into()));
+        }
+        let place = |name: &str| {
+            name == SETTINGS || name.split_once('/').is_some_and(|(f, n)| FOLDERS.contains(&f) && known(n))
+        };
+        if let Some(name) = b.files.keys().find(|n| !place(n)).filter(|_| b.files.len() <= MOST_FILES) {
+            return Err(strange(format!("{name:?} is no part of a station")));
+        }
+        if b.files.len() > MOST_FILES || !b.files.contains_key(SETTINGS) {
+            return Err(strange(format!("holds {} files, and {SETTINGS} must be one of them", b.files.len())));
+        }
+        Ok(b)
+    }
+
+    /// Writes it.
+    pub fn store(&self, path: &Path) -> Result<()> {
+        crate::files::write(path, serde_json::to_string_pretty(self).expect("plain data").as_bytes())
+    }
+
+    /// Puts a station into the state of the backup; what it has beside that stays (jobs, recordings, logs). All of it or nothing.
+    ///
+    /// # Errors
+    /// A backup whose settings or calibrations this version refuses, the disk: the station is as it was then.
+    pub fn restore(&self, station: &Path) -> Result<()> {
+        crate::files::make_folder(station)?;
+        let _lock = Lock::take(station, "restore", "restore")?;
+        let together = together(station);
+        together.settle_locked()?;
+        let part = together.begin()?;
+        for folder in FOLDERS {
+            crate::files::make_folder(&part.join(folder))?;
+        }
+        for (name, text) in &self.files {
+            crate::files::write(&part.join(name), text.as_bytes())?;
+        }
+        let checked = Settings::load(&part).and_then(|_| Rig::load(&part));
+        if let Err(fault) = checked {
+            // It goes with the next restore where it cannot be taken away now.
+            let _ = remove(&part);
+            return Err(fault);
+        }
+        together.commit()
+    }
+}
+
+/// Ends a restore that was cut off.
+pub fn settle_restore(station: &Path) -> Result<()> {
+    together(station).settle()
+}
+
+fn together(station: &Path) -> Together<'_> {
+    Together::new(station, "restore", |station, _| {
+        remove(&station.join(SETTINGS))?;
+        FOLDERS.iter().try_for_each(|f| remove(&station.join(f)))
+    })
+}
+
+/// Whether a file's name is one that a station has: letters, digits and marks that no file system minds.
+fn known(name: &str) -> bool {
+    let ending = Path::new(name).extension().is_some_and(|e| ["toml", "json", "html"].iter().any(|k| e == *k));
+    ending && !name.starts_with('.') && name.chars().all(|c| c.is_alphanumeric() || " ._-+()".contains(c))
+}
+
+/// Where a station keeps its own backups.
+pub fn backups(station: &Path) -> PathBuf {
+    station.join("backups")
+}
+
+/// Backs a station up into its own folder of backups; its name there.
+pub fn back_up_here(station: &Path, why: &str) -> Result<String> {
+    let backup = Backup::of(station)?;
+    let at = backup.created.split('.').next().unwrap_or_default().replace([':', '-'], "").replace('T', "-");
+    crate::files::make_folder(&backups(station))?;
+    let free = |k: &u32| !backups(station).join(name(&at, why, *k)).exists();
+    let name = name(&at, why, (0..).find(free).unwrap_or(0));
+    backup.store(&backups(station).join(&name))?;
+    Ok(name)
+}
+
+fn name(at: &str, why: &str, k: u32) -> String {
+    let again = if k == 0 { String::new() } else { format!("-{}", k + 1) };
+    format!("{}-{why}{again}.json", at.trim_end_matches('Z'))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn put(station: &Path, name: &str, text: &str) {
+        let path = station.join(name);
+        std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+        std::fs::write(path, text).unwrap();
+    }
+
+    fn station() -> tempfile::TempDir {
+        let dir = tempfile::tempdir().unwrap();
+        put(dir.path(), "station.toml", "name = 'a' # mine\n");
+        put(dir.path(), "recipes/one.toml", "first");
+        put(dir.path(), "jobs/0001-scan/job.json", "{}");
+        dir
+    }
+
+    #[test]
+    fn a_station_comes_back_as_it_was_and_jobs_stay() {
+        let dir = station();
+        let read = |name: &str| std::fs::read_to_string(dir.path().join(name)).ok();
+        let file = dir.path().join("b.json");
+        Backup::of(dir.path()).unwrap().store(&file).unwrap();
+        put(dir.path(), "station.toml", "name = 'b'\n");
+        put(dir.path(), "recipes/one.toml", "second");
+        put(dir.path(), "recipes/two.toml", "more");
+        let later = back_up_here(dir.path(), "before").unwrap();
+        Backup::load(&file).unwrap().restore(dir.path()).unwrap();
+        assert_eq!(read("station.toml").as_deref(), Some("name = 'a' # mine\n"));
+        assert_eq!((read("recipes/one.toml").as_deref(), read("recipes/two.toml")), (Some("first"), None));
+        assert!(read("jobs/0001-scan/job.json").is_some() && read("b.json").is_some(), "what is no part of it stays");
+        Backup::load(&backups(dir.path()).join(&later)).unwrap().restore(dir.path()).unwrap();
+        assert_eq!(read("recipes/two.toml").as_deref(), Some("more"), "the way back from the way back");
+        assert_ne!(back_up_here(dir.path(), "before").unwrap(), back_up_here(dir.path(), "before").unwrap());
+    }
+
+    #[test]
+    fn what_is_no_backup_changes_nothing() {
+        let dir = station();
+        let good = Backup::of(dir.path()).unwrap();
+        let refused = |change: &dyn Fn(&mut Backup)| {
+            let mut b = good.clone();
+            change(&mut b);
+            b.seal = seal(&b.files);
+            let text = serde_json::to_string(&b).unwrap();
+            Backup::parse(&text).and_then(|b| b.restore(dir.path())).unwrap_err().what
+        };
+        let add = |name: &'static str| move |b: &mut Backup| drop(b.files.insert(name.into(), String::new()));
+        for name in [
+            "../x.toml",
+            "/etc/x.toml",
+            "recipes/../../x.toml",
+            "jobs/x.json",
+            "recipes/.x.toml",
+            "recipes/a/b.toml",
+            "recipes/x.sh",
+        ] {
+            assert!(refused(&add(name)).contains("no part of a station"), "{name}");
+        }
+        assert!(refused(&|b| drop(b.files.remove("station.toml"))).contains("station.toml must"));
+        assert!(refused(&|b| drop(b.files.insert("station.toml".into(), "nam = 1".into()))).contains("nam"));
+        assert!(refused(&add("calibration/camera.json")).contains("camera.json"));
+        let edited = serde_json::to_string(&good).unwrap().replace("first", "other");
+        assert!(Backup::parse(&edited).unwrap_err().what.contains("not those"));
+        let text = std::fs::read_to_string(dir.path().join("station.toml")).unwrap();
+        assert_eq!(text, "name = 'a' # mine\n");
+        assert!(dir.path().join("recipes/one.toml").is_file() && !dir.path().join("restore.part").exists());
+    }
+}

@@ -1,0 +1,71 @@
+//! In: the records of a joint solve, a check on poses that it did not see, why it ended. Out: the verdict with its reasons.
+//! Frame and unit: mm.
+
+use super::super::joint::run::JointResult;
+use super::check::SelfCheck;
+use super::options::AutoRun;
+use crate::rig::Verdict;
+
+/// Why no further stop was made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Ended {
+    /// The expected error is below the target.
+    Target,
+    /// The expected error does not fall any more.
+    Stalled,
+    /// As many stops as are allowed.
+    Most,
+    /// No pose from which the board can be seen may be gone to.
+    NoPose,
+}
+
+/// What [`super::procedure::calibrate_auto`] made.
+pub struct AutoResult {
+    /// The rig.
+    pub joint: JointResult,
+    /// Expected error of a scanned point after each stop of the solve, mm rms; the first is after the small moves.
+    pub expected_mm: Vec<f64>,
+    /// Stops that went into the solve.
+    pub stops: usize,
+    /// Why it ended.
+    pub ended: Ended,
+    /// On poses that no solve saw; `None` where none could be gone to.
+    pub check: Option<SelfCheck>,
+}
+
+impl AutoResult {
+    /// What the check and the end say goes into every record.
+    pub(super) fn judge(&mut self, run: &AutoRun, stranded: Option<String>) {
+        let mut reasons: Vec<String> =
+            stranded.into_iter().map(|why| format!("the arm did not go back to where it began: {why}")).collect();
+        let mut worst = Verdict::Good;
+        let last = self.expected_mm.last().copied().unwrap_or(f64::INFINITY);
+        if last > run.target_mm {
+            let why = match self.ended {
+                Ended::Stalled => "more stops lower it no further",
+                Ended::NoPose => "no other pose from which the board is seen may be gone to",
+                _ => "no more stops are allowed",
+            };
+            reasons.push(format!("the target of {} mm is not reached ({last:.4} mm): {why}", run.target_mm));
+            worst = Verdict::Usable;
+        }
+        match &self.check {
+            Some(c) => {
+                reasons.push(format!(
+                    "{} poses that no solve saw: points lie {:.4} mm from the board (rms), {:.4} mm were expected",
+                    c.stops, c.off_mm, c.expected_mm
+                ));
+                if c.off_mm > 2.0 * c.expected_mm {
+                    worst = Verdict::Usable;
+                    reasons.push("that is more than twice what was expected: something is not in the model".into());
+                }
+            }
+            None => {
+                worst = Verdict::Usable;
+                reasons.push("it is not checked: no further pose may be gone to".into());
+            }
+        }
+        self.joint.remark(worst, &reasons);
+    }
+}

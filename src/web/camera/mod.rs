@@ -1,0 +1,10 @@
+//! In: a camera's URI. Out: what it shows now, what it can be set to, the camera itself for a job.
+//! Frame and unit: px of the picture, grey levels, ms; features by their standard names.
+
+mod lent;
+mod settings;
+mod state;
+mod watch;
+
+pub use state::Looked;
+pub use watch::Camera;

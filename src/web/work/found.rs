@@ -1,0 +1,45 @@
+//! In: a job that found a part, finished or still under way. Out: where the part lies and its recipe as it was then.
+//! Frame and unit: the scan's frame, mm.
+
+use super::jobs::Jobs;
+use super::recipes::load;
+use super::resumes::INSERTION;
+use crate::fault::{Fault, Result};
+use crate::find::Recipe;
+use crate::station::Lies;
+use crate::web::message::{Job, Order};
+use std::path::PathBuf;
+
+/// The job's own copy of its recipe: what is edited meanwhile changes nothing in it.
+pub(super) const RECIPE: &str = "recipe.toml";
+/// What was found.
+pub(super) const FOUND: &str = "found.json";
+
+/// The file that says where a job found its part.
+///
+/// # Errors
+/// A job that looks for none.
+pub fn report_of(jobs: &Jobs, job: &Job) -> Result<PathBuf> {
+    let folder = jobs.folder(job);
+    match job.order {
+        Order::Find(_) | Order::Teach(_) => Ok(folder.join(FOUND)),
+        Order::Insert(_) => Ok(folder.join(INSERTION).join(FOUND)),
+        _ => Err(Fault::usage(format!("{}: looks for no part", job.id)).next("choose a job that finds or inserts one")),
+    }
+}
+
+/// Where the part lies, and what it is.
+///
+/// # Errors
+/// Nothing was found yet; a job of a former version whose recipe is gone.
+pub fn lies(jobs: &Jobs, job: &Job) -> Result<(Lies, Recipe)> {
+    let path = report_of(jobs, job)?;
+    if !path.is_file() {
+        return Err(Fault::refused(format!("{}: has found no part yet", job.id))
+            .cause("it still scans, or the part was not there")
+            .next("wait until the part is found, or look at why it was not"));
+    }
+    let (lies, own) = (Lies::load(&path)?, jobs.folder(job).join(RECIPE));
+    let recipe = if own.is_file() { Recipe::load(&own)? } else { load(&jobs.place, &lies.recipe)? };
+    Ok((lies, recipe))
+}

@@ -1,0 +1,63 @@
+//! In: tests/data/outside, a program that uses the library as others do, and a simulated station. Out: whether it gets what `scan`
+//! gets. Its sources are compiled into this test too, which is quick; SHEETLIGHT_LONG=1 builds and runs the program itself,
+//! without the features it does not ask for. Frame and unit: robot's base, mm.
+
+#[allow(dead_code)]
+#[path = "data/outside/src/main.rs"]
+mod outside;
+
+use outside::{Held, line, measure};
+use sheetlight::recording::Recording;
+use sheetlight::rig::Rig;
+use sheetlight::scan::read_cloud;
+use sheetlight::simulate::{Set, SimulateOptions, simulate};
+use sheetlight::station::{ScanOptions, Settings, scan_recording};
+use std::process::Command;
+
+#[test]
+fn a_program_of_others_gets_the_points_that_scan_gets() {
+    let dir = tempfile::tempdir().unwrap();
+    let options = SimulateOptions { shots: 30, sets: vec![Set::Scan], ..SimulateOptions::default() };
+    let station = simulate(dir.path(), &options, &|_, _| {}).unwrap().station;
+    let recording = dir.path().join("scan");
+
+    let (mut cloud, mut lines) = (Vec::new(), vec!["shot,z_mm,sigma_mm".to_owned()]);
+    let take = |p: &sheetlight::scan::Profile| {
+        cloud.extend(p.points.iter().copied());
+        lines.extend(line(p));
+    };
+    measure(&station, Held::read(&recording).unwrap(), take).unwrap();
+    assert!(lines.len() > 24 && cloud.len() > 3000, "{} lines, {} points", lines.len(), cloud.len());
+
+    let (settings, rig) = (Settings::load(&station).unwrap(), Rig::load(&station).unwrap());
+    let out = dir.path().join("result");
+    let asked = ScanOptions { place: sheetlight::scan::Where::Cpu, ..ScanOptions::for_station(&settings, &rig, &out) };
+    scan_recording(&Recording::open(&recording).unwrap(), None, &rig, &asked, |_, _| {}).unwrap();
+    let scanned = read_cloud(&out.join("cloud.ply")).unwrap();
+    assert!(cloud == scanned, "{} points against {}", cloud.len(), scanned.len());
+
+    if std::env::var_os("SHEETLIGHT_LONG").is_none() {
+        eprintln!("SHEETLIGHT_LONG=1 builds the program without default features and runs it: skipped");
+        return;
+    }
+    let run = Command::new(env!("CARGO"))
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .args(["run", "--quiet", "--locked", "--offline", "--package", "outside", "--"])
+        .args([recording.as_path(), station.as_path()])
+        .output()
+        .unwrap();
+    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    let said = String::from_utf8(run.stdout).unwrap();
+    assert_eq!(said.lines().collect::<Vec<_>>(), lines);
+}
+
+#[test]
+fn another_picture_size_is_refused_before_a_shot_is_taken() {
+    let dir = tempfile::tempdir().unwrap();
+    let options = SimulateOptions { shots: 3, sets: vec![Set::Scan], ..SimulateOptions::default() };
+    let station = simulate(dir.path(), &options, &|_, _| {}).unwrap().station;
+    let mut source = Held::read(&dir.path().join("scan")).unwrap();
+    source.format.width += 2;
+    let said = measure(&station, source, |_| panic!("a profile came")).unwrap_err();
+    assert!(said.what.contains("642") && !said.next.is_empty(), "{said}");
+}

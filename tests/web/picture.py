@@ -1,0 +1,136 @@
+"""In: the program, a simulated station, its simulated camera, a browser. Out: failure where the camera cannot be set from the page Picture, where
+the exposure that was found is lost, where a region is not kept to, or where the stripe is described otherwise than its pictures show it.
+Frame and unit: px, us, shares of full scale."""
+
+import json
+import struct
+import sys
+import tempfile
+import time
+
+from browser import Browser
+from server import Server
+from shots import quiet
+
+program, folder = sys.argv[1:3]
+REGION = "extraction.region"
+
+
+def newest(s):
+    """u, v and fate of the newest picture's peaks; its grey levels."""
+    while True:
+        status, _, b = s.ask("GET", "/api/v1/camera/newest")
+        if status == 200:
+            break
+    _, width, height, peaks = struct.unpack("<4I", b[:16])
+    return [struct.unpack("<ffI", b[20 + 12 * k:32 + 12 * k]) for k in range(peaks)], b[20 + 12 * peaks:], width
+
+
+def until(what, holds, seconds=20):
+    end = time.time() + seconds
+    while time.time() < end:
+        value = holds()
+        if value:
+            return value
+        time.sleep(0.1)
+    raise AssertionError(f"{what}: not within {seconds} s")
+
+
+def exposure(s):
+    return next(f for f in s.json("GET", "/camera")["features"] if f["name"] == "ExposureTime")
+
+
+def by_hand(s):
+    """The camera is set by who operates; what cannot be is refused; a setting outlives the connection that it was made over."""
+    until("what the camera can be set to", lambda: s.json("GET", "/camera")["features"])
+    assert exposure(s)["value"] == 1000 and exposure(s)["unit"] == "us" and exposure(s)["range"] == [1, 1e6], exposure(s)
+    ask = lambda name, value: s.ask("PUT", "/api/v1/camera/features", {"name": name, "value": value})[0]
+    assert ask("ExposureTime", "300") == 403, "the camera was set by who only watches"
+    s.json("POST", "/lease")
+    for name, value in (("NoSuchFeature", "1"), ("ExposureTime", "much"), ("ExposureTime", "-3")):
+        assert 400 <= ask(name, value) < 500, (name, value)
+    until("a stripe", lambda: newest(s)[0])
+    peak = lambda: (s.json("GET", "/camera/look")["stripe"] or {"peak": 0})["peak"]
+    before = peak()
+    assert ask("ExposureTime", "100") == 200 and exposure(s)["value"] == 100
+    until("darker pictures", lambda: peak() < 0.5 * before)
+    s.json("POST", "/lease/release")
+
+
+def tuned(s, b):
+    """Set exposure: the stripe's peaks stand where they are wanted, in the pictures that come afterwards too."""
+    b.page("picture")
+    b.until("the stripe", "return document.querySelector('[data-stripe=seen] .figure')", 20)
+    b.click("#set-exposure")
+    us = float(b.until("an exposure", "return document.querySelector('[data-tuned]')?.dataset.tuned", 90))
+    job = next(j for j in s.json("GET", "/jobs") if j["order"]["procedure"] == "tune")["outcome"]
+    low, high = job["look"]["stripe"]["wanted"]
+    assert job["exposure_us"] == us and low <= job["look"]["stripe"]["peak"] <= high, job
+    assert abs(exposure(s)["value"] - us) < 1e-6 * us, (exposure(s), us)
+    until("peaks where they are wanted", lambda: (s.json("GET", "/camera/look")["stripe"] or {"peak": 0})["peak"] > low - 0.08)
+    print(f"exposure: {us:.0f} us after {len(job['tried'])} tries, peaks at {100 * job['look']['stripe']['peak']:.0f} %")
+    # By hand, on the page.
+    b.until("the field", "return document.querySelector('[data-feature=ExposureTime]')")
+    b.run("const e = document.querySelector('[data-feature=ExposureTime]'); e.value = arguments[0]; e.dispatchEvent(new Event('change'))", str(round(us * 0.8)))
+    until("what was written into the field", lambda: exposure(s)["value"] == round(us * 0.8))
+    quiet(b, "picture")
+
+
+def region(s, b):
+    """The stripe is looked for in the region that was drawn, and nowhere else; a reload and other screens know it."""
+    peaks = lambda: [p for p in newest(s)[0] if p[2] == 0]
+    width = newest(s)[2]
+    until("peaks on both sides", lambda: (lambda p: min(x[0] for x in p) < 0.2 * width and max(x[0] for x in p) > 0.8 * width)(peaks() or [(width / 2, 0)]))
+    b.click("#region")
+    x, y = b.run("const r = document.querySelector('[data-grip=\"1,0\"]').getBoundingClientRect(); return [r.left + r.width / 2, r.top + r.height / 2]")
+    far = b.run("return document.querySelector('.region').getBoundingClientRect().width")
+    at = lambda x: {"x": round(x), "y": round(y)}
+    b.mouse({"type": "pointerMove", "duration": 0, **at(x)}, {"type": "pointerDown", "button": 0}, {"type": "pointerMove", "duration": 80, **at(x - far / 4)}, {"type": "pointerMove", "duration": 80, **at(x - far / 2)}, {"type": "pointerUp", "button": 0})
+    kept = until("a region", lambda: (lambda r: r if r != [0, 0, 1, 1] else None)(s.json("GET", "/settings")["values"][REGION]))
+    assert kept[:2] == [0, 0] and kept[3] == 1 and abs(kept[2] - 0.5) < 0.01, kept
+    until("peaks in the region alone", lambda: (lambda p: p and max(x[0] for x in p) < kept[2] * width)(peaks()))
+    assert min(x[0] for x in peaks()) < 0.2 * width, "the region took what it should have left"
+    # By keyboard: an arrow moves an edge by a hundredth.
+    b.run("document.querySelector('[data-grip=\"-1,0\"]').focus()")
+    b.keys("\ue014")
+    until("an edge that was moved by an arrow", lambda: abs(s.json("GET", "/settings")["values"][REGION][0] - 0.01) < 1e-6)
+    b.run("location.reload()")
+    b.ready("picture")
+    b.until("the region again", "return !document.querySelector('.region').hidden", 20)
+    b.click("#region-whole")
+    until("the whole picture", lambda: s.json("GET", "/settings")["values"][REGION] == [0, 0, 1, 1] and max(x[0] for x in peaks() or [(0,)]) > 0.8 * width)
+    ask = lambda value: s.ask("PUT", "/api/v1/settings", {"sha256": s.json("GET", "/settings")["sha256"], "changes": {REGION: value}})[0]
+    for wrong in ([0.5, 0, 0.4, 1], [0, 0, 1.2, 1], [0, 0, 0.5, 0.001], [0, 0, 1]):
+        assert 400 <= ask(wrong) < 500, wrong
+    quiet(b, "region")
+
+
+def recorded(s, b):
+    """A recording's picture is described too: its levels are those of the picture."""
+    b.run("const e = document.querySelector('.head select'); e.value = 'scan'; e.dispatchEvent(new Event('change'))")
+    look = s.json("GET", "/look?recording=scan&frame=30")
+    stripe = look["stripe"]
+    assert stripe["lying"] and 1.5 < stripe["width_px"] < 12 and len(stripe["pieces"]) == 32, stripe
+    assert abs(sum(p[3] for p in stripe["pieces"]) / 32 - stripe["dark"]) < 0.02, stripe
+    b.until("the stripe of the recording", "return document.querySelectorAll('.along polyline').length === 3")
+    assert s.ask("GET", "/api/v1/look?recording=scan&frame=3000")[0] == 404
+    assert s.ask("GET", "/api/v1/look?recording=../scan&frame=0")[0] in (400, 403, 404)
+    quiet(b, "recorded")
+
+
+s = Server(program, folder, "--recordings", folder, "--camera", "sim:3?rate=6&speed=0.2")
+by_hand(s)
+if not Browser.there():
+    print("no chromium and chromedriver here")
+    sys.exit(77)
+with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+    b = Browser(profile)
+    try:
+        b.open(s.url)
+        b.ready("station")
+        tuned(s, b)
+        region(s, b)
+        recorded(s, b)
+    finally:
+        b.close()
+assert s.end() == 0

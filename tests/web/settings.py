@@ -1,0 +1,114 @@
+"""In: the screen with a station or a simulated cell, the browser that shows it. Out: failure where a setting is changed otherwise than it was
+said, a comment or a calibration is lost, a backup does not come back, or an output is switched that nobody pressed.
+Frame and unit: as the settings."""
+
+import json
+import os
+import subprocess
+import time
+
+from shots import quiet
+
+
+def text(s):
+    with open(os.path.join(s.json("GET", "/settings")["folder"], "station.toml")) as f:
+        return f.read()
+
+
+def change(b, name, value):
+    b.run("const e = document.querySelector(`[data-setting='${arguments[0]}']`); e.value = arguments[1]; e.dispatchEvent(new Event(e.tagName === 'SELECT' ? 'change' : 'input'))", name, value)
+
+
+def settings(program, s, b, shot):
+    """Notation and tolerance by fields, a broken text by hand, a backup that comes back."""
+    first = "# by the window\n" + text(s)
+    with open(os.path.join(s.station, "station.toml"), "w") as f:
+        f.write(first)
+    b.page("station")
+    b.page("settings")
+    b.until("the fields", "return document.querySelector('[data-setting=tolerance_mm]')")
+    assert b.run("return document.querySelector('#save-settings').disabled"), "nothing was changed yet"
+    change(b, "robot", "ur")
+    change(b, "tolerance_mm", "0.08")
+    b.click("#save-settings")
+    b.until("saved", "return /Saved/.test(document.querySelector('.head').innerText)", 10)
+    now = text(s)
+    assert now.startswith("# by the window\n") and 'robot = "ur"' in now and "tolerance_mm = 0.08" in now, now
+    assert s.json("GET", "/station")["robot"] == "ur" and s.json("GET", "/bar")["station"] == "cell 3"
+    shot(b, "settings")
+    # What cannot be is named, and nothing is changed.
+    b.run("const e = document.querySelector('textarea'); e.value = e.value.replace('robot', 'robbot')")
+    b.click("#save-text")
+    b.until("the line of a broken setting", "return /robbot/.test(document.querySelector('#main .problem')?.innerText ?? '')", 10)
+    assert text(s) == now
+    # An editor has changed the file since: the page's change would undo that.
+    with open(os.path.join(s.station, "station.toml"), "a") as f:
+        f.write("# later\n")
+    change(b, "tolerance_mm", "0.5")
+    b.click("#save-settings")
+    b.until("that the file is another one", "return /other ones by now/.test(document.querySelector('#main .problem')?.innerText ?? '')", 10)
+    assert text(s) == now + "# later\n"
+    # The backup from before the first change comes back, calibrations and all; what is put away for it is a backup too.
+    kept = s.json("GET", "/settings")["backups"]
+    assert len(kept) == 1 and kept[0]["files"] >= 3, kept
+    status, _, data = s.ask("GET", f"/api/v1/backups/{kept[0]['name']}")
+    assert status == 200 and json.loads(data)["files"]["station.toml"] == first
+    calibration = os.path.join(s.station, "calibration", "camera.json")
+    with open(calibration, "rb") as f:
+        camera = f.read()
+    os.remove(calibration)
+    b.page("station")
+    b.page("settings")
+    b.click(".restore")
+    time.sleep(0.5)
+    assert text(s) == now + "# later\n", "it came back without being asked for twice"
+    b.click(".restore")
+    b.until("restored", "return /Restored/.test(document.querySelector('.head').innerText)", 10)
+    assert text(s) == first
+    with open(calibration, "rb") as f:
+        assert f.read() == camera
+    assert len(s.json("GET", "/settings")["backups"]) == 2, "the state before the restore is a backup, once"
+    assert s.json("GET", "/jobs"), "jobs stay"
+    for trick in ("..%2f..%2fstation.toml", "%2e%2e", "no-such.json"):
+        assert s.ask("GET", f"/api/v1/backups/{trick}")[0] in (400, 404), trick
+    # The same on the command line.
+    run = lambda *words: subprocess.run([program, "--quiet", "station", *words, "--station", s.station], capture_output=True)
+    out = os.path.join(os.path.dirname(s.station), "kept.json")
+    assert run("backup", "--out", out).returncode == 0
+    done = run("set", "robot=kuka", "tolerance_mm=")
+    assert done.returncode == 0 and 'robot = "kuka"' in text(s), done.stderr
+    assert run("set", "robot=none such").returncode != 0 and 'robot = "kuka"' in text(s)
+    assert run("restore", out).returncode == 0 and text(s) == first
+    b.page("station")
+    quiet(b, "settings", refused=2)
+
+
+def outputs(s, b, events):
+    """An armed robot's line lights for a moment, at a press and no other; the gripper opens at the second press alone."""
+    b.page("settings")
+    b.until("outputs", "return document.querySelector('[data-output=line]')")
+    assert b.run("return document.querySelector('[data-output=line]').disabled"), "outputs can be tried without arming"
+    refused = s.ask("POST", "/api/v1/robot/output", {"output": "line"})
+    assert refused[0] in (403, 409), refused
+    before = len(events())
+    b.click("#arm")
+    b.click("[data-output=line]")
+    b.until("that it was switched", "return /was switched/.test(document.getElementById('main').innerText)", 20)
+    b.click("[data-output=open]")
+    time.sleep(0.3)
+    assert "falls" in b.text("[data-output=open]")
+    switched = [(e["number"], e["on"]) for e in events()[before:] if e["what"] == "output"]
+    assert switched == [(24, True), (24, False)], switched
+    # Settings wait while the robot is armed: its limits were read then.
+    before = text(s)
+    change(b, "motion.speed_mm_s", "20")
+    b.click("#save-settings")
+    b.until("that the robot is armed", "return /robot is armed/.test(document.querySelector('#main .problem')?.innerText ?? '')", 10)
+    assert text(s) == before
+    b.click("#arm")
+    b.until("given back", "return document.querySelector('#arm')?.getAttribute('aria-pressed') === 'false'", 20)
+    change(b, "motion.speed_mm_s", "45")
+    b.click("#save-settings")
+    b.until("saved", "return /Saved/.test(document.querySelector('.head').innerText)", 10)
+    assert "speed_mm_s = 45" in text(s), text(s)
+    quiet(b, "outputs", refused=1)

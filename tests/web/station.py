@@ -1,0 +1,228 @@
+"""In: the program, a simulated station, a browser. Out: failure where the pages Touch, Station, Surface, Part, Scan and Health do not do what an
+operator expects: a square pose that is square, frames and links in the checks, recipes from drawings and grids, constructed points, pictures
+in the support file only where that is ticked.
+Frame and unit: mm, degrees."""
+
+import json
+import math
+import os
+import sys
+import tempfile
+import time
+
+from browser import Browser
+from server import Server
+from shots import quiet
+
+program, folder = sys.argv[1:3]
+# A tool 120 mm before the flange, its z back towards it (against the insertion), leaning by 3 degrees about x.
+LEAN = math.radians(183)
+TOOL = [1, 0, 0, 5, 0, math.cos(LEAN), -math.sin(LEAN), -2, 0, math.sin(LEAN), math.cos(LEAN), 120, 0, 0, 0, 1]
+
+
+def dot(a, b):
+    return sum(x * y for x, y in zip(a, b))
+
+
+def touch(s, b):
+    """The proposed pose is square to the surface that was touched, at the place where the tool stood, by the least turn."""
+    b.page("touch")
+    b.click("#touch")
+    b.until("a proposal", "return document.querySelectorAll('[data-square] .figure').length >= 12", 40)
+    o = next(j for j in s.json("GET", "/jobs") if j["order"]["procedure"] == "touch")["outcome"]
+    q, normal = o["square"], o["surface"]["normal"]
+    assert q["convention"] == "matrix", q["convention"]
+    tool, flange = q["tool"], q["flange"]
+    z = [tool[k] for k in (2, 6, 10)]
+    assert math.degrees(math.acos(min(1, dot(z, normal)))) < 1e-3, (z, normal)
+    # The flange with the tool on it is where the tool is said to be.
+    made = [[sum(flange[4 * i + k] * TOOL[4 * k + j] for k in range(4)) for j in range(4)] for i in range(3)]
+    assert all(abs(made[i][j] - tool[4 * i + j]) < 1e-5 for i in range(3) for j in range(4)), (made, tool)
+    # Where it stood, from the recording itself.
+    with open(os.path.join(folder, "surface", "poses.json")) as f:
+        poses = json.load(f)
+    last = poses["poses"][-1] if isinstance(poses, dict) else poses[-1]
+    last = last if isinstance(last, list) else next(v for v in last.values() if isinstance(v, list))
+    stood = [[sum(last[4 * i + k] * TOOL[4 * k + j] for k in range(4)) for j in range(4)] for i in range(3)]
+    assert max(abs(stood[i][3] - tool[4 * i + 3]) for i in range(3)) < 1e-3, "the tool's tip moved"
+    leant = math.degrees(math.acos(dot([stood[i][2] for i in range(3)], normal)))
+    assert abs(leant - q["tilt_deg"]) < 1e-3 and 0 < q["tilt_sigma_deg"] < 1, (leant, q)
+    turn = sum(stood[i][j] * tool[4 * i + j] for i in range(3) for j in range(3))
+    assert abs(math.degrees(math.acos(min(1, (turn - 1) / 2))) - leant) < 1e-3, "it turns by more than it leans"
+    print(f"touch: leant {leant:.3f} degrees, known to {q['tilt_sigma_deg']:.3f}; square to {math.degrees(math.acos(min(1, dot(z, normal)))):.1e}")
+    quiet(b, "touch")
+
+
+def station(s, b):
+    b.page("station")
+    shown = b.until("the tool", "return document.querySelector('[data-frame=tool]')?.innerText", 10)
+    assert "120.000" in shown, shown
+    info = s.json("GET", "/station")
+    assert info["work_frame"] == "base" and {f["name"] for f in info["frames"]} == {"tool", "camera"}, info["frames"]
+    b.click("#check")
+    b.until("the checks", "return [...document.querySelectorAll('.light')].some((e) => e.innerText.includes('picture size'))", 120)
+    lines = {(x["group"], x["name"]): x for x in next(j for j in s.json("GET", "/jobs") if j["order"]["procedure"] == "check")["outcome"]["lines"]}
+    assert lines["camera", "camera"]["state"] == "good" and lines["camera", "picture size"]["state"] == "good", lines
+    assert lines["robot", "robot"]["state"] == "absent", lines["robot", "robot"]
+    quiet(b, "station")
+
+
+def grey_of(b):
+    """Mean brightness of what the map shows."""
+    return b.run("""const c = document.querySelector('.map canvas'), d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;
+        let n = 0; for (let i = 0; i < d.length; i += 4) n += d[i] + d[i + 1] + d[i + 2]; return n / d.length""")
+
+
+def drawn(b, holds):
+    """The brightness once the map has been drawn so."""
+    end = time.time() + 15
+    while not holds(value := grey_of(b)):
+        assert time.time() < end, value
+        time.sleep(0.1)
+    return value
+
+
+def surface(s, b):
+    b.page("surface")
+    b.until("the map", "return document.querySelector('.map canvas')?.width > 300")
+    height = drawn(b, lambda v: v > 5)
+    b.click("[data-layer=both]")
+    # The light that came back is less than all light nearly everywhere.
+    both = drawn(b, lambda v: v > 5 and abs(v - height) > 0.05 * height)
+    assert 0.2 * height < both < height, (height, both)
+    quiet(b, "surface")
+
+
+def dxf(unit=4):
+    """Body and two rows of three contacts, as a drawing."""
+    out = ["0", "SECTION", "2", "HEADER", "9", "$INSUNITS", "70", str(unit), "0", "ENDSEC", "0", "SECTION", "2", "ENTITIES"]
+    out += ["0", "LWPOLYLINE", "8", "0", "90", "4", "70", "1"]
+    for x, y in ((-15.24, -8.89), (15.24, -8.89), (15.24, 8.89), (-15.24, 8.89)):
+        out += ["10", str(x), "20", str(y)]
+    for i in range(12):
+        for y in (-7.62, 7.62):
+            out += ["0", "CIRCLE", "8", "0", "10", str((i - 5.5) * 2.54), "20", str(y), "40", "0.72"]
+    return "\n".join(out + ["0", "ENDSEC", "0", "EOF", ""])
+
+
+def part(s, b):
+    """A drawing becomes a recipe that is found; points are constructed of its grid; the tool goes to one of them."""
+    b.page("part")
+    b.until("the map", "return document.querySelector('.map canvas')?.width > 300")
+    script = """const [text, name] = arguments, e = document.getElementById('drawing'), d = new DataTransfer();
+        d.items.add(new File([text], name)); e.files = d.files; e.dispatchEvent(new Event('change'))"""
+    b.run(script, dxf(0), "socket.dxf")
+    b.click("#make-recipe")
+    b.until("that the unit is not known", "return /unit/.test(document.querySelector('.problem')?.innerText ?? '')", 10)
+    b.run(script, dxf(), "socket.dxf")
+    b.click("#make-recipe")
+    b.until("a part that was found by its drawing", "return /score/.test(document.getElementById('main').innerText) && document.querySelector('[data-point]')", 60)
+    job = next(j for j in s.json("GET", "/jobs") if j["order"]["procedure"] == "find")
+    assert job["order"]["recipe"] == "socket", job["order"]
+    with open(os.path.join(folder, "scan", "truth.json")) as f:
+        led = next(p["base_T_part"] for p in json.load(f)["parts"] if p["name"] == "led")
+    found = job["outcome"]["part"]
+    off = math.dist([led[k] for k in (3, 7, 11)], [found[k] for k in (3, 7, 11)])
+    assert off < 0.1, f"the drawing's part lies {off:.3f} mm beside the truth"
+    recipe = next(r for r in s.json("GET", "/recipes") if r["name"] == "socket")
+    points = s.json("POST", "/points", {"text": recipe["text"]})
+    grid = next(p["name"] for p in points if p["kind"] == "grid")
+    assert sum(p["kind"] == "shape" and p["name"].startswith(grid) for p in points) == 24, points
+    # A midpoint of the two corner pins, chosen for the tool.
+    choose = "const e = [...document.querySelectorAll('select')].find((x) => x.previousElementSibling?.innerText === arguments[0]); e.value = arguments[1]; e.dispatchEvent(new Event('change'))"
+    b.run(choose, "Of", f"{grid}[1,1]")
+    b.run(choose, "and", f"{grid}[12,2]")
+    b.run("document.getElementById('point-name').value = 'middle'")
+    b.click("#add-point")
+    b.until("the point", "return document.querySelector('[data-point=middle]')", 10)
+    b.run("document.querySelector('[aria-label=\"Tool goes to middle\"]').click()")
+    b.until("that it is chosen", "return document.querySelector('[aria-label=\"Tool goes to middle\"]')?.checked", 10)
+    text = b.run("return document.querySelector('textarea').value")
+    points = {p["name"]: p for p in s.json("POST", "/points", {"text": text})}
+    corners = [points[f"{grid}[1,1]"]["at"], points[f"{grid}[12,2]"]["at"]]
+    assert points["middle"]["chosen"] and all(abs(points["middle"]["at"][k] - (corners[0][k] + corners[1][k]) / 2) < 1e-9 for k in (0, 1)), points["middle"]
+    # An offset along the lattice; what it is built of cannot be taken away below it.
+    b.run(choose, "Construct", "offset")
+    b.run(choose, "Of", "middle")
+    b.run("for (const [id, v] of [['by-along', 2.54], ['by-across', 1]]) { const e = document.getElementById(id); e.value = v; e.dispatchEvent(new Event('input')); }")
+    b.run("document.getElementById('point-name').value = 'aside'")
+    b.click("#add-point")
+    b.until("the offset", "return document.querySelector('[data-point=aside]')", 10)
+    points = {p["name"]: p for p in s.json("POST", "/points", {"text": b.run("return document.querySelector('textarea').value")})}
+    moved = [points["aside"]["at"][k] - points["middle"]["at"][k] for k in (0, 1)]
+    assert abs(math.hypot(*moved) - math.hypot(2.54, 1)) < 1e-6, moved
+    b.run("document.querySelector('[aria-label=\"Take away middle\"]').click()")
+    b.until("that it is needed", "return /middle/.test(document.querySelector('.problem')?.innerText ?? '')", 10)
+    quiet(b, "part", refused=2)
+
+
+def grid(s, b):
+    """Rows, columns and pitch make every hole of a grid, in the part's own turn."""
+    scan = next(j for j in s.json("GET", "/jobs") if j["order"]["procedure"] == "scan")["id"]
+    b.page("station")
+    b.page("part")
+    b.until("the map", "return document.querySelector('.map canvas')?.width > 300")
+    b.click("[data-tool=outline]")
+    b.drag(".map canvas", (0.3, 0.3), (0.7, 0.7))
+    b.click("[data-tool=grid]")
+    b.drag(".map canvas", (0.4, 0.6), (0.41, 0.6))
+    b.until("its fields", "return document.getElementById('grid-columns')")
+    b.run("for (const [id, v] of [['grid-columns', 3], ['grid-rows', 2], ['grid-x', 2.54], ['grid-y', 15.24]]) { const e = document.getElementById(id); e.value = v; e.dispatchEvent(new Event('input')); }")
+    made = b.run("return import('/widgets/holegrid.js').then((m) => m.places({ first: [10, 20], radius: 0.7, columns: 3, rows: 2, pitch: [2.54, 15.24] }, 30))")
+    assert len(made) == 6 and made[0] == [10, 20, 0.7], made
+    far = math.hypot(made[5][0] - 10, made[5][1] - 20)
+    assert abs(far - math.hypot(2 * 2.54, 15.24)) < 1e-9, made
+    turn = math.degrees(math.atan2(made[2][1] - 20, made[2][0] - 10))
+    assert abs(turn - 30) < 1e-9, turn
+    b.run("document.getElementById('turn').dispatchEvent(new Event('input'))")
+    assert scan
+    quiet(b, "grid")
+
+
+def health(s, b):
+    """Pictures leave the station only where somebody ticked that."""
+    b.page("health")
+    address = lambda: b.run("return document.getElementById('support').getAttribute('href')")
+    read = lambda: json.loads(s.ask("GET", address())[2])
+    assert "pictures" not in read(), "pictures that nobody asked for"
+    b.click("#support-pictures")
+    pictures = read()["pictures"]
+    assert "camera.png" in pictures and any("found.png" in k for k in pictures) and all(v.startswith("iVBOR") for v in pictures.values()), list(pictures)
+    b.click("#support-pictures")
+    assert "pictures" not in read()
+    quiet(b, "health")
+
+
+def repeat(s, b):
+    b.page("scan")
+    before = sum(j["order"]["procedure"] == "scan" for j in s.json("GET", "/jobs"))
+    b.click("#repeat")
+    b.until("one more scan", "return [...document.querySelectorAll('h2')].some((e) => /^\\d+-scan/i.test(e.innerText) && e.innerText.slice(0, 4) > arguments[0])", 60, "0003")
+    scans = [j for j in s.json("GET", "/jobs") if j["order"]["procedure"] == "scan"]
+    assert len(scans) == before + 1 and scans[0]["order"] == scans[1]["order"] and scans[0]["outcome"]["points"] == scans[1]["outcome"]["points"]
+    quiet(b, "repeat")
+
+
+with open(os.path.join(folder, "station", "station.toml"), "w") as f:
+    f.write(f'name = "cell 3"\n\n[tool]\nflange_from_tool = {[float(v) for v in TOOL]}\n')
+s = Server(program, folder, "--recordings", folder, "--camera", "sim:3?rate=4")
+if not Browser.there():
+    print("no chromium and chromedriver here")
+    sys.exit(77)
+assert s.job({"procedure": "scan", "recording": "scan"})["state"] == "done"
+s.json("POST", "/lease/release")
+with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+    b = Browser(profile)
+    try:
+        b.open(s.url)
+        b.ready("station")
+        touch(s, b)
+        station(s, b)
+        surface(s, b)
+        part(s, b)
+        grid(s, b)
+        health(s, b)
+        repeat(s, b)
+    finally:
+        b.close()
+assert s.end() == 0
