@@ -1,7 +1,7 @@
 //! In: simulated stations with known truth, a part seen from two sides, and stations or recordings made wrong by one edit.
 //! Out: judgement on the second look: no wrong pose passes, right ones do, sigmas are honest, one look says that it was not
 //! cross-checked. Peaks are the engine's, from rendered pictures; noise is drawn. Frame and unit: base frame; mm, degrees.
-//! SHEETLIGHT_LONG: ten stations of as many designs, thirty right draws each.
+//! SHEETLIGHT_LONG: ten stations of as many designs, thirty right draws each; a design's name: the stations of that one alone.
 
 mod common;
 #[path = "second_look/edits.rs"]
@@ -22,8 +22,14 @@ use world::{Believed, DESIGNS, Recorded, World};
 fn long() -> bool {
     std::env::var_os("SHEETLIGHT_LONG").is_some()
 }
-fn worlds() -> usize {
-    if long() { DESIGNS.len() } else { 1 }
+fn worlds() -> Vec<usize> {
+    let named = std::env::var("SHEETLIGHT_LONG").unwrap_or_default();
+    let of_name: Vec<usize> = (0..DESIGNS.len()).filter(|&i| DESIGNS[i] == named).collect();
+    match (long(), of_name.is_empty()) {
+        (true, false) => of_name,
+        (true, true) => (0..DESIGNS.len()).collect(),
+        _ => vec![0],
+    }
 }
 /// Rendered once for both tests.
 fn world(index: usize) -> &'static World {
@@ -88,7 +94,7 @@ fn tried(world: &World, name: &str, edit: fn(&mut Believed, &mut [Recorded; 2]))
 #[test]
 fn no_edit_of_a_station_or_recording_passes_two_looks_with_a_wrong_pose() {
     let (mut alone, mut both) = (0, 0);
-    for index in 0..worlds() {
+    for index in worlds() {
         let world = world(index);
         let passed: Vec<Passed> = EDITS.par_iter().map(|(name, edit)| tried(world, name, *edit)).collect();
         let count = |f: fn(&Passed) -> bool| passed.iter().filter(|p| f(p)).count();
@@ -98,7 +104,7 @@ fn no_edit_of_a_station_or_recording_passes_two_looks_with_a_wrong_pose() {
     }
     assert_eq!(both, 0, "wrong poses pass two looks");
     // Otherwise this test would show nothing.
-    assert!(alone > 5 * worlds(), "{alone} edits pass one look with a wrong pose");
+    assert!(alone > 5 * worlds().len(), "{alone} edits pass one look with a wrong pose");
 }
 
 /// Squares of error over stated sigma, x y z of the part.
@@ -143,7 +149,7 @@ fn right_stations_pass_two_looks_and_the_pose_is_as_good_as_it_says() {
     let rms = |of: &[Right], f: &dyn Fn(&Right) -> Squares| {
         [0, 1, 2].map(|k| (of.iter().map(|r| f(r)[k]).sum::<f64>() / of.len() as f64).sqrt())
     };
-    for index in 0..worlds() {
+    for index in worlds() {
         let world = world(index);
         let here: Vec<Right> = (0..draws).into_par_iter().filter_map(|draw| right(world, draw)).collect();
         println!(
@@ -155,7 +161,7 @@ fn right_stations_pass_two_looks_and_the_pose_is_as_good_as_it_says() {
         );
         all.extend(here);
     }
-    let (n, passed) = (worlds() * draws as usize, all.iter().filter(|r| r.passed).count());
+    let (n, passed) = (worlds().len() * draws as usize, all.iter().filter(|r| r.passed).count());
     let (one, two) = (rms(&all, &|r| r.one), rms(&all, &|r| r.two));
     let worse = all.iter().filter(|r| r.worse).count();
     println!(
