@@ -80,6 +80,10 @@ pub fn refine(
             return None;
         }
         let (step, covariance, sigma) = solve(&rows, free)?;
+        // Edges were looked for within REACH: a longer step is an extrapolation along a motion that few of them hold, as where a
+        // shadow hides the edges across it. The next round looks from where this one could see.
+        let longest = step.x.hypot(step.y) + model.radius * (step.z.abs() + step.w.abs());
+        let step = step * (REACH as f64 / longest).min(1.0);
         pose.x += step.x;
         pose.y += step.y;
         pose.angle += step.z;
@@ -164,4 +168,42 @@ fn solve(rows: &[(Vector4<f64>, f64)], free: Free) -> Option<(Vector4<f64>, Matr
         covariance.column_mut(k).fill(0.0);
     }
     Some((step, covariance, sigma))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::find::model::drawing::Drawing;
+    use crate::find::model::gradient::slopes;
+    use crate::find::model::shape_model::ModelOptions;
+    use crate::find::scene::Layer;
+
+    /// A plate whose upper and lower edges lie in shadow, half a cell narrower than drawn: its nearly parallel sides alone hold it
+    /// along them, and meet their edges 20 px away.
+    #[test]
+    fn a_step_is_never_longer_than_edges_were_looked_for() {
+        let drawing =
+            Drawing::parse("[[shape]]\nkind = \"polygon\"\npoints = [[-19, -20], [19, -20], [21, 20], [-21, 20]]\n")
+                .unwrap();
+        let model = ShapeModel::from_drawing(&drawing, 1.0, Kind::Height, &ModelOptions::default()).unwrap();
+        let (width, height, turn) = (100usize, 80usize, 0.1f64);
+        let cell = |i: usize| {
+            let (x, y) = ((i % width) as f64 - 50.0, (i / width) as f64 - 40.0);
+            let (u, v) = (turn.cos() * x + turn.sin() * y, turn.cos() * y - turn.sin() * x);
+            let side = 19.5 + 0.05 * v;
+            if v.abs() > 15.0 { f32::NAN } else { 5.0 * (0.5 + (side - u.abs())).clamp(0.0, 1.0) as f32 }
+        };
+        let layer = Layer::new(Kind::Height, width, height, (0..width * height).map(cell).collect()).unwrap();
+        let field = slopes(&layer);
+        let fields = [(Kind::Height, &field, 0.1)];
+        let free = Free { angle: true, scale: false };
+        let mut most = 0.0f64;
+        for shift in [-1.5, -0.5, 0.5, 1.5] {
+            let start = Pose { x: 50.0 + shift, y: 40.0, angle: turn + 0.04 * shift, scale: 1.0 };
+            let r = refine(&fields, &model, start, free, false, 1).unwrap();
+            let step = (r.pose.x - start.x).hypot(r.pose.y - start.y);
+            most = most.max(step + model.radius * (r.pose.angle - start.angle).abs());
+        }
+        assert!((1.0..=REACH as f64 + 1e-9).contains(&most), "{most} px");
+    }
 }
