@@ -190,7 +190,7 @@ impl World {
 
     /// Both looks with the station that is believed.
     pub fn look(&self, b: &Believed, looks: &[Recorded; 2]) -> Result<(Vec<Report>, Report), String> {
-        let rig = rig(b);
+        let rig = stored(&rig(b)).map_err(|e| e.what)?;
         let mut reports: Vec<Report> = Vec::new();
         for look in looks {
             let options = LocateOptions::default();
@@ -200,6 +200,13 @@ impl World {
         let both = agree(reports.clone(), None, &self.recipe, Convention::Matrix).map_err(|e| e.what)?;
         Ok((reports, both))
     }
+}
+
+/// As the program reads it from its folder: what cannot be a calibration is refused there.
+fn stored(rig: &Rig) -> sheetlight::fault::Result<Rig> {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    rig.store_all(folder.path())?;
+    Rig::load(folder.path())
 }
 
 pub fn rig(b: &Believed) -> Rig {
