@@ -29,5 +29,5 @@ pub use latency::Latency;
 pub use look::{Look, Piece, StripeLook, WANTED, look, look_at};
 pub use picture::{Event, Picture, PictureSource};
 pub use stream::{Stream, Streamed};
-pub use tune::{Tuned, fresh, tune};
+pub use tune::{Tuned, fresh, tune, unexposed};
 pub use uri::CameraUri;

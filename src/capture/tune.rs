@@ -127,15 +127,19 @@ fn changes(what: String) -> Fault {
         .next("hold everything still and tune again")
 }
 
+/// What tuning says of a source whose exposure cannot be set.
+pub fn unexposed(name: &str) -> Fault {
+    Fault::usage(format!("{name}: has no ExposureTime to set"))
+        .cause("a pipe, a folder, a file, or a camera whose exposure is set elsewhere")
+        .next("set the exposure there; sheetlight camera snap says how the stripe looks")
+}
+
 /// The feature's name, its range, its value.
 fn exposure(source: &mut dyn PictureSource) -> Result<(String, [f64; 2], f64)> {
     let features = source.features()?;
     let names = ["ExposureTime", "ExposureTimeAbs"];
-    let feature = names.iter().find_map(|n| features.iter().find(|f| f.name == *n)).ok_or_else(|| {
-        Fault::usage(format!("{}: has no ExposureTime to set", source.name()))
-            .cause("a pipe, a folder, a file, or a camera whose exposure is set elsewhere")
-            .next("set the exposure there; sheetlight camera snap says how the stripe looks")
-    })?;
+    let feature =
+        names.iter().find_map(|n| features.iter().find(|f| f.name == *n)).ok_or_else(|| unexposed(&source.name()))?;
     let range = if let Range::Between(low, high) = feature.range { [low.max(1.0), high] } else { [1.0, 1e6] };
     let value = match feature.value {
         Some(Value::Float(v)) => v,

@@ -266,6 +266,9 @@ fn an_exposure_is_found_at_which_the_stripe_stands_right() {
         assert!((0.70..=0.85).contains(&stripe["peak"].as_f64().unwrap()), "{tuned}");
         assert!(stripe["saturated"].as_f64().unwrap() <= 0.005, "{tuned}");
     }
+    // Nor does a folder: said before it waits for a picture.
+    let said = sheetlight_fails(&["camera", "tune", "--camera", &format!("folder:{}", text(&scan_folder()))]).1;
+    assert!(said.contains("has no ExposureTime"), "{said}");
     let said = sheetlight_fails(&["camera", "tune", "--camera", &format!("play:{}", text(&scan_folder()))]).1;
     assert!(said.contains("no ExposureTime"), "{said}");
 }

@@ -1,7 +1,7 @@
 //! In: a camera. Out: what cameras there are, what one can be set to, one picture with what it shows, the exposure that suits the stripe.
 //! Frame and unit: features by the standard names (SFNC); px, us.
 
-use crate::capture::{CameraUri, PictureSource, RawFormat, Value, fresh, look, tune};
+use crate::capture::{CameraUri, PictureSource, RawFormat, Value, fresh, look, tune, unexposed};
 use crate::cli::terminal::arguments::parse;
 use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
@@ -64,7 +64,12 @@ pub struct Named {
 const PATIENCE: Duration = Duration::from_secs(10);
 
 impl Named {
-    fn open(&self) -> Result<Box<dyn PictureSource>> {
+    fn open(&self, console: &Console) -> Result<Box<dyn PictureSource>> {
+        if let CameraUri::Folder { path, wait_s, .. } = &self.camera {
+            let folder = path.display();
+            console
+                .say(format!("waiting up to {wait_s:.0} s for a new picture in {folder}; those in it are not taken"));
+        }
         self.camera.open(self.raw)
     }
 }
@@ -76,7 +81,11 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Set { key, value, named } => set(key, value, named, console),
         Command::Snap { out, named, station } => snap(out, named, station.as_deref(), console),
         Command::Tune(named) => {
-            let mut source = named.open()?;
+            // Before it waits for a picture.
+            if let CameraUri::Folder { path, .. } = &named.camera {
+                return Err(unexposed(&path.display().to_string()));
+            }
+            let mut source = named.open(console)?;
             let tuned = tune(source.as_mut(), |us, seen| console.say(format!("{us:.0} us: {seen}")))?;
             let remark =
                 tuned.remark.as_ref().map_or(String::new(), |said| format!("no exposure is quite right: {said}\n"));
@@ -110,7 +119,7 @@ fn list(console: &Console) -> Result<()> {
 }
 
 fn show(named: &Named, console: &Console) -> Result<()> {
-    let mut source = named.open()?;
+    let mut source = named.open(console)?;
     let features = source.features()?;
     let mut text = format!("{}: {}\n", source.name(), source.format());
     for f in &features {
@@ -123,7 +132,7 @@ fn show(named: &Named, console: &Console) -> Result<()> {
 }
 
 fn set(key: &str, value: &str, named: &Named, console: &Console) -> Result<()> {
-    let mut source = named.open()?;
+    let mut source = named.open(console)?;
     source.set(key, value)?;
     let now = source.features()?.into_iter().find(|f| f.name == key);
     // A camera from before the standard's second version calls it otherwise.
@@ -133,7 +142,7 @@ fn set(key: &str, value: &str, named: &Named, console: &Console) -> Result<()> {
 }
 
 fn snap(out: &Path, named: &Named, station: Option<&Path>, console: &Console) -> Result<()> {
-    let mut source = named.open()?;
+    let mut source = named.open(console)?;
     let image = fresh(source.as_mut(), PATIENCE)?;
     drop(source);
     let seen = look(&image);
