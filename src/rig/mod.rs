@@ -10,6 +10,7 @@ mod hash;
 mod joint;
 mod kind;
 mod measured;
+mod once;
 mod seal;
 mod volume;
 

@@ -43,7 +43,7 @@ pub fn unsealed<T: DeserializeOwned>(text: &str, what: &str) -> Result<T> {
 
 /// The object in a file and the seal that it carries, unchecked.
 pub(super) fn apart(text: &str, what: &str) -> Result<(Value, Option<String>)> {
-    let mut value: Value = serde_json::from_str(text).map_err(|e| strange(what, &e))?;
+    let mut value = super::once::parse(text).map_err(|e| strange(what, &e))?;
     let Some(object) = value.as_object_mut() else {
         return Err(Fault::input(format!("{what}: is no JSON object")).cause("another kind of file").next(AGAIN));
     };

@@ -35,6 +35,7 @@ fn results(out: &Path) -> Vec<(String, Vec<u8>)> {
 }
 
 #[test]
+#[cfg_attr(not(debug_assertions), ignore = "only debug builds can be stopped at a file operation")]
 fn an_import_that_is_stopped_anywhere_is_old_or_new() {
     let b = Bench::new(1);
     let other = VALUES.replace("305.8", "310.5").replace("\"offset_mm\": 72", "\"offset_mm\": 73");
@@ -65,6 +66,7 @@ fn an_import_that_is_stopped_anywhere_is_old_or_new() {
 }
 
 #[test]
+#[cfg_attr(not(debug_assertions), ignore = "only debug builds can be stopped at a file operation")]
 fn a_scan_that_is_stopped_anywhere_is_resumed_to_the_same_bytes() {
     let b = Bench::new(3);
     b.record("former", 90);

@@ -170,6 +170,7 @@ const fn command(words: &'static str, result: &'static str) -> Stopped {
 }
 
 #[test]
+#[cfg_attr(not(debug_assertions), ignore = "only debug builds can be stopped at a file operation")]
 fn quick_commands() {
     for c in [
         command("station export --station {in}/sim{n}/station --out {work}/values.json", "values.json"),
@@ -189,6 +190,7 @@ fn quick_commands() {
 }
 
 #[test]
+#[cfg_attr(not(debug_assertions), ignore = "only debug builds can be stopped at a file operation")]
 fn finding() {
     let every = if long() { 1 } else { 5 };
     Stopped {
