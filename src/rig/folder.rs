@@ -36,15 +36,22 @@ pub struct Rig {
 impl Rig {
     /// Loads and checks what there is in `station/calibration`.
     pub fn load(station: &Path) -> Result<Rig> {
+        let folder = station.join("calibration");
+        together(&folder).settle()?;
+        Ok(Rig { joint: Joint::load(station), ..Rig::read(&folder)? })
+    }
+
+    /// The records in a folder.
+    fn read(folder: &Path) -> Result<Rig> {
         Ok(Rig {
-            camera: load(station, Kind::Camera)?,
-            laser_plane: load(station, Kind::LaserPlane)?,
-            pointer: load(station, Kind::Pointer)?,
-            hand_eye: load(station, Kind::HandEye)?,
-            base_camera: load(station, Kind::BaseCamera)?,
-            linear_axis: load(station, Kind::LinearAxis)?,
-            turntable: load(station, Kind::Turntable)?,
-            joint: Joint::load(station),
+            camera: read(folder, Kind::Camera)?,
+            laser_plane: read(folder, Kind::LaserPlane)?,
+            pointer: read(folder, Kind::Pointer)?,
+            hand_eye: read(folder, Kind::HandEye)?,
+            base_camera: read(folder, Kind::BaseCamera)?,
+            linear_axis: read(folder, Kind::LinearAxis)?,
+            turntable: read(folder, Kind::Turntable)?,
+            joint: Joint::default(),
         })
     }
 
@@ -83,6 +90,16 @@ impl Rig {
 
     /// Stores every part that is there, all of them or none; former ones are kept as [`Rig::store`] keeps them.
     pub fn store_all(&self, station: &Path) -> Result<Vec<Kind>> {
+        self.store_all_with(station, |_| Vec::new())
+    }
+
+    /// [`Rig::store_all`] together with files (name, text) that are of these records and of no others; they are made from the rig as
+    /// a reader will find it: a rotation comes back from its file orthonormal to the last digit.
+    pub fn store_all_with(
+        &self,
+        station: &Path,
+        others: impl FnOnce(&Rig) -> Vec<(&'static str, String)>,
+    ) -> Result<Vec<Kind>> {
         let mut texts = Vec::new();
         add(&mut texts, &self.camera)?;
         add(&mut texts, &self.laser_plane)?;
@@ -99,6 +116,9 @@ impl Rig {
         let part = set.begin()?;
         for (kind, text) in &texts {
             crate::files::write(&part.join(format!("{}.json", kind.name())), text.as_bytes())?;
+        }
+        for (name, text) in others(&Rig::read(&part)?) {
+            crate::files::write(&part.join(name), text.as_bytes())?;
         }
         set.commit()?;
         Ok(texts.into_iter().map(|(kind, _)| kind).collect())
@@ -272,11 +292,12 @@ fn add<T: Serialize + Measured>(texts: &mut Vec<(Kind, String)>, part: &Option<C
     Ok(())
 }
 
-/// Calibrations that are stored at once; those they replace are kept.
+/// Calibrations that are stored at once; those they replace are kept, their pages are not.
 fn together(folder: &Path) -> Together<'_> {
     fn keep_former(folder: &Path, new: &Path) -> std::io::Result<()> {
         for entry in std::fs::read_dir(new)? {
             let path = folder.join(entry?.file_name());
+            crate::files::remove(&path.with_extension("html"))?;
             if path.exists() {
                 crate::files::moment()?;
                 std::fs::rename(&path, path.with_extension("previous.json"))?;
@@ -311,8 +332,13 @@ fn file(station: &Path, kind: Kind) -> PathBuf {
 }
 
 fn load<T: DeserializeOwned + Measured>(station: &Path, kind: Kind) -> Result<Option<Calibration<T>>> {
-    together(&station.join("calibration")).settle()?;
-    let path = file(station, kind);
+    let folder = station.join("calibration");
+    together(&folder).settle()?;
+    read(&folder, kind)
+}
+
+fn read<T: DeserializeOwned + Measured>(folder: &Path, kind: Kind) -> Result<Option<Calibration<T>>> {
+    let path = folder.join(format!("{}.json", kind.name()));
     let Some(text) = crate::files::read_text_if_there(&path)? else { return Ok(None) };
     let found: Calibration<T> = unsealed(&text, &path.display().to_string()).map_err(|e| e.next(again(kind)))?;
     found.check(kind).map_err(|e| e.at(path.display()).next(again(kind)))?;

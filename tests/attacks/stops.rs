@@ -40,6 +40,10 @@ fn inputs() -> &'static Path {
                 simulate.extend(["--width", "320", "--quiet"].map(str::to_owned));
                 simulate.extend(sets.iter().flat_map(|s| ["--set".to_owned(), (*s).to_owned()]));
                 run(&simulate);
+                let axis = ["simulate", "--motion", "linear", "--set", "axis", "--width", "320", "--quiet"];
+                let axis = axis.into_iter().chain(["--rig", rig.to_str().unwrap()]).map(str::to_owned);
+                let own = ["--out".to_owned(), at(&format!("axis{n}")), "--seed".into(), n.to_string()];
+                run(&axis.chain(own).collect::<Vec<_>>());
             }
         }
         dir
@@ -57,6 +61,8 @@ struct Stopped {
     before: Option<&'static str>,
     /// Of its file operations every so many are tried.
     every: u64,
+    /// Its files take their names together, and whoever reads them next ends what was begun.
+    read_first: bool,
 }
 
 impl Stopped {
@@ -94,6 +100,9 @@ impl Stopped {
                 for at in (1..).step_by(self.every as usize) {
                     restore(&work, &before);
                     let done = cut_off(&self.args(&work, 1), variable, at);
+                    if self.read_first {
+                        read(&work);
+                    }
                     let place = format!("{} {variable}={at}, former {former}", self.words);
                     self.judge(&place, done, &snapshot(&work), &old, &new);
                     tried[usize::from(variable == "SHEETLIGHT_FULL_AT")] += 1;
@@ -165,8 +174,14 @@ fn restore(work: &Path, files: &Content) {
     }
 }
 
+fn read(station: &Path) {
+    if let Err(fault) = sheetlight::rig::Rig::load(station).and_then(|rig| rig.belong_together()) {
+        panic!("{fault}");
+    }
+}
+
 const fn command(words: &'static str, result: &'static str) -> Stopped {
-    Stopped { words, result, before: None, every: 1 }
+    Stopped { words, result, before: None, every: 1, read_first: false }
 }
 
 #[test]
@@ -238,6 +253,20 @@ fn calibrating() {
         Stopped {
             every: 3,
             ..calibration("calibrate camera {in}/cal{n}/intrinsics --station {work}", "calibration/camera.json")
+        },
+        Stopped {
+            before: Some("axis0/station"),
+            ..command("calibrate axis {in}/axis{n}/axis --station {work}", "calibration/linear_axis.json")
+        },
+        // Half a minute each.
+        Stopped {
+            every: 7,
+            read_first: true,
+            ..calibration(
+                "calibrate joint {in}/cal{n}/handeye {in}/cal{n}/laserplane {in}/cal{n}/pointer_cal --poses poses_noisy \
+                 --station {work} --on cpu --keep-badly-determined",
+                "calibration/joint.json",
+            )
         },
     ] {
         c.attack();

@@ -317,20 +317,11 @@ fn contents(rig: &Rig) -> BTreeMap<Kind, String> {
     of
 }
 
-/// Stores all records at once, and beside them their covariance together (`joint.json`, of no meaning for other records) and
-/// the page (`joint.html`).
+/// Stores all records, their covariance together (`joint.json`, of no meaning for other records) and the page (`joint.html`), all of
+/// them or none.
 pub fn store_joint(station: &Path, result: &JointResult) -> Result<Vec<Kind>> {
-    let stored = result.rig.store_all(station)?;
-    // A rotation comes back from its file orthonormal to the last digit: what a reader finds is named.
-    let stored_rig = Rig::load(station)?;
-    let of = contents(&stored_rig).into_iter().filter(|(kind, _)| stored.contains(kind)).collect();
-    let together = JointCovariance { of, ..result.together.clone() };
-    let folder = station.join("calibration");
-    let page = folder.join("joint.html");
-    let html = result.page.html();
-    crate::files::write_beside(
-        (&folder.join("joint.json"), sealed(&together).as_bytes()),
-        &[(page.as_path(), html.as_bytes())],
-    )?;
-    Ok(stored)
+    result.rig.store_all_with(station, |stored| {
+        let together = JointCovariance { of: contents(stored), ..result.together.clone() };
+        vec![("joint.json", sealed(&together)), ("joint.html", result.page.html())]
+    })
 }
