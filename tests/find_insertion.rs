@@ -8,7 +8,8 @@ use common::pose::{Off, truth};
 use sheetlight::find::insert::recipe::InsertionSpec;
 use sheetlight::find::{LocateOptions, Recipe, Report, locate};
 use sheetlight::geometry::{Base, Part, Rigid, Vec3};
-use sheetlight::scan::{CloudPoint, read_cloud};
+use sheetlight::scan::{Along, CloudPoint, Shots, read_cloud};
+use sheetlight::station::shots_of;
 use std::path::PathBuf;
 
 const PARTS: [&str; 4] = ["dimm", "led", "osc", "flash"];
@@ -20,6 +21,7 @@ const ANGLE_DEG: f64 = 0.15;
 struct Scanned {
     part: &'static str,
     cloud: Vec<CloudPoint>,
+    shots: Shots,
     truth: Rigid<Base, Part>,
     recipe: Recipe,
 }
@@ -62,6 +64,7 @@ fn scans(test: &str) -> Vec<Scanned> {
             out.push(Scanned {
                 part,
                 cloud: read_cloud(&to.join("cloud.ply")).unwrap(),
+                shots: shots_of(&to).unwrap(),
                 truth: truth(&truths.join(format!("scan_{part}"))),
                 recipe: recipe(part),
             });
@@ -78,7 +81,7 @@ fn error(report: &Report, truth: &Rigid<Base, Part>) -> (f64, f64, f64) {
 
 /// A report that passed must be right within what insertion bears; returns whether it passed.
 fn right_or_refused(what: &str, s: &Scanned, cloud: &[CloudPoint], truth: &Rigid<Base, Part>) -> bool {
-    match locate(cloud, &s.recipe, None, &LocateOptions::default()) {
+    match locate(cloud, &s.shots, &s.recipe, None, &LocateOptions::default()) {
         Err(e) => {
             println!("{what} {}: refused: {}", s.part, e.what);
             assert!(!e.cause.is_empty() && !e.next.is_empty());
@@ -103,7 +106,8 @@ fn right_or_refused(what: &str, s: &Scanned, cloud: &[CloudPoint], truth: &Rigid
 fn the_four_parts_are_found_and_the_damaged_scans_are_never_wrong() {
     for s in scans("insertion poses") {
         let report =
-            locate(&s.cloud, &s.recipe, None, &LocateOptions::default()).unwrap_or_else(|e| panic!("{}: {e}", s.part));
+            locate(&s.cloud, &s.shots, &s.recipe, None, &LocateOptions::default())
+                .unwrap_or_else(|e| panic!("{}: {e}", s.part));
         let (plane, height, angle) = error(&report, &s.truth);
         println!(
             "{}: {plane:.4} mm in the plane, {height:.4} mm in height, {angle:.4} degrees; sigma {:.4?} mm {:.4?} degrees; two pins against lattice {:?} mm",
@@ -155,7 +159,7 @@ fn the_four_parts_are_found_and_the_damaged_scans_are_never_wrong() {
         assert!(!right_or_refused("no part", &s, &cloud, &s.truth), "{}: found on an empty board", s.part);
         // The wrong part.
         for other in PARTS.iter().filter(|p| **p != s.part) {
-            let wrong = Scanned { part: s.part, cloud: vec![], truth: s.truth, recipe: recipe(other) };
+            let wrong = Scanned { part: s.part, cloud: vec![], shots: s.shots.clone(), truth: s.truth, recipe: recipe(other) };
             assert!(
                 !right_or_refused(&format!("recipe {other} on"), &wrong, &s.cloud, &s.truth),
                 "{other} found in {}",
@@ -169,7 +173,11 @@ fn the_four_parts_are_found_and_the_damaged_scans_are_never_wrong() {
             CloudPoint { position: [q.x as f32, q.y as f32, q.z as f32], ..*p }
         };
         let cloud: Vec<CloudPoint> = s.cloud.iter().map(turned).collect();
-        assert!(right_or_refused("turned by half", &s, &cloud, &(turn * s.truth)), "{}: the turned part", s.part);
+        let last = s.cloud.last().unwrap().shot;
+        let places = (0..=last).filter_map(|k| Some((k, turn * *s.shots.place(k)?)));
+        let truth = turn * s.truth;
+        let s = Scanned { shots: Shots::new(s.shots.along, places), ..s };
+        assert!(right_or_refused("turned by half", &s, &cloud, &truth), "{}: the turned part", s.part);
     }
 }
 
@@ -200,7 +208,7 @@ fn bad_recipes_and_empty_scans_are_refused_with_numbers() {
     let recipe = Recipe::parse(&text).unwrap();
     for n in [0usize, 30] {
         let cloud = vec![CloudPoint::default(); n];
-        let e = locate(&cloud, &recipe, None, &LocateOptions::default()).unwrap_err();
+        let e = locate(&cloud, &Shots::unplaced(Along::U), &recipe, None, &LocateOptions::default()).unwrap_err();
         assert!(e.what.contains(&format!("{n} points")) && e.what.contains("500"), "{}", e.what);
     }
 }
@@ -291,7 +299,7 @@ fn a_part_is_taught_from_half_millimetre_numbers() {
         holes: holes.map(|h| [h[0], h[1], 0.72]).to_vec(),
         insertion: InsertionSpec::at_the_part((0.25, 1.0), 30.0, 60.0),
     };
-    let (recipe, proof) = teach(&s.cloud, &map, &options).unwrap();
+    let (recipe, proof) = teach(&s.cloud, &s.shots, &map, &options).unwrap();
     let again = Recipe::parse(&toml::to_string(&recipe).unwrap()).unwrap();
     assert_eq!(again, recipe);
     let size = recipe.shape[0].size.unwrap();
@@ -305,7 +313,7 @@ fn a_part_is_taught_from_half_millimetre_numbers() {
     let (plane, height, _) = error(&proof, &s.truth);
     assert!(plane < 0.15 && height < 0.05, "{plane} {height}");
     let outside = TeachOptions { outline: [-1.0, 0.0, 5.0, 5.0], ..options };
-    assert!(teach(&s.cloud, &map, &outside).unwrap_err().what.contains("outline"));
+    assert!(teach(&s.cloud, &s.shots, &map, &outside).unwrap_err().what.contains("outline"));
 }
 
 #[test]

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use sheetlight::find::{LocateOptions, Recipe, locate};
 use sheetlight::geometry::{Base, Part, Rigid, Vec3};
 use sheetlight::rig::{Rig, Volume};
-use sheetlight::scan::{CloudPoint, Extraction, Format, Processor, Scanner, Shot};
+use sheetlight::scan::{CloudPoint, Extraction, Format, Processor, Profile, Scanner, Shot, Shots};
 use sheetlight::simulate::{
     Canvas, InScene, Scene, SceneSpec, Sensor, Station, View, above, base_from_scene, expose, flange, part_pose,
     reported,
@@ -90,6 +90,7 @@ struct Scanned {
     part: &'static str,
     recipe: Recipe,
     cloud: Vec<CloudPoint>,
+    shots: Shots,
     truth: Rigid<Base, Part>,
     rig: Rig,
     about: String,
@@ -167,7 +168,13 @@ fn scan(part: &'static str, seed: u64) -> Scanned {
     let mut scanner =
         Scanner::new(&rig, carrier, format, &Extraction::default(), Some(&volume), None, Processor::host()).unwrap();
     let above_scene = scene.spec.focus_height_mm + station.working_distance;
-    let mut cloud: Vec<CloudPoint> = Vec::new();
+    let (mut cloud, mut places): (Vec<CloudPoint>, Vec<_>) = Default::default();
+    let mut take = |profiles: Vec<Profile>| {
+        for p in profiles {
+            places.push((p.shot, p.from_camera));
+            cloud.extend(p.points);
+        }
+    };
     for i in 0..(2.0 * half[1] / pitch) as usize {
         let scene_from_camera = above(0.0, pitch * i as f64 - half[1], above_scene);
         let view = View { station: &station, scene: &scene, scene_from_camera };
@@ -187,15 +194,16 @@ fn scan(part: &'static str, seed: u64) -> Scanned {
                 here_ns: None,
             })
             .unwrap();
-        cloud.extend(scanner.ready().unwrap().into_iter().flat_map(|p| p.points));
+        take(scanner.ready().unwrap());
     }
-    cloud.extend(scanner.finish().unwrap().into_iter().flat_map(|p| p.points));
+    take(scanner.finish().unwrap());
+    let shots = Shots::new(scanner.stripe_along(), places);
     let truth = base_from_scene * part_pose::<InScene>(&scene.spec.part[0]);
     let about = format!(
         "{part} {seed}: size {k:.2}, turn {turn:.0}, albedo {albedo:.2}, noise {noise:.2}, pitch {pitch:.2}, shaky {shaky}, {} points",
         cloud.len()
     );
-    Scanned { part, recipe: scaled(&recipe(part), k), cloud, truth, rig, about, height: height * k }
+    Scanned { part, recipe: scaled(&recipe(part), k), cloud, shots, truth, rig, about, height: height * k }
 }
 
 /// What came out of one search.
@@ -205,8 +213,8 @@ enum Outcome {
     Wrong(String),
 }
 
-fn judged(recipe: &Recipe, cloud: &[CloudPoint], rig: &Rig, truth: Option<&Rigid<Base, Part>>) -> Outcome {
-    match locate(cloud, recipe, Some(rig), &LocateOptions::default()) {
+fn judged(s: &Scanned, recipe: &Recipe, cloud: &[CloudPoint], truth: Option<&Rigid<Base, Part>>) -> Outcome {
+    match locate(cloud, &s.shots, recipe, Some(&s.rig), &LocateOptions::default()) {
         Err(e) => {
             assert!(!e.cause.is_empty() && !e.next.is_empty(), "{e}");
             Outcome::Refused(e.what)
@@ -233,7 +241,7 @@ fn cases(s: &Scanned, seed: u64) -> Vec<(&'static str, Outcome)> {
         let up = s.truth.direction(&Vec3::z()) * mm;
         CloudPoint { position: std::array::from_fn(|k| p.position[k] + up[k] as f32), ..*p }
     };
-    let judge = |cloud: &[CloudPoint], truth| judged(&s.recipe, cloud, &s.rig, truth);
+    let judge = |cloud: &[CloudPoint], truth| judged(s, &s.recipe, cloud, truth);
     let mut out = vec![("whole", judge(&s.cloud, Some(&s.truth)))];
     let mut rng = Pcg64::seed_from_u64(seed);
     let shots = s.cloud.iter().map(|p| p.shot).max().unwrap_or(0) as usize + 1;
@@ -257,7 +265,7 @@ fn cases(s: &Scanned, seed: u64) -> Vec<(&'static str, Outcome)> {
     let board: Vec<CloudPoint> = s.cloud.iter().map(flat).collect();
     out.push(("no part", judge(&board, None)));
     for other in PARTS.iter().filter(|p| **p != s.part) {
-        out.push(("another part's recipe", judged(&recipe(other), &s.cloud, &s.rig, None)));
+        out.push(("another part's recipe", judged(s, &recipe(other), &s.cloud, None)));
     }
     // A part whose turn tells nothing must not pass as if it did: the recipe without the notch, key or corner.
     out

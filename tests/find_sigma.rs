@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use sheetlight::find::{LocateOptions, Recipe, locate};
 use sheetlight::geometry::{Base, Part, Rigid};
 use sheetlight::rig::{Rig, Volume};
-use sheetlight::scan::{CloudPoint, Extraction, Format, Processor, Scanner, Shot};
+use sheetlight::scan::{CloudPoint, Extraction, Format, Processor, Profile, Scanner, Shot, Shots};
 use sheetlight::simulate::{
     Canvas, InScene, Scene, SceneSpec, Sensor, Station, View, above, base_from_scene, expose, flange, part_pose,
     reported,
@@ -118,7 +118,13 @@ fn trial(seed: u64) -> Option<Trial> {
         Scanner::new(&rig, carrier, format, &Extraction::default(), Some(&volume), None, Processor::host()).unwrap();
     let [_, y0, _, y1] = scene.spec.region_mm;
     let height = scene.spec.focus_height_mm + station.working_distance;
-    let mut cloud: Vec<CloudPoint> = Vec::new();
+    let (mut cloud, mut places): (Vec<CloudPoint>, Vec<_>) = Default::default();
+    let mut take = |profiles: Vec<Profile>| {
+        for p in profiles {
+            places.push((p.shot, p.from_camera));
+            cloud.extend(p.points);
+        }
+    };
     let shots = ((y1 - y0) / said.pitch) as usize;
     for i in 0..shots {
         let scene_from_camera = above(0.0, y0 + said.pitch * i as f64, height);
@@ -139,12 +145,13 @@ fn trial(seed: u64) -> Option<Trial> {
                 here_ns: None,
             })
             .unwrap();
-        cloud.extend(scanner.ready().unwrap().into_iter().flat_map(|p| p.points));
+        take(scanner.ready().unwrap());
     }
-    cloud.extend(scanner.finish().unwrap().into_iter().flat_map(|p| p.points));
+    take(scanner.finish().unwrap());
+    let shots = Shots::new(scanner.stripe_along(), places);
     let truth: Rigid<Base, Part> = base_from_scene * part_pose::<InScene>(&scene.spec.part[0]);
     let recipe = Recipe::parse(RELAY).unwrap();
-    let report = match locate(&cloud, &recipe, Some(&rig), &LocateOptions::default()) {
+    let report = match locate(&cloud, &shots, &recipe, Some(&rig), &LocateOptions::default()) {
         Ok(r) => r,
         Err(e) => {
             println!("{seed}: refused: {} {:?}", e.what, said);

@@ -10,7 +10,7 @@ use damage::{scratch, sealed_anew, survives, text, through_file};
 use proptest::prelude::*;
 use sheetlight::find::dxf::{self, DxfOptions};
 use sheetlight::find::{Drawing, ModelOptions, Recipe, Scene as FindScene, SearchOptions, Template, find};
-use sheetlight::geometry::{Base, Flange};
+use sheetlight::geometry::{Base, Flange, Rigid};
 use sheetlight::raster::{Channel, Image, decode, float_tiff, png, read_float_tiff};
 use sheetlight::recording::{BoardSpec, Markers, Meta, load_board_poses, load_poses};
 use sheetlight::rig::Rig;
@@ -126,6 +126,17 @@ fn scans() {
             Err(e) if e.next.is_empty() => Err(e),
             _ => Ok(()),
         }
+    });
+    let folder = scratch();
+    let mut list = ShotsWriter::create(folder.path(), "base", Along::U, "rig").unwrap();
+    (0..3).for_each(|shot| list.add(shot, Rigid::identity()));
+    list.checkpoint().unwrap();
+    let path = folder.path().join(SHOTS_FILE);
+    let seed = std::fs::read(&path).unwrap();
+    survives("shots", vec![seed], move |b| {
+        std::fs::write(&path, b).expect("a file");
+        Shots::load(folder.path(), "rig")?;
+        ShotsWriter::resume(folder.path(), 2, "rig").map(drop)
     });
     let mut cloud = CloudWriter::create(&dir.path().join("cloud.ply")).unwrap();
     let mut state = Checkpoint::new("id".into());

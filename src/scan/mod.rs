@@ -15,6 +15,7 @@ mod pcd;
 mod processor;
 mod scanner;
 mod shift;
+mod shots;
 mod source;
 
 pub use crate::capture::{Format, RawFormat, RawFrames};
@@ -37,4 +38,5 @@ pub use processor::{Processor, Where, Why};
 pub use scanner::{Profile, Scanner, camera_for};
 pub use shift::plateau::Plateau;
 pub use shift::scan::{ShiftReport, ShiftRig, Side, shift_scan};
+pub use shots::{Along, SHOTS_FILE, Shots, ShotsWriter};
 pub use source::{BadShot, RawSource, RecordingSource, Shot, Source};

@@ -3,7 +3,7 @@
 //! Frame and unit: points in the carrier's frame (mostly the robot's base), mm (docs/math.md, Stripe peak; the paper's eq. 5 and 6).
 
 use super::engine::{Engine, Measured, Optical, StripeSeen};
-use super::{Ambient, Carrier, CloudPoint, Extraction, Format, Place, Processor, Shot};
+use super::{Along, Ambient, Carrier, CloudPoint, Extraction, Format, Place, Processor, Shot};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Camera, Plane, Rigid, Vec2, Vec3};
@@ -25,6 +25,8 @@ pub struct Profile {
     pub peaks: Vec<Peak>,
     /// One point a kept peak.
     pub points: Vec<CloudPoint>,
+    /// Where the camera stood, cloud's frame, mm.
+    pub from_camera: Rigid<Base, Camera>,
 }
 
 /// Shots looked at for the stripe's width before the first profile leaves.
@@ -179,6 +181,11 @@ impl Scanner {
         self.stripe
     }
 
+    /// The image axis that the stripe runs along.
+    pub fn stripe_along(&self) -> Along {
+        Along::crossed(self.optics.across())
+    }
+
     /// Towards the camera at the first shot; on a turntable along its axis. Cloud's frame.
     pub fn up_in_base(&self) -> Vec3 {
         self.up
@@ -282,7 +289,7 @@ impl Scanner {
                 v: k.v,
             })
             .collect();
-        Profile { shot: judged.shot, peaks: judged.peaks, points }
+        Profile { shot: judged.shot, from_camera: place.from_camera, peaks: judged.peaks, points }
     }
 }
 

@@ -8,7 +8,7 @@ use crate::fault::{Fault, Result};
 use crate::files::Lock;
 use crate::geometry::Vec3;
 use crate::rig::hash_file;
-use crate::scan::{CloudPoint, CloudWriter, Filter, HeightMap, MOST_FILTERS};
+use crate::scan::{CloudPoint, CloudWriter, Filter, HeightMap, MOST_FILTERS, SHOTS_FILE};
 use std::path::Path;
 
 /// Points below which nothing is left to look at.
@@ -68,7 +68,12 @@ pub fn filter_scan(scan: &Path, filters: &[Filter], out: &Path) -> Result<ScanRe
     let mut writer = CloudWriter::create_in(&part.join("cloud.ply"), frame(&report)?)?;
     writer.append(&points)?;
     let count = writer.finish()?;
-    let (height_map, files) = products::of_map(&part, &part.join("cloud.ply"), count, &map)?;
+    let (height_map, mut files) = products::of_map(&part, &part.join("cloud.ply"), count, &map)?;
+    if report.imported.is_none() {
+        let shots = crate::files::read_text(&scan.join(SHOTS_FILE))?;
+        crate::files::write(&part.join(SHOTS_FILE), shots.as_bytes())?;
+        files.extend([products::hash(&part, SHOTS_FILE)?]);
+    }
     let name = scan.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let filtered =
         Filtered { scan: name, sha256: hash_file(&scan.join("scan.json"))?, filters: filters.to_vec(), cells };

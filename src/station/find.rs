@@ -3,7 +3,7 @@
 //! Frame and unit: the scan's frame, mm; plans of a second look: base.
 
 use super::height_witness::height_witness;
-use super::scan::report::{ScanReport, cloud_of, load_report};
+use super::scan::report::{ScanReport, cloud_of, load_report, shots_of};
 use crate::fault::{Fault, Result};
 use crate::find::insert::picture;
 use crate::find::insert::teach::{TeachOptions, teach};
@@ -129,11 +129,11 @@ pub fn find_part(
         rig.belong_together().map_err(|e| e.at(station.display()))?;
         fits(rig, scan, &scanned)?;
     }
-    let cloud = cloud_of(scan)?;
+    let (cloud, shots) = (cloud_of(scan)?, shots_of(scan)?);
     // A turntable's part turns before the camera: heights are those over the table, z of the axis frame.
     let over_table = (scanned.motion.axis() == Some(AxisKind::Turntable)).then(Vec3::z);
     let options = &LocateOptions { up: options.up.or(over_table), ..options.clone() };
-    let mut report = locate(&cloud, recipe, rig.as_ref(), options).map_err(|e| e.at(scan.display()))?;
+    let mut report = locate(&cloud, &shots, recipe, rig.as_ref(), options).map_err(|e| e.at(scan.display()))?;
     if scanned.frame != report.frame {
         report.notes.push(format!(
             "all poses are in the {} frame of the scan, not in a robot's base (docs/conventions.md)",
@@ -163,9 +163,9 @@ pub(super) fn fits(rig: &Rig, scan: &Path, scanned: &ScanReport) -> Result<()> {
 
 /// Teaches a part from a finished scan: the recipe, its proof on that scan, and a picture of it.
 pub fn teach_part(scan: &Path, options: &TeachOptions) -> Result<(Recipe, Report, RgbImage)> {
-    let cloud = cloud_of(scan)?;
+    let (cloud, shots) = (cloud_of(scan)?, shots_of(scan)?);
     let map = grid(&cloud, &GridOptions::default())?;
-    let (recipe, proof) = teach(&cloud, &map, options).map_err(|e| e.at(scan.display()))?;
+    let (recipe, proof) = teach(&cloud, &shots, &map, options).map_err(|e| e.at(scan.display()))?;
     let image = picture::draw(&proof, &recipe.drawing());
     Ok((recipe, proof, image))
 }

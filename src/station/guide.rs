@@ -148,11 +148,11 @@ pub fn guide(options: &GuideOptions, confirm: &mut dyn FnMut(&Step) -> Result<bo
     let run = ScanOptions { place: options.place, ..ScanOptions::for_station(&settings, &rig, &scan_folder) };
     let scanned = scan_recording(&recording, poses, &rig, &run, |_, _| {})?;
 
-    let cloud = crate::station::scan::report::cloud_of(&scan_folder)?;
+    let (cloud, shots) = (super::cloud_of(&scan_folder)?, super::shots_of(&scan_folder)?);
     let accelerator = (options.place != Where::Cpu).then(Accelerator::open).flatten();
     let locate_options =
         LocateOptions { up: Some(normal), robot: options.robot, accelerator, ..LocateOptions::default() };
-    let report = locate(&cloud, &recipe, Some(&rig), &locate_options)?;
+    let report = locate(&cloud, &shots, &recipe, Some(&rig), &locate_options)?;
     picture::draw(&report, &recipe.drawing()).save_png(&options.out.join("found.png"))?;
     let tilt = report.base_from_part.direction(&Vec3::z()).dot(&normal).clamp(-1.0, 1.0).acos().to_degrees();
     let mut says = vec![

@@ -8,7 +8,7 @@ use sheetlight::find::insert::teach::{TeachOptions, teach};
 use sheetlight::find::measure::points::Ordered;
 use sheetlight::geometry::{Base, Flange};
 use sheetlight::scan::grid;
-use sheetlight::scan::{CloudPoint, GridOptions};
+use sheetlight::scan::{Along, CloudPoint, GridOptions, Shots};
 
 /// A plate of 40 x 24 mm, 5 mm high, on a table; a shot every 0.2 mm.
 fn plate() -> Vec<CloudPoint> {
@@ -35,7 +35,7 @@ fn plate() -> Vec<CloudPoint> {
 fn with(edit: impl Fn(&mut CloudPoint)) -> Result<Ordered, Fault> {
     let mut cloud = plate();
     edit(&mut cloud[777]);
-    Ordered::new(&cloud)
+    Ordered::new(&cloud, &Shots::unplaced(Along::U))
 }
 
 #[test]
@@ -49,7 +49,7 @@ fn points() {
         case("z of inf", Says(&["inf"]), || with(|p| p.position[2] = f32::INFINITY)),
         case("u of 100,000", Says(&["columns"]), || with(|p| p.u = 1e5)),
         case("a shot of 4 billion", Good, || with(|p| p.shot = u32::MAX)),
-        case("499 points", Says(&["499 points", "at least 500"]), || Ordered::new(&plate()[..499])),
+        case("499 points", Says(&["499 points", "at least 500"]), || Ordered::new(&plate()[..499], &Shots::unplaced(Along::U))),
     ]);
 }
 
@@ -62,6 +62,7 @@ fn teaching() {
             let insertion = InsertionSpec::at_the_part((0.2, 0.5), 20.0, 20.0);
             teach(
                 &cloud,
+                &Shots::unplaced(Along::U),
                 &map,
                 &TeachOptions {
                     name: "plate".into(),

@@ -11,7 +11,7 @@ use sheetlight::find::{LocateOptions, Recipe, Report, agree, locate};
 use sheetlight::geometry::{Base, Camera, Flange, Mat3, Part, Plane, Rigid, Vec2, Vec3, exp};
 use sheetlight::rig::{Calibration, Covariance, Kind, Quality, Rig, Verdict};
 use sheetlight::robot::Convention;
-use sheetlight::scan::CloudPoint;
+use sheetlight::scan::{Along, CloudPoint, Shots};
 use sheetlight::simulate::{InScene, RigSpec, Scene, SceneSpec, Station, base_from_scene, flange, part_pose, scan};
 use std::path::PathBuf;
 
@@ -47,6 +47,15 @@ pub struct Believed {
     pub unit: f64,
     pub plane: Plane<Camera>,
     pub hand_eye: Rigid<Flange, Camera>,
+}
+
+impl Believed {
+    /// Where the camera is believed to have stood.
+    fn shots(&self, look: &Recorded) -> Shots {
+        let across = across(&self.station).map(|x| x as f32);
+        let places = look.poses.iter().map(|pose| *pose * self.hand_eye);
+        Shots::new(Along::crossed([across.x, across.y]), (0..).zip(places))
+    }
 }
 
 pub struct World {
@@ -195,7 +204,7 @@ impl World {
         for look in looks {
             let options = LocateOptions::default();
             let options = if let Some(first) = reports.first() { options.again(first) } else { options };
-            reports.push(locate(&self.cloud(b, look), &self.recipe, Some(&rig), &options).map_err(|e| e.what)?);
+            reports.push(locate(&self.cloud(b, look), &b.shots(look), &self.recipe, Some(&rig), &options).map_err(|e| e.what)?);
         }
         let both = agree(reports.clone(), None, &self.recipe, Convention::Matrix).map_err(|e| e.what)?;
         Ok((reports, both))

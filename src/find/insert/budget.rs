@@ -99,7 +99,7 @@ pub fn budget(points: &Ordered, measured: &Measured, rig: Option<&Rig>, recipe: 
         term("match", &measured.covariance, "edges and surfaces of the part, peak noise included".into()),
     ];
     let mut complete = true;
-    let seen = rig.and_then(|r| PartSeen::new(points, &recipe.drawing(), measured, r, &recipe.measure));
+    let seen = rig.and_then(|_| PartSeen::new(points, &recipe.drawing(), measured, &recipe.measure));
     let levers = seen.as_ref().zip(rig).map_or(Vec::new(), |(seen, rig)| seen.levers(rig));
     let into_part = both(&measured.base_from_part.rotation.transpose());
     let (together, aside) = seen.as_ref().zip(rig).map_or((None, None), |(seen, rig)| at_once(seen, rig));

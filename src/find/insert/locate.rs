@@ -24,7 +24,7 @@ use crate::find::search::options::SearchOptions;
 use crate::geometry::{Base, Part, Rigid, Tool, Vec3};
 use crate::rig::Rig;
 use crate::robot::Convention;
-use crate::scan::{CloudPoint, GridOptions, HeightMap, grid};
+use crate::scan::{CloudPoint, GridOptions, HeightMap, Shots, grid};
 
 /// What else is known about a scan.
 #[derive(Clone, Debug)]
@@ -151,11 +151,14 @@ pub struct Report {
 
 /// Finds the part of a recipe in a cloud. A part that is not there, or that is seen too badly to be
 /// measured, is a `Fault`; one that was measured but misses a gate is a report without poses.
-pub fn locate(cloud: &[CloudPoint], recipe: &Recipe, rig: Option<&Rig>, options: &LocateOptions) -> Result<Report> {
+pub fn locate(
+    cloud: &[CloudPoint],
+    shots: &Shots,
+    recipe: &Recipe, rig: Option<&Rig>, options: &LocateOptions) -> Result<Report> {
     recipe.check()?;
     let drawing = recipe.drawing();
-    let points = Ordered::new(cloud)?;
-    let up = options.up.or_else(|| rig.and_then(|r| towards_camera(&points, r))).unwrap_or_else(Vec3::z);
+    let points = Ordered::new(cloud, shots)?;
+    let up = options.up.or_else(|| towards_camera(&points)).unwrap_or_else(Vec3::z);
     let map = grid(cloud, &GridOptions { cell: Some(recipe.cell_mm), up, ..GridOptions::default() })?;
     let scene = scene_of(&map, &recipe.layers)?;
     let model = model_of(recipe, &scene)?;

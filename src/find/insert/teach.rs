@@ -12,7 +12,7 @@ use crate::find::measure::pose::{Measured, measure};
 use crate::find::model::drawing::Drawing;
 use crate::find::model::shape::{Form, Inside, Shape};
 use crate::geometry::{Base, Grid, Part, Rigid, Vec3};
-use crate::scan::{CloudPoint, HeightMap};
+use crate::scan::{CloudPoint, HeightMap, Shots};
 
 /// A few clicks' worth of numbers.
 #[derive(Clone, Debug)]
@@ -33,8 +33,11 @@ pub struct TeachOptions {
 }
 
 /// Teaches from a cloud and its map. Refuses numbers that lie outside the map or show no part.
-pub fn teach(cloud: &[CloudPoint], map: &HeightMap, options: &TeachOptions) -> Result<(Recipe, Report)> {
-    let points = Ordered::new(cloud)?;
+pub fn teach(
+    cloud: &[CloudPoint],
+    shots: &Shots,
+    map: &HeightMap, options: &TeachOptions) -> Result<(Recipe, Report)> {
+    let points = Ordered::new(cloud, shots)?;
     let [x0, y0, x1, y1] = options.outline;
     let (w, h) = (f64::from(map.width) * map.cell, f64::from(map.height) * map.cell);
     if !(x0 < x1 && y0 < y1 && x0 >= 0.0 && y0 >= 0.0 && x1 <= w && y1 <= h) {
@@ -95,7 +98,7 @@ pub fn teach(cloud: &[CloudPoint], map: &HeightMap, options: &TeachOptions) -> R
     }
     let recipe = recipe_of(options, drawing, map)?;
     let up = map.base_from_grid.direction(&Vec3::z());
-    let proof = locate(cloud, &recipe, None, &LocateOptions { up: Some(up), ..LocateOptions::default() })?;
+    let proof = locate(cloud, shots, &recipe, None, &LocateOptions { up: Some(up), ..LocateOptions::default() })?;
     Ok((recipe, proof))
 }
 

@@ -9,9 +9,9 @@ use crate::find::measure::points::localise;
 use crate::find::measure::pose::Measured;
 use crate::find::measure::shape::shape_row;
 use crate::find::model::drawing::Drawing;
-use crate::geometry::{Base, Camera, Mat3, Part, Rigid, Vec2, Vec3};
+use crate::geometry::{Base, Camera, Part, Rigid, Vec3};
 use crate::rig::{JointCovariance, Rig};
-use nalgebra::{DMatrix, DVector, Matrix3, SMatrix, SVector};
+use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
 /// Shots that are looked at, places in each, and the least that say how a camera stood.
 const SHOTS: usize = 24;
@@ -29,12 +29,11 @@ pub struct PartSeen {
 }
 
 impl PartSeen {
-    /// `None` where the scan does not fit the rig, or where too few points lie on the part's surfaces.
+    /// `None` where nobody knows where the camera stood, or where too few points lie on the part's surfaces.
     pub fn new(
         points: &Ordered,
         drawing: &Drawing,
         measured: &Measured,
-        rig: &Rig,
         options: &MeasureOptions,
     ) -> Option<PartSeen> {
         let faces = drawing.faces();
@@ -50,7 +49,7 @@ impl PartSeen {
             .into_iter()
             .filter(|s| s.1.len() >= MIN_PLACES)
             .flat_map(|(row, on)| on.into_iter().map(move |i| (row, i)));
-        let seen = seen_by(points, rig, on).into_iter().map(|s| s.1).collect();
+        let seen = seen_by(points, on).into_iter().map(|s| s.1).collect();
         let edges = measured.observations.iter().filter(|o| o.locates && o.weight > 0.0);
         let edges: Vec<[f64; 4]> = edges.map(|o| [o.x, o.y, o.nx, o.ny]).collect();
         PartSeen::of(measured.base_from_part, seen, edges)
@@ -155,10 +154,9 @@ pub(in crate::find) fn middle(seen: &[Seen], of: &Vec3) -> Option<Rigid<Base, Ca
 }
 
 /// How some of a scan's points, given as (row, point) in the order of rows, were seen: at most [`SHOTS`] shots and [`PLACES`] in
-/// each. Empty where the scan does not fit the rig.
+/// each. Empty where nobody knows where the camera stood.
 pub(in crate::find) fn seen_by(
     points: &Ordered,
-    rig: &Rig,
     on: impl Iterator<Item = (u32, usize)>,
 ) -> Vec<(usize, Seen)> {
     let mut shots: Vec<(u32, Vec<usize>)> = Vec::new();
@@ -170,15 +168,14 @@ pub(in crate::find) fn seen_by(
     }
     let (mut stood, mut places) = (Vec::new(), Vec::new());
     for (row, on) in strided(shots.len(), SHOTS).into_iter().map(|k| &shots[k]) {
-        let Some(camera) = camera_at(points, *row, rig) else { continue };
+        let Some(camera) = points.from_camera[*row as usize] else { continue };
         stood.push((points.shot[*row as usize], camera));
         let back = camera.inverse();
         places.extend(
             strided(on.len(), PLACES).into_iter().map(|k| (stood.len() - 1, on[k], back.point(&points.points[on[k]]))),
         );
     }
-    let first = camera_at(points, 0, rig).or(stood.first().map(|s| s.1));
-    let (Some(first), 2..) = (first, stood.len()) else { return Vec::new() };
+    let (Some(first), 2..) = (points.from_camera[0], stood.len()) else { return Vec::new() };
     let travel = travelled(&stood, &first, &places.iter().map(|p| (p.0, p.2)).collect::<Vec<_>>());
     places.iter().map(|p| p.1).zip(travel).collect()
 }
@@ -211,48 +208,8 @@ fn inverted(normal: &DMatrix<f64>) -> DMatrix<f64> {
     (normal + DMatrix::identity(n, n) * ridge.max(1e-300)).try_inverse().unwrap_or_else(|| DMatrix::zeros(n, n))
 }
 
-/// Where the camera stood for one row of points: the laser plane says where their pixels are seen in it, the scan where they
-/// are in the base.
-pub(in crate::find) fn camera_at(points: &Ordered, row: u32, rig: &Rig) -> Option<Rigid<Base, Camera>> {
-    let (camera, plane) = (rig.camera.as_ref()?.value, rig.laser_plane.as_ref()?.value);
-    let (mut seen, mut known) = (vec![], vec![]);
-    for i in points.in_row(row) {
-        let px = Vec2::new(f64::from(points.pixel[i][0]), f64::from(points.pixel[i][1]));
-        if let Some(p) = camera.ray_from_pixel(&px).and_then(|r| r.meet(&plane)) {
-            seen.push(p);
-            known.push(points.points[i]);
-        }
-    }
-    align(&seen, &known)
-}
-
-/// Direction towards the camera during the scan, base frame; `None` where the rig does not fit the scan.
-pub fn towards_camera(points: &Ordered, rig: &Rig) -> Option<Vec3> {
+/// Direction towards the camera during the scan, base frame; `None` where nobody knows where it stood.
+pub fn towards_camera(points: &Ordered) -> Option<Vec3> {
     let middle = points.row[points.row.len() / 2];
-    camera_at(points, middle, rig).map(|c| -c.direction(&Vec3::z()))
-}
-
-/// The rotation and translation that bring `from` to `to`; `None` where they do not determine it.
-fn align(from: &[Vec3], to: &[Vec3]) -> Option<Rigid<Base, Camera>> {
-    if from.len() < 10 {
-        return None;
-    }
-    let mean = |v: &[Vec3]| v.iter().sum::<Vec3>() / v.len() as f64;
-    let (a, b) = (mean(from), mean(to));
-    let m = from.iter().zip(to).map(|(p, q)| (q - b) * (p - a).transpose()).sum::<Mat3>();
-    let s = m.singular_values();
-    // Points on one line leave a turn about it open.
-    if s[1] < 1e-6 * s[0] {
-        return None;
-    }
-    // Points of one shot lie in a plane: the third axis follows from the other two.
-    let svd = m.svd(true, true);
-    let (u, vt) = (svd.u?, svd.v_t?);
-    let d = (u * vt).determinant().signum();
-    let rotation = u * Matrix3::from_diagonal(&Vec3::new(1.0, 1.0, d)) * vt;
-    let t = Rigid::new(rotation, b - rotation * a);
-    let rms =
-        (from.iter().zip(to).map(|(p, q)| (t.point(p) - q).norm_squared()).sum::<f64>() / from.len() as f64).sqrt();
-    // The cloud was made with these very values; more than float rounding means another calibration.
-    (rms < 0.2).then_some(t)
+    points.from_camera[middle as usize].map(|c| -c.direction(&Vec3::z()))
 }

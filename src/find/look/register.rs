@@ -196,7 +196,7 @@ pub fn register(scans: &[(String, Ordered)], rig: &Rig) -> Result<Vec<Registered
                 ))
             })?,
         };
-        let seen = seen_by(points, rig, pieces.iter().map(|p| (p.row, p.point)));
+        let seen = seen_by(points, pieces.iter().map(|p| (p.row, p.point)));
         let [shift, turn] = [0, 3].map(|k| Vec3::new(fit.step[k], fit.step[k + 1], fit.step[k + 2]));
         let budget = budget(&seen, pieces, &centre, rig, fit.covariance)
             .ok_or_else(|| weak(format!("{name}: the scan does not say how its camera stood")))?;

@@ -9,8 +9,8 @@ use super::shape::{Shape, shape_row};
 use crate::find::model::drawn_edges::EdgeSample;
 use crate::find::model::edge_index::EdgeIndex;
 use crate::find::model::face::Face;
-use crate::geometry::Vec3;
-use nalgebra::{Matrix3, Vector2, Vector3};
+use crate::geometry::{Base, Camera, Part, Rigid, Vec3};
+use nalgebra::{Matrix3, Rotation2, Vector2, Vector3};
 
 /// Prior mean and standard deviation of growth and width, in the recipe's unit of about 1 mm, as are the lengths below: optics
 /// blur a stripe's end by about a pixel, a line laser is about a tenth of a millimetre wide; both are measured where edges are
@@ -59,6 +59,8 @@ pub(in crate::find) struct Lit {
 
 struct Sample {
     at: Vector2<f64>,
+    /// Of the stripe, and from shot to shot, at this shot.
+    directions: [Vector2<f64>; 2],
     light: f64,
     row: u32,
     z: f64,
@@ -68,16 +70,17 @@ struct Sample {
 /// too, and start there.
 pub(in crate::find) fn fit_light(
     points: &Ordered,
-    local: &[Option<Vec3>],
-    faces: &[Face],
+    pose: &Rigid<Base, Part>,
+    (local, faces): (&[Option<Vec3>], &[Face]),
     edges: &EdgeIndex,
     options: &MeasureOptions,
     shape: Option<Vector3<f64>>,
 ) -> Option<Lit> {
     let on: Vec<Option<f64>> = local.iter().map(|q| face_of(q.as_ref()?, faces, options.height_gate_mm)).collect();
     let unit = edges.unit();
-    let [along, across] = sampling(points, local, &on)?;
-    let slant = slant(points, local, unit);
+    let turns = turns(points, local, pose);
+    let [along, across] = sampling(points, local, &on, &turns)?;
+    let slant = slant(points, local, &turns, unit);
     let deep: Vec<bool> = (0..on.len())
         .map(|i| {
             let (Some(q), Some(z)) = (&local[i], on[i]) else { return false };
@@ -95,19 +98,20 @@ pub(in crate::find) fn fit_light(
             continue;
         };
         // Where the middle of the sheet meets the surface: the middle of a cut spot lies off the sheet's.
-        let at = Vector2::new(q.x, q.y) + slant * (q.z - z);
-        samples.push(Sample { at, light: f64::from(points.intensity[i]) / full, row: points.row[i], z });
+        let (row, turn) = (points.row[i], turns[points.row[i] as usize]);
+        let at = Vector2::new(q.x, q.y) + turn * slant * (q.z - z);
+        let directions = [turn * along.normalize(), turn * across.normalize()];
+        samples.push(Sample { at, directions, light: f64::from(points.intensity[i]) / full, row, z });
     }
     let scatter = TURNS_TOO * pose_scatter(points, local, &deep, &on);
     let bias = options.edge_bias * along.norm().max(across.norm());
-    let directions = [along.normalize(), across.normalize()];
     let mut x = Unknowns::zeros();
     let priors = priors(unit, if shape.is_some() { FREE } else { DRAWN });
     priors.iter().for_each(|p| x[p.0] = p.1);
     x.fixed_rows_mut::<3>(7).copy_from(&shape.unwrap_or_default());
     let mut last = None;
     for _ in 0..ROUNDS {
-        let rows: Vec<Row> = samples.iter().filter_map(|s| row(s, edges, &x, &directions)).collect();
+        let rows: Vec<Row> = samples.iter().filter_map(|s| row(s, edges, &x)).collect();
         if rows.len() < MIN_SAMPLES {
             return None;
         }
@@ -131,8 +135,28 @@ fn face_of(q: &Vec3, faces: &[Face], gate: f64) -> Option<f64> {
     faces.iter().map(|f| f.z).find(|z| (q.z - z).abs() <= gate)
 }
 
-/// The usual steps between neighbouring samples along the stripe and from shot to shot, in the part's plane.
-fn sampling(points: &Ordered, local: &[Option<Vec3>], on: &[Option<f64>]) -> Option<[Vector2<f64>; 2]> {
+/// By how much each row's shot was turned about the part's normal against the shot that saw its middle: on a turntable the stripe
+/// crosses a part in another direction at every place. None where nobody knows where the camera stood.
+fn turns(points: &Ordered, local: &[Option<Vec3>], pose: &Rigid<Base, Part>) -> Vec<Rotation2<f64>> {
+    let on: Vec<u32> = (0..local.len()).filter(|&i| local[i].is_some()).map(|i| points.row[i]).collect();
+    let middle = on.get(on.len() / 2).and_then(|row| points.from_camera[*row as usize]);
+    let into_part = pose.rotation.transpose();
+    let turn = |camera: &Option<Rigid<Base, Camera>>| {
+        let (Some(camera), Some(middle)) = (camera, &middle) else { return Rotation2::identity() };
+        let r = into_part * camera.rotation * middle.rotation.transpose() * pose.rotation;
+        Rotation2::new((r[(1, 0)] - r[(0, 1)]).atan2(r[(0, 0)] + r[(1, 1)]))
+    };
+    points.from_camera.iter().map(turn).collect()
+}
+
+/// The usual steps between neighbouring samples along the stripe and from shot to shot, in the part's plane as the shot that saw its
+/// middle has them.
+fn sampling(
+    points: &Ordered,
+    local: &[Option<Vec3>],
+    on: &[Option<f64>],
+    turns: &[Rotation2<f64>],
+) -> Option<[Vector2<f64>; 2]> {
     let median = |mut v: Vec<f64>| {
         let middle = v.len() / 2;
         *v.select_nth_unstable_by(middle, f64::total_cmp).1
@@ -142,8 +166,9 @@ fn sampling(points: &Ordered, local: &[Option<Vec3>], on: &[Option<f64>]) -> Opt
         for i in (0..on.len()).filter(|&i| on[i].is_some()) {
             let next = points.at(i64::from(points.row[i]) + dr, i64::from(points.column[i]) + dc);
             if let (Some(p), Some(q)) = (&local[i], next.filter(|&n| on[n] == on[i]).and_then(|n| local[n])) {
-                x.push(q.x - p.x);
-                y.push(q.y - p.y);
+                let step = turns[points.row[i] as usize].inverse() * (q - p).xy();
+                x.push(step.x);
+                y.push(step.y);
             }
         }
         (x.len() >= 20).then(|| Vector2::new(median(x), median(y))).filter(|s| s.norm() > 0.0)
@@ -152,12 +177,13 @@ fn sampling(points: &Ordered, local: &[Option<Vec3>], on: &[Option<f64>]) -> Opt
 }
 
 /// How far the sheet moves in the part's plane for a millimetre of height, from the points of the shots themselves, which
-/// lie in it; zero where they all lie on one line.
-fn slant(points: &Ordered, local: &[Option<Vec3>], unit: f64) -> Vector2<f64> {
+/// lie in it, as the shot that saw the part's middle has it; zero where they all lie on one line.
+fn slant(points: &Ordered, local: &[Option<Vec3>], turns: &[Rotation2<f64>], unit: f64) -> Vector2<f64> {
     let mut rows = std::collections::BTreeMap::<u32, Vec<Vec3>>::new();
     for (q, row) in local.iter().zip(&points.row) {
         if let Some(q) = q {
-            rows.entry(*row).or_default().push(*q);
+            let flat = turns[*row as usize].inverse() * q.xy();
+            rows.entry(*row).or_default().push(Vec3::new(flat.x, flat.y, q.z));
         }
     }
     let (mut scatter, mut n) = (Matrix3::zeros(), 0.0);
@@ -237,7 +263,8 @@ fn pose_scatter(points: &Ordered, local: &[Option<Vec3>], deep: &[bool], on: &[O
 }
 
 /// The light that a sample should send back, its derivatives, and which piece of which edge it measures.
-fn row(s: &Sample, edges: &EdgeIndex, x: &Unknowns, directions: &[Vector2<f64>; 2]) -> Option<Row> {
+fn row(s: &Sample, edges: &EdgeIndex, x: &Unknowns) -> Option<Row> {
+    let directions = &s.directions;
     let (sin, cos) = x[2].sin_cos();
     let (dx, dy) = (s.at.x - x[0], s.at.y - x[1]);
     let (px, py) = (cos * dx + sin * dy, cos * dy - sin * dx);

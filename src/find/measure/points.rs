@@ -1,12 +1,12 @@
-//! In: a cloud. Out: its points in the order of the sensor: one row a shot, one column a pixel of the
+//! In: a cloud and the shots it is from. Out: its points in the order of the sensor: one row a shot, one column a pixel of the
 //! stripe, so that a point's neighbours along the stripe and in the next shot are known.
 //! Frame and unit: base frame, mm.
 
 use super::options::MeasureOptions;
 use crate::fault::{Fault, Result};
 use crate::find::model::drawing::Drawing;
-use crate::geometry::{Base, Part, Rigid, Vec3};
-use crate::scan::CloudPoint;
+use crate::geometry::{Base, Camera, Part, Rigid, Vec3};
+use crate::scan::{Along, CloudPoint, Shots};
 
 const NONE: u32 = u32::MAX;
 
@@ -24,6 +24,8 @@ pub struct Ordered {
     pub column: Vec<u32>,
     /// Shot number of each row.
     pub shot: Vec<u32>,
+    /// Where the camera stood at each row's shot; `None` where nobody knows.
+    pub from_camera: Vec<Option<Rigid<Base, Camera>>>,
     /// Pixel (u, v) of each point.
     pub pixel: Vec<[f32; 2]>,
     columns: usize,
@@ -37,7 +39,10 @@ const FARTHEST_PX: f32 = 131_072.0;
 
 impl Ordered {
     /// Sorts a cloud. The strongest of several points in one pixel column of a shot stays.
-    pub fn new(cloud: &[CloudPoint]) -> Result<Ordered> {
+    ///
+    /// # Errors
+    /// A cloud that is too small, damaged, or of other shots than those that are listed.
+    pub fn new(cloud: &[CloudPoint], shots: &Shots) -> Result<Ordered> {
         if cloud.len() < MIN_POINTS {
             return Err(Fault::refused(format!(
                 "the scan has {} points, at least {MIN_POINTS} are needed",
@@ -57,20 +62,21 @@ impl Ordered {
             .cause("the cloud was damaged, or not written by sheetlight scan")
             .next("scan again"));
         }
-        // The stripe runs along the image axis in which the points of a shot are spread wider.
-        let spread = |f: fn(&CloudPoint) -> f32| {
-            let mut sums = std::collections::HashMap::<u32, (f64, f64, f64)>::new();
-            for p in cloud {
-                let v = f64::from(f(p));
-                let s = sums.entry(p.shot).or_default();
-                *s = (s.0 + 1.0, s.1 + v, s.2 + v * v);
-            }
-            sums.values().map(|s| s.2 - s.1 * s.1 / s.0).sum::<f64>()
+        let along: fn(&CloudPoint) -> f32 = match shots.along {
+            Along::U => |p| p.u,
+            Along::V => |p| p.v,
         };
-        let along: fn(&CloudPoint) -> f32 = if spread(|p| p.u) >= spread(|p| p.v) { |p| p.u } else { |p| p.v };
         let mut shot: Vec<u32> = cloud.iter().map(|p| p.shot).collect();
         shot.sort_unstable();
         shot.dedup();
+        let from_camera: Vec<_> = shot.iter().map(|s| shots.place(*s).copied()).collect();
+        if let Some(i) = from_camera.iter().position(Option::is_none)
+            && from_camera.iter().any(Option::is_some)
+        {
+            return Err(Fault::input(format!("the cloud holds points of shot {}, which is not listed", shot[i]))
+                .cause("the cloud and the list of shots are of two scans")
+                .next("scan again"));
+        }
         let first = cloud.iter().map(along).fold(f32::MAX, f32::min).round();
         let last = cloud.iter().map(along).fold(f32::MIN, f32::max).round();
         let columns = (last - first) as usize + 1;
@@ -95,6 +101,7 @@ impl Ordered {
             column: vec![],
             pixel: vec![],
             shot,
+            from_camera,
             columns,
             index: vec![],
         };

@@ -90,7 +90,8 @@ pub fn measure(
     let mut lit = None;
     for _ in 0..LIT_ROUNDS {
         level(&mut pose, ROUNDS)?;
-        lit = fit_light(points, &localise(points, drawing, &pose, options), &faces, &edges, options, None);
+        let local = localise(points, drawing, &pose, options);
+        lit = fit_light(points, &pose, (&local, &faces), &edges, options, None);
         let Some(lit) = &lit else { break };
         pose = pose * moved(&lit.step);
     }
@@ -103,7 +104,7 @@ pub fn measure(
         o.residual -= o.nx * plane.step.x + o.ny * plane.step.y + (o.x * o.ny - o.y * o.nx) * plane.step.z;
     }
     let shape =
-        measure_shape(&plane.observations, |start| fit_light(points, &local, &faces, &edges, options, Some(start)));
+        measure_shape(&plane.observations, |start| fit_light(points, &pose, (&local, &faces), &edges, options, Some(start)));
     let in_plane = lit.as_ref().map_or(plane.covariance, |l| l.covariance);
     let mut covariance = Matrix6::zeros();
     // Datum unknowns are z, rx, ry; edge unknowns x, y, rz.

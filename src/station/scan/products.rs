@@ -50,7 +50,8 @@ pub fn of_map(
     Ok((figures(map), hashes(out, hash(out, "cloud.ply")?)?))
 }
 
-fn hash(out: &Path, name: &str) -> Result<(String, String)> {
+/// The SHA-256 of a file of the folder, under its name.
+pub fn hash(out: &Path, name: &str) -> Result<(String, String)> {
     Ok((name.to_owned(), hash_file(&out.join(name))?))
 }
 

@@ -7,7 +7,7 @@ use crate::capture::{Account, Delay};
 use crate::fault::{Fault, Result};
 use crate::recording::Motion;
 use crate::rig::{Volume, hash_file};
-use crate::scan::{CloudFile, CloudPoint, Extraction, Filter, Format, read_cloud};
+use crate::scan::{Along, CloudFile, CloudPoint, Extraction, Filter, Format, SHOTS_FILE, Shots, read_cloud};
 use crate::stages::peak::Stripe;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -184,7 +184,7 @@ impl ScanReport {
     pub(in crate::station) fn check_files(&self, scan: &Path) -> Result<()> {
         self.files.par_iter().try_for_each(|(name, hash)| {
             let path = scan.join(name);
-            if name != "cloud.ply" && crate::files::length(&path)? > MOST_OF_A_MAP {
+            if !["cloud.ply", SHOTS_FILE].contains(&name.as_str()) && crate::files::length(&path)? > MOST_OF_A_MAP {
                 return Err(Fault::input(format!("{}: is longer than any map", path.display()))
                     .cause("another file of that name, or a damaged one")
                     .next("scan again"));
@@ -220,6 +220,19 @@ pub fn load_report(scan: &Path) -> Result<ScanReport> {
         return Err(strange(format!("is of format {}, this version reads {FORMAT}", report.format)));
     }
     Ok(report)
+}
+
+/// The shots of a finished scan.
+///
+/// # Errors
+/// As [`Shots::load`].
+pub fn shots_of(scan: &Path) -> Result<Shots> {
+    let report = load_report(scan)?;
+    // Its lines lie from column to column, whatever sensor they are from.
+    if report.imported.is_some() {
+        return Ok(Shots::unplaced(Along::U));
+    }
+    Shots::load(scan, &report.rig_fingerprint)
 }
 
 /// The points of a finished scan, checked to be those that the scan wrote.

@@ -15,8 +15,8 @@ use crate::raster::Image;
 use crate::recording::Motion;
 use crate::rig::{Rig, Volume};
 use crate::scan::{
-    BadShot, Carrier, CloudWriter, Extraction, GridOptions, Processor, Profile, Scanner, Source, Where, camera_for,
-    parts_for,
+    BadShot, Carrier, CloudWriter, Extraction, GridOptions, Processor, Profile, SHOTS_FILE, Scanner, ShotsWriter, Source,
+    Where, camera_for, parts_for,
 };
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -117,6 +117,12 @@ pub fn scan_on(
         &rig.need_laser_plane()?.value,
         Volume::depths(options.volume.as_ref()),
     );
+    let print = rig.fingerprint();
+    let shots = if state.shots > 0 {
+        ShotsWriter::resume(&part, state.shots as u32, &print)?
+    } else {
+        ShotsWriter::create(&part, options.motion.frame(), scanner.stripe_along(), &print)?
+    };
     let started = Instant::now();
     let first = state.shots;
     let spent = Spent { start_s: begun.elapsed().as_secs_f64(), ..Spent::default() };
@@ -128,6 +134,7 @@ pub fn scan_on(
         repeated,
         cut_before,
         cloud,
+        shots,
         state,
         scanner,
         overlays,
@@ -146,7 +153,7 @@ pub fn scan_on(
     let points = cloud.finish()?;
     let seconds = started.elapsed().as_secs_f64();
     let products = Instant::now();
-    let (height_map, files) = crate::station::scan::products::write(
+    let (height_map, mut files) = super::products::write(
         &part,
         &cloud_path,
         points,
@@ -154,6 +161,7 @@ pub fn scan_on(
         scanner.up_in_base(),
         scanner.device(),
     )?;
+    files.extend([super::products::hash(&part, SHOTS_FILE)?]);
     spent.products_s = products.elapsed().as_secs_f64();
     if state.cut > 0 {
         state.peaks.insert("beyond the list: more than a twentieth of the pictures lit".into(), state.cut);
@@ -166,7 +174,7 @@ pub fn scan_on(
         frame: options.motion.frame().into(),
         motion: options.motion.clone(),
         recording: label.into(),
-        rig_fingerprint: rig.fingerprint(),
+        rig_fingerprint: print,
         working_volume: options.volume.clone(),
         ran_on: scanner.ran_on(),
         image: format,
@@ -233,6 +241,7 @@ struct Work<'a> {
     /// Pixels that found no room in the runs before.
     cut_before: u64,
     cloud: CloudWriter,
+    shots: ShotsWriter,
     state: Checkpoint,
     scanner: Scanner,
     overlays: Overlays,
@@ -322,6 +331,7 @@ impl Work<'_> {
             self.overlays.draw(profile)?;
             // Points and state go together: what is counted here is what a resumed scan keeps.
             self.cloud.append(&profile.points)?;
+            self.shots.add(profile.shot, profile.from_camera);
             self.state.add(profile);
             self.state.last_picture = Some(picture);
             if self.state.shots.is_multiple_of(CHECKPOINT_SHOTS) {
@@ -334,6 +344,7 @@ impl Work<'_> {
     fn save(&mut self) -> Result<()> {
         self.state.stripe = self.scanner.stripe();
         self.state.cut = self.cut_before + self.scanner.cut();
+        self.shots.checkpoint()?;
         self.state.save(self.part, &mut self.cloud)
     }
 }

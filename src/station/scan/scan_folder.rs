@@ -4,16 +4,18 @@
 
 use crate::fault::{Fault, Result};
 use crate::files::{Together, remove};
+use crate::scan::SHOTS_FILE;
 use std::io::Result as Io;
 use std::path::Path;
 
 /// Everything that a scan leaves in its folder, and what is made of it there; the report first, because without it the rest
 /// is no scan.
-const FILES: [&str; 20] = [
+const FILES: [&str; 21] = [
     "scan.json",
     "index.html",
     "cloud.ply",
     "cloud.pcd",
+    SHOTS_FILE,
     "height.tif",
     "height.png",
     "height.json",

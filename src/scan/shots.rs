@@ -1,0 +1,230 @@
+//! In: where the camera stood at each shot of a scan. Out: `shots.jsonl`, which grows with the scan, and what a later step asks it:
+//! the camera at a shot, the image axis that the stripe runs along.
+//! Frame and unit: the cloud's frame, mm (docs/file-formats.md).
+
+use crate::fault::{Fault, Result};
+use crate::files::moment;
+use crate::geometry::{Base, Camera, Rigid};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// The file's name in a scan folder.
+pub const SHOTS_FILE: &str = "shots.jsonl";
+const FORMAT: &str = "sheetlight shots 1";
+
+/// The image axis that a stripe runs along, of two the nearer one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Along {
+    /// From column to column: a lying stripe.
+    U,
+    /// From row to row: an upright one.
+    V,
+}
+
+impl Along {
+    /// Of a stripe that is crossed in this direction of the image.
+    pub fn crossed([x, y]: [f32; 2]) -> Along {
+        if y.abs() >= x.abs() { Along::U } else { Along::V }
+    }
+}
+
+/// What the points of a cloud do not say of the shots they are from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shots {
+    /// How the stripe lies in the pictures.
+    pub along: Along,
+    places: BTreeMap<u32, Rigid<Base, Camera>>,
+}
+
+impl Shots {
+    /// Shots and where the camera stood, cloud's frame.
+    pub fn new(along: Along, places: impl IntoIterator<Item = (u32, Rigid<Base, Camera>)>) -> Shots {
+        Shots { along, places: places.into_iter().collect() }
+    }
+
+    /// Of a sensor that nobody knows the places of: an imported map.
+    pub fn unplaced(along: Along) -> Shots {
+        Shots { along, places: BTreeMap::new() }
+    }
+
+    /// Where the camera stood, cloud's frame; `None` for a shot that is not listed.
+    pub fn place(&self, shot: u32) -> Option<&Rigid<Base, Camera>> {
+        self.places.get(&shot)
+    }
+
+    /// Reads a scan folder's file.
+    ///
+    /// # Errors
+    /// No file, lines that are none of these, a shot twice, another calibration's.
+    pub fn load(scan: &Path, rig: &str) -> Result<Shots> {
+        let path = scan.join(SHOTS_FILE);
+        let again = "scan again";
+        let Some(text) = crate::files::read_text_if_there(&path)? else {
+            return Err(Fault::input(format!("{}: is not there", path.display()))
+                .cause("scanned by a former version, which did not keep where the camera stood")
+                .next(again));
+        };
+        let strange = |n: usize, what: String| {
+            Fault::input(format!("{} line {}: {what}", path.display(), n + 1))
+                .cause("another version, edited by hand, or damaged")
+                .next(again)
+        };
+        let mut lines = text.lines();
+        let head: Head = serde_json::from_str(lines.next().unwrap_or_default())
+            .map_err(|e| strange(0, format!("is not the head of a list of shots: {e}")))?;
+        if head.format != FORMAT {
+            return Err(strange(0, format!("is of format {:?}, this version reads {FORMAT}", head.format)));
+        }
+        if head.rig != rig {
+            return Err(strange(0, format!("is of calibration {:.12}, the scan of {rig:.12}", head.rig)));
+        }
+        let mut shots = Shots::unplaced(head.stripe_along);
+        for (n, line) in lines.enumerate().map(|(i, line)| (i + 1, line)) {
+            let Line { shot, from_camera } = serde_json::from_str(line).map_err(|e| strange(n, e.to_string()))?;
+            if shots.places.insert(shot, from_camera).is_some() {
+                return Err(strange(n, format!("shot {shot} stands there twice")));
+            }
+        }
+        Ok(shots)
+    }
+}
+
+#[derive(serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Head {
+    format: String,
+    /// The cloud's frame.
+    frame: String,
+    units: String,
+    stripe_along: Along,
+    /// Fingerprint of the rig that the points were made with.
+    rig: String,
+}
+
+#[derive(serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Line {
+    shot: u32,
+    from_camera: Rigid<Base, Camera>,
+}
+
+fn line<T: serde::Serialize>(value: &T) -> String {
+    serde_json::to_string(value).expect("plain data") + "\n"
+}
+
+/// Adds shots to the file as they are done.
+pub struct ShotsWriter {
+    path: PathBuf,
+    out: File,
+    /// Not yet written.
+    next: String,
+}
+
+impl ShotsWriter {
+    /// Starts a list; a former one of that name is discarded. `frame`: the cloud's; `rig`: the rig's fingerprint.
+    pub fn create(folder: &Path, frame: &str, along: Along, rig: &str) -> Result<ShotsWriter> {
+        let head = Head {
+            format: FORMAT.into(),
+            frame: frame.into(),
+            units: "mm".into(),
+            stripe_along: along,
+            rig: rig.into(),
+        };
+        ShotsWriter::with(folder, &line(&head))
+    }
+
+    /// Goes on with the list of an interrupted scan that did the shots before `done`; what came after is cut off.
+    pub fn resume(folder: &Path, done: u32, rig: &str) -> Result<ShotsWriter> {
+        let path = folder.join(SHOTS_FILE);
+        let text = crate::files::read_text(&path)?;
+        // The last line may be half a line.
+        let whole = text.split_inclusive('\n').filter(|l| l.ends_with('\n'));
+        let is_done = |l: &&str| serde_json::from_str::<Line>(l).map_or(true, |l| l.shot < done);
+        let kept: String = whole.take_while(is_done).collect();
+        let writer = ShotsWriter::with(folder, &kept)?;
+        Shots::load(folder, rig)?;
+        Ok(writer)
+    }
+
+    fn with(folder: &Path, text: &str) -> Result<ShotsWriter> {
+        let path = folder.join(SHOTS_FILE);
+        crate::files::write(&path, text.as_bytes())?;
+        let out = File::options().append(true).open(&path).map_err(|e| Fault::write(&path, e))?;
+        Ok(ShotsWriter { path, out, next: String::new() })
+    }
+
+    /// Adds a shot; [`ShotsWriter::checkpoint`] writes it.
+    pub fn add(&mut self, shot: u32, from_camera: Rigid<Base, Camera>) {
+        self.next += &line(&Line { shot, from_camera });
+    }
+
+    /// Puts everything on the disk.
+    pub fn checkpoint(&mut self) -> Result<()> {
+        let text = std::mem::take(&mut self.next);
+        moment()
+            .and_then(|()| self.out.write_all(text.as_bytes()))
+            .and_then(|()| self.out.sync_data())
+            .map_err(|e| Fault::write(&self.path, e))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Vec3, exp};
+
+    fn place(shot: u32) -> Rigid<Base, Camera> {
+        let k = f64::from(shot);
+        Rigid::new(exp(&Vec3::new(0.1 * k, 2.0, -0.3)), Vec3::new(300.0 + 0.25 * k, -40.0, 500.0))
+    }
+
+    #[test]
+    fn what_is_written_is_read_and_a_cut_off_list_goes_on() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut w = ShotsWriter::create(dir.path(), "base", Along::V, "rig").unwrap();
+        (0..5).for_each(|s| w.add(s, place(s)));
+        w.checkpoint().unwrap();
+        w.add(5, place(5));
+        w.checkpoint().unwrap();
+        let whole = Shots::load(dir.path(), "rig").unwrap();
+        assert_eq!((whole.along, whole.places.len()), (Along::V, 6));
+        for s in 0..6 {
+            let (turn, shift) = whole.place(s).unwrap().difference(&place(s));
+            assert!(turn < 1e-12 && shift < 1e-9, "{s}");
+        }
+        assert!(whole.place(6).is_none());
+        // Half a line, and shots that the checkpoint does not know.
+        let path = dir.path().join(SHOTS_FILE);
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::write(&path, &text[..text.len() - 30]).unwrap();
+        let mut w = ShotsWriter::resume(dir.path(), 3, "rig").unwrap();
+        (3..6).for_each(|s| w.add(s, place(s)));
+        w.checkpoint().unwrap();
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
+    }
+
+    #[test]
+    fn other_lists_are_refused() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join(SHOTS_FILE);
+        let mut w = ShotsWriter::create(dir.path(), "base", Along::U, "rig").unwrap();
+        w.add(0, place(0));
+        w.checkpoint().unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let refused = |text: &str| {
+            std::fs::write(&path, text).unwrap();
+            Shots::load(dir.path(), "rig").unwrap_err().to_string()
+        };
+        let last = text.lines().last().unwrap().to_owned();
+        assert!(refused(&format!("{text}{last}\n")).contains("shot 0 stands there twice"));
+        assert!(refused(&text.replace("shots 1", "shots 9")).contains("shots 9"));
+        assert!(refused(&text.replace("\"rig\":\"rig\"", "\"rig\":\"other\"")).contains("of calibration other"));
+        assert!(refused(&text.replace("\"u\"", "\"x\"")).contains("line 1"));
+        assert!(refused("").contains("line 1"));
+        std::fs::remove_file(&path).unwrap();
+        assert!(Shots::load(dir.path(), "rig").unwrap_err().to_string().contains("former version"));
+    }
+}
