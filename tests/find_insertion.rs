@@ -105,9 +105,8 @@ fn right_or_refused(what: &str, s: &Scanned, cloud: &[CloudPoint], truth: &Rigid
 #[test]
 fn the_four_parts_are_found_and_the_damaged_scans_are_never_wrong() {
     for s in scans("insertion poses") {
-        let report =
-            locate(&s.cloud, &s.shots, &s.recipe, None, &LocateOptions::default())
-                .unwrap_or_else(|e| panic!("{}: {e}", s.part));
+        let report = locate(&s.cloud, &s.shots, &s.recipe, None, &LocateOptions::default())
+            .unwrap_or_else(|e| panic!("{}: {e}", s.part));
         let (plane, height, angle) = error(&report, &s.truth);
         println!(
             "{}: {plane:.4} mm in the plane, {height:.4} mm in height, {angle:.4} degrees; sigma {:.4?} mm {:.4?} degrees; two pins against lattice {:?} mm",
@@ -159,7 +158,8 @@ fn the_four_parts_are_found_and_the_damaged_scans_are_never_wrong() {
         assert!(!right_or_refused("no part", &s, &cloud, &s.truth), "{}: found on an empty board", s.part);
         // The wrong part.
         for other in PARTS.iter().filter(|p| **p != s.part) {
-            let wrong = Scanned { part: s.part, cloud: vec![], shots: s.shots.clone(), truth: s.truth, recipe: recipe(other) };
+            let wrong =
+                Scanned { part: s.part, cloud: vec![], shots: s.shots.clone(), truth: s.truth, recipe: recipe(other) };
             assert!(
                 !right_or_refused(&format!("recipe {other} on"), &wrong, &s.cloud, &s.truth),
                 "{other} found in {}",

@@ -49,7 +49,9 @@ fn points() {
         case("z of inf", Says(&["inf"]), || with(|p| p.position[2] = f32::INFINITY)),
         case("u of 100,000", Says(&["columns"]), || with(|p| p.u = 1e5)),
         case("a shot of 4 billion", Good, || with(|p| p.shot = u32::MAX)),
-        case("499 points", Says(&["499 points", "at least 500"]), || Ordered::new(&plate()[..499], &Shots::unplaced(Along::U))),
+        case("499 points", Says(&["499 points", "at least 500"]), || {
+            Ordered::new(&plate()[..499], &Shots::unplaced(Along::U))
+        }),
     ]);
 }
 

@@ -204,7 +204,9 @@ impl World {
         for look in looks {
             let options = LocateOptions::default();
             let options = if let Some(first) = reports.first() { options.again(first) } else { options };
-            reports.push(locate(&self.cloud(b, look), &b.shots(look), &self.recipe, Some(&rig), &options).map_err(|e| e.what)?);
+            reports.push(
+                locate(&self.cloud(b, look), &b.shots(look), &self.recipe, Some(&rig), &options).map_err(|e| e.what)?,
+            );
         }
         let both = agree(reports.clone(), None, &self.recipe, Convention::Matrix).map_err(|e| e.what)?;
         Ok((reports, both))

@@ -56,7 +56,8 @@ pub struct AxisFit {
     pub counts: Vec<f64>,
     /// Corners of the board and then its middle, axis frame at count 0, mm.
     pub landmarks: [Vec3; 5],
-    /// How far the used stops lie from a straight line as a bow over the whole way, mm, and its sigma; 0 for a turntable.
+    /// How far the used stops lie from a straight line as a bow over the whole way, mm, and its sigma; of a
+    /// turntable over the turn seen.
     pub bend_mm: [f64; 2],
     /// Whether the counts seem to belong to the pictures.
     pub order: Order,
@@ -76,7 +77,7 @@ pub struct Order {
 impl AxisFit {
     /// Standard deviation of where a part that rides on the axis is put against where it stood in the middle of the way, rms
     /// over the stops (on a turntable over a whole turn) and the board's corners, mm: of the axis as a whole, and with its
-    /// scatter from stop to stop.
+    /// scatter from stop to stop and what its way bows by, which is used as straight.
     pub fn expected_error(&self, covariance: &DMatrix<f64>) -> [f64; 2] {
         let (low, high) =
             self.counts.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), c| (a.min(*c), b.max(*c)));
@@ -95,19 +96,23 @@ impl AxisFit {
             AxisKind::Linear => p + Vec3::x() * (self.axis.pitch * middle),
             AxisKind::Turntable => exp(&(Vec3::z() * (self.axis.pitch * middle))) * p,
         };
-        let (mut sum, mut n) = (0.0, 0.0);
+        // Of a straight way chance leaves a bow too, as large as its sigma along each axis.
+        let [bow, chance] = self.bend_mm;
+        let bow2 = (bow * bow - 3.0 * chance * chance).max(0.0);
+        let (mut sum, mut bent, mut n) = (0.0, 0.0, 0.0);
         for k in -4..=4 {
             let errors = self.axis.errors(half * f64::from(k) / 4.0);
             for p in self.landmarks.iter().map(ridden) {
                 let j = DMatrix::from_fn(3, errors.len(), |i, k| errors[k].at(&p)[i]);
                 let c = &j * covariance * j.transpose();
                 sum += c.trace().max(0.0);
+                bent += bow2 * (f64::from(k) / 4.0).powi(4);
                 n += 1.0;
             }
         }
-        let own = sum / n;
+        let (own, bent) = (sum / n, bent / n);
         let arm2 = self.landmarks.iter().map(|p| (p - self.landmarks[4]).norm_squared()).sum::<f64>() / 5.0;
         let scatter = 3.0 * self.sigma_mm.powi(2) + 2.0 * self.sigma_rad.powi(2) * arm2;
-        [own.sqrt(), (own + scatter).sqrt()]
+        [own.sqrt(), (own + scatter + bent).sqrt()]
     }
 }

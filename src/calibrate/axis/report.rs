@@ -51,7 +51,7 @@ pub fn judge(fit: &AxisFit, limits: &Limits, board_length: &str) -> Quality {
         expected,
         format!(
             "a point that rides along is put right to {expected:.4} mm (1 sigma) over {over}: {own:.4} mm by direction and pitch, \
-             the rest scatters from stop to stop"
+             the rest scatters from stop to stop or bows"
         ),
     );
     contradictions(fit, &mut j);

@@ -154,7 +154,10 @@ pub struct Report {
 pub fn locate(
     cloud: &[CloudPoint],
     shots: &Shots,
-    recipe: &Recipe, rig: Option<&Rig>, options: &LocateOptions) -> Result<Report> {
+    recipe: &Recipe,
+    rig: Option<&Rig>,
+    options: &LocateOptions,
+) -> Result<Report> {
     recipe.check()?;
     let drawing = recipe.drawing();
     let points = Ordered::new(cloud, shots)?;

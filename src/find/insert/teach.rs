@@ -33,10 +33,7 @@ pub struct TeachOptions {
 }
 
 /// Teaches from a cloud and its map. Refuses numbers that lie outside the map or show no part.
-pub fn teach(
-    cloud: &[CloudPoint],
-    shots: &Shots,
-    map: &HeightMap, options: &TeachOptions) -> Result<(Recipe, Report)> {
+pub fn teach(cloud: &[CloudPoint], shots: &Shots, map: &HeightMap, options: &TeachOptions) -> Result<(Recipe, Report)> {
     let points = Ordered::new(cloud, shots)?;
     let [x0, y0, x1, y1] = options.outline;
     let (w, h) = (f64::from(map.width) * map.cell, f64::from(map.height) * map.cell);

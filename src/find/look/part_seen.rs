@@ -30,12 +30,7 @@ pub struct PartSeen {
 
 impl PartSeen {
     /// `None` where nobody knows where the camera stood, or where too few points lie on the part's surfaces.
-    pub fn new(
-        points: &Ordered,
-        drawing: &Drawing,
-        measured: &Measured,
-        options: &MeasureOptions,
-    ) -> Option<PartSeen> {
+    pub fn new(points: &Ordered, drawing: &Drawing, measured: &Measured, options: &MeasureOptions) -> Option<PartSeen> {
         let faces = drawing.faces();
         let local = localise(points, drawing, &measured.base_from_part, options);
         let mut shots = std::collections::BTreeMap::<u32, Vec<usize>>::new();
@@ -155,10 +150,7 @@ pub(in crate::find) fn middle(seen: &[Seen], of: &Vec3) -> Option<Rigid<Base, Ca
 
 /// How some of a scan's points, given as (row, point) in the order of rows, were seen: at most [`SHOTS`] shots and [`PLACES`] in
 /// each. Empty where nobody knows where the camera stood.
-pub(in crate::find) fn seen_by(
-    points: &Ordered,
-    on: impl Iterator<Item = (u32, usize)>,
-) -> Vec<(usize, Seen)> {
+pub(in crate::find) fn seen_by(points: &Ordered, on: impl Iterator<Item = (u32, usize)>) -> Vec<(usize, Seen)> {
     let mut shots: Vec<(u32, Vec<usize>)> = Vec::new();
     for (row, i) in on {
         match shots.last_mut() {

@@ -103,8 +103,9 @@ pub fn measure(
     for o in &mut plane.observations {
         o.residual -= o.nx * plane.step.x + o.ny * plane.step.y + (o.x * o.ny - o.y * o.nx) * plane.step.z;
     }
-    let shape =
-        measure_shape(&plane.observations, |start| fit_light(points, &pose, (&local, &faces), &edges, options, Some(start)));
+    let shape = measure_shape(&plane.observations, |start| {
+        fit_light(points, &pose, (&local, &faces), &edges, options, Some(start))
+    });
     let in_plane = lit.as_ref().map_or(plane.covariance, |l| l.covariance);
     let mut covariance = Matrix6::zeros();
     // Datum unknowns are z, rx, ry; edge unknowns x, y, rz.

@@ -15,8 +15,8 @@ use crate::raster::Image;
 use crate::recording::Motion;
 use crate::rig::{Rig, Volume};
 use crate::scan::{
-    BadShot, Carrier, CloudWriter, Extraction, GridOptions, Processor, Profile, SHOTS_FILE, Scanner, ShotsWriter, Source,
-    Where, camera_for, parts_for,
+    BadShot, Carrier, CloudWriter, Extraction, GridOptions, Processor, Profile, SHOTS_FILE, Scanner, ShotsWriter,
+    Source, Where, camera_for, parts_for,
 };
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -153,14 +153,8 @@ pub fn scan_on(
     let points = cloud.finish()?;
     let seconds = started.elapsed().as_secs_f64();
     let products = Instant::now();
-    let (height_map, mut files) = super::products::write(
-        &part,
-        &cloud_path,
-        points,
-        &options.grid,
-        scanner.up_in_base(),
-        scanner.device(),
-    )?;
+    let (height_map, mut files) =
+        super::products::write(&part, &cloud_path, points, &options.grid, scanner.up_in_base(), scanner.device())?;
     files.extend([super::products::hash(&part, SHOTS_FILE)?]);
     spent.products_s = products.elapsed().as_secs_f64();
     if state.cut > 0 {
