@@ -15,7 +15,8 @@ use sheetlight::raster::{Channel, Image, decode, float_tiff, png, read_float_tif
 use sheetlight::recording::{BoardSpec, Markers, Meta, load_board_poses, load_poses};
 use sheetlight::rig::Rig;
 use sheetlight::scan::{
-    Along, CloudPoint, CloudWriter, HeightMap, RawFormat, RawFrames, SHOTS_FILE, Shots, ShotsWriter, Stated, lines, read_cloud, read_foreign, write_cloud,
+    Along, CloudPoint, CloudWriter, HeightMap, RawFormat, RawFrames, SHOTS_FILE, Shots, ShotsWriter, Stated, lines,
+    read_cloud, read_foreign, write_cloud,
 };
 use sheetlight::simulate::{RigSpec, Scene, SceneSpec, Truth};
 use sheetlight::station::{Checkpoint, Settings, Values, load_report};

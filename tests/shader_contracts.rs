@@ -11,8 +11,18 @@ fn every_shader_is_what_its_stage_says() {
     for entry in stages::all() {
         let stage = entry.stage;
         let module = valid(stage.name, &stage.source());
-        // What a software adapter is given.
-        valid(stage.name, &stage.source_of_texels());
+        // What a software adapter is given: images in place of these arrays, and no other binding.
+        let texels = stage.tree(true, &[]);
+        validated(stage.name, &texels);
+        let images = stage.bindings.iter().filter(|b| b.access == Access::Texels).count();
+        let is_image = |g: &naga::GlobalVariable| matches!(texels.types[g.ty].inner, TypeInner::Image { .. });
+        let seen = texels.global_variables.iter().filter(|(_, g)| is_image(g)).count();
+        assert!(seen <= images, "{}: {seen} images of {images} bindings", stage.name);
+        let arrays = stage.bindings.iter().filter(|b| b.access == Access::Texels).map(|b| b.name);
+        for name in arrays {
+            let left = texels.global_variables.iter().any(|(_, g)| g.name.as_deref() == Some(name));
+            assert!(!left, "{}: '{name}' is read otherwise than element by element", stage.name);
+        }
         assert_eq!(module.entry_points.len(), 1, "{}", stage.name);
         let main = &module.entry_points[0];
         assert_eq!((main.name.as_str(), main.workgroup_size), ("main", stage.workgroup), "{}", stage.name);
@@ -105,10 +115,14 @@ fn literals_and_constants_are_read_in_every_form() {
 fn valid(name: &str, source: &str) -> naga::Module {
     let module =
         naga::front::wgsl::parse_str(source).unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(source)));
+    validated(name, &module);
+    module
+}
+
+fn validated(name: &str, module: &naga::Module) {
     let mut validator =
         naga::valid::Validator::new(naga::valid::ValidationFlags::all(), naga::valid::Capabilities::empty());
-    validator.validate(&module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
-    module
+    validator.validate(module).unwrap_or_else(|e| panic!("{name}: {e:?}"));
 }
 
 /// Loops run without a limit on their turns (gpu::Stage): each has to count to its end, or stands here with the reason why it

@@ -60,6 +60,11 @@ impl<'a> Together<'a> {
         done.map_err(|e| Fault::write(self.folder, e))
     }
 
+    /// Takes away what was made in [`Together::part`] where it could not be made whole. A commit that has begun stays.
+    pub fn abandon(&self) {
+        let _ = std::fs::remove_dir_all(self.part());
+    }
+
     /// Ends a commit that a stopped process has begun; does nothing where there is none.
     pub fn settle(&self) -> Result<()> {
         let begun = || self.at("whole").exists() || self.at("moving").exists();

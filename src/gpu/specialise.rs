@@ -1,9 +1,10 @@
 //! In: a stage's WGSL and the values of its override constants. Out: its tree with these numbers put in, without the branches
-//! that they rule out. Frame and unit: none.
+//! that they rule out, reading as texels what has a reader. Frame and unit: none.
 //!
 //! A driver first writes out every call and only then finds out what is dead; until then each of its passes works on all of it.
 //! Mesa's software adapter (22.3) pays for that at every start: its cache on disk spares only the machine code behind it.
 
+use super::texels::{bind_images, read_texels};
 use naga::back::pipeline_constants::process_overrides;
 use naga::compact::{KeepUnused, compact};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
@@ -11,10 +12,19 @@ use naga::{Arena, Block, Expression, Literal, Module, ShaderStage, Statement};
 use wgpu::naga;
 
 pub(super) fn specialised(source: &str, overrides: &[(String, f64)]) -> Module {
-    let module = naga::front::wgsl::parse_str(source).unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)));
+    let parsed = naga::front::wgsl::parse_str(source);
+    let mut module = parsed.unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)));
+    bind_images(&mut module);
     // The device validates what comes out; here its types are asked for.
-    let info = Validator::new(ValidationFlags::empty(), Capabilities::all()).validate(&module);
-    let info = info.unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)));
+    let types = |module: &Module| {
+        let info = Validator::new(ValidationFlags::empty(), Capabilities::all()).validate(module);
+        info.unwrap_or_else(|e| panic!("{}", e.emit_to_string(source)))
+    };
+    let mut info = types(&module);
+    // Before the numbers are put in: what nobody calls is gone after.
+    if read_texels(&mut module, &info) {
+        info = types(&module);
+    }
     let values = overrides.iter().cloned().collect();
     let main = Some((ShaderStage::Compute, "main"));
     let (module, _) = process_overrides(&module, &info, main, &values).unwrap_or_else(|e| panic!("{e}"));

@@ -3,15 +3,17 @@
 
 use super::description::{Access, Stage};
 use super::specialise::specialised;
-use super::texels::{rewrite, texel_of};
+use super::texels::{readers, texel_of};
 use super::{Buffer, Device};
 use crate::fault::Result;
 use std::sync::{Arc, LazyLock, OnceLock};
+use wgpu::naga;
 
 impl Stage {
-    /// The stage's text, reading `Access::Texels` as what they are called.
-    pub fn source_of_texels(&self) -> String {
-        rewrite(self, &self.source())
+    /// The stage's tree with its override constants, reading `Access::Texels` bindings as texels, or as the arrays that they are.
+    pub fn tree(&self, texels: bool, overrides: &[(String, f64)]) -> naga::Module {
+        let source = self.source() + &if texels { readers(self) } else { String::new() };
+        specialised(&source, overrides)
     }
 
     /// The stage with its override constants, compiled on another thread: who uses it first waits for it, or compiles it where
@@ -72,8 +74,7 @@ impl Stage {
         layout: &wgpu::BindGroupLayout,
         overrides: &[(String, f64)],
     ) -> wgpu::ComputePipeline {
-        let source = if texels { self.source_of_texels() } else { self.source() };
-        let module = std::borrow::Cow::Owned(specialised(&source, overrides));
+        let module = std::borrow::Cow::Owned(self.tree(texels, overrides));
         let source = wgpu::ShaderModuleDescriptor { label: Some(self.name), source: wgpu::ShaderSource::Naga(module) };
         // A counter of turns in every loop keeps the driver from writing short loops out, and takes it longer to compile.
         let checks = wgpu::ShaderRuntimeChecks { force_loop_bounding: false, ..wgpu::ShaderRuntimeChecks::checked() };

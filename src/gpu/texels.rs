@@ -1,4 +1,4 @@
-//! In: WGSL that reads arrays of words. Out: the same WGSL reading the same words as texels of an image.
+//! In: the tree of a stage that reads arrays of words. Out: the same tree reading the same words as texels of an image.
 //! Frame and unit: words of 32 bits, alone or in vectors of 2 or 4.
 //!
 //! Mesa's software adapter reads a storage buffer one lane after the other, in a loop with a branch; a texel it gathers for
@@ -6,6 +6,14 @@
 //! same memory ([`super::alias`]); decision 0012 says how to measure it.
 
 use super::description::{Access, Stage};
+use naga::proc::TypeResolution;
+use naga::valid::{FunctionInfo, ModuleInfo};
+use naga::{
+    Arena, Block, Expression, Function, GlobalVariable, Handle, Literal, Module, Range, ScalarKind, Span, Statement,
+    TypeInner,
+};
+use std::collections::HashMap;
+use wgpu::naga;
 
 /// Texels a row of such an image, as a power of two: what lies behind each other in the buffer fills row after row.
 /// 16,384 rows, what every adapter has, of single words are 256 MiB.
@@ -59,16 +67,19 @@ impl Element {
     fn declaration(self, name: &str) -> String {
         format!("var<storage, read> {name}: array<{}>;", self.ty)
     }
-    /// A function that reads element `i`.
+    /// The image in the array's place, and the function that reads element `i` of it.
     fn reader(self, name: &str) -> String {
-        let (mask, shift) = ((1 << ROW_LOG2) - 1, ROW_LOG2);
-        let load = |index: &str| format!("textureLoad({name}, vec2(({index}) & {mask}u, ({index}) >> {shift}u))");
+        let (mask, shift, format) = ((1 << ROW_LOG2) - 1, ROW_LOG2, self.texel.wgsl());
+        let load = |index: &str| format!("textureLoad({name}_image, vec2(({index}) & {mask}u, ({index}) >> {shift}u))");
         let value = match self.ty {
             "u32" => format!("{}.x", load("i")),
             "vec2<u32>" => format!("vec2({}.x, {}.x)", load("2u * i"), load("2u * i + 1u")),
             _ => load("i"),
         };
-        format!("\nfn {name}_texel(i: u32) -> {} {{\n    return {value};\n}}\n", self.ty)
+        format!(
+            "\nvar {name}_image: texture_storage_2d<{format}, read>;\nfn {name}_texel(i: u32) -> {} {{\n    return {value};\n}}\n",
+            self.ty
+        )
     }
 }
 
@@ -83,63 +94,206 @@ pub(super) fn texel_of(stage: &Stage, binding: &str) -> Texel {
     element_of(stage, binding).texel
 }
 
-/// The stage's text with its `Access::Texels` bindings as images.
-pub(super) fn rewrite(stage: &Stage, source: &str) -> String {
-    let mut text = source.to_string();
-    for b in stage.bindings.iter().filter(|b| b.access == Access::Texels) {
-        let (name, element) = (b.name, element_of(stage, b.name));
-        let image = format!("var {name}: texture_storage_2d<{}, read>;", element.texel.wgsl());
-        text = reads(&text.replace(&element.declaration(name), &image), name);
-        text += &element.reader(name);
-    }
-    text
+/// Images and readers for a stage's `Access::Texels` bindings, to stand behind its text: [`read_texels`] puts them to use.
+pub(super) fn readers(stage: &Stage) -> String {
+    let bindings = stage.bindings.iter().filter(|b| b.access == Access::Texels);
+    bindings.map(|b| element_of(stage, b.name).reader(b.name)).collect()
 }
 
-/// Every `name[index]` as `name_texel(u32(index))`.
-fn reads(text: &str, name: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    let mut rest = text;
-    while let Some(at) = rest.find(name) {
-        let (before, from) = rest.split_at(at);
-        let inside_word = before.ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == '.');
-        out += before;
-        match from[name.len()..].strip_prefix('[') {
-            Some(index) if !inside_word => {
-                let end = closing(index);
-                out += &format!("{name}_texel(u32({}))", reads(&index[..end], name));
-                rest = &index[end + 1..];
-            }
-            _ => {
-                out += name;
-                rest = &from[name.len()..];
-            }
+/// Gives every image that [`readers`] declared the binding of its array, before the tree is validated.
+pub(super) fn bind_images(module: &mut Module) {
+    let bound: HashMap<String, _> = module
+        .global_variables
+        .iter()
+        .filter_map(|(_, g)| Some((format!("{}_image", g.name.as_ref()?), g.binding?)))
+        .collect();
+    for (_, global) in module.global_variables.iter_mut() {
+        if let Some(binding) = global.name.as_ref().and_then(|name| bound.get(name)) {
+            global.binding = Some(*binding);
         }
     }
-    out + rest
 }
 
-/// Where the bracket that was just opened closes.
-fn closing(text: &str) -> usize {
-    let mut depth = 0;
-    for (at, c) in text.char_indices() {
-        match c {
-            '[' => depth += 1,
-            ']' if depth == 0 => return at,
-            ']' => depth -= 1,
+/// Every load of an element of an array that has a reader becomes a call of it; the arrays themselves are left without use.
+/// `info` is of this module. Whether there was any.
+pub(super) fn read_texels(module: &mut Module, info: &ModuleInfo) -> bool {
+    let reader = |name: &str| module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(name)).map(|(h, _)| h);
+    let readers: Readers = module
+        .global_variables
+        .iter()
+        .filter_map(|(h, g)| Some((h, reader(&format!("{}_texel", g.name.as_ref()?))?)))
+        .collect();
+    if readers.is_empty() {
+        return false;
+    }
+    let types = module.types.clone();
+    let signed = |info: &FunctionInfo, index: Handle<Expression>| {
+        let inner = match &info[index].ty {
+            TypeResolution::Handle(h) => &types[*h].inner,
+            TypeResolution::Value(inner) => inner,
+        };
+        matches!(inner, TypeInner::Scalar(s) if s.kind == ScalarKind::Sint)
+    };
+    for (h, f) in module.functions.iter_mut() {
+        read_in(f, &readers, &|index| signed(&info[h], index));
+    }
+    for (i, entry) in module.entry_points.iter_mut().enumerate() {
+        read_in(&mut entry.function, &readers, &|index| signed(info.get_entry_point(i), index));
+    }
+    true
+}
+
+/// The function that reads an element of each array.
+type Readers = HashMap<Handle<GlobalVariable>, Handle<Function>>;
+
+/// A call in place of a load: of this function, with this index.
+struct Call {
+    function: Handle<Function>,
+    index: Index,
+}
+
+#[derive(Clone, Copy)]
+enum Index {
+    Constant(u32),
+    Of(Handle<Expression>),
+}
+
+fn read_in(f: &mut Function, readers: &Readers, signed: &dyn Fn(Handle<Expression>) -> bool) {
+    let mut calls = HashMap::new();
+    let loads: Vec<_> = f
+        .expressions
+        .iter()
+        .filter_map(|(h, e)| if let Expression::Load { pointer } = e { Some((h, *pointer)) } else { None })
+        .collect();
+    for (load, pointer) in loads {
+        let Some((element, call)) = element_of_array(&f.expressions, pointer, readers) else { continue };
+        if element == pointer {
+            f.expressions[load] = Expression::CallResult(call.function);
+            calls.insert(load, call);
+        } else {
+            // One component of the element: a step into the value that the call returns.
+            f.expressions[element] = Expression::CallResult(call.function);
+            f.expressions[load] = f.expressions[pointer].clone();
+            calls.insert(element, call);
+        }
+    }
+    if !calls.is_empty() {
+        put_calls(&mut f.body, &mut f.expressions, &calls, signed);
+    }
+}
+
+/// The step of a chain of accesses that takes an element of an array with a reader, and the call in its place.
+fn element_of_array(
+    expressions: &Arena<Expression>,
+    pointer: Handle<Expression>,
+    readers: &Readers,
+) -> Option<(Handle<Expression>, Call)> {
+    let (base, index) = match expressions[pointer] {
+        Expression::Access { base, index } => (base, Index::Of(index)),
+        Expression::AccessIndex { base, index } => (base, Index::Constant(index)),
+        _ => return None,
+    };
+    match expressions[base] {
+        Expression::GlobalVariable(g) => readers.get(&g).map(|&function| (pointer, Call { function, index })),
+        _ => element_of_array(expressions, base, readers),
+    }
+}
+
+/// Calls are statements: each stands where the load stood among the expressions that are evaluated in one go.
+fn put_calls(
+    block: &mut Block,
+    expressions: &mut Arena<Expression>,
+    calls: &HashMap<Handle<Expression>, Call>,
+    signed: &dyn Fn(Handle<Expression>) -> bool,
+) {
+    for (mut statement, span) in std::mem::take(block).span_into_iter() {
+        match &mut statement {
+            Statement::Block(body) => put_calls(body, expressions, calls, signed),
+            Statement::Loop { body, continuing, .. } => {
+                put_calls(body, expressions, calls, signed);
+                put_calls(continuing, expressions, calls, signed);
+            }
+            Statement::Switch { cases, .. } => {
+                cases.iter_mut().for_each(|c| put_calls(&mut c.body, expressions, calls, signed));
+            }
+            Statement::If { accept, reject, .. } => {
+                put_calls(accept, expressions, calls, signed);
+                put_calls(reject, expressions, calls, signed);
+            }
+            Statement::Emit(range) => {
+                let mut since: Option<Handle<Expression>> = None;
+                let mut last = None;
+                for h in range.clone() {
+                    let Some(call) = calls.get(&h) else {
+                        since = since.or(Some(h));
+                        last = Some(h);
+                        continue;
+                    };
+                    emit(block, since.take().zip(last), span);
+                    let argument = match call.index {
+                        Index::Constant(i) => expressions.append(Expression::Literal(Literal::U32(i)), span),
+                        Index::Of(i) if signed(i) => {
+                            let word = Expression::As { expr: i, kind: ScalarKind::Uint, convert: Some(4) };
+                            let word = expressions.append(word, span);
+                            emit(block, Some((word, word)), span);
+                            word
+                        }
+                        Index::Of(i) => i,
+                    };
+                    let (function, arguments) = (call.function, vec![argument]);
+                    block.push(Statement::Call { function, arguments, result: Some(h) }, span);
+                }
+                emit(block, since.zip(last), span);
+                continue;
+            }
             _ => {}
         }
+        block.push(statement, span);
     }
-    panic!("a bracket is not closed: {text}")
+}
+
+fn emit(block: &mut Block, range: Option<(Handle<Expression>, Handle<Expression>)>, span: Span) {
+    if let Some((first, last)) = range {
+        block.push(Statement::Emit(Range::new_from_bounds(first, last)), span);
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::specialise::specialised;
     use super::*;
 
+    const TEXT: &str = "
+@group(0) @binding(0) var<storage, read> list: array<u32>;
+@group(0) @binding(1) var<storage, read> pairs: array<vec2<u32>>;
+@group(0) @binding(2) var<storage, read> plain: array<u32>;
+@group(0) @binding(3) var<storage, read_write> out: array<u32>;
+@compute @workgroup_size(1)
+fn main(@builtin(global_invocation_id) id: vec3<u32>) {
+    let nested = list[plain[3] + list[id.x]];
+    for (var i = 0; i < 4; i++) {
+        out[id.x] += pairs[i].y + pairs[2].x + list[7];
+    }
+    let pair = pairs[id.y];
+    out[nested] = pair.x + arrayLength(&plain);
+}";
+
     #[test]
-    fn reads_become_texels_and_nothing_else_does() {
-        let text = "let a = list[listing[3] + list[i]] + my_list[2] + o.list[1] + lists[4] + list_index;";
-        let wanted = "let a = list_texel(u32(listing[3] + list_texel(u32(i)))) + my_list[2] + o.list[1] + lists[4] + list_index;";
-        assert_eq!(reads(text, "list"), wanted);
+    fn loads_become_texels_and_nothing_else_does() {
+        let readers: String = [("list", 0), ("pairs", 1)].map(|(n, k)| ELEMENTS[k].reader(n)).concat();
+        let module = specialised(&(TEXT.to_owned() + &readers), &[]);
+        let mut validator = naga::valid::Validator::new(Default::default(), naga::valid::Capabilities::all());
+        validator.validate(&module).unwrap();
+        let bound = |name: &str| {
+            let mut all = module.global_variables.iter();
+            all.find(|(_, g)| g.name.as_deref() == Some(name)).map(|(_, g)| g.binding.unwrap().binding)
+        };
+        assert_eq!(["list_image", "pairs_image", "plain", "out"].map(bound), [0, 1, 2, 3].map(Some));
+        assert_eq!(["list", "pairs"].map(bound), [None, None]);
+        let body = format!("{:?}", module.entry_points[0].function.body);
+        // list twice and once in the loop, pairs twice in the loop and once.
+        assert_eq!(body.matches("Call {").count(), 6, "{body}");
+        // As it stands nothing is changed.
+        assert!(format!("{:?}", specialised(TEXT, &[]).entry_points[0].function.body).matches("Call {").count() == 0);
     }
 }

@@ -114,13 +114,16 @@ impl Rig {
         let _lock = crate::files::Lock::take(&folder, "import", "import")?;
         set.settle_locked()?;
         let part = set.begin()?;
-        for (kind, text) in &texts {
-            crate::files::write(&part.join(format!("{}.json", kind.name())), text.as_bytes())?;
-        }
-        for (name, text) in others(&Rig::read(&part)?) {
-            crate::files::write(&part.join(name), text.as_bytes())?;
-        }
-        set.commit()?;
+        let made = || {
+            for (kind, text) in &texts {
+                crate::files::write(&part.join(format!("{}.json", kind.name())), text.as_bytes())?;
+            }
+            for (name, text) in others(&Rig::read(&part)?) {
+                crate::files::write(&part.join(name), text.as_bytes())?;
+            }
+            set.commit()
+        };
+        made().inspect_err(|_| set.abandon())?;
         Ok(texts.into_iter().map(|(kind, _)| kind).collect())
     }
 

@@ -1,7 +1,7 @@
 //! In: the chain's table, the stages beside it. Out: every stage with its twin, its cases and how far the two may be apart.
 //! Frame and unit: each stage's own.
 
-use super::chain::table::STEPS;
+use super::chain::table::steps;
 use super::entry::{Case, Entry};
 use super::same::Same;
 use super::shape::{self, maps, sums};
@@ -61,5 +61,5 @@ pub fn all() -> Vec<Entry> {
             Same::Within(sums::differing_hits, 0.0, "whole numbers only: the same set, in whatever order the GPU ran"),
         ),
     ];
-    STEPS.iter().map(of_chain).chain(beside).collect()
+    steps().map(of_chain).chain(beside).collect()
 }

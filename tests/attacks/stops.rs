@@ -237,10 +237,7 @@ fn finding() {
              {in}/sim{n}/station --out {work}/second.json",
             "second.json",
         ),
-        command(
-            format!("teach {{in}}/scan0 --name p{{n}} {} --out {{work}}/taught.toml", outline()),
-            "taught.toml",
-        ),
+        command(format!("teach {{in}}/scan0 --name p{{n}} {} --out {{work}}/taught.toml", outline()), "taught.toml"),
     ] {
         c.attack();
     }

@@ -98,44 +98,73 @@ impl From<Step> for Placed {
     }
 }
 
-/// Every step of the chain, each once, in order; a new stage is one line here.
-pub const STEPS: &[Step] = &[
-    listing::CLEARING,
-    listing::RESETTING,
-    ambient::STEP,
-    stats::STEP,
-    tiles::STEP,
-    specks::STEP,
-    threshold::BY_MEAN,
-    threshold::BY_GAUSSIAN,
-    threshold::GATHERING,
-    thin::STEP,
-    listing::COMPACTING,
-    listing::REBASING,
-    lengthen::COPYING,
-    lengthen::STEP,
-    spacing::STEP,
-    skeleton::COUNTING,
-    skeleton::SCANNING_ROWS,
-    skeleton::SCANNING_SHOTS,
-    skeleton::HEADING,
-    skeleton::STEP,
-];
+/// A step with what the layout of a batch must have for it to run.
+type When = fn(&Frame) -> bool;
 
 /// What is done to the pictures where they lie, once: a batch that starts over must not do it again.
+const PREPARE: &[Step] = &[ambient::STEP];
+
+/// From the pictures to the mask, in order. A new stage is one line here or in [`BACK`].
+const FRONT: &[(When, Step)] = &[
+    (always, listing::CLEARING),
+    (always, listing::RESETTING),
+    (always, stats::STEP),
+    (always, tiles::STEP),
+    (by_mean, specks::STEP),
+    (by_mean, threshold::BY_MEAN),
+    (by_gaussian, threshold::BY_GAUSSIAN),
+    (by_gaussian, threshold::GATHERING),
+];
+
+/// What thinning and its restarts repeat.
+const THINNING: &[Step] = &[thin::STEP, listing::COMPACTING, listing::REBASING];
+
+/// From the thinned mask to the list of points, in order.
+const BACK: &[(When, Step)] = &[
+    (lengthened, lengthen::COPYING),
+    (lengthened, lengthen::STEP),
+    (spaced, spacing::STEP),
+    (always, skeleton::COUNTING),
+    (always, skeleton::SCANNING_ROWS),
+    (always, skeleton::SCANNING_SHOTS),
+    (always, skeleton::HEADING),
+    (always, skeleton::STEP),
+];
+
+fn always(_: &Frame) -> bool {
+    true
+}
+fn by_gaussian(f: &Frame) -> bool {
+    f.flags & GAUSSIAN != 0
+}
+fn by_mean(f: &Frame) -> bool {
+    !by_gaussian(f)
+}
+fn lengthened(f: &Frame) -> bool {
+    f.lengthen != 0
+}
+fn spaced(f: &Frame) -> bool {
+    f.spacing != 0
+}
+
+/// Every step of the chain, each once.
+pub fn steps() -> impl Iterator<Item = &'static Step> {
+    let of = |part: &'static [(When, Step)]| part.iter().map(|(_, s)| s);
+    PREPARE.iter().chain(of(FRONT)).chain(THINNING).chain(of(BACK))
+}
+
+fn running(part: &[(When, Step)], f: &Frame) -> Vec<Placed> {
+    part.iter().filter(|(when, _)| when(f)).map(|(_, s)| (*s).into()).collect()
+}
+
+/// What is done to the pictures where they lie.
 pub fn prepare(has_ambient: bool) -> Vec<Placed> {
-    has_ambient.then(|| ambient::STEP.into()).into_iter().collect()
+    PREPARE.iter().filter(|_| has_ambient).map(|s| (*s).into()).collect()
 }
 
 /// From the pictures to the mask.
 pub fn front(f: &Frame) -> Vec<Placed> {
-    let threshold: &[Step] = if f.flags & GAUSSIAN != 0 {
-        &[threshold::BY_GAUSSIAN, threshold::GATHERING]
-    } else {
-        &[specks::STEP, threshold::BY_MEAN]
-    };
-    let first = [listing::CLEARING, listing::RESETTING, stats::STEP, tiles::STEP];
-    first.iter().chain(threshold).map(|&s| s.into()).collect()
+    running(FRONT, f)
 }
 
 /// One round of thinning, in sections that end with a shortened list.
@@ -166,19 +195,10 @@ pub fn restart() -> Vec<Placed> {
 
 /// From the thinned mask to the list of points.
 pub fn back(f: &Frame) -> Vec<Placed> {
-    let mut steps: Vec<Placed> = Vec::new();
-    if f.lengthen != 0 {
-        steps.extend([lengthen::COPYING.into(), lengthen::STEP.into()]);
-    }
-    if f.spacing != 0 {
-        steps.push(spacing::STEP.into());
-    }
-    let rest =
-        [skeleton::COUNTING, skeleton::SCANNING_ROWS, skeleton::SCANNING_SHOTS, skeleton::HEADING, skeleton::STEP];
-    steps.extend(rest.map(Placed::from));
+    let mut steps = running(BACK, f);
     // The same stages read the thinned mask, or the one whose lines were carried on, or what was chosen of it.
-    let long = if f.lengthen != 0 { "long" } else { "mask" };
-    let last = if f.spacing != 0 { "spaced" } else { long };
+    let long = if lengthened(f) { "long" } else { "mask" };
+    let last = if spaced(f) { "spaced" } else { long };
     for s in &mut steps {
         let mask = match s.step.stage.name {
             name if name == spacing::STAGE.name => long,
