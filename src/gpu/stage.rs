@@ -12,7 +12,7 @@ use wgpu::naga;
 impl Stage {
     /// The stage's tree with its override constants, reading `Access::Texels` bindings as texels, or as the arrays that they are.
     pub fn tree(&self, texels: bool, overrides: &[(String, f64)]) -> naga::Module {
-        let source = self.source() + &if texels { readers(self) } else { String::new() };
+        let source = if texels { readers(self) + &self.source() } else { self.source() };
         specialised(&source, overrides)
     }
 
