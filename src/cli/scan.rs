@@ -12,6 +12,7 @@ use crate::rig::Rig;
 use crate::scan::{GridOptions, RawFormat, RawSource, Where};
 use crate::station::judge;
 use crate::station::{Judged, ScanOptions, ScanReport, Settings, scan_recording};
+use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
 
 /// Turn the shots of a recording into a point cloud and a height map
@@ -103,56 +104,10 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         crate::files::length(truth)?;
     }
     let bar = console.bar("scanning", 0);
-    let progress = |done: usize, total: Option<usize>| {
-        bar.set_length(total.unwrap_or(done) as u64);
-        bar.set_position(done as u64);
-    };
     let report = match (&args.recording, args.raw) {
-        _ if args.capture.running.camera.is_some() => {
-            let (poses, keep) = (args.poses.as_deref().map(Path::new), args.record.as_deref());
-            if let (Some(path), Some(raw)) = (&args.ambient, args.raw) {
-                let f = raw.format;
-                options.ambient = Some(ambient(path, args.channel, f.bits, [f.width, f.height])?);
-            }
-            scan_camera(&args.capture, args.raw, poses, &args.station, keep, &rig, &options, console, &bar)?
-        }
-        (Some(folder), None) => {
-            let mut recording = Recording::open(folder)?;
-            recording.channel = args.channel;
-            recording.outside = args.pictures_outside;
-            if recording.meta.motion().axis().is_none() {
-                recording.pose_file(args.poses.as_deref())?.warnings.iter().for_each(|w| console.warn(w));
-            } else if args.poses.is_some() {
-                return Err(Fault::usage("--poses is given, and meta.json says that an axis moved")
-                    .cause("another recording, or a motion that is not this one's")
-                    .next("leave --poses out, or correct 'motion' in meta.json"));
-            }
-            if let Some(name) = &args.ambient {
-                let inside = folder.join(name);
-                let path = if inside.is_file() { inside } else { name.clone() };
-                options.ambient = Some(recording.load(&path).map_err(no_ambient)?);
-            }
-            scan_recording(&recording, args.poses.as_deref(), &rig, &options, progress)?
-        }
-        (None, Some(raw)) => {
-            let poses = args.poses.as_deref().ok_or_else(|| {
-                Fault::usage("frames on standard input, and no poses").next("give their poses in order: --poses FILE")
-            })?;
-            let file = load_poses(Path::new(poses))?;
-            file.warnings.iter().for_each(|w| console.warn(w));
-            if args.resume {
-                return Err(
-                    Fault::usage("a pipe cannot be resumed").next("record the frames to a folder to be able to resume")
-                );
-            }
-            if let Some(path) = &args.ambient {
-                let f = raw.format;
-                options.ambient = Some(ambient(path, args.channel, f.bits, [f.width, f.height])?);
-            }
-            let missing = args.missing.iter().copied().collect();
-            let open = |_| Ok(Box::new(RawSource::new(raw, std::io::stdin().lock(), file.poses, missing)?) as Box<_>);
-            crate::station::scan("pipe", "standard input", open, &rig, &options, progress)?
-        }
+        _ if args.capture.running.camera.is_some() => from_camera(args, &rig, &mut options, console, &bar)?,
+        (Some(folder), None) => from_recording(args, folder, &rig, &mut options, console, &bar)?,
+        (None, Some(raw)) => from_pipe(args, raw, &rig, &mut options, console, &bar)?,
         _ => {
             return Err(
                 Fault::usage("nothing to scan").next("give a recording folder, or --raw with frames on standard input")
@@ -180,6 +135,77 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     Ok(())
 }
 
+fn from_camera(
+    args: &Args,
+    rig: &Rig,
+    options: &mut ScanOptions,
+    console: &Console,
+    bar: &ProgressBar,
+) -> Result<ScanReport> {
+    if let Some(raw) = args.raw {
+        options.ambient = ambient_beside(args, raw)?;
+    }
+    let (poses, keep) = (args.poses.as_deref().map(Path::new), args.record.as_deref());
+    scan_camera(&args.capture, args.raw, poses, &args.station, keep, rig, options, console, bar)
+}
+
+fn from_recording(
+    args: &Args,
+    folder: &Path,
+    rig: &Rig,
+    options: &mut ScanOptions,
+    console: &Console,
+    bar: &ProgressBar,
+) -> Result<ScanReport> {
+    let mut recording = Recording::open(folder)?;
+    recording.channel = args.channel;
+    recording.outside = args.pictures_outside;
+    if recording.meta.motion().axis().is_none() {
+        recording.pose_file(args.poses.as_deref())?.warnings.iter().for_each(|w| console.warn(w));
+    } else if args.poses.is_some() {
+        return Err(Fault::usage("--poses is given, and meta.json says that an axis moved")
+            .cause("another recording, or a motion that is not this one's")
+            .next("leave --poses out, or correct 'motion' in meta.json"));
+    }
+    if let Some(name) = &args.ambient {
+        let inside = folder.join(name);
+        let path = if inside.is_file() { inside } else { name.clone() };
+        options.ambient = Some(recording.load(&path).map_err(no_ambient)?);
+    }
+    scan_recording(&recording, args.poses.as_deref(), rig, options, shown_by(bar))
+}
+
+/// Frames on standard input.
+fn from_pipe(
+    args: &Args,
+    raw: RawFormat,
+    rig: &Rig,
+    options: &mut ScanOptions,
+    console: &Console,
+    bar: &ProgressBar,
+) -> Result<ScanReport> {
+    let poses = args.poses.as_deref().ok_or_else(|| {
+        Fault::usage("frames on standard input, and no poses").next("give their poses in order: --poses FILE")
+    })?;
+    let file = load_poses(Path::new(poses))?;
+    file.warnings.iter().for_each(|w| console.warn(w));
+    if args.resume {
+        return Err(Fault::usage("a pipe cannot be resumed").next("record the frames to a folder to be able to resume"));
+    }
+    options.ambient = ambient_beside(args, raw)?;
+    let missing = args.missing.iter().copied().collect();
+    let open = |_| Ok(Box::new(RawSource::new(raw, std::io::stdin().lock(), file.poses, missing)?) as Box<_>);
+    crate::station::scan("pipe", "standard input", open, rig, options, shown_by(bar))
+}
+
+/// Tells a bar how many shots are done, and of how many.
+fn shown_by(bar: &ProgressBar) -> impl Fn(usize, Option<usize>) + Sync {
+    |done, total| {
+        bar.set_length(total.unwrap_or(done) as u64);
+        bar.set_position(done as u64);
+    }
+}
+
 /// What the middle shot of a recording shows, and what is asked of it; nothing where it cannot be read.
 fn seen(folder: &Path, channel: Channel) -> String {
     let read = || {
@@ -196,9 +222,11 @@ fn seen(folder: &Path, channel: Channel) -> String {
     read().unwrap_or_default()
 }
 
-/// The picture with the laser off, of the shots' size.
-fn ambient(path: &Path, channel: Channel, bits: u8, size: [u32; 2]) -> Result<Image> {
-    load_sized(path, channel, bits, size).map_err(no_ambient)
+/// The picture with the laser off that --ambient names, of the raw frames' size.
+fn ambient_beside(args: &Args, raw: RawFormat) -> Result<Option<Image>> {
+    let f = raw.format;
+    let load = |path: &PathBuf| load_sized(path, args.channel, f.bits, [f.width, f.height]).map_err(no_ambient);
+    args.ambient.as_ref().map(load).transpose()
 }
 
 fn no_ambient(fault: Fault) -> Fault {

@@ -3,12 +3,14 @@
 //! retract — each with its numbers and, where a person would decide, a question.
 //! Frame and unit: base frame; mm, degrees.
 
-use super::range::{RangeReport, RangeRun, measure_range};
+use super::range::{RangeReport, RangeRun, SurfaceFound, measure_range};
 use super::scan::recorded::scan_recording;
+use super::scan::report::ScanReport;
 use super::scan::run::ScanOptions;
 use super::settings::Settings;
 use super::volume;
 use crate::fault::{Fault, Result};
+use crate::find::insert::locate::Poses;
 use crate::find::insert::picture;
 use crate::find::{Accelerator, LocateOptions, Recipe, Report, locate};
 use crate::geometry::{Base, Camera, Flange, Mat3, Rigid, Vec3};
@@ -90,6 +92,10 @@ impl GuideOptions {
         }
         Ok(())
     }
+
+    fn scan_folder(&self) -> PathBuf {
+        self.out.join("scan")
+    }
 }
 
 /// Runs the procedure. `confirm` is shown every step and answers its question; a "no" ends it with a
@@ -100,100 +106,17 @@ pub fn guide(options: &GuideOptions, confirm: &mut dyn FnMut(&Step) -> Result<bo
     let (settings, rig) = (Settings::load(&options.station)?, Rig::load(&options.station)?);
     rig.belong_together()?;
     let hand_eye = rig.need_hand_eye()?.value;
-    let mut steps = Vec::new();
-    let mut pass = |step: Step| -> Result<()> {
-        let go = confirm(&step)?;
-        let name = step.name;
-        steps.push(step);
-        if go {
-            return Ok(());
-        }
-        Err(Fault::refused(format!("stopped at '{name}' by the operator")).next("start again when the cell is ready"))
-    };
-
-    let touched = measure_range(
-        &Recording::open(&options.touch)?,
-        &rig,
-        &RangeRun { poses: options.touch_poses.clone(), one_surface: true, ..RangeRun::default() },
-    )?;
-    let surface = touched.surface.as_ref().expect("asked for");
+    let mut run = Run { options, recipe, settings, rig, confirm, steps: Vec::new() };
+    let surface = run.touch()?;
     let normal = Vec3::from(surface.normal);
-    pass(Step { name: "touch", says: touched_words(&touched), asks: None, pose: None })?;
-
-    let far = match options.view_mm {
-        Some(mm) => Volume::new(mm, mm, "stated"),
-        None => volume::view(&settings, &rig)?,
-    };
-    let view = square_view(&surface.base_from_tool.rotation, &Vec3::from(surface.centre_mm), far.middle(), &hand_eye);
-    pass(Step {
-        name: "look squarely",
-        says: vec![format!(
-            "the camera {} mm above the board ({}), its axis along the normal",
-            far.depth(far.middle()),
-            far.from
-        )],
-        asks: Some("move the flange to this pose?".into()),
-        pose: Some(options.robot.write(&view)),
-    })?;
-
-    pass(Step {
-        name: "scan",
-        says: vec![format!("the line sweeps over the part: {}", options.scan.display())],
-        asks: Some("is the path free?".into()),
-        pose: None,
-    })?;
-    let recording = Recording::open(&options.scan)?;
-    let scan_folder = options.out.join("scan");
-    let poses = options.scan_poses.as_deref();
-    let run = ScanOptions { place: options.place, ..ScanOptions::for_station(&settings, &rig, &scan_folder) };
-    let scanned = scan_recording(&recording, poses, &rig, &run, |_, _| {})?;
-
-    let (cloud, shots) = (super::cloud_of(&scan_folder)?, super::shots_of(&scan_folder)?);
-    let accelerator = (options.place != Where::Cpu).then(Accelerator::open).flatten();
-    let locate_options =
-        LocateOptions { up: Some(normal), robot: options.robot, accelerator, ..LocateOptions::default() };
-    let report = locate(&cloud, &shots, &recipe, Some(&rig), &locate_options)?;
-    picture::draw(&report, &recipe.drawing()).save_png(&options.out.join("found.png"))?;
-    let tilt = report.base_from_part.direction(&Vec3::z()).dot(&normal).clamp(-1.0, 1.0).acos().to_degrees();
-    let mut says = vec![
-        format!("{} points from {} shots", scanned.points, scanned.shots),
-        format!("'{}' found with score {:.3}; {} edges", report.recipe, report.found.score, report.edges),
-        format!(
-            "sigma {:.3} {:.3} {:.3} mm, {:.3} {:.3} {:.3} degrees",
-            report.sigma_mm[0],
-            report.sigma_mm[1],
-            report.sigma_mm[2],
-            report.sigma_deg[0],
-            report.sigma_deg[1],
-            report.sigma_deg[2]
-        ),
-        format!("the part's top and the touched board differ by {tilt:.2} degrees"),
-    ];
-    says.extend(report.notes.iter().chain(&scanned.remarks).cloned());
-    let Some(poses) = report.poses.clone() else {
-        return Err(Fault::refused(format!("no pose: {}", report.reasons.join("; ")))
-            .cause("the part is hidden in part, another one, or too badly seen")
-            .next(format!("look at {}", options.out.join("found.png").display())));
-    };
-    if tilt > options.max_tilt_deg {
-        return Err(Fault::refused(format!(
-            "the part's top is {tilt:.2} degrees off the touched board, limit {}",
-            options.max_tilt_deg
-        ))
-        .cause("the part is not fully seated, or the pointer touched something else than the board")
-        .next("look at the board, then start again"));
-    }
-    pass(Step { name: "find", says, asks: Some("is the part where the picture shows it?".into()), pose: None })?;
-    for (name, pose, question) in [
-        ("approach", &poses.approach, "move the tool to the approach pose?"),
-        ("insert", &poses.insertion, "insert?"),
-        ("retract", &poses.retract, "is the part in? retract?"),
-    ] {
-        let says = vec![format!("{}: {}", pose.convention, pose.labels.join(", "))];
-        pass(Step { name, says, asks: Some(question.into()), pose: Some(pose.numbers.clone()) })?;
-    }
+    run.look_squarely(&surface, &hand_eye)?;
+    let scanned = run.scan()?;
+    let (report, tilt) = run.find(&normal)?;
+    let poses = run.poses(&report, tilt)?;
+    run.ask_found(&report, &scanned, tilt)?;
+    run.insert(&poses)?;
     let guided = Guided {
-        steps,
+        steps: run.steps,
         finished: true,
         convention: options.robot.name(),
         normal: surface.normal,
@@ -203,6 +126,130 @@ pub fn guide(options: &GuideOptions, confirm: &mut dyn FnMut(&Step) -> Result<bo
     let text = serde_json::to_string_pretty(&guided).expect("plain data");
     crate::files::write(&options.out.join("guide.json"), text.as_bytes())?;
     Ok(guided)
+}
+
+/// The procedure under way.
+struct Run<'a> {
+    options: &'a GuideOptions,
+    recipe: Recipe,
+    settings: Settings,
+    rig: Rig,
+    confirm: &'a mut dyn FnMut(&Step) -> Result<bool>,
+    steps: Vec<Step>,
+}
+
+impl Run<'_> {
+    /// Shows a step; a refusal where the operator says no.
+    fn pass(&mut self, step: Step) -> Result<()> {
+        let go = (self.confirm)(&step)?;
+        let name = step.name;
+        self.steps.push(step);
+        if go {
+            return Ok(());
+        }
+        Err(Fault::refused(format!("stopped at '{name}' by the operator")).next("start again when the cell is ready"))
+    }
+
+    /// The board by the pointer's spots on it.
+    fn touch(&mut self) -> Result<SurfaceFound> {
+        let touched = measure_range(
+            &Recording::open(&self.options.touch)?,
+            &self.rig,
+            &RangeRun { poses: self.options.touch_poses.clone(), one_surface: true, ..RangeRun::default() },
+        )?;
+        self.pass(Step { name: "touch", says: touched_words(&touched), asks: None, pose: None })?;
+        Ok(touched.surface.expect("asked for"))
+    }
+
+    /// The flange pose from which the camera looks at the board squarely.
+    fn look_squarely(&mut self, surface: &SurfaceFound, hand_eye: &Rigid<Flange, Camera>) -> Result<()> {
+        let far = match self.options.view_mm {
+            Some(mm) => Volume::new(mm, mm, "stated"),
+            None => volume::view(&self.settings, &self.rig)?,
+        };
+        let centre = Vec3::from(surface.centre_mm);
+        let view = square_view(&surface.base_from_tool.rotation, &centre, far.middle(), hand_eye);
+        self.pass(Step {
+            name: "look squarely",
+            says: vec![format!(
+                "the camera {} mm above the board ({}), its axis along the normal",
+                far.depth(far.middle()),
+                far.from
+            )],
+            asks: Some("move the flange to this pose?".into()),
+            pose: Some(self.options.robot.write(&view)),
+        })
+    }
+
+    /// The line over the part.
+    fn scan(&mut self) -> Result<ScanReport> {
+        let options = self.options;
+        self.pass(Step {
+            name: "scan",
+            says: vec![format!("the line sweeps over the part: {}", options.scan.display())],
+            asks: Some("is the path free?".into()),
+            pose: None,
+        })?;
+        let recording = Recording::open(&options.scan)?;
+        let poses = options.scan_poses.as_deref();
+        let settings = ScanOptions::for_station(&self.settings, &self.rig, &options.scan_folder());
+        scan_recording(&recording, poses, &self.rig, &ScanOptions { place: options.place, ..settings }, |_, _| {})
+    }
+
+    /// The part in the scan, drawn for the operator, and the angle between its top and the board, degrees.
+    fn find(&self, normal: &Vec3) -> Result<(Report, f64)> {
+        let (options, folder) = (self.options, self.options.scan_folder());
+        let (cloud, shots) = (super::cloud_of(&folder)?, super::shots_of(&folder)?);
+        let accelerator = (options.place != Where::Cpu).then(Accelerator::open).flatten();
+        let locate_options =
+            LocateOptions { up: Some(*normal), robot: options.robot, accelerator, ..LocateOptions::default() };
+        let report = locate(&cloud, &shots, &self.recipe, Some(&self.rig), &locate_options)?;
+        picture::draw(&report, &self.recipe.drawing()).save_png(&options.out.join("found.png"))?;
+        let tilt = report.base_from_part.direction(&Vec3::z()).dot(normal).clamp(-1.0, 1.0).acos().to_degrees();
+        Ok((report, tilt))
+    }
+
+    /// Where the tool goes; a refusal where a gate failed, or where the part does not lie as the board does.
+    fn poses(&self, report: &Report, tilt: f64) -> Result<Poses> {
+        let Some(poses) = report.poses.clone() else {
+            return Err(Fault::refused(format!("no pose: {}", report.reasons.join("; ")))
+                .cause("the part is hidden in part, another one, or too badly seen")
+                .next(format!("look at {}", self.options.out.join("found.png").display())));
+        };
+        if tilt > self.options.max_tilt_deg {
+            return Err(Fault::refused(format!(
+                "the part's top is {tilt:.2} degrees off the touched board, limit {}",
+                self.options.max_tilt_deg
+            ))
+            .cause("the part is not fully seated, or the pointer touched something else than the board")
+            .next("look at the board, then start again"));
+        }
+        Ok(poses)
+    }
+
+    fn ask_found(&mut self, report: &Report, scanned: &ScanReport, tilt: f64) -> Result<()> {
+        let ([x, y, z], [rx, ry, rz]) = (report.sigma_mm, report.sigma_deg);
+        let mut says = vec![
+            format!("{} points from {} shots", scanned.points, scanned.shots),
+            format!("'{}' found with score {:.3}; {} edges", report.recipe, report.found.score, report.edges),
+            format!("sigma {x:.3} {y:.3} {z:.3} mm, {rx:.3} {ry:.3} {rz:.3} degrees"),
+            format!("the part's top and the touched board differ by {tilt:.2} degrees"),
+        ];
+        says.extend(report.notes.iter().chain(&scanned.remarks).cloned());
+        self.pass(Step { name: "find", says, asks: Some("is the part where the picture shows it?".into()), pose: None })
+    }
+
+    fn insert(&mut self, poses: &Poses) -> Result<()> {
+        for (name, pose, question) in [
+            ("approach", &poses.approach, "move the tool to the approach pose?"),
+            ("insert", &poses.insertion, "insert?"),
+            ("retract", &poses.retract, "is the part in? retract?"),
+        ] {
+            let says = vec![format!("{}: {}", pose.convention, pose.labels.join(", "))];
+            self.pass(Step { name, says, asks: Some(question.into()), pose: Some(pose.numbers.clone()) })?;
+        }
+        Ok(())
+    }
 }
 
 fn touched_words(r: &RangeReport) -> Vec<String> {

@@ -10,9 +10,9 @@ use crate::calibrate::pointer::range::{
 use crate::calibrate::pointer::spot::{Spot, SpotOptions, SpotPicture, find_spots, hot_pixels};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Mat3, Rigid, Tool, Vec3};
-use crate::raster::Light;
+use crate::raster::{Image, Light};
 use crate::recording::{Beam, Recording};
-use crate::rig::Rig;
+use crate::rig::{Calibration, HandEye, Rig};
 
 /// How [`measure_range`] is run.
 #[derive(Clone, Debug)]
@@ -154,40 +154,21 @@ pub(super) fn touched(recording: &Recording, rig: &Rig, run: &RangeRun) -> Resul
     let (camera, pointer) = (rig.need_camera()?, rig.need_pointer()?);
     recording.shows(Beam::Pointer)?;
     let joint = joint_covariance(&pointer.covariance);
-    let has_poses = run.poses.is_some() || recording.meta.pose_file.is_some();
-    let poses = if has_poses { Some(recording.poses(run.poses.as_deref())?) } else { None };
-    if run.one_surface && poses.is_none() {
-        return Err(Fault::usage("a surface's normal needs the robot's poses").next(
-            "name the recording's pose file (range: --poses, guide: --touch-poses), or range without --surface",
-        ));
-    }
-    let base = match (&poses, run.one_surface) {
-        (Some(p), true) => Some((p, rig.need_hand_eye()?)),
-        (Some(p), false) if rig.hand_eye.is_some() => Some((p, rig.need_hand_eye()?)),
-        (Some(_), false) => None,
-        (None, _) => None,
-    };
+    let carried = Carried::of(recording, rig, run)?;
     let mut remarks = rig.remarks();
     let mut shared = SharedCovariance::zeros();
     shared.fixed_view_mut::<RIG, RIG>(0, 0).copy_from(&joint);
-    let mut robot = RobotNoise::default();
-    if let Some((_, h)) = base {
-        shared.fixed_view_mut::<6, 6>(RIG, RIG).copy_from(&h.covariance.of(HAND_EYE_NAMES));
-        match h.robot_sigma()? {
-            Some([mm, deg]) => robot = RobotNoise { mm, rad: deg.to_radians() },
-            None => remarks.push("nothing is known of the robot's noise: the points' sigmas are without it".into()),
+    if let Some(c) = &carried {
+        shared.fixed_view_mut::<6, 6>(RIG, RIG).copy_from(&c.hand_eye.covariance.of(HAND_EYE_NAMES));
+        if c.robot.is_none() {
+            remarks.push("nothing is known of the robot's noise: the points' sigmas are without it".into());
         }
     }
-    let frames: Vec<_> =
-        recording.meta.frames.iter().enumerate().filter_map(|(i, f)| Some((i, f.laser.as_deref()?))).collect();
-    let images = frames.iter().map(|f| recording.picture(f.1)).collect::<Result<Vec<_>>>()?;
-    let hot = hot_pixels(&images.iter().collect::<Vec<_>>());
-    let asked: Vec<SpotPicture<'_>> =
-        frames.iter().zip(&images).map(|(f, laser)| SpotPicture { name: f.1, laser, ambient: None }).collect();
-    let mut out = RangeReport { distances: Vec::new(), surface: None, square: None, missing: Vec::new(), remarks };
-    let mut points: Vec<(String, BasePoint)> = Vec::new();
-    let (mut first_x, mut last) = (None, None);
-    for ((index, name), spot) in frames.iter().zip(find_spots(&asked, &hot, &run.spots)?) {
+    let frames = laser_pictures(recording)?;
+    let report = RangeReport { distances: Vec::new(), surface: None, square: None, missing: Vec::new(), remarks };
+    let mut out = Touched { report, points: Vec::new(), shared, first_x: None, last: None };
+    for (frame, spot) in frames.iter().zip(spots(&frames, &run.spots)?) {
+        let name = frame.name;
         let found = spot.and_then(|s| {
             let r = range(&s.pixel, &s.covariance, &camera.value, &pointer.value, &joint)?;
             on_beam(&r, run.max_off_beam).map(|()| (s, r))
@@ -195,33 +176,90 @@ pub(super) fn touched(recording: &Recording, rig: &Rig, run: &RangeRun) -> Resul
         let (spot, ranged) = match found {
             Ok(f) => f,
             Err(fault) => {
-                out.missing.push((name.to_string(), first_line(&fault.to_string()).to_owned()));
+                out.report.missing.push((name.to_string(), first_line(&fault.to_string()).to_owned()));
                 continue;
             }
         };
         let mut in_base = None;
-        if let Some((poses, hand_eye)) = base {
-            let pose = recording.pose_of(*index, poses).map_err(|e| e.at(name))?;
-            first_x.get_or_insert(Vec3::from(pose.rotation.column(0)));
-            last = Some((*pose, robot.rad));
-            let p = to_base(&ranged, pose, &hand_eye.value, &shared, &robot);
-            in_base = Some(p.clone());
-            points.push((name.to_string(), p));
+        if let Some(c) = &carried {
+            let pose = recording.pose_of(frame.index, &c.poses).map_err(|e| e.at(name))?;
+            in_base = Some(out.in_base(name, &ranged, pose, c));
         }
-        out.distances.push(row(name, &spot, &ranged, in_base.as_ref()));
+        out.report.distances.push(row(name, &spot, &ranged, in_base.as_ref()));
     }
-    if out.distances.is_empty() {
-        let (name, why) = out.missing.first().cloned().unwrap_or_default();
-        let fault = Fault::refused(format!("no distance could be measured; {name}: {why}"))
-            .cause("the pointer was off, or it is not the one that was calibrated")
-            .next("look at the pictures");
-        let middle = frames.len() / 2;
-        return Err(match (frames.get(middle), images.get(middle)) {
-            (Some((_, name)), Some(image)) => Light::of(image).explain(name, fault),
-            _ => fault,
-        });
+    if out.report.distances.is_empty() {
+        return Err(nothing_measured(&out.report, &frames));
     }
-    Ok(Touched { report: out, points, shared, first_x, last })
+    Ok(out)
+}
+
+impl Touched {
+    /// A measured point in the base frame, noted with where the flange stood.
+    fn in_base(&mut self, name: &str, ranged: &Ranged, pose: &Rigid<Base, Flange>, c: &Carried<'_>) -> BasePoint {
+        let robot = c.robot.unwrap_or_default();
+        self.first_x.get_or_insert(Vec3::from(pose.rotation.column(0)));
+        self.last = Some((*pose, robot.rad));
+        let point = to_base(ranged, pose, &c.hand_eye.value, &self.shared, &robot);
+        self.points.push((name.to_string(), point.clone()));
+        point
+    }
+}
+
+/// The robot that carries the sensor: its poses, how the sensor stands on it, and its noise where that is known.
+struct Carried<'a> {
+    poses: Vec<Rigid<Base, Flange>>,
+    hand_eye: &'a Calibration<HandEye>,
+    robot: Option<RobotNoise>,
+}
+
+impl<'a> Carried<'a> {
+    /// `None` where poses or hand-eye are not there and no surface asks for them.
+    fn of(recording: &Recording, rig: &'a Rig, run: &RangeRun) -> Result<Option<Carried<'a>>> {
+        let has_poses = run.poses.is_some() || recording.meta.pose_file.is_some();
+        let poses = if has_poses { Some(recording.poses(run.poses.as_deref())?) } else { None };
+        if run.one_surface && poses.is_none() {
+            return Err(Fault::usage("a surface's normal needs the robot's poses").next(
+                "name the recording's pose file (range: --poses, guide: --touch-poses), or range without --surface",
+            ));
+        }
+        let Some(poses) = poses.filter(|_| run.one_surface || rig.hand_eye.is_some()) else { return Ok(None) };
+        let hand_eye = rig.need_hand_eye()?;
+        let robot = hand_eye.robot_sigma()?.map(|[mm, deg]| RobotNoise { mm, rad: deg.to_radians() });
+        Ok(Some(Carried { poses, hand_eye, robot }))
+    }
+}
+
+/// A frame's picture with the pointer on.
+struct LaserPicture<'a> {
+    /// Of the frame.
+    index: usize,
+    name: &'a str,
+    image: Image,
+}
+
+fn laser_pictures(recording: &Recording) -> Result<Vec<LaserPicture<'_>>> {
+    let frames = recording.meta.frames.iter().enumerate().filter_map(|(i, f)| Some((i, f.laser.as_deref()?)));
+    frames.map(|(index, name)| Ok(LaserPicture { index, name, image: recording.picture(name)? })).collect()
+}
+
+/// The spot in each picture, hot pixels left out.
+fn spots(frames: &[LaserPicture<'_>], options: &SpotOptions) -> Result<Vec<Result<Spot>>> {
+    let hot = hot_pixels(&frames.iter().map(|f| &f.image).collect::<Vec<_>>());
+    let asked: Vec<SpotPicture<'_>> =
+        frames.iter().map(|f| SpotPicture { name: f.name, laser: &f.image, ambient: None }).collect();
+    find_spots(&asked, &hot, options)
+}
+
+/// Says what the middle picture shows.
+fn nothing_measured(report: &RangeReport, frames: &[LaserPicture<'_>]) -> Fault {
+    let (name, why) = report.missing.first().cloned().unwrap_or_default();
+    let fault = Fault::refused(format!("no distance could be measured; {name}: {why}"))
+        .cause("the pointer was off, or it is not the one that was calibrated")
+        .next("look at the pictures");
+    match frames.get(frames.len() / 2) {
+        Some(f) => Light::of(&f.image).explain(f.name, fault),
+        None => fault,
+    }
 }
 
 /// Turns the tool by the least turn that brings its z onto the normal.

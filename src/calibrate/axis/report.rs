@@ -2,7 +2,7 @@
 //! verification apart.
 //! Frame and unit: camera frame; mm, degrees.
 
-use super::fit::AxisFit;
+use super::fit::{AxisFit, StopResidual};
 use crate::calibrate::limits::{Judgement, Limits, rms};
 use crate::calibrate::report::{Page, bars, scatter};
 use crate::calibrate::scatter::{ENOUGH, overrule};
@@ -34,18 +34,26 @@ pub fn covariance(fit: &AxisFit) -> Covariance {
     Covariance::new(kind(fit).parameters().0, &fit.covariance)
 }
 
+/// What a verdict rests on.
+struct Evidence<'a> {
+    fit: &'a AxisFit,
+    used: Vec<&'a StopResidual>,
+    /// Expected error in all, its part by direction and pitch, and the camera's share of that part, mm.
+    expected: f64,
+    own: f64,
+    camera_part: f64,
+    /// Least and greatest count, and the way between them, mm or rad.
+    counts: [f64; 2],
+    way: f64,
+}
+
 /// Judges a fit. `board_length` names what states the board's lengths.
 pub fn judge(fit: &AxisFit, limits: &Limits, board_length: &str) -> Quality {
-    let [own, expected] = fit.expected_error(&fit.covariance);
-    let exact = fit.expected_error(&fit.covariance_camera_exact)[0];
-    let camera_part = (own * own - exact * exact).max(0.0).sqrt();
-    let used: Vec<_> = fit.stops.iter().filter(|s| s.used).collect();
-    let (low, high) = fit.counts.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), c| (a.min(*c), b.max(*c)));
-    let way = fit.axis.pitch.abs() * (high - low);
-    let unit = fit.axis.unit.name();
-    let (over, way_words) = match fit.axis.kind {
-        AxisKind::Linear => (format!("{way:.2} mm of way"), format!("{way:.2} mm")),
-        AxisKind::Turntable => ("a whole turn".into(), format!("{:.1} degrees", way.to_degrees())),
+    let evidence = Evidence::of(fit);
+    let Evidence { expected, own, way, .. } = evidence;
+    let over = match fit.axis.kind {
+        AxisKind::Linear => format!("{way:.2} mm of way"),
+        AxisKind::Turntable => "a whole turn".into(),
     };
     let mut j = limits.by_error(
         expected,
@@ -56,79 +64,125 @@ pub fn judge(fit: &AxisFit, limits: &Limits, board_length: &str) -> Quality {
     );
     contradictions(fit, &mut j);
     order(fit, &mut j);
-    j.at_best(Verdict::BadlyDetermined, used.len() < 4, || format!("{} stops leave nothing to check", used.len()));
-    j.at_best(Verdict::Usable, (4..ENOUGH).contains(&used.len()), || {
-        format!("{} stops, {ENOUGH} are needed to be good", used.len())
-    });
-    if fit.sigma_mm > 0.0 || fit.sigma_rad > 0.0 {
-        j.reasons.push(format!(
-            "the axis (or its encoder) scatters by {:.4} mm and {:.4} degrees from stop to stop beyond what pixels explain; every \
-             point's sigma contains it",
-            fit.sigma_mm,
-            fit.sigma_rad.to_degrees()
-        ));
-    }
-    let [bow, bow_sigma] = fit.bend_mm;
-    let bent = bow > BENT * bow_sigma && bow > 0.25 * limits.tolerance_mm;
-    let linear = fit.axis.kind == AxisKind::Linear;
-    j.at_best(Verdict::Usable, bent && linear, || {
-        format!("the way is bent: {bow:.4} mm from its ends to its middle, {bow_sigma:.4} mm is chance; it is used as straight")
-    });
-    // Where a table's error lies farther round than the board was seen, nobody knows.
-    j.at_best(Verdict::BadlyDetermined, bent && !linear, || {
-        format!(
-            "the table does not run true: over the turn seen, the board's place bows by {bow:.4} mm, {bow_sigma:.4} mm is chance"
-        )
-    });
-    if let Some(stated) = fit.axis.unit.stated() {
-        let ratio = fit.axis.pitch.abs() / stated;
-        let sigma = fit.covariance[(3, 3)].max(0.0).sqrt() / stated;
-        j.at_best(Verdict::BadlyDetermined, (ratio - 1.0).abs() > (4.0 * sigma).max(SCALE_TOLERANCE), || {
-            format!(
-                "a {unit} of the axis is {ratio:.4} {unit} by the board: the axis states another unit, or {board_length} is wrong"
-            )
-        });
-    }
-    if camera_part > 0.0 {
-        j.reasons.push(format!("the camera's own uncertainty makes {camera_part:.4} mm of the error"));
-    }
-    j.advise(used.len() < 8, || "show the board at eight or more stops".into());
-    let partly = fit.axis.kind == AxisKind::Turntable && way < HALF_TURN;
-    j.at_best(Verdict::Usable, partly, || {
-        format!("the board was seen over {way_words} of the turn: farther round the table is taken to run true")
-    });
-    j.advise(partly, || format!("let the board turn by more than {way_words}: put it near the axis, or tilt it less"));
-    j.advise(j.verdict != Verdict::Good && camera_part > 0.7 * own, || {
-        "calibrate the camera with more pictures first: most of the error comes from it".into()
-    });
-    let figures = BTreeMap::from([
-        ("expected_error_at_working_distance_mm".to_string(), expected),
-        ("expected_error_of_direction_and_pitch_mm".into(), own),
-        ("expected_error_from_camera_mm".into(), camera_part),
-        (AXIS_SIGMA_MM.into(), fit.sigma_mm),
-        (AXIS_SIGMA_DEG.into(), fit.sigma_rad.to_degrees()),
-        ("way_mm_or_deg".into(), if fit.axis.kind == AxisKind::Linear { way } else { way.to_degrees() }),
-        ("least_count".into(), low),
-        ("greatest_count".into(), high),
-        ("pitch_sigma_mm_or_rad".into(), fit.covariance[(3, 3)].max(0.0).sqrt()),
-        (
-            "direction_sigma_deg".into(),
-            (0..3).map(|i| fit.covariance[(i, i)].max(0.0)).sum::<f64>().sqrt().to_degrees(),
-        ),
-        ("bow_mm".into(), bow),
-        ("rms_mm".into(), rms(used.iter().map(|s| s.mm))),
-        ("holdout_rms_mm".into(), rms(used.iter().map(|s| s.holdout_mm))),
-        ("scatter_over_sigma".into(), fit.chi2.sqrt()),
-        ("variance_factor".into(), fit.inflation),
-        ("pictures_contradicting".into(), (fit.stops.len() - used.len()) as f64),
-    ]);
+    evidence.scatter(&mut j);
+    bow(fit, limits.tolerance_mm, &mut j);
+    pitch(fit, board_length, &mut j);
+    evidence.advise(&mut j);
     Quality {
         verdict: j.verdict,
         reasons: j.reasons,
         advice: j.advice,
-        figures,
+        figures: evidence.figures(),
         per_picture: fit.stops.iter().map(|s| (s.name.clone(), s.mm)).collect(),
     }
+}
+
+impl Evidence<'_> {
+    fn of(fit: &AxisFit) -> Evidence<'_> {
+        let [own, expected] = fit.expected_error(&fit.covariance);
+        let exact = fit.expected_error(&fit.covariance_camera_exact)[0];
+        let (low, high) =
+            fit.counts.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), c| (a.min(*c), b.max(*c)));
+        Evidence {
+            fit,
+            used: fit.stops.iter().filter(|s| s.used).collect(),
+            expected,
+            own,
+            camera_part: (own * own - exact * exact).max(0.0).sqrt(),
+            counts: [low, high],
+            way: fit.axis.pitch.abs() * (high - low),
+        }
+    }
+
+    /// Whether the stops are enough, and by how much they scatter.
+    fn scatter(&self, j: &mut Judgement) {
+        let (fit, used) = (self.fit, self.used.len());
+        j.at_best(Verdict::BadlyDetermined, used < 4, || format!("{used} stops leave nothing to check"));
+        j.at_best(Verdict::Usable, (4..ENOUGH).contains(&used), || {
+            format!("{used} stops, {ENOUGH} are needed to be good")
+        });
+        if fit.sigma_mm > 0.0 || fit.sigma_rad > 0.0 {
+            j.reasons.push(format!(
+                "the axis (or its encoder) scatters by {:.4} mm and {:.4} degrees from stop to stop beyond what pixels explain; every \
+                 point's sigma contains it",
+                fit.sigma_mm,
+                fit.sigma_rad.to_degrees()
+            ));
+        }
+    }
+
+    /// What the error comes from, and the next best picture.
+    fn advise(&self, j: &mut Judgement) {
+        let Evidence { camera_part, way, .. } = *self;
+        if camera_part > 0.0 {
+            j.reasons.push(format!("the camera's own uncertainty makes {camera_part:.4} mm of the error"));
+        }
+        j.advise(self.used.len() < 8, || "show the board at eight or more stops".into());
+        let partly = self.fit.axis.kind == AxisKind::Turntable && way < HALF_TURN;
+        let seen = format!("{:.1} degrees", way.to_degrees());
+        j.at_best(Verdict::Usable, partly, || {
+            format!("the board was seen over {seen} of the turn: farther round the table is taken to run true")
+        });
+        j.advise(partly, || format!("let the board turn by more than {seen}: put it near the axis, or tilt it less"));
+        j.advise(j.verdict != Verdict::Good && camera_part > 0.7 * self.own, || {
+            "calibrate the camera with more pictures first: most of the error comes from it".into()
+        });
+    }
+
+    fn figures(&self) -> BTreeMap<String, f64> {
+        let (fit, used) = (self.fit, &self.used);
+        let variance = |i: usize| fit.covariance[(i, i)].max(0.0);
+        let way = if fit.axis.kind == AxisKind::Linear { self.way } else { self.way.to_degrees() };
+        BTreeMap::from([
+            ("expected_error_at_working_distance_mm".to_string(), self.expected),
+            ("expected_error_of_direction_and_pitch_mm".into(), self.own),
+            ("expected_error_from_camera_mm".into(), self.camera_part),
+            (AXIS_SIGMA_MM.into(), fit.sigma_mm),
+            (AXIS_SIGMA_DEG.into(), fit.sigma_rad.to_degrees()),
+            ("way_mm_or_deg".into(), way),
+            ("least_count".into(), self.counts[0]),
+            ("greatest_count".into(), self.counts[1]),
+            ("pitch_sigma_mm_or_rad".into(), variance(3).sqrt()),
+            ("direction_sigma_deg".into(), (0..3).map(variance).sum::<f64>().sqrt().to_degrees()),
+            ("bow_mm".into(), fit.bend_mm[0]),
+            ("rms_mm".into(), rms(used.iter().map(|s| s.mm))),
+            ("holdout_rms_mm".into(), rms(used.iter().map(|s| s.holdout_mm))),
+            ("scatter_over_sigma".into(), fit.chi2.sqrt()),
+            ("variance_factor".into(), fit.inflation),
+            ("pictures_contradicting".into(), (fit.stops.len() - used.len()) as f64),
+        ])
+    }
+}
+
+/// Whether the way is straight, or the table runs true.
+fn bow(fit: &AxisFit, tolerance_mm: f64, j: &mut Judgement) {
+    let [bow, sigma] = fit.bend_mm;
+    let bent = bow > BENT * sigma && bow > 0.25 * tolerance_mm;
+    let linear = fit.axis.kind == AxisKind::Linear;
+    j.at_best(Verdict::Usable, bent && linear, || {
+        format!(
+            "the way is bent: {bow:.4} mm from its ends to its middle, {sigma:.4} mm is chance; it is used as straight"
+        )
+    });
+    // Where a table's error lies farther round than the board was seen, nobody knows.
+    j.at_best(Verdict::BadlyDetermined, bent && !linear, || {
+        format!(
+            "the table does not run true: over the turn seen, the board's place bows by {bow:.4} mm, {sigma:.4} mm is chance"
+        )
+    });
+}
+
+/// Whether the board's lengths agree with the unit that the axis counts in.
+fn pitch(fit: &AxisFit, board_length: &str, j: &mut Judgement) {
+    let Some(stated) = fit.axis.unit.stated() else { return };
+    let unit = fit.axis.unit.name();
+    let ratio = fit.axis.pitch.abs() / stated;
+    let sigma = fit.covariance[(3, 3)].max(0.0).sqrt() / stated;
+    j.at_best(Verdict::BadlyDetermined, (ratio - 1.0).abs() > (4.0 * sigma).max(SCALE_TOLERANCE), || {
+        format!(
+            "a {unit} of the axis is {ratio:.4} {unit} by the board: the axis states another unit, or {board_length} is wrong"
+        )
+    });
 }
 
 /// What the stops say against each other, and who says it.

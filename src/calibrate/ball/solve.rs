@@ -71,6 +71,7 @@ fn expected(q: &Vec3, radius: f64) -> (Vec3, Mat3) {
     (Vec3::new(q.x, q.z, r), Mat3::new(1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, -q.y / r, 0.0))
 }
 
+#[derive(Clone, Copy)]
 struct Item<'a> {
     circle: &'a Circle,
     pose: &'a Rigid<Base, Flange>,
@@ -113,6 +114,7 @@ impl Problem for Fit<'_> {
     }
 }
 
+/// Sigmas of a profile point and of the robot's position, mm.
 struct Noise {
     point: f64,
     robot: f64,
@@ -124,7 +126,12 @@ fn covariance_of(s: &State, item: &Item<'_>, radius: f64, n: &Noise) -> Mat3 {
     own + by_q * by_q.transpose() * (n.robot * n.robot)
 }
 
-type Solved = (State, DMatrix<f64>, f64);
+/// A minimum, its covariance, and the squared Mahalanobis distances there in all.
+struct Solved {
+    state: State,
+    covariance: DMatrix<f64>,
+    cost: f64,
+}
 
 fn fit(items: &[Item<'_>], start: &State, radius: f64, n: &Noise, loss: Loss) -> Option<Solved> {
     let whiteners = items
@@ -134,7 +141,7 @@ fn fit(items: &[Item<'_>], start: &State, radius: f64, n: &Noise, loss: Loss) ->
     let s = lm(&Fit { items, whiteners, radius }, *start, &LmOptions { loss, ..Default::default() });
     (s.stop != Stop::BadStart).then_some(())?;
     let cost = s.lengths.iter().map(|l| l * l).sum();
-    Some((s.state, s.covariance?, cost))
+    Some(Solved { state: s.state, covariance: s.covariance?, cost })
 }
 
 /// One step of the robot's variance component.
@@ -203,9 +210,155 @@ fn undetermined() -> Fault {
         .next("scan the ball with the flange tilted by 20 degrees and more about two axes, at both ends of the line and at several distances")
 }
 
+/// All profiles of one ball.
+struct Data<'a> {
+    items: Vec<Item<'a>>,
+    radius: f64,
+    o: &'a BallOptions,
+}
+
+/// The best solution that has the ball on one side of the profile plane.
+struct Solution {
+    side: Side,
+    solved: Solved,
+    noise: Noise,
+    /// Profiles in the fit.
+    used: Vec<usize>,
+}
+
+impl Data<'_> {
+    fn chosen(&self, used: impl Iterator<Item = usize>) -> Vec<Item<'_>> {
+        used.map(|i| self.items[i]).collect()
+    }
+
+    /// The robust fit with the ball on one side that costs least. A start of one side may end on the other where the ball is
+    /// seen from both: all are tried for each.
+    fn best_start(&self, side: Side, point: f64) -> Option<Solved> {
+        let rough = Noise { point, robot: 0.5 };
+        [Side::Plus, Side::Minus]
+            .into_iter()
+            .flat_map(|s| starts(&self.items, self.radius, s))
+            .filter_map(|s| fit(&self.items, &s, self.radius, &rough, Loss::Cauchy(2.0)))
+            .filter(|s| side_of(&self.items, &s.state) == side)
+            .min_by(|a, b| a.cost.total_cmp(&b.cost))
+    }
+
+    /// The solution with the ball on one side, profiles beyond the gate left out.
+    fn on_side(&self, side: Side, point: f64) -> Option<Solution> {
+        let all: Vec<usize> = (0..self.items.len()).collect();
+        let noise = Noise { point, robot: 0.1 };
+        let mut s = Solution { side, solved: self.best_start(side, point)?, noise, used: all };
+        for _ in 0..12 {
+            s.refit(self)?;
+            let next = s.within_gate(self);
+            if next == s.used || next.len() < self.o.min_profiles {
+                break;
+            }
+            // One at a time: a wrong profile spoils the others' distances.
+            let worst = s.worst(self)?;
+            if s.distance2(self, worst, true) > self.o.gate {
+                s.used.retain(|&i| i != worst);
+            } else {
+                s.used = next;
+            }
+        }
+        Some(Solution { side: side_of(&self.items, &s.solved.state), ..s })
+    }
+
+    /// Squared Mahalanobis distances of all profiles, none counted beyond the gate.
+    fn misfit(&self, s: &Solved, n: &Noise) -> f64 {
+        let one = |i: &Item<'_>| {
+            let (r, _, _) = row(&s.state, i, self.radius);
+            let own = covariance_of(&s.state, i, self.radius, n).cholesky();
+            own.map_or(f64::INFINITY, |c| r.dot(&c.solve(&r)).min(self.o.gate))
+        };
+        self.items.iter().map(one).sum()
+    }
+}
+
+impl Solution {
+    /// Least squares over the used profiles, in turn with the robot's variance component.
+    fn refit(&mut self, data: &Data<'_>) -> Option<()> {
+        let chosen = data.chosen(self.used.iter().copied());
+        for _ in 0..8 {
+            self.solved = fit(&chosen, &self.solved.state, data.radius, &self.noise, Loss::Squares)?;
+            self.noise.robot = robot_sigma(&chosen, &self.solved.state, data.radius, &self.noise)?;
+        }
+        self.solved = fit(&chosen, &self.solved.state, data.radius, &self.noise, Loss::Squares)?;
+        Some(())
+    }
+
+    fn distance2(&self, data: &Data<'_>, i: usize, used: bool) -> f64 {
+        distance2(&self.solved, &data.items[i], data.radius, &self.noise, used)
+    }
+
+    fn within_gate(&self, data: &Data<'_>) -> Vec<usize> {
+        let near = |i: &usize| self.distance2(data, *i, self.used.contains(i)) <= data.o.gate;
+        (0..data.items.len()).filter(near).collect()
+    }
+
+    fn worst(&self, data: &Data<'_>) -> Option<usize> {
+        let d = |i: usize| self.distance2(data, i, true);
+        self.used.iter().copied().max_by(|&a, &b| d(a).total_cmp(&d(b)))
+    }
+
+    /// Refuses a pose that is known to a fifth of the ball's radius or worse; turns count at a reach of 50 mm or the radius.
+    fn determined(&self, radius: f64) -> Result<()> {
+        let c = &self.solved.covariance;
+        let largest_sigma =
+            (0..6).map(|i| c[(i, i)].sqrt() * if i < 3 { 1.0 } else { radius.max(50.0) }).fold(0.0, f64::max);
+        if !(largest_sigma < 0.2 * radius) {
+            return Err(undetermined());
+        }
+        Ok(())
+    }
+
+    /// How a profile fits, and how the others predict it.
+    fn residual(&self, data: &Data<'_>, i: usize, name: &str) -> ProfileResidual {
+        let (item, state) = (&data.items[i], &self.solved.state);
+        let rest = data.chosen(self.used.iter().copied().filter(|&k| k != i));
+        let without = fit(&rest, state, data.radius, &self.noise, Loss::Squares);
+        let used = self.used.contains(&i);
+        ProfileResidual {
+            name: name.to_owned(),
+            used,
+            points: item.circle.points,
+            mm: row(state, item, data.radius).0.norm(),
+            holdout_mm: without.map_or(f64::INFINITY, |s| row(&s.state, item, data.radius).0.norm()),
+            distance2: self.distance2(data, i, used),
+            height: in_sensor(state, item.pose).y,
+        }
+    }
+}
+
 /// Solves for the sensor on the flange and the ball in the base frame. Profile i belongs to pose i.
 pub fn solve(profiles: &[Profile], poses: &[Rigid<Base, Flange>], o: &BallOptions) -> Result<BallFit> {
     o.check()?;
+    enough(profiles, poses, o)?;
+    let radius = o.diameter / 2.0;
+    let circles = circles_of(profiles, radius, o)?;
+    let items = circles.iter().zip(poses).map(|(circle, pose)| Item { circle, pose }).collect();
+    let data = Data { items, radius, o };
+    let point = point_sigma(&circles);
+    let sides = [Side::Plus, Side::Minus].into_iter().filter_map(|side| data.on_side(side, point)).collect();
+    let (found, side_margin) = told_side(&data, sides)?;
+    found.determined(radius)?;
+    let residuals = profiles.iter().enumerate().map(|(i, p)| found.residual(&data, i, &p.name)).collect();
+    let Solution { side, solved, noise, used } = found;
+    Ok(BallFit {
+        flange_from_sensor: solved.state.x,
+        ball: solved.state.ball,
+        chi2: solved.cost / ((3 * used.len()) as f64 - 9.0).max(1.0),
+        covariance: solved.covariance,
+        point_sigma: noise.point,
+        robot_sigma: noise.robot,
+        side,
+        side_margin,
+        profiles: residuals,
+    })
+}
+
+fn enough(profiles: &[Profile], poses: &[Rigid<Base, Flange>], o: &BallOptions) -> Result<()> {
     if profiles.len() != poses.len() {
         return Err(Fault::input(format!("{} profiles and {} poses", profiles.len(), poses.len()))
             .cause("a profile or a pose is missing")
@@ -215,7 +368,11 @@ pub fn solve(profiles: &[Profile], poses: &[Rigid<Base, Flange>], o: &BallOption
         return Err(Fault::refused(format!("{} profiles, {} are needed", profiles.len(), o.min_profiles))
             .next("scan the ball from more poses"));
     }
-    let radius = o.diameter / 2.0;
+    Ok(())
+}
+
+/// One a profile; none may be larger than the ball.
+fn circles_of(profiles: &[Profile], radius: f64, o: &BallOptions) -> Result<Vec<Circle>> {
     let circles = profiles.iter().map(|p| circle(p, radius, o)).collect::<Result<Vec<_>>>()?;
     let largest = circles.iter().map(|c| c.value.z).fold(0.0, f64::max);
     if largest > 1.02 * radius + o.gate_mm {
@@ -225,128 +382,50 @@ pub fn solve(profiles: &[Profile], poses: &[Rigid<Base, Flange>], o: &BallOption
         .cause("the ball's diameter is wrong, or the profiles are in another unit")
         .next("measure the ball and give its diameter in mm"));
     }
+    Ok(circles)
+}
+
+/// Sigma of a profile point about its circle, all profiles together, mm.
+fn point_sigma(circles: &[Circle]) -> f64 {
     let freedom: f64 = circles.iter().map(|c| c.points[0] as f64 - 3.0).sum();
-    let point = (circles.iter().map(|c| c.squares).sum::<f64>() / freedom.max(1.0)).sqrt().max(1e-5);
-    let items: Vec<Item<'_>> = circles.iter().zip(poses).map(|(circle, pose)| Item { circle, pose }).collect();
-    let solve_side = |side: Side| -> Option<(Side, (Solved, Noise, Vec<usize>))> {
-        let rough = Noise { point, robot: 0.5 };
-        // A start of one side may end on the other where the ball is seen from both: all are tried for each.
-        let best = [Side::Plus, Side::Minus]
-            .into_iter()
-            .flat_map(|s| starts(&items, radius, s))
-            .filter_map(|s| fit(&items, &s, radius, &rough, Loss::Cauchy(2.0)))
-            .filter(|s| side_of(&items, &s.0) == side)
-            .min_by(|a, b| a.2.total_cmp(&b.2))?;
-        let mut used: Vec<usize> = (0..items.len()).collect();
-        let mut noise = Noise { point, robot: 0.1 };
-        let mut now = best;
-        for _ in 0..12 {
-            let chosen: Vec<Item<'_>> =
-                used.iter().map(|&i| Item { circle: items[i].circle, pose: items[i].pose }).collect();
-            for _ in 0..8 {
-                now = fit(&chosen, &now.0, radius, &noise, Loss::Squares)?;
-                noise.robot = robot_sigma(&chosen, &now.0, radius, &noise)?;
-            }
-            now = fit(&chosen, &now.0, radius, &noise, Loss::Squares)?;
-            let next: Vec<usize> = (0..items.len())
-                .filter(|&i| distance2(&now, &items[i], radius, &noise, used.contains(&i)) <= o.gate)
-                .collect();
-            if next == used || next.len() < o.min_profiles {
-                break;
-            }
-            // One at a time: a wrong profile spoils the others' distances.
-            let worst = used.iter().copied().max_by(|&a, &b| {
-                let d = |i: usize| distance2(&now, &items[i], radius, &noise, true);
-                d(a).total_cmp(&d(b))
-            })?;
-            if distance2(&now, &items[worst], radius, &noise, true) > o.gate {
-                used.retain(|&i| i != worst);
-            } else {
-                used = next;
-            }
-        }
-        Some((side_of(&items, &now.0), (now, noise, used)))
-    };
-    let mut both: Vec<(Side, (Solved, Noise, Vec<usize>))> =
-        [Side::Plus, Side::Minus].into_iter().filter_map(solve_side).collect();
+    (circles.iter().map(|c| c.squares).sum::<f64>() / freedom.max(1.0)).sqrt().max(1e-5)
+}
+
+/// The solution on the stated side, or on the one that fits clearly better; and by how much the other fits worse.
+fn told_side(data: &Data<'_>, mut sides: Vec<Solution>) -> Result<(Solution, f64)> {
     // Both sides are judged with the noise of the better one.
-    both.sort_by(|a, b| a.1.1.robot.total_cmp(&b.1.1.robot));
+    sides.sort_by(|a, b| a.noise.robot.total_cmp(&b.noise.robot));
     // A ball that is seen as often from one side as from the other: both ways may end in one place.
-    both.dedup_by_key(|b| b.0);
-    let judged = |s: &Solved, n: &Noise| -> f64 {
-        items
-            .iter()
-            .map(|i| {
-                let (r, _, _) = row(&s.0, i, radius);
-                covariance_of(&s.0, i, radius, n).cholesky().map_or(f64::INFINITY, |c| r.dot(&c.solve(&r)).min(o.gate))
-            })
-            .sum()
+    sides.dedup_by_key(|s| s.side);
+    let margin = match sides.as_slice() {
+        [] => return Err(undetermined()),
+        [_] => f64::INFINITY,
+        [a, b, ..] => data.misfit(&b.solved, &a.noise) - data.misfit(&a.solved, &a.noise),
     };
-    let margin = match (both.first(), both.get(1)) {
-        (Some(a), Some(b)) => judged(&b.1.0, &a.1.1) - judged(&a.1.0, &a.1.1),
-        (Some(_), None) => f64::INFINITY,
-        _ => return Err(undetermined()),
-    };
-    let (side, (now, noise, used)) = match o.side {
-        Some(wanted) => {
-            let found = both.into_iter().find(|b| b.0 == wanted);
-            found.ok_or_else(|| {
-                Fault::refused(format!("no solution has the ball on the side that was stated ({wanted:?})"))
-                    .cause("the side is counted along the sensor's y axis: y = z × x")
-                    .next("check the direction of the sensor's x axis, or leave the side to the data")
-            })?
-        }
-        None if margin < o.clear => {
+    let found = match data.o.side {
+        Some(wanted) => sides.into_iter().find(|s| s.side == wanted).ok_or_else(|| {
+            Fault::refused(format!("no solution has the ball on the side that was stated ({wanted:?})"))
+                .cause("the side is counted along the sensor's y axis: y = z × x")
+                .next("check the direction of the sensor's x axis, or leave the side to the data")
+        })?,
+        None if margin < data.o.clear => {
             return Err(Fault::refused(format!(
                 "the data does not tell on which side of the profile plane the ball lies: the other side fits worse by {margin:.1} only, {} are needed",
-                o.clear
+                data.o.clear
             ))
             .cause("the profiles all pass near the ball's middle, or the poses are too alike")
             .next("state it with --side plus or --side minus (y = z × x of the sensor), or add poses with other tilts"));
         }
-        None => both.swap_remove(0),
+        None => sides.swap_remove(0),
     };
-    let largest_sigma =
-        (0..6).map(|i| now.1[(i, i)].sqrt() * if i < 3 { 1.0 } else { radius.max(50.0) }).fold(0.0, f64::max);
-    if !(largest_sigma < 0.2 * radius) {
-        return Err(undetermined());
-    }
-    let residuals = (0..items.len())
-        .map(|i| {
-            let rest: Vec<Item<'_>> = used
-                .iter()
-                .filter(|&&k| k != i)
-                .map(|&k| Item { circle: items[k].circle, pose: items[k].pose })
-                .collect();
-            let without = fit(&rest, &now.0, radius, &noise, Loss::Squares);
-            ProfileResidual {
-                name: profiles[i].name.clone(),
-                used: used.contains(&i),
-                points: circles[i].points,
-                mm: row(&now.0, &items[i], radius).0.norm(),
-                holdout_mm: without.map_or(f64::INFINITY, |s| row(&s.0, &items[i], radius).0.norm()),
-                distance2: distance2(&now, &items[i], radius, &noise, used.contains(&i)),
-                height: in_sensor(&now.0, items[i].pose).y,
-            }
-        })
-        .collect();
-    Ok(BallFit {
-        flange_from_sensor: now.0.x,
-        ball: now.0.ball,
-        chi2: now.2 / ((3 * used.len()) as f64 - 9.0).max(1.0),
-        covariance: now.1,
-        point_sigma: noise.point,
-        robot_sigma: noise.robot,
-        side,
-        side_margin: margin,
-        profiles: residuals,
-    })
+    Ok((found, margin))
 }
 
+/// Squared Mahalanobis distance; a used profile has drawn the fit towards itself, another has not.
 fn distance2(s: &Solved, item: &Item<'_>, radius: f64, n: &Noise, used: bool) -> f64 {
-    let (r, j, _) = row(&s.0, item, radius);
-    let own = covariance_of(&s.0, item, radius, n);
-    let c: SMatrix<f64, 9, 9> = s.1.fixed_view::<9, 9>(0, 0).into();
+    let (r, j, _) = row(&s.state, item, radius);
+    let own = covariance_of(&s.state, item, radius, n);
+    let c: SMatrix<f64, 9, 9> = s.covariance.fixed_view::<9, 9>(0, 0).into();
     let fitted = j * c * j.transpose();
     let total = if used { own - fitted } else { own + fitted };
     let solve = |m: Mat3| m.cholesky().map(|c| r.dot(&c.solve(&r)));

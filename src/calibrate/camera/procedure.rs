@@ -8,6 +8,7 @@ use super::pictures::{Pictures, one_size, pictures};
 use super::quality;
 use super::ray_error::expected_ray_error;
 use crate::calibrate::boards::FindOptions;
+use crate::calibrate::limits::Judgement;
 use crate::camera::{ALWAYS_NAMED, Intrinsics, NAMES};
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec2;
@@ -83,18 +84,49 @@ pub fn calibrate(
 /// set aside.
 const OUTLIER_PICTURE: f64 = 3.5;
 
+/// The pictures that agree, and the camera that they make.
+struct Agreed {
+    pictures: Vec<Observation>,
+    solved: Solved,
+    /// Pictures left out: name and reason.
+    left_out: Vec<(String, String)>,
+    /// More than a quarter of the pictures would have to go.
+    contradiction: bool,
+}
+
 /// Calibrates from boards that were found already.
 pub fn from_observations(
-    mut pictures: Vec<Observation>,
-    mut left_out: Vec<(String, String)>,
+    pictures: Vec<Observation>,
+    left_out: Vec<(String, String)>,
     width: u32,
     height: u32,
     options: &CameraOptions,
 ) -> Result<CameraResult> {
-    let mut solved = solve(&pictures, width, height, &options.solve)?;
+    let agreed = agree(pictures, left_out, [width, height], &options.solve)?;
+    let Agreed { pictures, solved, .. } = &agreed;
+    let hold_out_px = if pictures.len() > 2 {
+        quality::hold_out(pictures, width, height, &options.solve)
+    } else {
+        vec![None; pictures.len()]
+    };
+    let worst = worst_corners(pictures, solved);
+    let judged = judge(&agreed, &hold_out_px, &worst, options);
+    let calibration = Calibration::new(Kind::Camera, solved.intrinsics, None, stated_covariance(solved), judged);
+    let Agreed { pictures, solved, left_out, .. } = agreed;
+    Ok(CameraResult { calibration, used: pictures, solved, left_out, hold_out_px, worst })
+}
+
+/// Solves, and sets aside what does not fit: one picture at a time, the worst first, because a wrong one bends the others'
+/// residuals too.
+fn agree(
+    mut pictures: Vec<Observation>,
+    mut left_out: Vec<(String, String)>,
+    [width, height]: [u32; 2],
+    options: &SolveOptions,
+) -> Result<Agreed> {
+    let mut solved = solve(&pictures, width, height, options)?;
     let most = pictures.len() / 4;
     let (mut outliers, mut contradiction) = (0, false);
-    // One at a time, the worst first: a wrong picture bends the others' residuals too.
     while let Some((i, ratio)) = worst_picture(&pictures, &solved).filter(|w| w.1 > OUTLIER_PICTURE) {
         if outliers == most {
             contradiction = true;
@@ -103,23 +135,19 @@ pub fn from_observations(
         let o = pictures.remove(i);
         left_out.push((o.name, format!("its residuals are {ratio:.1} times those of the median picture")));
         outliers += 1;
-        solved = solve(&pictures, width, height, &options.solve)?;
+        solved = solve(&pictures, width, height, options)?;
     }
-    let hold_out_px = if pictures.len() > 2 {
-        quality::hold_out(&pictures, width, height, &options.solve)
-    } else {
-        vec![None; pictures.len()]
-    };
-    let worst = worst_corners(&pictures, &solved);
-    let judged = judge(&pictures, &solved, &left_out, contradiction, &hold_out_px, &worst, options);
+    Ok(Agreed { pictures, solved, left_out, contradiction })
+}
+
+/// Of the parameters that a calibration names: all but those of the lens that were held.
+fn stated_covariance(solved: &Solved) -> Covariance {
     let stated = |i: &usize| *i < ALWAYS_NAMED || !solved.held.contains(i);
     let stated: Vec<usize> = (0..NAMES.len()).filter(stated).collect();
-    let covariance = solved.covariance.as_ref().map_or_else(Covariance::default, |c| {
+    solved.covariance.as_ref().map_or_else(Covariance::default, |c| {
         let names: Vec<&str> = stated.iter().map(|&i| NAMES[i]).collect();
         Covariance::new(&names, &c.select_rows(&stated).select_columns(&stated))
-    });
-    let calibration = Calibration::new(Kind::Camera, solved.intrinsics, None, covariance, judged);
-    Ok(CameraResult { calibration, used: pictures, solved, left_out, hold_out_px, worst })
+    })
 }
 
 /// Typical residual of a picture over its corners' sigmas; single wrong corners do not count.
@@ -161,133 +189,152 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
     (sum / n.max(1) as f64).sqrt()
 }
 
+/// What a verdict rests on.
+struct Evidence<'a> {
+    agreed: &'a Agreed,
+    /// Typical distance of the boards, and that at which the camera is judged, mm.
+    distance: f64,
+    working: f64,
+    /// Of the viewing rays, px; infinite where the pictures do not determine all parameters.
+    expected: f64,
+    /// Spread of the boards' normals, degrees.
+    tilt: f64,
+    /// Share of the image in which corners were seen.
+    covered: f64,
+    corners: usize,
+    /// rms of the pictures that were held out, px; `None` where none could be.
+    held_out: Option<f64>,
+}
+
 fn judge(
-    pictures: &[Observation],
-    solved: &Solved,
-    left_out: &[(String, String)],
-    contradiction: bool,
+    agreed: &Agreed,
     hold_out: &[Option<f64>],
     worst: &[(String, usize, f64)],
     options: &CameraOptions,
 ) -> Quality {
+    let Agreed { pictures, solved, .. } = agreed;
     let k = &solved.intrinsics;
     let distance = quality::typical_distance(pictures, &solved.camera_from_board);
-    let working = options.working_distance_mm.unwrap_or(distance);
-    let mm_per_px = working / (0.5 * (k.fx + k.fy));
-    let expected = solved.covariance.as_ref().map_or(f64::INFINITY, |c| expected_ray_error(k, c));
-    let tilt = quality::tilt_spread_deg(&solved.camera_from_board);
-    let covered = quality::coverage(pictures, k.width, k.height);
-    let corners: usize = pictures.iter().map(|o| o.view.points.len()).sum();
-    let held_rms = rms(hold_out.iter().flatten().copied());
-    let left_over = held_rms.is_finite() && held_rms > 0.0;
-
-    let mut verdict = Verdict::Good;
-    let mut reasons = Vec::new();
-    let mut lower = |to: Verdict, why: String| {
-        verdict = verdict.max(to);
-        reasons.push(why);
+    let evidence = Evidence {
+        agreed,
+        distance,
+        working: options.working_distance_mm.unwrap_or(distance),
+        expected: solved.covariance.as_ref().map_or(f64::INFINITY, |c| expected_ray_error(k, c)),
+        tilt: quality::tilt_spread_deg(&solved.camera_from_board),
+        covered: quality::coverage(pictures, k.width, k.height),
+        corners: pictures.iter().map(|o| o.view.points.len()).sum(),
+        held_out: Some(rms(hold_out.iter().flatten().copied())).filter(|r| r.is_finite() && *r > 0.0),
     };
-    if pictures.len() < 3 {
-        lower(
-            Verdict::BadlyDetermined,
-            format!(
-                "{} pictures: nothing is left over to check the result with; 3 are the least, 10 the rule",
-                pictures.len()
-            ),
-        );
-    } else if pictures.len() < 8 {
-        lower(Verdict::Usable, format!("only {} pictures", pictures.len()));
-    }
-    if tilt < 10.0 {
-        lower(
-            Verdict::BadlyDetermined,
-            format!(
-                "all boards are parallel within {tilt:.1} degrees; 10 are needed: focal length and distance cannot be told apart"
-            ),
-        );
-    }
-    if expected > 0.5 {
-        lower(
-            Verdict::BadlyDetermined,
-            if expected.is_finite() {
-                format!("the viewing rays are known to {expected:.2} px only, the limit is 0.5 px")
-            } else {
-                "the pictures do not determine all parameters".into()
-            },
-        );
-    } else if expected > 0.1 {
-        lower(Verdict::Usable, format!("the viewing rays are known to {expected:.2} px; 0.1 px is good"));
-    }
-    if contradiction {
-        lower(Verdict::BadlyDetermined, "more than a quarter of the pictures contradict the others".into());
-    }
-    if solved.rms_px > 1.0 {
-        let to = if solved.rms_px > 3.0 { Verdict::BadlyDetermined } else { Verdict::Usable };
-        lower(to, format!("reprojection rms {:.2} px; below 1 px is expected of a flat, sharp board", solved.rms_px));
-    }
-    if left_over && held_rms > 3.0 * solved.rms_px.max(0.01) {
-        lower(
-            Verdict::BadlyDetermined,
-            format!("pictures that were held out fit with {held_rms:.3} px, those used with {:.3} px", solved.rms_px),
-        );
-    }
-    if quality::folds(k) {
-        lower(Verdict::BadlyDetermined, "the lens model folds back inside the image".into());
-    }
-    if covered < 0.6 {
-        lower(
-            Verdict::Usable,
-            format!(
-                "corners cover {:.0} % of the image, 60 % are wanted: the lens is extrapolated elsewhere",
-                covered * 100.0
-            ),
-        );
-    }
-    let names = held_names(&solved.held);
-    let chosen = options.solve.lens == Lens::Evidence;
-    if chosen && !names.is_empty() {
-        reasons.push(format!(
-            "{} held at 0: the pictures do not tell {} from 0",
-            names.join(", "),
-            if names.len() > 1 { "them" } else { "it" }
-        ));
-    }
-    for (name, why) in left_out {
-        reasons.push(format!("{name} was left out: {why}"));
-    }
+    let Evidence { corners, expected, .. } = evidence;
+    let summary = format!("{} pictures, {corners} corners, reprojection rms {:.3} px", pictures.len(), solved.rms_px);
+    let mut j = Judgement { verdict: Verdict::Good, reasons: vec![summary], advice: Vec::new() };
+    evidence.determined(&mut j);
+    evidence.fits(&mut j);
+    j.reasons.extend(held_parameters(solved, options.solve.lens));
+    j.reasons.extend(agreed.left_out.iter().map(|(name, why)| format!("{name} was left out: {why}")));
     if let Some((name, id, r)) = worst.first() {
-        reasons.push(format!("worst corner: {name}, feature {id}, {r:.2} px ({} stand out)", worst.len()));
+        j.reasons.push(format!("worst corner: {name}, feature {id}, {r:.2} px ({} stand out)", worst.len()));
     }
-    reasons
-        .insert(0, format!("{} pictures, {corners} corners, reprojection rms {:.3} px", pictures.len(), solved.rms_px));
-
     let noise = rms(solved.residuals.iter().flatten().map(|r| r.0.norm())) / std::f64::consts::SQRT_2;
-    let advice = advise(pictures, solved, distance, noise, expected, verdict);
-    let mut figures = BTreeMap::from([
-        ("rms_px".to_string(), solved.rms_px),
-        ("corner_noise_ratio".into(), solved.sigma0),
-        ("largest_scatter_from_picture_to_picture".into(), solved.repeat.max()),
-        ("expected_ray_error_px".into(), expected),
-        ("expected_error_at_working_distance_mm".into(), expected * mm_per_px),
-        ("working_distance_mm".into(), working),
-        ("pictures".into(), pictures.len() as f64),
-        ("pictures_left_out".into(), left_out.len() as f64),
-        ("corners".into(), corners as f64),
-        ("coverage_share".into(), covered),
-        ("tilt_spread_deg".into(), tilt),
-    ]);
-    if left_over {
-        figures.insert("holdout_rms_px".into(), held_rms);
-        figures.insert("holdout_rms_mm".into(), held_rms * distance / (0.5 * (k.fx + k.fy)));
-    }
-    // JSON has no infinity: an unknown figure is left out, the reason says why.
-    figures.retain(|_, v| v.is_finite());
+    j.advice = advise(pictures, solved, distance, noise, expected, j.verdict);
     let per_picture = pictures
         .iter()
         .zip(&solved.residuals)
         .map(|(o, r)| (o.name.clone(), rms(r.iter().map(|r| r.0.norm()))))
         .collect();
-    Quality { verdict, reasons, advice, figures, per_picture }
+    let figures = evidence.figures();
+    Quality { verdict: j.verdict, reasons: j.reasons, advice: j.advice, figures, per_picture }
+}
+
+impl Evidence<'_> {
+    /// Whether the pictures are enough, and their boards tilted enough, for what is wanted of the viewing rays.
+    fn determined(&self, j: &mut Judgement) {
+        let (pictures, tilt, expected) = (self.agreed.pictures.len(), self.tilt, self.expected);
+        j.at_best(Verdict::BadlyDetermined, pictures < 3, || {
+            format!("{pictures} pictures: nothing is left over to check the result with; 3 are the least, 10 the rule")
+        });
+        j.at_best(Verdict::Usable, (3..8).contains(&pictures), || format!("only {pictures} pictures"));
+        j.at_best(Verdict::BadlyDetermined, tilt < 10.0, || {
+            format!(
+                "all boards are parallel within {tilt:.1} degrees; 10 are needed: focal length and distance cannot be told apart"
+            )
+        });
+        j.at_best(Verdict::BadlyDetermined, expected > 0.5, || {
+            if expected.is_finite() {
+                format!("the viewing rays are known to {expected:.2} px only, the limit is 0.5 px")
+            } else {
+                "the pictures do not determine all parameters".into()
+            }
+        });
+        j.at_best(Verdict::Usable, expected > 0.1 && expected <= 0.5, || {
+            format!("the viewing rays are known to {expected:.2} px; 0.1 px is good")
+        });
+    }
+
+    /// Whether the model fits the pictures, those held out too, and all of the image.
+    fn fits(&self, j: &mut Judgement) {
+        let Agreed { solved, contradiction, .. } = self.agreed;
+        j.at_best(Verdict::BadlyDetermined, *contradiction, || {
+            "more than a quarter of the pictures contradict the others".into()
+        });
+        let to = if solved.rms_px > 3.0 { Verdict::BadlyDetermined } else { Verdict::Usable };
+        j.at_best(to, solved.rms_px > 1.0, || {
+            format!("reprojection rms {:.2} px; below 1 px is expected of a flat, sharp board", solved.rms_px)
+        });
+        let worse = self.held_out.filter(|held| *held > 3.0 * solved.rms_px.max(0.01));
+        if let Some(held) = worse {
+            j.at_best(Verdict::BadlyDetermined, true, || {
+                format!("pictures that were held out fit with {held:.3} px, those used with {:.3} px", solved.rms_px)
+            });
+        }
+        j.at_best(Verdict::BadlyDetermined, quality::folds(&solved.intrinsics), || {
+            "the lens model folds back inside the image".into()
+        });
+        j.at_best(Verdict::Usable, self.covered < 0.6, || {
+            format!(
+                "corners cover {:.0} % of the image, 60 % are wanted: the lens is extrapolated elsewhere",
+                self.covered * 100.0
+            )
+        });
+    }
+
+    fn figures(&self) -> BTreeMap<String, f64> {
+        let Agreed { pictures, solved, left_out, .. } = self.agreed;
+        let k = &solved.intrinsics;
+        let mm_per_px = self.working / (0.5 * (k.fx + k.fy));
+        let mut figures = BTreeMap::from([
+            ("rms_px".to_string(), solved.rms_px),
+            ("corner_noise_ratio".into(), solved.sigma0),
+            ("largest_scatter_from_picture_to_picture".into(), solved.repeat.max()),
+            ("expected_ray_error_px".into(), self.expected),
+            ("expected_error_at_working_distance_mm".into(), self.expected * mm_per_px),
+            ("working_distance_mm".into(), self.working),
+            ("pictures".into(), pictures.len() as f64),
+            ("pictures_left_out".into(), left_out.len() as f64),
+            ("corners".into(), self.corners as f64),
+            ("coverage_share".into(), self.covered),
+            ("tilt_spread_deg".into(), self.tilt),
+        ]);
+        if let Some(held) = self.held_out {
+            figures.insert("holdout_rms_px".into(), held);
+            figures.insert("holdout_rms_mm".into(), held * self.distance / (0.5 * (k.fx + k.fy)));
+        }
+        // JSON has no infinity: an unknown figure is left out, the reason says why.
+        figures.retain(|_, v| v.is_finite());
+        figures
+    }
+}
+
+/// The lens parameters that the evidence holds at 0, in words; `None` where the lens was stated.
+fn held_parameters(solved: &Solved, lens: Lens) -> Option<String> {
+    let names = held_names(&solved.held);
+    (lens == Lens::Evidence && !names.is_empty()).then(|| {
+        format!(
+            "{} held at 0: the pictures do not tell {} from 0",
+            names.join(", "),
+            if names.len() > 1 { "them" } else { "it" }
+        )
+    })
 }
 
 fn advise(

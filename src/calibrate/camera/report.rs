@@ -1,41 +1,61 @@
 //! In: a camera calibration. Out: the page that a person judges it by.
 //! Frame and unit: pixels and mm as labelled.
 
+use super::intrinsics::Observation;
 use super::procedure::CameraResult;
 use super::quality::{feature_bias, tilt_deg};
 use crate::calibrate::report::{Page, axis_sphere, bars, coverage_map, residual_arrows, scatter};
 use crate::camera::NAMES;
-use crate::geometry::Vec3;
+use crate::geometry::{Board, Camera, Rigid, Vec3};
 
 /// The report of a camera calibration.
 pub fn page(result: &CameraResult, title: &str) -> Page {
-    let (c, solved) = (&result.calibration, &result.solved);
-    let k = &c.value;
+    let quality = &result.calibration.quality;
     let mut page = Page::new(title);
-    page.verdict(&c.quality);
-
-    let value = |name: &str| k.parameters()[NAMES.iter().position(|n| *n == name).unwrap_or(0)];
-    let parameters: Vec<Vec<String>> = c
-        .covariance
-        .parameters
-        .iter()
-        .map(|name| {
-            let held = NAMES.iter().position(|n| n == name).is_some_and(|i| solved.held.contains(&i));
-            let sigma = c.covariance.sigma(name).unwrap_or(f64::NAN);
-            let sigma = if held { "held".into() } else { format!("{sigma:.6}") };
-            vec![name.clone(), format!("{:.6}", value(name)), sigma]
-        })
-        .collect();
-    page.table("Parameters", &["name and unit", "value", "standard deviation"], &parameters);
-
+    page.verdict(quality);
+    page.table("Parameters", &["name and unit", "value", "standard deviation"], &parameters(result));
     let figures: Vec<Vec<String>> =
-        c.quality.figures.iter().map(|(name, v)| vec![name.clone(), format!("{v:.5}")]).collect();
+        quality.figures.iter().map(|(name, v)| vec![name.clone(), format!("{v:.5}")]).collect();
     page.paragraph(
         "Fit and check are apart: rms_px is the residual of the corners that made the result; holdout_rms_px that of \
          pictures which the result has not seen. The expected errors follow from the covariance.",
     );
     page.table("Figures", &["figure and unit", "value"], &figures);
+    draw_residuals(&mut page, result);
+    page.table(
+        "Features that are off the same way in every picture (board printed or mounted unevenly), the worst first",
+        &["feature", "x mm", "y mm", "standard error mm", "pictures"],
+        &uneven_features(result),
+    );
+    let worst: Vec<Vec<String>> =
+        result.worst.iter().map(|(name, id, r)| vec![name.clone(), id.to_string(), format!("{r:.3}")]).collect();
+    if !worst.is_empty() {
+        page.table("Corners that stand out", &["picture", "feature", "px"], &worst);
+    }
+    page.table("Boards", &["picture", "corners", "x mm", "y mm", "z mm", "tilt degrees"], &boards(result));
+    let left: Vec<Vec<String>> = result.left_out.iter().map(|(n, why)| vec![n.clone(), why.clone()]).collect();
+    if !left.is_empty() {
+        page.table("Pictures left out", &["picture", "why"], &left);
+    }
+    page
+}
 
+/// The camera's parameters with their sigmas.
+fn parameters(result: &CameraResult) -> Vec<Vec<String>> {
+    let (value, covariance) = (result.calibration.value.parameters(), &result.calibration.covariance);
+    let index = |name: &String| NAMES.iter().position(|n| n == name);
+    let row = |name: &String| {
+        let held = index(name).is_some_and(|i| result.solved.held.contains(&i));
+        let sigma = covariance.sigma(name).unwrap_or(f64::NAN);
+        let sigma = if held { "held".into() } else { format!("{sigma:.6}") };
+        vec![name.clone(), format!("{:.6}", value[index(name).unwrap_or(0)]), sigma]
+    };
+    covariance.parameters.iter().map(row).collect()
+}
+
+/// Figures of what corners and boards say: where they were seen, and what is left over where.
+fn draw_residuals(page: &mut Page, result: &CameraResult) {
+    let (k, solved) = (&result.calibration.value, &result.solved);
     let seen: Vec<_> = result.used.iter().flat_map(|o| o.view.points.iter().map(|p| p.pixel)).collect();
     page.figure(
         "Where corners were seen; red cells are empty, the lens is extrapolated there.",
@@ -52,7 +72,7 @@ pub fn page(result: &CameraResult, title: &str) -> Page {
          together mean that the lens model or the board's flatness is at fault.",
         &residual_arrows(k.width, k.height, &arrows),
     );
-    page.figure("Rms residual per picture", &bars(&c.quality.per_picture, "px", None));
+    page.figure("Rms residual per picture", &bars(&result.calibration.quality.per_picture, "px", None));
     let hold_out: Vec<(String, f64)> =
         result.used.iter().zip(&result.hold_out_px).filter_map(|(o, r)| Some((o.name.clone(), (*r)?))).collect();
     if !hold_out.is_empty() {
@@ -72,11 +92,13 @@ pub fn page(result: &CameraResult, title: &str) -> Page {
     let by_radius: Vec<(f64, f64)> =
         arrows.iter().map(|(p, r, _)| ((p.x - k.cx).hypot(p.y - k.cy), r.norm())).collect();
     page.figure("Residual against distance from the principal point", &scatter(&by_radius, "px from the centre", "px"));
+}
 
-    let mut bias = feature_bias(&result.used, solved);
+/// The ten features whose mean residual on the board is largest beside its standard error.
+fn uneven_features(result: &CameraResult) -> Vec<Vec<String>> {
+    let mut bias = feature_bias(&result.used, &result.solved);
     bias.sort_by(|a, b| (b.1.norm() / b.2).total_cmp(&(a.1.norm() / a.2)));
-    let rows: Vec<Vec<String>> = bias
-        .iter()
+    bias.iter()
         .take(10)
         .map(|(id, mean, error, n)| {
             vec![
@@ -87,34 +109,18 @@ pub fn page(result: &CameraResult, title: &str) -> Page {
                 n.to_string(),
             ]
         })
-        .collect();
-    page.table(
-        "Features that are off the same way in every picture (board printed or mounted unevenly), the worst first",
-        &["feature", "x mm", "y mm", "standard error mm", "pictures"],
-        &rows,
-    );
-    let worst: Vec<Vec<String>> =
-        result.worst.iter().map(|(name, id, r)| vec![name.clone(), id.to_string(), format!("{r:.3}")]).collect();
-    if !worst.is_empty() {
-        page.table("Corners that stand out", &["picture", "feature", "px"], &worst);
-    }
-    let poses: Vec<Vec<String>> = result
-        .used
-        .iter()
-        .zip(&solved.camera_from_board)
-        .map(|(o, p)| {
-            let t = p.translation;
-            let n = o.view.points.len().to_string();
-            let place = [t.x, t.y, t.z, tilt_deg(p)].map(|v| format!("{v:.2}"));
-            [vec![o.name.clone(), n], place.to_vec()].concat()
-        })
-        .collect();
-    page.table("Boards", &["picture", "corners", "x mm", "y mm", "z mm", "tilt degrees"], &poses);
-    let left: Vec<Vec<String>> = result.left_out.iter().map(|(n, why)| vec![n.clone(), why.clone()]).collect();
-    if !left.is_empty() {
-        page.table("Pictures left out", &["picture", "why"], &left);
-    }
-    page
+        .collect()
+}
+
+/// Where each picture's board was.
+fn boards(result: &CameraResult) -> Vec<Vec<String>> {
+    let row = |(o, p): (&Observation, &Rigid<Camera, Board>)| {
+        let t = p.translation;
+        let n = o.view.points.len().to_string();
+        let place = [t.x, t.y, t.z, tilt_deg(p)].map(|v| format!("{v:.2}"));
+        [vec![o.name.clone(), n], place.to_vec()].concat()
+    };
+    result.used.iter().zip(&result.solved.camera_from_board).map(row).collect()
 }
 
 /// A file name without its extension and zeros.

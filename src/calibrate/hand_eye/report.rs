@@ -7,7 +7,7 @@ use super::checks::belongs_to;
 use super::closed::{Pair, axis_spread};
 use super::expected::{ExpectedError, expected_error};
 use super::fit::HandEyeFit;
-use crate::calibrate::limits::{Limits, rms};
+use crate::calibrate::limits::{Judgement, Limits, rms};
 use crate::calibrate::report::{Page, axis_sphere, bars};
 use crate::camera::PARAMETERS;
 use crate::geometry::{Vec3, log};
@@ -22,138 +22,228 @@ pub fn covariance(fit: &HandEyeFit) -> Covariance {
     Covariance::new(&HAND_EYE_NAMES, &fit.covariance.view((0, 0), (6, 6)).into_owned())
 }
 
+/// Rotation about a second axis, degrees rms, at which a set of poses is usable and good.
+const SECOND_AXIS_DEG: [f64; 2] = [8.0, 12.0];
+
+/// What a verdict rests on.
+struct Evidence<'a> {
+    fit: &'a HandEyeFit,
+    pairs: &'a [Pair],
+    used: Vec<&'a Pair>,
+    /// Axes that the poses turn about, and by how much, degrees rms.
+    spread: [(Vec3, f64); 3],
+    error: ExpectedError,
+    camera: SolvedCamera,
+    /// See [`in_pixels`].
+    pixels: bool,
+}
+
 /// Judges a fit.
 pub fn judge(fit: &HandEyeFit, pairs: &[Pair], limits: &Limits) -> Quality {
     let used: Vec<&Pair> = pairs.iter().zip(&fit.pairs).filter(|(_, r)| r.used).map(|(p, _)| p).collect();
-    let spread = axis_spread(&used);
-    let [first, second, third] = spread.map(|s| s.1.to_degrees());
-    let ExpectedError { whole: expected, from_camera: camera_part, with_joint_camera } =
-        expected_error(fit, limits.middle());
-    let sigma = |i: usize| fit.covariance[(i, i)].max(0.0).sqrt();
-    let holdout_mm = rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.holdout_mm));
-    let pixels = in_pixels(pairs);
+    let evidence = Evidence {
+        fit,
+        pairs,
+        spread: axis_spread(&used).map(|(axis, rad)| (axis, rad.to_degrees())),
+        used,
+        error: expected_error(fit, limits.middle()),
+        camera: SolvedCamera::of(fit),
+        pixels: in_pixels(pairs),
+    };
     let mut j = limits.by_error(
-        expected,
+        evidence.error.whole,
         format!(
-            "a point at {} mm is placed in the flange frame to {expected:.3} mm (1 sigma); depths: {}",
+            "a point at {} mm is placed in the flange frame to {:.3} mm (1 sigma); depths: {}",
             limits.working.depth(limits.middle()),
+            evidence.error.whole,
             limits.working.from
         ),
     );
-    j.at_best(Verdict::BadlyDetermined, second < 8.0, || {
-        format!("rotation about a second axis is {second:.1} degrees rms, 8 are needed to be usable")
-    });
-    j.at_best(Verdict::Usable, (8.0..12.0).contains(&second), || {
-        format!("rotation about a second axis is {second:.1} degrees rms, 12 are needed to be good")
-    });
-    j.at_best(Verdict::Usable, used.len() < 8, || {
-        format!("{} pairs are in the fit, 8 are needed to be good", used.len())
-    });
-    j.at_best(Verdict::BadlyDetermined, used.len() < 5, || "fewer than 5 pairs leave nothing to check".into());
-    for (i, r) in fit.pairs.iter().enumerate().filter(|(_, r)| !r.used) {
-        let whose = belongs_to(pairs, fit, i).map_or(String::new(), |n| format!("; its picture fits the pose of {n}"));
-        j.at_best(Verdict::Usable, true, || {
-            format!("{} was left out: its pose and picture disagree by {:.2} mm{whose}", r.name, r.mm)
-        });
-    }
-    j.reasons.push(format!(
-        "the robot's poses{} scatter by {:.3} mm and {:.4} degrees per axis{}",
-        if pixels { "" } else { ", with what the boards' places scatter beyond what is stated," },
-        fit.noise.robot_mm,
-        fit.noise.robot_rad.to_degrees(),
-        if pixels {
-            format!("; the camera's own uncertainty makes {camera_part:.3} mm of the error")
-        } else {
-            String::new()
-        }
-    ));
-    let boards = rms(used.iter().map(|p| p.seen.rms_px));
-    if pixels {
-        j.reasons.push(format!("each board fits its own picture to {boards:.3} px rms, whatever the robot says"));
-    }
-    let change = fit.joint_camera.parameters() - fit.camera.parameters();
-    let moved = ray_error_px(&fit.camera, &(change * change.transpose()));
-    let before = ray_error_px(&fit.camera, &fit.given.covariance());
-    let after = ray_error_px(&fit.camera, &fit.joint_covariance.fixed_view::<PARAMETERS, PARAMETERS>(12, 12).into());
-    let (surprise, freedom) = fit.camera_surprise;
-    if before > 0.0 {
-        j.reasons.push(format!(
-            "the camera was solved along, its calibration as what is known beforehand: its viewing rays move by {moved:.3} px, \
-             known to {before:.3} px before and {after:.3} px after; the station's camera stays as it is"
-        ));
-    }
-    // One good set in some thousands [wilson31]: a chi-square variable over its freedom, to the third root, is normal.
-    let changed = freedom > 0.0
-        && ((surprise / freedom).cbrt() - 1.0 + 2.0 / (9.0 * freedom)) / (2.0 / (9.0 * freedom)).sqrt() > 3.7;
-    j.at_best(Verdict::Usable, changed, || {
-        format!(
-            "the camera is not the one that was calibrated: the boards in these pictures want another, squared distance {surprise:.0}, \
-             {freedom:.0} expected; focus, zoom or the board's description changed"
-        )
-    });
-    j.advise(changed, || {
-        "calibrate the camera again with its present focus, and compare the boards' descriptions".into()
-    });
-    let name = |v: &Vec3| format!("({:.2}, {:.2}, {:.2})", v.x, v.y, v.z);
-    let (weak, axis) = if second < 12.0 { (second, spread[1].0) } else { (third, spread[2].0) };
-    j.advise(weak < 12.0, || {
-        format!(
-            "turn the flange by 20 degrees or more, both ways, about its axis {}: the poses turn by only {weak:.1} degrees rms about it",
-            name(&axis)
-        )
-    });
-    j.advise(j.verdict != Verdict::Good && weak >= 12.0 && camera_part < 0.7 * expected, || {
-        format!(
-            "take {} more pictures spread over the same tilts: the error falls with the root of their number",
-            used.len()
-        )
-    });
-    j.advise(camera_part >= 0.7 * expected && j.verdict != Verdict::Good, || {
-        "calibrate the camera with more pictures first: most of the error comes from it".into()
-    });
-    let camera_figures = [
-        ("camera_change_px", moved),
-        ("camera_known_before_px", before),
-        ("camera_known_after_px", after),
-        ("camera_surprise", surprise),
-        ("camera_surprise_expected", freedom),
-    ];
-    let t = fit.chain.far_from_board.translation;
-    let mut figures = BTreeMap::from([
-        ("expected_error_at_working_distance_mm".to_string(), expected),
-        ("expected_error_from_camera_mm".into(), camera_part),
-        ("expected_error_with_joint_camera_mm".into(), with_joint_camera),
-        ("working_distance_mm".into(), limits.middle()),
-        ("rms_mm".into(), rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.mm))),
-        ("holdout_rms_mm".into(), holdout_mm),
-        (crate::rig::ROBOT_SIGMA_MM.into(), fit.noise.robot_mm),
-        (crate::rig::ROBOT_SIGMA_DEG.into(), fit.noise.robot_rad.to_degrees()),
-        ("translation_sigma_mm".into(), (0..3).map(|i| sigma(i).powi(2)).sum::<f64>().sqrt()),
-        ("rotation_sigma_deg".into(), (3..6).map(|i| sigma(i).powi(2)).sum::<f64>().sqrt().to_degrees()),
-        ("first_axis_rms_deg".into(), first),
-        ("second_axis_rms_deg".into(), second),
-        ("third_axis_rms_deg".into(), third),
-        ("pairs".into(), pairs.len() as f64),
-        ("pairs_used".into(), used.len() as f64),
-        ("chi2_per_freedom".into(), fit.chi2),
-        ("board_x_mm".into(), t.x),
-        ("board_y_mm".into(), t.y),
-        ("board_z_mm".into(), t.z),
-    ]);
-    if pixels {
-        figures.insert("rms_px".into(), rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.px)));
-        figures.insert("holdout_rms_px".into(), rms(fit.pairs.iter().filter(|p| p.used).map(|p| p.holdout_px)));
-        figures.insert("board_rms_px".into(), rms(used.iter().map(|p| p.seen.rms_px)));
-    }
-    if before > 0.0 {
-        figures.extend(camera_figures.map(|(name, value)| (name.to_string(), value)));
-    }
+    evidence.determined(&mut j);
+    evidence.left_out(&mut j);
+    evidence.scatter(&mut j);
+    evidence.camera.judge(&mut j);
+    evidence.advise(&mut j);
     Quality {
         verdict: j.verdict,
         reasons: j.reasons,
         advice: j.advice,
-        figures,
-        per_picture: fit.pairs.iter().map(|p| (p.name.clone(), if pixels { p.px } else { p.mm })).collect(),
+        figures: evidence.figures(limits.middle()),
+        per_picture: fit.pairs.iter().map(|p| (p.name.clone(), if evidence.pixels { p.px } else { p.mm })).collect(),
+    }
+}
+
+impl Evidence<'_> {
+    /// Whether the poses turn about two axes, and are enough.
+    fn determined(&self, j: &mut Judgement) {
+        let (second, used) = (self.spread[1].1, self.used.len());
+        let [usable, good] = SECOND_AXIS_DEG;
+        j.at_best(Verdict::BadlyDetermined, second < usable, || {
+            format!("rotation about a second axis is {second:.1} degrees rms, {usable} are needed to be usable")
+        });
+        j.at_best(Verdict::Usable, (usable..good).contains(&second), || {
+            format!("rotation about a second axis is {second:.1} degrees rms, {good} are needed to be good")
+        });
+        j.at_best(Verdict::Usable, used < 8, || format!("{used} pairs are in the fit, 8 are needed to be good"));
+        j.at_best(Verdict::BadlyDetermined, used < 5, || "fewer than 5 pairs leave nothing to check".into());
+    }
+
+    fn left_out(&self, j: &mut Judgement) {
+        for (i, r) in self.fit.pairs.iter().enumerate().filter(|(_, r)| !r.used) {
+            let whose = belongs_to(self.pairs, self.fit, i);
+            let whose = whose.map_or(String::new(), |n| format!("; its picture fits the pose of {n}"));
+            j.at_best(Verdict::Usable, true, || {
+                format!("{} was left out: its pose and picture disagree by {:.2} mm{whose}", r.name, r.mm)
+            });
+        }
+    }
+
+    /// What the robot's poses, the camera and the boards' own pictures make of the error.
+    fn scatter(&self, j: &mut Judgement) {
+        let (among, camera) = if self.pixels {
+            ("", format!("; the camera's own uncertainty makes {:.3} mm of the error", self.error.from_camera))
+        } else {
+            (", with what the boards' places scatter beyond what is stated,", String::new())
+        };
+        j.reasons.push(format!(
+            "the robot's poses{among} scatter by {:.3} mm and {:.4} degrees per axis{camera}",
+            self.fit.noise.robot_mm,
+            self.fit.noise.robot_rad.to_degrees()
+        ));
+        if self.pixels {
+            let boards = rms(self.used.iter().map(|p| p.seen.rms_px));
+            j.reasons.push(format!("each board fits its own picture to {boards:.3} px rms, whatever the robot says"));
+        }
+    }
+
+    /// The next best pose or picture.
+    fn advise(&self, j: &mut Judgement) {
+        let ExpectedError { whole, from_camera, .. } = self.error;
+        let good = SECOND_AXIS_DEG[1];
+        // The third axis is asked for only where the second one is well turned about.
+        let (axis, weak) = if self.spread[1].1 < good { self.spread[1] } else { self.spread[2] };
+        j.advise(weak < good, || {
+            format!(
+                "turn the flange by 20 degrees or more, both ways, about its axis ({:.2}, {:.2}, {:.2}): the poses turn by only {weak:.1} degrees rms about it",
+                axis.x, axis.y, axis.z
+            )
+        });
+        j.advise(j.verdict != Verdict::Good && weak >= good && from_camera < 0.7 * whole, || {
+            format!(
+                "take {} more pictures spread over the same tilts: the error falls with the root of their number",
+                self.used.len()
+            )
+        });
+        j.advise(from_camera >= 0.7 * whole && j.verdict != Verdict::Good, || {
+            "calibrate the camera with more pictures first: most of the error comes from it".into()
+        });
+    }
+
+    fn figures(&self, working_mm: f64) -> BTreeMap<String, f64> {
+        let (fit, error) = (self.fit, &self.error);
+        let [first, second, third] = self.spread.map(|s| s.1);
+        let variance = |i: usize| fit.covariance[(i, i)].max(0.0).sqrt().powi(2);
+        let used = || fit.pairs.iter().filter(|p| p.used);
+        let t = fit.chain.far_from_board.translation;
+        let mut figures = BTreeMap::from([
+            ("expected_error_at_working_distance_mm".to_string(), error.whole),
+            ("expected_error_from_camera_mm".into(), error.from_camera),
+            ("expected_error_with_joint_camera_mm".into(), error.with_joint_camera),
+            ("working_distance_mm".into(), working_mm),
+            ("rms_mm".into(), rms(used().map(|p| p.mm))),
+            ("holdout_rms_mm".into(), rms(used().map(|p| p.holdout_mm))),
+            (crate::rig::ROBOT_SIGMA_MM.into(), fit.noise.robot_mm),
+            (crate::rig::ROBOT_SIGMA_DEG.into(), fit.noise.robot_rad.to_degrees()),
+            ("translation_sigma_mm".into(), (0..3).map(variance).sum::<f64>().sqrt()),
+            ("rotation_sigma_deg".into(), (3..6).map(variance).sum::<f64>().sqrt().to_degrees()),
+            ("first_axis_rms_deg".into(), first),
+            ("second_axis_rms_deg".into(), second),
+            ("third_axis_rms_deg".into(), third),
+            ("pairs".into(), self.pairs.len() as f64),
+            ("pairs_used".into(), self.used.len() as f64),
+            ("chi2_per_freedom".into(), fit.chi2),
+            ("board_x_mm".into(), t.x),
+            ("board_y_mm".into(), t.y),
+            ("board_z_mm".into(), t.z),
+        ]);
+        if self.pixels {
+            figures.insert("rms_px".into(), rms(used().map(|p| p.px)));
+            figures.insert("holdout_rms_px".into(), rms(used().map(|p| p.holdout_px)));
+            figures.insert("board_rms_px".into(), rms(self.used.iter().map(|p| p.seen.rms_px)));
+        }
+        figures.extend(self.camera.figures());
+        figures
+    }
+}
+
+/// What became of the camera's parameters, which are solved along with their calibration as the prior.
+struct SolvedCamera {
+    /// By how much its viewing rays moved, and how well they were known before and after, px.
+    moved: f64,
+    before: f64,
+    after: f64,
+    /// Squared distance of the solved parameters from the calibrated ones, and what is expected of it.
+    surprise: f64,
+    freedom: f64,
+}
+
+impl SolvedCamera {
+    fn of(fit: &HandEyeFit) -> SolvedCamera {
+        let change = fit.joint_camera.parameters() - fit.camera.parameters();
+        let joint = fit.joint_covariance.fixed_view::<PARAMETERS, PARAMETERS>(12, 12).into();
+        let (surprise, freedom) = fit.camera_surprise;
+        SolvedCamera {
+            moved: ray_error_px(&fit.camera, &(change * change.transpose())),
+            before: ray_error_px(&fit.camera, &fit.given.covariance()),
+            after: ray_error_px(&fit.camera, &joint),
+            surprise,
+            freedom,
+        }
+    }
+
+    /// The calibrated camera was not taken as exact.
+    fn is_free(&self) -> bool {
+        self.before > 0.0
+    }
+
+    /// One good set in some thousands is called so \[wilson31\]: a chi-square variable over its freedom, to the third root, is
+    /// normal.
+    fn is_another(&self) -> bool {
+        let SolvedCamera { surprise, freedom, .. } = *self;
+        freedom > 0.0
+            && ((surprise / freedom).cbrt() - 1.0 + 2.0 / (9.0 * freedom)) / (2.0 / (9.0 * freedom)).sqrt() > 3.7
+    }
+
+    fn judge(&self, j: &mut Judgement) {
+        let SolvedCamera { moved, before, after, surprise, freedom } = *self;
+        if self.is_free() {
+            j.reasons.push(format!(
+                "the camera was solved along, its calibration as what is known beforehand: its viewing rays move by {moved:.3} px, \
+                 known to {before:.3} px before and {after:.3} px after; the station's camera stays as it is"
+            ));
+        }
+        j.at_best(Verdict::Usable, self.is_another(), || {
+            format!(
+                "the camera is not the one that was calibrated: the boards in these pictures want another, squared distance {surprise:.0}, \
+                 {freedom:.0} expected; focus, zoom or the board's description changed"
+            )
+        });
+        j.advise(self.is_another(), || {
+            "calibrate the camera again with its present focus, and compare the boards' descriptions".into()
+        });
+    }
+
+    /// None where the camera was taken as exact.
+    fn figures(&self) -> impl Iterator<Item = (String, f64)> {
+        let all = [
+            ("camera_change_px", self.moved),
+            ("camera_known_before_px", self.before),
+            ("camera_known_after_px", self.after),
+            ("camera_surprise", self.surprise),
+            ("camera_surprise_expected", self.freedom),
+        ];
+        let free = self.is_free();
+        all.into_iter().filter(move |_| free).map(|(name, value)| (name.to_string(), value))
     }
 }
 

@@ -4,7 +4,7 @@
 
 use super::checks::{expected_error, places_in_view};
 use super::options::LaserPlaneOptions;
-use super::solve::{LaserPlaneFit, PeakUse};
+use super::solve::{LaserPlaneFit, PeakUse, ViewResidual};
 use super::views::StripeView;
 use crate::calibrate::limits::{Judgement, Limits, rms};
 use crate::calibrate::measured_pose::MISFIT;
@@ -12,7 +12,7 @@ use crate::calibrate::report::{Page, axis_sphere, bars, coverage_map};
 use crate::calibrate::scatter::{ENOUGH, overrule};
 use crate::camera::Intrinsics;
 use crate::geometry::Vec2;
-use crate::rig::{Covariance, Quality, Verdict};
+use crate::rig::{Covariance, Quality, Verdict, Volume};
 use std::collections::BTreeMap;
 
 /// Names of the plane's covariance parameters.
@@ -28,96 +28,136 @@ const SCATTER: f64 = 3.0;
 /// Least spread of the stripes across their own direction, a share of the view.
 const LEAST_SPREAD: f64 = 0.02;
 
+/// What a verdict rests on.
+struct Evidence<'a> {
+    fit: &'a LaserPlaneFit,
+    used: Vec<&'a ViewResidual>,
+    work: &'a Volume,
+    /// Expected error at the work, and the camera's share of it, mm.
+    expected: f64,
+    camera_part: f64,
+    /// Sigma of the plane's tilt, rad.
+    tilt: f64,
+    /// Largest angle between two boards, degrees.
+    spread: f64,
+}
+
 /// Judges a fit.
 pub fn judge(fit: &LaserPlaneFit, views: &[StripeView], camera: &Intrinsics, limits: &Limits) -> Quality {
     let work = &limits.working;
-    let (near, far) = (work.near_mm, work.far_mm);
     let places = places_in_view(&fit.plane, camera, work);
     let expected = expected_error(&fit.covariance, &places);
     let exact = expected_error(&fit.covariance_camera_exact, &places);
-    let camera_part = (expected * expected - exact * exact).max(0.0).sqrt();
-    let used: Vec<_> = fit.views.iter().filter(|v| v.used).collect();
-    let spread = fit.board_spread.to_degrees();
-    let [low, high] = fit.reach;
-    let tilt = (0..3).map(|i| fit.covariance[(i, i)].max(0.0)).sum::<f64>().sqrt();
+    let evidence = Evidence {
+        fit,
+        used: fit.views.iter().filter(|v| v.used).collect(),
+        work,
+        expected,
+        camera_part: (expected * expected - exact * exact).max(0.0).sqrt(),
+        tilt: (0..3).map(|i| fit.covariance[(i, i)].max(0.0)).sum::<f64>().sqrt(),
+        spread: fit.board_spread.to_degrees(),
+    };
     let mut j = limits.by_error(
         expected,
         format!(
             "the plane is known to {expected:.4} mm (1 sigma) at {work}, its tilt to {:.4} degrees",
-            tilt.to_degrees()
+            evidence.tilt.to_degrees()
         ),
     );
     j.at_best(Verdict::BadlyDetermined, places.is_empty(), || format!("the camera does not see the sheet at {work}"));
     contradictions(fit, views, &mut j);
-    j.at_best(Verdict::BadlyDetermined, spread < 5.0, || {
-        format!(
-            "all boards are parallel to {spread:.1} degrees: an error that they share would stay unseen; 5 are needed"
-        )
-    });
-    j.at_best(Verdict::Usable, (5.0..15.0).contains(&spread), || {
-        format!("the boards' tilts spread over {spread:.1} degrees, 15 are needed to be good")
-    });
-    let least = LEAST_SPREAD * camera.view_mm(limits.middle());
-    j.at_best(Verdict::BadlyDetermined, fit.depth_spread < least, || {
-        format!(
-            "the stripes spread by {:.2} mm across their own direction, {least:.2} mm ({:.0} % of the view) are needed: they \
-             are nearly one line",
-            fit.depth_spread,
-            100.0 * LEAST_SPREAD
-        )
-    });
-    j.at_best(Verdict::BadlyDetermined, used.len() < 3, || "two pictures leave nothing to check".into());
-    j.at_best(Verdict::Usable, (3..ENOUGH).contains(&used.len()), || {
-        format!("{} pictures, {ENOUGH} are needed to be good", used.len())
-    });
-    j.at_best(Verdict::Usable, low > near + 0.25 * (far - near) || high < far - 0.25 * (far - near), || {
-        format!("the boards were lit at {} to {} mm, the work is at {work}", work.depth(low), work.depth(high))
-    });
-    if camera_part > 0.0 {
-        j.reasons.push(format!("the camera's own uncertainty makes {camera_part:.4} mm of the error"));
-    }
-    j.advise(spread < 15.0, || "tilt the board by 20 degrees or more, once to each side".into());
-    j.advise(low > near + 0.15 * (far - near), || {
-        format!("show a board nearer, at {} to {} mm", work.depth(near), work.depth(near + 0.15 * (far - near)))
-    });
-    j.advise(high < far - 0.15 * (far - near), || {
-        format!("show a board farther away, at {} to {} mm", work.depth(far - 0.15 * (far - near)), work.depth(far))
-    });
-    j.advise(j.verdict != Verdict::Good && camera_part > 0.7 * expected, || {
-        "calibrate the camera with more pictures first: most of the error comes from it".into()
-    });
-    let count = |u: PeakUse| fit.uses.iter().flatten().filter(|x| **x == u).count() as f64;
-    let figures = BTreeMap::from([
-        ("expected_error_at_working_distance_mm".to_string(), expected),
-        ("expected_error_from_camera_mm".into(), camera_part),
-        ("working_near_mm".into(), near),
-        ("working_far_mm".into(), far),
-        ("tilt_sigma_deg".into(), tilt.to_degrees()),
-        ("offset_sigma_mm".into(), fit.covariance[(3, 3)].max(0.0).sqrt()),
-        ("rms_px".into(), rms(used.iter().map(|v| v.px))),
-        ("rms_mm".into(), rms(used.iter().map(|v| v.mm))),
-        ("holdout_rms_px".into(), rms(used.iter().map(|v| v.holdout_px))),
-        ("holdout_rms_mm".into(), rms(used.iter().map(|v| v.holdout_mm))),
-        ("board_spread_deg".into(), spread),
-        ("stripe_spread_mm".into(), fit.depth_spread),
-        ("nearest_board_mm".into(), low),
-        ("farthest_board_mm".into(), high),
-        ("peaks_used".into(), count(PeakUse::Used)),
-        ("peaks_off_board".into(), count(PeakUse::OffBoard)),
-        ("peaks_at_print_edges".into(), count(PeakUse::AtEdge)),
-        ("peaks_disagreeing".into(), count(PeakUse::Disagrees)),
-        ("residual_over_sigma".into(), fit.sigma_ratio),
-        ("neighbour_factor".into(), fit.neighbour_factor),
-        ("scatter_over_sigma".into(), fit.scatter),
-        ("variance_factor".into(), fit.inflation),
-        ("pictures_contradicting".into(), fit.views.iter().filter(|v| v.contradicts).count() as f64),
-    ]);
+    evidence.determined(camera.view_mm(limits.middle()), &mut j);
+    evidence.advise(&mut j);
     Quality {
         verdict: j.verdict,
         reasons: j.reasons,
         advice: j.advice,
-        figures,
+        figures: evidence.figures(),
         per_picture: fit.views.iter().map(|v| (v.name.clone(), v.px)).collect(),
+    }
+}
+
+impl Evidence<'_> {
+    /// Whether tilts, stripes and pictures are enough, and were seen where the work is. `view_mm`: how wide the camera sees there.
+    fn determined(&self, view_mm: f64, j: &mut Judgement) {
+        let Evidence { fit, work, spread, .. } = *self;
+        let used = self.used.len();
+        j.at_best(Verdict::BadlyDetermined, spread < 5.0, || {
+            format!(
+                "all boards are parallel to {spread:.1} degrees: an error that they share would stay unseen; 5 are needed"
+            )
+        });
+        j.at_best(Verdict::Usable, (5.0..15.0).contains(&spread), || {
+            format!("the boards' tilts spread over {spread:.1} degrees, 15 are needed to be good")
+        });
+        let least = LEAST_SPREAD * view_mm;
+        j.at_best(Verdict::BadlyDetermined, fit.depth_spread < least, || {
+            format!(
+                "the stripes spread by {:.2} mm across their own direction, {least:.2} mm ({:.0} % of the view) are needed: they \
+                 are nearly one line",
+                fit.depth_spread,
+                100.0 * LEAST_SPREAD
+            )
+        });
+        j.at_best(Verdict::BadlyDetermined, used < 3, || "two pictures leave nothing to check".into());
+        j.at_best(Verdict::Usable, (3..ENOUGH).contains(&used), || {
+            format!("{used} pictures, {ENOUGH} are needed to be good")
+        });
+        let [low, high] = fit.reach;
+        let quarter = 0.25 * (work.far_mm - work.near_mm);
+        j.at_best(Verdict::Usable, low > work.near_mm + quarter || high < work.far_mm - quarter, || {
+            format!("the boards were lit at {} to {} mm, the work is at {work}", work.depth(low), work.depth(high))
+        });
+    }
+
+    /// What the error comes from, and the next best picture.
+    fn advise(&self, j: &mut Judgement) {
+        let Evidence { work, camera_part, .. } = *self;
+        if camera_part > 0.0 {
+            j.reasons.push(format!("the camera's own uncertainty makes {camera_part:.4} mm of the error"));
+        }
+        j.advise(self.spread < 15.0, || "tilt the board by 20 degrees or more, once to each side".into());
+        let ([low, high], (near, far)) = (self.fit.reach, (work.near_mm, work.far_mm));
+        let edge = 0.15 * (far - near);
+        j.advise(low > near + edge, || {
+            format!("show a board nearer, at {} to {} mm", work.depth(near), work.depth(near + edge))
+        });
+        j.advise(high < far - edge, || {
+            format!("show a board farther away, at {} to {} mm", work.depth(far - edge), work.depth(far))
+        });
+        j.advise(j.verdict != Verdict::Good && camera_part > 0.7 * self.expected, || {
+            "calibrate the camera with more pictures first: most of the error comes from it".into()
+        });
+    }
+
+    fn figures(&self) -> BTreeMap<String, f64> {
+        let (fit, used) = (self.fit, &self.used);
+        let count = |u: PeakUse| fit.uses.iter().flatten().filter(|x| **x == u).count() as f64;
+        BTreeMap::from([
+            ("expected_error_at_working_distance_mm".to_string(), self.expected),
+            ("expected_error_from_camera_mm".into(), self.camera_part),
+            ("working_near_mm".into(), self.work.near_mm),
+            ("working_far_mm".into(), self.work.far_mm),
+            ("tilt_sigma_deg".into(), self.tilt.to_degrees()),
+            ("offset_sigma_mm".into(), fit.covariance[(3, 3)].max(0.0).sqrt()),
+            ("rms_px".into(), rms(used.iter().map(|v| v.px))),
+            ("rms_mm".into(), rms(used.iter().map(|v| v.mm))),
+            ("holdout_rms_px".into(), rms(used.iter().map(|v| v.holdout_px))),
+            ("holdout_rms_mm".into(), rms(used.iter().map(|v| v.holdout_mm))),
+            ("board_spread_deg".into(), self.spread),
+            ("stripe_spread_mm".into(), fit.depth_spread),
+            ("nearest_board_mm".into(), fit.reach[0]),
+            ("farthest_board_mm".into(), fit.reach[1]),
+            ("peaks_used".into(), count(PeakUse::Used)),
+            ("peaks_off_board".into(), count(PeakUse::OffBoard)),
+            ("peaks_at_print_edges".into(), count(PeakUse::AtEdge)),
+            ("peaks_disagreeing".into(), count(PeakUse::Disagrees)),
+            ("residual_over_sigma".into(), fit.sigma_ratio),
+            ("neighbour_factor".into(), fit.neighbour_factor),
+            ("scatter_over_sigma".into(), fit.scatter),
+            ("variance_factor".into(), fit.inflation),
+            ("pictures_contradicting".into(), fit.views.iter().filter(|v| v.contradicts).count() as f64),
+        ])
     }
 }
 

@@ -12,9 +12,9 @@ use crate::calibrate::boards::extent::{inside, to_print_edge};
 use crate::calibrate::measured_pose::MeasuredPose;
 use crate::calibrate::scatter::inflation;
 use crate::camera::{CameraCovariance, Intrinsics};
-use crate::fault::Result;
+use crate::fault::{Fault, Result};
 use crate::geometry::{Board, Camera, Plane, Rigid};
-use crate::solve::Loss;
+use crate::solve::{Loss, Solution};
 use nalgebra::{DMatrix, Matrix6};
 
 /// Why a peak does not count.
@@ -93,6 +93,18 @@ pub struct LaserPlaneFit {
     pub depth_spread: f64,
 }
 
+/// The fit under way: what counts, where plane and boards are, and how far the stated sigmas are right.
+struct Fitting {
+    data: Data,
+    state: State,
+    /// Pictures in the fit.
+    used: Vec<bool>,
+    sigma_ratio: f64,
+    neighbours: f64,
+    /// What the peaks' sigmas are multiplied by, as both of these say.
+    factor: f64,
+}
+
 /// Fits the laser plane. `feature_factor` makes the stated sigmas of the boards' features true
 /// ([`crate::calibrate::measured_pose::pooled_factor`]),
 /// `camera_covariance` that of the camera's parameters.
@@ -105,82 +117,28 @@ pub fn solve(
 ) -> Result<LaserPlaneFit> {
     o.check()?;
     let mut uses: Vec<Vec<PeakUse>> = views.iter().map(|v| vec![PeakUse::OffBoard; v.peaks.len()]).collect();
-    let mut peaks = select(views, camera, o, &mut uses);
-    if views.len() < 2 || peaks.len() < 3 {
+    let all = select(views, camera, o, &mut uses);
+    if views.len() < 2 || all.len() < 3 {
         return Err(refused(format!(
             "{} pictures with {} stripe peaks on their boards: at least 2 pictures and 3 peaks are needed",
             views.len(),
-            peaks.len()
+            all.len()
         )));
     }
-    let mut data = Data {
-        peaks: Vec::new(),
-        measured: views.iter().map(|v| v.pose.camera_from_board).collect(),
-        roots: views.iter().map(|v| root(&v.pose, feature_factor)).collect::<Result<_>>()?,
-    };
-    let first = majority(&peaks, &data.measured, camera, o)?;
-    let all = peaks.clone();
-    peaks.retain(|p| near(p, &first, &data.measured, o.gate_px));
-    let mut used = agreeing(&all, &peaks, views.len(), o);
-    data.peaks = peaks.into_iter().filter(|p| used[p.view]).collect();
-    let mut state = State { plane: first, poses: data.measured.clone() };
-    let (mut factor, mut neighbours, mut sigma_ratio) = (1.0, 1.0, 1.0);
-    let mut solution = None;
-    for round in 0..views.len() + 3 {
-        if data.peaks.len() < 3 || used.iter().filter(|u| **u).count() < 2 {
-            return Err(refused("fewer than two pictures agree on one laser plane".into()));
-        }
-        if round == 0 {
-            state = data.solve(&state, Loss::Cauchy(2.4), factor).state;
-            let scale = robust_ratio(&data, &state, factor).max(0.2);
-            data.peaks = all
-                .iter()
-                .filter(|p| used[p.view] && ratio(p, &state, 1.0).abs() < o.gate_sigmas * scale)
-                .copied()
-                .collect();
-        }
-        let s = data.solve(&state, Loss::Squares, factor);
-        state = s.state.clone();
-        let ratios: Vec<f64> = data.peaks.iter().map(|p| ratio(p, &state, 1.0)).collect();
-        sigma_ratio = (ratios.iter().map(|r| r * r).sum::<f64>() / ratios.len() as f64).sqrt();
-        neighbours = neighbour_factor(&data.peaks, &ratios);
-        let next = sigma_ratio.max(1e-3) * neighbours.sqrt();
-        let settled = (next / factor - 1.0).abs() < 0.01;
-        factor = next;
-        let beside = consistency(&data, &state, factor).beside(&used);
-        let worst = (0..views.len()).filter(|&i| used[i]).max_by(|&a, &b| beside[a].total_cmp(&beside[b]));
-        solution = Some(s);
-        match worst {
-            Some(i) if beside[i] > o.gate_surprise && used.iter().filter(|u| **u).count() > 3 => {
-                used[i] = false;
-                data.peaks.retain(|p| p.view != i);
-            }
-            _ if settled => break,
-            _ => {}
-        }
-    }
-    let solution = solution.expect("at least one round");
-    let local = solution
-        .covariance
-        .as_ref()
-        .ok_or_else(|| refused("the laser plane is not determined by these stripes".into()))?
-        .view((0, 0), (3, 3))
-        .into_owned();
-    for p in &all {
-        uses[p.view][p.index] = if used[p.view] { PeakUse::Disagrees } else { PeakUse::PictureLeftOut };
-    }
-    for p in &data.peaks {
-        uses[p.view][p.index] = PeakUse::Used;
-    }
-    let basis = basis(&state.plane);
-    let by_camera = by_camera(&data, &state, views, camera, &camera_covariance.named(), factor)
-        .ok_or_else(|| refused("the laser plane is not determined by these stripes".into()))?;
+    let mut fitting = Fitting::start(views, &all, camera, feature_factor, o)?;
+    let solution = fitting.settle(&all, o)?;
+    let Fitting { data, state, used, sigma_ratio, neighbours, factor } = fitting;
+    let local = solution.covariance.as_ref().ok_or_else(undetermined)?.view((0, 0), (3, 3)).into_owned();
+    mark(&mut uses, &all, &data.peaks, &used);
+    let by_camera = by_camera(&data, &state, views, camera, &camera_covariance.named(), factor);
+    let by_camera = by_camera.ok_or_else(undetermined)?;
     let mut checks = consistency(&data, &state, factor);
     if checks.freedom > 0.0 {
         let explained = from_camera(&data, &state, factor, &by_camera, camera_covariance);
         checks.scatter2 *= checks.freedom / (checks.freedom + explained);
     }
     let inflation = inflation(checks.scatter2, checks.freedom);
+    let basis = basis(&state.plane);
     let exact = &basis * &local * basis.transpose() * inflation;
     let follows = by_camera.plane * camera_covariance.matrix() * by_camera.plane.transpose();
     let covariance = &exact + &basis * DMatrix::from_column_slice(3, 3, follows.as_slice()) * basis.transpose();
@@ -201,6 +159,93 @@ pub fn solve(
         reach: reach(&data, &state),
         depth_spread: depth_spread(&data, &state),
     })
+}
+
+impl Fitting {
+    /// The plane that most peaks lie on, the boards where they were measured, and the pictures that agree.
+    fn start(
+        views: &[StripeView],
+        all: &[Seen],
+        camera: &Intrinsics,
+        feature_factor: f64,
+        o: &LaserPlaneOptions,
+    ) -> Result<Fitting> {
+        let measured: Vec<_> = views.iter().map(|v| v.pose.camera_from_board).collect();
+        let roots = views.iter().map(|v| root(&v.pose, feature_factor)).collect::<Result<_>>()?;
+        let plane = majority(all, &measured, camera, o)?;
+        let on: Vec<Seen> = all.iter().filter(|p| near(p, &plane, &measured, o.gate_px)).copied().collect();
+        let used = agreeing(all, &on, views.len(), o);
+        let peaks = on.into_iter().filter(|p| used[p.view]).collect();
+        let state = State { plane, poses: measured.clone() };
+        let data = Data { peaks, measured, roots };
+        Ok(Fitting { data, state, used, sigma_ratio: 1.0, neighbours: 1.0, factor: 1.0 })
+    }
+
+    /// Least squares in rounds, until the sigmas stand still and no picture contradicts the others; of those that do, the
+    /// worst leaves each round.
+    fn settle(&mut self, all: &[Seen], o: &LaserPlaneOptions) -> Result<Solution<State>> {
+        let mut solution = None;
+        for round in 0..self.used.len() + 3 {
+            if self.data.peaks.len() < 3 || self.pictures() < 2 {
+                return Err(refused("fewer than two pictures agree on one laser plane".into()));
+            }
+            if round == 0 {
+                self.gate_peaks(all, o);
+            }
+            let s = self.data.solve(&self.state, Loss::Squares, self.factor);
+            self.state = s.state.clone();
+            solution = Some(s);
+            let settled = self.judge_sigmas();
+            let beside = consistency(&self.data, &self.state, self.factor).beside(&self.used);
+            let used = (0..self.used.len()).filter(|&i| self.used[i]);
+            match used.max_by(|&a, &b| beside[a].total_cmp(&beside[b])) {
+                Some(i) if beside[i] > o.gate_surprise && self.pictures() > 3 => {
+                    self.used[i] = false;
+                    self.data.peaks.retain(|p| p.view != i);
+                }
+                _ if settled => break,
+                _ => {}
+            }
+        }
+        Ok(solution.expect("at least one round"))
+    }
+
+    fn pictures(&self) -> usize {
+        self.used.iter().filter(|u| **u).count()
+    }
+
+    /// Chooses the peaks by their distance from a robust fit, in sigmas as these turn out there.
+    fn gate_peaks(&mut self, all: &[Seen], o: &LaserPlaneOptions) {
+        self.state = self.data.solve(&self.state, Loss::Cauchy(2.4), self.factor).state;
+        let scale = robust_ratio(&self.data, &self.state, self.factor).max(0.2);
+        let near = |p: &&Seen| self.used[p.view] && ratio(p, &self.state, 1.0).abs() < o.gate_sigmas * scale;
+        self.data.peaks = all.iter().filter(near).copied().collect();
+    }
+
+    /// The factor on the peaks' sigmas by what is left over; true where it stands still.
+    fn judge_sigmas(&mut self) -> bool {
+        let ratios: Vec<f64> = self.data.peaks.iter().map(|p| ratio(p, &self.state, 1.0)).collect();
+        self.sigma_ratio = (ratios.iter().map(|r| r * r).sum::<f64>() / ratios.len() as f64).sqrt();
+        self.neighbours = neighbour_factor(&self.data.peaks, &ratios);
+        let next = self.sigma_ratio.max(1e-3) * self.neighbours.sqrt();
+        let settled = (next / self.factor - 1.0).abs() < 0.01;
+        self.factor = next;
+        settled
+    }
+}
+
+fn undetermined() -> Fault {
+    refused("the laser plane is not determined by these stripes".into())
+}
+
+/// What became of the peaks on the boards.
+fn mark(uses: &mut [Vec<PeakUse>], all: &[Seen], fitted: &[Seen], used: &[bool]) {
+    for p in all {
+        uses[p.view][p.index] = if used[p.view] { PeakUse::Disagrees } else { PeakUse::PictureLeftOut };
+    }
+    for p in fitted {
+        uses[p.view][p.index] = PeakUse::Used;
+    }
 }
 
 /// Peaks on the boards and away from the print's edges.

@@ -3,6 +3,7 @@
 
 pub mod beam;
 mod fit;
+mod patch;
 pub mod range;
 pub mod report;
 pub mod solve;

@@ -4,17 +4,18 @@
 
 use super::budget::{Budget, budget};
 use super::hypothesis::{Judged, best_hypothesis, lead};
-use super::places::{Place, places};
+use super::places::places;
 use super::recipe::{Gates, Recipe};
+pub use super::report::{Poses, Report, RobotPose};
 use super::verdict::{Agreement, TurnVote, judge, vote};
-use crate::fault::Gate;
-use crate::fault::{Fault, Result};
-use crate::find::look::looks::{self, Agreed, Disagreement, Look, Witness};
+use crate::fault::{Fault, Gate, Result};
+use crate::find::look::looks::{self, Agreed, Look, Witness};
 use crate::find::look::part_seen::towards_camera;
 use crate::find::look::size_check::SizeCheck;
 use crate::find::measure::construct::{Built, build, features};
 use crate::find::measure::points::Ordered;
 use crate::find::measure::pose::{Measured, measure};
+use crate::find::model::drawing::Drawing;
 use crate::find::model::mirror::own_mirror_image;
 use crate::find::model::shape_model::ShapeModel;
 use crate::find::scene::{Kind, Layer, Scene};
@@ -57,98 +58,6 @@ impl LocateOptions {
     }
 }
 
-/// A pose for the robot.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct RobotPose {
-    /// Where the tool stands in the base, mm.
-    pub base_from_tool: Rigid<Base, Tool>,
-    /// Notation of `numbers`, see [`Convention::name`].
-    pub convention: &'static str,
-    /// One a number, with its unit.
-    pub labels: &'static [&'static str],
-    /// The pose as the robot writes it, in the order of the labels.
-    pub numbers: Vec<f64>,
-}
-
-/// The poses of one insertion.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct Poses {
-    /// The tool at its place in the part.
-    pub insertion: RobotPose,
-    /// Above that along the part's z, by the recipe's `approach_mm`.
-    pub approach: RobotPose,
-    /// Above the insertion along the part's z, by the recipe's `retract_mm`.
-    pub retract: RobotPose,
-}
-
-/// Everything that was found out. `poses` is there only where every gate was passed.
-#[derive(Clone, Debug, serde::Serialize)]
-pub struct Report {
-    /// Name of the recipe that was looked for.
-    pub recipe: String,
-    /// Frame of every pose here: the scan's. `base` in other names stands for it.
-    pub frame: String,
-    /// True where every gate was passed.
-    pub passed: bool,
-    /// Which gates failed, in words; empty when passed.
-    pub reasons: Vec<String>,
-    /// Where the tool goes; `None` where a gate failed.
-    pub poses: Option<Poses>,
-    /// 3 sigma in the plane and of the turn within the recipe's tolerance.
-    pub within_tolerance: bool,
-    /// What the recipe's insertion bears in the plane, mm.
-    pub tolerance_mm: f64,
-    /// What the recipe's insertion bears of any turn, degrees.
-    pub tolerance_deg: f64,
-    /// One standard deviation along x, y, z of the part, mm.
-    pub sigma_mm: [f64; 3],
-    /// One standard deviation of the turns about x, y, z of the part, degrees.
-    pub sigma_deg: [f64; 3],
-    /// What each source of error adds; of several looks, the first one's.
-    pub budget: Budget,
-    /// Every gate that was judged, passed or not.
-    pub gates: Vec<Gate>,
-    /// The part's pose as measured, in the scan's frame, mm; of several looks, the agreed one.
-    pub base_from_part: Rigid<Base, Part>,
-    /// The match in the height map at which the measurement began; px of the map.
-    pub found: Match,
-    /// Every place of the map that looks like the part, best first, where all were asked for.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub all: Vec<Place>,
-    /// How far the points agree with the drawing at the measured pose.
-    pub agreement: Agreement,
-    /// Votes on each other turn at which the part looks nearly alike.
-    pub turns: Vec<TurnVote>,
-    /// What was constructed on the part; those that could not be built are left out.
-    pub constructions: Vec<Built>,
-    /// Distance between the two-pin construction and the lattice fit, mm.
-    pub disagreement_mm: Option<f64>,
-    /// Number of surface ends at the drawn edges that were measured.
-    pub edges: usize,
-    /// Robust deviation of these ends from the drawn edges, mm.
-    pub edge_rms_mm: f64,
-    /// Number of points that gave height and tilt.
-    pub surface_points: usize,
-    /// Robust deviation of these points from their surfaces, mm.
-    pub surface_rms_mm: f64,
-    /// How much farther than drawn surfaces reach, along the stripe and from shot to shot, mm.
-    pub growth_mm: [f64; 2],
-    /// What else a reader must know, one sentence each.
-    pub notes: Vec<String>,
-    /// What the part's own sizes say of scale, steps and shear; `None` where too few edges were seen or no station is known.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub sizes: Option<SizeCheck>,
-    /// What further looks at the part said; `None`: one look alone, not cross-checked.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub looks: Option<Disagreement>,
-    /// The part's pose moved by what was constructed: the tool goes by it.
-    #[serde(skip)]
-    pub base_from_constructed: Rigid<Base, Part>,
-    /// The height map that was searched.
-    #[serde(skip)]
-    pub map: HeightMap,
-}
-
 /// Finds the part of a recipe in a cloud. A part that is not there, or that is seen too badly to be
 /// measured, is a `Fault`; one that was measured but misses a gate is a report without poses.
 pub fn locate(
@@ -159,11 +68,19 @@ pub fn locate(
     options: &LocateOptions,
 ) -> Result<Report> {
     recipe.check()?;
-    let drawing = recipe.drawing();
     let points = Ordered::new(cloud, shots)?;
     let up = options.up.or_else(|| towards_camera(&points)).unwrap_or_else(Vec3::z);
     let map = grid(cloud, &GridOptions { cell: Some(recipe.cell_mm), up, ..GridOptions::default() })?;
-    let scene = scene_of(&map, &recipe.layers)?;
+    let matches = search(&map, recipe, options)?;
+    let all = if options.all { places(&matches, &map) } else { vec![] };
+    let part = examine(&points, &map, recipe, options.expected.as_ref(), &matches)?;
+    let report = conclude(recipe, rig, options, &points, map, part);
+    Ok(Report { all, ..report })
+}
+
+/// Places of a height map that look like the part, best first; there is one at least.
+fn search(map: &HeightMap, recipe: &Recipe, options: &LocateOptions) -> Result<Vec<Match>> {
+    let scene = scene_of(map, &recipe.layers)?;
     let model = model_of(recipe, &scene)?;
     let mut search = recipe.search;
     search.max_matches = search.max_matches.max(3);
@@ -173,54 +90,15 @@ pub fn locate(
     }
     search.min_score = search.min_score.min(recipe.gates.min_score);
     let matches = find_on(&scene, &model, &search, options.accelerator.as_ref())?;
-    let Some(best) = matches.first().cloned() else {
+    if matches.is_empty() {
         return Err(Fault::refused(format!(
             "'{}' was not found: nothing scores {:.2} or more",
             recipe.name, search.min_score
         ))
         .cause("the part is not there, is another one, is hidden, or lies outside the scan")
         .next("look at the height map of the scan; scan the part again, or teach it anew"));
-    };
-    let mut notes = Vec::new();
-    if matches.len() > 1 {
-        notes.push(format!(
-            "{} places look like the part, scores {}; the best was taken",
-            matches.len(),
-            matches.iter().take(8).map(|m| format!("{:.3}", m.score)).collect::<Vec<_>>().join(" ")
-        ));
     }
-    let all = if options.all { places(&matches, &map) } else { vec![] };
-    let Judged { found: best, mut measured } =
-        best_hypothesis(&points, &map, recipe, options.expected.as_ref(), &best, &matches)?;
-    let mut turns = vote(&points, &drawing, &measured.base_from_part, recipe.alike_turns, &recipe.measure);
-    if let Some(t) = turns.iter().find(|t| t.told() == Some(false)) {
-        notes.push(format!(
-            "turned by {:.0} degrees: {} of {} points where the turns differ say so",
-            t.rival_deg,
-            t.votes_against,
-            t.votes_for + t.votes_against
-        ));
-        let back: Rigid<Part, Part> =
-            Rigid::from_vectors(&Vec3::new(0.0, 0.0, t.rival_deg.to_radians()), Vec3::zeros());
-        measured = measure(&points, &drawing, measured.base_from_part * back, &recipe.measure)?;
-        turns = vote(&points, &drawing, &measured.base_from_part, recipe.alike_turns, &recipe.measure);
-    }
-    let agreement = judge(&points, &drawing, &measured, &recipe.measure);
-    let seen = features(&measured.observations, measured.growth, &recipe.measure);
-    let mut constructions = Vec::new();
-    for c in &recipe.construction {
-        // One construction that cannot be built does not hinder the others, unless it is the one used.
-        let earlier: Vec<_> = recipe.construction.iter().take_while(|o| o.name != c.name).cloned().collect();
-        let usable: Vec<_> =
-            earlier.into_iter().filter(|e| constructions.iter().any(|b: &Built| b.name == e.name)).collect();
-        match build(&[usable, vec![c.clone()]].concat(), &drawing, &seen, &recipe.measure) {
-            Ok(mut all) => constructions.push(all.pop().expect("one was asked for")),
-            Err(e) if recipe.insertion.construction == c.name => return Err(e),
-            Err(e) => notes.push(e.what),
-        }
-    }
-    let report = conclude(recipe, rig, options, &points, map, best, measured, agreement, turns, constructions, notes);
-    Ok(Report { all, ..report })
+    Ok(matches)
 }
 
 /// The layers of a height map that a recipe wants.
@@ -249,46 +127,92 @@ fn model_of(recipe: &Recipe, scene: &Scene) -> Result<ShapeModel> {
     Ok(model)
 }
 
-#[allow(clippy::too_many_arguments)]
+/// A part as the points say that it lies.
+struct Examined {
+    found: Match,
+    measured: Measured,
+    agreement: Agreement,
+    turns: Vec<TurnVote>,
+    constructions: Vec<Built>,
+    notes: Vec<String>,
+}
+
+/// Measures the part, the right way round, and constructs on it what the recipe wants.
+fn examine(
+    points: &Ordered,
+    map: &HeightMap,
+    recipe: &Recipe,
+    expected: Option<&Rigid<Base, Part>>,
+    matches: &[Match],
+) -> Result<Examined> {
+    let drawing = recipe.drawing();
+    let mut notes = Vec::new();
+    if matches.len() > 1 {
+        notes.push(format!(
+            "{} places look like the part, scores {}; the best was taken",
+            matches.len(),
+            matches.iter().take(8).map(|m| format!("{:.3}", m.score)).collect::<Vec<_>>().join(" ")
+        ));
+    }
+    let Judged { found, mut measured } = best_hypothesis(points, map, recipe, expected, &matches[0], matches)?;
+    let votes = |m: &Measured| vote(points, &drawing, &m.base_from_part, recipe.alike_turns, &recipe.measure);
+    let mut turns = votes(&measured);
+    if let Some(t) = turns.iter().find(|t| t.told() == Some(false)) {
+        notes.push(format!(
+            "turned by {:.0} degrees: {} of {} points where the turns differ say so",
+            t.rival_deg,
+            t.votes_against,
+            t.votes_for + t.votes_against
+        ));
+        let back: Rigid<Part, Part> =
+            Rigid::from_vectors(&Vec3::new(0.0, 0.0, t.rival_deg.to_radians()), Vec3::zeros());
+        measured = measure(points, &drawing, measured.base_from_part * back, &recipe.measure)?;
+        turns = votes(&measured);
+    }
+    let agreement = judge(points, &drawing, &measured, &recipe.measure);
+    let constructions = construct(recipe, &drawing, &measured, &mut notes)?;
+    Ok(Examined { found, measured, agreement, turns, constructions, notes })
+}
+
+/// The recipe's constructions. One that cannot be built does not hinder the others, unless it is the one used.
+fn construct(recipe: &Recipe, drawing: &Drawing, measured: &Measured, notes: &mut Vec<String>) -> Result<Vec<Built>> {
+    let seen = features(&measured.observations, measured.growth, &recipe.measure);
+    let mut constructions: Vec<Built> = Vec::new();
+    for c in &recipe.construction {
+        let earlier = recipe.construction.iter().take_while(|o| o.name != c.name);
+        let usable: Vec<_> = earlier.filter(|e| constructions.iter().any(|b| b.name == e.name)).cloned().collect();
+        match build(&[usable, vec![c.clone()]].concat(), drawing, &seen, &recipe.measure) {
+            Ok(mut all) => constructions.push(all.pop().expect("one was asked for")),
+            Err(e) if recipe.insertion.construction == c.name => return Err(e),
+            Err(e) => notes.push(e.what),
+        }
+    }
+    Ok(constructions)
+}
+
 fn conclude(
     recipe: &Recipe,
     rig: Option<&Rig>,
     options: &LocateOptions,
     points: &Ordered,
     map: HeightMap,
-    found: Match,
-    measured: Measured,
-    agreement: Agreement,
-    turns: Vec<TurnVote>,
-    constructions: Vec<Built>,
-    mut notes: Vec<String>,
+    part: Examined,
 ) -> Report {
     let spec = &recipe.insertion;
-    let mut budget = budget(points, &measured, rig, recipe);
-    constructions.iter().filter(|b| b.name == spec.construction).for_each(|b| budget.built(b));
+    let used = part.constructions.iter().find(|b| b.name == spec.construction);
+    let mut budget = budget(points, &part.measured, rig, recipe);
+    part.constructions.iter().filter(|b| b.name == spec.construction).for_each(|b| budget.built(b));
     let sizes = size_check(&budget, recipe);
-    let named = |name: &Option<String>| constructions.iter().find(|b| Some(&b.name) == name.as_ref());
-    let disagreement_mm = named(&spec.two_pin)
-        .zip(named(&spec.lattice))
-        .map(|(a, b)| (a.deviation_mm[0] - b.deviation_mm[0]).hypot(a.deviation_mm[1] - b.deviation_mm[1]));
-    let lead = lead(points, &map, recipe, &found, &measured.base_from_part, &agreement);
-    let mut gates = gates(&recipe.gates, found.score, lead, &budget, &agreement, &turns, disagreement_mm);
+    let disagreement_mm = disagreement(recipe, &part.constructions);
+    let lead = lead(points, &map, recipe, &part.found, &part.measured.base_from_part, &part.agreement);
+    let mut gates = gates(&recipe.gates, &part, lead, &budget, disagreement_mm);
     // Where another look says where the part lies, no other place is in question: the looks have to agree.
     gates.retain(|g| options.expected.is_none() || g.name != "margin");
     gates.extend(sizes.as_ref().map(|s| s.gate(&recipe.gates)));
     let reasons: Vec<String> =
         missed(&gates).chain(gates.iter().filter(|g| g.name == LOOKS).map(Gate::words)).collect();
-    // The construction's deviation moves the part pose in its plane.
-    let moved = constructions.iter().find(|b| b.name == spec.construction).map_or_else(Rigid::identity, |b| {
-        let turn = b.deviation_deg.unwrap_or(0.0).to_radians();
-        let (s, c) = turn.sin_cos();
-        let (x, y) = (b.nominal.x, b.nominal.y);
-        Rigid::<Part, Part>::from_vectors(
-            &Vec3::new(0.0, 0.0, turn),
-            Vec3::new(b.measured.x - (c * x - s * y), b.measured.y - (s * x + c * y), 0.0),
-        )
-    });
-    let base_from_constructed = measured.base_from_part * moved;
+    let base_from_constructed = part.measured.base_from_part * used.map_or_else(Rigid::identity, moved_by);
+    let Examined { found, measured, agreement, turns, constructions, mut notes } = part;
     notes.push(ONE_LOOK.into());
     notes.extend(sizes.as_ref().and_then(SizeCheck::silent));
     if own_mirror_image(&recipe.drawing()) {
@@ -326,6 +250,24 @@ fn conclude(
         base_from_constructed,
         map,
     }
+}
+
+/// Distance between the two-pin construction and the lattice, mm; `None` where one of them is missing.
+fn disagreement(recipe: &Recipe, constructions: &[Built]) -> Option<f64> {
+    let named = |name: &Option<String>| constructions.iter().find(|b| Some(&b.name) == name.as_ref());
+    let (a, b) = (named(&recipe.insertion.two_pin)?, named(&recipe.insertion.lattice)?);
+    Some((a.deviation_mm[0] - b.deviation_mm[0]).hypot(a.deviation_mm[1] - b.deviation_mm[1]))
+}
+
+/// A construction's deviation moves the part's pose in its plane: the nominal place comes to lie on the measured one.
+fn moved_by(b: &Built) -> Rigid<Part, Part> {
+    let turn = b.deviation_deg.unwrap_or(0.0).to_radians();
+    let (s, c) = turn.sin_cos();
+    let (x, y) = (b.nominal.x, b.nominal.y);
+    Rigid::from_vectors(
+        &Vec3::new(0.0, 0.0, turn),
+        Vec3::new(b.measured.x - (c * x - s * y), b.measured.y - (s * x + c * y), 0.0),
+    )
 }
 
 /// The part's sizes against what the calibrations make expect; they are the robot's and the camera's as much as the part's.
@@ -407,18 +349,11 @@ fn missed(gates: &[Gate]) -> impl Iterator<Item = String> {
     gates.iter().filter(|g| !g.passed && g.name != LOOKS).map(Gate::words)
 }
 
-fn gates(
-    g: &Gates,
-    score: f64,
-    lead: f64,
-    budget: &Budget,
-    agreement: &Agreement,
-    turns: &[TurnVote],
-    disagreement: Option<f64>,
-) -> Vec<Gate> {
-    let (least, most) = (Gate::least, Gate::most);
+/// What the recipe asks of a part and of the pose that was measured.
+fn gates(g: &Gates, part: &Examined, lead: f64, budget: &Budget, disagreement: Option<f64>) -> Vec<Gate> {
+    let (least, most, agreement) = (Gate::least, Gate::most, &part.agreement);
     let mut out = vec![
-        least("score", score, g.min_score),
+        least("score", part.found.score, g.min_score),
         least("margin", lead, g.min_margin),
         least("coverage", agreement.coverage, g.min_coverage),
         least("agreement", agreement.agreement, g.min_agreement),
@@ -431,7 +366,7 @@ fn gates(
         out.push(most("disagreement_mm", d, g.max_disagreement_mm));
     }
     if g.turn_must_be_told {
-        out.extend(turns.iter().map(TurnVote::gate));
+        out.extend(part.turns.iter().map(TurnVote::gate));
     }
     if g.second_look {
         out.push(least(LOOKS, 1.0, 2.0));

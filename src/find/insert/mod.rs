@@ -8,6 +8,7 @@ pub mod locate;
 pub mod picture;
 mod places;
 pub mod recipe;
+mod report;
 pub mod teach;
 pub mod verdict;
 

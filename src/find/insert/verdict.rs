@@ -6,10 +6,12 @@ use crate::fault::Gate;
 use crate::find::measure::options::MeasureOptions;
 use crate::find::measure::points::{Ordered, localise};
 use crate::find::measure::pose::Measured;
+use crate::find::measure::surface_ends::Observation;
 use crate::find::model::drawing::Drawing;
 use crate::find::model::edge_index::EdgeIndex;
 use crate::find::model::face::Face;
 use crate::geometry::{Base, Part, Rigid, Vec3};
+use std::collections::HashSet;
 
 /// What the points say about a pose.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -33,6 +35,7 @@ pub struct Agreement {
 }
 
 /// Lengths of the judgement, in the recipe's unit.
+#[derive(Clone, Copy)]
 struct Lengths {
     /// Points nearer than this to an edge say nothing about what is surface and what is not, mm.
     margin: f64,
@@ -51,81 +54,128 @@ impl Lengths {
     }
 }
 
+/// A drawing against which points are counted.
+struct Drawn<'a> {
+    faces: Vec<Face>,
+    edges: EdgeIndex,
+    bounds: [f64; 4],
+    lengths: Lengths,
+    options: &'a MeasureOptions,
+}
+
+/// Counts of points, and the places that they show.
+#[derive(Default)]
+struct Tally {
+    /// Points inside surfaces, and those of them that lie on one.
+    inside: usize,
+    on: usize,
+    /// Points in holes and beside the part, and those of them that lie on no surface.
+    beside: usize,
+    clear: usize,
+    /// Squares in which a surface was seen.
+    seen: HashSet<(i32, i32)>,
+    /// Pieces of edges beyond which a surface goes on.
+    crossed: HashSet<(i32, i32, usize)>,
+}
+
 /// Judges a pose.
 pub fn judge(points: &Ordered, drawing: &Drawing, measured: &Measured, options: &MeasureOptions) -> Agreement {
-    let Lengths { margin, ring, square, piece: side, .. } = Lengths::of(options);
-    let gate = options.height_gate_mm;
-    let faces = drawing.faces();
-    let edges = EdgeIndex::new(drawing, options.unit());
-    let local = localise(points, drawing, &measured.base_from_part, options);
-    let b = drawing.bounds();
-    let (mut on, mut inside, mut clear, mut beside) = (0usize, 0usize, 0usize, 0usize);
-    let cell = |x: f64, y: f64| ((x / square).floor() as i32, (y / square).floor() as i32);
-    let mut seen = std::collections::HashSet::new();
-    let mut crossed = std::collections::HashSet::new();
-    let piece = |x: f64, y: f64, shape: usize| ((x / side).floor() as i32, (y / side).floor() as i32, shape);
-    for q in local.iter().flatten() {
-        if q.x < b[0] - ring || q.x > b[2] + ring || q.y < b[1] - ring || q.y > b[3] + ring {
-            continue;
-        }
-        let at = |f: &Face| (q.z - f.z).abs() <= gate;
-        let here: Vec<&Face> = faces.iter().filter(|f| f.material(q.x, q.y)).collect();
-        if here.iter().any(|f| at(f)) {
-            seen.insert(cell(q.x, q.y));
-        }
-        if edges.nearest(q.x, q.y, margin, |_| true).is_some() {
-            continue;
-        }
-        if here.is_empty() {
-            beside += 1;
-            clear += usize::from(!faces.iter().any(at));
-            for f in faces.iter().filter(|f| at(f)) {
-                if let Some(s) = edges.nearest(q.x, q.y, ring, |s| s.z == f.z && s.locates) {
-                    crossed.insert(piece(s.x, s.y, s.shape));
-                }
-            }
-        } else {
-            inside += 1;
-            on += usize::from(here.iter().any(|f| at(f)));
-        }
-    }
-    let (x0, y0) = cell(b[0], b[1]);
-    let (x1, y1) = cell(b[2], b[3]);
-    let (mut drawn, mut covered) = (0usize, 0usize);
-    for cy in y0..=y1 {
-        for cx in x0..=x1 {
-            let (x, y) = ((f64::from(cx) + 0.5) * square, (f64::from(cy) + 0.5) * square);
-            if faces.iter().any(|f| f.material(x, y)) {
-                drawn += 1;
-                covered += usize::from(seen.contains(&(cx, cy)));
-            }
-        }
-    }
-    let all: std::collections::HashSet<_> = edges.samples().iter().map(|s| piece(s.x, s.y, s.shape)).collect();
-    let ended: std::collections::HashSet<_> = measured
-        .observations
-        .iter()
-        .filter(|o| o.weight > 0.0)
-        // By the drawing's own sample: a coordinate of an edge may lie between two pieces, where rounding decides.
-        .filter_map(|o| {
-            let (x, y) = (o.x - o.residual * o.nx, o.y - o.residual * o.ny);
-            edges.nearest(x, y, side, |s| (s.shape, s.element) == (o.shape, o.element))
-        })
-        .map(|s| piece(s.x, s.y, s.shape))
-        .collect();
+    let drawn = Drawn {
+        faces: drawing.faces(),
+        edges: EdgeIndex::new(drawing, options.unit()),
+        bounds: drawing.bounds(),
+        lengths: Lengths::of(options),
+        options,
+    };
+    let tally = drawn.count(&localise(points, drawing, &measured.base_from_part, options));
+    let pieces: HashSet<_> = drawn.edges.samples().iter().map(|s| drawn.piece(s.x, s.y, s.shape)).collect();
     let share = |n: usize, of: usize| if of == 0 { 0.0 } else { n as f64 / of as f64 };
-    let on_surface = share(on, inside);
+    let on_surface = share(tally.on, tally.inside);
     // Without any point beside the part nothing contradicts it there.
-    let free = if beside == 0 { 1.0 } else { share(clear, beside) };
+    let free = if tally.beside == 0 { 1.0 } else { share(tally.clear, tally.beside) };
+    let (covered, squares) = drawn.covered(&tally.seen);
     Agreement {
         on_surface,
-        surface_points: inside,
+        surface_points: tally.inside,
         beside: free,
-        beside_points: beside,
+        beside_points: tally.beside,
         agreement: on_surface.min(free),
-        coverage: share(covered, drawn),
-        edges: share(ended.len(), all.len()),
-        crossed: share(crossed.len(), all.len()),
+        coverage: share(covered, squares),
+        edges: share(drawn.ended(&measured.observations), pieces.len()),
+        crossed: share(tally.crossed.len(), pieces.len()),
+    }
+}
+
+impl Drawn<'_> {
+    fn square(&self, x: f64, y: f64) -> (i32, i32) {
+        let side = self.lengths.square;
+        ((x / side).floor() as i32, (y / side).floor() as i32)
+    }
+
+    fn piece(&self, x: f64, y: f64, shape: usize) -> (i32, i32, usize) {
+        let side = self.lengths.piece;
+        ((x / side).floor() as i32, (y / side).floor() as i32, shape)
+    }
+
+    /// Points at and around the part, by what the drawing has there; those near edges say only that a surface was seen.
+    fn count(&self, local: &[Option<Vec3>]) -> Tally {
+        let mut t = Tally::default();
+        let (b, Lengths { margin, ring, .. }) = (self.bounds, self.lengths);
+        for q in local.iter().flatten() {
+            if q.x < b[0] - ring || q.x > b[2] + ring || q.y < b[1] - ring || q.y > b[3] + ring {
+                continue;
+            }
+            let at = |f: &Face| (q.z - f.z).abs() <= self.options.height_gate_mm;
+            let here: Vec<&Face> = self.faces.iter().filter(|f| f.material(q.x, q.y)).collect();
+            let on = here.iter().any(|f| at(f));
+            if on {
+                t.seen.insert(self.square(q.x, q.y));
+            }
+            if self.edges.nearest(q.x, q.y, margin, |_| true).is_some() {
+                continue;
+            }
+            if !here.is_empty() {
+                t.inside += 1;
+                t.on += usize::from(on);
+                continue;
+            }
+            t.beside += 1;
+            t.clear += usize::from(!self.faces.iter().any(at));
+            for f in self.faces.iter().filter(|f| at(f)) {
+                if let Some(s) = self.edges.nearest(q.x, q.y, ring, |s| s.z == f.z && s.locates) {
+                    t.crossed.insert(self.piece(s.x, s.y, s.shape));
+                }
+            }
+        }
+        t
+    }
+
+    /// Squares of the drawn surfaces that were seen, and all of them.
+    fn covered(&self, seen: &HashSet<(i32, i32)>) -> (usize, usize) {
+        let (b, square) = (self.bounds, self.lengths.square);
+        let ((x0, y0), (x1, y1)) = (self.square(b[0], b[1]), self.square(b[2], b[3]));
+        let (mut drawn, mut covered) = (0usize, 0usize);
+        for cy in y0..=y1 {
+            for cx in x0..=x1 {
+                let (x, y) = ((f64::from(cx) + 0.5) * square, (f64::from(cy) + 0.5) * square);
+                if self.faces.iter().any(|f| f.material(x, y)) {
+                    drawn += 1;
+                    covered += usize::from(seen.contains(&(cx, cy)));
+                }
+            }
+        }
+        (covered, drawn)
+    }
+
+    /// Pieces of the drawn edges at which a surface was seen to end.
+    fn ended(&self, observations: &[Observation]) -> usize {
+        // By the drawing's own sample: a coordinate of an edge may lie between two pieces, where rounding decides.
+        let sample = |o: &Observation| {
+            let (x, y) = (o.x - o.residual * o.nx, o.y - o.residual * o.ny);
+            self.edges.nearest(x, y, self.lengths.piece, |s| (s.shape, s.element) == (o.shape, o.element))
+        };
+        let ends = observations.iter().filter(|o| o.weight > 0.0).filter_map(sample);
+        ends.map(|s| self.piece(s.x, s.y, s.shape)).collect::<HashSet<_>>().len()
     }
 }
 

@@ -43,56 +43,22 @@ impl Ordered {
     /// # Errors
     /// A cloud that is too small, damaged, or of other shots than those that are listed.
     pub fn new(cloud: &[CloudPoint], shots: &Shots) -> Result<Ordered> {
-        if cloud.len() < MIN_POINTS {
-            return Err(Fault::refused(format!(
-                "the scan has {} points, at least {MIN_POINTS} are needed",
-                cloud.len()
-            ))
-            .cause("an empty or tiny scan: no laser in the pictures, or a few shots only")
-            .next("look at the scan's report, then scan the part again"));
-        }
-        let bad = |p: &&CloudPoint| p.position.iter().any(|x| !x.is_finite()) || !(p.u.abs() + p.v.abs() < FARTHEST_PX);
-        if let Some(p) = cloud.iter().find(bad) {
-            let ([x, y, z], u, v) = (p.position, p.u, p.v);
-            return Err(Fault::input(format!(
-                "the cloud holds the point ({x}, {y}, {z}) of pixel ({u}, {v}) in shot {}; wanted finite mm, and pixels \
-                 below {FARTHEST_PX}",
-                p.shot
-            ))
-            .cause("the cloud was damaged, or not written by sheetlight scan")
-            .next("scan again"));
-        }
-        let along: fn(&CloudPoint) -> f32 = match shots.along {
-            Along::U => |p| p.u,
-            Along::V => |p| p.v,
-        };
+        whole(cloud)?;
         let mut shot: Vec<u32> = cloud.iter().map(|p| p.shot).collect();
         shot.sort_unstable();
         shot.dedup();
-        let from_camera: Vec<_> = shot.iter().map(|s| shots.place(*s).copied()).collect();
-        if let Some(i) = from_camera.iter().position(Option::is_none)
-            && from_camera.iter().any(Option::is_some)
-        {
-            return Err(Fault::input(format!("the cloud holds points of shot {}, which is not listed", shot[i]))
-                .cause("the cloud and the list of shots are of two scans")
-                .next("scan again"));
-        }
-        let first = cloud.iter().map(along).fold(f32::MAX, f32::min).round();
-        let last = cloud.iter().map(along).fold(f32::MIN, f32::max).round();
-        let columns = (last - first) as usize + 1;
-        if columns > 1 << 16 || columns.saturating_mul(shot.len()) > 1 << 28 {
-            return Err(Fault::input(format!("the cloud spans {columns} pixel columns in {} shots", shot.len()))
-                .cause("the cloud was not written by sheetlight scan")
-                .next("scan again"));
-        }
-        let mut index = vec![NONE; columns * shot.len()];
-        for (i, p) in cloud.iter().enumerate() {
-            let r = shot.binary_search(&p.shot).expect("listed above");
-            let slot = &mut index[r * columns + (along(p).round() - first) as usize];
-            if *slot == NONE || cloud[*slot as usize].intensity < p.intensity {
-                *slot = i as u32;
-            }
-        }
+        let from_camera = places(&shot, shots)?;
+        let table = Table::of(cloud, &shot, shots.along)?;
+        Ok(Ordered::filled(cloud, table, shot, from_camera))
+    }
+
+    /// The points of a table in its order; its indices into the cloud become such into these.
+    fn filled(
+        cloud: &[CloudPoint],
+        Table { columns, mut index }: Table,
+        shot: Vec<u32>,
+        from_camera: Vec<Option<Rigid<Base, Camera>>>,
+    ) -> Ordered {
         let mut out = Ordered {
             points: vec![],
             intensity: vec![],
@@ -118,7 +84,7 @@ impl Ordered {
             }
         }
         out.index = index;
-        Ok(out)
+        out
     }
 
     /// The point in a row and column, if there is one.
@@ -139,6 +105,72 @@ impl Ordered {
     /// says that no light was seen.
     pub fn covers(&self, row: i64, column: i64) -> bool {
         row >= 0 && row < self.shot.len() as i64 && column >= 0 && column < self.columns as i64
+    }
+}
+
+/// Refuses a cloud that is too small or holds what no scan writes.
+fn whole(cloud: &[CloudPoint]) -> Result<()> {
+    if cloud.len() < MIN_POINTS {
+        return Err(Fault::refused(format!("the scan has {} points, at least {MIN_POINTS} are needed", cloud.len()))
+            .cause("an empty or tiny scan: no laser in the pictures, or a few shots only")
+            .next("look at the scan's report, then scan the part again"));
+    }
+    let bad = |p: &&CloudPoint| p.position.iter().any(|x| !x.is_finite()) || !(p.u.abs() + p.v.abs() < FARTHEST_PX);
+    if let Some(p) = cloud.iter().find(bad) {
+        let ([x, y, z], u, v) = (p.position, p.u, p.v);
+        return Err(Fault::input(format!(
+            "the cloud holds the point ({x}, {y}, {z}) of pixel ({u}, {v}) in shot {}; wanted finite mm, and pixels \
+             below {FARTHEST_PX}",
+            p.shot
+        ))
+        .cause("the cloud was damaged, or not written by sheetlight scan")
+        .next("scan again"));
+    }
+    Ok(())
+}
+
+/// Where the camera stood at each shot: at all of them, or nobody knows of any.
+fn places(shot: &[u32], shots: &Shots) -> Result<Vec<Option<Rigid<Base, Camera>>>> {
+    let from_camera: Vec<_> = shot.iter().map(|s| shots.place(*s).copied()).collect();
+    if let Some(i) = from_camera.iter().position(Option::is_none)
+        && from_camera.iter().any(Option::is_some)
+    {
+        return Err(Fault::input(format!("the cloud holds points of shot {}, which is not listed", shot[i]))
+            .cause("the cloud and the list of shots are of two scans")
+            .next("scan again"));
+    }
+    Ok(from_camera)
+}
+
+/// A cloud's points by row and column: index into the cloud, or [`NONE`].
+struct Table {
+    columns: usize,
+    index: Vec<u32>,
+}
+
+impl Table {
+    fn of(cloud: &[CloudPoint], shot: &[u32], along: Along) -> Result<Table> {
+        let along: fn(&CloudPoint) -> f32 = match along {
+            Along::U => |p| p.u,
+            Along::V => |p| p.v,
+        };
+        let first = cloud.iter().map(along).fold(f32::MAX, f32::min).round();
+        let last = cloud.iter().map(along).fold(f32::MIN, f32::max).round();
+        let columns = (last - first) as usize + 1;
+        if columns > 1 << 16 || columns.saturating_mul(shot.len()) > 1 << 28 {
+            return Err(Fault::input(format!("the cloud spans {columns} pixel columns in {} shots", shot.len()))
+                .cause("the cloud was not written by sheetlight scan")
+                .next("scan again"));
+        }
+        let mut index = vec![NONE; columns * shot.len()];
+        for (i, p) in cloud.iter().enumerate() {
+            let r = shot.binary_search(&p.shot).expect("listed above");
+            let slot = &mut index[r * columns + (along(p).round() - first) as usize];
+            if *slot == NONE || cloud[*slot as usize].intensity < p.intensity {
+                *slot = i as u32;
+            }
+        }
+        Ok(Table { columns, index })
     }
 }
 

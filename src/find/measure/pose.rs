@@ -6,7 +6,7 @@
 use super::datum;
 use super::datum::{Datum, fit_datum};
 use super::in_plane::fit_edges;
-use super::lit_edges::fit_light;
+use super::lit_edges::{Lit, fit_light};
 use super::options::MeasureOptions;
 use super::points::{Ordered, localise};
 use super::shape::Shape;
@@ -15,8 +15,9 @@ use super::surface_ends::{Observation, surface_ends};
 use crate::fault::{Fault, Result};
 use crate::find::model::drawing::Drawing;
 use crate::find::model::edge_index::EdgeIndex;
+use crate::find::model::face::Face;
 use crate::geometry::{Base, Part, Rigid, Vec3};
-use nalgebra::{Matrix6, Vector3};
+use nalgebra::{Matrix3, Matrix6, Vector3};
 
 /// A measured pose.
 #[derive(Clone, Debug)]
@@ -63,66 +64,29 @@ pub fn measure(
     options: &MeasureOptions,
 ) -> Result<Measured> {
     options.check()?;
-    let faces = drawing.faces();
-    let edges = EdgeIndex::new(drawing, options.unit());
+    let (faces, edges) = (drawing.faces(), EdgeIndex::new(drawing, options.unit()));
     if faces.is_empty() || edges.is_empty() {
         return Err(Fault::input("the drawing has no closed shape to measure on")
             .cause("only lines and arcs, or measure = false everywhere")
             .next("draw at least one rectangle, circle or polygon with inside = \"high\""));
     }
-    let mut pose = start;
-    let moved = |step: &Vector3<f64>| {
-        Rigid::<Part, Part>::from_vectors(&Vec3::new(0.0, 0.0, step.z), Vec3::new(step.x, step.y, 0.0))
-    };
-    let level = |pose: &mut Rigid<Base, Part>, round: usize| -> Result<Datum> {
-        let datum = fit_datum(points, &localise(points, drawing, pose, options), &faces, &edges, options, round)?;
-        *pose = *pose * datum::moved(&datum.step);
-        Ok(datum)
-    };
+    let mut part = Measuring { points, drawing, faces: &faces, edges: &edges, options, pose: start };
     // Ends of surfaces lead to within some hundredths of a millimetre, the light of the samples beside them from there.
-    for round in 0..ROUNDS {
-        level(&mut pose, round)?;
-        let local = localise(points, drawing, &pose, options);
-        let gate = if round < 2 { 2.0 * options.edge_gate_mm } else { options.edge_gate_mm };
-        let (observations, step) = surface_ends(points, &local, &faces, &edges, options, gate);
-        pose = pose * moved(&fit_edges(observations, &step, options)?.step);
-    }
-    let mut lit = None;
-    for _ in 0..LIT_ROUNDS {
-        level(&mut pose, ROUNDS)?;
-        let local = localise(points, drawing, &pose, options);
-        lit = fit_light(points, &pose, (&local, &faces), &edges, options, None);
-        let Some(lit) = &lit else { break };
-        pose = pose * moved(&lit.step);
-    }
-    let datum = level(&mut pose, ROUNDS)?;
-    let local = localise(points, drawing, &pose, options);
-    let (observations, step) = surface_ends(points, &local, &faces, &edges, options, options.edge_gate_mm);
+    part.follow_ends()?;
+    let lit = part.follow_light()?;
+    let datum = part.level(ROUNDS)?;
+    let local = part.local();
+    let (observations, step) = part.ends(&local, options.edge_gate_mm);
     let mut plane = fit_edges(observations, &step, options)?;
     // What the ends alone would still move is common to all of them: the light knows better.
     for o in &mut plane.observations {
         o.residual -= o.nx * plane.step.x + o.ny * plane.step.y + (o.x * o.ny - o.y * o.nx) * plane.step.z;
     }
-    let shape = measure_shape(&plane.observations, |start| {
-        fit_light(points, &pose, (&local, &faces), &edges, options, Some(start))
-    });
+    let shape = measure_shape(&plane.observations, |start| part.light(&local, Some(start)));
     let in_plane = lit.as_ref().map_or(plane.covariance, |l| l.covariance);
-    let mut covariance = Matrix6::zeros();
-    // Datum unknowns are z, rx, ry; edge unknowns x, y, rz.
-    for (i, a) in [2, 3, 4].into_iter().enumerate() {
-        for (k, b) in [2, 3, 4].into_iter().enumerate() {
-            covariance[(a, b)] = datum.covariance[(i, k)];
-        }
-    }
-    covariance[(2, 2)] += (LEVEL_BIAS * step[0].max(step[1])).powi(2);
-    for (i, a) in [0, 1, 5].into_iter().enumerate() {
-        for (k, b) in [0, 1, 5].into_iter().enumerate() {
-            covariance[(a, b)] = in_plane[(i, k)];
-        }
-    }
     Ok(Measured {
-        base_from_part: pose,
-        covariance,
+        base_from_part: part.pose,
+        covariance: covariance(&datum.covariance, &in_plane, LEVEL_BIAS * step[0].max(step[1])),
         surface_points: datum.used,
         surface_rms: datum.sigma,
         edges: plane.used,
@@ -134,4 +98,76 @@ pub fn measure(
         observations: plane.observations,
         shape,
     })
+}
+
+/// A pose on its way to the points.
+struct Measuring<'a> {
+    points: &'a Ordered,
+    drawing: &'a Drawing,
+    faces: &'a [Face],
+    edges: &'a EdgeIndex,
+    options: &'a MeasureOptions,
+    pose: Rigid<Base, Part>,
+}
+
+impl Measuring<'_> {
+    fn local(&self) -> Vec<Option<Vec3>> {
+        localise(self.points, self.drawing, &self.pose, self.options)
+    }
+
+    /// Brings height and tilt onto the faces.
+    fn level(&mut self, round: usize) -> Result<Datum> {
+        let datum = fit_datum(self.points, &self.local(), self.faces, self.edges, self.options, round)?;
+        self.pose = self.pose * datum::moved(&datum.step);
+        Ok(datum)
+    }
+
+    fn ends(&self, local: &[Option<Vec3>], gate: f64) -> (Vec<Observation>, [f64; 2]) {
+        surface_ends(self.points, local, self.faces, self.edges, self.options, gate)
+    }
+
+    fn light(&self, local: &[Option<Vec3>], shape: Option<Vector3<f64>>) -> Option<Lit> {
+        fit_light(self.points, &self.pose, (local, self.faces), self.edges, self.options, shape)
+    }
+
+    fn follow_ends(&mut self) -> Result<()> {
+        for round in 0..ROUNDS {
+            self.level(round)?;
+            let gate = if round < 2 { 2.0 * self.options.edge_gate_mm } else { self.options.edge_gate_mm };
+            let (observations, step) = self.ends(&self.local(), gate);
+            self.pose = self.pose * in_plane(&fit_edges(observations, &step, self.options)?.step);
+        }
+        Ok(())
+    }
+
+    /// `None` where too few samples are lit in part.
+    fn follow_light(&mut self) -> Result<Option<Lit>> {
+        let mut lit = None;
+        for _ in 0..LIT_ROUNDS {
+            self.level(ROUNDS)?;
+            lit = self.light(&self.local(), None);
+            let Some(lit) = &lit else { break };
+            self.pose = self.pose * in_plane(&lit.step);
+        }
+        Ok(lit)
+    }
+}
+
+/// A correction x, y, turn as a motion.
+fn in_plane(step: &Vector3<f64>) -> Rigid<Part, Part> {
+    Rigid::from_vectors(&Vec3::new(0.0, 0.0, step.z), Vec3::new(step.x, step.y, 0.0))
+}
+
+/// Of x y z rx ry rz, from that of the datum (z rx ry), that in the plane (x y rz), and what all heights have in common, mm.
+fn covariance(datum: &Matrix3<f64>, in_plane: &Matrix3<f64>, level_bias: f64) -> Matrix6<f64> {
+    let mut out = Matrix6::zeros();
+    for (part, at) in [(datum, [2, 3, 4]), (in_plane, [0, 1, 5])] {
+        for i in 0..3 {
+            for k in 0..3 {
+                out[(at[i], at[k])] = part[(i, k)];
+            }
+        }
+    }
+    out[(2, 2)] += level_bias.powi(2);
+    out
 }

@@ -39,8 +39,40 @@ pub struct Observation {
 /// degrees to the sweep are seen along the stripe and from shot to shot.
 const LEAST_COSINE: f64 = 0.6;
 
+/// Where a sample's neighbours are, by side: the axis as in [`Observation::axis`], and the way to the next one in rows and columns.
+const SIDES: [(usize, i64, i64); 4] = [(0, 0, 1), (0, 0, -1), (1, 1, 0), (1, -1, 0)];
+/// So many steps of an axis give their median.
+const MOST_STEPS: usize = 4000;
+
+/// The step that leads to a sample on a face from the one before it.
+struct Step {
+    before: usize,
+    /// The neighbour behind the sample, on the face or not.
+    next: Option<usize>,
+    dx: f64,
+    dy: f64,
+    length: f64,
+}
+
+/// A last sample on a face.
+struct End {
+    /// Place of the sample before it in the part frame, mm, and the direction from there.
+    x: f64,
+    y: f64,
+    nx: f64,
+    ny: f64,
+    /// Light of the last sample and the next one, in fully lit samples.
+    lit: f64,
+    /// Of the face, mm.
+    z: f64,
+    /// Index into [`SIDES`].
+    side: usize,
+    row: u32,
+}
+
 /// Ends of surfaces: a sample on a face whose next neighbour is not. The end lies where the light that
-/// the last samples still send back says: a sample that is lit by half counts as half a step.
+/// the last samples still send back says: a sample that is lit by half counts as half a step. With them come the usual steps
+/// between samples along the stripe and from shot to shot, mm.
 pub(in crate::find) fn surface_ends(
     points: &Ordered,
     local: &[Option<Vec3>],
@@ -49,91 +81,116 @@ pub(in crate::find) fn surface_ends(
     options: &MeasureOptions,
     gate: f64,
 ) -> (Vec<Observation>, [f64; 2]) {
-    let mut found: Vec<(Observation, f64, usize)> = Vec::new();
+    let samples = Samples { points, local, options, stride: shot_stride(points) };
+    let mut found: Vec<End> = Vec::new();
     let mut last_steps: [Vec<f64>; 4] = Default::default();
     let mut steps: [Vec<f64>; 2] = [vec![], vec![]];
-    let stride = shot_stride(points);
     for (i, q) in local.iter().enumerate() {
         let Some(q) = q else { continue };
         for face in faces {
             if (q.z - face.z).abs() > options.height_gate_mm {
                 continue;
             }
-            let (row, column) = (i64::from(points.row[i]), i64::from(points.column[i]));
-            for (side, (axis, dr, dc)) in [(0, 0, 1), (0, 0, -1), (1, 1, 0), (1, -1, 0)].into_iter().enumerate() {
-                let (next, before) = ((row + dr, column + dc), (row - dr, column - dc));
-                if !points.covers(next.0, next.1) || !consecutive(points, row, dr, stride) {
-                    continue;
+            for (side, (axis, ..)) in SIDES.into_iter().enumerate() {
+                let Some(step) = samples.step(i, q, face.z, side) else { continue };
+                if !step.next.is_some_and(|n| samples.near(n, face.z, options.height_gate_mm)) {
+                    last_steps[side].push(step.length);
+                    found.push(samples.end(i, &step, face.z, side));
+                } else if steps[axis].len() < MOST_STEPS {
+                    steps[axis].push(step.length);
                 }
-                let on = |k: usize| local[k].is_some_and(|p| (p.z - face.z).abs() <= options.height_gate_mm);
-                let Some(b) = points.at(before.0, before.1).filter(|&b| on(b)) else { continue };
-                let n = points.at(next.0, next.1);
-                let p = local[b].expect("on the face");
-                let (dx, dy) = (q.x - p.x, q.y - p.y);
-                let length = dx.hypot(dy);
-                if !(0.005..2.0).contains(&(length / options.unit())) {
-                    continue;
-                }
-                if n.is_some_and(on) {
-                    if steps[axis].len() < 4000 {
-                        steps[axis].push(length);
-                    }
-                    continue;
-                }
-                // Light of the last sample and, where it still shows near the face, of the next one.
-                let full = f64::from(points.intensity[b]).max(1e-6);
-                let mut lit = (f64::from(points.intensity[i]) / full).min(1.0);
-                if let Some(n) =
-                    n.filter(|&n| local[n].is_some_and(|p| (p.z - face.z).abs() <= 2.0 * options.height_gate_mm))
-                {
-                    lit += (f64::from(points.intensity[n]) / full).min(1.0);
-                }
-                let template = Observation {
-                    x: p.x,
-                    y: p.y,
-                    residual: lit,
-                    nx: dx / length,
-                    ny: dy / length,
-                    axis,
-                    row: points.row[i],
-                    shape: 0,
-                    element: 0,
-                    locates: true,
-                    weight: 1.0,
-                };
-                last_steps[side].push(length);
-                found.push((template, face.z, side));
             }
         }
     }
-    let median = |mut s: Vec<f64>| {
-        if s.is_empty() {
-            return 0.0;
-        }
-        let middle = s.len() / 2;
-        *s.select_nth_unstable_by(middle, f64::total_cmp).1
-    };
-    let step = steps.map(median);
     // The last sample is lit in part, so its place lies back from the sheet's: by less on the side where
     // a wall below the edge still shows, by more on the side of the shadow. The usual last step of a
     // side is therefore the ruler for that side, not the step between full samples.
     let rulers = last_steps.map(median);
-    let observations = found
-        .into_iter()
-        .filter_map(|(o, z, side)| {
-            let reach = rulers[side] * (0.5 + o.residual);
-            let (x, y) = (o.x + o.nx * reach, o.y + o.ny * reach);
-            // The nearest edge of any direction: at a corner or beside a hole none is taken for another.
-            let s = edges.nearest(x, y, gate, |s| s.z == z)?;
-            if s.nx * o.nx + s.ny * o.ny < LEAST_COSINE {
-                return None;
-            }
-            let residual = (x - s.x) * s.nx + (y - s.y) * s.ny;
-            let (shape, element, locates) = (s.shape, s.element, s.locates);
-            Some(Observation { x, y, residual, nx: s.nx, ny: s.ny, shape, element, locates, ..o })
+    let observations = found.iter().filter_map(|end| end.at_edge(rulers[end.side], edges, gate)).collect();
+    (observations, steps.map(median))
+}
+
+/// 0 for none.
+fn median(mut s: Vec<f64>) -> f64 {
+    if s.is_empty() {
+        return 0.0;
+    }
+    let middle = s.len() / 2;
+    *s.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// A scan's samples in the part frame.
+struct Samples<'a> {
+    points: &'a Ordered,
+    local: &'a [Option<Vec3>],
+    options: &'a MeasureOptions,
+    stride: u32,
+}
+
+impl Samples<'_> {
+    fn near(&self, k: usize, z: f64, gate: f64) -> bool {
+        self.local[k].is_some_and(|p| (p.z - z).abs() <= gate)
+    }
+
+    /// To sample `i` at `q` on the face at `z`; `None` where its neighbours on that side and opposite say nothing.
+    fn step(&self, i: usize, q: &Vec3, z: f64, side: usize) -> Option<Step> {
+        let (points, (_, dr, dc)) = (self.points, SIDES[side]);
+        let (row, column) = (i64::from(points.row[i]), i64::from(points.column[i]));
+        if !points.covers(row + dr, column + dc) || !consecutive(points, row, dr, self.stride) {
+            return None;
+        }
+        let before = points.at(row - dr, column - dc).filter(|&b| self.near(b, z, self.options.height_gate_mm))?;
+        let p = self.local[before].expect("on the face");
+        let (dx, dy) = (q.x - p.x, q.y - p.y);
+        let length = dx.hypot(dy);
+        (0.005..2.0).contains(&(length / self.options.unit())).then(|| Step {
+            before,
+            next: points.at(row + dr, column + dc),
+            dx,
+            dy,
+            length,
         })
-        .collect();
-    (observations, step)
+    }
+
+    /// With the light of the last sample `i` and, where it still shows near the face, of the next one.
+    fn end(&self, i: usize, step: &Step, z: f64, side: usize) -> End {
+        let intensity = &self.points.intensity;
+        let full = f64::from(intensity[step.before]).max(1e-6);
+        let light = |k: usize| (f64::from(intensity[k]) / full).min(1.0);
+        let mut lit = light(i);
+        if let Some(n) = step.next.filter(|&n| self.near(n, z, 2.0 * self.options.height_gate_mm)) {
+            lit += light(n);
+        }
+        let p = self.local[step.before].expect("on the face");
+        let (nx, ny) = (step.dx / step.length, step.dy / step.length);
+        End { x: p.x, y: p.y, nx, ny, lit, z, side, row: self.points.row[i] }
+    }
+}
+
+impl End {
+    /// The end measured against the drawn edge; `None` where none is near in that direction. `ruler`: the usual last step.
+    fn at_edge(&self, ruler: f64, edges: &EdgeIndex, gate: f64) -> Option<Observation> {
+        let reach = ruler * (0.5 + self.lit);
+        let (x, y) = (self.x + self.nx * reach, self.y + self.ny * reach);
+        // The nearest edge of any direction: at a corner or beside a hole none is taken for another.
+        let s = edges.nearest(x, y, gate, |s| s.z == self.z)?;
+        if s.nx * self.nx + s.ny * self.ny < LEAST_COSINE {
+            return None;
+        }
+        Some(Observation {
+            x,
+            y,
+            residual: (x - s.x) * s.nx + (y - s.y) * s.ny,
+            nx: s.nx,
+            ny: s.ny,
+            axis: SIDES[self.side].0,
+            row: self.row,
+            shape: s.shape,
+            element: s.element,
+            locates: s.locates,
+            weight: 1.0,
+        })
+    }
 }
 
 /// The usual difference of shot numbers between rows.

@@ -93,6 +93,11 @@ impl Checkpoint {
         crate::files::write(&part.join(PROGRESS), sealed(self).as_bytes())
     }
 
+    /// Shots done that a resumed scan reads again: the last one, because points are judged by the shots around them.
+    pub(super) fn repeated(&self) -> usize {
+        self.shots.min(1)
+    }
+
     /// Where the camera was at the scan's first shot.
     pub fn first_place(&self) -> Option<Rigid<Base, Camera>> {
         // Not repaired as poses from outside are: to the last bit what it was.

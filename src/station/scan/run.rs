@@ -58,6 +58,8 @@ pub struct ScanOptions {
 /// Shots between two checkpoints: what a crash can cost beside those under way.
 const CHECKPOINT_SHOTS: usize = 64;
 
+const CLOUD_FILE: &str = "cloud.ply";
+
 /// [`scan_on`] where the options say; the device is opened while the first pictures are decoded.
 pub fn scan(
     id: &str,
@@ -96,102 +98,16 @@ pub fn scan_on(
     let state = state(id, rig, options, &folder.part())?;
     let part = if state.shots == 0 { folder.begin()? } else { folder.part() };
     scan_folder::sweep(&part)?;
-    let cloud_path = part.join("cloud.ply");
-    // A resumed scan reads the last finished shot again, because points are judged by the shots around them.
-    let repeated = state.shots.min(1);
-    let mut source = open(state.shots - repeated)?;
-    let processor = processor()?;
-    let cloud = if state.shots > 0 {
-        CloudWriter::resume(&cloud_path, state.points)?
-    } else {
-        CloudWriter::create_in(&cloud_path, options.motion.frame())?
-    };
-    let total = source.remaining().map(|n| n + state.shots - repeated);
-    let format = source.format();
-    let ambient = options.ambient.clone();
-    let carrier = Carrier::new(rig, &options.motion)?;
-    let scanner = Scanner::new(rig, carrier, format, &options.extraction, options.volume.as_ref(), ambient, processor)?
-        .resumed(state.stripe, state.first_place());
-    let seen = Seen::new(
-        &camera_for(&rig.need_camera()?.value, format)?,
-        &rig.need_laser_plane()?.value,
-        Volume::depths(options.volume.as_ref()),
-    );
-    let print = rig.fingerprint();
-    let shots = if state.shots > 0 {
-        ShotsWriter::resume(&part, state.shots as u32, &print)?
-    } else {
-        ShotsWriter::create(&part, options.motion.frame(), scanner.stripe_along(), &print)?
-    };
-    let started = Instant::now();
-    let first = state.shots;
-    let spent = Spent { start_s: begun.elapsed().as_secs_f64(), ..Spent::default() };
-    let cut_before = state.cut;
-    let overlays = Overlays::new(&part, options.overlays, total)?;
-    let pictures = VecDeque::new();
-    let mut work = Work {
-        part: &part,
-        repeated,
-        cut_before,
-        cloud,
-        shots,
-        state,
-        scanner,
-        overlays,
-        seen,
-        pictures,
-        delays: Delays::default(),
-        spent,
-        stopped: None,
-    };
+    let mut source = open(state.shots - state.repeated())?;
+    let mut work = Work::begin(&part, rig, options, state, source.as_ref(), processor()?)?;
+    work.spent.start_s = begun.elapsed().as_secs_f64();
+    let total = work.total;
     let ended = work.all(source.as_mut(), options, |done| progress(done, total));
     // Where the disk itself failed, the checkpoint before this one stands.
     let saved = work.save();
     ended.map_err(|fault| kept(fault, &work.state, saved.is_ok(), total))?;
     saved?;
-    let Work { cloud, mut state, scanner, mut spent, seen, delays, stopped, .. } = work;
-    let points = cloud.finish()?;
-    let seconds = started.elapsed().as_secs_f64();
-    let products = Instant::now();
-    let (height_map, mut files) =
-        super::products::write(&part, &cloud_path, points, &options.grid, scanner.up_in_base(), scanner.device())?;
-    files.extend([super::products::hash(&part, SHOTS_FILE)?]);
-    spent.products_s = products.elapsed().as_secs_f64();
-    if state.cut > 0 {
-        state.peaks.insert("beyond the list: more than a twentieth of the pictures lit".into(), state.cut);
-    }
-    let report = ScanReport {
-        format: FORMAT,
-        program: format!("sheetlight {}", env!("CARGO_PKG_VERSION")),
-        created: jiff::Timestamp::now().to_string(),
-        units: "mm".into(),
-        frame: options.motion.frame().into(),
-        motion: options.motion.clone(),
-        recording: label.into(),
-        rig_fingerprint: print,
-        working_volume: options.volume.clone(),
-        ran_on: scanner.ran_on(),
-        image: format,
-        shots: state.shots,
-        points,
-        median_sigma_mm: state.median_sigma(),
-        stripe: scanner.stripe(),
-        seen,
-        peaks: state.peaks,
-        dark_shots: state.dark,
-        camera: source.account(),
-        delay: delays.so_far(),
-        skipped: state.skipped,
-        seconds,
-        shots_per_second: (state.shots - first) as f64 / seconds.max(1e-9),
-        spent,
-        settings: options.extraction.clone(),
-        height_map,
-        remarks: rig.remarks().into_iter().chain(source.remarks()).chain(stopped).collect(),
-        files,
-        imported: None,
-        filtered: None,
-    };
+    let report = work.finish(label, rig, options, source.as_ref())?;
     let text = serde_json::to_string_pretty(&report).expect("plain data");
     crate::files::write(&part.join("scan.json"), text.as_bytes())?;
     crate::station::judge::page::save(&part, None, &[])?;
@@ -230,8 +146,12 @@ fn kept(fault: Fault, state: &Checkpoint, saved: bool, total: Option<usize>) -> 
 /// A scan under way.
 struct Work<'a> {
     part: &'a Path,
-    /// Shots that an earlier run finished and this one reads again.
+    started: Instant,
+    /// Shots that an earlier run finished, and those of them that this one reads again.
+    first: usize,
     repeated: usize,
+    /// Shots in all, where that is known.
+    total: Option<usize>,
     /// Pixels that found no room in the runs before.
     cut_before: u64,
     cloud: CloudWriter,
@@ -248,7 +168,57 @@ struct Work<'a> {
     stopped: Option<String>,
 }
 
-impl Work<'_> {
+impl<'a> Work<'a> {
+    /// Opens all that shots go to, as an interrupted run left it where `state` is of one.
+    fn begin(
+        part: &'a Path,
+        rig: &Rig,
+        options: &ScanOptions,
+        state: Checkpoint,
+        source: &dyn Source,
+        processor: Processor,
+    ) -> Result<Work<'a>> {
+        let (resumed, first, repeated) = (state.shots > 0, state.shots, state.repeated());
+        let cloud_path = part.join(CLOUD_FILE);
+        let cloud = if resumed {
+            CloudWriter::resume(&cloud_path, state.points)?
+        } else {
+            CloudWriter::create_in(&cloud_path, options.motion.frame())?
+        };
+        let total = source.remaining().map(|n| n + first - repeated);
+        let (format, volume) = (source.format(), options.volume.as_ref());
+        let carrier = Carrier::new(rig, &options.motion)?;
+        let ambient = options.ambient.clone();
+        let scanner = Scanner::new(rig, carrier, format, &options.extraction, volume, ambient, processor)?
+            .resumed(state.stripe, state.first_place());
+        let camera = camera_for(&rig.need_camera()?.value, format)?;
+        let seen = Seen::new(&camera, &rig.need_laser_plane()?.value, Volume::depths(volume));
+        let print = rig.fingerprint();
+        let shots = if resumed {
+            ShotsWriter::resume(part, first as u32, &print)?
+        } else {
+            ShotsWriter::create(part, options.motion.frame(), scanner.stripe_along(), &print)?
+        };
+        Ok(Work {
+            part,
+            started: Instant::now(),
+            first,
+            repeated,
+            total,
+            cut_before: state.cut,
+            cloud,
+            shots,
+            state,
+            scanner,
+            overlays: Overlays::new(part, options.overlays, total)?,
+            seen,
+            pictures: VecDeque::new(),
+            delays: Delays::default(),
+            spent: Spent::default(),
+            stopped: None,
+        })
+    }
+
     /// Every shot of the source, to its points in the cloud.
     fn all(&mut self, source: &mut dyn Source, options: &ScanOptions, mut progress: impl FnMut(usize)) -> Result<()> {
         let mut ended = false;
@@ -340,6 +310,54 @@ impl Work<'_> {
         self.state.cut = self.cut_before + self.scanner.cut();
         self.shots.checkpoint()?;
         self.state.save(self.part, &mut self.cloud)
+    }
+
+    /// What is derived from the whole cloud, and the report of it all.
+    fn finish(self, label: &str, rig: &Rig, options: &ScanOptions, source: &dyn Source) -> Result<ScanReport> {
+        let Work { part, cloud, mut state, scanner, mut spent, .. } = self;
+        let points = cloud.finish()?;
+        let seconds = self.started.elapsed().as_secs_f64();
+        let products = Instant::now();
+        let (cloud_path, up) = (part.join(CLOUD_FILE), scanner.up_in_base());
+        let (height_map, mut files) =
+            super::products::write(part, &cloud_path, points, &options.grid, up, scanner.device())?;
+        files.extend([super::products::hash(part, SHOTS_FILE)?]);
+        spent.products_s = products.elapsed().as_secs_f64();
+        if state.cut > 0 {
+            state.peaks.insert("beyond the list: more than a twentieth of the pictures lit".into(), state.cut);
+        }
+        Ok(ScanReport {
+            format: FORMAT,
+            program: format!("sheetlight {}", env!("CARGO_PKG_VERSION")),
+            created: jiff::Timestamp::now().to_string(),
+            units: "mm".into(),
+            frame: options.motion.frame().into(),
+            motion: options.motion.clone(),
+            recording: label.into(),
+            rig_fingerprint: rig.fingerprint(),
+            working_volume: options.volume.clone(),
+            ran_on: scanner.ran_on(),
+            image: source.format(),
+            shots: state.shots,
+            points,
+            median_sigma_mm: state.median_sigma(),
+            stripe: scanner.stripe(),
+            seen: self.seen,
+            peaks: state.peaks,
+            dark_shots: state.dark,
+            camera: source.account(),
+            delay: self.delays.so_far(),
+            skipped: state.skipped,
+            seconds,
+            shots_per_second: (state.shots - self.first) as f64 / seconds.max(1e-9),
+            spent,
+            settings: options.extraction.clone(),
+            height_map,
+            remarks: rig.remarks().into_iter().chain(source.remarks()).chain(self.stopped).collect(),
+            files,
+            imported: None,
+            filtered: None,
+        })
     }
 }
 

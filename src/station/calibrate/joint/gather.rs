@@ -5,10 +5,12 @@
 use crate::calibrate::boards::{BoardView, FindOptions, find};
 use crate::calibrate::joint::shots::Reported;
 use crate::fault::{Fault, Kind, Result};
+use crate::geometry::{Base, Flange, Rigid};
 use crate::recording::{Beam, BoardSpec, Recording};
 use crate::rig::hash_file;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A picture of one of the recordings.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,12 +100,44 @@ pub fn gather(
     progress: &(dyn Fn(usize, usize) + Sync),
 ) -> Result<Gathered> {
     same_size(recordings)?;
-    let mut out = Gathered::default();
-    let mut frames = Vec::new();
-    let mut robots = Vec::new();
+    let (frames, robots, inputs) = listed(recordings, poses)?;
+    if frames.is_empty() {
+        return Err(Fault::input("no frame of the recordings has an 'ambient' picture")
+            .cause("boards are found in pictures taken in room light, the lasers off")
+            .next("record an ambient picture with each frame"));
+    }
+    let out = Gathered { inputs, ..Gathered::default() };
+    let mut gathering = Gathering { recordings, robots, places: Vec::new(), known: BTreeMap::new(), out };
+    for (f, (hash, view)) in frames.iter().zip(boards(recordings, &frames, progress)?) {
+        match view {
+            Ok(view) => gathering.add(f, hash, view)?,
+            // Missing files and misdescribed boards are the recording's fault, not one picture's.
+            Err(fault) if fault.kind != Kind::Refused => return Err(fault),
+            Err(fault) => gathering.out.missing.push((f.name.clone(), format!("{} ({})", fault.what, fault.cause))),
+        }
+    }
+    let Gathering { out, places, .. } = gathering;
+    if out.stops.is_empty() {
+        let (name, why) = &out.missing[out.missing.len() / 2];
+        return Err(Fault::refused(format!("no board was found in any of {} pictures; {name}: {why}", frames.len()))
+            .cause("the board is out of view, or another one than meta.json describes")
+            .next("compare meta.json's board with the real one, and look at the pictures"));
+    }
+    Ok(Gathered { places: places.len(), ..out })
+}
+
+/// The robot's poses of each recording, where it has some.
+type Robots = Vec<Option<Vec<Rigid<Base, Flange>>>>;
+
+/// The frames with a picture in room light, the robot's poses, and the hash of each meta.json.
+fn listed<'a>(
+    recordings: &'a [Recording],
+    poses: Option<&str>,
+) -> Result<(Vec<Frame<'a>>, Robots, BTreeMap<String, String>)> {
+    let (mut frames, mut robots, mut inputs) = (Vec::new(), Vec::new(), BTreeMap::new());
     for (i, r) in recordings.iter().enumerate() {
         let label = label(recordings, i);
-        out.inputs.insert(format!("{label}meta.json"), hash_file(&r.folder.join("meta.json"))?);
+        inputs.insert(format!("{label}meta.json"), hash_file(&r.folder.join("meta.json"))?);
         let has_poses = r.meta.pose_file.is_some() || !r.meta.pose_files.is_empty();
         let several = poses.filter(|_| r.meta.pose_file.is_none());
         robots.push(if has_poses { Some(r.poses(several)?) } else { None });
@@ -113,44 +147,50 @@ pub fn gather(
             }
         }
     }
-    if frames.is_empty() {
-        return Err(Fault::input("no frame of the recordings has an 'ambient' picture")
-            .cause("boards are found in pictures taken in room light, the lasers off")
-            .next("record an ambient picture with each frame"));
-    }
-    let done = std::sync::atomic::AtomicUsize::new(0);
-    let seen: Vec<(String, Result<BoardView>)> = frames
-        .par_iter()
-        .map(|f| {
-            let r = &recordings[f.recording];
-            let hash = hash_file(&r.inside(f.file)?)?;
-            let view = (|| {
-                let board = r.meta.board_of(&r.meta.frames[f.index]).ok_or_else(|| {
-                    Fault::input(format!("{}: meta.json describes no board for it", f.name))
-                        .next("describe the board under 'board' or 'boards'")
-                })?;
-                find(&r.picture(f.file)?, board, &FindOptions::default())
-            })();
-            progress(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1, frames.len());
-            Ok((hash, view))
-        })
-        .collect::<Result<_>>()?;
-    let mut places: Vec<(usize, usize)> = Vec::new();
-    let mut known: BTreeMap<String, usize> = BTreeMap::new();
-    for (f, (hash, view)) in frames.iter().zip(seen) {
+    Ok((frames, robots, inputs))
+}
+
+/// Each picture's hash, and the board in it.
+fn boards(
+    recordings: &[Recording],
+    frames: &[Frame<'_>],
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Vec<(String, Result<BoardView>)>> {
+    let done = AtomicUsize::new(0);
+    let look = |f: &Frame<'_>| {
         let r = &recordings[f.recording];
+        let hash = hash_file(&r.inside(f.file)?)?;
+        let view = (|| {
+            let board = r.meta.board_of(&r.meta.frames[f.index]).ok_or_else(|| {
+                Fault::input(format!("{}: meta.json describes no board for it", f.name))
+                    .next("describe the board under 'board' or 'boards'")
+            })?;
+            find(&r.picture(f.file)?, board, &FindOptions::default())
+        })();
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1, frames.len());
+        Ok((hash, view))
+    };
+    frames.par_iter().map(look).collect()
+}
+
+/// Stops as their pictures come in.
+struct Gathering<'a> {
+    recordings: &'a [Recording],
+    robots: Robots,
+    /// Where boards stood: recording, and index of the board there.
+    places: Vec<(usize, usize)>,
+    /// Index of a stop by the hash of its picture in room light.
+    known: BTreeMap<String, usize>,
+    out: Gathered,
+}
+
+impl Gathering<'_> {
+    /// A picture in room light and what belongs to it: a stop, or more of one that another recording has shown.
+    fn add(&mut self, f: &Frame<'_>, hash: String, view: BoardView) -> Result<()> {
+        let r = &self.recordings[f.recording];
         let frame = &r.meta.frames[f.index];
-        let view = match view {
-            Ok(view) => view,
-            // Missing files and misdescribed boards are the recording's fault, not one picture's.
-            Err(fault) if fault.kind != Kind::Refused => return Err(fault),
-            Err(fault) => {
-                out.missing.push((f.name.clone(), format!("{} ({})", fault.what, fault.cause)));
-                continue;
-            }
-        };
-        let at = *known.entry(hash.clone()).or_insert_with(|| {
-            out.stops.push(Stop {
+        let at = *self.known.entry(hash.clone()).or_insert_with(|| {
+            self.out.stops.push(Stop {
                 name: f.name.clone(),
                 board: r.meta.board_of(frame).expect("it was found").clone(),
                 view,
@@ -159,36 +199,38 @@ pub fn gather(
                 line: None,
                 pointer: None,
             });
-            out.stops.len() - 1
+            self.out.stops.len() - 1
         });
-        out.inputs.insert(f.name.clone(), hash);
-        let stop = &mut out.stops[at];
-        if let (Some(poses), None) = (&robots[f.recording], &stop.robot) {
-            let key = (f.recording, frame.board.unwrap_or(0));
-            let place = places.iter().position(|p| *p == key).unwrap_or_else(|| {
-                places.push(key);
-                places.len() - 1
-            });
-            stop.robot = Some(Reported { pose: *r.pose_of(f.index, poses)?, place });
+        self.out.inputs.insert(f.name.clone(), hash);
+        if self.out.stops[at].robot.is_none()
+            && let Some(poses) = &self.robots[f.recording]
+        {
+            let pose = *r.pose_of(f.index, poses)?;
+            let place = self.place(f.recording, frame.board.unwrap_or(0));
+            self.out.stops[at].robot = Some(Reported { pose, place });
         }
         if let Some(file) = &frame.laser {
             let picture = Picture { recording: f.recording, file: file.clone() };
-            out.inputs.insert(format!("{}{file}", label(recordings, f.recording)), hash_file(&r.inside(file)?)?);
+            let name = format!("{}{file}", label(self.recordings, f.recording));
+            self.out.inputs.insert(name, hash_file(&r.inside(file)?)?);
+            let stop = &mut self.out.stops[at];
             match r.meta.beam {
                 Some(Beam::Line) => stop.line = Some(picture),
                 Some(Beam::Pointer) => stop.pointer = Some(picture),
                 None => return Err(nameless(r)),
             }
         }
+        Ok(())
     }
-    if out.stops.is_empty() {
-        let (name, why) = &out.missing[out.missing.len() / 2];
-        return Err(Fault::refused(format!("no board was found in any of {} pictures; {name}: {why}", frames.len()))
-            .cause("the board is out of view, or another one than meta.json describes")
-            .next("compare meta.json's board with the real one, and look at the pictures"));
+
+    /// Index of the place where a recording's board stood.
+    fn place(&mut self, recording: usize, board: usize) -> usize {
+        let known = self.places.iter().position(|p| *p == (recording, board));
+        known.unwrap_or_else(|| {
+            self.places.push((recording, board));
+            self.places.len() - 1
+        })
     }
-    out.places = places.len();
-    Ok(out)
 }
 
 fn nameless(r: &Recording) -> Fault {
