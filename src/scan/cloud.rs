@@ -117,7 +117,8 @@ impl CloudWriter {
         let head = head_of(&mut file).map_err(|e| Fault::read(&part, e))?;
         let length = file.metadata().map_err(|e| Fault::read(&part, e))?.len();
         let (frame, start) = head.as_ref().map_or((FRAMES[0], 0), |h| (h.frame, h.length));
-        let wanted = start + keep * RECORD;
+        // A count that no file holds is a length that none has.
+        let wanted = keep.saturating_mul(RECORD).saturating_add(start);
         if head.is_none() || length < wanted {
             return Err(Fault::input(format!("{}: holds {length} bytes, {wanted} needed to resume", part.display()))
                 .cause("another program's file, or the disk lost what was written")
