@@ -136,8 +136,8 @@ fn scans() {
     let seed = std::fs::read(&path).unwrap();
     survives("shots", vec![seed], move |b| {
         std::fs::write(&path, b).expect("a file");
-        Shots::load(folder.path(), "rig")?;
-        ShotsWriter::resume(folder.path(), 2, "rig").map(drop)
+        Shots::load(folder.path(), "base", "rig")?;
+        ShotsWriter::resume(folder.path(), 2, "base", "rig").map(drop)
     });
     let mut cloud = CloudWriter::create(&dir.path().join("cloud.ply")).unwrap();
     let mut state = Checkpoint::new("id".into());

@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 /// The file's name in a scan folder.
 pub const SHOTS_FILE: &str = "shots.jsonl";
 const FORMAT: &str = "sheetlight shots 1";
+const UNITS: &str = "mm";
 
 /// The image axis that a stripe runs along, of two the nearer one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -55,17 +56,15 @@ impl Shots {
         self.places.get(&shot)
     }
 
-    /// Reads a scan folder's file.
+    /// Reads a scan folder's file, of a cloud in `frame` that was made with `rig` (its fingerprint).
     ///
     /// # Errors
-    /// No file, lines that are none of these, a shot twice, another calibration's.
-    pub fn load(scan: &Path, rig: &str) -> Result<Shots> {
+    /// No file, lines that are none of these, a shot twice, another frame, unit or calibration.
+    pub fn load(scan: &Path, frame: &str, rig: &str) -> Result<Shots> {
         let path = scan.join(SHOTS_FILE);
         let again = "scan again";
         let Some(text) = crate::files::read_text_if_there(&path)? else {
-            return Err(Fault::input(format!("{}: is not there", path.display()))
-                .cause("scanned by a former version, which did not keep where the camera stood")
-                .next(again));
+            return Err(missing(scan));
         };
         let strange = |n: usize, what: String| {
             Fault::input(format!("{} line {}: {what}", path.display(), n + 1))
@@ -77,6 +76,11 @@ impl Shots {
             .map_err(|e| strange(0, format!("is not the head of a list of shots: {e}")))?;
         if head.format != FORMAT {
             return Err(strange(0, format!("is of format {:?}, this version reads {FORMAT}", head.format)));
+        }
+        if (head.frame.as_str(), head.units.as_str()) != (frame, UNITS) {
+            let is =
+                format!("is in the {} frame and {}, the scan in the {frame} frame and {UNITS}", head.frame, head.units);
+            return Err(strange(0, is));
         }
         if head.rig != rig {
             return Err(strange(0, format!("is of calibration {:.12}, the scan of {rig:.12}", head.rig)));
@@ -90,6 +94,12 @@ impl Shots {
         }
         Ok(shots)
     }
+}
+
+fn missing(folder: &Path) -> Fault {
+    Fault::input(format!("{}: is not there", folder.join(SHOTS_FILE).display()))
+        .cause("scanned by a former version, which did not keep where the camera stood")
+        .next("scan again, without --resume: the pictures are still there")
 }
 
 #[derive(serde::Serialize, serde::Deserialize)]
@@ -129,7 +139,7 @@ impl ShotsWriter {
         let head = Head {
             format: FORMAT.into(),
             frame: frame.into(),
-            units: "mm".into(),
+            units: UNITS.into(),
             stripe_along: along,
             rig: rig.into(),
         };
@@ -137,15 +147,20 @@ impl ShotsWriter {
     }
 
     /// Goes on with the list of an interrupted scan that did the shots before `done`; what came after is cut off.
-    pub fn resume(folder: &Path, done: u32, rig: &str) -> Result<ShotsWriter> {
-        let path = folder.join(SHOTS_FILE);
-        let text = crate::files::read_text(&path)?;
+    ///
+    /// # Errors
+    /// As [`Shots::load`].
+    pub fn resume(folder: &Path, done: usize, frame: &str, rig: &str) -> Result<ShotsWriter> {
+        let text = match crate::files::read_text_if_there(&folder.join(SHOTS_FILE))? {
+            Some(text) => text,
+            None => return Err(missing(folder)),
+        };
         // The last line may be half a line.
         let whole = text.split_inclusive('\n').filter(|l| l.ends_with('\n'));
-        let is_done = |l: &&str| serde_json::from_str::<Line>(l).map_or(true, |l| l.shot < done);
+        let is_done = |l: &&str| serde_json::from_str::<Line>(l).map_or(true, |l| (l.shot as usize) < done);
         let kept: String = whole.take_while(is_done).collect();
         let writer = ShotsWriter::with(folder, &kept)?;
-        Shots::load(folder, rig)?;
+        Shots::load(folder, frame, rig)?;
         Ok(writer)
     }
 
@@ -189,7 +204,7 @@ mod tests {
         w.checkpoint().unwrap();
         w.add(5, place(5));
         w.checkpoint().unwrap();
-        let whole = Shots::load(dir.path(), "rig").unwrap();
+        let whole = Shots::load(dir.path(), "base", "rig").unwrap();
         assert_eq!((whole.along, whole.places.len()), (Along::V, 6));
         for s in 0..6 {
             let (turn, shift) = whole.place(s).unwrap().difference(&place(s));
@@ -200,7 +215,7 @@ mod tests {
         let path = dir.path().join(SHOTS_FILE);
         let text = std::fs::read_to_string(&path).unwrap();
         std::fs::write(&path, &text[..text.len() - 30]).unwrap();
-        let mut w = ShotsWriter::resume(dir.path(), 3, "rig").unwrap();
+        let mut w = ShotsWriter::resume(dir.path(), 3, "base", "rig").unwrap();
         (3..6).for_each(|s| w.add(s, place(s)));
         w.checkpoint().unwrap();
         assert_eq!(std::fs::read_to_string(&path).unwrap(), text);
@@ -216,15 +231,17 @@ mod tests {
         let text = std::fs::read_to_string(&path).unwrap();
         let refused = |text: &str| {
             std::fs::write(&path, text).unwrap();
-            Shots::load(dir.path(), "rig").unwrap_err().to_string()
+            Shots::load(dir.path(), "base", "rig").unwrap_err().to_string()
         };
         let last = text.lines().last().unwrap().to_owned();
         assert!(refused(&format!("{text}{last}\n")).contains("shot 0 stands there twice"));
         assert!(refused(&text.replace("shots 1", "shots 9")).contains("shots 9"));
         assert!(refused(&text.replace("\"rig\":\"rig\"", "\"rig\":\"other\"")).contains("of calibration other"));
         assert!(refused(&text.replace("\"u\"", "\"x\"")).contains("line 1"));
+        assert!(refused(&text.replace("\"base\"", "\"axis\"")).contains("in the axis frame"));
+        assert!(refused(&text.replace("\"mm\"", "\"m\"")).contains("frame and m,"));
         assert!(refused("").contains("line 1"));
         std::fs::remove_file(&path).unwrap();
-        assert!(Shots::load(dir.path(), "rig").unwrap_err().to_string().contains("former version"));
+        assert!(Shots::load(dir.path(), "base", "rig").unwrap_err().to_string().contains("former version"));
     }
 }

@@ -6,7 +6,7 @@ use sheetlight::fault::Fault;
 use sheetlight::find::insert::recipe::InsertionSpec;
 use sheetlight::find::insert::teach::{TeachOptions, teach};
 use sheetlight::find::measure::points::Ordered;
-use sheetlight::geometry::{Base, Flange};
+use sheetlight::geometry::{Base, Flange, Rigid};
 use sheetlight::scan::grid;
 use sheetlight::scan::{Along, CloudPoint, GridOptions, Shots};
 
@@ -49,6 +49,10 @@ fn points() {
         case("z of inf", Says(&["inf"]), || with(|p| p.position[2] = f32::INFINITY)),
         case("u of 100,000", Says(&["columns"]), || with(|p| p.u = 1e5)),
         case("a shot of 4 billion", Good, || with(|p| p.shot = u32::MAX)),
+        case("a shot that is not listed", Says(&["shot 3, which is not listed"]), || {
+            let listed = (0..3).map(|shot| (shot, Rigid::identity()));
+            Ordered::new(&plate(), &Shots::new(Along::U, listed))
+        }),
         case("499 points", Says(&["499 points", "at least 500"]), || {
             Ordered::new(&plate()[..499], &Shots::unplaced(Along::U))
         }),

@@ -232,7 +232,7 @@ pub fn shots_of(scan: &Path) -> Result<Shots> {
     if report.imported.is_some() {
         return Ok(Shots::unplaced(Along::U));
     }
-    Shots::load(scan, &report.rig_fingerprint)
+    Shots::load(scan, &report.frame, &report.rig_fingerprint)
 }
 
 /// The points of a finished scan, checked to be those that the scan wrote.

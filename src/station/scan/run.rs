@@ -195,7 +195,7 @@ impl<'a> Work<'a> {
         let seen = Seen::new(&camera, &rig.need_laser_plane()?.value, Volume::depths(volume));
         let print = rig.fingerprint();
         let shots = if resumed {
-            ShotsWriter::resume(part, first as u32, &print)?
+            ShotsWriter::resume(part, first, options.motion.frame(), &print)?
         } else {
             ShotsWriter::create(part, options.motion.frame(), scanner.stripe_along(), &print)?
         };
