@@ -116,7 +116,7 @@ impl Rig {
         let part = set.begin()?;
         let made = || {
             for (kind, text) in &texts {
-                crate::files::write(&part.join(format!("{}.json", kind.name())), text.as_bytes())?;
+                crate::files::write(&part.join(file_name(*kind)), text.as_bytes())?;
             }
             for (name, text) in others(&Rig::read(&part)?) {
                 crate::files::write(&part.join(name), text.as_bytes())?;
@@ -331,7 +331,11 @@ fn missing(kind: Kind) -> Fault {
 }
 
 fn file(station: &Path, kind: Kind) -> PathBuf {
-    station.join("calibration").join(format!("{}.json", kind.name()))
+    station.join("calibration").join(file_name(kind))
+}
+
+fn file_name(kind: Kind) -> String {
+    format!("{}.json", kind.name())
 }
 
 fn load<T: DeserializeOwned + Measured>(station: &Path, kind: Kind) -> Result<Option<Calibration<T>>> {
@@ -341,7 +345,7 @@ fn load<T: DeserializeOwned + Measured>(station: &Path, kind: Kind) -> Result<Op
 }
 
 fn read<T: DeserializeOwned + Measured>(folder: &Path, kind: Kind) -> Result<Option<Calibration<T>>> {
-    let path = folder.join(format!("{}.json", kind.name()));
+    let path = folder.join(file_name(kind));
     let Some(text) = crate::files::read_text_if_there(&path)? else { return Ok(None) };
     let found: Calibration<T> = unsealed(&text, &path.display().to_string()).map_err(|e| e.next(again(kind)))?;
     found.check(kind).map_err(|e| e.at(path.display()).next(again(kind)))?;
