@@ -3,13 +3,13 @@
 //! Frame and unit: base frame, mm.
 
 use super::capture::options::Capture;
-use super::capture::scanning::scan_camera;
+use super::capture::scanning::{Taken, scan_camera};
 use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
 use crate::raster::{Channel, Image, Light, load_sized};
 use crate::recording::{Recording, load_poses};
 use crate::rig::Rig;
-use crate::scan::{GridOptions, RawFormat, RawSource, Where};
+use crate::scan::{Format, GridOptions, RawFormat, RawSource, Where};
 use crate::station::judge;
 use crate::station::{Judged, ScanOptions, ScanReport, Settings, scan_recording};
 use indicatif::ProgressBar;
@@ -105,7 +105,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     }
     let bar = console.bar("scanning", 0);
     let report = match (&args.recording, args.raw) {
-        _ if args.capture.running.camera.is_some() => from_camera(args, &rig, &mut options, console, &bar)?,
+        _ if args.capture.running.camera.is_some() => from_camera(args, &rig, &options, console, &bar)?,
         (Some(folder), None) => from_recording(args, folder, &rig, &mut options, console, &bar)?,
         (None, Some(raw)) => from_pipe(args, raw, &rig, &mut options, console, &bar)?,
         _ => {
@@ -138,15 +138,19 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
 fn from_camera(
     args: &Args,
     rig: &Rig,
-    options: &mut ScanOptions,
+    options: &ScanOptions,
     console: &Console,
     bar: &ProgressBar,
 ) -> Result<ScanReport> {
-    if let Some(raw) = args.raw {
-        options.ambient = ambient_beside(args, raw)?;
-    }
-    let (poses, keep) = (args.poses.as_deref().map(Path::new), args.record.as_deref());
-    scan_camera(&args.capture, args.raw, poses, &args.station, keep, rig, options, console, bar)
+    let taken = Taken {
+        capture: &args.capture,
+        raw: args.raw,
+        poses: args.poses.as_deref().map(Path::new),
+        station: &args.station,
+        keep: args.record.as_deref(),
+        ambient: &|format| ambient_beside(args, format),
+    };
+    scan_camera(&taken, rig, options, console, bar)
 }
 
 fn from_recording(
@@ -192,7 +196,7 @@ fn from_pipe(
     if args.resume {
         return Err(Fault::usage("a pipe cannot be resumed").next("record the frames to a folder to be able to resume"));
     }
-    options.ambient = ambient_beside(args, raw)?;
+    options.ambient = ambient_beside(args, raw.format)?;
     let missing = args.missing.iter().copied().collect();
     let open = |_| Ok(Box::new(RawSource::new(raw, std::io::stdin().lock(), file.poses, missing)?) as Box<_>);
     crate::station::scan("pipe", "standard input", open, rig, options, shown_by(bar))
@@ -222,9 +226,8 @@ fn seen(folder: &Path, channel: Channel) -> String {
     read().unwrap_or_default()
 }
 
-/// The picture with the laser off that --ambient names, of the raw frames' size.
-fn ambient_beside(args: &Args, raw: RawFormat) -> Result<Option<Image>> {
-    let f = raw.format;
+/// The picture with the laser off that --ambient names, of the frames' size.
+fn ambient_beside(args: &Args, f: Format) -> Result<Option<Image>> {
     let load = |path: &PathBuf| load_sized(path, args.channel, f.bits, [f.width, f.height]).map_err(no_ambient);
     args.ambient.as_ref().map(load).transpose()
 }

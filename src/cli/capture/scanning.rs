@@ -3,9 +3,10 @@
 
 use super::options::{Capture, Teller};
 use crate::capture::record::{Backlog, RecordReport, Recorder, RecorderOptions, record};
-use crate::capture::{Mode, RawFormat};
+use crate::capture::{Format, Mode, RawFormat};
 use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
+use crate::raster::Image;
 use crate::recording::{Motion, Sources};
 use crate::rig::Rig;
 use crate::scan::{RecordedSource, Source, StreamSource};
@@ -14,13 +15,22 @@ use indicatif::ProgressBar;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
 
+/// What is asked of a running camera and of what moves.
+pub struct Taken<'a> {
+    pub capture: &'a Capture,
+    /// Frames on standard input.
+    pub raw: Option<RawFormat>,
+    pub poses: Option<&'a Path>,
+    pub station: &'a Path,
+    /// Where it is recorded too.
+    pub keep: Option<&'a Path>,
+    /// The picture with the laser off, of the camera's size.
+    pub ambient: &'a dyn Fn(Format) -> Result<Option<Image>>,
+}
+
 /// Scans a camera while it runs. With `keep` it is recorded there, and what cannot be scanned in time waits on that disk.
 pub fn scan_camera(
-    capture: &Capture,
-    raw: Option<RawFormat>,
-    poses: Option<&Path>,
-    station: &Path,
-    keep: Option<&Path>,
+    &Taken { capture, raw, poses, station, keep, ambient }: &Taken<'_>,
     rig: &Rig,
     options: &ScanOptions,
     console: &Console,
@@ -34,8 +44,13 @@ pub fn scan_camera(
         return Err(Fault::usage("a camera cannot be resumed").next("record it (--record FOLDER): recordings can"));
     }
     // A camera's Ctrl-C ends the stream; the scan of what came goes on to its end.
-    let options = &ScanOptions { motion: motion.clone(), stop: Default::default(), ..options.clone() };
     let mut stream = capture.open(raw, poses, Some(station), Mode::All)?;
+    let options = &ScanOptions {
+        motion: motion.clone(),
+        stop: Default::default(),
+        ambient: ambient(stream.format())?,
+        ..options.clone()
+    };
     let name = stream.feed().name().to_owned();
     let teller = capture.running.teller();
     let progress = |done: usize, _: Option<usize>| {
