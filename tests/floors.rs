@@ -129,11 +129,13 @@ const HOMES: &[(&str, &str)] = &[
     ("wgpu", "gpu"),
 ];
 
-/// Outside crates that any floor may use: numbers, files, threads, chance.
+/// Outside crates that any floor may use: numbers, files, pages, names of values, threads, chance.
 const COMMON: &[&str] = &[
     "bytemuck",
     "calib_targets_aruco",
+    "csv",
     "jiff",
+    "maud",
     "nalgebra",
     "rand",
     "rand_distr",
@@ -142,6 +144,7 @@ const COMMON: &[&str] = &[
     "serde",
     "serde_json",
     "sha2",
+    "strum",
     "tempfile",
     "toml",
 ];

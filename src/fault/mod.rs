@@ -41,6 +41,19 @@ pub struct Fault {
 /// What every function returns that bad input can stop.
 pub type Result<T> = std::result::Result<T, Fault>;
 
+/// What is said of a word that names none of `T`'s values: all that there are.
+///
+/// ```
+/// #[derive(Clone, Copy, strum::IntoStaticStr, strum::VariantArray)]
+/// #[strum(serialize_all = "lowercase")]
+/// enum Side { Left, Right }
+/// assert_eq!(sheetlight::fault::unknown::<Side>("side", "up"), "unknown side 'up': left, right");
+/// ```
+pub fn unknown<T: strum::VariantArray + Copy + Into<&'static str>>(what: &str, word: &str) -> String {
+    let names: Vec<&str> = T::VARIANTS.iter().map(|v| (*v).into()).collect();
+    format!("unknown {what} '{word}': {}", names.join(", "))
+}
+
 impl Fault {
     /// Without cause and next step; [`Fault::cause`] and [`Fault::next`] add them.
     pub fn new(kind: Kind, what: impl Into<String>) -> Fault {

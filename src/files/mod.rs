@@ -1,5 +1,5 @@
 //! In: bytes of results and the names they are to have, paths of files that others wrote. Out: files that are whole or not there, sets of files that take
-//! their names together, folders that one process at a time writes into, names in the order people count in, bytes and text within limits, slips of the hand in them.
+//! their names together, folders that one process at a time writes into, names in the order people count in, bytes and text within limits, rows of tables, slips of the hand in them.
 //! Frame and unit: none; bytes and paths.
 
 mod append;
@@ -13,6 +13,7 @@ mod moment;
 mod natural;
 mod read;
 mod slip;
+mod table;
 mod together;
 
 pub use append::Append;
@@ -26,4 +27,5 @@ pub use moment::moment;
 pub use natural::natural;
 pub use read::{length, read, read_text, read_text_if_there};
 pub use slip::{named, slip_at, slip_in};
+pub use table::{TableRow, table};
 pub use together::Together;

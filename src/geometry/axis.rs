@@ -25,8 +25,9 @@ impl AxisKind {
 }
 
 /// What a recording's counts count.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, strum::IntoStaticStr)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum CountUnit {
     /// An encoder's steps.
     Count,
@@ -39,11 +40,7 @@ pub enum CountUnit {
 impl CountUnit {
     /// In files and messages.
     pub fn name(self) -> &'static str {
-        match self {
-            CountUnit::Count => "count",
-            CountUnit::Mm => "mm",
-            CountUnit::Deg => "deg",
-        }
+        self.into()
     }
     /// What one of it is by its own statement, mm or rad; an encoder's step states nothing.
     pub fn stated(self) -> Option<f64> {

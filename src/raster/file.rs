@@ -10,8 +10,21 @@ use std::io::Cursor;
 use std::path::Path;
 
 /// Which part of a colour picture is taken as grey. A grey picture ignores it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    serde::Serialize,
+    serde::Deserialize,
+    strum::EnumString,
+    strum::IntoStaticStr,
+    strum::VariantArray,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Channel {
     /// The red samples alone.
     Red,
@@ -24,17 +37,8 @@ pub enum Channel {
     Luma,
 }
 
-impl std::str::FromStr for Channel {
-    type Err = String;
-    fn from_str(s: &str) -> std::result::Result<Channel, String> {
-        match s {
-            "red" => Ok(Channel::Red),
-            "green" => Ok(Channel::Green),
-            "blue" => Ok(Channel::Blue),
-            "luma" => Ok(Channel::Luma),
-            _ => Err(format!("unknown channel '{s}': red, green, blue or luma")),
-        }
-    }
+fn unknown(word: &str) -> String {
+    crate::fault::unknown::<Channel>("channel", word)
 }
 
 /// Memory for pictures while they are decoded, by all threads together, bytes.

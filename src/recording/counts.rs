@@ -6,6 +6,7 @@ use super::Recording;
 use super::frame::FrameRef;
 use super::motion::MOST;
 use crate::fault::{Fault, Result};
+use crate::files::{TableRow, table};
 use std::collections::BTreeSet;
 
 impl Recording {
@@ -36,23 +37,19 @@ impl Recording {
 
 /// Rows `frame,count`; frames that are not named have no count.
 fn from_csv(text: &str, frames: usize) -> Result<Vec<Option<f64>>> {
-    let bad = |number: usize, what: String| {
+    let bad = |number: u64, what: String| {
         Err(Fault::input(format!("line {number}: {what}"))
             .cause("a truncated or edited file, or one of another recording")
             .next("write a header frame,count and a row for each frame of meta.json, counted from 0"))
     };
-    let mut lines = (1..).zip(text.trim_start_matches('\u{feff}').lines()).filter(|(_, l)| {
-        let l = l.trim();
-        !l.is_empty() && !l.starts_with('#')
-    });
-    let header = lines.next().map(|(_, l)| l.replace(' ', "").to_lowercase()).unwrap_or_default();
+    let mut rows = table(text, ',').into_iter();
+    let header = rows.next().map(|r| r.cells.join(",").to_lowercase()).unwrap_or_default();
     if header != "frame,count" {
         return bad(1, format!("the columns are '{header}', a counts file has 'frame,count'"));
     }
     let mut out = vec![None; frames];
     let mut seen = BTreeSet::new();
-    for (number, line) in lines {
-        let cells: Vec<&str> = line.split(',').map(str::trim).collect();
+    for TableRow { line: number, text: line, cells } in rows {
         let (Some(frame), Some(count), 2) = (
             cells.first().and_then(|c| c.parse::<usize>().ok()),
             cells.get(1).and_then(|c| c.parse::<f64>().ok()).filter(|c| c.abs() <= MOST),

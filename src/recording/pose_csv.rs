@@ -3,6 +3,7 @@
 //! Frame and unit: as the convention says (docs/conventions.md).
 
 use crate::fault::{Fault, Result};
+use crate::files::{TableRow, table};
 use crate::robot::Convention;
 
 /// One pose: its number, the convention, its numbers.
@@ -17,30 +18,26 @@ pub(super) struct Read {
 
 /// `frame,m00,...,m33` is a matrix in mm; every other layout is preceded by a line `# convention: NAME`.
 pub(super) fn read(text: &str) -> Result<Read> {
-    let mut convention = None;
-    let mut header: Option<Header> = None;
-    let mut rows = Vec::new();
-    // A mark of the byte order says nothing in UTF-8.
-    for (number, line) in (1..).zip(text.trim_start_matches('\u{feff}').lines()) {
-        let line = line.trim();
-        if line.is_empty() {
-            continue;
+    let convention = convention(text)?;
+    let (mut header, mut rows) = (None, Vec::new());
+    for r in table(text, ',') {
+        let here = |e: Fault| e.at(format!("line {}", r.line));
+        match &header {
+            None => header = Some(Header::read(&r, convention).map_err(here)?),
+            Some(h) => rows.push(row(&r, h).map_err(here)?),
         }
-        if let Some(comment) = line.strip_prefix('#') {
-            if let Some(name) = comment.trim().strip_prefix("convention:") {
-                let named = name.trim().parse::<Convention>();
-                convention = Some(named.map_err(|e| Fault::input(e).next("name a convention of docs/conventions.md"))?);
-            }
-            continue;
-        }
-        let Some(h) = &header else {
-            header = Some(Header::read(line, convention).map_err(|e| e.at(format!("line {number}")))?);
-            continue;
-        };
-        rows.push(row(line, h).map_err(|e| e.at(format!("line {number}")))?);
     }
     let stated = |k: fn(&Header) -> bool| header.as_ref().is_some_and(k);
     Ok(Read { length_stated: stated(|h| h.length_stated), angle_stated: stated(|h| h.angle_stated), rows })
+}
+
+/// What the last comment before the header names.
+fn convention(text: &str) -> Result<Option<Convention>> {
+    let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim);
+    let comments = lines.take_while(|l| l.is_empty() || l.starts_with('#'));
+    let names = comments.filter_map(|l| l.trim_start_matches('#').trim().strip_prefix("convention:"));
+    let named = names.last().map(|name| name.trim().parse::<Convention>()).transpose();
+    named.map_err(|e| Fault::input(e).next("name a convention of docs/conventions.md"))
 }
 
 struct Header {
@@ -64,21 +61,20 @@ fn unit(word: &str) -> Option<&'static str> {
 
 /// A column's name and unit: `RX_deg`, `rx [deg]`, `RX deg` are `rx` in `deg`.
 fn column(cell: &str) -> (String, Option<String>) {
-    let lower = cell.trim().trim_matches('"').to_lowercase();
+    let lower = cell.to_lowercase();
     let mut words = lower.split(|c: char| !c.is_alphanumeric() && c != '°').filter(|w| !w.is_empty());
     let name = words.next().unwrap_or_default().to_owned();
     (name, words.next().map(str::to_owned))
 }
 
 impl Header {
-    fn read(line: &str, convention: Option<Convention>) -> Result<Header> {
-        let cells: Vec<&str> = line.split(',').collect();
+    fn read(TableRow { text: line, cells, .. }: &TableRow, convention: Option<Convention>) -> Result<Header> {
         if cells.len() < 2 && line.contains([';', '\t']) {
             return Err(Fault::input("columns are parted by semicolons or tabs, only commas are read")
                 .cause("exported by a spreadsheet whose numbers have decimal commas")
                 .next("export with commas between columns and points in numbers"));
         }
-        if cells.iter().all(|c| c.trim().parse::<f64>().is_ok()) {
+        if cells.iter().all(|c| c.parse::<f64>().is_ok()) {
             return Err(Fault::input(format!("'{line}' is numbers where the columns should be named"))
                 .cause("the header line is missing")
                 .next("put a header first, e.g. frame,X_mm,Y_mm,Z_mm,RX_deg,RY_deg,RZ_deg"));
@@ -113,8 +109,7 @@ impl Header {
         for (k, ((_, is), (_, want))) in columns[1..].iter().zip(&wanted).enumerate() {
             if is.is_some() && is.as_deref().and_then(unit) != want.as_deref() {
                 let want = want.as_deref().unwrap_or("no unit");
-                let what =
-                    format!("column {} is '{}', {} has it in {want}", k + 2, cells[k + 1].trim(), convention.name());
+                let what = format!("column {} is '{}', {} has it in {want}", k + 2, cells[k + 1], convention.name());
                 return other(what, "the numbers are in another unit than the convention's");
             }
         }
@@ -127,11 +122,10 @@ impl Header {
     }
 }
 
-fn row(line: &str, header: &Header) -> Result<Row> {
-    let cells: Vec<&str> = line.split(',').collect();
+fn row(TableRow { text: line, cells, .. }: &TableRow, header: &Header) -> Result<Row> {
     let wanted = header.convention.labels().len() + 1 + usize::from(header.figure);
     if cells.len() != wanted {
-        let whole = |c: &&str| c.trim().trim_matches('"').parse::<i64>().is_ok();
+        let whole = |c: &String| c.parse::<i64>().is_ok();
         let cause = if line.contains(';') {
             "columns parted by semicolons, as spreadsheets export numbers with decimal commas"
         } else if cells.len() > wanted && cells.iter().all(whole) {
@@ -143,10 +137,11 @@ fn row(line: &str, header: &Header) -> Result<Row> {
             .cause(cause)
             .next("export the poses again, with points in numbers"));
     }
-    let numbers: std::result::Result<Vec<f64>, _> = cells.iter().map(|c| c.trim().parse::<f64>()).collect();
+    let numbers: std::result::Result<Vec<f64>, _> = cells.iter().map(|c| c.parse::<f64>()).collect();
+    let commas = cells.iter().any(|c| c.contains(','));
     let bad = || {
         Fault::input(format!("'{line}' is not a row of numbers"))
-            .cause("a truncated or edited file")
+            .cause(if commas { "numbers with decimal commas" } else { "a truncated or edited file" })
             .next("export the poses again")
     };
     let numbers = numbers.map_err(|_| bad())?;

@@ -6,8 +6,9 @@ use super::stand::Stand;
 use crate::geometry::{Base, Flange, Mat3, Rigid, Vec3};
 
 /// How a picture and where what moves stood were brought together.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, strum::Display)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase")]
 pub enum Pairing {
     /// Everything stood still: before and after the picture the pose was the same.
     Step,
@@ -17,17 +18,6 @@ pub enum Pairing {
     Clock,
     /// The source itself says: a played recording, a simulated station.
     Given,
-}
-
-impl std::fmt::Display for Pairing {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(match self {
-            Pairing::Step => "step",
-            Pairing::Count => "count",
-            Pairing::Clock => "clock",
-            Pairing::Given => "given",
-        })
-    }
 }
 
 /// A small motion: how far a stand may be off because nobody knows the time of the picture better (one standard deviation), or what moves

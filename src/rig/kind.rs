@@ -5,8 +5,11 @@ use crate::camera::{ALWAYS_NAMED, NAMES, PARAMETERS};
 use std::collections::BTreeMap;
 
 /// What a calibration is of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize, strum::IntoStaticStr,
+)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Kind {
     /// A camera with its lens.
     Camera,
@@ -81,16 +84,7 @@ impl Kind {
 
     /// In files and their names.
     pub fn name(self) -> &'static str {
-        match self {
-            Kind::Camera => "camera",
-            Kind::LaserPlane => "laser_plane",
-            Kind::Pointer => "pointer",
-            Kind::HandEye => "hand_eye",
-            Kind::BaseCamera => "base_camera",
-            Kind::ProfileHandEye => "profile_hand_eye",
-            Kind::LinearAxis => "linear_axis",
-            Kind::Turntable => "turntable",
-        }
+        self.into()
     }
     /// The `sheetlight calibrate` command that makes it.
     pub fn command(self) -> String {

@@ -12,8 +12,20 @@ use crate::geometry::{Frame, Mat3, Rigid, Vec3, exp, log, repair};
 const FIGURES: std::ops::RangeInclusive<f64> = -3.0..=31.0;
 
 /// How a robot writes a pose as numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    serde::Serialize,
+    serde::Deserialize,
+    strum::EnumString,
+    strum::IntoStaticStr,
+    strum::VariantArray,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Convention {
     /// X Y Z RX RY RZ: mm, degrees, R = Rz·Ry·Rx.
     Denso,
@@ -43,37 +55,11 @@ pub enum Convention {
 
 impl Convention {
     /// All of them.
-    pub const ALL: [Convention; 12] = [
-        Convention::Denso,
-        Convention::Ur,
-        Convention::Kuka,
-        Convention::Fanuc,
-        Convention::Abb,
-        Convention::Yaskawa,
-        Convention::Ros,
-        Convention::Quaternion,
-        Convention::Matrix,
-        Convention::DensoT,
-        Convention::Gba,
-        Convention::Kawasaki,
-    ];
+    pub const ALL: &[Convention] = <Convention as strum::VariantArray>::VARIANTS;
 
     /// As options and files write it.
     pub fn name(self) -> &'static str {
-        match self {
-            Convention::Denso => "denso",
-            Convention::Ur => "ur",
-            Convention::Kuka => "kuka",
-            Convention::Fanuc => "fanuc",
-            Convention::Abb => "abb",
-            Convention::Yaskawa => "yaskawa",
-            Convention::Ros => "ros",
-            Convention::Quaternion => "quaternion",
-            Convention::Matrix => "matrix",
-            Convention::DensoT => "densot",
-            Convention::Gba => "gba",
-            Convention::Kawasaki => "kawasaki",
-        }
+        self.into()
     }
 
     /// Labels of the numbers with their units, in order.
@@ -227,13 +213,8 @@ fn most(label: &str) -> Option<f64> {
     }
 }
 
-impl std::str::FromStr for Convention {
-    type Err = String;
-    fn from_str(s: &str) -> std::result::Result<Convention, String> {
-        Convention::ALL.into_iter().find(|c| c.name() == s).ok_or_else(|| {
-            format!("unknown pose convention '{s}': {}", Convention::ALL.map(Convention::name).join(", "))
-        })
-    }
+fn unknown(word: &str) -> String {
+    crate::fault::unknown::<Convention>("pose convention", word)
 }
 
 /// Rz(z)·Ry(y)·Rx(x), degrees (the paper's Table 2).
@@ -289,7 +270,7 @@ mod tests {
             w in proptest::array::uniform3(-1.8f64..1.8), t in proptest::array::uniform3(-900.0f64..900.0)
         ) {
             let pose: Rigid<Base, Flange> = Rigid::from_vectors(&Vec3::from(w), Vec3::from(t));
-            for c in Convention::ALL {
+            for &c in Convention::ALL {
                 let (angle, shift) = c.read(&c.write(&pose)).unwrap().difference(&pose);
                 prop_assert!(angle < 1e-7 && shift < 1e-9, "{} {angle} {shift}", c.name());
             }

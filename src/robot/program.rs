@@ -6,7 +6,8 @@ use super::Convention;
 use crate::geometry::{Base, Rigid, Tool};
 
 /// A robot's language.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr, strum::VariantArray)]
+#[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Language {
     /// Denso PacScript.
     PacScript,
@@ -21,23 +22,12 @@ pub enum Language {
 }
 
 impl Language {
-    /// All of them, with the names that options have.
-    pub const ALL: [(Language, &'static str); 5] = [
-        (Language::PacScript, "pacscript"),
-        (Language::UrScript, "urscript"),
-        (Language::Krl, "krl"),
-        (Language::Tp, "tp"),
-        (Language::Rapid, "rapid"),
-    ];
+    /// All of them.
+    pub const ALL: &[Language] = <Language as strum::VariantArray>::VARIANTS;
 }
 
-impl std::str::FromStr for Language {
-    type Err = String;
-    fn from_str(s: &str) -> std::result::Result<Language, String> {
-        let all = Language::ALL;
-        let found = all.iter().find(|(_, name)| *name == s).map(|(language, _)| *language);
-        found.ok_or_else(|| format!("unknown language '{s}': {}", all.map(|a| a.1).join(", ")))
-    }
+fn unknown(word: &str) -> String {
+    crate::fault::unknown::<Language>("language", word)
 }
 
 /// Where the tool goes, in order.

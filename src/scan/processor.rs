@@ -5,7 +5,8 @@ use crate::fault::Result;
 use crate::gpu::{AdapterInfo, Device, adapters};
 
 /// Where the stages run.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr, strum::VariantArray)]
+#[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Where {
     /// On the GPU where there is one with processors of its own, else on this machine's, which gives the same results.
     #[default]
@@ -16,16 +17,8 @@ pub enum Where {
     Cpu,
 }
 
-impl std::str::FromStr for Where {
-    type Err = String;
-    fn from_str(s: &str) -> std::result::Result<Where, String> {
-        match s {
-            "auto" => Ok(Where::Auto),
-            "gpu" => Ok(Where::Gpu),
-            "cpu" => Ok(Where::Cpu),
-            _ => Err(format!("unknown place '{s}': auto, gpu or cpu")),
-        }
-    }
+fn unknown(word: &str) -> String {
+    crate::fault::unknown::<Where>("place", word)
 }
 
 /// Why the stages run without a GPU.

@@ -10,8 +10,11 @@ use crate::recording::BoardSpec;
 use std::path::PathBuf;
 
 /// One kind of recording.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, strum::EnumString, strum::IntoStaticStr, strum::VariantArray,
+)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Set {
     /// The sheet passed over the scene.
     Scan,
@@ -37,27 +40,12 @@ impl Set {
         [Set::Scan, Set::Intrinsics, Set::Handeye, Set::Laserplane, Set::PointerCal, Set::Pointer, Set::Surface];
     /// As options, folders and files write it.
     pub fn name(self) -> &'static str {
-        match self {
-            Set::Scan => "scan",
-            Set::Intrinsics => "intrinsics",
-            Set::Handeye => "handeye",
-            Set::Laserplane => "laserplane",
-            Set::PointerCal => "pointer_cal",
-            Set::Pointer => "pointer",
-            Set::Surface => "surface",
-            Set::Axis => "axis",
-        }
+        self.into()
     }
 }
 
-impl std::str::FromStr for Set {
-    type Err = String;
-    fn from_str(s: &str) -> std::result::Result<Set, String> {
-        let mut known = Set::ALL.into_iter().chain([Set::Axis]);
-        known
-            .find(|x| x.name() == s)
-            .ok_or_else(|| format!("unknown set '{s}': {}, axis, all", Set::ALL.map(Set::name).join(", ")))
-    }
+fn unknown(word: &str) -> String {
+    format!("{}, all", crate::fault::unknown::<Set>("set", word))
 }
 
 /// The scene that is simulated when no other is named: a circuit board with parts.

@@ -44,8 +44,8 @@ pub use find::{Looked, SecondLook, find_part, find_part_in_all, second_look, tea
 pub use ghost::{Lies, ghost};
 pub use guide::{GuideOptions, Guided, Step, guide};
 pub use import_map::import_map;
+pub use judge::embed::base64;
 pub use judge::figures::Judged;
-pub use judge::page::base64;
 pub use judge::parts::{FoundPart, judge_parts};
 pub use judge::points::judge;
 pub use output::{Output, try_output};

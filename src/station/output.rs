@@ -10,8 +10,20 @@ use std::time::Duration;
 const LIT: Duration = Duration::from_millis(1500);
 
 /// What hangs on an output.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    serde::Serialize,
+    serde::Deserialize,
+    strum::EnumString,
+    strum::IntoStaticStr,
+    strum::VariantArray,
+)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Output {
     /// The line laser.
     Line,
@@ -25,14 +37,8 @@ pub enum Output {
     Close,
 }
 
-impl std::str::FromStr for Output {
-    type Err = String;
-
-    fn from_str(word: &str) -> std::result::Result<Output, String> {
-        let all = [Output::Line, Output::Pointer, Output::Room, Output::Open, Output::Close];
-        let named = |o: &Output| serde_json::to_value(o).is_ok_and(|v| v == word);
-        all.into_iter().find(named).ok_or_else(|| format!("'{word}' is no output: line, pointer, room, open or close"))
-    }
+fn unknown(word: &str) -> String {
+    crate::fault::unknown::<Output>("output", word)
 }
 
 /// Tries it; the number of the output that was switched.

@@ -37,7 +37,8 @@ fn programs_hold_the_poses_in_order() {
         near(pose, Convention::Fanuc, &Convention::Fanuc.write(&read[k].pose));
     }
     assert!(of(Language::UrScript).contains("v=0.0500") && of(Language::Tp).contains("50mm/sec"));
-    for (language, name) in Language::ALL {
+    for &language in Language::ALL {
+        let name: &str = language.into();
         let text = of(language);
         let [down, open] = ["insertion", "open the gripper"].map(|w| text.rfind(w).unwrap());
         assert!(

@@ -4,7 +4,7 @@
 use super::profile::Profile;
 use super::sequences::{by_turns, from_brackets, value};
 use crate::fault::{Fault, Result};
-use crate::files::natural;
+use crate::files::{TableRow, natural, table};
 use std::path::Path;
 
 /// Reads profiles from a file with many, or from a folder with a file each, in the order of their
@@ -47,24 +47,18 @@ fn load_file(path: &Path) -> Result<Vec<Profile>> {
 
 /// Columns x, z (one profile), or profile, x, z (many). A header may name them in another order.
 pub fn from_csv(text: &str, stem: &str) -> Result<Vec<Profile>> {
+    let first = text.lines().map(str::trim).find(|l| !l.is_empty() && !l.starts_with('#')).unwrap_or_default();
+    let separator = [';', ','].into_iter().find(|c| first.contains(*c)).unwrap_or(' ');
     let mut columns: Option<[Option<usize>; 3]> = None;
     let mut out: Vec<Profile> = Vec::new();
-    for (number, line) in text.lines().enumerate() {
-        let line = line.trim();
-        if line.is_empty() || line.starts_with('#') {
-            continue;
+    for TableRow { line: number, text: line, mut cells } in table(text, separator) {
+        // A separator at a line's end parts nothing.
+        while cells.last().is_some_and(String::is_empty) {
+            cells.pop();
         }
-        let separator = if line.contains(';') {
-            ';'
-        } else if line.contains(',') {
-            ','
-        } else {
-            ' '
-        };
-        let cells: Vec<&str> = line.split(separator).map(str::trim).filter(|c| !c.is_empty()).collect();
         let bad = |what: &str| {
             let commas = separator == ';' && line.contains(',');
-            Fault::input(format!("line {}: '{line}' {what}", number + 1))
+            Fault::input(format!("line {number}: '{line}' {what}"))
                 .cause(if commas { "numbers with decimal commas" } else { "not a list of x, z points in mm" })
                 .next("write x and z (mm) a line, or profile, x and z with a header")
         };
@@ -73,7 +67,7 @@ pub fn from_csv(text: &str, stem: &str) -> Result<Vec<Profile>> {
             if cells.iter().any(|c| !is_number(c)) {
                 let find = |key: &str| {
                     cells.iter().position(|c| {
-                        let c = c.trim_matches('"').to_lowercase();
+                        let c = c.to_lowercase();
                         c == key || c == format!("{key}_mm") || c == format!("{key} mm") || c == format!("{key} [mm]")
                     })
                 };
@@ -94,7 +88,7 @@ pub fn from_csv(text: &str, stem: &str) -> Result<Vec<Profile>> {
         let [profile, x, z] = columns.expect("set above");
         if x.is_none() {
             let numbers = cells.iter().map(|c| c.parse()).collect::<std::result::Result<Vec<f64>, _>>();
-            let name = format!("{stem} line {}", number + 1);
+            let name = format!("{stem} line {number}");
             let points = by_turns(&numbers.map_err(|_| bad("is no row of numbers"))?, &name)?;
             out.push(Profile {
                 name,
@@ -102,7 +96,7 @@ pub fn from_csv(text: &str, stem: &str) -> Result<Vec<Profile>> {
             });
             continue;
         }
-        let cell = |i: usize| cells.get(i).copied().ok_or_else(|| bad("is too short"));
+        let cell = |i: usize| cells.get(i).map(String::as_str).ok_or_else(|| bad("is too short"));
         let value = |i: usize| cell(i).and_then(|c| c.parse::<f64>().map_err(|_| bad("is no row of numbers")));
         let point = [value(x.expect("checked"))?, value(z.expect("checked"))?];
         let name = match profile {

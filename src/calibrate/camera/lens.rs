@@ -5,7 +5,8 @@
 use crate::camera::{LENS, NAMES, SKEW};
 
 /// Which lens terms are estimated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr, strum::VariantArray)]
+#[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Lens {
     /// k1 k2 p1 p2 k3; terms that the pictures do not determine are held at zero and said so.
     #[default]
@@ -29,25 +30,8 @@ pub enum Lens {
     All,
 }
 
-const WORDS: [(&str, Lens); 9] = [
-    ("evidence", Lens::Evidence),
-    ("none", Lens::None),
-    ("one", Lens::One),
-    ("four", Lens::Four),
-    ("five", Lens::Five),
-    ("rational", Lens::Rational),
-    ("prism", Lens::Prism),
-    ("scheimpflug", Lens::Scheimpflug),
-    ("all", Lens::All),
-];
-
-impl std::str::FromStr for Lens {
-    type Err = String;
-    fn from_str(s: &str) -> Result<Lens, String> {
-        let names: Vec<&str> = WORDS.iter().map(|w| w.0).collect();
-        let found = WORDS.iter().find(|w| w.0 == s).map(|w| w.1);
-        found.ok_or_else(|| format!("unknown lens '{s}': {}", names.join(", ")))
-    }
+fn unknown(word: &str) -> String {
+    crate::fault::unknown::<Lens>("lens", word)
 }
 
 const BROWN: &[usize] = &[4, 5, 6, 7, 8];

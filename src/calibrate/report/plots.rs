@@ -1,7 +1,6 @@
 //! In: measured numbers. Out: SVG elements: coverage, residual arrows, bars, scatter, axes on a sphere.
 //! Frame and unit: SVG user units; the data's own units are named in the labels.
 
-use super::escape;
 use crate::geometry::{Vec2, Vec3};
 use std::fmt::Write;
 
@@ -17,8 +16,13 @@ fn open(width: f64, height: f64) -> String {
     )
 }
 
+/// Text made safe inside SVG.
+fn safe(text: &str) -> String {
+    maud::html! { (text) }.into_string()
+}
+
 fn text(out: &mut String, x: f64, y: f64, anchor: &str, s: &str) {
-    let _ = write!(out, "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\" fill=\"{INK}\">{}</text>", escape(s));
+    let _ = write!(out, "<text x=\"{x:.1}\" y=\"{y:.1}\" text-anchor=\"{anchor}\" fill=\"{INK}\">{}</text>", safe(s));
 }
 
 fn line(out: &mut String, a: (f64, f64), b: (f64, f64), colour: &str, width: f64) {

@@ -12,7 +12,8 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// What pictures are stored as.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr, strum::VariantArray)]
+#[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = no_store)]
 pub enum Store {
     /// PNG, and raw frames where PNG is too slow.
     #[default]
@@ -23,20 +24,13 @@ pub enum Store {
     Raw,
 }
 
-impl std::str::FromStr for Store {
-    type Err = String;
-    fn from_str(s: &str) -> std::result::Result<Store, String> {
-        match s {
-            "auto" => Ok(Store::Auto),
-            "png" => Ok(Store::Png),
-            "raw" => Ok(Store::Raw),
-            _ => Err(format!("'{s}': auto, png or raw")),
-        }
-    }
+fn no_store(word: &str) -> String {
+    crate::fault::unknown::<Store>("way to store", word)
 }
 
 /// What pictures show.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr, strum::VariantArray)]
+#[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = shows_nothing)]
 pub enum Shows {
     /// The stripe.
     #[default]
@@ -47,16 +41,8 @@ pub enum Shows {
     Room,
 }
 
-impl std::str::FromStr for Shows {
-    type Err = String;
-    fn from_str(s: &str) -> std::result::Result<Shows, String> {
-        match s {
-            "line" => Ok(Shows::Line),
-            "pointer" => Ok(Shows::Pointer),
-            "room" => Ok(Shows::Room),
-            _ => Err(format!("'{s}': line, pointer or room")),
-        }
-    }
+fn shows_nothing(word: &str) -> String {
+    crate::fault::unknown::<Shows>("thing to show", word)
 }
 
 /// How is recorded.

@@ -14,7 +14,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// How pictures and what moves are brought together.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr, strum::VariantArray)]
+#[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Pair {
     None,
     Given,
@@ -23,18 +24,8 @@ pub enum Pair {
     Clock,
 }
 
-impl std::str::FromStr for Pair {
-    type Err = String;
-    fn from_str(s: &str) -> std::result::Result<Pair, String> {
-        Ok(match s {
-            "none" => Pair::None,
-            "given" => Pair::Given,
-            "step" => Pair::Step,
-            "count" => Pair::Count,
-            "clock" => Pair::Clock,
-            _ => return Err(format!("'{s}': none, given, step, count or clock")),
-        })
-    }
+fn unknown(word: &str) -> String {
+    crate::fault::unknown::<Pair>("pairing", word)
 }
 
 /// What moves, as typed: `robot`, `robot:part`, `linear:count`, `turntable:deg:sensor`.

@@ -10,8 +10,20 @@ use crate::scan::CloudPoint;
 use std::path::{Path, PathBuf};
 
 /// To which side of the picture a raised surface moves the stripe.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    serde::Serialize,
+    serde::Deserialize,
+    strum::EnumString,
+    strum::IntoStaticStr,
+    strum::VariantArray,
+)]
 #[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Side {
     /// Towards smaller columns.
     Left,
@@ -19,15 +31,8 @@ pub enum Side {
     Right,
 }
 
-impl std::str::FromStr for Side {
-    type Err = String;
-    fn from_str(s: &str) -> std::result::Result<Side, String> {
-        match s {
-            "left" => Ok(Side::Left),
-            "right" => Ok(Side::Right),
-            _ => Err(format!("unknown side '{s}': left or right")),
-        }
-    }
+fn unknown(word: &str) -> String {
+    crate::fault::unknown::<Side>("side", word)
 }
 
 /// A rig whose stripe runs along image columns.

@@ -1,0 +1,61 @@
+//! In: the text of a table: a line a row, cells parted by a sign or by white space, quoted or not, lines of comment behind `#`. Out: its
+//! rows with the lines that they stand on.
+//! Frame and unit: none; cells are text.
+
+/// A row of a table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TableRow {
+    /// Of the text, counted from 1.
+    pub line: u64,
+    /// The line as it stands, without white space around it.
+    pub text: String,
+    /// Without white space and quotes around them.
+    pub cells: Vec<String>,
+}
+
+/// Rows of any length, in order; empty lines and comments are none, and no row goes over a line's end. `separator` is one ASCII character;
+/// a space stands for any white space. A mark of the byte order says nothing in UTF-8.
+pub fn table(text: &str, separator: char) -> Vec<TableRow> {
+    let lines = (1..).zip(text.trim_start_matches('\u{feff}').lines().map(str::trim));
+    let rows = lines.filter(|(_, l)| !l.is_empty() && !l.starts_with('#'));
+    rows.map(|(line, l)| TableRow { line, text: l.to_owned(), cells: cells(l, separator) }).collect()
+}
+
+fn cells(line: &str, separator: char) -> Vec<String> {
+    if separator == ' ' {
+        return line.split_whitespace().map(str::to_owned).collect();
+    }
+    let mut reader = csv::ReaderBuilder::new();
+    reader
+        .has_headers(false)
+        .flexible(true)
+        .trim(csv::Trim::All)
+        .delimiter(separator as u8)
+        .buffer_capacity(line.len());
+    // Text in memory cannot fail to be read, and what is UTF-8 stays it: separators and quotes are ASCII.
+    let record = reader.from_reader(line.as_bytes()).into_records().next().and_then(std::result::Result::ok);
+    record.map_or_else(Vec::new, |r| r.iter().map(str::to_owned).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_are_the_same_however_a_program_writes_them() {
+        for (text, separator) in [
+            ("\u{feff}# head\n\n  a, b c ,d\n# 1,2\n\n\"1\" ,2\n", ','),
+            ("#\r\n\r\n\"a\";\"b c\";d\r\n  # b\r\n\r\n1;2", ';'),
+            ("\n\na\tb c\td\n\n\n1\t2\n", '\t'),
+        ] {
+            let rows = table(text, separator);
+            let is: Vec<_> = rows.iter().map(|r| (r.line, r.cells.join("|"))).collect();
+            assert_eq!(is, [(3, "a|b c|d".to_owned()), (6, "1|2".to_owned())], "{text:?}");
+        }
+        assert_eq!(table("# x\n 1  2\t3\n", ' ')[0].cells, ["1", "2", "3"]);
+        assert_eq!(table("a,\"1,5\"\n", ',')[0].cells, ["a", "1,5"]);
+        let never_closed = table("\"never closed\n1,2,\n", ',');
+        assert_eq!(never_closed[1].cells, ["1", "2", ""]);
+        assert!(table("", ',').is_empty());
+    }
+}
