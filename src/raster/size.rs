@@ -11,9 +11,9 @@ pub const MOST_PIXELS: u64 = 1 << 28;
 pub(super) fn fits(width: u32, height: u32, size: Option<[u32; 2]>) -> Result<()> {
     match size {
         Some([w, h]) if [w, h] != [width, height] => {
-            Err(Fault::input(format!("is {width}x{height}, it should be {w}x{h} as meta.json says"))
+            Err(Fault::input(format!("is {width}x{height}, it should be {w}x{h}"))
                 .cause("pictures of two cameras or two resolutions in one folder")
-                .next("correct meta.json, or take the odd pictures out"))
+                .next("correct the size that meta.json or an option states, or take the odd pictures out"))
         }
         None if width.max(height) > MOST_SIDE || u64::from(width) * u64::from(height) > MOST_PIXELS => {
             Err(Fault::input(format!(

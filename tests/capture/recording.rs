@@ -62,6 +62,36 @@ fn what_is_recorded_is_what_was_sent_and_scans_to_the_same_bytes() {
 }
 
 #[test]
+fn the_rooms_light_is_taken_out_of_a_cameras_pictures_as_of_a_files() {
+    let dir = tempfile::tempdir().unwrap();
+    let size = Recording::open(&scan_folder()).unwrap().meta.image;
+    let grey = |name: &str, width: u32| {
+        let path = dir.path().join(name);
+        image::GrayImage::from_pixel(width, size.height, image::Luma([4])).save(&path).unwrap();
+        text(&path)
+    };
+    let (room, narrow) = (grey("room.png", size.width), grey("narrow.png", size.width / 2));
+    let (recording, station) = (text(&scan_folder()), station());
+    let camera = format!("play:{recording}?rate=30");
+    let file = ["scan", &recording];
+    let wire = ["scan", "--camera", &camera, "--pair", "given"];
+    let scanned = |from: &[&str], name: &str, more: &[&str]| {
+        let out = dir.path().join(name);
+        let to = text(&out);
+        let common = ["--station", &station, "--out", &to, "--on", "cpu", "--overlays", "0", "--quiet"];
+        sheetlight(&[from, &common, more].concat());
+        std::fs::read(out.join("cloud.ply")).unwrap()
+    };
+    let lit = scanned(&wire, "lit", &["--ambient", &room]);
+    assert!(lit == scanned(&file, "file", &["--ambient", &room]), "another cloud than the file's");
+    assert!(lit != scanned(&wire, "dark", &[]), "--ambient changes nothing");
+    let to = text(&dir.path().join("refused"));
+    let (_, said) =
+        sheetlight_fails(&[&wire[..], &["--station", &station, "--out", &to, "--ambient", &narrow]].concat());
+    assert!(said.contains(&format!("is {}x{}", size.width / 2, size.height)), "{said}");
+}
+
+#[test]
 fn a_recorder_that_is_killed_leaves_all_but_the_last_second() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("cut");
