@@ -9,7 +9,7 @@ use super::log::{Entry, Event, Insertion};
 use super::options::CellOptions;
 use super::world::{Places, START_DEG, World};
 use crate::fault::{Fault, Result};
-use crate::geometry::{Base, Board, Flange, Mat3, Part, Rigid, Tool, Vec3, exp};
+use crate::geometry::{Base, Board, Camera, Flange, Mat3, Part, Rigid, Tool, Vec3, exp};
 use crate::raster::Image;
 use crate::simulate::{InScene, Scene, SceneSpec, Station, hot_pixels, part_pose};
 use rand::Rng;
@@ -21,6 +21,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 const GRIPPER_AT_MM: [f64; 3] = [72.0, 0.0, 160.0];
 /// The calibration board lies so far beside the scene's middle, mm.
 const BOARD_BESIDE_MM: [f64; 3] = [0.0, 170.0, 0.0];
+/// So thick is the plate on the flange that carries a board, mm.
+const PLATE_MM: f64 = 20.0;
 /// From so many working distances a whole board is in the picture, with the stripe on it.
 const BOARD_FROM: f64 = 1.5;
 /// Greys of a printed board.
@@ -47,6 +49,8 @@ struct Inside {
     hot: Vec<(usize, f32)>,
     scene: Mutex<Arc<Scene>>,
     base_from_board: Option<Rigid<Base, Board>>,
+    /// Where the sensor stands, if it stands still.
+    base_from_camera: Option<Rigid<Base, Camera>>,
     arm_error: ArmError,
     world: Mutex<World>,
     pictures: AtomicU64,
@@ -65,12 +69,16 @@ impl Cell {
         let (scene, base_from_board) = with_board(&options, Scene::new(options.scene.clone())?, &base_from_scene)?;
         let held = held(&options.scene, options.holds.as_deref())?;
         let flange_from_tool = gripper(&station);
+        let flange_from_scene = options.eye_to_hand.then(on_flange);
         let places = Places {
             parts: parts(&options.scene, &base_from_scene),
             scene: scene.clone(),
             base_from_scene,
+            flange_from_scene,
             flange_from_tool,
         };
+        let base_from_camera =
+            flange_from_scene.map(|f| stand(&options, &station, &base_from_scene, &f)).transpose()?;
         let arm_error = arm_error(&station, options.arm_error_mm, options.arm_error_deg);
         let arm = (Vs060::built(&arm_error), start(&options, &base_from_scene)?);
         let world = World::new(&options, arm, places, held, station.rng("repeatability", 0));
@@ -81,7 +89,8 @@ impl Cell {
             hot: hot_pixels(&station.sensor, pixels, &mut station.rng("hot", 0)),
             gripper,
             scene: Mutex::new(Arc::new(scene)),
-            base_from_board,
+            base_from_board: base_from_board.filter(|_| base_from_camera.is_none()),
+            base_from_camera,
             arm_error,
             world: Mutex::new(world),
             pictures: AtomicU64::new(0),
@@ -131,13 +140,17 @@ impl Cell {
         [self.0.gripper.camera.width, self.0.gripper.camera.height]
     }
 
-    fn seen(&self, t: f64, station: &Station) -> (Lit, Rigid<InScene, crate::geometry::Camera>) {
+    fn seen(&self, t: f64, station: &Station) -> (Lit, Rigid<InScene, Camera>) {
         let world = self.world();
         let stuck = self.0.stuck.lock().unwrap_or_else(PoisonError::into_inner);
         let on = |number: u16| stuck.get(&number).copied().unwrap_or_else(|| world.output(number, t));
         let outputs = self.0.options.outputs;
         let lit = Lit { line: on(outputs.line), pointer: on(outputs.pointer), room: on(outputs.room) };
-        (lit, world.places().base_from_scene.inverse() * world.true_flange(t) * station.flange_from_camera)
+        let base_from_camera = match self.0.base_from_camera {
+            Some(still) if std::ptr::eq(station, &self.0.station) => still,
+            _ => world.true_flange(t) * station.flange_from_camera,
+        };
+        (lit, world.true_scene(t).inverse() * base_from_camera)
     }
 
     /// No laser and no lamp follows its output any more: a fuse is out.
@@ -183,12 +196,12 @@ impl Cell {
     /// Lays something else before the robot, at the same place; the gripper gets the component that belongs to it.
     pub fn lay(&self, spec: &SceneSpec, holds: Option<&str>) -> Result<()> {
         let held = held(spec, holds)?;
-        let base_from_scene = self.world().places().base_from_scene;
+        let Places { base_from_scene, flange_from_scene, .. } = *self.world().places();
         let (scene, _) = with_board(&self.0.options, Scene::new(spec.clone())?, &base_from_scene)?;
         let flange_from_tool = self.flange_from_tool();
         *self.0.scene.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(scene.clone());
         let parts = parts(spec, &base_from_scene);
-        self.world().replace(Places { scene, base_from_scene, parts, flange_from_tool }, held);
+        self.world().replace(Places { scene, base_from_scene, flange_from_scene, parts, flange_from_tool }, held);
         let gripper = self.0.options.outputs.gripper;
         let now = self.0.clock.now();
         self.world().switch(now, gripper, true);
@@ -243,7 +256,11 @@ impl Cell {
     pub fn base_from_scene(&self) -> Rigid<Base, InScene> {
         self.world().places().base_from_scene
     }
-    /// Where the calibration board is.
+    /// Where the sensor stands, if it stands still.
+    pub fn base_from_camera(&self) -> Option<Rigid<Base, Camera>> {
+        self.0.base_from_camera
+    }
+    /// Where the calibration board is, if it lies still.
     pub fn base_from_board(&self) -> Option<Rigid<Base, Board>> {
         self.0.base_from_board
     }
@@ -301,6 +318,24 @@ fn start(options: &CellOptions, base_from_scene: &Rigid<Base, InScene>) -> Resul
             .cause("the board lies beyond its reach")
             .next("take another seed")
     })
+}
+
+/// A plate on the flange with the scene on its far side, the calibration board in its middle.
+fn on_flange() -> Rigid<Flange, InScene> {
+    Rigid::new(Mat3::identity(), Vec3::z() * PLATE_MM - Vec3::from(BOARD_BESIDE_MM))
+}
+
+/// The sensor as it stands: the flange, as the arm begins, holds the board before it as a sensor on the flange would have it below.
+fn stand(
+    options: &CellOptions,
+    station: &Station,
+    base_from_scene: &Rigid<Base, InScene>,
+    flange_from_scene: &Rigid<Flange, InScene>,
+) -> Result<Rigid<Base, Camera>> {
+    let arm = Vs060::drawn();
+    let over = arm.forward(&start(&CellOptions { over_board: true, ..options.clone() }, base_from_scene)?);
+    let scene_from_camera = base_from_scene.inverse() * over * station.flange_from_camera;
+    Ok(arm.forward(&START_DEG.map(f64::to_radians)) * *flange_from_scene * scene_from_camera)
 }
 
 /// The gripper's axes lie as the scene's do while the sensor looks at it, so that little has to be turned.

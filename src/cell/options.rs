@@ -15,7 +15,9 @@ pub struct CellOptions {
     pub board: Option<BoardSpec>,
     /// The arm begins over the board, as an operator jogs it there to calibrate; else over the scene.
     pub over_board: bool,
-    /// The design of the sensor on the flange.
+    /// The sensor stands still and the flange carries board and scene before it, as for a sensor that is fixed in the cell.
+    pub eye_to_hand: bool,
+    /// The design of the sensor.
     pub rig: RigSpec,
     /// Specimen, places and noise; 0 is the design itself.
     pub seed: u64,
@@ -48,6 +50,7 @@ impl CellOptions {
             scene,
             board: None,
             over_board: false,
+            eye_to_hand: false,
             rig: RigSpec::paper(),
             seed,
             speed: 1.0,
@@ -68,6 +71,12 @@ impl CellOptions {
         if self.over_board && self.board.is_none() {
             return Err(Fault::usage("the arm is to begin over the board, and there is no board")
                 .next("name one with --board (sheetlight board writes it)"));
+        }
+        if self.eye_to_hand && (self.board.is_none() || self.over_board) {
+            return Err(Fault::usage(
+                "the flange is to carry a board before the sensor, and there is none or the arm is to begin over it",
+            )
+            .next("name a board, and let the arm begin where it begins"));
         }
         let limits = [
             ("speed", self.speed, 0.1, 1000.0),

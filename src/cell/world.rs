@@ -34,8 +34,10 @@ struct Segment {
 pub struct Places {
     /// What lies before the robot.
     pub scene: Scene,
-    /// Where that is.
+    /// Where that is; nowhere in the cell where it rides on the flange.
     pub base_from_scene: Rigid<Base, InScene>,
+    /// Where it is on the flange, if it rides there.
+    pub flange_from_scene: Option<Rigid<Flange, InScene>>,
     /// The sockets in it by name.
     pub parts: BTreeMap<String, Rigid<Base, Part>>,
     /// The gripper on the flange.
@@ -125,6 +127,11 @@ impl World {
         Rigid::new(turn * pose.rotation, pose.translation + Vec3::new(off[0], off[1], off[2]))
     }
 
+    /// Where the scene truly is.
+    pub fn true_scene(&self, t: f64) -> Rigid<Base, InScene> {
+        self.places.flange_from_scene.map_or(self.places.base_from_scene, |f| self.true_flange(t) * f)
+    }
+
     /// Where the gripper's tool truly is.
     pub fn true_tool(&self, t: f64) -> Rigid<Base, Tool> {
         self.true_flange(t) * self.places.flange_from_tool
@@ -178,6 +185,8 @@ impl World {
         let near = |pose: &Rigid<Base, Tool>| {
             judge::collision(self.held.as_ref(), &self.hull, pose, &self.places.scene, &self.places.base_from_scene)
         };
+        // What the flange carries cannot be run into.
+        let looks = if self.places.flange_from_scene.is_some() { 0 } else { looks };
         let times = (1..=looks).map(|k| start + (end - start) * k as f64 / looks as f64);
         let hit = times.filter_map(|at| near(&self.true_tool(at)).map(|event| (at, event))).next();
         self.note(t, Event::Arrived);

@@ -42,6 +42,9 @@ pub struct Args {
     /// The arm begins over the board, as an operator jogs it there for `calibrate auto`; else over the scene
     #[arg(long, requires = "board")]
     over_board: bool,
+    /// The sensor stands still and the flange carries the board before it, for `calibrate auto --eye-to-hand`
+    #[arg(long, requires = "board", conflicts_with = "over_board")]
+    eye_to_hand: bool,
     /// Another specimen of sensor, gripper and places, other noise, for every seed; 0 is the design itself
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -95,6 +98,7 @@ fn simulate(args: &Args, console: &Console) -> Result<()> {
     let options = CellOptions {
         board,
         over_board: args.over_board,
+        eye_to_hand: args.eye_to_hand,
         rig: args.rig.as_ref().map_or_else(|| Ok(RigSpec::paper()), |p| RigSpec::load(p))?,
         speed: args.speed,
         noise_mm: args.noise_mm,

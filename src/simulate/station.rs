@@ -6,7 +6,7 @@ use super::rig::RigSpec;
 use super::sensor::Sensor;
 use crate::camera::{ALWAYS_NAMED, Distortion, Intrinsics, NAMES};
 use crate::fault::Result;
-use crate::geometry::{Camera, Flange, Plane, Ray, Rigid, Vec3, exp};
+use crate::geometry::{Base, Camera, Flange, Plane, Ray, Rigid, Vec3, exp};
 use crate::rig::{Calibration, Covariance, HandEye, Kind, Quality, Rig, Verdict};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
@@ -208,6 +208,11 @@ impl Station {
     /// Writes the true values as the calibration of a station folder; an independent random stream
     /// for everything that is drawn later is [`Station::rng`].
     pub fn store(&self, folder: &Path) -> Result<()> {
+        self.store_at(folder, None)
+    }
+
+    /// The same; with `base_from_camera` of a sensor that stands still there, in place of the one on the flange.
+    pub fn store_at(&self, folder: &Path, base_from_camera: Option<Rigid<Base, Camera>>) -> Result<()> {
         let quality = Quality {
             verdict: Verdict::Good,
             reasons: vec![TRUE_VALUES.into()],
@@ -219,13 +224,16 @@ impl Station {
         let camera = none(&NAMES[..ALWAYS_NAMED]);
         let plane = none(&["nx", "ny", "nz", "offset_mm"]);
         let pointer = none(&["ox_mm", "oy_mm", "oz_mm", "dx", "dy", "dz"]);
-        let hand_eye = none(&["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"]);
+        let pose = none(&["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"]);
         let camera = Calibration::new(Kind::Camera, self.camera, None, camera, quality.clone());
         let with = Some(&camera);
         let rig = Rig {
             laser_plane: Some(Calibration::new(Kind::LaserPlane, self.laser.plane(), with, plane, quality.clone())),
             pointer: Some(Calibration::new(Kind::Pointer, self.pointer.ray(), with, pointer, quality.clone())),
-            hand_eye: Some(Calibration::new(Kind::HandEye, self.flange_from_camera, with, hand_eye, quality)),
+            hand_eye: base_from_camera
+                .is_none()
+                .then(|| Calibration::new(Kind::HandEye, self.flange_from_camera, with, pose.clone(), quality.clone())),
+            base_camera: base_from_camera.map(|x| Calibration::new(Kind::BaseCamera, x, with, pose, quality)),
             camera: Some(camera),
             ..Rig::default()
         };

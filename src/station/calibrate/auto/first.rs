@@ -82,7 +82,7 @@ const STEPS: i32 = 45;
 
 /// The pinhole camera with which the robot's moves and the board's agree best. A focal length that is wrong puts the board at
 /// a wrong distance, and the robot's shifts say so.
-pub fn camera(stops: &[Stop], size: [u32; 2]) -> Result<Intrinsics> {
+pub fn camera(stops: &[Stop], mount: Mount, size: [u32; 2]) -> Result<Intrinsics> {
     let [width, height] = size;
     let long = f64::from(width.max(height));
     let (cx, cy) = (f64::from(width - 1) / 2.0, f64::from(height - 1) / 2.0);
@@ -91,7 +91,7 @@ pub fn camera(stops: &[Stop], size: [u32; 2]) -> Result<Intrinsics> {
     let misfit = |k: &Intrinsics| {
         let pair = |s: &Stop| {
             let seen = board(k, &SeenBoard::from_view(&s.name, &s.board, &s.view)).ok()?;
-            Some(Pair { near_from_far: near_from_far(Mount::EyeInHand, &s.robot?.pose), seen })
+            Some(Pair { near_from_far: near_from_far(mount, &s.robot?.pose), seen })
         };
         let pairs: Vec<Pair> = stops.iter().filter_map(pair).collect();
         // In px: a camera that puts the board far away must not be preferred for its millimetres.
@@ -105,8 +105,11 @@ pub fn camera(stops: &[Stop], size: [u32; 2]) -> Result<Intrinsics> {
         .map(|(_, k)| k)
         .ok_or_else(|| {
             Fault::input("no camera explains how the board moved with the robot")
-                .cause("the board moved, the robot's poses are of another tool or in another unit, or the camera is not on the flange")
-                .next("check tool and work number of the controller (0), and that the board lies still")
+                .cause(match mount {
+                    Mount::EyeInHand => "the board moved, the robot's poses are of another tool or in another unit, or the camera is not on the flange",
+                    Mount::EyeToHand => "the board slips on the flange, the robot's poses are of another tool or in another unit, or the camera moves",
+                })
+                .next("check tool and work number of the controller (0), that the board is fast, and where the camera is (--eye-to-hand)")
         })
 }
 

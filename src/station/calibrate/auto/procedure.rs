@@ -1,4 +1,4 @@
-//! In: a cell, a board below its robot, a target. Out: the rig, calibrated by moves of the program's own choice, checked on
+//! In: a cell, a board below its robot or on its flange, a target. Out: the rig, calibrated by moves of the program's own choice, checked on
 //! poses that no solve saw.
 //! Frame and unit: mm, rad, px (docs/math.md, Joint calibration (9), (10)).
 
@@ -118,9 +118,9 @@ impl<'a> Session<'a> {
         first::moves(cell, &home, &mut book)?;
         let recordings = book.recordings();
         let size = [recordings[0].meta.image.width, recordings[0].meta.image.height];
-        let first = first_camera(&book, size, rig)?;
+        let first = first_camera(&book, run.joint.mount, size, rig)?;
         let options = JointOptions {
-            mount: Mount::EyeInHand,
+            mount: run.joint.mount,
             camera_free: first.free.clone(),
             camera_prior: first.prior.clone(),
             ..JointOptions::default()
@@ -207,7 +207,7 @@ impl<'a> Session<'a> {
         let seed = self.run.seed.wrapping_mul(1_000_003).wrapping_add(self.tries);
         let mut out = Vec::new();
         for seen in candidates(state, &self.run.board, &looks, self.run.candidates, seed) {
-            let to = flange(Mount::EyeInHand, &state.near_from_camera, &state.far_from_board[0], &seen);
+            let to = flange(self.run.joint.mount, &state.near_from_camera, &state.far_from_board[0], &seen);
             if self.refused.iter().any(|r| alike(r, &to, self.working[1])) {
                 continue;
             }
@@ -329,7 +329,7 @@ impl<'a> Session<'a> {
             }
         }
         let shots: Vec<Shot> = (before..self.book.stops.len()).map(|i| self.measured(i)).collect::<Result<_>>()?;
-        Ok(check(&joint.fit, &shots, joint.expected_mm()))
+        Ok(check(&joint.fit, self.run.joint.mount, &shots, joint.expected_mm()))
     }
 }
 
@@ -407,12 +407,12 @@ fn solved(
 }
 
 /// The station's camera where it has one, else one that the small moves tell.
-fn first_camera(book: &Notebook, size: [u32; 2], rig: &Rig) -> Result<FirstCamera> {
+fn first_camera(book: &Notebook, mount: Mount, size: [u32; 2], rig: &Rig) -> Result<FirstCamera> {
     let known = rig.camera.as_ref().filter(|c| [c.value.width, c.value.height] == size);
     let (value, covariance) = match known {
         Some(c) => (c.value, intrinsic_covariance(&c.covariance)?),
         None => {
-            let value = first::camera(&book.stops, size)?;
+            let value = first::camera(&book.stops, mount, size)?;
             (value, first::usual(&value))
         }
     };
