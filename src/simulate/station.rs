@@ -208,6 +208,11 @@ impl Station {
     /// Writes the true values as the calibration of a station folder; an independent random stream
     /// for everything that is drawn later is [`Station::rng`].
     pub fn store(&self, folder: &Path) -> Result<()> {
+        self.calibrations().store_all(folder).map(|_| ())
+    }
+
+    /// The true values as a calibrated rig.
+    pub fn calibrations(&self) -> Rig {
         let quality = Quality {
             verdict: Verdict::Good,
             reasons: vec![TRUE_VALUES.into()],
@@ -222,14 +227,13 @@ impl Station {
         let hand_eye = none(&["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"]);
         let camera = Calibration::new(Kind::Camera, self.camera, None, camera, quality.clone());
         let with = Some(&camera);
-        let rig = Rig {
+        Rig {
             laser_plane: Some(Calibration::new(Kind::LaserPlane, self.laser.plane(), with, plane, quality.clone())),
             pointer: Some(Calibration::new(Kind::Pointer, self.pointer.ray(), with, pointer, quality.clone())),
             hand_eye: Some(Calibration::new(Kind::HandEye, self.flange_from_camera, with, hand_eye, quality)),
             camera: Some(camera),
             ..Rig::default()
-        };
-        rig.store_all(folder).map(|_| ())
+        }
     }
 
     /// A random stream of its own for each purpose, so that adding one does not change the others.

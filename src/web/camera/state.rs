@@ -32,6 +32,8 @@ pub(super) struct State {
     /// When the newest pictures' last bytes came, ns of the host's clock.
     pub moments: VecDeque<(u64, u64)>,
     pub account: Account,
+    /// Pictures a second, as they came lately.
+    pub rate_hz: Option<f64>,
     pub measured: u64,
     pub without_stripe: u64,
     pub delays: VecDeque<f64>,

@@ -117,6 +117,11 @@ impl Camera {
         lock(&self.state).newest.as_ref().filter(|l| l.number != number).cloned()
     }
 
+    /// Pictures a second, as it sent them lately; `None`: not known.
+    pub fn rate_hz(&self) -> Option<f64> {
+        lock(&self.state).rate_hz
+    }
+
     /// When a picture's last byte came, ns of the host's clock; `None`: it is long gone.
     pub fn moment(&self, number: u64) -> Option<u64> {
         lock(&self.state).moments.iter().find(|(n, _)| *n == number).map(|(_, at)| *at)
@@ -215,7 +220,7 @@ fn look(
         if state.delays.len() > DELAYS {
             state.delays.pop_front();
         }
-        state.account = feed.account();
+        (state.account, state.rate_hz) = (feed.account(), feed.rate_hz());
         if live.is_ok() {
             state.wrong = feed.news().pop();
         }
