@@ -60,7 +60,7 @@ camera: boolean,
  */
 robot: RobotState, 
 /**
- * Whether the line is on; null where nobody switches it from here.
+ * Line or pointer is on, by the controller's outputs; null without a link that can say.
  */
 laser: boolean | null, 
 /**
@@ -87,6 +87,10 @@ calibration: CalibrationAge | null,
  * On the disk that holds the jobs, GB; null where the system does not say.
  */
 disk_left_gb: number | null, 
+/**
+ * Memory of the program, now and at its most, MB; null where the system does not say.
+ */
+memory_mb: [number, number] | null, 
 /**
  * What an operator must know now, one sentence each.
  */
@@ -320,7 +324,13 @@ speed_mm_s?: number | null,
  */
 back_out: boolean, };
 
-export type Order = { "procedure": "check" } & Plain | { "procedure": "scan" } & ScanOrder | { "procedure": "filter" } & FilterOrder | { "procedure": "find" } & FindOrder | { "procedure": "teach" } & TeachOrder | { "procedure": "touch" } & TouchOrder | { "procedure": "tune" } & Plain | { "procedure": "calibrate" } & CalibrateOrder | { "procedure": "joint" } & JointOrder | { "procedure": "auto" } & AutoOrder | { "procedure": "insert" } & InsertOrder | { "procedure": "benchmark" } & Plain;
+export type BenchmarkOrder = { 
+/**
+ * Pictures a second of the camera whose drops are counted; null: 30.
+ */
+rate_hz?: number | null, };
+
+export type Order = { "procedure": "check" } & Plain | { "procedure": "scan" } & ScanOrder | { "procedure": "filter" } & FilterOrder | { "procedure": "find" } & FindOrder | { "procedure": "teach" } & TeachOrder | { "procedure": "touch" } & TouchOrder | { "procedure": "tune" } & Plain | { "procedure": "calibrate" } & CalibrateOrder | { "procedure": "joint" } & JointOrder | { "procedure": "auto" } & AutoOrder | { "procedure": "insert" } & InsertOrder | { "procedure": "benchmark" } & BenchmarkOrder;
 
 export type CheckLine = { 
 /**
@@ -828,6 +838,44 @@ height: number,
  */
 ms_per_shot: number, };
 
+export type KeptUp = { 
+/**
+ * What it ran on.
+ */
+on: string, 
+/**
+ * Columns, px.
+ */
+width: number, 
+/**
+ * Rows, px.
+ */
+height: number, 
+/**
+ * Pictures a second that were sent.
+ */
+rate_hz: number, 
+/**
+ * Pictures that were sent.
+ */
+sent: number, 
+/**
+ * Of these with points.
+ */
+measured: number, 
+/**
+ * Passed over, because a newer one had come.
+ */
+passed_over: number, 
+/**
+ * Lost otherwise.
+ */
+lost: number, 
+/**
+ * From the last byte to the points, p50 and p99, ms.
+ */
+ms: [number, number], };
+
 export type Outcome = { "procedure": "check", 
 /**
  * In the order in which they were made.
@@ -848,7 +896,11 @@ rows: Array<BenchRow>,
 /**
  * The same of other machines, as they were recorded.
  */
-recorded: Array<BenchRow>, };
+recorded: Array<BenchRow>, 
+/**
+ * What of a camera was measured and what was dropped, at half and at full resolution.
+ */
+kept_up: Array<KeptUp>, };
 
 export type Job = { 
 /**
@@ -1638,3 +1690,191 @@ rms_mm: number | null,
  * Cells that went in.
  */
 cells: number, };
+
+export type SweepAsk = { 
+/**
+ * Name of the recipe.
+ */
+recipe: string, 
+/**
+ * An insertion that touched the board already.
+ */
+job?: string | null, 
+/**
+ * From the camera to the board, mm, before it was touched.
+ */
+distance_mm?: number | null, 
+/**
+ * Length, mm.
+ */
+sweep_mm?: number | null, 
+/**
+ * From one shot to the next, mm.
+ */
+step_mm?: number | null, 
+/**
+ * mm/s; without: the fastest that all bear.
+ */
+speed_mm_s?: number | null, 
+/**
+ * Pictures a second of another camera than the one that is linked.
+ */
+camera_hz?: number | null, };
+
+export type Pace = { 
+/**
+ * mm/s.
+ */
+speed_mm_s: number, 
+/**
+ * mm a shot.
+ */
+step_mm: number, 
+/**
+ * Pictures a second.
+ */
+rate_hz: number, 
+/**
+ * Over the whole length, s.
+ */
+seconds: number, 
+/**
+ * camera, chain or speed: the one that allows no more; null: none does.
+ */
+limited_by: string | null, 
+/**
+ * The fastest that each of them bears at this step, mm/s.
+ */
+bears: Array<[string, number]>, 
+/**
+ * The step that is left at this speed, mm.
+ */
+left_step_mm: number, };
+
+export type SweepPlan = { 
+/**
+ * Name of the recipe.
+ */
+recipe: string, 
+/**
+ * The board was touched; else it is taken to lie squarely before the camera.
+ */
+touched: boolean, 
+/**
+ * From the board to the camera, mm.
+ */
+depth_mm: number, 
+/**
+ * From the first shot's stripe to the last one's, mm.
+ */
+length_mm: number, 
+/**
+ * From one shot to the next, mm.
+ */
+step_mm: number, 
+/**
+ * Pictures.
+ */
+shots: number, 
+/**
+ * Across the part however it is turned, mm.
+ */
+part_mm: number, 
+/**
+ * What the camera sees of the board: x0 y0 x1 y1, mm.
+ */
+field_mm: [number, number, number, number], 
+/**
+ * Ends of the first shot's stripe, then of the last one's, in the order around what is swept, mm.
+ */
+swept_mm: [[number, number], [number, number], [number, number], [number, number]], 
+/**
+ * How far the part may lie off the picture's middle along the sweep, mm; negative: it is never swept whole.
+ */
+along_mm: number, 
+/**
+ * The same along the stripe.
+ */
+across_mm: number, 
+/**
+ * Left of the working volume above the board and below it, mm; null: nobody knows it.
+ */
+volume_mm: [number, number] | null, 
+/**
+ * Left to the sides of the flange's box, mm; negative: outside; null: no box is stated or the robot's place is not known.
+ */
+box_mm: number | null, 
+/**
+ * Names of a flange pose's numbers.
+ */
+labels: Array<string>, 
+/**
+ * The flange at the first and the last shot; empty where the robot's place is not known.
+ */
+flange: Array<Array<number>>, 
+/**
+ * What is swept, and how far a part in its middle reaches, in the camera's picture as it stands now, px; empty: not known.
+ */
+seen_px: Array<Array<[number, number]>>, 
+/**
+ * Pictures a second that the camera sends; null: not known.
+ */
+camera_hz: number | null, 
+/**
+ * Pictures of this size that a scan of this station measured in a second; null: none did.
+ */
+chain_hz: number | null, 
+/**
+ * The station's limit, mm/s.
+ */
+limit_mm_s: number | null, 
+/**
+ * Of a scan that does not stop for its pictures; null: nothing is known that limits it.
+ */
+pace: Pace | null, };
+
+export type RepeatsAsk = { 
+/**
+ * Their names.
+ */
+jobs: Array<string>, };
+
+export type Spread = { 
+/**
+ * x, y, z of the frame, or turn.
+ */
+name: string, 
+/**
+ * mm or degrees.
+ */
+unit: string, 
+/**
+ * One standard deviation of the places.
+ */
+scatter: number, 
+/**
+ * What they state of themselves, root mean square.
+ */
+stated: number, 
+/**
+ * From the first to the last of them.
+ */
+apart: number, 
+/**
+ * The histogram reaches so far to both sides of the median.
+ */
+half: number, 
+/**
+ * Places in each of its bars.
+ */
+bars: Array<number>, };
+
+export type Repeats = { 
+/**
+ * Of how many.
+ */
+places: number, 
+/**
+ * x, y, z, turn; empty of fewer than two.
+ */
+along: Array<Spread>, };

@@ -28,7 +28,7 @@ const MAY: &[(&str, &[&str])] = &[
     ),
     ("stages", &["geometry", "raster", "camera", "gpu"]),
     ("scan", &["geometry", "raster", "solve", "gpu", "camera", "robot", "recording", "rig", "capture", "stages"]),
-    ("bench", &["raster", "gpu", "stages", "scan"]),
+    ("bench", &["geometry", "raster", "gpu", "camera", "rig", "capture", "stages", "scan"]),
     ("find", &["geometry", "raster", "solve", "gpu", "camera", "robot", "recording", "rig", "stages", "scan"]),
     (
         "station",

@@ -169,6 +169,72 @@ fn exposure_and_region_are_set_from_the_picture() {
 }
 
 #[test]
+fn old_browsers_and_full_disks_are_told_what_to_do() {
+    let dir = copy();
+    python("tests/web/hurdles.py", &[program(), dir.path().to_str().unwrap()]);
+}
+
+#[test]
+fn an_axis_is_calibrated_through_its_page() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().to_str().unwrap();
+    sheetlight(&["--quiet", "simulate", "--out", folder, "--set", "axis", "--motion", "linear", "--seed", "3"]);
+    python("tests/web/axis.py", &[program(), folder]);
+}
+
+/// Texts that a script shows by its own words: `t("words")`, `t(so ? "words" : "others")`, `t({ a: "words" }[which])`.
+fn own_words(script: &str) -> Vec<String> {
+    let mut words = Vec::new();
+    for (at, _) in script.match_indices("t(") {
+        // The end of another name is none.
+        if script[..at].ends_with(|c: char| c.is_alphanumeric() || "_.$".contains(c)) {
+            continue;
+        }
+        let (mut depth, mut quoted, mut chosen) = (1, None::<String>, false);
+        let call = &script[at + 2..];
+        let all = call.starts_with(['"', '{']);
+        for c in call.chars() {
+            match (&mut quoted, c) {
+                (Some(word), '"') => {
+                    words.extend((all || chosen).then(|| word.clone()));
+                    quoted = None;
+                }
+                (Some(word), c) => word.push(c),
+                (None, '"') => quoted = Some(String::new()),
+                (None, '?') => chosen = true,
+                (None, '(') => depth += 1,
+                (None, ')') => depth -= 1,
+                _ => {}
+            }
+            if depth == 0 {
+                break;
+            }
+        }
+    }
+    words
+}
+
+/// Every text that a page shows by its own words is in the table, in all languages.
+#[test]
+fn every_text_has_its_translations() {
+    let read = own_words(r#"h(t("a (b)"), post("c"), t(x === "d" ? "e" : f), t({ g: "h" }[i]), t(j))"#);
+    assert_eq!(read, ["a (b)", "e", "h"]);
+    let pages = source("src/web/pages");
+    let table = std::fs::read_to_string(pages.join("base/texts.js")).unwrap();
+    let rows: Vec<&str> = table.lines().filter(|l| l.starts_with("  \"")).collect();
+    let whole = |row: &&str| row.matches("\", \"").count() >= 2;
+    assert!(rows.len() > 500 && rows.iter().all(whole), "{:?}", rows.iter().find(|r| !whole(r)));
+    let scripts = ["base", "pages", "widgets"].map(|f| std::fs::read_dir(pages.join(f)).unwrap());
+    let mut missing = Vec::new();
+    for path in scripts.into_iter().flatten().map(|e| e.unwrap().path()).filter(|p| p.extension().unwrap() == "js") {
+        let words = own_words(&std::fs::read_to_string(&path).unwrap());
+        let known = |w: &String| rows.iter().any(|r| r.starts_with(&format!("  \"{w}\": [")));
+        missing.extend(words.into_iter().filter(|w| !known(w)).map(|w| format!("{}: {w}", path.display())));
+    }
+    assert!(missing.is_empty(), "{missing:#?}");
+}
+
+#[test]
 fn touch_checks_layers_drawings_points_and_support_do_what_an_operator_expects() {
     let dir = copy();
     python("tests/web/station.py", &[program(), dir.path().to_str().unwrap()]);

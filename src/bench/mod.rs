@@ -1,6 +1,7 @@
 //! In: picture sizes and scenes. Out: how fast the chain is on this machine, stage by stage, against what
 //! its memory and its upload path could carry. Frame and unit: seconds, pixels, bytes, 1e9 bytes a second.
 
+mod keep_up;
 mod machine;
 mod peer;
 mod recorded;
@@ -12,6 +13,7 @@ mod steady;
 mod table;
 mod ways;
 
+pub use keep_up::{KeptUp, keep_up};
 pub use machine::{Ceilings, cpu_seconds, peak_memory_bytes};
 pub use peer::serve;
 pub use recorded::recorded;

@@ -1,10 +1,11 @@
 //! In: sizes and scenes. Out: a table of speeds of this machine, or a file of it; or the peer's side of a
 //! comparison on stdin and stdout. Frame and unit: ms, shots a second, pixels, GB/s.
 
-use crate::bench::{self, BenchOptions, Scene};
+use crate::bench::{self, BenchOptions, KeptUp, Scene, WayTime};
 use crate::cli::terminal::console::Console;
 use crate::fault::Result;
 use crate::gpu::Device;
+use crate::scan::Where;
 use std::path::{Path, PathBuf};
 
 /// Measure how fast the stripe chain is on this machine
@@ -18,6 +19,7 @@ use std::path::{Path, PathBuf};
 #[command(after_help = "Examples:
   sheetlight bench
   sheetlight bench --size 4096x3072 --scene one-stripe --seconds 10
+  sheetlight bench --keep-up 30
   sheetlight bench --json --save benches/runs/2026-11-21-desk")]
 pub struct Args {
     /// Picture size in pixels, may be repeated [default: 640x480, 1280x960, 4096x3072, 5120x5120]
@@ -35,6 +37,10 @@ pub struct Args {
     /// Let a software adapter read arrays from buffers, as all other adapters do
     #[arg(long)]
     from_buffers: bool,
+    /// In place of the table what the screen's page Health shows: what of a camera of so many pictures a second is measured and what
+    /// is dropped, at half and at full resolution; a shot on processor and GPU, beside recorded machines
+    #[arg(long, value_name = "HZ", conflicts_with_all = ["size", "scene", "soak", "from_buffers", "save"])]
+    keep_up: Option<f64>,
     /// Folder for bench.json and bench.txt
     #[arg(long)]
     save: Option<PathBuf>,
@@ -58,6 +64,9 @@ fn scene(text: &str) -> std::result::Result<Scene, String> {
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
+    if let Some(rate) = args.keep_up {
+        return health(rate, args.seconds, console);
+    }
     let device = Device::open()?;
     let device = if args.from_buffers { device.without_texels() } else { device };
     if args.peer_pipe {
@@ -87,6 +96,41 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         write(&folder.join("bench.txt"), &text)?;
     }
     console.result(&report, &text);
+    Ok(())
+}
+
+/// What a shot takes and what of a camera is dropped, here and elsewhere.
+#[derive(serde::Serialize)]
+struct Health {
+    kept_up: Vec<KeptUp>,
+    rows: Vec<WayTime>,
+    recorded: Vec<WayTime>,
+}
+
+fn health(rate_hz: f64, seconds: f64, console: &Console) -> Result<()> {
+    let kept_up = bench::keep_up(rate_hz, seconds, Where::default())?;
+    let device = Device::open().ok();
+    let found = Health { kept_up, rows: bench::way_times(device.as_ref())?, recorded: bench::recorded() };
+    let share = |n: u64, k: &KeptUp| 100.0 * n as f64 / k.sent.max(1) as f64;
+    let kept = |k: &KeptUp| {
+        format!(
+            "{:4}x{:<4} {} of {} pictures at {}/s measured, {:.1} % passed over, {:.1} % lost; p50 {:.2}, p99 {:.2} ms; {}",
+            k.width,
+            k.height,
+            k.measured,
+            k.sent,
+            k.rate_hz,
+            share(k.passed_over, k),
+            share(k.lost, k),
+            k.ms[0],
+            k.ms[1],
+            k.on
+        )
+    };
+    let time = |w: &WayTime| format!("{:4}x{:<4} {:8.2} ms a shot, {}", w.width, w.height, w.ms_per_shot, w.on);
+    let lines = found.kept_up.iter().map(kept).chain(found.rows.iter().map(time));
+    let lines = lines.chain(found.recorded.iter().map(|w| time(w) + ", recorded"));
+    console.result(&found, &lines.collect::<Vec<_>>().join("\n"));
     Ok(())
 }
 

@@ -3,8 +3,8 @@
 
 use super::capture::{camera, record};
 use super::doctor::command as doctor;
-use super::find::{filter, ghost, import_map, locate as find, matching, model, program, second_look, teach};
-use super::insert::{guide, job, robot};
+use super::find::{batch, filter, ghost, import_map, locate as find, matching, model, program, second_look, teach};
+use super::insert::{guide, job, robot, sweep};
 use super::terminal::console::Console;
 use super::terminal::threads;
 use super::{bench, board, calibrate, cell, demo, live, range, scan, shift_scan, simulate, station, verify};
@@ -38,6 +38,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Batch(batch::Args),
     Bench(bench::Args),
     Board(board::Args),
     /// Calibrate a station's camera, laser plane, pointer or hand-eye from a recording
@@ -74,12 +75,14 @@ enum Command {
     /// Make, show, import into or export from a station folder
     #[command(subcommand)]
     Station(station::Command),
+    Sweep(sweep::Args),
     Teach(teach::Args),
     Verify(verify::Args),
 }
 
 fn run(command: &Command, console: &Console) -> Result<()> {
     match command {
+        Command::Batch(a) => batch::run(a, console),
         Command::Bench(a) => bench::run(a, console),
         Command::Board(a) => board::run(a, console),
         Command::Calibrate(c) => calibrate::run(c, console),
@@ -106,6 +109,7 @@ fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Simulate(a) => simulate::run(a, console),
         Command::Verify(a) => verify::run(a, console),
         Command::Station(c) => station::run(c, console),
+        Command::Sweep(a) => sweep::run(a, console),
         Command::Teach(a) => teach::run(a, console),
     }
 }

@@ -38,6 +38,9 @@ pub struct Fault {
     pub next: String,
 }
 
+/// The cause of a result that found no room.
+const FULL: &str = "the disk is full";
+
 /// What every function returns that bad input can stop.
 pub type Result<T> = std::result::Result<T, Fault>;
 
@@ -94,6 +97,10 @@ impl Fault {
         self.what = format!("{place}: {}", self.what);
         self
     }
+    /// A result found no room on its disk.
+    pub fn is_full_disk(&self) -> bool {
+        self.kind == Kind::Output && self.cause == FULL
+    }
     /// 2 for misuse, 1 for everything else.
     pub fn exit_code(&self) -> u8 {
         if self.kind == Kind::Usage { 2 } else { 1 }
@@ -122,7 +129,7 @@ impl Fault {
     pub fn write(path: &Path, e: std::io::Error) -> Fault {
         let full = e.kind() == std::io::ErrorKind::StorageFull;
         Fault::output(format!("{}: cannot be written: {e}", path.display()))
-            .cause(if full { "the disk is full" } else { "the folder is missing or not writable" })
+            .cause(if full { FULL } else { "the folder is missing or not writable" })
             .next(if full {
                 "free some space or choose another --out, then run the same command again"
             } else {

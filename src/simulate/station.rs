@@ -208,11 +208,11 @@ impl Station {
     /// Writes the true values as the calibration of a station folder; an independent random stream
     /// for everything that is drawn later is [`Station::rng`].
     pub fn store(&self, folder: &Path) -> Result<()> {
-        self.store_at(folder, None)
+        self.calibrations(None).store_all(folder).map(|_| ())
     }
 
-    /// The same; with `base_from_camera` of a sensor that stands still there, in place of the one on the flange.
-    pub fn store_at(&self, folder: &Path, base_from_camera: Option<Rigid<Base, Camera>>) -> Result<()> {
+    /// The true values as a calibrated rig; with `base_from_camera` of a sensor that stands still there, in place of the one on the flange.
+    pub fn calibrations(&self, base_from_camera: Option<Rigid<Base, Camera>>) -> Rig {
         let quality = Quality {
             verdict: Verdict::Good,
             reasons: vec![TRUE_VALUES.into()],
@@ -227,7 +227,7 @@ impl Station {
         let pose = none(&["tx_mm", "ty_mm", "tz_mm", "rx_rad", "ry_rad", "rz_rad"]);
         let camera = Calibration::new(Kind::Camera, self.camera, None, camera, quality.clone());
         let with = Some(&camera);
-        let rig = Rig {
+        Rig {
             laser_plane: Some(Calibration::new(Kind::LaserPlane, self.laser.plane(), with, plane, quality.clone())),
             pointer: Some(Calibration::new(Kind::Pointer, self.pointer.ray(), with, pointer, quality.clone())),
             hand_eye: base_from_camera
@@ -236,8 +236,7 @@ impl Station {
             base_camera: base_from_camera.map(|x| Calibration::new(Kind::BaseCamera, x, with, pose, quality)),
             camera: Some(camera),
             ..Rig::default()
-        };
-        rig.store_all(folder).map(|_| ())
+        }
     }
 
     /// A random stream of its own for each purpose, so that adding one does not change the others.

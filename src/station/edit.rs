@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 /// # Errors
 /// Names that are no setting, values that a station cannot have; the text is refused as a whole then.
 pub fn edited(text: &str, changes: &BTreeMap<String, Value>) -> Result<String> {
-    let wanted = with(&Settings::parse(text)?, changes)?;
+    let wanted = changed(&Settings::parse(text)?, "", changes)?;
     let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
     for (key, value) in changes {
         let (table, name) = key.rsplit_once('.').unwrap_or(("", key));
@@ -26,11 +26,15 @@ pub fn edited(text: &str, changes: &BTreeMap<String, Value>) -> Result<String> {
     Ok(toml::to_string(&wanted).expect("plain data"))
 }
 
-/// The settings themselves, changed and checked.
-fn with(settings: &Settings, changes: &BTreeMap<String, Value>) -> Result<Settings> {
+/// The settings themselves, changed and checked; names are those within a table, with dots (`below`: "" or "extraction").
+///
+/// # Errors
+/// Names that are no setting, values that a station cannot have.
+pub fn changed(settings: &Settings, below: &str, changes: &BTreeMap<String, Value>) -> Result<Settings> {
     let mut all = serde_json::to_value(settings).expect("plain data");
     for (key, value) in changes {
-        let (table, name) = key.rsplit_once('.').unwrap_or(("", key));
+        let key = if below.is_empty() { key.clone() } else { format!("{below}.{key}") };
+        let (table, name) = key.rsplit_once('.').unwrap_or(("", &key));
         let mut at = &mut all;
         for word in table.split('.').filter(|w| !w.is_empty()) {
             at = at.as_object_mut().expect("a table").entry(word).or_insert_with(|| Value::Object(Default::default()));

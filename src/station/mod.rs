@@ -2,6 +2,7 @@
 //! Frame and unit: millimetres; each file names its frames.
 
 mod backup;
+mod batch;
 mod calibrate;
 mod edit;
 mod filter;
@@ -22,6 +23,7 @@ mod verify;
 pub mod volume;
 
 pub use backup::{Backup, back_up_here, backups, settle_restore};
+pub use batch::{Batch, BatchOptions, BatchRow, FoundAt, Placed, Repeats, Spread, batch, repeats};
 pub use calibrate::auto::arm::ArmCell;
 pub use calibrate::auto::cell::{Cell, Light, Went};
 pub use calibrate::auto::check::SelfCheck;
@@ -38,7 +40,7 @@ pub use calibrate::joint::run::{JointResult, JointRun, calibrate_joint, store_jo
 pub use calibrate::laser_plane::{LaserPlaneRun, calibrate_laser_plane};
 pub use calibrate::latency::{LatencyFound, calibrate_latency};
 pub use calibrate::pointer::{PointerRun, calibrate_pointer};
-pub use edit::edited;
+pub use edit::{changed, edited};
 pub use filter::{filter_map, filter_scan, left};
 pub use find::{Looked, SecondLook, find_part, find_part_in_all, second_look, teach_part};
 pub use ghost::{Lies, ghost};

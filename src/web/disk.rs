@@ -1,5 +1,5 @@
-//! In: a folder. Out: how much its disk still takes.
-//! Frame and unit: GB of 10^9 bytes.
+//! In: a folder; this process. Out: how much its disk still takes; the memory that it has.
+//! Frame and unit: GB of 10^9 bytes, MB of 10^6.
 
 use std::path::Path;
 use std::process::Command;
@@ -12,8 +12,27 @@ pub fn left_gb(folder: &Path) -> Option<f64> {
     Some(available * 1024e-9)
 }
 
+/// Memory of this process, now and at its most; `None` where the system does not say it as Linux does.
+pub fn memory_mb() -> Option<[f64; 2]> {
+    let text = std::fs::read_to_string("/proc/self/status").ok()?;
+    let mb = |name: &str| {
+        let line = text.lines().find_map(|l| l.strip_prefix(name))?;
+        Some(line.split_whitespace().next()?.parse::<f64>().ok()? * 1024e-6)
+    };
+    Some([mb("VmRSS:")?, mb("VmHWM:")?])
+}
+
 #[cfg(test)]
 mod tests {
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn memory_that_is_used_is_counted() {
+        let [before, _] = super::memory_mb().unwrap();
+        let much = std::hint::black_box(vec![1u8; 64 << 20]);
+        let [now, most] = super::memory_mb().unwrap();
+        assert!(now > before + 40.0 && most >= now && much[1 << 20] == 1, "{before} {now} {most}");
+    }
+
     #[test]
     fn a_disk_says_what_is_left() {
         let left = super::left_gb(std::path::Path::new(".")).expect("df is there");

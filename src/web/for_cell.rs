@@ -17,7 +17,7 @@ const WORKSPACE: Space = Space { from_mm: [150.0, -350.0, 200.0], to_mm: [650.0,
 /// A file cannot be written.
 pub fn station_for(cell: &Cell, folder: &Path, name: &str, silence_ms: Option<f64>) -> Result<()> {
     crate::files::make_folder(folder)?;
-    cell.station().store_at(folder, cell.base_from_camera())?;
+    cell.station().calibrations(cell.base_from_camera()).store_all(folder)?;
     let usual = Limits::within(WORKSPACE);
     let motion = Limits { max_silence_ms: silence_ms.unwrap_or(usual.max_silence_ms), ..usual };
     let tool = Some(ToolSpec { flange_from_tool: cell.flange_from_tool() });

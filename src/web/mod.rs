@@ -13,6 +13,7 @@ mod guard;
 mod message;
 mod motion;
 mod pages;
+mod port;
 mod robot;
 mod screen;
 mod serve;
@@ -20,6 +21,7 @@ mod settings;
 mod simulated;
 mod station;
 mod surface;
+mod sweep;
 mod track;
 mod work;
 

@@ -3,9 +3,11 @@
 
 use super::message::RobotState;
 use super::track::Track;
-use crate::arm::{Arm, Mode, RobotUri, State, open};
+use crate::arm::{Arm, Mode, Outputs, RobotUri, State, open};
 use crate::capture::now_ns;
 use crate::fault::{Fault, Result};
+use crate::station::Settings;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
@@ -24,6 +26,8 @@ pub struct Seen {
     pub state: Option<State>,
     /// Why there is none, or what stands on the controller.
     pub wrong: Option<String>,
+    /// Line or pointer is on, by the controller's outputs; None: the link cannot say.
+    pub laser: Option<bool>,
 }
 
 /// A robot that is looked at, over a link of its own; it is moved from [`super::motion`].
@@ -34,17 +38,20 @@ pub struct Robot {
 }
 
 impl Robot {
-    /// Begins to look. The robot need not be there yet.
-    pub fn watch(uri: &str) -> Result<Robot> {
+    /// Begins to look, at the outputs that the station names too. The robot need not be there yet.
+    pub fn watch(uri: &str, station: &Path) -> Result<Robot> {
         // Poses of a file have no times: none of them is that of a picture.
         let timed = !matches!(uri.parse::<RobotUri>()?, RobotUri::File(_));
         let (seen, ended) = (Arc::new(Mutex::new(Seen::default())), Arc::new(AtomicBool::new(false)));
         let track = Arc::new(Mutex::new(Track::default()));
         let (uri, tell, end, tracks) = (uri.to_owned(), seen.clone(), ended.clone(), track.clone());
+        let station = station.to_owned();
         let body = move || {
             while !end.load(Ordering::Relaxed) {
-                let Err(fault) = look(&uri, &tell, timed.then_some(&*tracks), &end) else { return };
-                *tell.lock().unwrap_or_else(|e| e.into_inner()) = Seen { state: None, wrong: Some(fault.what) };
+                let outputs = Settings::load(&station).ok().and_then(|s| s.outputs).unwrap_or_default();
+                let Err(fault) = look(&uri, &outputs, &tell, timed.then_some(&*tracks), &end) else { return };
+                let gone = Seen { wrong: Some(fault.what), ..Seen::default() };
+                *tell.lock().unwrap_or_else(|e| e.into_inner()) = gone;
                 std::thread::sleep(AGAIN);
             }
         };
@@ -69,7 +76,13 @@ impl Drop for Robot {
     }
 }
 
-fn look(uri: &str, tell: &Mutex<Seen>, track: Option<&Mutex<Track>>, end: &AtomicBool) -> Result<()> {
+fn look(
+    uri: &str,
+    outputs: &Outputs,
+    tell: &Mutex<Seen>,
+    track: Option<&Mutex<Track>>,
+    end: &AtomicBool,
+) -> Result<()> {
     let mut arm = open(uri)?;
     for turn in 0u32.. {
         if end.load(Ordering::Relaxed) {
@@ -81,7 +94,7 @@ fn look(uri: &str, tell: &Mutex<Seen>, track: Option<&Mutex<Track>>, end: &Atomi
             track.lock().unwrap_or_else(|e| e.into_inner()).add(at, pose.base_from_flange);
         }
         if turn % STATE == 0 {
-            state(&mut *arm, tell)?;
+            state(&mut *arm, outputs, tell)?;
         }
         std::thread::sleep(READ);
     }
@@ -89,8 +102,10 @@ fn look(uri: &str, tell: &Mutex<Seen>, track: Option<&Mutex<Track>>, end: &Atomi
 }
 
 /// Reads the state and tells it.
-fn state(arm: &mut dyn Arm, tell: &Mutex<Seen>) -> Result<()> {
+fn state(arm: &mut dyn Arm, outputs: &Outputs, tell: &Mutex<Seen>) -> Result<()> {
     let state = arm.state()?;
+    let lit: Vec<bool> = [outputs.line, outputs.pointer].into_iter().filter_map(|n| arm.signal(n).ok()).collect();
+    let laser = (!lit.is_empty()).then(|| lit.contains(&true));
     let mut wrong: Vec<String> =
         state.errors.iter().map(|e| format!("controller error {:X}: {}", e.code, e.text)).collect();
     if state.emergency_stop == Some(true) {
@@ -100,7 +115,7 @@ fn state(arm: &mut dyn Arm, tell: &Mutex<Seen>) -> Result<()> {
         wrong.push("the controller is not in automatic mode".into());
     }
     let wrong = (!wrong.is_empty()).then(|| wrong.join("; "));
-    *tell.lock().unwrap_or_else(|e| e.into_inner()) = Seen { state: Some(state), wrong };
+    *tell.lock().unwrap_or_else(|e| e.into_inner()) = Seen { state: Some(state), wrong, laser };
     Ok(())
 }
 

@@ -7,6 +7,7 @@ use super::event::Hub;
 use super::guard::{Door, Doorway, Sessions, door, tls, verify};
 use super::message::Event;
 use super::motion::{Desk, Links, SimulatedRobot};
+use super::port::listen;
 use super::robot::Robot;
 use super::screen::Screen;
 use super::work::{Jobs, Place, Worker};
@@ -21,7 +22,6 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
-use tokio::net::TcpListener;
 
 /// What guards a screen that other machines may open.
 #[derive(Clone, Debug)]
@@ -63,14 +63,13 @@ pub struct ServeOptions {
     pub stop: Arc<AtomicBool>,
 }
 
-/// Ports that are tried after the one that was asked for.
-const TRIES: u16 = 20;
 /// How often is looked whether the server is to end.
 const LOOK: Duration = Duration::from_millis(100);
 /// The bar is told so often.
 const BAR: Duration = Duration::from_secs(1);
 
-/// Serves until `stop`; `simulated` is the cell that robot and camera are of, where it is one of ours. `ready` is told the address to open, with the token of this start behind `#`.
+/// Serves until `stop`; `simulated` is the cell that robot and camera are of, where it is one of ours. `ready` is told the address to open, with
+/// the token of this start behind `#`, and where its port is another than was asked for why.
 ///
 /// # Errors
 /// A station that is none or in use by another server, an address that cannot be listened on or is not guarded, bad TLS files.
@@ -78,7 +77,7 @@ pub fn serve(
     options: &ServeOptions,
     simulated: Option<SimulatedRobot>,
     token: &str,
-    ready: impl FnOnce(&str) -> Result<()>,
+    ready: impl FnOnce(&str, Option<&str>) -> Result<()>,
 ) -> Result<()> {
     check(options)?;
     let place = Place { station: options.station.clone(), recordings: options.recordings.clone(), mode: options.mode };
@@ -94,7 +93,7 @@ pub fn serve(
     let hub = Arc::new(Hub::default());
     let camera = options.camera.as_ref();
     let camera = camera.map(|(uri, raw)| Camera::watch(uri, *raw, &options.station)).transpose()?.map(Arc::new);
-    let robot = options.robot.as_deref().map(Robot::watch).transpose()?.map(Arc::new);
+    let robot = options.robot.as_deref().map(|uri| Robot::watch(uri, &options.station)).transpose()?.map(Arc::new);
     let links = Links {
         watched: robot.clone(),
         station: options.station.clone(),
@@ -139,9 +138,9 @@ async fn run(
     options: &ServeOptions,
     token: &str,
     jobs: Arc<Jobs>,
-    ready: impl FnOnce(&str) -> Result<()>,
+    ready: impl FnOnce(&str, Option<&str>) -> Result<()>,
 ) -> Result<()> {
-    let listener = listen(options).await?;
+    let (listener, instead) = listen(options.address, options.port, options.next_free).await?;
     let address = listener.local_addr().map_err(lost)?;
     let acceptor = options.secured.as_ref().map(|s| tls(&s.certificates, &s.key)).transpose()?;
     let sessions = Arc::new(Sessions::new(token));
@@ -157,7 +156,7 @@ async fn run(
     // Adapters are asked for before the first page needs them.
     tokio::task::spawn_blocking(move || first.bar());
     tokio::spawn(bars(screen));
-    ready(&format!("{scheme}://{address}/#token={token}"))?;
+    ready(&format!("{scheme}://{address}/#token={token}"), instead.as_deref())?;
     let stop = options.stop.clone();
     let asked = async move {
         while !stop.load(Ordering::Relaxed) {
@@ -180,21 +179,6 @@ fn hosts(options: &ServeOptions, address: SocketAddr) -> Vec<String> {
     let names = options.secured.iter().flat_map(|s| &s.names);
     hosts.extend(names.flat_map(|n| [format!("{}:{port}", n.to_lowercase()), n.to_lowercase()]));
     hosts
-}
-
-async fn listen(options: &ServeOptions) -> Result<TcpListener> {
-    let most = if options.next_free && options.port > 0 { TRIES } else { 1 };
-    let mut failed = None;
-    for port in (0..most).map_while(|k| options.port.checked_add(k)) {
-        match TcpListener::bind((options.address, port)).await {
-            Ok(listener) => return Ok(listener),
-            Err(e) => failed = failed.or(Some(e)),
-        }
-    }
-    let why = failed.map_or_else(|| "no port".into(), |e| e.to_string());
-    Err(Fault::device(format!("{}:{} cannot be listened on: {why}", options.address, options.port))
-        .cause("another program has the port, or the address is not this machine's")
-        .next("choose another --port; 0 takes any that is free"))
 }
 
 /// Tells the bar, while anybody looks on.

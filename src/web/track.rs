@@ -38,6 +38,11 @@ impl Track {
         self.0.back().map(|s| s.to_ns)
     }
 
+    /// Where it stands, as it was read last.
+    pub fn newest(&self) -> Option<Rigid<Base, Flange>> {
+        self.0.back().map(|s| s.pose)
+    }
+
     /// The readings before and after a moment; twice the same where the arm stood. `None`: nothing was read before or after it.
     pub fn about(&self, at_ns: u64) -> Option<[Rigid<Base, Flange>; 2]> {
         let after = self.0.partition_point(|s| s.to_ns < at_ns);
@@ -73,7 +78,7 @@ mod tests {
         assert_eq!(x(25), Some([0.0, 5.0]), "it moved");
         assert_eq!(x(45), Some([9.0, 9.0]));
         assert_eq!((x(5), x(51)), (None, None), "nothing was read then");
-        assert_eq!(track.newest_ns(), Some(50));
+        assert_eq!((track.newest_ns(), track.newest().map(|p| p.translation.x)), (Some(50), Some(9.0)));
         (0..2000).for_each(|k| track.add(100 + k, at(k as f64)));
         assert!(track.0.len() == MOST && track.about(100).is_none());
     }

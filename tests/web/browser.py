@@ -23,7 +23,7 @@ class Browser:
     def there():
         return shutil.which("chromedriver") and (shutil.which("chromium") or shutil.which("google-chrome"))
 
-    def __init__(self, folder, width=1280, height=800):
+    def __init__(self, folder, width=1280, height=800, flags=()):
         with socket.socket() as s:
             s.bind(("127.0.0.1", 0))
             port = s.getsockname()[1]
@@ -33,7 +33,7 @@ class Browser:
         arguments = [
             "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", f"--window-size={width},{height}", "--hide-scrollbars",
             f"--user-data-dir={folder}", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--lang=en",
-            "--force-device-scale-factor=1", "--force-prefers-reduced-motion",
+            "--force-device-scale-factor=1", "--force-prefers-reduced-motion", *flags,
         ]
         wanted = {"alwaysMatch": {"browserName": "chrome", "goog:loggingPrefs": {"browser": "ALL"}, "goog:chromeOptions": {"args": arguments}}}
         until = time.time() + 30

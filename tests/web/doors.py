@@ -4,7 +4,10 @@ Frame and unit: bytes, seconds, MB."""
 
 import json
 import os
+import shutil
 import socket
+import struct
+import subprocess
 import sys
 import time
 
@@ -135,6 +138,10 @@ def viewers(s):
         kind, data = frame(sockets[1])
         if kind == 2:
             assert data[:4] == b"GROW"
+            if rows == 0:
+                # One of them is killed while the scan runs: nothing is said, its connection is gone.
+                sockets[2].setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+                sockets[2].close()
             rows = int.from_bytes(data[16:20], "little") + int.from_bytes(data[20:24], "little")
         elif kind == 1:
             event = json.loads(data)
@@ -191,7 +198,70 @@ def killed():
     return whole
 
 
+def killed_in_a_calibration():
+    """What a killed calibration had found so far is not in the station; it is offered again, and accepted by a person alone."""
+    s = Server(program, folder, "--recordings", folder)
+    camera = os.path.join(s.station, "calibration", "camera.json")
+    with open(camera, "rb") as f:
+        before = f.read()
+    s.json("POST", "/lease")
+    job = s.json("POST", "/jobs", {"procedure": "calibrate", "target": "camera", "recording": "intrinsics"})["id"]
+    while s.json("GET", f"/jobs/{job}")["done"] < 2:
+        time.sleep(0.01)
+    s.kill()
+    again = Server(program, folder, "--recordings", folder)
+    cut = again.json("GET", f"/jobs/{job}")
+    assert cut["state"] == "cut_off" and cut["outcome"] is None and cut["resumable"], cut
+    again.json("POST", "/lease")
+    refused("accepting what was cut off", again.ask("POST", f"/api/v1/jobs/{job}/accept", {})[0])
+    again.json("POST", f"/jobs/{job}/resume")
+    whole = again.ended(job)
+    assert whole["state"] == "done" and whole["outcome"]["verdict"] and not whole["outcome"]["accepted"], whole
+    with open(camera, "rb") as f:
+        assert f.read() == before, "the station has a calibration that nobody accepted"
+    assert again.end() == 0
+
+
+def starts():
+    """Folders that are no station, a port that is taken, a station that is broken, links that are not there: said, with what to do."""
+    run = lambda station, *more: subprocess.run([program, "station", "serve", "--station", station, "--port", "0", *more], capture_output=True, text=True, timeout=30)
+    empty = os.path.join(folder, "empty")
+    os.makedirs(empty)
+    for station in (os.path.join(folder, "nothing"), empty, os.path.join(folder, "scan")):
+        bad = run(station)
+        assert bad.returncode != 0 and "station.toml" in bad.stderr and "station new" in bad.stderr, bad.stderr
+    foreign = os.path.join(folder, "foreign", "station")
+    shutil.copytree(os.path.join(folder, "station"), foreign, ignore=shutil.ignore_patterns("jobs"))
+    with open(os.path.join(foreign, "station.toml"), "w") as f:
+        f.write("[tool.poetry]\nname = 'another program'\n")
+    s = Server(program, os.path.join(folder, "foreign"))
+    assert any("station.toml" in a for a in s.json("GET", "/bar")["alarms"]), s.json("GET", "/bar")
+    assert "station.toml" in s.json("GET", "/station")["problem"]["what"]
+    assert s.end() == 0
+    # The port is another program's: who has it, and the next free one.
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        s = Server(program, folder, "--port", str(port))
+        assert port < int(s.host.rsplit(":", 1)[1]) <= port + 20, s.host
+        said = "".join(s.said)
+        assert f"port {port} is taken by python" in said and f"(process {os.getpid()})" in said, said
+        assert s.end() == 0
+    # Neither camera nor robot is there: the screen is, and says so.
+    s = Server(program, folder, "--camera", "cell://127.0.0.1:1", "--robot", "bcap://127.0.0.1:1")
+    end = time.time() + 20
+    while len(s.json("GET", "/bar")["alarms"]) < 2:
+        assert time.time() < end, s.json("GET", "/bar")
+        time.sleep(0.1)
+    bar = s.json("GET", "/bar")
+    assert bar["robot"] == "no_link" and bar["camera"] and bar["laser"] is None, bar
+    assert s.ask("GET", "/api/v1/camera/newest")[0] == 204 and s.ask("GET", "/")[0] == 200
+    assert s.end() == 0
+
+
 def main():
+    starts()
     s = Server(program, folder, "--recordings", folder)
     cookie = who_gets_in(s)
     scanned = s.job({"procedure": "scan", "recording": "scan"})
@@ -206,6 +276,7 @@ def main():
     assert s.end() == 0
     whole = killed()
     same = ("points", "median_sigma_mm", "peaks")
+    killed_in_a_calibration()
     assert {k: whole["outcome"][k] for k in same} == {k: scanned["outcome"][k] for k in same}, "a resumed scan is another one"
 
 

@@ -9,6 +9,7 @@ import tempfile
 import time
 
 import ghost
+import plan
 import settings
 from browser import Browser
 from server import Server, events
@@ -112,6 +113,9 @@ def insert(s, b, part):
         f"{to_position:.1f} s of the cell ({job['outcome']['time_to_position_s']:.1f} s of this machine), {time.time() - begun:.1f} s in all; the held button was not heard for {max(silence):.0f} ms at the longest (limit 1000), the page was silent for {b.run(SILENT)}"
     )
     assert clicks <= 8, f"{clicks} clicks"
+    if float(sweep):
+        shown = plan.as_the_job(program, s, job, sweep)
+        print(f"the sweep is the plan's: {shown['shots']} shots, {shown['along_mm']:.1f} and {shown['across_mm']:.1f} mm left beside the part, {shown['box_mm']:.0f} mm to the box")
     if float(speed) == 1:
         assert to_position <= 120, f"{to_position} s of the cell"
     if part == "osc":
@@ -135,6 +139,7 @@ def main():
             b.run(PULSES)
             for part in parts.split(","):
                 insert(s, b, part)
+            plan.drawn(s, b, "osc")
             settings.outputs(s, b, lambda: events(folder))
         finally:
             b.close()

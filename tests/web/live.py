@@ -71,3 +71,28 @@ assert abs(count["measured"] + sum(count["dropped"].values()) - sent) <= 1, (cou
 print(f"{sent} pictures at {RATE}/s to two that look on: {[len(seen[k]) for k in seen]} shown, {over} passed over, delay p50/p99 {bar['delay_ms']} ms")
 assert any("ended" in a for a in bar["alarms"]), bar["alarms"]
 s.end()
+
+# A job comes first: while it runs what nobody looks at is not measured, and counted; who asks gets a fresh picture all the same.
+s = Server(program, folder, "--recordings", folder, "--camera", "sim:3?rate=8")
+unlooked = lambda: s.json("GET", "/bar")["frames"]["dropped"].get("nobody looked while a job ran", 0)
+end = time.time() + 20
+while s.json("GET", "/bar")["frames"]["measured"] < 3:
+    assert time.time() < end, s.json("GET", "/bar")
+    time.sleep(0.1)
+assert unlooked() == 0, "a picture was left out while no job ran"
+s.json("POST", "/lease")
+job = s.json("POST", "/jobs", {"procedure": "scan", "recording": "scan"})["id"]
+assert s.ended(job)["state"] == "done"
+# The next one is looked at while it runs.
+before = unlooked()
+assert before > 0, s.json("GET", "/bar")["frames"]
+job = s.json("POST", "/jobs", {"procedure": "scan", "recording": "scan"})["id"]
+numbers = []
+while s.json("GET", f"/jobs/{job}")["state"] in ("queued", "running"):
+    status, _, b = s.ask("GET", f"/api/v1/camera/newest?after={numbers[-1] if numbers else 0}")
+    numbers += [struct.unpack("<I", b[:4])[0]] if status == 200 else []
+assert len(numbers) > 1 and numbers == sorted(set(numbers)), numbers
+count = s.json("GET", "/bar")["frames"]
+assert abs(count["measured"] + sum(count["dropped"].values()) - count["seen"]) <= 1, count
+print(f"while scans ran: {before} pictures that nobody looked at left out, then {len(numbers)} shown")
+assert s.end() == 0

@@ -52,6 +52,17 @@ return bad;
 """
 
 
+def usable(b):
+    """The first page can be used within a second of its address: the best of five loads, for other programs run here too."""
+    times = []
+    for _ in range(5):
+        b.run("location.reload()")
+        b.ready("station")
+        times.append(b.run("return performance.getEntriesByName('usable')[0].startTime"))
+    print(f"the first page is usable after {min(times):.0f} ms (five loads: {', '.join(f'{x:.0f}' for x in times)})")
+    assert min(times) < 1000, times
+
+
 def insertion(s, b):
     """From the first page to the position in a recording, as an operator goes; the pose against the truth."""
     b.open(s.url)
@@ -59,6 +70,7 @@ def insertion(s, b):
     assert "token" not in b.run("return location.href"), "the token stays in the address"
     size = b.run("return performance.getEntries().filter((e) => e.transferSize).reduce((a, e) => a + e.transferSize, 0)")
     assert 10_000 < size < 300_000, f"the first page takes {size} bytes"
+    usable(b)
     b.run("localStorage.theme = 'dark'; location.reload()")
     b.ready("station")
     begun, b.clicks = time.time(), 0
@@ -108,6 +120,10 @@ def surface(s, b):
     b.until("a curve", "return document.querySelector('.plot .curve')")
     b.drag(".plot", (0.2, 0.5), (0.3, 0.5))
     b.until("a fitted line", "return document.querySelector('.plot .fit')")
+    # A second piece by keyboard alone: arrows to its ends, Enter at both.
+    b.run("document.querySelector('svg.plot[tabindex]').focus()")
+    b.keys(*["\ue014"] * 10, "\ue007", *["\ue014"] * 12, "\ue007")
+    b.until("a second fitted line", "return document.querySelectorAll('.plot .fit').length === 2")
     b.click("[data-tool=plane]")
     b.drag(".map canvas", (0.3, 0.3), (0.7, 0.7))
     b.drag(".map canvas", (0.5, 0.5), (0.5, 0.5))

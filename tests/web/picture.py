@@ -3,13 +3,15 @@ the exposure that was found is lost, where a region is not kept to, or where the
 Frame and unit: px, us, shares of full scale."""
 
 import json
+import os
 import struct
+import subprocess
 import sys
 import tempfile
 import time
 
 from browser import Browser
-from server import Server
+from server import Server, events
 from shots import quiet
 
 program, folder = sys.argv[1:3]
@@ -76,6 +78,43 @@ def tuned(s, b):
     quiet(b, "picture")
 
 
+def lit(b):
+    """Set exposure with an armed robot: its controller's line is switched on for it and off afterwards, and the bar says so."""
+    cell_folder = os.path.join(folder, "cell")
+    os.makedirs(cell_folder)
+    cell = subprocess.Popen([program, "--json", "cell", "simulate", "--part", "osc", "--robot-port", "0", "--camera-port", "0", "--station", os.path.join(cell_folder, "station"), "--log", os.path.join(cell_folder, "cell.jsonl")], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    try:
+        text = ""
+        while text.count("{") != text.count("}") or not text:
+            text += cell.stdout.readline().decode()
+        s = Server(program, cell_folder, "--camera", "sim:3?rate=6&speed=0.2", "--robot", json.loads(text)["robot"], "--allow-motion")
+        b.open(s.url)
+        b.ready("station")
+        b.page("settings")
+        b.click("#arm")
+        b.until("armed", "return document.querySelector('#arm')?.getAttribute('aria-pressed') === 'true'", 20)
+        line = lambda: [e["on"] for e in events(cell_folder) if e["what"] == "output" and e["number"] == 24]
+        assert line() == [] and s.json("GET", "/bar")["laser"] is False, (line(), s.json("GET", "/bar")["laser"])
+        b.page("picture")
+        b.until("the stripe", "return document.querySelector('[data-stripe=seen] .figure')", 20)
+        b.click("#set-exposure")
+        until("the laser in the bar", lambda: s.json("GET", "/bar")["laser"])
+        assert line() == [True], line()
+        us = float(b.until("an exposure", "return document.querySelector('[data-tuned]')?.dataset.tuned", 90))
+        until("that the laser is off", lambda: s.json("GET", "/bar")["laser"] is False)
+        assert line() == [True, False], line()
+        job = next(j for j in s.json("GET", "/jobs") if j["order"]["procedure"] == "tune")
+        low, high = job["outcome"]["look"]["stripe"]["wanted"]
+        assert job["outcome"]["exposure_us"] == us and low <= job["outcome"]["look"]["stripe"]["peak"] <= high, job
+        assert s.json("GET", "/motion")["armed"], "the robot was given back"
+        print(f"exposure with the robot's line: {us:.0f} us after {len(job['outcome']['tried'])} tries")
+        quiet(b, "exposure, lit")
+        assert s.end() == 0
+    finally:
+        cell.terminate()
+        cell.wait(10)
+
+
 def region(s, b):
     """The stripe is looked for in the region that was drawn, and nowhere else; a reload and other screens know it."""
     peaks = lambda: [p for p in newest(s)[0] if p[2] == 0]
@@ -131,6 +170,10 @@ with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         tuned(s, b)
         region(s, b)
         recorded(s, b)
+        # A page that is left asks nobody who is gone.
+        b.open("about:blank")
+        assert s.end() == 0
+        b.console()
+        lit(b)
     finally:
         b.close()
-assert s.end() == 0

@@ -16,12 +16,12 @@ import time
 class Server:
     """`sheetlight station serve` on any free port."""
 
-    def __init__(self, program, folder, *more, stdin=None):
+    def __init__(self, program, folder, *more, stdin=None, env=None):
         """With --simulate the folder gets its station; else it holds one."""
         station = folder if "--simulate" in more else os.path.join(folder, "station")
         self.station = station
-        command = [program, "--json", "station", "serve", "--station", station, "--port", "0", *more]
-        self.process = subprocess.Popen(command, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+        command = [program, "--json", "station", "serve", "--station", station, *(() if "--port" in more else ("--port", "0")), *more]
+        self.process = subprocess.Popen(command, stdin=stdin, env={**os.environ, **(env or {})}, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
         # A test that fails leaves nobody serving.
         atexit.register(self.process.kill)
         self.said = []

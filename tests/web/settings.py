@@ -93,6 +93,10 @@ def outputs(s, b, events):
     before = len(events())
     b.click("#arm")
     b.click("[data-output=line]")
+    lit = time.time() + 10
+    while s.json("GET", "/bar")["laser"] is not True:
+        assert time.time() < lit, "the bar says nothing of a laser that is on"
+        time.sleep(0.05)
     b.until("that it was switched", "return /was switched/.test(document.getElementById('main').innerText)", 20)
     b.click("[data-output=open]")
     time.sleep(0.3)

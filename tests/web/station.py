@@ -10,6 +10,7 @@ import sys
 import tempfile
 import time
 
+import plan
 from browser import Browser
 from server import Server
 from shots import quiet
@@ -222,7 +223,12 @@ with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         part(s, b)
         grid(s, b)
         health(s, b)
+        # A minute of a machine's time.
+        if os.environ.get("SHEETLIGHT_LONG"):
+            plan.health(program, s, b)
+        plan.drawn(s, b, "led")
         repeat(s, b)
+        plan.batch(program, s, folder)
     finally:
         b.close()
 assert s.end() == 0

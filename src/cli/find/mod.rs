@@ -1,6 +1,7 @@
 //! In: the command line's words about parts. Out: models, recipes, found poses, second looks.
 //! Frame and unit: base frame, mm.
 
+pub mod batch;
 pub mod filter;
 pub mod ghost;
 pub mod import_map;

@@ -5,3 +5,4 @@ pub mod guide;
 pub mod job;
 pub(in crate::cli) mod moving;
 pub mod robot;
+pub mod sweep;

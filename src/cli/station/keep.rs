@@ -1,12 +1,12 @@
 //! In: a station. Out: its settings changed by name, all that was chosen and measured of it in one file, and the way back.
 //! Frame and unit: as docs/file-formats.md says of each setting.
 
+use crate::cli::terminal::arguments;
 use crate::cli::terminal::console::Console;
 use crate::cli::terminal::outputs;
 use crate::cli::terminal::outputs::Inputs;
-use crate::fault::{Fault, Result};
+use crate::fault::Result;
 use crate::station::{Backup, back_up_here, edited};
-use serde_json::Value;
 use std::path::PathBuf;
 
 /// Change settings of station.toml by their names; comments and all else in it stay
@@ -53,15 +53,7 @@ pub struct Restore {
 pub fn set(args: &Set, console: &Console) -> Result<()> {
     let path = args.station.join("station.toml");
     let text = crate::files::read_text(&path)?;
-    let changes = args.settings.iter().map(|s| {
-        let (name, value) = s.split_once('=').ok_or_else(|| {
-            Fault::usage(format!("'{s}' has no =")).next("write NAME=VALUE, for example tolerance_mm=0.05")
-        })?;
-        let text = || Value::String(value.to_owned());
-        let value = if value.is_empty() { Value::Null } else { serde_json::from_str(value).unwrap_or_else(|_| text()) };
-        Ok((name.trim().to_owned(), value))
-    });
-    let new = edited(&text, &changes.collect::<Result<_>>()?).map_err(|e| e.at(path.display()))?;
+    let new = edited(&text, &arguments::changes(&args.settings)?).map_err(|e| e.at(path.display()))?;
     crate::files::write(&path, new.as_bytes())?;
     console.result(&args.settings, &format!("{}: changed", path.display()));
     Ok(())

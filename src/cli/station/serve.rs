@@ -125,7 +125,8 @@ pub fn run(args: &Serve, console: &Console) -> Result<()> {
         secured,
         stop: interrupt::asked_for(),
     };
-    serve(&options, cell, &random_hex(), |url| {
+    serve(&options, cell, &random_hex(), |url, instead| {
+        instead.into_iter().for_each(|why| console.warn(why));
         let said =
             format!("open {url}\nthe address holds the token of this start; Ctrl-C ends the screen, jobs are kept");
         console.result(&serde_json::json!({ "url": url }), &said);

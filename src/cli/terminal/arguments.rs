@@ -1,6 +1,10 @@
 //! In: an option's value as typed. Out: the value, or what was wanted.
 //! Frame and unit: the option's.
 
+use crate::fault::{Fault, Result};
+use serde_json::Value;
+use std::collections::BTreeMap;
+
 /// Reads numbers parted by commas, for clap's `value_parser`.
 pub(crate) fn numbers<const N: usize>(s: &str) -> std::result::Result<[f64; N], String> {
     let read: Option<Vec<f64>> = s.split(',').map(|v| v.trim().parse().ok().filter(|v: &f64| v.is_finite())).collect();
@@ -11,4 +15,17 @@ pub(crate) fn numbers<const N: usize>(s: &str) -> std::result::Result<[f64; N], 
 /// Reads an option's value with the type's own `FromStr`, for clap's `value_parser`.
 pub(crate) fn parse<T: std::str::FromStr<Err = String>>(s: &str) -> std::result::Result<T, String> {
     s.parse()
+}
+
+/// Reads NAME=VALUE each; nothing behind the = is null.
+pub(crate) fn changes(words: &[String]) -> Result<BTreeMap<String, Value>> {
+    let change = |s: &String| {
+        let (name, value) = s.split_once('=').ok_or_else(|| {
+            Fault::usage(format!("'{s}' has no =")).next("write NAME=VALUE, for example threshold.minimum=12")
+        })?;
+        let text = || Value::String(value.to_owned());
+        let value = if value.is_empty() { Value::Null } else { serde_json::from_str(value).unwrap_or_else(|_| text()) };
+        Ok((name.trim().to_owned(), value))
+    };
+    words.iter().map(change).collect()
 }

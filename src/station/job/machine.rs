@@ -5,17 +5,17 @@
 use super::eye::Eye;
 use super::lit::line_is_seen;
 use super::operator::{Ask, Operator};
-use super::places;
 use super::record::Record;
 use super::report::JobReport;
 use super::shoot::{settle, shoot};
 use super::state::{JobState, Phase};
+use super::sweep::{Board, checked, sweep};
 use crate::arm::rules::{Confirmation, Evidence, Guard, Plan, Proposal};
 use crate::arm::{Arm, Motion, Way};
 use crate::fault::{Fault, Gate, Result};
 use crate::find::insert::picture;
 use crate::find::{LocateOptions, Recipe, Report, locate};
-use crate::geometry::{Base, Flange, Mat3, Rigid, Vec3};
+use crate::geometry::{Base, Flange, Rigid, Vec3};
 use crate::recording::Beam;
 use crate::rig::{Rig, hash_file, hash_text};
 use crate::robot::Convention;
@@ -24,7 +24,6 @@ use crate::station::scan::recorded::scan_recording;
 use crate::station::scan::report::{cloud_of, load_report, shots_of};
 use crate::station::scan::run::ScanOptions;
 use crate::station::settings::Settings;
-use crate::station::volume;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -64,8 +63,9 @@ pub struct Job<'a> {
     since: Instant,
 }
 
-/// A known part lies so near to the picture's middle, as a share of the field's short side.
-const ASIDE: f64 = 1.0 / 8.0;
+/// A part whose pose is not known well enough is swept again so often, in steps half as long each time.
+const HALVINGS: u32 = 1;
+
 impl<'a> Job<'a> {
     /// Begins the job of a folder, or goes on with the one that stands there.
     ///
@@ -81,9 +81,7 @@ impl<'a> Job<'a> {
             return Err(Fault::usage(format!("max_tilt_deg is {}, wanted 0.1 to 20", options.max_tilt_deg))
                 .next("correct the option"));
         }
-        if let Some(mm) = options.sweep_mm.filter(|mm| !(5.0..=1000.0).contains(mm)) {
-            return Err(Fault::usage(format!("the sweep is {mm} mm, wanted 5 to 1000")).next("correct the option"));
-        }
+        options.sweep_mm.map(checked).transpose()?;
         let (settings, rig, recipe) =
             (Settings::load(&options.station)?, Rig::load(&options.station)?, Recipe::load(&options.recipe)?);
         rig.belong_together()?;
@@ -263,23 +261,11 @@ impl<'a> Job<'a> {
     fn scan(&mut self) -> Result<Phase> {
         let Some([centre, normal]) = self.state.surface else { return Ok(Phase::Touch) };
         line_is_seen(&mut self.eye, self.guard.link(), &self.rig, &self.settings, &self.options.out.join("lit"))?;
-        let hand_eye = self.rig.need_hand_eye()?.value;
-        let camera = self.rig.need_camera()?.value;
-        let depth = volume::view(&self.settings, &self.rig)?.middle();
-        let square = self.square(&normal, &centre, depth)?;
-        let field =
-            [f64::from(camera.width) / camera.fx, f64::from(camera.height) / camera.fy].map(|share| share * depth);
-        let short = field[0].min(field[1]);
-        // However it is turned, and as far beside the picture's middle as an operator leaves it.
-        let [x0, y0, x1, y1] = self.recipe.drawing().bounds();
-        let part = (x1 - x0).hypot(y1 - y0) + 2.0 * ASIDE * short;
-        let length = self.options.sweep_mm.unwrap_or(part.min(short));
-        // About two steps a cell of the recipe's map, and no finer than what a pixel sees.
-        let step = (0.6 * self.recipe.cell_mm).max(depth / camera.fx);
-        let path = places::sweep(&square, &hand_eye, &self.rig.need_laser_plane()?.value, depth, length, step);
-        let shots = path.len();
-        let legs = [square].into_iter().chain(path).map(|p| self.leg(p)).collect();
-        let says = vec![format!("the camera {depth:.0} mm above the board, then {shots} shots over {length:.0} mm")];
+        let board = Board { start: self.state.start, surface: [centre, normal] };
+        let planned =
+            sweep(&self.settings, &self.rig, &self.recipe, self.options.sweep_mm, self.state.halvings, &board)?;
+        let (says, shots, length) = (planned.figures.says(), planned.figures.shots, planned.figures.length_mm);
+        let legs = [planned.square].into_iter().chain(planned.flanges).map(|p| self.leg(p)).collect();
         let evidence = Evidence { normal: Some(normal), ..Evidence::default() };
         let plan = self.plan("scan", format!("look squarely, then {shots} shots over {length:.0} mm"), legs, evidence);
         let mut record = Record::begin(&self.options.out.join("line"), "scan", Beam::Line, self.eye.format())?;
@@ -301,21 +287,6 @@ impl<'a> Job<'a> {
         Ok(Phase::Find)
     }
 
-    /// The flange pose from which the camera looks along the normal at the board, turned as it is now.
-    fn square(&mut self, normal: &Vec3, centre: &Vec3, depth: f64) -> Result<Rigid<Base, Flange>> {
-        let hand_eye = self.rig.need_hand_eye()?.value;
-        let start = self.state.start * hand_eye;
-        let x = start.rotation.column(0).into_owned();
-        let x = (x - normal * x.dot(normal)).normalize();
-        let z = -normal;
-        let rotation = Mat3::from_columns(&[x, z.cross(&x), z]);
-        // The foot of the axis stays where the operator has put it, on the plane that was touched.
-        let axis = start.rotation.column(2).into_owned();
-        let foot = start.translation + axis * ((centre - start.translation).dot(normal) / axis.dot(normal));
-        let camera: Rigid<Base, crate::geometry::Camera> = Rigid::new(rotation, foot + normal * depth);
-        Ok(camera * hand_eye.inverse())
-    }
-
     fn find(&mut self) -> Result<Phase> {
         let Some([_, normal]) = self.state.surface else { return Ok(Phase::Touch) };
         let folder = self.options.out.join("scan");
@@ -325,12 +296,19 @@ impl<'a> Job<'a> {
         self.keep(&report)?;
         let tilt = report.base_from_part.direction(&Vec3::z()).dot(&normal).clamp(-1.0, 1.0).acos().to_degrees();
         let (poses, reasons) = (report.poses.clone(), report.reasons.join("; "));
+        // The right part, but not known well enough: more shots are more evidence.
+        let closer = report.gates.iter().all(|g| g.passed || g.name.starts_with("sigma"));
         self.operator.tell(&format!(
             "'{}' with score {:.3}, {tilt:.2} degrees off the board",
             report.recipe, report.found.score
         ));
         self.found = Some(report);
         let Some(poses) = poses else {
+            if closer && self.state.halvings < HALVINGS {
+                self.state.halvings += 1;
+                self.operator.tell(&format!("{reasons}: once more, in steps half as long"));
+                return Ok(Phase::Scan);
+            }
             return Err(Fault::refused(format!("no pose: {reasons}")).next("look at found.png"));
         };
         if tilt > self.options.max_tilt_deg {

@@ -46,6 +46,9 @@ pub struct JobState {
     pub start: Rigid<Base, Flange>,
     /// Of the touched board: a point and the unit normal away from it.
     pub surface: Option<[Vec3; 2]>,
+    /// So often the step of its sweep was halved, because a pose was not known well enough.
+    #[serde(default)]
+    pub halvings: u32,
     /// When the scan was finished, s since 1970.
     pub scanned_at: Option<f64>,
     /// Flange at approach, insertion and retract.
@@ -80,6 +83,7 @@ impl JobState {
             moving: false,
             start,
             surface: None,
+            halvings: 0,
             scanned_at: None,
             poses: None,
             released: false,

@@ -5,7 +5,7 @@ use super::answer::{Answer, body, json, operates};
 use super::place::recorded;
 use crate::capture::look;
 use crate::fault::{Fault, Result};
-use crate::web::camera::{Camera, Looked};
+use crate::web::camera::Camera;
 use crate::web::ghost as parts;
 use crate::web::guard::Tab;
 use crate::web::message::{CameraState, Ghost, Outlines, PictureLook, PictureRef, SetFeature};
@@ -74,16 +74,10 @@ pub async fn look_back(State(screen): State<Arc<Screen>>, Query(ask): Query<Pict
 /// each peak, then the grey levels; 204 where none came within a second.
 pub async fn newest(State(screen): State<Arc<Screen>>, Query(ask): Query<After>) -> Answer<Response> {
     let camera = camera(&screen)?;
-    let begun = Instant::now();
-    loop {
-        if let Some(looked) = camera.other_than(ask.after) {
-            return Ok(([(header::CONTENT_TYPE, "application/octet-stream")], bytes(&looked)).into_response());
-        }
-        if begun.elapsed() > LONGEST {
-            return Ok(StatusCode::NO_CONTENT.into_response());
-        }
-        tokio::time::sleep(OFTEN).await;
-    }
+    Ok(match camera.next(ask.after, LONGEST).await {
+        Some(looked) => ([(header::CONTENT_TYPE, "application/octet-stream")], looked.bytes()).into_response(),
+        None => StatusCode::NO_CONTENT.into_response(),
+    })
 }
 
 /// Over which picture.
@@ -109,17 +103,4 @@ pub async fn ghost(
         tokio::time::sleep(OFTEN).await;
     }
     json(screen, move |s| parts::over(s, &id, ask.number, at_ns)).await
-}
-
-fn bytes(l: &Looked) -> Vec<u8> {
-    let mut out = Vec::with_capacity(20 + 12 * l.peaks.len() + l.image.width as usize * l.image.height as usize);
-    let grey = l.image.to_u8();
-    for word in [l.number as u32, l.image.width, l.image.height, l.peaks.len() as u32, l.delay_ms.to_bits()] {
-        out.extend(word.to_le_bytes());
-    }
-    for (u, v, fate) in &l.peaks {
-        out.extend([u.to_bits(), v.to_bits(), *fate].iter().flat_map(|w| w.to_le_bytes()));
-    }
-    out.extend(&grey);
-    out
 }

@@ -13,6 +13,7 @@ mod session;
 mod settings;
 mod support;
 mod surface;
+mod sweep;
 
 pub use openapi::openapi;
 pub use router::router;

@@ -1,7 +1,7 @@
 //! In: nothing. Out: every route of the API, in one table: the server, its description and the tests read it.
 //! Frame and unit: none.
 
-use super::{camera, jobs, motion, place, session, settings, support, surface};
+use super::{camera, jobs, motion, place, session, settings, support, surface, sweep};
 use crate::web::screen::Screen;
 use axum::routing::{MethodRouter, delete, get, post, put};
 use std::sync::Arc;
@@ -230,6 +230,18 @@ pub fn routes() -> Vec<Route> {
             post(surface::measured),
         ),
         route(("GET", "/scans/{id}/points"), "Points to look at (most=)", ("", BYTES), get(surface::points)),
+        route(
+            ("GET", "/sweep"),
+            "How the line would go over a recipe's part, and which speed, step and pictures a second go together",
+            ("?SweepAsk", "SweepPlan"),
+            get(sweep::planned),
+        ),
+        route(
+            ("POST", "/repeats"),
+            "How the places of one part repeat that jobs have found",
+            ("RepeatsAsk", "Repeats"),
+            post(sweep::repeated),
+        ),
         route(("GET", "/motion"), "The robot as it may be moved from here", ("", "MotionState"), get(motion::state)),
         route(
             ("POST", "/robot"),

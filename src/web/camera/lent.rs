@@ -43,7 +43,8 @@ impl PictureSource for Lent {
             let mut state = lock(&self.state);
             let number = state.newest.as_ref().map_or(0, |l| l.number) + 1;
             state.taken(number, p.host_ns);
-            state.newest = Some(Arc::new(Looked { number, image: p.image.clone(), peaks: vec![], delay_ms: 0.0 }));
+            state.newest = Some(Arc::new(Looked::new(number, p.image.clone(), vec![], 0.0, p.host_ns)));
+            self.use_.came.notify_waiters();
         }
         event
     }

@@ -6,5 +6,4 @@ mod settings;
 mod state;
 mod watch;
 
-pub use state::Looked;
 pub use watch::Camera;

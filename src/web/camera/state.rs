@@ -3,9 +3,11 @@
 
 use crate::capture::{Account, Feature};
 use crate::raster::Image;
+use axum::body::Bytes;
 use std::collections::VecDeque;
-use std::sync::atomic::AtomicBool;
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::atomic::{AtomicBool, AtomicU64};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock};
+use tokio::sync::Notify;
 
 /// Pictures whose moments are known: pages show one that is at most so many old.
 const MOMENTS: usize = 64;
@@ -20,6 +22,36 @@ pub struct Looked {
     pub peaks: Vec<(f32, f32, u32)>,
     /// From its last byte to its points, ms.
     pub delay_ms: f32,
+    /// When its last byte came, ns of the host's clock.
+    pub came_ns: u64,
+    bytes: OnceLock<Bytes>,
+}
+
+impl Looked {
+    /// A picture with its peaks.
+    pub(super) fn new(number: u64, image: Image, peaks: Vec<(f32, f32, u32)>, delay_ms: f32, came_ns: u64) -> Looked {
+        Looked { number, image, peaks, delay_ms, came_ns, bytes: OnceLock::new() }
+    }
+
+    /// Number, columns, rows, number of peaks (u32), delay in ms (float), then u, v (float) and fate (u32) of each peak, then the grey
+    /// levels; written once for all who look.
+    pub fn bytes(&self) -> Bytes {
+        self.bytes.get_or_init(|| self.written().into()).clone()
+    }
+
+    fn written(&self) -> Vec<u8> {
+        let grey = self.image.to_u8();
+        let mut out = Vec::with_capacity(20 + 12 * self.peaks.len() + grey.len());
+        let (w, h) = (self.image.width, self.image.height);
+        for word in [self.number as u32, w, h, self.peaks.len() as u32, self.delay_ms.to_bits()] {
+            out.extend(word.to_le_bytes());
+        }
+        for (u, v, fate) in &self.peaks {
+            out.extend([u.to_bits(), v.to_bits(), *fate].iter().flat_map(|w| w.to_le_bytes()));
+        }
+        out.extend(&grey);
+        out
+    }
 }
 
 #[derive(Default)]
@@ -32,8 +64,12 @@ pub(super) struct State {
     /// When the newest pictures' last bytes came, ns of the host's clock.
     pub moments: VecDeque<(u64, u64)>,
     pub account: Account,
+    /// Pictures a second, as they came lately.
+    pub rate_hz: Option<f64>,
     pub measured: u64,
     pub without_stripe: u64,
+    /// Came while a job ran and nobody looked.
+    pub unlooked: u64,
     pub delays: VecDeque<f64>,
     pub wrong: Option<String>,
 }
@@ -61,6 +97,12 @@ pub(super) struct Use {
     pub open: AtomicBool,
     /// Settings or calibrations of the station are other ones.
     pub renewed: AtomicBool,
+    /// A job runs: it comes first.
+    pub busy: AtomicBool,
+    /// When somebody asked for a picture last, ns of the host's clock; 0: nobody did since the last one was measured.
+    pub asked_ns: AtomicU64,
+    /// A picture was measured.
+    pub came: Notify,
 }
 
 pub(super) fn lock(state: &Mutex<State>) -> MutexGuard<'_, State> {

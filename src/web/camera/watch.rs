@@ -21,6 +21,8 @@ const WITHIN: Duration = Duration::from_millis(200);
 const AGAIN: Duration = Duration::from_secs(1);
 /// A camera is given up by who looks at it within this.
 const GIVEN_UP: Duration = Duration::from_secs(5);
+/// While a job runs a picture that somebody asks for came no longer before that, ns.
+const FRESH: u64 = 50_000_000;
 /// Delays that p50 and p99 are of.
 const DELAYS: usize = 512;
 
@@ -112,9 +114,38 @@ impl Camera {
         self.use_.renewed.store(true, Ordering::SeqCst);
     }
 
+    /// A job runs: pictures are measured where somebody looks alone, and on a thread of their own, so that the job has all others.
+    pub fn make_way(&self, busy: bool) {
+        self.use_.busy.store(busy, Ordering::SeqCst);
+    }
+
+    /// The next picture other than the one of this number, waited for at most so long; while a job runs one that is fresh, where one comes.
+    pub async fn next(&self, number: u64, within: Duration) -> Option<Arc<Looked>> {
+        let (asked, until) = (now_ns(), tokio::time::Instant::now() + within);
+        loop {
+            let came = self.use_.came.notified();
+            self.use_.asked_ns.store(now_ns(), Ordering::SeqCst);
+            let looked = self.other_than(number);
+            // A job that has the camera takes pictures when it needs them: none is fresher.
+            let on_demand = self.use_.busy.load(Ordering::SeqCst) && !self.use_.lent.load(Ordering::SeqCst);
+            match looked {
+                Some(looked) if !on_demand || looked.came_ns + FRESH >= asked => return Some(looked),
+                _ => {}
+            }
+            if tokio::time::timeout_at(until, came).await.is_err() {
+                return self.other_than(number);
+            }
+        }
+    }
+
     /// The newest picture, if it is not the one of this number.
     pub fn other_than(&self, number: u64) -> Option<Arc<Looked>> {
         lock(&self.state).newest.as_ref().filter(|l| l.number != number).cloned()
+    }
+
+    /// Pictures a second, as it sent them lately; `None`: not known.
+    pub fn rate_hz(&self) -> Option<f64> {
+        lock(&self.state).rate_hz
     }
 
     /// When a picture's last byte came, ns of the host's clock; `None`: it is long gone.
@@ -129,6 +160,7 @@ impl Camera {
         let dropped = [
             ("passed over: a newer one came", a.dropped_processing),
             ("no stripe", state.without_stripe),
+            ("nobody looked while a job ran", state.unlooked),
             ("incomplete", a.incomplete),
             ("missed by the camera", a.missed),
             ("late", a.late),
@@ -183,6 +215,8 @@ fn look(
     let feed = Feed::start(source, FeedOptions { mode: Mode::Newest, ..FeedOptions::default() })?;
     uses.renewed.store(true, Ordering::SeqCst);
     let mut live = Err(Fault::input("no picture was measured yet").next("wait for the next picture"));
+    // A scan's threads are busy for a batch at a time: a picture does not wait for them.
+    let beside = rayon::ThreadPoolBuilder::new().num_threads(1).thread_name(|_| "look beside".into()).build();
     let mut number = lock(tell).newest.as_ref().map_or(0, |l| l.number);
     while !ends() {
         if uses.renewed.swap(false, Ordering::SeqCst) {
@@ -197,9 +231,22 @@ fn look(
                 return fault.map_or(Ok(()), Err);
             }
         };
+        let busy = uses.busy.load(Ordering::SeqCst);
+        if uses.asked_ns.swap(0, Ordering::SeqCst) == 0 && busy {
+            feed.fate(Fate::Used);
+            let mut state = lock(tell);
+            state.unlooked += 1;
+            (state.account, state.rate_hz) = (feed.account(), feed.rate_hz());
+            continue;
+        }
         number += 1;
         let (image, came_ns) = (picture.image, picture.host_ns);
-        let measured = live.as_mut().ok().map(|l| l.measure(number as u32, image.clone())).transpose()?.flatten();
+        let mut measure = || live.as_mut().ok().map(|l| l.measure(number as u32, image.clone())).transpose();
+        let measured = match &beside {
+            Ok(pool) if busy => pool.install(measure),
+            _ => measure(),
+        }?
+        .flatten();
         feed.fate(Fate::Used);
         let peaks: Vec<_> = measured.iter().flat_map(|m| &m.peaks).map(|p| (p.u, p.v, p.flags & 0xff)).collect();
         let delay_ms = now_ns().saturating_sub(came_ns) as f64 * 1e-6;
@@ -210,12 +257,13 @@ fn look(
             state.measured += 1;
         }
         state.taken(number, came_ns);
-        state.newest = Some(Arc::new(Looked { number, image, peaks, delay_ms: delay_ms as f32 }));
+        state.newest = Some(Arc::new(Looked::new(number, image, peaks, delay_ms as f32, came_ns)));
+        uses.came.notify_waiters();
         state.delays.push_back(delay_ms);
         if state.delays.len() > DELAYS {
             state.delays.pop_front();
         }
-        state.account = feed.account();
+        (state.account, state.rate_hz) = (feed.account(), feed.rate_hz());
         if live.is_ok() {
             state.wrong = feed.news().pop();
         }

@@ -76,7 +76,7 @@ pub struct Bar {
     pub camera: bool,
     /// What the robot may do.
     pub robot: RobotState,
-    /// Whether the line is on; null where nobody switches it from here.
+    /// Line or pointer is on, by the controller's outputs; null without a link that can say.
     pub laser: Option<bool>,
     /// Of the running scan.
     pub frames: Frames,
@@ -90,6 +90,8 @@ pub struct Bar {
     pub calibration: Option<CalibrationAge>,
     /// On the disk that holds the jobs, GB; null where the system does not say.
     pub disk_left_gb: Option<f64>,
+    /// Memory of the program, now and at its most, MB; null where the system does not say.
+    pub memory_mb: Option<[f64; 2]>,
     /// What an operator must know now, one sentence each.
     pub alarms: Vec<String>,
     /// Who operates.

@@ -24,6 +24,9 @@ pub enum JobState {
     CutOff,
 }
 
+/// What to do where the disk is full.
+const MAKE_ROOM: &str = "take old jobs away on the page Replay (the × behind each), or free space otherwise; then resume this job, or order it again";
+
 /// A fault as pages show it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, TS)]
 pub struct Problem {
@@ -46,7 +49,9 @@ impl From<&Fault> for Problem {
             Kind::Output => "output",
             Kind::Device => "device",
         };
-        Problem { kind: kind.into(), what: f.what.clone(), cause: f.cause.clone(), next: f.next.clone() }
+        // Operators have no --out: they have jobs.
+        let next = if f.is_full_disk() { MAKE_ROOM } else { &f.next };
+        Problem { kind: kind.into(), what: f.what.clone(), cause: f.cause.clone(), next: next.into() }
     }
 }
 

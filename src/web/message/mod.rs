@@ -13,6 +13,7 @@ mod outcome;
 mod place;
 mod settings;
 mod surface;
+mod sweep;
 mod typescript;
 
 pub use bar::{Bar, CalibrationAge, Frames, Lease, Mode, RobotState};
@@ -23,12 +24,12 @@ pub use filter::{Filter, FilterOrder, Filtered, Filters};
 pub use job::{Event, Job, JobState, Problem};
 pub use motion::{Arming, Asked, InTheCell, MotionState, SimulatedCell};
 pub use order::{
-    AutoOrder, CalibrateOrder, FindOrder, InsertOrder, JointOrder, Order, Plain, ScanOrder, Target, TeachOrder,
-    TouchOrder,
+    AutoOrder, BenchmarkOrder, CalibrateOrder, FindOrder, InsertOrder, JointOrder, Order, Plain, ScanOrder, Target,
+    TeachOrder, TouchOrder,
 };
 pub use outcome::{
-    BenchRow, CalibrationFigures, CheckLine, GateLight, Inserted, Notation, Outcome, Position, RobotPoses, ScanFigures,
-    SquareProposed, SurfaceTouched, Term, Touched,
+    BenchRow, CalibrationFigures, CheckLine, GateLight, Inserted, KeptUp, Notation, Outcome, Position, Repeats,
+    RepeatsAsk, RobotPoses, ScanFigures, Spread, SquareProposed, SurfaceTouched, Term, Touched,
 };
 pub use place::{
     BoardView, CalibrationState, FrameInfo, PictureRef, RecipeText, RecordingInfo, StationInfo, SupportAsk, ViewRef,
@@ -38,4 +39,5 @@ pub use surface::{
     Distance, Fit, Ghost, MapHead, Measure, MeasureAnswer, Outlines, PlaneAsk, PointsAsk, Section, SectionAsk,
     SectionPoint,
 };
+pub use sweep::{Pace, SweepAsk, SweepPlan};
 pub use typescript::declarations;

@@ -32,14 +32,24 @@ pub enum Order {
     Auto(AutoOrder),
     /// A part with the robot: touch, square, scan, find, approach, insert, retract.
     Insert(InsertOrder),
-    /// The time of a shot on this machine, with and without its GPU.
-    Benchmark(Plain),
+    /// The time of a shot on this machine, with and without its GPU; what is dropped of a camera.
+    Benchmark(BenchmarkOrder),
 }
 
 /// Nothing is to be said.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
 #[serde(deny_unknown_fields)]
 pub struct Plain {}
+
+/// What is measured of this machine.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+#[serde(deny_unknown_fields)]
+pub struct BenchmarkOrder {
+    /// Pictures a second of the camera whose drops are counted; null: 30.
+    #[serde(default)]
+    #[ts(optional = nullable)]
+    pub rate_hz: Option<f64>,
+}
 
 /// Which recording is scanned, and how.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]

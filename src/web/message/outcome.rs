@@ -45,6 +45,9 @@ pub enum Outcome {
         /// The same of other machines, as they were recorded.
         #[serde(default)]
         recorded: Vec<BenchRow>,
+        /// What of a camera was measured and what was dropped, at half and at full resolution.
+        #[serde(default)]
+        kept_up: Vec<KeptUp>,
     },
 }
 
@@ -294,6 +297,85 @@ pub struct CalibrationFigures {
     pub left_out: Vec<(String, String)>,
     /// It was stored in the station.
     pub accepted: bool,
+}
+
+/// What became of a camera's pictures while the newest one was measured again and again.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
+pub struct KeptUp {
+    /// What it ran on.
+    pub on: String,
+    /// Columns, px.
+    pub width: u32,
+    /// Rows, px.
+    pub height: u32,
+    /// Pictures a second that were sent.
+    pub rate_hz: f64,
+    /// Pictures that were sent.
+    #[ts(type = "number")]
+    pub sent: u64,
+    /// Of these with points.
+    #[ts(type = "number")]
+    pub measured: u64,
+    /// Passed over, because a newer one had come.
+    #[ts(type = "number")]
+    pub passed_over: u64,
+    /// Lost otherwise.
+    #[ts(type = "number")]
+    pub lost: u64,
+    /// From the last byte to the points, p50 and p99, ms.
+    pub ms: [f64; 2],
+}
+
+/// Jobs that found one part again and again.
+#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[serde(deny_unknown_fields)]
+pub struct RepeatsAsk {
+    /// Their names.
+    pub jobs: Vec<String>,
+}
+
+/// How places of one part repeat.
+#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+pub struct Repeats {
+    /// Of how many.
+    pub places: usize,
+    /// x, y, z, turn; empty of fewer than two.
+    pub along: Vec<Spread>,
+}
+
+/// How they repeat along one axis, or in the turn.
+#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+pub struct Spread {
+    /// x, y, z of the frame, or turn.
+    pub name: String,
+    /// mm or degrees.
+    pub unit: String,
+    /// One standard deviation of the places.
+    pub scatter: f64,
+    /// What they state of themselves, root mean square.
+    pub stated: f64,
+    /// From the first to the last of them.
+    pub apart: f64,
+    /// The histogram reaches so far to both sides of the median.
+    pub half: f64,
+    /// Places in each of its bars.
+    pub bars: Vec<u32>,
+}
+
+impl Repeats {
+    /// As pages show them.
+    pub fn of(places: usize, found: Option<crate::station::Repeats>) -> Repeats {
+        let spread = |s: crate::station::Spread| Spread {
+            name: s.name.into(),
+            unit: s.unit.into(),
+            scatter: s.scatter,
+            stated: s.stated,
+            apart: s.apart,
+            half: s.half,
+            bars: s.bars,
+        };
+        Repeats { places, along: found.into_iter().flat_map(|r| r.along).map(spread).collect() }
+    }
 }
 
 /// The time of a shot.

@@ -29,6 +29,7 @@ pub fn declarations() -> String {
         JointOrder::decl(),
         AutoOrder::decl(),
         InsertOrder::decl(),
+        BenchmarkOrder::decl(),
         Order::decl(),
         CheckLine::decl(),
         ScanFigures::decl(),
@@ -49,6 +50,7 @@ pub fn declarations() -> String {
         CameraState::decl(),
         SetFeature::decl(),
         BenchRow::decl(),
+        KeptUp::decl(),
         Outcome::decl(),
         Job::decl(),
         Asked::decl(),
@@ -92,6 +94,12 @@ pub fn declarations() -> String {
         PlaneAsk::decl(),
         Measure::decl(),
         MeasureAnswer::decl(),
+        SweepAsk::decl(),
+        Pace::decl(),
+        SweepPlan::decl(),
+        RepeatsAsk::decl(),
+        Spread::decl(),
+        Repeats::decl(),
     ];
     let body: Vec<String> = all.iter().map(|d| format!("export {d}")).collect();
     format!(

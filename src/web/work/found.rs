@@ -28,6 +28,18 @@ pub fn report_of(jobs: &Jobs, job: &Job) -> Result<PathBuf> {
     }
 }
 
+/// The folder of an insertion's own state.
+///
+/// # Errors
+/// No such job, or another procedure.
+pub fn insertion_of(jobs: &Jobs, id: &str) -> Result<PathBuf> {
+    let job = jobs.get(id)?;
+    match job.order {
+        Order::Insert(_) => Ok(jobs.folder(&job).join(INSERTION)),
+        _ => Err(Fault::usage(format!("{id}: inserts nothing")).next("choose an insertion")),
+    }
+}
+
 /// Where the part lies, and what it is.
 ///
 /// # Errors

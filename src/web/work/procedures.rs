@@ -4,16 +4,21 @@
 use super::find::labels;
 use super::run::Run;
 use super::{calibrate, check, find, insert, scan, tune};
-use crate::bench::{WayTime, recorded, way_times};
+use crate::bench::{WayTime, keep_up, recorded, way_times};
 use crate::fault::Result;
 use crate::geometry::Vec3;
 use crate::gpu::Device;
 use crate::recording::Recording;
 use crate::rig::Rig;
 use crate::robot::Convention;
+use crate::scan::Where;
 use crate::station::{RangeRun, Settings, measure_range};
 use crate::web::guard::resolve;
-use crate::web::message::{BenchRow, Order, Outcome, SquareProposed, SurfaceTouched, Touched};
+use crate::web::message::{BenchRow, KeptUp, Order, Outcome, SquareProposed, SurfaceTouched, Touched};
+
+/// Pictures a second of a camera whose drops are counted, and for how long at each size.
+const RATE_HZ: f64 = 30.0;
+const SECONDS: f64 = 2.0;
 
 /// Carries an order out.
 pub(super) fn run(this: &Run, order: &Order) -> Result<Outcome> {
@@ -29,7 +34,7 @@ pub(super) fn run(this: &Run, order: &Order) -> Result<Outcome> {
         Order::Joint(ask) => calibrate::joint(this, ask),
         Order::Auto(ask) => calibrate::auto(this, ask),
         Order::Insert(ask) => insert::insert(this, ask),
-        Order::Benchmark(_) => benchmark(),
+        Order::Benchmark(ask) => benchmark(this, ask.rate_hz),
     }
 }
 
@@ -60,9 +65,23 @@ fn touch(this: &Run, recording: &str) -> Result<Outcome> {
     Ok(Outcome::Touch(Box::new(Touched { spots, surface, square, missing: report.missing, remarks: report.remarks })))
 }
 
-fn benchmark() -> Result<Outcome> {
+fn benchmark(this: &Run, rate_hz: Option<f64>) -> Result<Outcome> {
+    this.progress(0, Some(2));
+    let kept_up = keep_up(rate_hz.unwrap_or(RATE_HZ), SECONDS, Where::default())?;
+    this.progress(1, Some(2));
     let device = Device::open().ok();
     let row = |w: WayTime| BenchRow { on: w.on, width: w.width, height: w.height, ms_per_shot: w.ms_per_shot };
     let rows = way_times(device.as_ref())?.into_iter().map(row).collect();
-    Ok(Outcome::Benchmark { rows, recorded: recorded().into_iter().map(row).collect() })
+    let kept_up = kept_up.into_iter().map(|k| KeptUp {
+        on: k.on,
+        width: k.width,
+        height: k.height,
+        rate_hz: k.rate_hz,
+        sent: k.sent,
+        measured: k.measured,
+        passed_over: k.passed_over,
+        lost: k.lost,
+        ms: k.ms,
+    });
+    Ok(Outcome::Benchmark { rows, recorded: recorded().into_iter().map(row).collect(), kept_up: kept_up.collect() })
 }

@@ -124,7 +124,7 @@ pub fn from_drawing(place: &Place, ask: &DrawingAsk) -> Result<DrawingRead> {
 }
 
 /// One of them, checked.
-pub(super) fn load(place: &Place, name: &str) -> Result<Recipe> {
+pub fn load(place: &Place, name: &str) -> Result<Recipe> {
     let all = recipes(place)?;
     let found = all.iter().find(|r| r.name == name).ok_or_else(|| {
         Fault::input(format!("{name:?}: is no recipe of this station")).next("choose one from the list")

@@ -3,19 +3,19 @@
 
 use super::run::Run;
 use super::store::scan_of;
+use crate::capture::Latency;
 use crate::fault::{Fault, Result};
 use crate::recording::Recording;
 use crate::rig::Rig;
-use crate::scan::{Extraction, GridOptions, Where};
-use crate::station::{ScanOptions, ScanReport, Settings, Watch, filter_scan, scan_recording};
+use crate::scan::{GridOptions, Where};
+use crate::station::{ScanOptions, ScanReport, Settings, Watch, changed, filter_scan, scan_recording};
 use crate::web::guard::resolve;
 use crate::web::message::{FilterOrder, Frames, Outcome, ScanFigures, ScanOrder};
-use serde_json::Value;
-use std::collections::BTreeMap;
 
 pub(super) fn scan(this: &Run, asked: &ScanOrder) -> Result<Outcome> {
     let place = &this.jobs.place;
     let (settings, rig) = (Settings::load(&place.station)?, Rig::load(&place.station)?);
+    let settings = changed(&settings, "extraction", &asked.settings)?;
     let recording = Recording::open(&resolve(&place.recordings, &asked.recording)?)?;
     let size = [recording.meta.image.width, recording.meta.image.height];
     let place_to_run: Where = asked
@@ -29,10 +29,10 @@ pub(super) fn scan(this: &Run, asked: &ScanOrder) -> Result<Outcome> {
     let resume = this.again && out.join("scan.part/progress.json").exists();
     let options = ScanOptions {
         place: place_to_run,
-        extraction: with(&settings.extraction, &asked.settings)?,
         grid: GridOptions { cell: asked.cell_mm, ..GridOptions::default() },
         overlays: 6,
         skip_bad: asked.skip_bad,
+        latency: Latency::load(&place.station)?,
         resume,
         stop: this.stop.clone(),
         watch: watch(this, &recording, size),
@@ -73,26 +73,6 @@ fn watch(this: &Run, recording: &Recording, size: [u32; 2]) -> Watch {
     })
 }
 
-/// The station's settings with some of them changed: keys with dots, as `threshold.window`.
-fn with(station: &Extraction, changes: &BTreeMap<String, Value>) -> Result<Extraction> {
-    let mut all = serde_json::to_value(station).expect("plain data");
-    for (key, value) in changes {
-        let mut at = &mut all;
-        for word in key.split('.') {
-            at = at.get_mut(word).ok_or_else(|| {
-                Fault::usage(format!("{key}: is no setting of the extraction"))
-                    .cause("a slip, or a setting of another version")
-                    .next("take one from docs/file-formats.md, [extraction]")
-            })?;
-        }
-        *at = value.clone();
-    }
-    let changed: Extraction = serde_json::from_value(all)
-        .map_err(|e| Fault::usage(format!("the changed settings cannot be used: {e}")).next("correct the value"))?;
-    changed.check()?;
-    Ok(changed)
-}
-
 fn figures(r: ScanReport) -> ScanFigures {
     let spent = serde_json::to_value(r.spent).ok().and_then(|v| serde_json::from_value(v).ok()).unwrap_or_default();
     ScanFigures {
@@ -113,20 +93,5 @@ fn figures(r: ScanReport) -> ScanFigures {
         ran_on: r.ran_on,
         spent,
         remarks: r.remarks,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn settings_are_changed_by_their_names_alone() {
-        let station = Extraction::default();
-        let change = |key: &str, value: Value| with(&station, &BTreeMap::from([(key.to_owned(), value)]));
-        assert_eq!(change("threshold.minimum", 12.into()).unwrap().threshold.minimum, 12);
-        assert_eq!(with(&station, &BTreeMap::new()).unwrap(), station);
-        assert!(change("threshold.minimun", 12.into()).unwrap_err().what.contains("minimun"));
-        assert!(change("threshold.minimum", "a".into()).unwrap_err().what.contains("cannot be used"));
     }
 }

@@ -48,6 +48,8 @@ fn one(jobs: &Arc<Jobs>, Taken { mut job, stop }: Taken) {
     let id = job.id.clone();
     let this = Run { jobs: jobs.clone(), id, number, folder: jobs.folder(&job), again, stop: stop.clone() };
     let order = job.order.clone();
+    let camera = jobs.desk.links.camera.as_ref();
+    camera.inspect(|c| c.make_way(true));
     let ended = jobs.put(&job).and_then(|()| {
         catch_unwind(AssertUnwindSafe(|| run(&this, &order))).unwrap_or_else(|panic| {
             let said = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
@@ -56,6 +58,7 @@ fn one(jobs: &Arc<Jobs>, Taken { mut job, stop }: Taken) {
                 .next("save the support file on the page Health and report it"))
         })
     });
+    camera.inspect(|c| c.make_way(false));
     let stopped = stop.load(std::sync::atomic::Ordering::Relaxed);
     jobs.end(job, stopped, ended, begun.elapsed().as_secs_f64());
 }

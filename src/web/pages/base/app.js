@@ -33,6 +33,7 @@ async function page() {
   try {
     leave = (await module.show(place, new URLSearchParams(query ?? ""))) ?? (() => {});
     main.dataset.ready = known;
+    performance.mark("usable");
   } catch (e) {
     fill(place, fault(e));
   }

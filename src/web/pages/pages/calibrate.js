@@ -44,7 +44,7 @@ export async function show(place, query) {
   function shown(j) {
     result = j;
     const f = j.outcome, keys = Object.keys(f.figures).filter((k) => !/^(n_|seed)/.test(k));
-    const accept = () => attempt(async () => { if (!operating()) await operate(false); await post(`/jobs/${j.id}/accept`); }, problem);
+    const accept = () => attempt(async () => { if (!operating()) await operate(false); shown(await post(`/jobs/${j.id}/accept`)); }, problem);
     fill(verdict, panel(`${t(TARGETS[j.order.target ?? j.order.procedure])} · ${j.id}`,
       h("p", {}, h("span", { class: `dot ${f.verdict === "good" ? "good" : f.verdict === "usable" ? "poor" : "bad"}` }), " ", h("b", {}, t(f.verdict)), f.accepted ? ` · ${t("accepted")}` : ""),
       f.reasons.map((r) => h("p", { class: "small" }, r)), f.advice.map((a) => h("p", { class: "note small" }, `${t("Next picture")}: ${a}`)),

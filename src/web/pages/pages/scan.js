@@ -6,6 +6,7 @@ import { t } from "../base/text.js";
 import { span } from "../widgets/colour.js";
 import { map } from "../widgets/map.js";
 import { attempt } from "../widgets/problem.js";
+import { sweep } from "../widgets/sweep.js";
 import { choice, field, follow, gallery, order, panel, recordings, scanFigures } from "../widgets/parts.js";
 
 export async function show(place, query) {
@@ -13,7 +14,7 @@ export async function show(place, query) {
   const named = query.get("job") && store.jobs.get(query.get("job"));
   let chosen = (named?.order.recording ?? sessionStorage.getItem("recording")) || list[0]?.name;
   let on_ = "auto";
-  const problem = h("div"), progress = h("div"), result = h("div"), pick = h("div"), live = h("div"), figures = h("div", { class: "small quiet" });
+  const problem = h("div"), progress = h("div"), result = h("div"), pick = h("div"), live = h("div"), way = h("div", { class: "stack" }), figures = h("div", { class: "small quiet" });
   const cell = field(t("Cell"), { type: "number", min: "0.001", step: "0.05", placeholder: t("auto") }, "mm");
   const view = map(live, t("Height map of the running scan"));
   let follows = () => {};
@@ -38,7 +39,7 @@ export async function show(place, query) {
     problem, progress,
     h("div", { class: "split" },
       h("section", { class: "panel fill" }, h("h2", {}, t("Height map, line by line")), live, figures),
-      h("div", { class: "stack" }, panel(t("Recording"), pick))),
+      h("div", { class: "stack" }, panel(t("Recording"), pick), panel(t("Path over the part"), way))),
     result);
   const rows = () => {
     const g = store.growing;
@@ -50,7 +51,8 @@ export async function show(place, query) {
   };
   rows();
   const off = on("rows", rows);
+  const plan = await sweep(way);
   const current = named ?? jobs((j) => j.order.procedure === "scan")[0];
   if (current) watch(current.id);
-  return () => { off(); follows(); view.end(); };
+  return () => { off(); follows(); plan?.(); view.end(); };
 }

@@ -77,5 +77,5 @@ const age = (days) => (days < 1 ? t("today") : `${Math.round(days)} d`);
 
 /** Where a job is looked at. */
 export function pageOf(job) {
-  return { check: "station", scan: "scan", filter: "surface", find: "position", teach: "part", touch: "touch", calibrate: "calibrate", joint: "calibrate", auto: "calibrate", insert: "position", benchmark: "health" }[job.order.procedure];
+  return { check: "station", tune: "picture", scan: "scan", filter: "surface", find: "position", teach: "part", touch: "touch", calibrate: "calibrate", joint: "calibrate", auto: "calibrate", insert: "position", benchmark: "health" }[job.order.procedure];
 }

@@ -1,7 +1,7 @@
 // In: recordings, a recipe, settings. Out: each of them scanned and searched, one job after the other; how far the places that were found lie
 // apart, beside what each said of itself.
 
-import { get } from "../base/api.js";
+import { get, post } from "../base/api.js";
 import { fill, h, num, svg } from "../base/dom.js";
 import { done, on } from "../base/store.js";
 import { t } from "../base/text.js";
@@ -23,42 +23,40 @@ export async function batch(place, settings, problem) {
       if (recipe) await order({ procedure: "find", scans: [scan.id], recipe });
     }
   }, problem);
-  const draw = () => fill(shown, spread(done("find").filter((j) => j.outcome.recipe === recipe && !j.order.pins)));
-  fill(place, h("div", { class: "row" }, choice(t("Recipe"), [["", t("none: scan only")], ...recipes.map((r) => [r.name, r.name])], recipe, (v) => { recipe = v; draw(); }),
+  let turn = 0, before = null;
+  const draw = () => attempt(async () => {
+    const mine = ++turn, found = done("find").filter((j) => j.outcome.recipe === recipe && !j.order.pins).map((j) => j.id), names = found.join(" ");
+    // Jobs are told of while they run: only other places are other repeats.
+    if (names === before) return;
+    const repeats = await post("/repeats", { jobs: found });
+    if (mine !== turn) return;
+    before = names;
+    fill(shown, spread(repeats));
+  }, problem);
+  fill(place, h("div", { class: "row" }, choice(t("Recipe"), [["", t("none: scan only")], ...recipes.map((r) => [r.name, r.name])], recipe, (v) => { recipe = v; before = null; draw(); }),
     h("button", { class: "main", id: "run-batch", disabled: !list.length, onclick: run }, t("Run batch"))),
     h("div", { class: "row" }, list.map((r) => h("label", {}, h("input", { type: "checkbox", checked: chosen.has(r.name), onchange: (e) => (e.target.checked ? chosen.add(r.name) : chosen.delete(r.name)) }), r.name))),
     shown);
-  draw();
-  return on("jobs", draw);
+  await draw();
+  const off = on("jobs", draw);
+  return () => { turn++; off(); };
 }
 
-/** Deviations of places from their median along x, y, z, mm, and of turns about z, degrees. */
-export function deviations(jobs) {
-  const poses = jobs.map((j) => j.outcome.part);
-  const median = (v) => { const s = [...v].sort((a, b) => a - b), k = s.length >> 1; return s.length % 2 ? s[k] : (s[k - 1] + s[k]) / 2; };
-  const along = [3, 7, 11].map((k) => poses.map((p) => p[k])).map((v) => { const m = median(v); return v.map((x) => x - m); });
-  // Turns against the first one, so that none is cut in two at half a turn.
-  const first = poses[0], turn = poses.map((p) => { const dot = (i, j) => first[i] * p[j] + first[4 + i] * p[4 + j] + first[8 + i] * p[8 + j]; return (Math.atan2(dot(1, 0), dot(0, 0)) * 180) / Math.PI; });
-  const m = median(turn);
-  return [...along, turn.map((x) => x - m)];
-}
+const NAMES = { x: "x", y: "y", z: "z", turn: "Turn" }, UNITS = { mm: "mm", degrees: "°" };
 
-function spread(jobs) {
-  if (jobs.length < 2) return h("p", { class: "small quiet" }, t("Two or more places of one recipe show how well they repeat."));
-  const values = deviations(jobs), stated = (k) => Math.sqrt(jobs.reduce((a, j) => a + (k < 3 ? Math.max(...j.outcome.sigma_mm.slice(0, 2), k === 2 ? j.outcome.sigma_mm[2] : 0) : j.outcome.sigma_deg[2]) ** 2, 0) / jobs.length);
-  const scatter = (v) => { const mean = v.reduce((a, x) => a + x, 0) / v.length; return Math.sqrt(v.reduce((a, x) => a + (x - mean) ** 2, 0) / (v.length - 1)); };
-  const names = ["x", "y", "z", t("Turn")], unit = (k) => (k < 3 ? "mm" : "°");
-  return h("div", { class: "stack", "data-repeats": String(jobs.length) },
-    h("div", { class: "even" }, values.map((v, k) => histogram(v, `${names[k]}, ${unit(k)}`))),
+/** What the program reckons of them, as `sheetlight batch` does. */
+function spread(r) {
+  if (r.places < 2) return h("p", { class: "small quiet" }, t("Two or more places of one recipe show how well they repeat."));
+  const name = (s) => t(NAMES[s.name]), unit = (s) => UNITS[s.unit];
+  return h("div", { class: "stack", "data-repeats": String(r.places) },
+    h("div", { class: "even" }, r.along.map((s) => histogram(s, `${name(s)}, ${unit(s)}`))),
     table([t("Along"), `#${t("repeats")}`, `#${t("scatter, 1 σ")}`, `#${t("stated, 1 σ")}`, `#${t("apart at most")}`],
-      values.map((v, k) => [names[k], String(v.length), num(scatter(v), 4, unit(k)), num(stated(k), 4, unit(k)), num(Math.max(...v) - Math.min(...v), 4, unit(k))])),
+      r.along.map((s) => [name(s), String(r.places), num(s.scatter, 4, unit(s)), num(s.stated, 4, unit(s)), num(s.apart, 4, unit(s))])),
     h("p", { class: "small quiet" }, t("In the scan's frame, against the median; only where the part stood still between the recordings.")));
 }
 
-function histogram(values, name) {
-  const bins = 15, most = Math.max(...values.map(Math.abs), 1e-6), counts = new Array(bins).fill(0);
-  for (const v of values) counts[Math.min(bins - 1, Math.floor(((v / most + 1) / 2) * bins))]++;
-  const high = Math.max(...counts);
-  return h("figure", { class: "histogram" }, svg("svg", { class: "plot", viewBox: `0 0 ${bins} 100`, preserveAspectRatio: "none", role: "img", "aria-label": `${t("Histogram of repeats")}: ${name}` }, counts.map((n, i) => svg("rect", { class: "bar", x: i + 0.04, width: 0.92, y: 100 - (95 * n) / high, height: (95 * n) / high }))),
-    h("figcaption", { class: "small quiet" }, `${name}: ±${num(most, 4)}`));
+function histogram({ bars, half }, name) {
+  const high = Math.max(...bars, 1);
+  return h("figure", { class: "histogram" }, svg("svg", { class: "plot", viewBox: `0 0 ${bars.length} 100`, preserveAspectRatio: "none", role: "img", "aria-label": `${t("Histogram of repeats")}: ${name}` }, bars.map((n, i) => svg("rect", { class: "bar", x: i + 0.04, width: 0.92, y: 100 - (95 * n) / high, height: (95 * n) / high }))),
+    h("figcaption", { class: "small quiet" }, `${name}: ±${num(half, 4)}`));
 }

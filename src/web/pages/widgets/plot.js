@@ -1,5 +1,4 @@
-// In: numbers along a line. Out: a curve with its band of standard deviations; pieces of it are chosen by dragging, or by the
-// fields below it.
+// In: numbers along a line. Out: a curve with its band of standard deviations; pieces of it are chosen by dragging, or by arrows and Enter.
 
 import { fill, h, num, svg } from "../base/dom.js";
 import { t } from "../base/text.js";
@@ -9,24 +8,41 @@ const W = 900, H = 190, LEFT = 54, RIGHT = 10, TOP = 10, BOTTOM = 26;
 
 /** A section: `points` of { s, z, sigma }; `chosen(pieces)` hears the pieces that lines are to be fitted to. */
 export function section(place, chosen) {
-  const plot = svg("svg", { class: "plot", viewBox: `0 0 ${W} ${H}`, preserveAspectRatio: "none", role: "img", "aria-label": t("Section") });
+  const plot = svg("svg", { class: "plot", viewBox: `0 0 ${W} ${H}`, preserveAspectRatio: "none", role: "img", tabindex: "0", "aria-label": t("Section"), "aria-roledescription": t("section: arrows move the mark, Enter begins and ends a piece") });
   fill(place, plot);
-  let data = null, pieces = [], begun = null;
+  let data = null, pieces = [], begun = null, mark = null, from = null;
   const x = (s) => LEFT + (s / data.length_mm) * (W - LEFT - RIGHT);
   const back = (e) => { const r = plot.getBoundingClientRect(); const px = ((e.clientX - r.left) / r.width) * W; return Math.max(0, Math.min(data.length_mm, ((px - LEFT) / (W - LEFT - RIGHT)) * data.length_mm)); };
   plot.addEventListener("pointerdown", (e) => { if (data) { begun = back(e); plot.setPointerCapture(e.pointerId); } });
+  const choose = (a, b) => {
+    const piece = [Math.min(a, b), Math.max(a, b)];
+    if (piece[1] - piece[0] < data.length_mm / 200) return;
+    pieces = [...pieces.slice(-1), piece].sort((p, q) => p[0] - q[0]);
+    chosen(pieces);
+  };
   plot.addEventListener("pointerup", (e) => {
     if (begun === null) return;
-    const piece = [Math.min(begun, back(e)), Math.max(begun, back(e))];
+    choose(begun, back(e));
     begun = null;
-    if (piece[1] - piece[0] < data.length_mm / 200) return;
-    pieces = [...pieces.slice(-1), piece].sort((a, b) => a[0] - b[0]);
-    chosen(pieces);
+  });
+  const cursor = svg("line", { class: "cursor", y1: TOP, y2: H - BOTTOM });
+  plot.addEventListener("keydown", (e) => {
+    const way = { ArrowLeft: -1, ArrowRight: 1 }[e.key];
+    if (!data || (!way && !["Enter", " ", "Escape"].includes(e.key))) return;
+    e.preventDefault();
+    mark ??= data.length_mm / 2;
+    if (way) mark = Math.max(0, Math.min(data.length_mm, mark + (way * data.length_mm) / (e.shiftKey ? 10 : 100)));
+    else if (e.key === "Escape") from = null;
+    else if (from === null) from = mark;
+    else { choose(from, mark); from = null; }
+    cursor.setAttribute("x1", String(x(mark)));
+    cursor.setAttribute("x2", String(x(mark)));
+    plot.append(cursor);
   });
   return {
     show(answer, keep = false) {
       data = answer;
-      if (!keep) pieces = [];
+      if (!keep) { pieces = []; mark = from = null; }
       const known = data.points.filter((p) => p.z !== null);
       if (!known.length) return void fill(plot, svg("text", { x: 20, y: 40 }, t("Nothing was measured along this line.")));
       let low = Math.min(...known.map((p) => p.z)), high = Math.max(...known.map((p) => p.z));

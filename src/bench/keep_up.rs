@@ -1,0 +1,184 @@
+//! In: pictures a second. Out: what of a camera that sends so many the newest-picture chain measures, at half and at full resolution, counted
+//! while it runs: every picture stands under its own name.
+//! Frame and unit: px, pictures, ms from a picture's last byte to its points.
+
+use super::scenes::{Scene, pictures};
+use super::steady::percentile;
+use crate::camera::{Distortion, Intrinsics};
+use crate::capture::{Event, Fate, Fed, Feed, FeedOptions, Format, Mode, Picture, PictureSource, now_ns};
+use crate::fault::{Fault, Result};
+use crate::geometry::{Plane, Vec3};
+use crate::raster::Image;
+use crate::rig::{Calibration, Covariance, Kind, Quality, Rig, Verdict};
+use crate::scan::{Extraction, Live, Where};
+use crate::stages::stripe::point::Optics;
+use std::time::Duration;
+
+/// Half of the resolution, and all of it.
+const SIZES: [(u32, u32); 2] = [(640, 480), (1280, 960)];
+/// Different pictures that are sent in turn.
+const PICTURES: u32 = 8;
+/// Waited for a picture at most so long before is looked whether it is over.
+const WITHIN: Duration = Duration::from_millis(100);
+
+/// What became of a camera's pictures.
+#[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
+pub struct KeptUp {
+    /// What measured them.
+    pub on: String,
+    /// Columns, px.
+    pub width: u32,
+    /// Rows, px.
+    pub height: u32,
+    /// Pictures a second that were sent.
+    pub rate_hz: f64,
+    /// Pictures that were sent.
+    pub sent: u64,
+    /// Of these with points.
+    pub measured: u64,
+    /// Passed over, because a newer one had come.
+    pub passed_over: u64,
+    /// Lost otherwise: nobody had taken them from the camera in time, or they showed no stripe.
+    pub lost: u64,
+    /// From a picture's last byte to its points, ms: half of them take less, and all but one in a hundred.
+    pub ms: [f64; 2],
+}
+
+/// Runs the chain at both sizes for so many seconds each.
+///
+/// # Errors
+/// A rate or time out of range; no GPU where one is asked for; no thread.
+pub fn keep_up(rate_hz: f64, seconds: f64, place: Where) -> Result<Vec<KeptUp>> {
+    if !(0.1..=10_000.0).contains(&rate_hz) || !(0.1..=600.0).contains(&seconds) {
+        return Err(Fault::usage(format!(
+            "{rate_hz} pictures a second for {seconds} s, 0.1 to 10000 for 0.1 to 600 s are possible"
+        ))
+        .next("correct the number"));
+    }
+    SIZES.into_iter().map(|size| at(size, rate_hz, seconds, place)).collect()
+}
+
+fn at((width, height): (u32, u32), rate_hz: f64, seconds: f64, place: Where) -> Result<KeptUp> {
+    let images = pictures(Scene::OneStripe, width, height, PICTURES);
+    let format = Format { width, height, bits: 8 };
+    let rig = rig(&Scene::OneStripe.optics(width, height), width, height);
+    let mut live = Live::new(&rig, format, &Extraction::default(), None, place)?;
+    // The first ones compile and learn the stripe.
+    for image in &images {
+        live.measure(0, image.clone())?;
+    }
+    let source = Paced { images, format, period: (1e9 / rate_hz) as u64, start: now_ns(), next: 0 };
+    let options = FeedOptions { mode: Mode::Newest, seconds: Some(seconds), ..FeedOptions::default() };
+    let feed = Feed::start(Box::new(source), options)?;
+    let (mut waits, mut measured) = (Vec::new(), 0);
+    loop {
+        let picture = match feed.next(WITHIN) {
+            Fed::Picture(picture) => picture,
+            Fed::Quiet => continue,
+            Fed::Ended(None) => break,
+            Fed::Ended(Some(fault)) => return Err(fault),
+        };
+        let seen = live.measure(picture.id as u32, picture.image)?;
+        feed.fate(Fate::Used);
+        waits.push(now_ns().saturating_sub(picture.host_ns) as f64 * 1e-9);
+        measured += u64::from(seen.is_some_and(|m| m.points.iter().any(|p| p.sigma_mm.is_finite())));
+    }
+    let a = feed.account();
+    if waits.is_empty() {
+        return Err(Fault::refused(format!("no picture was measured in {seconds} s"))
+            .cause("at so few pictures a second none came in that time, or this machine is at a stand")
+            .next("measure for longer"));
+    }
+    Ok(KeptUp {
+        on: live.ran_on(),
+        width,
+        height,
+        rate_hz,
+        sent: a.sent,
+        measured,
+        passed_over: a.dropped_processing,
+        lost: a.sent.saturating_sub(measured + a.dropped_processing),
+        ms: [0.5, 0.99].map(|p| percentile(&mut waits, p)),
+    })
+}
+
+/// A rig that sees these pictures.
+fn rig(o: &Optics, width: u32, height: u32) -> Rig {
+    let [fx, fy, cx, cy, skew] = o.pinhole.map(f64::from);
+    let mut lens = [0.0; 14];
+    lens.iter_mut().zip(o.distortion).for_each(|(to, from)| *to = from.into());
+    let camera = Intrinsics { fx, fy, cx, cy, skew, distortion: Distortion(lens), width, height };
+    let plane = Plane::new(Vec3::from(o.normal.map(f64::from)), o.offset.into()).expect("a normal");
+    let quality = Quality {
+        verdict: Verdict::Good,
+        reasons: vec!["drawn pictures".into()],
+        advice: vec![],
+        figures: Default::default(),
+        per_picture: vec![],
+    };
+    let camera = Calibration::new(Kind::Camera, camera, None, Covariance::default(), quality.clone());
+    let laser_plane = Calibration::new(Kind::LaserPlane, plane, Some(&camera), Covariance::default(), quality);
+    Rig { laser_plane: Some(laser_plane), camera: Some(camera), ..Rig::default() }
+}
+
+/// A camera that runs at its own pace: what nobody takes in time is lost, and its numbers show it.
+struct Paced {
+    images: Vec<Image>,
+    format: Format,
+    /// ns.
+    period: u64,
+    start: u64,
+    next: u64,
+}
+
+impl PictureSource for Paced {
+    fn format(&self) -> Format {
+        self.format
+    }
+
+    fn next(&mut self, within: Duration) -> Event {
+        let due = self.start + self.next * self.period;
+        let now = now_ns();
+        if due > now {
+            std::thread::sleep(Duration::from_nanos(due - now).min(within));
+            if due > now_ns() {
+                return Event::Quiet;
+            }
+        }
+        self.next = self.next.max((now_ns() - self.start) / self.period);
+        let (id, host_ns) = (self.next, now_ns());
+        self.next += 1;
+        let image = self.images[(id % self.images.len() as u64) as usize].clone();
+        let picture = Picture { image, id, device_ns: None, host_ns, exposure_ns: None, count: None, stand: None };
+        Event::Picture(Box::new(picture))
+    }
+
+    fn sent(&self) -> Option<u64> {
+        Some(self.next)
+    }
+
+    fn name(&self) -> String {
+        "pictures that are drawn".into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_picture_is_accounted_for_slow_and_fast() {
+        for k in keep_up(8.0, 0.6, Where::Cpu).unwrap() {
+            assert!(k.measured > 0 && k.sent >= k.measured && k.ms[0] > 0.0 && k.ms[1] >= k.ms[0], "{k:?}");
+            assert_eq!(k.sent, k.measured + k.passed_over + k.lost, "{k:?}");
+        }
+        // More than any machine measures: the rest is passed over or lost, and said so.
+        let fast = keep_up(10_000.0, 0.5, Where::Cpu).unwrap();
+        for k in &fast {
+            assert_eq!(k.sent, k.measured + k.passed_over + k.lost, "{k:?}");
+            assert!(k.sent > 2000 && k.passed_over + k.lost > k.sent / 4, "{k:?}");
+        }
+        assert!(fast[1].ms[0] > fast[0].ms[0], "four times the pixels take longer: {fast:?}");
+        assert!(keep_up(0.0, 1.0, Where::Cpu).is_err() && keep_up(30.0, f64::NAN, Where::Cpu).is_err());
+    }
+}

@@ -1,0 +1,106 @@
+//! In: recordings, a station, a recipe. Out: a scan of each and what was found in it, one after the other; a table, and how the places repeat.
+//! Frame and unit: the scans' frame; mm, degrees.
+
+use crate::cli::terminal::arguments::{changes, parse};
+use crate::cli::terminal::console::Console;
+use crate::cli::terminal::interrupt;
+use crate::cli::terminal::outputs::{self, Inputs};
+use crate::fault::{Fault, Result};
+use crate::find::{Accelerator, LocateOptions, Recipe};
+use crate::robot::Convention;
+use crate::scan::Where;
+use crate::station::{Batch, BatchOptions, BatchRow, Settings, Spread, batch};
+use std::path::PathBuf;
+
+/// Scan several recordings and look for a part in each; tell how the places repeat
+///
+/// Leaves a scan folder for each recording, found.json and found.png beside it, and of all together batch.json and batch.csv. Where
+/// the part stood still between the recordings, the scatter of its places stands beside what each place said of itself. A recording
+/// that fails is named with its reason, and the others go on; the exit code is 1 then.
+#[derive(clap::Args)]
+#[command(after_help = "Example:
+  sheetlight batch recordings/a recordings/b recordings/c --station cell3 \\
+      --recipe data/recipes/led.toml --set threshold.minimum=14 --out batch1")]
+pub struct Args {
+    /// Recording folders, in the order in which they are scanned
+    #[arg(required = true)]
+    recordings: Vec<PathBuf>,
+    /// Station folder with the calibration
+    #[arg(long)]
+    station: PathBuf,
+    /// Recipe (TOML) of the part; without it recordings are scanned only
+    #[arg(long)]
+    recipe: Option<PathBuf>,
+    /// A setting of [extraction] other than the station's, several times
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    settings: Vec<String>,
+    /// Folder for scans and tables
+    #[arg(long)]
+    out: PathBuf,
+    /// Where the stages run: auto, gpu, or cpu
+    #[arg(long, default_value = "auto", value_parser = parse::<Where>)]
+    on: Where,
+    /// Notation of the poses [default: the station's robot, else matrix]
+    #[arg(long, value_parser = parse::<Convention>)]
+    robot: Option<Convention>,
+}
+
+pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let files: Vec<_> = args.recipe.iter().map(PathBuf::as_path).collect();
+    outputs::check(&[&args.out], &Inputs { files: &files, station: Some(&args.station), ..Inputs::default() })?;
+    let of_station = Settings::load(&args.station)?.robot;
+    let robot = args.robot.or(of_station).unwrap_or(Convention::Matrix);
+    let options = BatchOptions {
+        station: args.station.clone(),
+        recordings: args.recordings.clone(),
+        recipe: args.recipe.as_deref().map(Recipe::load).transpose()?,
+        out: args.out.clone(),
+        settings: changes(&args.settings)?,
+        place: args.on,
+        locate: LocateOptions { robot, accelerator: Accelerator::open(), ..LocateOptions::default() },
+        stop: interrupt::asked_for(),
+    };
+    let done = batch(&options, |row| console.say(line(row)))?;
+    console.result(&done, &text(&done));
+    console.say(format!("see {}", args.out.join("batch.csv").display()));
+    let failed = done.rows.iter().filter(|r| r.problem.is_some()).count();
+    if failed == 0 {
+        return Ok(());
+    }
+    Err(Fault::refused(format!("{failed} of {} recordings came to no place", done.rows.len()))
+        .cause("what stands behind each of them")
+        .next("look at the table; their scans are kept"))
+}
+
+fn line(r: &BatchRow) -> String {
+    let mut s = r.scan.clone();
+    if let Some(n) = r.points {
+        s += &format!(": {n} points");
+    }
+    s += &r.median_sigma_mm.map_or(String::new(), |mm| format!(", sigma {mm:.4} mm"));
+    if let Some(f) = &r.found {
+        let [x, y, z] = [3, 7, 11].map(|k| f.part[k]);
+        s += &format!("; at {x:.3} {y:.3} {z:.3} mm, score {:.3}", f.score);
+    }
+    s + &r.problem.as_ref().map_or(String::new(), |why| format!("; {why}"))
+}
+
+fn text(b: &Batch) -> String {
+    let mut lines: Vec<String> = b.rows.iter().map(line).collect();
+    if let Some(r) = &b.repeats {
+        lines.push(format!("{} places; 1 sigma of them, what they state, from the first to the last", r.places));
+        lines.extend(r.along.iter().map(spread));
+    }
+    lines.join("\n")
+}
+
+/// Figures and a histogram of a hand's breadth.
+fn spread(s: &Spread) -> String {
+    const HEIGHTS: [char; 9] = [' ', '▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+    let most = s.bars.iter().max().copied().unwrap_or(1).max(1);
+    let bars: String = s.bars.iter().map(|n| HEIGHTS[(n * 8).div_ceil(most) as usize]).collect();
+    format!(
+        "{:5} {:8.4} {:8.4} {:8.4} {:7}  -{:.4} |{bars}| +{:.4}",
+        s.name, s.scatter, s.stated, s.apart, s.unit, s.half, s.half
+    )
+}

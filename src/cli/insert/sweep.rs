@@ -1,0 +1,104 @@
+//! In: a station, a recipe, maybe a robot that says where it stands. Out: how the line goes over the part, what is left beside it, and
+//! which speed goes with which step; nothing moves.
+//! Frame and unit: base frame; poses in the robot's own notation; mm, mm/s, pictures a second.
+
+use crate::cli::terminal::console::Console;
+use crate::fault::Result;
+use crate::find::Recipe;
+use crate::rig::Rig;
+use crate::robot::Convention;
+use crate::station::job::{JobState, Preview, PreviewOptions, preview};
+use crate::station::{Settings, load_report};
+use std::path::PathBuf;
+
+/// Show how the line will sweep over a part, before anything moves
+///
+/// The same sweep that sheetlight job makes: its length, step and shots, how far the part may lie off the picture's middle, what is
+/// left of the working volume and to the box of [motion]. Until a job has touched the board it is taken to lie squarely before the
+/// camera. Below stands the pace of a scan that does not stop for its pictures (sheetlight scan --camera): speed, step and pictures
+/// a second, and whether camera, chain or arm limits them. A job stops at each shot.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  sheetlight sweep --station cell3 --recipe data/recipes/led.toml --robot bcap://10.0.0.2
+  sheetlight sweep --station cell3 --recipe led.toml --camera-rate 60 --scan scans/board7 --step 0.1")]
+pub struct Args {
+    /// Station folder; its station.toml may state [motion]
+    #[arg(long)]
+    station: PathBuf,
+    /// Recipe (TOML) of the part
+    #[arg(long)]
+    recipe: PathBuf,
+    /// The robot, asked once where it stands: bcap://HOST[:5007], ur://HOST, file:POSES.json
+    #[arg(long)]
+    robot: Option<String>,
+    /// Folder of a job: the board that it touched
+    #[arg(long, conflicts_with = "robot")]
+    job: Option<PathBuf>,
+    /// From the camera to the board along its axis, mm [default: where the rig works]
+    #[arg(long, conflicts_with = "job")]
+    distance: Option<f64>,
+    /// Length of the sweep, mm [default: over the part, as the job's]
+    #[arg(long)]
+    sweep: Option<f64>,
+    /// From one shot to the next, mm [default: the job's]
+    #[arg(long)]
+    step: Option<f64>,
+    /// Speed, mm/s [default: the fastest that camera, chain and station bear]
+    #[arg(long)]
+    speed: Option<f64>,
+    /// Pictures a second that the camera sends
+    #[arg(long, value_name = "HZ")]
+    camera_rate: Option<f64>,
+    /// A finished scan of such pictures: so many shots a second did this machine measure
+    #[arg(long)]
+    scan: Option<PathBuf>,
+    /// Notation in which poses are shown [default: the station's robot, else matrix]
+    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Convention>)]
+    notation: Option<Convention>,
+}
+
+pub fn run(args: &Args, console: &Console) -> Result<()> {
+    let (settings, rig) = (Settings::load(&args.station)?, Rig::load(&args.station)?);
+    let recipe = Recipe::load(&args.recipe)?;
+    let start = match &args.robot {
+        Some(uri) => Some(crate::arm::open(uri)?.pose()?.base_from_flange),
+        None => None,
+    };
+    let options = PreviewOptions {
+        job: args.job.as_deref().map(JobState::load).transpose()?.flatten(),
+        start,
+        now: None,
+        distance_mm: args.distance,
+        sweep_mm: args.sweep,
+        step_mm: args.step,
+        speed_mm_s: args.speed,
+        camera_hz: args.camera_rate,
+        chain_hz: args.scan.as_deref().map(load_report).transpose()?.map(|r| r.shots_per_second),
+    };
+    let shown = preview(&settings, &rig, &recipe, &options)?;
+    console.result(&shown, &text(&shown, args.notation.or(settings.robot).unwrap_or(Convention::Matrix)));
+    Ok(())
+}
+
+fn text(p: &Preview, robot: Convention) -> String {
+    let mut lines = vec![format!(
+        "{}, {}",
+        p.recipe,
+        if p.touched { "over the board that was touched" } else { "the board taken to lie squarely before the camera" }
+    )];
+    lines.extend(p.sweep.says());
+    lines.push(format!("{:.3} mm from one shot to the next", p.sweep.step_mm));
+    for (name, pose) in ["first", "last"].iter().zip(p.flange.iter().flatten()) {
+        let numbers: Vec<String> = robot.write(pose).iter().map(|v| format!("{v:.3}")).collect();
+        lines.push(format!("flange at the {name} shot: {} ({})", numbers.join(" "), robot.labels().join(", ")));
+    }
+    match &p.pace {
+        Some(pace) => {
+            lines.push(format!("without stopping: {}", pace.words()));
+            let bears = pace.bears.iter().map(|(name, v)| format!("{name} {v:.1} mm/s"));
+            lines.push(format!("at this step: {}", bears.collect::<Vec<_>>().join(", ")));
+        }
+        None => lines.push("what limits its speed is not known: give --camera-rate, --scan or --speed".into()),
+    }
+    lines.join("\n")
+}

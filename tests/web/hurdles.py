@@ -1,0 +1,76 @@
+"""In: the program, a simulated station, browsers. Out: failure where an old browser without WebGL2 shows nothing in the place of three
+dimensions, or where a full disk is not named on the page where it happens, with what to do.
+Frame and unit: none."""
+
+import sys
+import tempfile
+import time
+
+from browser import Browser
+from server import Server
+from shots import quiet
+
+program, folder = sys.argv[1:3]
+# File operations after which the disk is full: a start takes fewer, a scan more.
+ROOM = 24
+
+
+def old_browser(url, scanned):
+    """Neither WebGL nor WebGL2: the map stays, and the page says why."""
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+        b = Browser(profile, flags=("--disable-3d-apis",))
+        try:
+            b.open(url)
+            b.ready("station")
+            assert b.run("return document.createElement('canvas').getContext('webgl2') === null"), "this browser is none of the old ones"
+            for page in (f"surface?job={scanned}", "position"):
+                b.run("location.hash = arguments[0]", f"#/{page}")
+                b.until("the map", "return document.querySelector('.map canvas')?.width > 300", 30)
+                b.click("#three")
+                b.until("that there is no WebGL2", "return /no WebGL2/.test(document.getElementById('main').innerText)", 10)
+            b.page("surface")
+            b.until("the map again", "return document.querySelector('.map canvas')?.width > 300", 20)
+            # What a browser without it says of that by itself is none of the page's.
+            said = [m for m in b.console() if "WebGL" not in m and "GPU" not in m]
+            assert not said, said
+        finally:
+            b.close()
+
+
+def full_disk():
+    """The disk is full while a scan writes: the page Scan names it in the operator's words."""
+    s = Server(program, folder, "--recordings", folder, env={"SHEETLIGHT_FULL_AT": str(ROOM)})
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+        b = Browser(profile)
+        try:
+            b.open(s.url)
+            b.ready("station")
+            former = s.json("GET", "/jobs")[0]["id"]
+            b.page("scan")
+            b.click("#start")
+            ends = lambda: [j["state"] for j in s.json("GET", "/jobs")[:1] if j["id"] != former]
+            end = time.time() + 60
+            while not (said := b.text("#main .problem")) and ends() != ["done"]:
+                assert time.time() < end, b.text("#main")
+                time.sleep(0.1)
+            if not said:
+                print("this build knows no full disks: a release")
+                return
+            assert "the disk is full" in said and "take old jobs away on the page Replay" in said and "--out" not in said, said
+            quiet(b, "full disk", refused=0)
+        finally:
+            b.close()
+            s.kill()
+
+
+if not Browser.there():
+    print("no chromium and chromedriver here")
+    sys.exit(77)
+s = Server(program, folder, "--recordings", folder)
+job = s.job({"procedure": "scan", "recording": "scan"})
+assert job["state"] == "done", job
+assert s.job({"procedure": "find", "scans": [job["id"]], "recipe": "led"})["state"] == "done"
+s.json("POST", "/lease/release")
+old_browser(s.url, job["id"])
+assert s.end() == 0
+full_disk()

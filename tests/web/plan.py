@@ -1,0 +1,129 @@
+"""In: the program, a simulated station, a browser; an insertion that was made. Out: failure where the way over a part that the page Scan draws
+is another than the job's or the command line's, where speed, step and pictures a second do not go together, where repeats are reckoned
+otherwise on the page than on the command line, or where drops are not counted.
+Frame and unit: mm, mm/s, pictures a second."""
+
+import csv
+import json
+import math
+import os
+import subprocess
+
+from shots import quiet
+
+FIGURES = ("depth_mm", "length_mm", "step_mm", "shots", "part_mm", "field_mm", "swept_mm", "along_mm", "across_mm", "volume_mm", "box_mm")
+
+
+def command(program, *words, code=0):
+    done = subprocess.run([program, "--json", *words], capture_output=True, text=True, timeout=300)
+    assert done.returncode == code, (words, done.returncode, done.stderr)
+    # Where it failed the fault stands behind the result.
+    return json.JSONDecoder().raw_decode(done.stdout)[0]
+
+
+def as_the_job(program, s, job, sweep_mm):
+    """The sweep that is shown is the one that the job made: its poses, shot by shot, at both ends, on page and command line."""
+    shown = s.json("GET", f"/sweep?recipe={job['order']['recipe']}&job={job['id']}&sweep_mm={sweep_mm}")
+    # A simulated cell's folder has its station in it.
+    station = s.station if os.path.isdir(os.path.join(s.station, "jobs")) else os.path.join(s.station, "station")
+    folder = os.path.join(station, "jobs", job["id"])
+    made = os.path.join(folder, "insertion")
+    with open(os.path.join(made, "line", "meta.json")) as f:
+        shots = [x for x in json.load(f)["frames"] if x.get("laser")]
+    assert shown["touched"] and shown["shots"] == len(shots), (shown, len(shots))
+    line = command(program, "sweep", "--station", station, "--recipe", os.path.join(folder, "recipe.toml"), "--job", made, "--sweep", str(sweep_mm), "--notation", "denso")
+    assert line["touched"] and all(line["sweep"][k] == shown[k] for k in FIGURES), (line["sweep"], shown)
+    with open(os.path.join(made, "line", "poses.json")) as f:
+        poses = json.load(f)
+    poses = poses["poses"] if isinstance(poses, dict) else poses
+    row = lambda p: p if isinstance(p, list) else next(v for v in p.values() if isinstance(v, list) and len(v) == 16)
+    for end, shot in ((0, shots[0]), (1, shots[-1])):
+        stood, said = row(poses[shot["pose"]]), line["flange"][end]
+        off = math.dist([stood[k] for k in (3, 7, 11)], [said[k] for k in (3, 7, 11)])
+        assert off < 0.05, f"the job's shot was made {off} mm beside where the plan says"
+        assert math.dist(shown["flange"][end][:3], [said[k] for k in (3, 7, 11)]) < 1e-3
+    return shown
+
+
+def drawn(s, b, recipe):
+    """The page Scan draws it, and its figures go together; the slowest of camera, chain and arm limits."""
+    b.run("sessionStorage.recipe = arguments[0]", recipe)
+    b.page("scan")
+    plan = s.json("GET", f"/sweep?recipe={recipe}")
+    b.until("the way over the part", "return Number(document.querySelector('[data-swept]')?.dataset.swept) === arguments[0]", 20, plan["shots"])
+    points = b.run("return document.querySelector('.sweep .band').getAttribute('points')")
+    corners = [[float(v) for v in p.split(",")] for p in points.split()]
+    assert all(math.dist(p, q) < 0.02 for p, q in zip(corners, plan["swept_mm"])), (corners, plan["swept_mm"])
+    # A rectangle as long as the sweep, its ends at the picture's edges.
+    a, c = plan["swept_mm"][0], plan["swept_mm"][3]
+    assert abs(math.dist(a, c) - plan["length_mm"]) < 1e-9
+    for hz, step, limits in ((20, 0.2, "camera"), (1e6, plan["limit_mm_s"] and 50, "speed")):
+        if not step:
+            continue
+        for key, value in (("camera_hz", hz), ("step_mm", step)):
+            b.run("const e = document.getElementById(arguments[0]); e.value = arguments[1]; e.dispatchEvent(new Event('change'))", f"plan-{key}", str(value))
+        b.until(f"that the {limits} limits", "return document.querySelector('[data-limit]')?.dataset.limit === arguments[0]", 20, limits)
+        pace = s.json("GET", f"/sweep?recipe={recipe}&camera_hz={hz}&step_mm={step}")["pace"]
+        assert pace["limited_by"] == limits and abs(pace["rate_hz"] * pace["step_mm"] - pace["speed_mm_s"]) < 1e-9 * pace["speed_mm_s"], pace
+        assert abs(pace["seconds"] * pace["speed_mm_s"] - plan["length_mm"]) < 1e-6, pace
+        shown = b.run("return document.querySelector('[data-limit]').previousElementSibling.innerText")
+        assert f"{pace['speed_mm_s']:.1f}" in shown and f"{pace['rate_hz']:.1f}" in shown, (shown, pace)
+    assert s.ask("GET", f"/api/v1/sweep?recipe={recipe}&sweep_mm=2")[0] == 400
+    assert s.ask("GET", "/api/v1/sweep?recipe=../x")[0] == 404
+    quiet(b, "path over the part")
+    return plan
+
+
+def batch(program, s, folder):
+    """Several recordings by one command: each scan is the page's, the table has every line, repeats are those that the page is told."""
+    out = os.path.join(folder, "batch")
+    scan = os.path.join(folder, "scan")
+    s.json("POST", "/lease", {"firmly": True})
+    jobs = [s.job({"procedure": "scan", "recording": "scan", "settings": {"threshold.minimum": q} if q else {}}) for q in (0, 20)]
+    assert all(j["state"] == "done" for j in jobs), jobs
+    finds = [s.job({"procedure": "find", "scans": [j["id"]], "recipe": "led"}) for j in jobs]
+    recipe = os.path.join(s.station, "jobs", finds[0]["id"], "recipe.toml")
+    made = command(program, "batch", scan, scan, "--station", s.station, "--recipe", recipe, "--out", out)
+    assert [r["scan"] for r in made["rows"]] == ["scan", "scan-2"] and made["repeats"]["places"] == 2, made
+    first = finds[0]["outcome"]
+    assert all(r["points"] == jobs[0]["outcome"]["points"] and math.dist(r["found"]["part"], first["part"]) < 1e-9 for r in made["rows"]), made["rows"]
+    assert all(a["scatter"] < 1e-12 and a["stated"] > 0 for a in made["repeats"]["along"]), made["repeats"]
+    # With another setting the place is another one, and both tell the same of the two.
+    other = command(program, "batch", scan, "--station", s.station, "--recipe", recipe, "--set", "threshold.minimum=20", "--out", out + "2")
+    assert math.dist(other["rows"][0]["found"]["part"], finds[1]["outcome"]["part"]) < 1e-9 and other["repeats"] is None
+    told = s.json("POST", "/repeats", {"jobs": [j["id"] for j in finds]})
+    x = [j["outcome"]["part"][3] for j in finds]
+    along = told["along"][0]
+    assert told["places"] == 2 and abs(along["apart"] - abs(x[0] - x[1])) < 1e-12 and abs(along["scatter"] - abs(x[0] - x[1]) / 2 ** 0.5) < 1e-9, told
+    with open(os.path.join(out, "batch.csv"), newline="") as f:
+        rows = list(csv.DictReader(f))
+    assert [float(r["x_mm"]) for r in rows] == [r["found"]["part"][3] for r in made["rows"]] and rows[0]["passed"] == "true", rows
+    # One that is none is named, and the others go on.
+    worse = command(program, "batch", os.path.join(folder, "none"), scan, "--station", s.station, "--recipe", recipe, "--out", out + "3", code=1)
+    assert worse["rows"][0]["problem"] and not worse["rows"][1]["problem"], worse["rows"]
+    done = subprocess.run([program, "batch", scan, "--station", s.station, "--out", folder], capture_output=True, text=True)
+    assert done.returncode == 2 and "is a recording" in done.stderr, done.stderr
+    s.json("POST", "/lease/release")
+
+
+def health(program, s, b):
+    """Drops are counted at half and at full resolution while pictures come at the stated rate; every picture is accounted for."""
+    b.page("health")
+    b.run("const e = document.getElementById('rate'); e.value = 2000; e.dispatchEvent(new Event('change'))")
+    b.click("#benchmark")
+    b.until("what was counted", "return Number(document.querySelector('[data-kept]')?.dataset.kept) === 2", 240)
+    kept = next(j for j in s.json("GET", "/jobs") if j["order"]["procedure"] == "benchmark")["outcome"]["kept_up"]
+    for k in kept:
+        assert k["rate_hz"] == 2000 and k["sent"] == k["measured"] + k["passed_over"] + k["lost"] and k["measured"] > 0, k
+    half, full = kept
+    assert [half["width"], full["width"]] == [640, 1280] and full["ms"][0] > half["ms"][0], kept
+    # No machine that tests run on measures 2000 full pictures a second.
+    assert full["passed_over"] + full["lost"] > 0 and full["measured"] < half["measured"], kept
+    cells = b.run("return [...document.querySelectorAll('[data-kept] tbody td')].map((e) => e.innerText)")
+    assert str(full["passed_over"]) in " ".join(cells), cells
+    memory = s.json("GET", "/bar")["memory_mb"]
+    assert memory is None or 10 < memory[0] <= memory[1] < 5000, memory
+    line = command(program, "bench", "--keep-up", "20", "--seconds", "0.5")
+    assert [k["width"] for k in line["kept_up"]] == [640, 1280] and line["rows"] and line["recorded"], line
+    print("drops of 2000 pictures a second: " + "; ".join(f"{k['width']}x{k['height']} {k['measured']} of {k['sent']} measured, {k['ms'][0]:.2f} ms" for k in kept))
+    quiet(b, "health, counted")
