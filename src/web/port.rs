@@ -43,7 +43,7 @@ fn holder(port: u16, proc: &Path) -> Option<String> {
     let socket = |inode: &str| format!("socket:[{inode}]");
     let sockets: Vec<String> = ["net/tcp", "net/tcp6"]
         .iter()
-        .filter_map(|table| std::fs::read_to_string(proc.join(table)).ok())
+        .filter_map(|table| crate::files::read_text(&proc.join(table)).ok())
         .flat_map(|table| table.lines().filter_map(|l| listening(l, port)).map(socket).collect::<Vec<_>>())
         .collect();
     let processes = std::fs::read_dir(proc).ok()?.flatten();
@@ -54,7 +54,7 @@ fn holder(port: u16, proc: &Path) -> Option<String> {
     };
     let numbered = processes.filter_map(|e| Some((e.file_name().to_str()?.parse::<u32>().ok()?, e.path())));
     let (number, folder) = numbered.into_iter().find(|(_, folder)| !sockets.is_empty() && has(folder))?;
-    let name = std::fs::read_to_string(folder.join("comm")).unwrap_or_default();
+    let name = crate::files::read_text(&folder.join("comm")).unwrap_or_default();
     Some(format!("{} (process {number})", name.trim()))
 }
 

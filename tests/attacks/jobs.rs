@@ -16,6 +16,7 @@ fn begun() -> JobState {
         phase: Phase::Insert,
         poses: Some([at(130.5), at(71.25), at(160.5)]),
         surface: Some([Vec3::new(400.0, -100.0, 60.0), Vec3::z()]),
+        halvings: 0,
         scanned_at: Some(1.7e9),
         made_from: "made of this".into(),
         ..JobState::new(at(300.0))

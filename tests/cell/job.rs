@@ -29,6 +29,29 @@ fn a_component_goes_into_its_socket() {
     assert_eq!((report.confirmations_to_position, report.confirmations), (Some(3), 5));
 }
 
+/// What is not known well enough is swept once more, in steps half as long, and is known better then.
+#[test]
+fn a_pose_that_is_not_known_well_enough_is_looked_at_again_closer() {
+    let set = set(scene("osc", 3), 3, 5.0);
+    let mut options = set.options("osc.toml", "job", 30.0);
+    let strict = std::fs::read_to_string(&options.recipe).unwrap() + "\n[gates]\nmax_sigma_deg = 0.001\n";
+    options.recipe = set.dir.path().join("strict.toml");
+    std::fs::write(&options.recipe, strict).unwrap();
+    let mut who = Yes::always();
+    let report = set.run(&options, &mut who).unwrap();
+    println!("{}\n{:#?}", report.why, who.told);
+    // Not once more after that, and nothing towards the part.
+    assert_eq!(who.asked, ["touch", "scan", "scan"]);
+    assert_eq!(report.outcome, Outcome::Stopped);
+    let sigma = |said: &str| -> f64 {
+        let (_, rest) = said.split_once("sigma_deg is ").unwrap_or_else(|| panic!("{said}"));
+        rest.split(',').next().unwrap().parse().unwrap()
+    };
+    let first = sigma(who.told.iter().find(|l| l.contains("once more")).expect("a second sweep is told of"));
+    let second = sigma(&report.why);
+    assert!(second < 0.85 * first, "{first} degrees, then {second}");
+}
+
 #[test]
 fn sockets_of_many_cells_are_filled() {
     let Some(long) = std::env::var_os("SHEETLIGHT_LONG") else { return };
