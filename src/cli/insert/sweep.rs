@@ -20,7 +20,7 @@ use std::path::PathBuf;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight sweep --station cell3 --recipe data/recipes/led.toml --robot bcap://10.0.0.2
-  sheetlight sweep --station cell3 --recipe led.toml --camera-rate 60 --scan scans/board7 --step 0.1")]
+  sheetlight sweep --station cell3 --recipe led.toml --camera-rate 60 --scan scans/a --step 0.1")]
 pub struct Args {
     /// Station folder; its station.toml may state [motion]
     #[arg(long)]
