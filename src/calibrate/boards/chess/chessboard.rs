@@ -9,6 +9,9 @@ use crate::fault::{Fault, Result};
 use crate::geometry::Vec2;
 use crate::raster::Image;
 
+/// Corners from which a lattice may grow: what it becomes is verified on the picture, corner by corner, and must be the whole board.
+const SEED: usize = 12;
+
 /// Finds a chessboard that is wholly in view.
 pub fn find(image: &Image, corners: [u32; 2], black_first: bool, options: &FindOptions) -> Result<BoardView> {
     let (columns, rows) = (corners[0] as usize, corners[1] as usize);
@@ -94,7 +97,7 @@ fn whole(
     corners.iter().all(Option::is_some).then_some(Found { grid: turned, corners })
 }
 
-/// Grows the lattice as far as the picture shows the board, one line beyond what was asked for at most: a larger board is
+/// Grows the lattice as far as the picture shows the board, a line beyond what was asked for at least: a larger board is
 /// not this one. A few corners may stay unseen (glare).
 fn mended(
     grid: &Grid,
@@ -104,11 +107,10 @@ fn mended(
     window: &Window,
     options: &FindOptions,
 ) -> Option<Found> {
-    let least = columns.min(rows);
-    if 2 * grid.count() < columns * rows || grid.columns.min(grid.rows) + 3 < least {
+    if grid.count() < SEED {
         return None;
     }
-    let mut large = grid.padded(columns.max(rows).saturating_sub(grid.columns.min(grid.rows)).clamp(1, 4));
+    let mut large = grid.padded(columns.max(rows).saturating_sub(grid.columns.min(grid.rows)) + 1);
     let corners = grown(&mut large, grey, window, options.band_px);
     let [across, down] = large.extent();
     let cut = |k: usize| (down.start + k / across.len()) * large.columns + across.start + k % across.len();
@@ -124,7 +126,9 @@ fn mended(
     if (found.grid.columns, found.grid.rows) != (columns, rows) {
         let places = Grid { corners: (0..count).map(|k| Some(Vec2::new(k as f64, 0.0))).collect(), ..found.grid };
         let order = places.quarter_turn();
-        found.corners = order.corners.iter().flatten().map(|k| found.corners[k.x as usize]).collect();
+        // The quadrant between the axes is the next one after a quarter turn, and of the other colour.
+        let turned = |c: Corner| Corner { contrast: -c.contrast, ..c };
+        found.corners = order.corners.iter().flatten().map(|k| found.corners[k.x as usize].map(turned)).collect();
         found.grid = Grid {
             corners: found.corners.iter().map(|c| c.map(|c| c.pixel)).collect(),
             columns: order.columns,

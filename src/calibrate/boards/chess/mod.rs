@@ -10,3 +10,5 @@ mod parity;
 #[cfg(test)]
 mod trials;
 pub(super) mod turns;
+#[cfg(test)]
+mod whole;
