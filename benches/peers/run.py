@@ -2,8 +2,8 @@
 for the same pictures, in turns within one run, and whether Sheetlight's masks are OpenCV's, pixel for pixel, and its points
 those of OpenCV's lens and the plane.
 Unit: milliseconds a shot, medians over the rounds; ratios are medians of the rounds' ratios. "ours" ends with the same as
-OpenCV's chain, a point for the middle of every skeleton pixel; "full" fits a peak to each, with its standard deviation, and
-looks for every reason against it. "by CPU" compares the CPU time of all threads, which says more than wall time on a machine
+OpenCV's chain, a point for the middle of every skeleton pixel; "full" is the chain of a scan, settings and result: a peak is
+fitted to each, with its standard deviation, and every reason against it is looked for; "host" is that on the processor. "by CPU" compares the CPU time of all threads, which says more than wall time on a machine
 that is busy with something else. "apart" is the largest distance of a point from OpenCV's ray and from the plane, in pixels.
 
     make bench-peers            (or: python run.py --sheetlight target/release/sheetlight)

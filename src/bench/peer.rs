@@ -14,7 +14,6 @@ use crate::stages::host::Host;
 use crate::stages::peak::params::{Method, PeakParams};
 use crate::stages::peak::{Stripe, noise};
 use crate::stages::stripe::choose_params::ChooseParams;
-use crate::stages::stripe::lengthen::LengthenParams;
 use crate::stages::stripe::point::{FLAT, Optics};
 use crate::stages::{ThresholdParams, Window};
 use rayon::prelude::*;
@@ -51,9 +50,9 @@ const STILL: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0,
 enum Command {
     /// Run all pictures so many times over, several batches in flight, to a point for every skeleton pixel's middle.
     Run(usize),
-    /// The same with a peak fitted to each, its standard deviation and every reason against it.
+    /// With the settings of a scan, so to peaks, their standard deviations and every reason against them.
     RunFull(usize),
-    /// As RunFull on this machine's processor with the settings of a scan, all pictures at once, or one after the other.
+    /// As RunFull on this machine's processor, all pictures at once, or one after the other.
     RunHost(usize),
     RunHostSingly(usize),
     /// x, y of the skeleton pixels of one picture and X, Y, Z of their points, little-endian f32, after their number in JSON.
@@ -105,16 +104,14 @@ pub fn serve(device: &Device, mut input: impl BufRead, mut output: impl Write) -
     };
     let mut chain = Chain::new(device, &config)?;
     run(&mut chain, &images, 1)?;
-    let measure = Measure { peak, choose: ChooseParams::default(), optics };
-    let lengthen = LengthenParams::default().word(setup.width_px);
-    let mut full = Chain::new(device, &ChainConfig { measure: Some(measure), lengthen, ..config.clone() })?;
-    run(&mut full, &images, 1)?;
     let mut single = Chain::new(device, &ChainConfig { shots: 1, slots: 1, ..config })?;
     let stripe =
         Stripe { width_px: setup.width_px, speckle: peak.speckle, noise: noise(&images[0]), ..Stripe::default() };
     let format = Format { width: setup.width, height: setup.height, bits: 8 };
     let scan = Extraction::default().for_stripe(&stripe).chain(format, optics, setup.width_px);
     let host = Host::new(&scan)?;
+    let mut full = Chain::new(device, &ChainConfig { shots: setup.shots_per_batch, ..scan })?;
+    run(&mut full, &images, 1)?;
     writeln!(output, "{}", serde_json::json!({"ready": device.info.name})).map_err(lost)?;
     output.flush().map_err(lost)?;
     loop {

@@ -42,7 +42,7 @@ impl<'a, T: Sample> View<'a, T> {
 pub struct Sums<W> {
     columns: Vec<W>,
     line: Vec<W>,
-    doubled: [Vec<u32>; 2],
+    before: Vec<u32>,
     sums: Vec<u32>,
     blurred: Vec<f32>,
     wide: Vec<f32>,
@@ -165,8 +165,7 @@ fn settle<T: Sample>(v: View<T>, ty: usize, run: std::ops::Range<usize>, sums: &
     }
 }
 
-/// Column sums of all rows of the window, from row to row by what enters and what leaves; then sums of one, two, four
-/// columns and so on, put together to the window's width.
+/// Column sums of all rows of the window, from row to row by what enters and what leaves; then the sums of the window's columns.
 #[multiversion(targets = "simd")]
 fn mean<T: Sample>(v: View<T>, ty: usize, run: std::ops::Range<usize>, s: &mut Sums<T::Wide>, out: &mut [Tile]) {
     let (w, h, r) = (v.f.width as usize, v.f.height as usize, (v.f.size / 2) as isize);
@@ -175,18 +174,15 @@ fn mean<T: Sample>(v: View<T>, ty: usize, run: std::ops::Range<usize>, s: &mut S
     s.columns.clear();
     s.columns.resize(n, T::Wide::default());
     for y in top as isize - r..=top as isize + r {
-        widened(v.row(y), from, &mut s.line, n);
-        s.columns.iter_mut().zip(&s.line).for_each(|(c, &v)| *c += v);
+        each(v.row(y), from, s, |column, v| *column += v);
     }
     for k in 0..rows {
         let y = (top + k) as isize;
         if k > 0 {
-            widened(v.row(y + r), from, &mut s.line, n);
-            s.columns.iter_mut().zip(&s.line).for_each(|(c, &v)| *c += v);
-            widened(v.row(y - 1 - r), from, &mut s.line, n);
-            s.columns.iter_mut().zip(&s.line).for_each(|(c, &v)| *c -= v);
+            each(v.row(y + r), from, s, |column, v| *column += v);
+            each(v.row(y - 1 - r), from, s, |column, v| *column -= v);
         }
-        across(&s.columns, v.f.size as usize, &mut s.doubled, &mut s.sums);
+        across(&s.columns, v.f.size as usize, &mut s.before, &mut s.sums);
         let row = v.row(y);
         for (i, tile) in out[run.clone()].iter_mut().enumerate() {
             let at = WIDE * (run.start + i);
@@ -197,6 +193,19 @@ fn mean<T: Sample>(v: View<T>, ty: usize, run: std::ops::Range<usize>, s: &mut S
                 Ok(row) => bits(|i| passes_mean(T::number(row[i].wide()), sums[i], &v.p)),
                 Err(_) => bits(|i| i < row.len() && passes(i)),
             };
+        }
+    }
+}
+
+/// Changes every column by its pixel of a row; the first column is `from`.
+#[inline(always)]
+fn each<W: Copy + Default, T: Sample<Wide = W>>(row: &[T], from: isize, s: &mut Sums<W>, change: impl Fn(&mut W, W)) {
+    let n = s.columns.len();
+    match usize::try_from(from).ok().and_then(|from| row.get(from..from + n)) {
+        Some(row) => s.columns.iter_mut().zip(row).for_each(|(c, v)| change(c, v.wide())),
+        None => {
+            widened(row, from, &mut s.line, n);
+            s.columns.iter_mut().zip(&s.line).for_each(|(c, &v)| change(c, v));
         }
     }
 }
@@ -215,35 +224,19 @@ fn widened<T: Sample>(row: &[T], from: isize, out: &mut Vec<T::Wide>, n: usize) 
     }
 }
 
-/// Sums of `size` columns beside each other.
+/// Sums of `size` columns beside each other: what lies before the last of them less what lies before the first.
 #[inline(always)]
-fn across<W: Copy + Into<u32>>(columns: &[W], size: usize, doubled: &mut [Vec<u32>; 2], sums: &mut Vec<u32>) {
-    let n = columns.len() - size + 1;
-    let [now, next] = doubled;
-    now.resize(columns.len(), 0);
-    next.resize(columns.len(), 0);
-    for (now, &c) in now.iter_mut().zip(columns) {
-        *now = c.into();
+fn across<W: Copy + Into<u32>>(columns: &[W], size: usize, before: &mut Vec<u32>, sums: &mut Vec<u32>) {
+    before.resize(columns.len() + 1, 0);
+    // Of deep pictures all columns together may be more than a word holds; their differences are not.
+    let mut all = 0u32;
+    for (before, &column) in before.iter_mut().zip(columns) {
+        *before = all;
+        all = all.wrapping_add(column.into());
     }
+    before[columns.len()] = all;
     sums.clear();
-    sums.resize(n, 0);
-    let (mut bit, mut done) = (1, 0);
-    loop {
-        if size & bit != 0 {
-            for (sum, &v) in sums.iter_mut().zip(&now[done..]) {
-                *sum += v;
-            }
-            done += bit;
-        }
-        if 2 * bit > size {
-            return;
-        }
-        for ((next, a), b) in next.iter_mut().zip(&*now).zip(&now[bit..]) {
-            *next = a + b;
-        }
-        std::mem::swap(now, next);
-        bit *= 2;
-    }
+    sums.extend(before[size..].iter().zip(&*before).map(|(to, from)| to.wrapping_sub(*from)));
 }
 
 /// Along the row first, then down the columns, both in f32 and in ascending order, as the shader does.

@@ -191,8 +191,11 @@ impl Host {
         kept.clear();
         kept.extend(work.list.iter().map(|&at| -> Tile {
             let (tx, ty) = thin.tile(at);
+            let alone = thin.alone(at as usize, self.frame.spacing);
             std::array::from_fn(|r| {
-                let (mut left, mut some) = (thin.words[at as usize][r], 0);
+                // What has nothing near it is a run by itself.
+                let mut some = alone[r];
+                let mut left = thin.words[at as usize][r] & !some;
                 while left != 0 {
                     let bit = left.trailing_zeros();
                     left &= left - 1;

@@ -49,6 +49,20 @@ impl Tiles {
             self.words[at][r] & (one ^ two) & !more
         })
     }
+    /// Pixels of a tile with no other one above or below them within the distance of a spacing's setting; none are told of settings
+    /// that look along rows or beyond the tiles beside it.
+    #[inline(always)]
+    pub fn alone(&self, at: usize, spacing: u32) -> Tile {
+        if spacing > 8 {
+            return [0; 8];
+        }
+        let column = [at - self.stride, at, at + self.stride].map(|at| self.words[at]);
+        let row = |r: usize| column[r / 8][r % 8];
+        std::array::from_fn(|r| {
+            let near = (1..=spacing as usize).fold(0, |near, d| near | row(8 + r - d) | row(8 + r + d));
+            self.words[at][r] & !near
+        })
+    }
     /// The eight neighbours of every pixel of a tile, row by row.
     #[inline(always)]
     pub fn around(&self, at: usize) -> [Neighbours; 8] {
