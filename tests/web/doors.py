@@ -245,8 +245,11 @@ def starts():
         port = taken.getsockname()[1]
         s = Server(program, folder, "--port", str(port))
         assert port < int(s.host.rsplit(":", 1)[1]) <= port + 20, s.host
-        said = "".join(s.said)
-        assert f"port {port} is taken by python" in said and f"(process {os.getpid()})" in said, said
+        # What it says and its address come by two pipes.
+        wanted, end = (f"port {port} is taken by python", f"(process {os.getpid()})"), time.time() + 10
+        while not all(w in "".join(s.said) for w in wanted):
+            assert time.time() < end, "".join(s.said)
+            time.sleep(0.05)
         assert s.end() == 0
     # Neither camera nor robot is there: the screen is, and says so.
     s = Server(program, folder, "--camera", "cell://127.0.0.1:1", "--robot", "bcap://127.0.0.1:1")
