@@ -239,3 +239,48 @@ fn why_not(best: Option<&Grid>, columns: usize, rows: usize, span: f64, grey: &G
         .cause("part of the board is covered, glares or is blurred, or a wrong board size was given")
         .next("check the board's description, the light and the focus")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::trials::{facing, picture_by};
+    use super::*;
+    use crate::camera::{Distortion, Intrinsics};
+    use crate::geometry::Vec3;
+    use crate::recording::BoardSpec;
+
+    /// Labels run in any direction; a corner under glare makes the lattice one that has to be mended.
+    #[test]
+    fn a_mended_lattice_has_its_origin_whichever_way_its_labels_run() {
+        let (width, height) = (640, 480);
+        let distortion = Distortion::default();
+        let camera = Intrinsics { fx: 600.0, fy: 600.0, cx: 319.5, cy: 239.5, skew: 0.0, distortion, width, height };
+        let board = BoardSpec::Chessboard {
+            inner_corners: [11, 8],
+            square_mm: 12.0,
+            border_mm: 8.0,
+            first_square: "black".into(),
+        };
+        let pose = facing(&board, Vec3::new(0.3, -0.2, 0.1), 270.0);
+        let truth: Vec<Vec2> =
+            board.features().iter().map(|f| camera.pixel_from_point(&pose.point(f)).unwrap()).collect();
+        let mut levels: Vec<u8> = picture_by(&camera, &board, &pose).to_f32().iter().map(|v| *v as u8).collect();
+        for (i, level) in levels.iter_mut().enumerate() {
+            let p = Vec2::new((i as u32 % width).into(), (i as u32 / width).into());
+            if (p - truth[37]).norm() < 9.0 {
+                *level = 255;
+            }
+        }
+        let image = Image::from_u8(width, height, levels);
+        let (grey, options) = (Grey::new(&image), FindOptions::default());
+        let window = Window { reach: options.reach, longest_px: options.longest_px, margin: 1.0 };
+        let seen = |k: usize| (k != 37).then_some(truth[k]);
+        let mut grid = Grid { columns: 11, rows: 8, corners: (0..88).map(seen).collect() };
+        for quarters in 0..4 {
+            let view = accept(&grid, 11, 8, true, &grey, &window, &options).unwrap().expect("a whole board");
+            assert!((80..88).contains(&view.points.len()), "{} corners", view.points.len());
+            let off = view.points.iter().map(|p| (p.pixel - truth[p.feature_id]).norm()).fold(0.0, f64::max);
+            assert!(off < 0.1, "labels turned by {quarters} quarters: {off} px");
+            grid = grid.quarter_turn();
+        }
+    }
+}

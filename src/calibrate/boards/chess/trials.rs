@@ -265,34 +265,6 @@ fn dots_of_unstated_diameter_are_measured() {
     }
 }
 
-/// A corner under glare, so that the lattice has to be mended, whichever way the board lies.
-#[test]
-fn a_board_under_glare_is_read_from_its_origin() {
-    let board = chessboard(11, 8);
-    for k in 0..4 {
-        let turn = Rigid::<Board, Board>::new(
-            crate::geometry::exp(&Vec3::new(0.0, 0.0, f64::from(k) * std::f64::consts::FRAC_PI_2)),
-            Vec3::zeros(),
-        );
-        let lying = facing(&board, Vec3::new(0.3, -0.2, 0.1), 270.0);
-        let centre = board.features().iter().sum::<Vec3>() / 88.0;
-        let about = Rigid::new(crate::geometry::Mat3::identity(), centre);
-        let pose = lying * about * turn * about.inverse();
-        let glare = camera().pixel_from_point(&pose.point(&board.features()[37])).unwrap();
-        let mut levels: Vec<u8> = picture(&board, &pose).to_f32().iter().map(|v| *v as u8).collect();
-        for (i, level) in levels.iter_mut().enumerate() {
-            let p = Vec2::new((i as u32 % WIDTH).into(), (i as u32 / WIDTH).into());
-            if (p - glare).norm() < 9.0 {
-                *level = 255;
-            }
-        }
-        let view = find(&Image::from_u8(WIDTH, HEIGHT, levels), &board, &FindOptions::default()).unwrap();
-        assert!((80..88).contains(&view.points.len()), "turned by {k} quarters: {} corners", view.points.len());
-        let off = worst(&board, &pose, &view);
-        assert!(off < 0.1, "turned by {k} quarters: {off} px");
-    }
-}
-
 #[test]
 fn boards_that_look_alike_when_turned_say_so() {
     for board in [chessboard(8, 6), chessboard(7, 7), circles(7, 5, false)] {

@@ -11,6 +11,7 @@ use crate::recording::BoardSpec;
 use rand::{Rng, SeedableRng};
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64;
+use std::f64::consts::{PI, TAU};
 
 const WIDTH: usize = 640;
 const HEIGHT: usize = 480;
@@ -36,7 +37,7 @@ fn pose(board: &BoardSpec, rng: &mut Pcg64) -> (Rigid<Camera, Board>, f64) {
     };
     loop {
         let (tilt, about, roll) =
-            (rng.random_range(0.0..1.0f64), rng.random_range(0.0..6.28f64), rng.random_range(-3.14..3.14));
+            (rng.random_range(0.0..1.0f64), rng.random_range(0.0..TAU), rng.random_range(-PI..PI));
         let lean = crate::geometry::exp(&Vec3::new(tilt * about.cos(), tilt * about.sin(), 0.0));
         let lying = facing(board, Vec3::new(0.0, 0.0, roll), rng.random_range(150.0..450.0));
         let aside = Vec3::new(rng.random_range(-90.0..90.0), rng.random_range(-70.0..70.0), lying.translation.z);
@@ -113,9 +114,10 @@ fn every_board_that_is_whole_and_in_view_is_found() {
             }
         };
         let features = board.features();
-        let far = view.points.iter().map(|p| {
-            (camera().pixel_from_point(&pose.point(&features[p.feature_id])).unwrap() - p.pixel).norm()
-        });
+        let far = view
+            .points
+            .iter()
+            .map(|p| (camera().pixel_from_point(&pose.point(&features[p.feature_id])).unwrap() - p.pixel).norm());
         // Blurred squares of 9 px under noise of 5 levels: a corner is known to 0.4 px.
         let off = far.fold(0.0, f64::max);
         if off > 2.0 || view.points.len() < 80 {
