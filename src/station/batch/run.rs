@@ -33,7 +33,7 @@ pub struct BatchOptions {
     pub recipe: Option<Recipe>,
     /// Folder for the scans, one each, and the table.
     pub out: PathBuf,
-    /// Settings other than the station's: names of [extraction] with dots.
+    /// Settings other than the station's: names of `[extraction]` with dots.
     pub settings: BTreeMap<String, Value>,
     /// Where the stages run.
     pub place: Where,

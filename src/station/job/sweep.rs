@@ -92,7 +92,7 @@ pub struct SweepFigures {
     pub across_mm: f64,
     /// How far something may stand above the board, and lie below it, within the working volume, mm; none: nobody knows it.
     pub volume_mm: Option<[f64; 2]>,
-    /// How far the flange stays inside the box of [motion], mm; negative: outside; none: no box is stated.
+    /// How far the flange stays inside the box of `[motion]`, mm; negative: outside; none: no box is stated.
     pub box_mm: Option<f64>,
 }
 
