@@ -15,7 +15,7 @@ use tokio::time::{MissedTickBehavior, interval, timeout};
 /// A viewer that takes nothing for so long is let go.
 const PATIENCE: Duration = Duration::from_secs(20);
 /// Rows of the growing map are sent this often at most.
-const PICTURE: Duration = Duration::from_millis(100);
+const PICTURE: Duration = Duration::from_millis(250);
 
 /// Serves one viewer until it goes. `state` is asked for at first and whenever events were missed, beside the server's own threads: it
 /// looks at the disk. `hears` gets what the viewer says, in a task of its own: however long telling takes, a button that is held is heard.

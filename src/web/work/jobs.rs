@@ -15,8 +15,8 @@ use std::time::{Duration, Instant};
 
 /// Jobs that wait.
 const MOST_WAITING: usize = 32;
-/// Pages are told of progress this often at most.
-const TOLD: Duration = Duration::from_millis(100);
+/// Pages are told of progress this often at most: a browser without a GPU spends 10 ms of a core on each frame, whatever changed in it.
+const TOLD: Duration = Duration::from_millis(500);
 
 /// All jobs of a station.
 pub struct Jobs {

@@ -3,7 +3,7 @@
 
 import { bytes, get, picture } from "../base/api.js";
 import { fill, h, num, svg } from "../base/dom.js";
-import { store } from "../base/store.js";
+import { busy, store } from "../base/store.js";
 import { t } from "../base/text.js";
 import { exposure } from "../widgets/exposure.js";
 import { map } from "../widgets/map.js";
@@ -17,6 +17,9 @@ const FATES = [["kept", "#3ddc84"], ["outside the working volume", "#5aa9ff"], [
 
 /** A picture that is drawn in less than this leaves the machine its time, ms. */
 const FLUENT = 15;
+/** Between two pictures while a job runs, ms. On the station itself a browser without a GPU spends some 20 ms of a core on each, which a scan
+ * on all cores lacks (tests/web/rates.py); elsewhere a picture costs the station its measuring alone. */
+const BESIDE = ["localhost", "127.0.0.1", "[::1]"].includes(location.hostname) ? 500 : 250;
 
 export async function show(place) {
   const list = await recordings(() => true);
@@ -63,7 +66,8 @@ export async function show(place) {
       await new Promise(requestAnimationFrame);
       // Drawing takes its share of this machine, not what a scan needs: where it is slow, fewer pictures are shown, each the newest.
       const took = performance.now() - begun;
-      if (took > FLUENT) await new Promise((go) => setTimeout(go, Math.min(1000, took * (store.bar?.running ? 10 : 1))));
+      const rest = busy() ? Math.max(BESIDE, 10 * took) : took > FLUENT ? took : 0;
+      if (rest) await new Promise((go) => setTimeout(go, Math.min(1000, rest)));
     }
   }
   /** What the newest picture shows is reckoned where the pictures are: once in a while is enough for people. */
@@ -76,8 +80,8 @@ export async function show(place) {
   function show_(grey, width, height) {
     const reads = (p) => { const [u, v] = [Math.floor(p[0]), height - 1 - Math.floor(p[1])]; return `u ${u}  v ${v}  ${u >= 0 && v >= 0 && u < width && v < height ? grey[v * width + u] : "–"}`; };
     view.picture(width, height, grey, reads);
-    // Figures are read by people: twice a second is enough of a live picture.
-    if (!r && performance.now() - counted < 500) return;
+    // Figures are read by people: twice a second is enough of a live picture, and a job's time is dearer.
+    if (!r && performance.now() - counted < (busy() ? 2000 : 500)) return;
     counted = performance.now();
     const counts = new Uint32Array(64), peaks = new Uint8Array(width);
     let saturated = 0;

@@ -58,9 +58,19 @@ export function bar(place) {
       b.alarms.length > 0 && h("span", { class: "alarm", role: "alert", title: b.alarms.join("\n") }, `⚠ ${b.alarms.join(" · ")}`));
     work();
   };
+  const advance = h("progress"), count = h("span");
+  let shown = null;
   const work = () => {
     const now = jobs((j) => j.state === "running")[0];
-    fill(running, now && [h("a", { href: `#/${pageOf(now)}?job=${now.id}` }, now.id), h("progress", { max: now.of || 1, ...(now.of ? { value: now.done } : {}), "aria-label": now.id }), h("span", {}, now.of ? `${now.done} / ${now.of}` : `${now.done}`)]);
+    if (shown !== now?.id) {
+      shown = now?.id;
+      advance.removeAttribute("value");
+      advance.setAttribute("aria-label", shown ?? "");
+      fill(running, now && [h("a", { href: `#/${pageOf(now)}?job=${shown}` }, shown), advance, count]);
+    }
+    if (!now) return;
+    if (now.of) [advance.max, advance.value] = [now.of, now.done];
+    count.textContent = now.of ? `${now.done} / ${now.of}` : `${now.done}`;
   };
   on("bar", draw);
   on("lost", draw);
