@@ -7,8 +7,11 @@ use super::{rms, seeds};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 use sheetlight::calibrate::joint::options::JointOptions;
+use sheetlight::calibrate::joint::records::{Beside, judge};
 use sheetlight::calibrate::joint::shots::Part;
 use sheetlight::calibrate::joint::volume::{expected, places, weights};
+use sheetlight::calibrate::limits::Limits;
+use sheetlight::rig::{Verdict, Volume};
 
 /// Error of scanned points, what was expected, and what the robot's noise alone makes of it, for stations of a rig.
 fn of(name: &str, levels: &Levels, count: usize, short: u64) -> Vec<[f64; 3]> {
@@ -72,6 +75,29 @@ fn every_source_gets_the_weight_that_its_residuals_show() {
         assert!(fit.left_out.is_empty(), "{:?}", fit.left_out);
     }
     assert!((data_sheet(&cell).fx - cell.station.camera.fx).abs() > 1.0);
+}
+
+/// An arm far better than the boards are seen leaves nothing of its own to see: what is stated of it is a bound, the calibration is right
+/// all the same and is not refused. Few stops are.
+#[test]
+fn an_arm_too_exact_to_be_seen_is_no_reason_to_refuse() {
+    let exact = Levels { robot_mm: 2e-4, robot_deg: 1e-5, ..QUIET };
+    let limits =
+        Limits { working: Volume::new(1000.0, 2000.0, "a test"), tolerance_mm: 1.0, tolerance_from: "a test".into() };
+    let beside = Beside { separate: None, systematic: None, lit: [1000.0, 2000.0], missing: Vec::new() };
+    let judged = |cell: &Cell, count: usize| {
+        let fit = calibrate(cell, &stops(cell, count, 40.0, &exact, 3), &JointOptions::default()).unwrap();
+        let m = weights(&fit.state, &fit.layout, &places(&fit.state, cell.working()));
+        (errors(cell, &fit), judge(&fit, &m, &beside, &limits), fit)
+    };
+    let cell = Cell::new(&rig("telephoto"), 3);
+    let ([off, sigma], quality, fit) = judged(&cell, 40);
+    println!("{} numbers left; off {off:.4} mm, {sigma:.4} stated; {:?}", fit.freedom[3], quality.reasons);
+    assert!(fit.freedom[3] < 6.0 && fit.noise.robot_mm > exact.robot_mm);
+    assert!(quality.verdict == Verdict::Usable && quality.reasons.iter().any(|r| r.contains("at most")), "{quality:?}");
+    assert!(off < 3.0 * sigma, "{off} {sigma}");
+    let (_, quality, _) = judged(&cell, 3);
+    assert!(quality.verdict == Verdict::BadlyDetermined, "{quality:?}");
 }
 
 /// What the records say one by one, added up as if they were independent, beside what they say together (docs/math.md, Joint

@@ -115,6 +115,9 @@ pub fn separately(
     out
 }
 
+/// Fewest numbers beyond what they determine by which a scatter is told: to three tenths of itself.
+const LEAST_NUMBERS: i64 = 6;
+
 /// What is to be said beside the fit itself.
 pub struct Beside {
     /// Expected error of a scanned point by separate calibrations of the same pictures, mm rms; and how far their points lie
@@ -171,8 +174,14 @@ pub fn judge(fit: &JointFit, weights: &DMatrix<f64>, beside: &Beside, limits: &L
     }
     let names = |shots: usize| format!("{shots} pictures of boards");
     j.at_best(Verdict::Usable, fit.shots.len() < 8, || format!("{}, 8 are needed to be good", names(fit.shots.len())));
-    j.at_best(Verdict::BadlyDetermined, robot && fit.freedom[3] < 6.0, || {
-        format!("{:.0} numbers tell the robot's scatter, 6 are needed", fit.freedom[3])
+    // Each stop brings three numbers of the arm's place, hand-eye and boards take six of them.
+    let beyond = 3 * fit.shots.iter().filter(|s| s.robot.is_some()).count() as i64 - 6;
+    j.at_best(Verdict::BadlyDetermined, robot && beyond < LEAST_NUMBERS, || {
+        format!("{} numbers tell the robot's scatter, {LEAST_NUMBERS} are needed", beyond.max(0))
+    });
+    // An arm that scatters by far less than boards are seen to takes up none of what is left: what is stated is what it may be at most.
+    j.at_best(Verdict::Usable, robot && beyond >= LEAST_NUMBERS && fit.freedom[3] < LEAST_NUMBERS as f64, || {
+        format!("{robot_mm:.4} mm is what the robot scatters by at most: the boards' own scatter hides it")
     });
     for l in &fit.left_out {
         j.at_best(Verdict::Usable, true, || format!("{}: {} was left out: {}", l.name, l.part.words(), l.why));
