@@ -2,16 +2,11 @@
 //! their pixels can come to; all others are proven dark.
 //! Frame and unit: blocks of pixels, four of them a tile; 256ths of full scale. docs/math.md, Stripe stages.
 
-use super::sample::Sample;
+use super::sample::{EDGE, FOUR, Four, Sample};
 use crate::stages::Frame;
 use crate::stages::frame::{ALL_TILES, GAUSSIAN};
 use crate::stages::stripe::stats::depth_shift;
 use multiversion::multiversion;
-
-/// Edge of a block, px.
-pub const EDGE: usize = 8;
-/// Blocks of a tile.
-const FOUR: usize = 4;
 
 /// Statistics of a row of blocks, one array each: what the proof needs of every block.
 #[derive(Clone, Default)]
@@ -116,6 +111,25 @@ impl Blocks {
 }
 
 impl Row {
+    /// Takes four blocks in, levels of 8 bits.
+    #[inline(always)]
+    fn put(&mut self, at: usize, four: &Four, deep: u32) {
+        // The largest is rounded to the safe side.
+        let up = (1 << deep) - 1;
+        let columns: [(&mut Vec<u16>, &[u32; FOUR], u32); 5] = [
+            (&mut self.sum, &four.sum, 0),
+            (&mut self.row, &four.row, 0),
+            (&mut self.column, &four.column, 0),
+            (&mut self.largest, &four.largest, up),
+            (&mut self.smallest, &four.smallest, 0),
+        ];
+        for (to, from, up) in columns {
+            let to: &mut [u16; FOUR] = (&mut to[at..at + FOUR]).try_into().expect("four blocks");
+            for b in 0..FOUR {
+                to[b] = ((from[b] + up) >> deep) as u16;
+            }
+        }
+    }
     /// Beside the picture each row repeats its last pixel: a block there is eight times a column of the border's.
     fn repeat_sides(&mut self, margin: usize) {
         let last = self.sum.len() - margin - 1;
@@ -143,53 +157,14 @@ fn statistics<T: Sample>(px: &[T], f: &Frame, y: usize, margin: usize, out: &mut
         &px[from..from + w]
     };
     let lines: [&[T]; EDGE] = std::array::from_fn(line);
-    for tx in 0..f.tiles_x as usize {
-        let at = margin + FOUR * tx;
-        let mut columns = [T::Wide::default(); 32];
-        let first = pixels(lines[0], 32 * tx);
-        let (mut largest, mut smallest) = (first, first);
-        let mut least = T::eights(&first);
-        let mut sum = [T::Wide::default(); FOUR];
-        for line in lines {
-            let row = pixels(line, 32 * tx);
-            for i in 0..32 {
-                columns[i] += row[i].wide();
-                largest[i] = largest[i].max(row[i]);
-                smallest[i] = smallest[i].min(row[i]);
-            }
-            let eights = T::eights(&row);
-            for i in 0..FOUR {
-                least[i] = least[i].min(eights[i]);
-                sum[i] += eights[i];
-            }
-        }
-        let eight = |b: usize| EDGE * b..EDGE * b + EDGE;
-        let down = |v: T::Wide| (T::number(v) >> deep) as u16;
-        for (b, at) in (at..at + FOUR).enumerate() {
-            out.sum[at] = down(sum[b]);
-            out.row[at] = down(least[b]);
-            let column = columns[eight(b)].iter().copied().fold(columns[EDGE * b], Ord::min);
-            out.column[at] = down(column);
-            // Rounded to the safe side.
-            let top = largest[eight(b)].iter().copied().fold(largest[EDGE * b], Ord::max);
-            out.largest[at] = ((T::number(top.wide()) + ((1 << deep) - 1)) >> deep) as u16;
-            out.smallest[at] = down(smallest[eight(b)].iter().copied().fold(smallest[EDGE * b], Ord::min).wide());
-        }
+    let whole = w / 32;
+    for tx in 0..whole {
+        out.put(margin + FOUR * tx, &T::four(&lines, 32 * tx), deep);
     }
-}
-
-/// A tile's part of a row, the last pixel repeated beyond the border.
-#[inline(always)]
-fn pixels<T: Sample>(line: &[T], from: usize) -> [T; 32] {
-    let mut row = [line[line.len() - 1]; 32];
-    match line.get(from..from + 32) {
-        Some(all) => row.copy_from_slice(all),
-        None => {
-            let rest = line.get(from..).unwrap_or_default();
-            row[..rest.len()].copy_from_slice(rest);
-        }
+    if whole < f.tiles_x as usize {
+        let rest: [[T; 32]; EDGE] = lines.map(|line| std::array::from_fn(|i| line[(32 * whole + i).min(w - 1)]));
+        out.put(margin + FOUR * whole, &T::four(&rest.each_ref().map(|r| &r[..]), 0), deep);
     }
-    row
 }
 
 /// Lower bounds on the sums of the windows around a row's pixels: windows hold the blocks near them whole, and of those

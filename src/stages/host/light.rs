@@ -2,8 +2,8 @@
 //! only where they were not ruled out.
 //! Frame and unit: pixels, tiles of 32 x 8 as eight words; grey levels of the picture's depth.
 
-use super::blocks::{EDGE, Proof, level};
-use super::sample::Sample;
+use super::blocks::{Proof, level};
+use super::sample::{EDGE, Sample};
 use crate::stages::frame::{ALL_TILES, GAUSSIAN};
 use crate::stages::stripe::threshold::passes_mean;
 use crate::stages::{Frame, ThresholdParams};
