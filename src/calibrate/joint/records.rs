@@ -179,9 +179,13 @@ pub fn judge(fit: &JointFit, weights: &DMatrix<f64>, beside: &Beside, limits: &L
     j.at_best(Verdict::BadlyDetermined, robot && beyond < LEAST_NUMBERS, || {
         format!("{} numbers tell the robot's scatter, {LEAST_NUMBERS} are needed", beyond.max(0))
     });
-    // An arm that scatters by far less than boards are seen to takes up none of what is left: what is stated is what it may be at most.
-    j.at_best(Verdict::Usable, robot && beyond >= LEAST_NUMBERS && fit.freedom[3] < LEAST_NUMBERS as f64, || {
-        format!("{robot_mm:.4} mm is what the robot scatters by at most: the boards' own scatter hides it")
+    // An arm that scatters by far less than boards are seen to takes up little of what is left: it hardly matters for points, but whoever
+    // wants to know the arm by this number does not.
+    let told = fit.freedom[3];
+    j.at_best(Verdict::Usable, robot && beyond >= LEAST_NUMBERS && told < LEAST_NUMBERS as f64, || {
+        format!(
+            "the robot's scatter is hardly seen beside the boards': of {beyond} numbers {told:.1} are left to tell it"
+        )
     });
     for l in &fit.left_out {
         j.at_best(Verdict::Usable, true, || format!("{}: {} was left out: {}", l.name, l.part.words(), l.why));
