@@ -65,7 +65,7 @@ fn clouds(c: &mut Criterion) {
         .map(|i| {
             let (x, y) = (0.1 * (i % 600) as f32, 0.1 * (i / 600) as f32);
             CloudPoint {
-                position: [400.0 + x, y, 0.2 * x],
+                position: [400.0 + x, y, 0.2 * x].into(),
                 sigma_mm: 0.02,
                 intensity: 90.0,
                 quality: 1.0,

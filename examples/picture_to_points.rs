@@ -31,7 +31,7 @@ fn main() -> Result<()> {
     println!("u_px,v_px,x_mm,y_mm,z_mm,sigma_mm");
     for shot in engine.collect(true)? {
         for (k, p) in shot.peaks.iter().zip(&shot.points).filter(|(k, _)| k.kept()) {
-            let [x, y, z] = p.position;
+            let [x, y, z] = p.position.to_array();
             println!("{:.3},{:.3},{x:.4},{y:.4},{z:.4},{:.4}", k.u, k.v, p.sigma_mm);
         }
     }

@@ -65,7 +65,7 @@ fn judged(cloud: &[CloudPoint], truth: &Path) -> Found {
         let x = TREAD_MM[0] * (i as f64 - 2.0) * u;
         let on: Vec<(Vec3, f32)> = cloud
             .iter()
-            .map(|p| (back.point(&Vec3::from(p.position.map(f64::from))), p.sigma_mm))
+            .map(|p| (back.point(&Vec3::from(p.position.as_dvec3().to_array())), p.sigma_mm))
             .filter(|(q, _)| {
                 (q.x - x).abs() < 0.3 * TREAD_MM[0] * u
                     && q.y.abs() < 0.35 * TREAD_MM[1] * u
@@ -156,7 +156,9 @@ fn counts_are_taken_as_they_are() {
         write(&meta);
     };
     let sorted = |mut cloud: Vec<CloudPoint>| {
-        cloud.sort_by(|a, b| a.position.map(|x| (x * 1e3) as i64).cmp(&b.position.map(|x| (x * 1e3) as i64)));
+        cloud.sort_by(|a, b| {
+            a.position.to_array().map(|x| (x * 1e3) as i64).cmp(&b.position.to_array().map(|x| (x * 1e3) as i64))
+        });
         cloud.into_iter().map(|p| p.position).collect::<Vec<_>>()
     };
 

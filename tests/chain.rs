@@ -101,7 +101,7 @@ fn without_a_fit_every_skeleton_pixel_gives_the_point_of_its_middle() {
         let [fx, fy, cx, cy, skew] = optics.pinhole.map(f64::from);
         let distortion = sheetlight::camera::Distortion::from_opencv(&optics.distortion.map(f64::from)).unwrap();
         let camera = Intrinsics { fx, fy, cx, cy, skew, distortion, width, height };
-        let plane = Plane::new(Vec3::from(optics.normal.map(f64::from)), f64::from(optics.offset)).unwrap();
+        let plane = Plane::new(Vec3::from(optics.normal.as_dvec3().to_array()), f64::from(optics.offset)).unwrap();
         let mut chain = Chain::new(&device, &config).unwrap();
         let mut batch = Batch::default();
         chain.submit_posed(0, &[&images[0], &images[1]], &[pose_words(&pose); 2]).unwrap();
@@ -115,7 +115,7 @@ fn without_a_fit_every_skeleton_pixel_gives_the_point_of_its_middle() {
                 let (x, y) = (f64::from(k.pixel & 0xffff), f64::from(k.pixel >> 16));
                 assert!(k.kept() && (k.u, k.v) == (x as f32, y as f32), "{k:?}");
                 let exact = camera.ray_from_pixel(&Vec2::new(x, y)).unwrap().meet(&plane).unwrap();
-                let off = (Vec3::from(p.position.map(f64::from)) - pose.point(&exact)).norm() * fx / exact.z;
+                let off = (Vec3::from(p.position.as_dvec3().to_array()) - pose.point(&exact)).norm() * fx / exact.z;
                 assert!(off < 1e-3, "pixel {x}, {y}: {off} px");
                 // An even distribution over the pixel's own height, seen along the plane.
                 assert!((k.sigma_px - 1.0 / 12f32.sqrt()).abs() < 1e-6 && p.sigma_mm > 0.0, "{k:?} {p:?}");

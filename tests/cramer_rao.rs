@@ -18,7 +18,7 @@ const DARK: f64 = 4.0;
 const WIDTH: u32 = 1600;
 const HEIGHT: u32 = 120;
 /// The stripe moves along the columns with depth.
-const ACROSS: [f32; 2] = [0.0, 1.0];
+const ACROSS: glam::Vec2 = glam::Vec2::from_array([0.0, 1.0]);
 
 /// A straight stripe: its centre is v = 60 + slope (u - 800) + phase.
 #[derive(Clone, Copy)]

@@ -128,11 +128,11 @@ fn the_four_parts_are_found_and_the_damaged_scans_are_never_wrong() {
             right_or_refused("30 % of the shots gone", &s, &cloud, &s.truth);
         }
         let part_from_base = s.truth.inverse();
-        let local = |p: &CloudPoint| part_from_base.point(&Vec3::from(p.position.map(f64::from)));
+        let local = |p: &CloudPoint| part_from_base.point(&Vec3::from(p.position.as_dvec3().to_array()));
         let lifted = |p: &CloudPoint, mm: f64| {
             let up = s.truth.direction(&Vec3::z()) * mm;
             let position: [f32; 3] = std::array::from_fn(|k| p.position[k] + up[k] as f32);
-            CloudPoint { position, ..*p }
+            CloudPoint { position: position.into(), ..*p }
         };
         // Half of the body was not seen, or lies under something that is 4 mm thick.
         for sign in [1.0, -1.0] {
@@ -169,8 +169,8 @@ fn the_four_parts_are_found_and_the_damaged_scans_are_never_wrong() {
         // The whole board turned by half: the notch, the cut corner or the key tells.
         let turn: Rigid<Base, Base> = Rigid::from_vectors(&Vec3::new(0.0, 0.0, std::f64::consts::PI), Vec3::zeros());
         let turned = |p: &CloudPoint| {
-            let q = turn.point(&Vec3::from(p.position.map(f64::from)));
-            CloudPoint { position: [q.x as f32, q.y as f32, q.z as f32], ..*p }
+            let q = turn.point(&Vec3::from(p.position.as_dvec3().to_array()));
+            CloudPoint { position: [q.x as f32, q.y as f32, q.z as f32].into(), ..*p }
         };
         let cloud: Vec<CloudPoint> = s.cloud.iter().map(turned).collect();
         let last = s.cloud.last().unwrap().shot;

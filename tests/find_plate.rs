@@ -45,7 +45,11 @@ fn plate() -> Option<HeightMap> {
         .filter(|(_, z)| *z != 0)
         .map(|(i, z)| {
             let (x, y) = ((i % width) as f64 * CELL[0], (i / width) as f64 * CELL[1]);
-            CloudPoint { position: [x as f32, y as f32, 0.02 * f32::from(z)], quality: 1.0, ..Default::default() }
+            CloudPoint {
+                position: [x as f32, y as f32, 0.02 * f32::from(z)].into(),
+                quality: 1.0,
+                ..Default::default()
+            }
         })
         .collect();
     let fixed = GridOptions { cell: Some(0.22), base_from_grid: Some(Rigid::identity()), ..Default::default() };

@@ -236,10 +236,10 @@ fn judged(s: &Scanned, recipe: &Recipe, cloud: &[CloudPoint], truth: Option<&Rig
 
 fn cases(s: &Scanned, seed: u64) -> Vec<(&'static str, Outcome)> {
     let part_from_base = s.truth.inverse();
-    let local = |p: &CloudPoint| part_from_base.point(&Vec3::from(p.position.map(f64::from)));
+    let local = |p: &CloudPoint| part_from_base.point(&Vec3::from(p.position.as_dvec3().to_array()));
     let lifted = |p: &CloudPoint, mm: f64| {
         let up = s.truth.direction(&Vec3::z()) * mm;
-        CloudPoint { position: std::array::from_fn(|k| p.position[k] + up[k] as f32), ..*p }
+        CloudPoint { position: p.position + glam::DVec3::from_array(up.into()).as_vec3(), ..*p }
     };
     let judge = |cloud: &[CloudPoint], truth| judged(s, &s.recipe, cloud, truth);
     let mut out = vec![("whole", judge(&s.cloud, Some(&s.truth)))];

@@ -134,6 +134,7 @@ const COMMON: &[&str] = &[
     "bytemuck",
     "calib_targets_aruco",
     "csv",
+    "glam",
     "jiff",
     "maud",
     "nalgebra",

@@ -272,7 +272,7 @@ fn clouds() {
     let dir = scratch();
     let path = dir.path().join("cloud.ply");
     let points: Vec<CloudPoint> =
-        (0..5).map(|i| CloudPoint { position: [i as f32, 2.5, -1.0], shot: 7, ..Default::default() }).collect();
+        (0..5).map(|i| CloudPoint { position: [i as f32, 2.5, -1.0].into(), shot: 7, ..Default::default() }).collect();
     write_cloud(&path, &points).unwrap();
     let seed = std::fs::read(&path).unwrap();
     survives("PLY", vec![seed], through_file("cloud.ply", |p| read_cloud(p).map(drop)));
@@ -311,7 +311,7 @@ fn foreign_maps() {
     let stated = Stated { unit_mm: Some(1.0), spacing_mm: Some([1.0, 1.0]), ..Stated::default() };
     survives("foreign maps", seeds, move |b| {
         let made = lines(&read_foreign(b)?, None, &stated)?;
-        assert!(made.points.iter().all(|p| p.position.iter().all(|v| v.is_finite())) && made.sigma_mm > 0.0);
+        assert!(made.points.iter().all(|p| p.position.is_finite()) && made.sigma_mm > 0.0);
         Ok(())
     });
     let pixels =

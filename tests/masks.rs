@@ -146,7 +146,7 @@ fn thinning_loses_no_stripe() {
                 (x * sin + y * cos - 0.1 * f64::from(place)).abs() <= 0.5 * width
             });
             let lit = Mask::from_fn(SIZE, SIZE, |x, y| inside(x) && inside(y) && lit.get(x, y));
-            let thinned = thin::twin(&lit, Thinning::across([sin as f32, cos as f32]));
+            let thinned = thin::twin(&lit, Thinning::across([sin as f32, cos as f32].into()));
             let crossed = |mask: &Mask, a: u32| {
                 (0..SIZE).filter(|&b| if lying { mask.get(a, b) } else { mask.get(b, a) }).count()
             };
@@ -157,7 +157,8 @@ fn thinning_loses_no_stripe() {
                 (lines, pixels) = (lines + 1, pixels + crossed(&thinned, a));
             }
             // Zhang-Suen's leaves the corners of stairs.
-            let corners = if Thinning::across([sin as f32, cos as f32]) == Thinning::ZhangSuen { 0.2 } else { 0.0 };
+            let corners =
+                if Thinning::across([sin as f32, cos as f32].into()) == Thinning::ZhangSuen { 0.2 } else { 0.0 };
             most = most.max(pixels as f64 / f64::from(lines) - corners);
         }
     }

@@ -27,7 +27,7 @@ const DARK: f64 = 6.0;
 const READ: f64 = 0.7;
 const GAIN: f64 = 0.05;
 /// The stripe moves along the columns with depth.
-const ACROSS: [f32; 2] = [0.0, 1.0];
+const ACROSS: glam::Vec2 = glam::Vec2::from_array([0.0, 1.0]);
 
 #[derive(Clone, Copy)]
 struct Light {

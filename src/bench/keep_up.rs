@@ -108,7 +108,7 @@ fn rig(o: &Optics, width: u32, height: u32) -> Rig {
     let mut lens = [0.0; 14];
     lens.iter_mut().zip(o.distortion).for_each(|(to, from)| *to = from.into());
     let camera = Intrinsics { fx, fy, cx, cy, skew, distortion: Distortion(lens), width, height };
-    let plane = Plane::new(Vec3::from(o.normal.map(f64::from)), o.offset.into()).expect("a normal");
+    let plane = Plane::new(Vec3::from(o.normal.as_dvec3().to_array()), o.offset.into()).expect("a normal");
     let quality = Quality {
         verdict: Verdict::Good,
         reasons: vec!["drawn pictures".into()],

@@ -84,7 +84,7 @@ pub fn serve(device: &Device, mut input: impl BufRead, mut output: impl Write) -
         pinhole: setup.pinhole,
         distortion: std::array::from_fn(|i| setup.distortion.get(i).copied().unwrap_or(0.0)),
         untilt: FLAT,
-        normal: setup.normal,
+        normal: setup.normal.into(),
         offset: setup.offset_mm,
     };
     let peak = PeakParams { width_px: setup.width_px, ..PeakParams::default() };
@@ -141,7 +141,7 @@ pub fn serve(device: &Device, mut input: impl BufRead, mut output: impl Write) -
                 single.collect_into(true, &mut batch)?;
                 writeln!(output, "{}", serde_json::json!({"points": batch.points.len()})).map_err(lost)?;
                 for (k, p) in batch.peaks.iter().zip(&batch.points) {
-                    let [x, y, z] = p.position;
+                    let [x, y, z] = p.position.to_array();
                     let row = [(k.pixel & 0xffff) as f32, (k.pixel >> 16) as f32, x, y, z];
                     output.write_all(&row.map(f32::to_le_bytes).concat()).map_err(lost)?;
                 }

@@ -5,6 +5,7 @@ use crate::raster::Image;
 use crate::stages::cases::{drawn, optics, stripe};
 use crate::stages::noise::Noise;
 use crate::stages::stripe::point::Optics;
+use glam::Vec3Swizzles;
 
 /// What the pictures show.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
@@ -52,9 +53,8 @@ impl Scene {
     /// The rig that sees it.
     pub fn optics(self, width: u32, height: u32) -> Optics {
         let lying = optics(width, height);
-        let [x, y, z] = lying.normal;
         let upright = matches!(self, Scene::UprightStripe | Scene::UprightThick);
-        if upright { Optics { normal: [y, x, z], ..lying } } else { lying }
+        if upright { Optics { normal: lying.normal.yxz(), ..lying } } else { lying }
     }
 }
 

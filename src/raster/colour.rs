@@ -3,24 +3,25 @@
 //! Frame and unit: sRGB.
 
 use super::Rgb;
+use glam::Vec3;
 
 /// Dark violet over teal to yellow (the viridis map, sampled at nine places); clamped to 0..=1.
 pub fn ordered(x: f32) -> Rgb {
-    const STOPS: [[f32; 3]; 9] = [
-        [68.0, 1.0, 84.0],
-        [71.0, 44.0, 122.0],
-        [59.0, 81.0, 139.0],
-        [44.0, 113.0, 142.0],
-        [33.0, 144.0, 141.0],
-        [39.0, 173.0, 129.0],
-        [92.0, 200.0, 99.0],
-        [170.0, 220.0, 50.0],
-        [253.0, 231.0, 37.0],
+    const STOPS: [Vec3; 9] = [
+        Vec3::new(68.0, 1.0, 84.0),
+        Vec3::new(71.0, 44.0, 122.0),
+        Vec3::new(59.0, 81.0, 139.0),
+        Vec3::new(44.0, 113.0, 142.0),
+        Vec3::new(33.0, 144.0, 141.0),
+        Vec3::new(39.0, 173.0, 129.0),
+        Vec3::new(92.0, 200.0, 99.0),
+        Vec3::new(170.0, 220.0, 50.0),
+        Vec3::new(253.0, 231.0, 37.0),
     ];
     let at = x.clamp(0.0, 1.0) * (STOPS.len() - 1) as f32;
     let i = (at as usize).min(STOPS.len() - 2);
     let f = at - i as f32;
-    std::array::from_fn(|c| (STOPS[i][c] + f * (STOPS[i + 1][c] - STOPS[i][c])).round() as u8)
+    (STOPS[i] + f * (STOPS[i + 1] - STOPS[i])).round().to_array().map(|v| v as u8)
 }
 
 /// Black to white.

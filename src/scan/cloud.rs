@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct CloudPoint {
     /// The cloud's frame, mm.
-    pub position: [f32; 3],
+    pub position: glam::Vec3,
     /// Standard deviation of the position along its worst direction, mm.
     pub sigma_mm: f32,
     /// Stripe amplitude, grey levels of the recording's depth.
@@ -274,7 +274,7 @@ mod tests {
     fn some(n: u32) -> Vec<CloudPoint> {
         (0..n)
             .map(|i| CloudPoint {
-                position: [i as f32, 0.5, -2.0],
+                position: [i as f32, 0.5, -2.0].into(),
                 shot: i / 7,
                 u: i as f32 * 0.25,
                 ..Default::default()

@@ -13,6 +13,7 @@ use crate::stages::stripe::point::Optics;
 use crate::stages::stripe::spacing;
 use crate::stages::support::params::SupportParams;
 use crate::stages::{Thinning, ThresholdParams};
+use glam::Vec2;
 
 /// Which rule thins the lit pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -29,7 +30,7 @@ pub enum Rule {
 
 impl Rule {
     /// The rule for a rig that sees its stripe move in this direction with depth.
-    pub fn thinning(self, across: [f32; 2]) -> Thinning {
+    pub fn thinning(self, across: Vec2) -> Thinning {
         match self {
             Rule::Auto => Thinning::across(across),
             Rule::ZhangSuen => Thinning::ZhangSuen,

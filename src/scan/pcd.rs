@@ -33,7 +33,7 @@ fn header(count: u64) -> String {
 }
 
 fn record(p: &CloudPoint) -> [u8; 36] {
-    let [x, y, z] = p.position;
+    let [x, y, z] = p.position.to_array();
     let floats = [x, y, z, p.intensity, p.sigma_mm, p.quality].map(f32::to_bits);
     let words = floats.into_iter().chain([p.shot, p.u.to_bits(), p.v.to_bits()]);
     let mut bytes = [0; 36];
@@ -67,7 +67,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("cloud.pcd");
         let points: Vec<CloudPoint> = (0..5)
-            .map(|i| CloudPoint { position: [i as f32, 2.5, -1.0], shot: 7, v: 3.25, ..Default::default() })
+            .map(|i| CloudPoint { position: [i as f32, 2.5, -1.0].into(), shot: 7, v: 3.25, ..Default::default() })
             .collect();
         write_pcd(&path, &points, 5).unwrap();
         let reader = pcd_rs::DynReader::open(&path).unwrap();

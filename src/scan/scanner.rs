@@ -236,7 +236,7 @@ impl Scanner {
 
     /// Direction of the stripe, camera frame.
     fn along(&self) -> Vec3 {
-        let [nx, ny, _] = self.optics.normal.map(f64::from);
+        let [nx, ny, _] = self.optics.normal.as_dvec3().to_array();
         Vec3::new(ny, -nx, 0.0).try_normalize(1e-9).unwrap_or(Vec3::x())
     }
 
@@ -294,11 +294,11 @@ impl Scanner {
 }
 
 /// The standard deviation along the worst direction, with what the place of the shot adds.
-fn with_place(sigma_mm: f32, position: &[f32; 3], place: &Place) -> f32 {
+fn with_place(sigma_mm: f32, position: &glam::Vec3, place: &Place) -> f32 {
     if place.covariance.is_none() {
         return sigma_mm;
     }
-    let more = place.variance_at(&Vec3::from(position.map(f64::from)));
+    let more = place.variance_at(&Vec3::from(position.as_dvec3().to_array()));
     (f64::from(sigma_mm).powi(2) + more).sqrt() as f32
 }
 

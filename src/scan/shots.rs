@@ -5,6 +5,7 @@
 use crate::fault::{Fault, Result};
 use crate::files::moment;
 use crate::geometry::{Base, Camera, Rigid};
+use glam::Vec2;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Write;
@@ -27,7 +28,7 @@ pub enum Along {
 
 impl Along {
     /// Of a stripe that is crossed in this direction of the image.
-    pub fn crossed([x, y]: [f32; 2]) -> Along {
+    pub fn crossed(Vec2 { x, y }: Vec2) -> Along {
         if y.abs() >= x.abs() { Along::U } else { Along::V }
     }
 }

@@ -28,10 +28,10 @@ pub fn filter_map(map: &mut HeightMap, filters: &[Filter]) -> Result<Vec<usize>>
 }
 
 /// Which points stay: all but those in cells that were taken away.
-pub fn left<'a>(before: &'a HeightMap, after: &'a HeightMap) -> impl Fn(&[f32; 3]) -> bool + 'a {
+pub fn left<'a>(before: &'a HeightMap, after: &'a HeightMap) -> impl Fn(&glam::Vec3) -> bool + 'a {
     let grid_from_base = before.base_from_grid.inverse();
     move |position| {
-        let at = grid_from_base.point(&Vec3::from(position.map(f64::from)));
+        let at = grid_from_base.point(&Vec3::from(position.as_dvec3().to_array()));
         let [x, y] = [at.x, at.y].map(|v| (v / before.cell).floor() as i64);
         before.get(x, y).is_none() || after.get(x, y).is_some()
     }

@@ -19,7 +19,7 @@ fn plate() -> Vec<CloudPoint> {
             let z = if x.abs() < 20.0 && y.abs() < 12.0 { 5.0 } else { 0.0 };
             let position = [x, y, z].map(|v| v as f32);
             out.push(CloudPoint {
-                position,
+                position: position.into(),
                 sigma_mm: 0.02,
                 intensity: 100.0,
                 quality: 1.0,

@@ -27,7 +27,7 @@ pub fn apart(a: &[CloudPoint], b: &[CloudPoint]) -> Apart {
     let (mut i, mut j) = (0, 0);
     while i < a.len() && j < b.len() {
         if same(&a[i], &b[j]) {
-            let (p, q) = (a[i].position.map(f64::from), b[j].position.map(f64::from));
+            let (p, q) = (a[i].position.as_dvec3().to_array(), b[j].position.as_dvec3().to_array());
             let mm = (0..3).map(|k| (p[k] - q[k]).powi(2)).sum::<f64>().sqrt();
             out.worst_mm = out.worst_mm.max(mm);
             out.equal += usize::from(a[i] == b[j]);

@@ -131,7 +131,7 @@ fn all_formats_hold_the_same_points() {
         let made = lines(&raw, None, &stated).unwrap();
         assert_eq!(made.size, [h, w], "file {k}");
         assert!((made.sigma_mm - f64::from(SIGMA_MM)).abs() < 0.15 * f64::from(SIGMA_MM), "{}", made.sigma_mm);
-        let mut points: Vec<[f32; 3]> = made.points.iter().map(|p: &CloudPoint| p.position).collect();
+        let mut points: Vec<[f32; 3]> = made.points.iter().map(|p: &CloudPoint| p.position.to_array()).collect();
         points.sort_by(|a, b| b[1].total_cmp(&a[1]).then(a[0].total_cmp(&b[0])));
         assert_eq!(points, *first.get_or_insert(points.clone()), "file {k}");
         // Cut anywhere, it is refused or holds fewer points; nothing panics.

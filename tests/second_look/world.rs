@@ -54,7 +54,7 @@ impl Believed {
     fn shots(&self, look: &Recorded) -> Shots {
         let across = across(&self.station).map(|x| x as f32);
         let places = look.poses.iter().map(|pose| *pose * self.hand_eye);
-        Shots::new(Along::crossed([across.x, across.y]), (0..).zip(places))
+        Shots::new(Along::crossed([across.x, across.y].into()), (0..).zip(places))
     }
 }
 
@@ -184,7 +184,7 @@ impl World {
                 };
                 let q = camera.point(&point);
                 out.push(CloudPoint {
-                    position: [q.x as f32, q.y as f32, q.z as f32],
+                    position: [q.x as f32, q.y as f32, q.z as f32].into(),
                     sigma_mm: (0.02 * self.unit) as f32,
                     intensity: p.light as f32,
                     quality: 1.0,

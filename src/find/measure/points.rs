@@ -75,7 +75,7 @@ impl Ordered {
             if *i != NONE {
                 let p = &cloud[*i as usize];
                 *i = out.points.len() as u32;
-                out.points.push(Vec3::from(p.position.map(f64::from)));
+                out.points.push(Vec3::from(p.position.as_dvec3().to_array()));
                 out.intensity.push(p.intensity);
                 out.sigma.push(p.sigma_mm);
                 out.row.push((slot / columns) as u32);
@@ -115,9 +115,9 @@ fn whole(cloud: &[CloudPoint]) -> Result<()> {
             .cause("an empty or tiny scan: no laser in the pictures, or a few shots only")
             .next("look at the scan's report, then scan the part again"));
     }
-    let bad = |p: &&CloudPoint| p.position.iter().any(|x| !x.is_finite()) || !(p.u.abs() + p.v.abs() < FARTHEST_PX);
+    let bad = |p: &&CloudPoint| !p.position.is_finite() || !(p.u.abs() + p.v.abs() < FARTHEST_PX);
     if let Some(p) = cloud.iter().find(bad) {
-        let ([x, y, z], u, v) = (p.position, p.u, p.v);
+        let ([x, y, z], u, v) = (p.position.to_array(), p.u, p.v);
         return Err(Fault::input(format!(
             "the cloud holds the point ({x}, {y}, {z}) of pixel ({u}, {v}) in shot {}; wanted finite mm, and pixels \
              below {FARTHEST_PX}",

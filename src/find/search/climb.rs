@@ -7,6 +7,7 @@ use super::refine::Pose;
 use crate::find::model::gradient::Field;
 use crate::find::model::shape_model::ModelPoint;
 use crate::find::scene::{Kind, to_level};
+use glam::Vec2;
 use rayon::prelude::*;
 
 /// Directions of a level, unit length, 0 where weak or unseen.
@@ -92,7 +93,7 @@ impl<const ROWS: usize, const LANES: usize> Around<ROWS, LANES> {
         for p in points {
             let ix = (cx + k * (c * p.x - s * p.y)).floor() as i64;
             let iy = (cy + k * (s * p.x + c * p.y)).floor() as i64;
-            let (gx, gy) = ((c * p.gx - s * p.gy) as f32, (s * p.gx + c * p.gy) as f32);
+            let g = Vec2::new((c * p.gx - s * p.gy) as f32, (s * p.gx + c * p.gy) as f32);
             let either = ignore || p.either;
             for d in layers.iter().filter(|d| d.kind == p.kind) {
                 let (w, h) = (d.field.width as i64, d.field.height as i64);
@@ -101,13 +102,13 @@ impl<const ROWS: usize, const LANES: usize> Around<ROWS, LANES> {
                     ix >= edge && iy >= edge && ix + (LANES as i64) + edge <= w && iy + (ROWS as i64) + edge <= h;
                 for r in 0..ROWS {
                     if inside {
-                        out.row(d, r, ((iy + r as i64) * w + ix) as usize, [gx, gy], either);
+                        out.row(d, r, ((iy + r as i64) * w + ix) as usize, g, either);
                         continue;
                     }
                     for l in 0..LANES {
                         let (x, y) = (ix + l as i64, iy + r as i64);
                         if (0..w).contains(&x) && (0..h).contains(&y) {
-                            out.cell(d, r, l, (y * w + x) as usize, [gx, gy], either);
+                            out.cell(d, r, l, (y * w + x) as usize, g, either);
                         }
                     }
                 }
@@ -116,10 +117,10 @@ impl<const ROWS: usize, const LANES: usize> Around<ROWS, LANES> {
         out
     }
 
-    fn row(&mut self, d: &Directions, r: usize, i: usize, [gx, gy]: [f32; 2], either: bool) {
+    fn row(&mut self, d: &Directions, r: usize, i: usize, g: Vec2, either: bool) {
         let ux: &[f32; LANES] = d.ux[i..i + LANES].try_into().expect("so long");
         let uy: &[f32; LANES] = d.uy[i..i + LANES].try_into().expect("so long");
-        let mut dot: [f32; LANES] = std::array::from_fn(|l| ux[l] * gx + uy[l] * gy);
+        let mut dot: [f32; LANES] = std::array::from_fn(|l| ux[l] * g.x + uy[l] * g.y);
         if either {
             dot = dot.map(f32::abs);
         }
@@ -136,8 +137,8 @@ impl<const ROWS: usize, const LANES: usize> Around<ROWS, LANES> {
         }
     }
 
-    fn cell(&mut self, d: &Directions, r: usize, l: usize, i: usize, [gx, gy]: [f32; 2], either: bool) {
-        let dot = d.ux[i] * gx + d.uy[i] * gy;
+    fn cell(&mut self, d: &Directions, r: usize, l: usize, i: usize, g: Vec2, either: bool) {
+        let dot = d.ux[i] * g.x + d.uy[i] * g.y;
         self.sum[r][l] += if either { dot.abs() } else { dot };
         *(if d.field.seen[i] { &mut self.seen[r][l] } else { &mut self.missing[r][l] }) += 1.0;
     }

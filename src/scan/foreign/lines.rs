@@ -205,7 +205,7 @@ fn finish(mut placed: Vec<Placed>, stated: &Stated, mut notes: Vec<String>) -> R
     };
     let size = [0, 1].map(|k| placed.iter().map(|p| if k == 0 { p.0 } else { p.1 }).max().unwrap_or(0) as usize + 1);
     let point = |&(line, place, p, light): &Placed| CloudPoint {
-        position: p.map(|v| v as f32),
+        position: glam::DVec3::from_array(p).as_vec3(),
         sigma_mm: sigma_mm as f32,
         intensity: if light.is_finite() && light > 0.0 { light } else { 1.0 },
         quality: 1.0,

@@ -151,7 +151,7 @@ mod tests {
             let up = if i.is_multiple_of(3) && x > 10.0 { 2.0 } else { 0.0 };
             let p = frame.point(&Vec3::new(x, y, 0.3 * (x / 3.0).sin() + up));
             CloudPoint {
-                position: [p.x as f32, p.y as f32, p.z as f32],
+                position: [p.x as f32, p.y as f32, p.z as f32].into(),
                 sigma_mm: 0.01 + 0.001 * (i % 7) as f32,
                 intensity: 30.0 + (i % 90) as f32,
                 quality: (i % 10) as f32 / 9.0,

@@ -51,7 +51,7 @@ mod tests {
                 let z = if (10.0..20.0).contains(&x) && (8.0..18.0).contains(&y) { 3.0 } else { 0.0 };
                 let p = tilt.point(&Vec3::new(x, y, z));
                 out.push(CloudPoint {
-                    position: [p.x as f32, p.y as f32, p.z as f32],
+                    position: [p.x as f32, p.y as f32, p.z as f32].into(),
                     sigma_mm: 0.02,
                     intensity: 80.0,
                     quality: 1.0,

@@ -156,8 +156,8 @@ pub fn sample(source: &(impl PointSource + ?Sized), min_quality: f32) -> Result<
     let mut extremes: [[Option<(f32, Vec3)>; 2]; 3] = Default::default();
     let mut stride = 1u64;
     source.for_each_chunk(&mut |chunk| {
-        for p in chunk.iter().filter(|p| p.quality >= min_quality && p.position.iter().all(|x| x.is_finite())) {
-            let point = Vec3::from(p.position.map(f64::from));
+        for p in chunk.iter().filter(|p| p.quality >= min_quality && p.position.is_finite()) {
+            let point = Vec3::from(p.position.as_dvec3().to_array());
             out.most_intensity = out.most_intensity.max(p.intensity);
             for (axis, [low, high]) in extremes.iter_mut().enumerate() {
                 let value = p.position[axis];

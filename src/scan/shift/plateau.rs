@@ -84,7 +84,7 @@ mod tests {
     use rand::{Rng, SeedableRng};
 
     fn point(shot: u32, row: u32, z: f64) -> CloudPoint {
-        CloudPoint { position: [0.0, 0.0, z as f32], shot, v: row as f32, ..Default::default() }
+        CloudPoint { position: [0.0, 0.0, z as f32].into(), shot, v: row as f32, ..Default::default() }
     }
 
     #[test]

@@ -136,7 +136,8 @@ fn points(rows: &[Option<Crossing>], shot: u32, rig: &ShiftRig, zero: &Zero) -> 
     let point = |(v, k): (usize, Crossing)| {
         let (z, mm_per_px) = rig.height(sign * (k.u - bed(v)));
         CloudPoint {
-            position: [(v as f64 / rig.pixels_per_mm) as f32, (f64::from(shot) * rig.travel_mm) as f32, z as f32],
+            position: [(v as f64 / rig.pixels_per_mm) as f32, (f64::from(shot) * rig.travel_mm) as f32, z as f32]
+                .into(),
             sigma_mm: (k.sigma_px * mm_per_px) as f32,
             intensity: k.amplitude as f32,
             quality: if k.saturated { 0.5 } else { 1.0 },

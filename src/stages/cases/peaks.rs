@@ -75,7 +75,7 @@ pub fn ruled(stage: &str, space: Space) -> Vec<Case> {
 fn rig(width: u32, level_deg: f32) -> Optics {
     let (sin, cos) = level_deg.to_radians().sin_cos();
     let [f, c] = [4.0 * width as f32, 0.5 * width as f32];
-    Optics { pinhole: [f, f, c, c, 0.0], normal: [0.8828 * sin, 0.8828 * cos, 0.4694], ..optics(width, width) }
+    Optics { pinhole: [f, f, c, c, 0.0], normal: [0.8828 * sin, 0.8828 * cos, 0.4694].into(), ..optics(width, width) }
 }
 
 /// A straight stripe through the middle of a picture that holds its background on both sides.

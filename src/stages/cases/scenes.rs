@@ -193,7 +193,7 @@ pub fn optics(width: u32, height: u32) -> point::Optics {
         pinhole: [f, f, 0.49 * width as f32, 0.51 * height as f32, 0.0],
         distortion: [-0.118, 0.086, 0.00062, -0.00041, -0.017, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
         untilt: point::FLAT,
-        normal: [-0.0192, 0.8828, 0.4694],
+        normal: glam::Vec3::from_array([-0.0192, 0.8828, 0.4694]),
         offset: 72.15,
     }
 }

@@ -6,6 +6,7 @@ use super::turn::{FLAT, turn};
 use crate::gpu::Field;
 use crate::stages::frame::px_log2;
 use crate::stages::stripe::choose_params::ChooseParams;
+use glam::Vec2;
 
 /// The WGSL struct of the same name, shaders/shared/peaks.wgsl.
 #[repr(C)]
@@ -108,7 +109,7 @@ impl PeakFrame {
         shots: u32,
         p: &PeakParams,
         c: &ChooseParams,
-        across: [f32; 2],
+        across: Vec2,
     ) -> PeakFrame {
         let full_scale = ((1u32 << bits) - 1) as f32;
         let scale = full_scale / 255.0;

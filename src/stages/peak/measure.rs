@@ -8,6 +8,7 @@ use super::params::{Method, PeakParams, Stripe};
 use super::{PeakFrame, twin};
 use crate::raster::{Image, Pixels};
 use crate::stages::stripe::choose_params::ChooseParams;
+use glam::Vec2;
 
 /// Skeleton pixels looked at, spread over the picture; the median of 400 is good to 6 % of the spread.
 const SAMPLES: usize = 400;
@@ -16,7 +17,7 @@ const FEWEST: usize = 20;
 
 /// Width, speckle and noise of the stripe in one picture, and the dark pixels' noise as it was assumed; `None` where there is too little of it.
 /// `across` is the unit image direction of depth. Start: half the pixels above half maximum. Then three rounds of fitting with the medians of the round before.
-pub fn measure(image: &Image, skeleton: &[u32], p: &PeakParams, across: [f32; 2]) -> Option<Stripe> {
+pub fn measure(image: &Image, skeleton: &[u32], p: &PeakParams, across: Vec2) -> Option<Stripe> {
     let step = (skeleton.len() / SAMPLES).max(1);
     let sample: Vec<(i32, i32)> =
         skeleton.iter().step_by(step).map(|&q| ((q & 0xffff) as i32, (q >> 16) as i32)).collect();

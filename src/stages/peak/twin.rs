@@ -10,12 +10,13 @@ use super::profile::Profiles;
 use super::{fit, methods};
 use crate::raster::{Image, Pixels};
 use crate::stages::stripe::choose_params::ChooseParams;
+use glam::Vec2;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
 /// CPU twin: one peak per skeleton pixel, in the order given. `skeleton` is packed x | y << 16, `across` the unit image
 /// direction of depth ([`crate::stages::stripe::point::Optics::across`]).
-pub fn peaks(image: &Image, skeleton: &[u32], shot: u32, p: &PeakParams, across: [f32; 2]) -> Vec<Peak> {
+pub fn peaks(image: &Image, skeleton: &[u32], shot: u32, p: &PeakParams, across: Vec2) -> Vec<Peak> {
     let size = (image.width, image.height, image.bits);
     let frame = PeakFrame::new(size, 1, p, &ChooseParams::default(), across);
     fitted(image, skeleton, shot, &frame, p.method)
@@ -77,10 +78,10 @@ mod tests {
             let image = stripe(160, 120, 8, width, 5, 4);
             let places: Vec<u32> = (0..160).map(|x| x | (x * 7 % 120) << 16).collect();
             let params = PeakParams { width_px: width as f32, method, ..PeakParams::default() };
-            let together = peaks(&image, &places, 3, &params, [0.1, 0.99]);
+            let together = peaks(&image, &places, 3, &params, Vec2::new(0.1, 0.99));
             assert_eq!(together.len(), places.len());
             for (place, seen) in places.iter().zip(&together) {
-                let alone = peaks(&image, std::slice::from_ref(place), 3, &params, [0.1, 0.99]);
+                let alone = peaks(&image, std::slice::from_ref(place), 3, &params, Vec2::new(0.1, 0.99));
                 let bits = |peak: &Peak| bytemuck::cast::<Peak, [u32; 12]>(*peak);
                 assert_eq!(bits(&alone[0]), bits(seen), "{method:?}, {width} px, {place:x}");
             }

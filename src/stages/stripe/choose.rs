@@ -7,6 +7,7 @@ use crate::gpu::{Binding, Stage};
 use crate::stages::peak::found::{Peak, Reject};
 use crate::stages::peak::params::PeakParams;
 use crate::stages::peak::{PeakFrame, SHARED, UNIFORM, frame_of};
+use glam::Vec2;
 
 /// What the step knows about picture, stripe and laser.
 #[derive(Clone, Copy, Debug)]
@@ -20,7 +21,7 @@ pub struct Scene {
     /// The stripe's Gaussian sigma, px.
     pub width_px: f32,
     /// Unit image direction of depth: the laser plane's normal in the camera frame without its z component.
-    pub across: [f32; 2],
+    pub across: Vec2,
 }
 
 impl Scene {
@@ -153,7 +154,7 @@ pub(crate) fn lines_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
 mod tests {
     use super::*;
 
-    const SCENE: Scene = Scene { width: 64, height: 48, full_scale: 255.0, width_px: 1.0, across: [0.0, 1.0] };
+    const SCENE: Scene = Scene { width: 64, height: 48, full_scale: 255.0, width_px: 1.0, across: Vec2::new(0.0, 1.0) };
 
     fn peak(x: u32, amplitude: f32, width_px: f32) -> Peak {
         let normal_v = 1.0;
@@ -197,7 +198,7 @@ mod tests {
 
     #[test]
     fn a_stripe_along_the_columns_is_judged_by_rows() {
-        let scene = Scene { across: [1.0, 0.0], ..SCENE };
+        let scene = Scene { across: Vec2::new(1.0, 0.0), ..SCENE };
         let at = |x: u32, y: u32, amplitude: f32| Peak {
             pixel: x | y << 16,
             normal_u: 1.0,

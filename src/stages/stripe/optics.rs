@@ -4,6 +4,7 @@
 use super::choose::Lines;
 use crate::camera::{Distortion, Intrinsics};
 use crate::geometry::{Camera, Plane};
+use glam::{DVec3, Vec2, Vec3};
 
 /// Camera and laser plane as the stage uses them: f32, the camera's frame.
 #[derive(Clone, Copy, Debug)]
@@ -15,7 +16,7 @@ pub struct Optics {
     /// From the tilted sensor back to the plane that the lens draws on, rows one below the other.
     pub untilt: [f32; 9],
     /// normal · X = offset, mm; the offset is positive.
-    pub normal: [f32; 3],
+    pub normal: Vec3,
     /// Distance of the plane from the camera's centre, mm.
     pub offset: f32,
 }
@@ -28,7 +29,7 @@ impl Optics {
             pinhole: [camera.fx, camera.fy, camera.cx, camera.cy, camera.skew].map(|v| v as f32),
             distortion: std::array::from_fn(|i| camera.distortion[i] as f32),
             untilt: untilt(&camera.distortion),
-            normal: [laser.normal.x as f32, laser.normal.y as f32, laser.normal.z as f32],
+            normal: DVec3::from_array(laser.normal.into()).as_vec3(),
             offset: laser.offset as f32,
         }
     }
@@ -42,10 +43,10 @@ impl Optics {
         f64::from(u8::from(!self.plain()))
     }
     /// Unit image direction in which the stripe moves with depth: the plane's normal without its z component.
-    pub fn across(&self) -> [f32; 2] {
-        let [x, y, _] = self.normal;
-        let l = (x * x + y * y).sqrt();
-        if l > 1e-6 { [x / l, y / l] } else { [0.0, 1.0] }
+    pub fn across(&self) -> Vec2 {
+        let across = self.normal.truncate();
+        let l = across.length();
+        if l > 1e-6 { across / l } else { Vec2::Y }
     }
 }
 
@@ -149,7 +150,7 @@ impl PointFrame {
     pub fn new(o: &Optics, l: &Lines) -> PointFrame {
         let ([fx, fy, cx, cy, skew], [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4]) = (o.pinhole, o.distortion);
         let [t0, t1, t2, t3, t4, t5, t6, t7, t8] = o.untilt;
-        let [normal_x, normal_y, normal_z] = o.normal;
+        let [normal_x, normal_y, normal_z] = o.normal.to_array();
         let none = f32::NAN.to_bits();
         PointFrame {
             fx,
@@ -203,7 +204,7 @@ impl PointFrame {
                 self.s4,
             ],
             untilt: [self.t0, self.t1, self.t2, self.t3, self.t4, self.t5, self.t6, self.t7, self.t8],
-            normal: [self.normal_x, self.normal_y, self.normal_z],
+            normal: Vec3::new(self.normal_x, self.normal_y, self.normal_z),
             offset: self.offset,
         }
     }

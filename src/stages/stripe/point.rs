@@ -11,6 +11,7 @@ use crate::gpu::{Binding, Stage};
 use crate::stages::listing;
 use crate::stages::peak::SHARED as PEAKS;
 use crate::stages::peak::found::{Peak, Reject};
+use glam::Vec3;
 
 pub use super::optics::{FLAT, Optics};
 
@@ -19,7 +20,7 @@ pub use super::optics::{FLAT, Optics};
 #[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Point {
     /// mm
-    pub position: [f32; 3],
+    pub position: Vec3,
     /// Standard deviation along the direction in which the point moves with the stripe's centre, mm; from the
     /// peak's own noise, not from calibration or robot.
     pub sigma_mm: f32,
@@ -27,7 +28,7 @@ pub struct Point {
 
 impl Point {
     /// What stands for no point: not a number in all four words.
-    pub const NONE: Point = Point { position: [f32::NAN; 3], sigma_mm: f32::NAN };
+    pub const NONE: Point = Point { position: Vec3::NAN, sigma_mm: f32::NAN };
 }
 
 /// 1: the lens has terms beside Brown-Conrady's five, or its sensor is tilted.
@@ -55,12 +56,12 @@ pub(in crate::stages) fn one(k: &mut Peak, optics: &Optics, pose: &[f32; 12]) ->
         k.refuse(Reject::NoPoint);
         return Point::NONE;
     };
-    let row = |i: usize| (pose[4 * i] * p[0] + pose[4 * i + 1] * p[1]) + (pose[4 * i + 2] * p[2] + pose[4 * i + 3]);
-    Point { position: [row(0), row(1), row(2)], sigma_mm }
+    let row = |i: usize| (pose[4 * i] * p.x + pose[4 * i + 1] * p.y) + (pose[4 * i + 2] * p.z + pose[4 * i + 3]);
+    Point { position: Vec3::new(row(0), row(1), row(2)), sigma_mm }
 }
 
 /// The viewing ray's foot on the laser plane, camera frame, and its standard deviation; mm.
-pub fn camera_point(k: &Peak, o: &Optics) -> Option<([f32; 3], f32)> {
+pub fn camera_point(k: &Peak, o: &Optics) -> Option<(Vec3, f32)> {
     let [fx, fy, cx, cy, skew] = o.pinhole;
     let yv = (k.v - cy) / fy;
     let xv = (k.u - cx - skew * yv) / fx;
@@ -68,7 +69,7 @@ pub fn camera_point(k: &Peak, o: &Optics) -> Option<([f32; 3], f32)> {
     let dv = k.normal_v / fy;
     let du = (k.normal_u - skew * dv) / fx;
     let (x, y, dx, dy) = undistort([xv, yv, du, dv], o)?;
-    let [nx, ny, nz] = o.normal;
+    let Vec3 { x: nx, y: ny, z: nz } = o.normal;
     let slope = nx * x + (ny * y + nz);
     let z = o.offset / slope;
     if !(slope > 1e-6 && z < 1e6) {
@@ -78,7 +79,7 @@ pub fn camera_point(k: &Peak, o: &Optics) -> Option<([f32; 3], f32)> {
     let dz = -z * (nx * dx + ny * dy) / slope;
     let (ex, ey) = (dz * x + z * dx, dz * y + z * dy);
     let per_px = (ex * ex + (ey * ey + dz * dz)).sqrt();
-    Some(([x * z, y * z, z], per_px * k.sigma_px))
+    Some((Vec3::new(x * z, y * z, z), per_px * k.sigma_px))
 }
 
 /// A place on the sensor and a small move there, undone by Newton's method: the ray and how it moves; `None` beyond the picture
@@ -261,7 +262,7 @@ mod tests {
         let [fx, fy, cx, cy, skew] = optics.pinhole.map(f64::from);
         let distortion = Distortion::from_opencv(&optics.distortion.map(f64::from)).unwrap();
         let exact = Intrinsics { fx, fy, cx, cy, skew, distortion, ..camera };
-        let [x, y, z] = optics.normal.map(f64::from);
+        let [x, y, z] = optics.normal.as_dvec3().to_array();
         let exact_plane = Plane::new(Vec3::new(x, y, z), f64::from(optics.offset)).unwrap();
         let mut worst = 0f64;
         for v in (150..480).step_by(7) {
@@ -272,7 +273,7 @@ mod tests {
                 let truth = ray.meet(&exact_plane).unwrap();
                 if truth.z < 320.0 {
                     // Across the ray: along it a pixel of any size can mean any length.
-                    let d = Vec3::from(p.map(f64::from)) - truth;
+                    let d = Vec3::from(p.as_dvec3().to_array()) - truth;
                     worst = worst.max((d - truth.normalize() * truth.normalize().dot(&d)).norm());
                 }
             }
@@ -289,9 +290,9 @@ mod tests {
         let at = |p: Peak| points(&mut [p], &optics, &pose)[0];
         let base = at(peak);
         let exact = pose.point(&camera.ray_from_pixel(&Vec2::new(200.3, 250.7)).unwrap().meet(&plane).unwrap());
-        assert!((Vec3::from(base.position.map(f64::from)) - exact).norm() < 2e-4);
+        assert!((Vec3::from(base.position.as_dvec3().to_array()) - exact).norm() < 2e-4);
         let moved = at(Peak { u: peak.u + 0.1, v: peak.v + 0.995, ..peak });
-        let per_px = (Vec3::from(moved.position.map(f64::from)) - exact).norm();
+        let per_px = (Vec3::from(moved.position.as_dvec3().to_array()) - exact).norm();
         assert!((f64::from(base.sigma_mm) / (0.05 * per_px) - 1.0).abs() < 0.005, "{} {per_px}", base.sigma_mm);
     }
 

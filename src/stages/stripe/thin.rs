@@ -9,6 +9,7 @@ use crate::stages::frame::{PX_LOG2, SHARED, frame_of, tile_unpack};
 use crate::stages::listing::{self, mask_index, tile_index};
 use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
+use glam::Vec2;
 
 /// One sub-iteration over the listed tiles.
 pub const STAGE: Stage = Stage {
@@ -56,7 +57,7 @@ const SLANTED: f32 = std::f32::consts::FRAC_1_SQRT_2;
 
 impl Thinning {
     /// The rule for a stripe that is crossed in this direction (a unit vector of the image).
-    pub fn across([x, y]: [f32; 2]) -> Thinning {
+    pub fn across(Vec2 { x, y }: Vec2) -> Thinning {
         if 2.0 * (x * y).abs() > SLANTED { Thinning::GuoHall } else { Thinning::ZhangSuen }
     }
 }

@@ -103,7 +103,7 @@ impl<T> Support<T> {
             if !k.kept() {
                 return [0; 4];
             }
-            let [x, y, z] = p.position.map(f64::from);
+            let [x, y, z] = p.position.as_dvec3().to_array();
             [x, y, z, self.axis.dot(&Vec3::new(x, y, z))].map(whole)
         };
         let places: Vec<Site> = profile.peaks.iter().zip(&profile.points).map(place).collect();
@@ -187,11 +187,12 @@ mod tests {
     /// A flat surface of 21 points a shot, 0.25 mm apart, shots 0.35 mm apart; one more point 3 mm above the middle.
     fn shot(index: u32, width_px: f32, stray: bool) -> Profile {
         let mut peaks = vec![Peak { width_px, amplitude: 100.0, sigma_px: 0.05, shot: index, ..Peak::default() }; 21];
-        let mut points: Vec<Point> =
-            (0..21).map(|i| Point { position: [0.25 * i as f32, 0.35 * index as f32, 0.0], sigma_mm: 0.02 }).collect();
+        let mut points: Vec<Point> = (0..21)
+            .map(|i| Point { position: [0.25 * i as f32, 0.35 * index as f32, 0.0].into(), sigma_mm: 0.02 })
+            .collect();
         if stray {
             peaks.push(peaks[10]);
-            points.push(Point { position: [2.5, 0.35 * index as f32, 3.0], sigma_mm: 0.02 });
+            points.push(Point { position: [2.5, 0.35 * index as f32, 3.0].into(), sigma_mm: 0.02 });
         }
         Profile {
             shot: index,

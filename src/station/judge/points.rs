@@ -23,7 +23,7 @@ pub fn judge(scan: &Path, truth: &Path, found: &[FoundPart]) -> Result<Judged> {
     let mut within = [0u64; 3];
     cloud.for_each_chunk(&mut |chunk| {
         for p in chunk {
-            let place = Vec3::from(p.position.map(f64::from));
+            let place = Vec3::from(p.position.as_dvec3().to_array());
             let d = truth.distance(&place);
             let part = truth.part_near(&place).unwrap_or("board");
             match parts.get_mut(part) {

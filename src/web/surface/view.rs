@@ -16,7 +16,7 @@ pub struct CloudView {
 
 /// Takes at most `most` points, of those that `stays` lets stay. They are spread by a golden step over the scan, so that every share of them from the start on
 /// covers all of it: a page that shows the first tenth shows the whole part, coarsely.
-pub fn view(cloud: &impl PointSource, all: u64, most: usize, stays: &dyn Fn(&[f32; 3]) -> bool) -> Result<CloudView> {
+pub fn view(cloud: &impl PointSource, all: u64, most: usize, stays: &dyn Fn(&glam::Vec3) -> bool) -> Result<CloudView> {
     let every = all.div_ceil(most.max(1) as u64).max(1);
     let mut taken: Vec<CloudPoint> = Vec::with_capacity((all / every) as usize + 1);
     let mut index = 0u64;
@@ -57,8 +57,9 @@ mod tests {
 
     #[test]
     fn every_share_of_a_view_covers_the_scan() {
-        let cloud: Vec<CloudPoint> =
-            (0..10_000).map(|i| CloudPoint { position: [i as f32, 0.0, 5.0], ..CloudPoint::default() }).collect();
+        let cloud: Vec<CloudPoint> = (0..10_000)
+            .map(|i| CloudPoint { position: [i as f32, 0.0, 5.0].into(), ..CloudPoint::default() })
+            .collect();
         let view = view(&cloud, 10_000, 1000, &|_| true).unwrap();
         assert_eq!((view.all, view.points.len()), (10_000, 1000));
         let mut seen: Vec<f32> = view.points.iter().map(|p| p[0]).collect();

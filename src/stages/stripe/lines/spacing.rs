@@ -10,6 +10,7 @@ use crate::stages::frame::{PX_LOG2, SHARED, frame_of, tile_unpack};
 use crate::stages::listing::{self, mask_index};
 use crate::stages::same::Same;
 use crate::stages::step::{Groups, Step};
+use glam::Vec2;
 
 /// A run that goes on for longer has no middle that can be found from here: its pixels are counted from the picture's border.
 pub(in crate::stages) const FAR: i32 = 32;
@@ -23,7 +24,7 @@ const NARROW_PX: f32 = 2.0;
 /// Speckle makes the skeleton of a wide stripe wind and branch. Its pixels across the stripe see the same light, so their fits
 /// find the same centre once more (at 4 px of sigma 1.9 points a column; every 1.5 widths leaves 1.1). A stripe narrower than
 /// 2 px keeps every pixel. `across`: unit image direction of depth.
-pub fn word(widths: f32, width_px: f32, across: [f32; 2]) -> u32 {
+pub fn word(widths: f32, width_px: f32, across: Vec2) -> u32 {
     let step = (widths * width_px).floor();
     let rows = across[1].abs() < across[0].abs();
     if width_px < NARROW_PX || step < 2.0 { 0 } else { step.min(65535.0) as u32 | u32::from(rows) << 16 }
@@ -118,11 +119,11 @@ mod tests {
 
     /// Row and column of what is kept of a column of lit rows.
     fn of_column(rows: std::ops::Range<u32>, step: u32) -> Vec<u32> {
-        let (line, setting) = (rows, word(1.0, step as f32, [0.0, 1.0]));
+        let (line, setting) = (rows, word(1.0, step as f32, Vec2::new(0.0, 1.0)));
         let kept = twin(&Mask::from_fn(9, 200, |x, y| x == 4 && line.contains(&y)), setting);
         // Upright it is the same.
         let upright = Mask::from_fn(200, 9, |x, y| y == 4 && line.contains(&x));
-        assert_eq!(setting | 1 << 16, word(1.0, step as f32, [-1.0, 0.1]));
+        assert_eq!(setting | 1 << 16, word(1.0, step as f32, Vec2::new(-1.0, 0.1)));
         let turned = twin(&upright, setting | 1 << 16);
         assert!((0..200).all(|i| kept.get(4, i) == turned.get(i, 4)), "rows and columns differ");
         (0..200).filter(|&y| kept.get(4, y)).collect()
@@ -136,7 +137,7 @@ mod tests {
         assert_eq!(of_column(50..70, 4), [52, 56, 60, 64, 68]);
         // Two branches of one stripe, and two stripes.
         let two = |apart: u32| twin(&Mask::from_fn(9, 60, |_, y| y == 20 || y == 20 + apart), 4);
-        assert_eq!((4, 9), (word(1.0, 4.0, [0.0, 1.0]), skeletons(&two(4)).len()));
+        assert_eq!((4, 9), (word(1.0, 4.0, Vec2::new(0.0, 1.0)), skeletons(&two(4)).len()));
         assert_eq!(18, skeletons(&two(5)).len());
         // A run with no end in sight, as of a steep face, is sampled as finely.
         assert!(of_column(20..180, 3).windows(2).filter(|w| w[1] - w[0] == 3).count() >= 50);
@@ -144,9 +145,9 @@ mod tests {
 
     #[test]
     fn what_lies_along_the_stripe_is_kept() {
-        let setting = word(1.0, 4.0, [0.0, 1.0]);
+        let setting = word(1.0, 4.0, Vec2::new(0.0, 1.0));
         let slanted = Mask::from_fn(120, 60, |x, y| y == 10 + x / 3);
         assert!(twin(&slanted, setting) == slanted);
-        assert_eq!(word(1.0, 1.9, [0.0, 1.0]), 0, "a narrow stripe keeps every pixel");
+        assert_eq!(word(1.0, 1.9, Vec2::new(0.0, 1.0)), 0, "a narrow stripe keeps every pixel");
     }
 }
