@@ -8,12 +8,12 @@ use sheetlight::arm::{Motion, Outputs, Way};
 use sheetlight::calibrate::hand_eye::closed::{Far, Near};
 use sheetlight::calibrate::hand_eye::options::Mount;
 use sheetlight::calibrate::joint::unknowns::State;
-use sheetlight::calibrate::joint::volume::{apart, places};
+use sheetlight::calibrate::joint::volume::{apart, places, scanned};
 use sheetlight::calibrate::limits::Asked;
 use sheetlight::capture::source::cell::CellCamera;
 use sheetlight::cell::{Cell, CellOptions, Event, Served, Vs060};
 use sheetlight::fault::Result;
-use sheetlight::geometry::{Rigid, Vec3};
+use sheetlight::geometry::{Base, Board, Camera, Flange, Mat3, Rigid, Vec3, exp, log};
 use sheetlight::recording::BoardSpec;
 use sheetlight::rig::{Rig, Volume};
 use sheetlight::robot::Convention;
@@ -102,6 +102,38 @@ impl Cold {
             boards: vec![],
         };
         apart(&result.joint.fit.state, &truth, &places(&truth, self.working))
+    }
+
+    /// The same as the arm itself has it, which is not built as its controller believes: at poses between those of the calibration, places
+    /// beside the board as the station finds it, against where they truly lie beside it. A board, a part and the gripper that goes to it
+    /// are all off together by what the arm's first and last links are, and nobody sees that.
+    fn off_beside_the_board(&self, result: &AutoResult) -> f64 {
+        let (station, fit) = (self.served.cell.station(), &result.joint.fit);
+        let truth = State { plane: station.laser.plane(), camera: station.camera, ..fit.state.clone() };
+        let lit = places(&truth, self.working);
+        let rigid = |r: &Mat3, t: &Vec3| Rigid::<Flange, Camera>::new(*r, *t);
+        let near = &fit.state.near_from_camera;
+        let calibrated = rigid(&near.rotation, &near.translation);
+        let far = &fit.state.far_from_board[0];
+        let found = Rigid::<Base, Board>::new(far.rotation, far.translation).inverse();
+        let board = self.served.cell.base_from_board().unwrap().inverse();
+        let (drawn, built) = (Vs060::drawn(), Vs060::built(&self.served.cell.arm_error()));
+        let asked: Vec<Rigid<Base, Flange>> = fit.shots.iter().filter_map(|s| s.robot).map(|r| r.pose).collect();
+        let mut squares = Vec::new();
+        for pair in asked.windows(2) {
+            let turn = log(&(pair[0].rotation.transpose() * pair[1].rotation));
+            let middle = (pair[0].translation + pair[1].translation) * 0.5;
+            let said = Rigid::new(pair[0].rotation * exp(&(turn * 0.5)), middle);
+            let Ok(joints) = drawn.inverse(&said, &[0.0, 0.2, 1.5, 0.0, 1.3, 0.0]) else { continue };
+            let truly = built.forward(&joints);
+            for pixel in lit.iter().step_by(7) {
+                let (Some(p), Some(q)) = (scanned(&fit.state, pixel), scanned(&truth, pixel)) else { continue };
+                let stated = found.point(&(said * calibrated).point(&p));
+                squares.push((stated - board.point(&(truly * station.flange_from_camera).point(&q))).norm_squared());
+            }
+        }
+        assert!(squares.len() > 100, "{} places", squares.len());
+        (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
     }
 
     /// Goals of motions that lie outside the box, and stops that pictures were taken at.
@@ -214,7 +246,9 @@ fn calibrated(cold: &Cold, what: &str, target_mm: f64) -> Option<(f64, f64, bool
     let begun = Instant::now();
     match cold.calibrate(target_mm, 150) {
         Ok(result) => {
-            let (off, expected) = (cold.off(&result), result.joint.expected_mm());
+            let crooked = cold.served.cell.options().arm_error_mm > 0.0;
+            let off = if crooked { cold.off_beside_the_board(&result) } else { cold.off(&result) };
+            let expected = result.joint.expected_mm();
             println!(
                 "{what}: {} stops, {:?}, off {off:.4} mm, expected {expected:.4}, ratio {:.2}, outside {}, refused {}, {:.0} s of the cell, {:.0} s; {:?}",
                 result.stops,
@@ -299,7 +333,12 @@ fn cold_cells_of_other_kinds_calibrate_themselves() {
         ("portrait", 0.02, 0.025, &|seed| options(rig("portrait"), seed, 10.0)),
     ];
     let mut wrong = Vec::new();
+    // Some of them alone: SHEETLIGHT_CELLS=loud,crooked.
+    let some = std::env::var("SHEETLIGHT_CELLS").ok();
     for (name, target, bar, of) in kinds {
+        if some.as_ref().is_some_and(|some| !some.split(',').any(|one| one == name)) {
+            continue;
+        }
         let each: Vec<_> = seeds
             .iter()
             .filter_map(|&seed| calibrated(&Cold::new(of(seed)), &format!("{name} {seed}"), target))
