@@ -119,6 +119,12 @@ def lease(s, cookie, found):
     refused("stopping what does not run", s.ask("POST", f"/api/v1/jobs/{found['id']}/stop", {}, **other)[0])
 
 
+def grown(data):
+    """Rows that a message of the growing map goes to, and rows in all."""
+    words = struct.unpack_from("<6I", data)
+    return words[4] + words[5], words[3]
+
+
 def viewers(s):
     """Fifty look on, one of them reads nothing: the scan goes on and memory stays."""
     # A scan ran already: what it needs itself is in the peak before.
@@ -132,7 +138,7 @@ def viewers(s):
     begun = time.time()
     s.json("POST", "/lease")
     job = s.json("POST", "/jobs", {"procedure": "scan", "recording": "scan"})
-    seen, rows = set(), 0
+    seen, rows, total = set(), 0, None
     sockets[1].settimeout(30)
     while True:
         kind, data = frame(sockets[1])
@@ -142,7 +148,7 @@ def viewers(s):
                 # One of them is killed while the scan runs: nothing is said, its connection is gone.
                 sockets[2].setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
                 sockets[2].close()
-            rows = int.from_bytes(data[16:20], "little") + int.from_bytes(data[20:24], "little")
+            rows, total = grown(data)
         elif kind == 1:
             event = json.loads(data)
             seen.add(event["event"])
@@ -151,11 +157,12 @@ def viewers(s):
     took, more = time.time() - begun, s.peak_mb() - before
     print(f"50 viewers, one of which reads nothing: scan in {took:.1f} s, peak {more:.0f} MB above that of a scan alone")
     assert more <= 64, f"{more} MB"
-    # The bar comes in its own time, which may be after a short scan.
-    while "bar" not in seen:
+    # The bar and the last rows come in their own time, which may be after a short scan.
+    while "bar" not in seen or rows != total:
         kind, data = frame(sockets[1])
         seen |= {json.loads(data)["event"]} if kind == 1 else set()
-    assert rows > 20, rows
+        rows, total = grown(data) if kind == 2 else (rows, total)
+    assert total > 20, total
     for c in sockets:
         c.close()
 
