@@ -17,7 +17,7 @@ from shots import quiet
 
 program, folder = sys.argv[1:3]
 RATE, RUNS, SIZE = 30, 5, (1280, 960)
-# As a browser on a machine without a GPU puts its pages together; the other tests' browser draws them with WebGL in software, five times as dear.
+# As a browser on a machine without a GPU puts its pages together; the other tests' browser draws them with WebGL in software.
 PLAIN = ("--disable-gpu-compositing",)
 
 # Notes which picture is drawn when: its number is in its first four pixels.

@@ -4,8 +4,9 @@
 import { fill, h, num } from "../base/dom.js";
 import { t } from "../base/text.js";
 import { SCALES, paint } from "./colour.js";
-import { levels } from "./levels.js";
 
+/** Levels of a picture as pixels, in the colours of the scale beside it. */
+const GREYS = Uint32Array.from({ length: 256 }, (_, v) => 0xff000000 | (SCALES.grey[3 * v] * 0x010101));
 /** A drag shorter than this is a click, px. */
 const CLICK = 5;
 
@@ -16,7 +17,7 @@ export function map(place, label) {
   place.classList.add("map");
   // Drawn by the processor: pixels come from it, and a machine without a GPU is three times as fast that way.
   const g = canvas.getContext("2d", { willReadFrequently: true }), off = document.createElement("canvas");
-  const m = { head: null, values: null, grey: null, seen: null, view: null, cross: null, tool: null, marks: [], from: null, to: null, reads: () => "" };
+  const m = { head: null, values: null, view: null, cross: null, tool: null, marks: [], from: null, to: null, reads: () => "" };
   let asked = false, fitted = true;
   const redraw = () => { if (!asked) { asked = true; requestAnimationFrame(() => { asked = false; draw(); }); } };
   const ratio = () => devicePixelRatio || 1;
@@ -34,18 +35,11 @@ export function map(place, label) {
     if (!m.head || !canvas.width) return;
     if (!m.view) fit();
     g.setTransform(1, 0, 0, 1, 0, 0);
-    if (m.grey) {
-      if (m.seen?.width !== canvas.width || m.seen?.height !== canvas.height) m.seen = new ImageData(canvas.width, canvas.height);
-      const { width, height } = m.head, [left, top] = toView([0, height]);
-      levels(m.seen, m.grey, width, height, m.view.s, left, top);
-      g.putImageData(m.seen, 0, 0);
-    } else {
-      g.fillStyle = "#0b0d11";
-      g.fillRect(0, 0, canvas.width, canvas.height);
-      const { width, height, cell_mm } = m.head, [x, y] = toView([0, height * cell_mm]);
-      g.imageSmoothingEnabled = m.view.s * cell_mm < 1;
-      g.drawImage(off, x, y, width * cell_mm * m.view.s, height * cell_mm * m.view.s);
-    }
+    g.fillStyle = "#0b0d11";
+    g.fillRect(0, 0, canvas.width, canvas.height);
+    const { width, height, cell_mm } = m.head, [x, y] = toView([0, height * cell_mm]);
+    g.imageSmoothingEnabled = m.view.s * cell_mm < 1;
+    g.drawImage(off, x, y, width * cell_mm * m.view.s, height * cell_mm * m.view.s);
     for (const mark of m.marks) stroke(mark);
     if (m.from && m.to && m.tool) stroke({ kind: m.tool.shape, points: [m.from, m.to], colour: "#ffd33d" });
     if (m.cross) cross(m.cross);
@@ -182,9 +176,10 @@ export function map(place, label) {
     /** Shows a layer: `head` has width, height and cell_mm; `colours` is ordered, grey or diverging. */
     show(head, values, { range, unit = "mm", digits = 2, colours = "ordered", shaded = false, lit, reads }) {
       const same = m.head && m.head.width === head.width && m.head.height === head.height;
-      Object.assign(m, { head, values, grey: null, reads: reads ?? ((p) => { const v = m.values[index(p)]; return v === v && v !== undefined ? `x ${num(p[0], 2)}  y ${num(p[1], 2)}  ${num(v, digits + 1)} ${unit}` : `x ${num(p[0], 2)}  y ${num(p[1], 2)}  –`; }) });
+      Object.assign(m, { head, values, reads: reads ?? ((p) => { const v = m.values[index(p)]; return v === v && v !== undefined ? `x ${num(p[0], 2)}  y ${num(p[1], 2)}  ${num(v, digits + 1)} ${unit}` : `x ${num(p[0], 2)}  y ${num(p[1], 2)}  –`; }) });
       if (!same) m.view = null;
       off.width = head.width; off.height = head.height;
+      m.pixels = null;
       const drawn = range[1] > range[0] ? range : [range[0], range[0] + 1];
       off.getContext("2d", { willReadFrequently: true }).putImageData(paint(values, head.width, head.height, drawn, colours, shaded ? head.cell_mm : 0, lit), 0, 0);
       legend(scale, drawn, unit, digits, colours);
@@ -193,10 +188,16 @@ export function map(place, label) {
     /** A picture as it comes from a camera, grey levels row by row from the top: no scale, no shading. `reads` says what a place holds. */
     picture(width, height, grey, reads) {
       const same = m.head && m.head.width === width && m.head.height === height;
-      const legends = !m.grey;
-      Object.assign(m, { head: { width, height, cell_mm: 1, bare: true }, values: null, grey, reads });
-      if (!same) m.view = null;
-      if (legends) legend(scale, [0, 255], "", 0, "grey");
+      Object.assign(m, { head: { width, height, cell_mm: 1, bare: true }, values: null, reads });
+      if (!same || !m.pixels) {
+        if (!same) m.view = null;
+        off.width = width; off.height = height;
+        m.pixels = new ImageData(width, height);
+        legend(scale, [0, 255], "", 0, "grey");
+      }
+      const words = new Uint32Array(m.pixels.data.buffer);
+      for (let i = 0; i < words.length; i++) words[i] = GREYS[grey[i]];
+      off.getContext("2d", { willReadFrequently: true }).putImageData(m.pixels, 0, 0);
       redraw();
     },
     /** What lies over the map: { kind: line | box | circle | point, points, colour, label }. */
