@@ -13,7 +13,6 @@ use crate::stages::stripe::point::Optics;
 use crate::stages::stripe::spacing;
 use crate::stages::support::params::SupportParams;
 use crate::stages::{Thinning, ThresholdParams};
-use glam::Vec2;
 
 /// Which rule thins the lit pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -30,7 +29,7 @@ pub enum Rule {
 
 impl Rule {
     /// The rule for a rig that sees its stripe move in this direction with depth.
-    pub fn thinning(self, across: Vec2) -> Thinning {
+    pub fn thinning(self, across: glam::Vec2) -> Thinning {
         match self {
             Rule::Auto => Thinning::across(across),
             Rule::ZhangSuen => Thinning::ZhangSuen,
@@ -92,13 +91,9 @@ const LEAST_REGION: f64 = 0.02;
 /// Least window of the threshold in stripe sigmas: the stripe fills a sixth of it, so the mean stays that
 /// of the surroundings and the flanks stay lit.
 const WINDOW_WIDTHS: f32 = 24.0;
-/// Standard deviations of a dark pixel by which a peak exceeds it.
+/// Standard deviations of a dark pixel by which light exceeds it: one pixel in 740 of pure noise does, and such specks have
+/// no neighbours.
 const ABOVE_NOISE: f32 = 3.0;
-/// The same for a pixel to be looked at: one in 740 of pure noise lies three above it, one in 31,000 four, and each such speck is thinned
-/// and fitted before it is refused. A peak's own height is the fit's, over many pixels: three are enough for that.
-const LIT_ABOVE_NOISE: f32 = 4.0;
-/// Grey levels up to which the fourth is asked for: in noisier pictures the stripe itself is fainter than that in many columns.
-const LIT_MOST: f32 = 16.0;
 /// Grey levels by which the measured noise must exceed the assumed one to replace it: the measurement comes in steps of 0.6.
 const COARSE: f32 = 1.0;
 
@@ -106,9 +101,8 @@ impl Extraction {
     /// The same for pictures whose dark pixels scatter by `noise` grey levels of an 8-bit picture: no limit of light lies within it.
     pub fn in_noise(mut self, noise: f32) -> Extraction {
         let least = (ABOVE_NOISE * noise).round().min(255.0);
-        let lit = least.max((LIT_ABOVE_NOISE * noise).round().min(LIT_MOST));
-        self.threshold.offset = self.threshold.offset.max(lit as i32);
-        self.threshold.minimum = self.threshold.minimum.max(lit as u16);
+        self.threshold.offset = self.threshold.offset.max(least as i32);
+        self.threshold.minimum = self.threshold.minimum.max(least as u16);
         self.choose.faintest = self.choose.faintest.max(least);
         if noise > self.peak.read_noise + COARSE {
             self.peak.read_noise = noise.min(20.0);
@@ -179,27 +173,5 @@ impl Extraction {
         self.peak.check()?;
         self.choose.check()?;
         self.support.check()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn light_is_looked_for_four_sigmas_above_little_noise_and_three_above_much() {
-        let at = |noise: f32| {
-            let e = Extraction::default().in_noise(noise);
-            (e.threshold.offset, e.threshold.minimum, e.choose.faintest)
-        };
-        let plain = Extraction::default();
-        // What is asked for without noise stays.
-        assert_eq!(at(0.5), (plain.threshold.offset, plain.threshold.minimum, plain.choose.faintest));
-        assert_eq!(at(3.5), (14, 14, 11.0));
-        // Between the two the limit stands still: it never falls while the noise grows.
-        assert_eq!(at(4.8), (16, 16, 14.0));
-        assert_eq!(at(8.0), (24, 24, 24.0));
-        let lits: Vec<i32> = (0..100).map(|k| at(0.25 * k as f32).0).collect();
-        assert!(lits.is_sorted(), "{lits:?}");
     }
 }
