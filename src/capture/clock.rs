@@ -9,20 +9,20 @@ use std::time::{Instant, SystemTime, UNIX_EPOCH};
 /// The host's time, ns since the Unix epoch. The system's clock is asked once; from then on the steady one counts, so that
 /// nobody who sets the clock makes time jump.
 pub fn now_ns() -> u64 {
+    ns_of(Instant::now())
+}
+
+/// A moment of the steady clock as the host's time, ns since the Unix epoch. The order and the distance of moments stay as they are,
+/// whatever happens between the reading of a clock and this.
+pub fn ns_of(moment: Instant) -> u64 {
     static START: OnceLock<(u64, Instant)> = OnceLock::new();
     let (epoch, began) = START.get_or_init(|| {
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         (since.as_nanos() as u64, Instant::now())
     });
-    epoch + began.elapsed().as_nanos() as u64
-}
-
-/// A moment of the steady clock as the host's time, ns since the Unix epoch.
-pub fn ns_of(moment: Instant) -> u64 {
-    let (now, now_ns) = (Instant::now(), now_ns());
-    match moment.checked_duration_since(now) {
-        Some(ahead) => now_ns + ahead.as_nanos() as u64,
-        None => now_ns - now.duration_since(moment).as_nanos() as u64,
+    match moment.checked_duration_since(*began) {
+        Some(after) => epoch + after.as_nanos() as u64,
+        None => epoch.saturating_sub(began.duration_since(moment).as_nanos() as u64),
     }
 }
 
@@ -230,6 +230,19 @@ mod tests {
         read(&mut map, last + 400_000_000, 30_000_000);
         let told = map.told(last + 330_000_000, last + 310_000_000).unwrap().unwrap();
         assert!((told.ns - (last + 300_000_000) as f64).abs() < 1e6, "{told:?}");
+    }
+
+    /// Moments read by turns with others, so that nothing but their own distance may count.
+    #[test]
+    fn moments_of_the_steady_clock_keep_their_distances_to_the_nanosecond() {
+        let first = Instant::now();
+        let told = ns_of(first);
+        for k in 0..20_000u64 {
+            let later = first + std::time::Duration::from_nanos(k * 37);
+            assert_eq!(ns_of(later) - told, k * 37);
+        }
+        assert_eq!(ns_of(first), told);
+        assert!(now_ns() >= told);
     }
 
     #[test]

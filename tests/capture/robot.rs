@@ -128,6 +128,8 @@ fn pictures_of_a_robot_that_moved_are_refused_and_those_at_rest_are_paired() {
         taken.len(),
         moved.len()
     );
+    let others: Vec<_> = left.iter().filter(|l| !l["why"].as_str().unwrap().contains("moved by")).take(4).collect();
+    println!("{} left out for another reason, the first {others:?}", left.len() - moved.len());
     assert!(taken.len() >= 8 && moved.len() >= 8, "{account}");
     assert!(farthest < 0.002, "a picture of an arm on its way: {farthest} mm in a millisecond");
     // The arm's repeatability is 0.02 mm an axis.

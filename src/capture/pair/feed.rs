@@ -4,9 +4,10 @@
 use super::lines::{LONGEST, LineClock, Lines};
 use super::track::{Between, Sample, Track};
 use super::uri::PoseUri;
+use crate::arm::{PoseSource, TimedPose};
 use crate::capture::clock::{ClockMap, RoundTrip, now_ns, ns_of};
 use crate::capture::source::sim::{SimMotion, SimSpec};
-use crate::fault::{Fault, Result};
+use crate::fault::{Fault, Kind, Result};
 use crate::recording::Stand;
 use std::io::{BufRead, BufReader, Read};
 use std::net::TcpStream;
@@ -52,7 +53,13 @@ impl PoseFeed {
         let theirs = (shared.0.clone(), shared.1.clone());
         let thread = |work: Box<dyn FnOnce(Shared) + Send>| {
             let name = std::thread::Builder::new().name("poses".into());
-            name.spawn(move || work(theirs)).map(|_| ()).map_err(|e| Fault::threads(&e))
+            let last = Last(theirs.clone());
+            name.spawn(move || {
+                let _last = last;
+                work(theirs);
+            })
+            .map(|_| ())
+            .map_err(|e| Fault::threads(&e))
         };
         match uri {
             PoseUri::Tcp(address) => {
@@ -63,12 +70,9 @@ impl PoseFeed {
                 let file = open(path)?;
                 // A named pipe is opened, and read, only when somebody writes into it.
                 let paced = !path.is_file();
-                thread(Box::new(move |s| {
-                    match file() {
-                        Ok(file) => drop(listen(file, &s, paced)),
-                        Err(fault) => lock(&s.0).fault = Some(fault),
-                    }
-                    lock(&s.0).track.end();
+                thread(Box::new(move |s| match file() {
+                    Ok(file) => drop(listen(file, &s, paced)),
+                    Err(fault) => lock(&s.0).fault = Some(fault),
                 }))?;
             }
             PoseUri::Sim(word) => {
@@ -82,7 +86,7 @@ impl PoseFeed {
             PoseUri::Robot(uri) => {
                 let arm = crate::arm::open(uri)?;
                 let poses = arm.watch()?;
-                thread(Box::new(move |s| ask(poses, &s)))?;
+                thread(Box::new(move |s| ask(poses, || arm.watch(), &s)))?;
             }
         }
         Ok(PoseFeed { state: shared.0, stop: shared.1 })
@@ -128,6 +132,20 @@ impl PoseFeed {
 impl Drop for PoseFeed {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Ends the track with the thread that fills it, however that ends: else pictures would wait for poses that never come.
+struct Last(Shared);
+
+impl Drop for Last {
+    fn drop(&mut self) {
+        let mut state = lock(&self.0.0);
+        state.track.end();
+        if std::thread::panicking() {
+            let what = "the part of this program that takes in poses broke down";
+            state.fault = Some(Fault::device(what).cause("a mistake in this program").next("report what stands above"));
+        }
     }
 }
 
@@ -227,31 +245,129 @@ fn simulate(motion: &SimMotion, shared: &Shared) {
     }
 }
 
-fn ask(mut poses: Box<dyn crate::arm::PoseSource>, shared: &Shared) {
-    let mut clock = ClockMap::default();
+/// Of a controller's time, ns: most count whole milliseconds.
+const RESOLUTION: u64 = 1_000_000;
+
+/// A pose with its time. A controller's own time is told by round trips, half its resolution wider at both ends.
+fn sample(pose: &TimedPose, clock: &mut ClockMap) -> Sample {
+    let (before_ns, after_ns) = (ns_of(pose.asked), ns_of(pose.here));
+    let plain = || (before_ns + (after_ns - before_ns) / 2, 0.5 * (after_ns - before_ns) as f64 / 3f64.sqrt());
+    let (ns, sigma_ns) = match pose.device.map(|d| d.as_nanos() as u64) {
+        Some(there_ns) => {
+            let (before_ns, after_ns) = (before_ns - RESOLUTION / 2, after_ns + RESOLUTION / 2);
+            clock.round_trip(RoundTrip { before_ns, there_ns, after_ns });
+            clock.host(there_ns).map_or_else(plain, |m| (m.ns as u64, m.sigma_ns))
+        }
+        None => plain(),
+    };
+    Sample { ns, sigma_ns, stand: Stand::Robot(pose.base_from_flange) }
+}
+
+/// Asks a robot until it is told to stop; `again` connects anew where a connection broke. A list of poses that is at its end stays so.
+fn ask(poses: Box<dyn PoseSource>, again: impl Fn() -> Result<Box<dyn PoseSource>>, shared: &Shared) {
+    let (mut clock, mut poses, mut answers) = (ClockMap::default(), Some(poses), true);
     while !shared.1.load(Ordering::Relaxed) {
-        match poses.pose() {
+        let told = match &mut poses {
+            Some(source) => source.pose(),
+            None => again().and_then(|source| poses.insert(source).pose()),
+        };
+        match told {
             Ok(pose) => {
-                let (before_ns, after_ns) = (ns_of(pose.asked), ns_of(pose.here));
-                let plain =
-                    || (before_ns + (after_ns - before_ns) / 2, 0.5 * (after_ns - before_ns) as f64 / 3f64.sqrt());
-                let (ns, sigma_ns) = match pose.device.map(|d| d.as_nanos() as u64) {
-                    // The controller's own time: its resolution, often a millisecond, is what is left.
-                    Some(there_ns) => {
-                        clock.round_trip(RoundTrip { before_ns, there_ns, after_ns });
-                        clock.host(there_ns).map_or_else(plain, |m| (m.ns as u64, m.sigma_ns))
-                    }
-                    None => plain(),
-                };
-                add(shared, Sample { ns, sigma_ns, stand: Stand::Robot(pose.base_from_flange) });
+                let jumps = clock.jumps();
+                let sample = sample(&pose, &mut clock);
+                let mut state = lock(&shared.0);
+                if clock.jumps() > jumps {
+                    state.track.cut();
+                    state.said.push("the controller's clock jumped: nothing is told across it".into());
+                }
+                if !std::mem::replace(&mut answers, true) {
+                    state.said.push("the robot tells its pose again".into());
+                }
+                drop(state);
+                add(shared, sample);
+                std::thread::sleep(ASK / 2);
             }
             Err(fault) => {
+                let comes_back = matches!(fault.kind, Kind::Device | Kind::Refused);
                 let mut state = lock(&shared.0);
-                state.said.push(fault.what.clone());
-                state.track.end();
-                return;
+                state.track.cut();
+                if std::mem::replace(&mut answers, false) {
+                    state.said.push(if comes_back { format!("{}; asking again", fault.what) } else { fault.what });
+                }
+                drop(state);
+                if !comes_back {
+                    return;
+                }
+                poses = None;
+                std::thread::sleep(RETRY);
             }
         }
-        std::thread::sleep(ASK / 2);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Rigid;
+    use std::collections::VecDeque;
+    use std::time::Instant;
+
+    fn pose(asked: Instant, way: Duration, device: Option<Duration>) -> TimedPose {
+        TimedPose { base_from_flange: Rigid::identity(), figure: None, asked, here: asked + way, device }
+    }
+
+    /// Round trips far shorter than the millisecond that a controller counts in.
+    #[test]
+    fn a_controller_that_counts_whole_milliseconds_does_not_jump() {
+        let (begun, mut clock) = (Instant::now() + Duration::from_secs(1), ClockMap::default());
+        for k in 0..2000u64 {
+            let (asked, way) = (Duration::from_micros(k * 4_321), Duration::from_micros(40 + k % 90));
+            let there = Duration::from_secs(77) + asked + way / 2;
+            let told = pose(begun + asked, way, Some(Duration::from_millis(there.as_millis() as u64)));
+            let sample = sample(&told, &mut clock);
+            let truth = ns_of(begun + asked + way / 2) as f64;
+            assert!((sample.ns as f64 - truth).abs() < 1.2e6, "{k}: {} ns off", sample.ns as f64 - truth);
+            assert!((sample.ns as f64 - truth).abs() < 4.0 * sample.sigma_ns, "{k}: sigma {}", sample.sigma_ns);
+        }
+        assert_eq!(clock.jumps(), 0);
+    }
+
+    struct Spells(VecDeque<Option<Fault>>);
+
+    impl PoseSource for Spells {
+        fn pose(&mut self) -> Result<TimedPose> {
+            match self.0.pop_front().expect("asked no more after the end") {
+                None => Ok(pose(Instant::now(), Duration::ZERO, None)),
+                Some(fault) => Err(fault),
+            }
+        }
+    }
+
+    #[test]
+    fn a_robot_that_was_cut_off_is_asked_again_and_a_list_ends_with_its_last_pose() {
+        let shared: Shared = Default::default();
+        let spells = |s: &[Option<Fault>]| -> Box<dyn PoseSource> { Box::new(Spells(s.iter().cloned().collect())) };
+        let cut = || Some(Fault::device("cut"));
+        let later = Mutex::new(VecDeque::from([
+            Err(Fault::device("no way yet")),
+            Ok(spells(&[None, None, Some(Fault::input("asked for more than there is"))])),
+        ]));
+        ask(spells(&[None, cut()]), || later.lock().unwrap().pop_front().unwrap(), &shared);
+        let state = lock(&shared.0);
+        assert_eq!(state.came, 3);
+        assert_eq!(state.said, ["cut; asking again", "the robot tells its pose again", "asked for more than there is"]);
+    }
+
+    #[test]
+    fn pictures_do_not_wait_for_a_thread_that_broke_down() {
+        let shared: Shared = Default::default();
+        let last = Last(shared.clone());
+        let thread = std::thread::spawn(move || {
+            let _last = last;
+            panic!("on purpose");
+        });
+        assert!(thread.join().is_err());
+        assert!(lock(&shared.0).fault.is_some());
+        assert!(lock(&shared.0).track.at(1).unwrap().is_err());
     }
 }
