@@ -8,6 +8,7 @@ use crate::stages::frame::{ALL_TILES, GAUSSIAN};
 use crate::stages::stripe::threshold::passes_mean;
 use crate::stages::{Frame, ThresholdParams};
 use multiversion::multiversion;
+use std::ops::{AddAssign, SubAssign};
 
 /// The lit pixels of a tile, a word a row.
 pub type Tile = [u32; 8];
@@ -40,6 +41,8 @@ impl<'a, T: Sample> View<'a, T> {
 /// Sums along the columns, and what is made of them.
 #[derive(Default)]
 pub struct Sums<W> {
+    rolled: Rolled<W>,
+    few: Vec<(usize, Tile)>,
     columns: Vec<W>,
     line: Vec<W>,
     before: Vec<u32>,
@@ -61,6 +64,7 @@ pub fn row<T: Sample>(
     let wanted = |tx: usize| region.is_none_or(|r| r[tx] != [0; 8]);
     // Tiles whose columns are to be added up wait for their neighbours.
     let mut run = 0..0;
+    sums.few.clear();
     for tx in 0..tiles {
         let four: [u8; 4] = proof.lit[4 * tx..4 * tx + 4].try_into().expect("four blocks a tile");
         if u32::from_ne_bytes(four) == 0 || !wanted(tx) {
@@ -71,8 +75,8 @@ pub fn row<T: Sample>(
         } else {
             let question = in_question(v, tx, ty, four, &proof.least[4 * tx..4 * tx + 4]);
             let count: u32 = question.iter().map(|w| w.count_ones()).sum();
-            if count <= FEW && v.f.flags & GAUSSIAN == 0 {
-                out[tx] = one_by_one(v, tx, ty, &question, &mut sums.columns);
+            if (1..=FEW).contains(&count) && v.f.flags & GAUSSIAN == 0 {
+                sums.few.push((tx, question));
             }
             count > FEW || v.f.flags & GAUSSIAN != 0 && count > 0
         };
@@ -84,6 +88,7 @@ pub fn row<T: Sample>(
         }
     }
     settle(v, ty, run, sums, out);
+    few(v, ty, sums, out);
     if let Some(region) = region {
         for (tile, region) in out.iter_mut().zip(region) {
             (0..8).for_each(|r| tile[r] &= region[r]);
@@ -117,19 +122,90 @@ fn bits(of: impl Fn(usize) -> bool) -> u32 {
     (0..WIDE).fold(0, |word, i| word | u32::from(of(i)) << i)
 }
 
-fn one_by_one<T: Sample>(v: View<T>, tx: usize, ty: usize, question: &Tile, columns: &mut Vec<T::Wide>) -> Tile {
-    let mut tile = [0; 8];
-    for r in 0..8 {
-        let mut left = question[r];
-        while left != 0 {
-            let i = left.trailing_zeros();
-            left &= left - 1;
-            let (x, y) = (WIDE * tx + i as usize, EDGE * ty + r);
-            let value = T::number(v.row(y as isize)[x].wide());
-            tile[r] |= u32::from(passes_mean(value, window(v, x, y, columns), &v.p)) << i;
+/// Tiles with few pixels in question: each window by itself, or, where that is less work, the columns of the whole picture from row to
+/// row by what enters and what leaves.
+fn few<T: Sample>(v: View<T>, ty: usize, s: &mut Sums<T::Wide>, out: &mut [Tile]) {
+    let (height, rows) = (v.f.size as usize, (v.f.height as usize - EDGE * ty).min(EDGE));
+    let pixels: u32 = s.few.iter().flat_map(|(_, question)| question).map(|w| w.count_ones()).sum();
+    let alone = pixels as usize * height * (height + WIDE);
+    let rolling = alone > v.f.width as usize * (s.rolled.rows_to(EDGE * ty, height) + 2 * rows);
+    for r in 0..rows {
+        for (tx, question) in &s.few {
+            let mut left = question[r];
+            while left != 0 {
+                let i = left.trailing_zeros();
+                left &= left - 1;
+                let (x, y) = (WIDE * tx + i as usize, EDGE * ty + r);
+                let sum = if rolling {
+                    s.rolled.to(v, y);
+                    s.rolled.window(v, x)
+                } else {
+                    window(v, x, y, &mut s.columns)
+                };
+                let value = T::number(v.row(y as isize)[x].wide());
+                out[*tx][r] |= u32::from(passes_mean(value, sum, &v.p)) << i;
+            }
         }
     }
-    tile
+}
+
+/// Sums along all columns of the picture, over the window's rows around one.
+#[derive(Default)]
+struct Rolled<W> {
+    around: Option<usize>,
+    columns: Vec<W>,
+}
+
+impl<W> Rolled<W> {
+    /// Rows that are read on the way to a row.
+    fn rows_to(&self, y: usize, height: usize) -> usize {
+        self.around.and_then(|at| y.checked_sub(at)).map_or(height, |n| (2 * n).min(height))
+    }
+}
+
+impl<W: Copy + Default + AddAssign + SubAssign> Rolled<W> {
+    fn to<T: Sample<Wide = W>>(&mut self, v: View<T>, y: usize) {
+        if self.around == Some(y) {
+            return;
+        }
+        let (height, r) = (v.f.size as usize, (v.f.size / 2) as isize);
+        match self.around {
+            Some(at) if self.rows_to(y, height) < height => {
+                for y in at as isize + 1..=y as isize {
+                    exchange(v.row(y + r), v.row(y - 1 - r), &mut self.columns);
+                }
+            }
+            _ => {
+                self.columns.clear();
+                self.columns.resize(v.f.width as usize, W::default());
+                (y as isize - r..=y as isize + r).for_each(|y| enter(v.row(y), &mut self.columns));
+            }
+        }
+        self.around = Some(y);
+    }
+
+    /// The sum of the window around a pixel of the row.
+    #[inline]
+    fn window<T: Sample<Wide = W>>(&self, v: View<T>, x: usize) -> u32 {
+        let (columns, r) = (&self.columns, (v.f.size / 2) as usize);
+        let (from, to) = (x.saturating_sub(r), (x + r + 1).min(columns.len()));
+        let (left, right) = ((r - (x - from)) as u32, (x + r + 1 - to) as u32);
+        let edges = left * T::number(columns[0]) + right * T::number(columns[columns.len() - 1]);
+        edges + columns[from..to].iter().map(|&c| T::number(c)).sum::<u32>()
+    }
+}
+
+#[multiversion(targets = "simd")]
+fn enter<T: Sample>(row: &[T], columns: &mut [T::Wide]) {
+    columns.iter_mut().zip(row).for_each(|(c, v)| *c += v.wide());
+}
+
+#[multiversion(targets = "simd")]
+fn exchange<T: Sample>(enters: &[T], leaves: &[T], columns: &mut [T::Wide]) {
+    for ((c, enters), leaves) in columns.iter_mut().zip(enters).zip(leaves) {
+        *c += enters.wide();
+        *c -= leaves.wide();
+    }
 }
 
 /// The sum of the window around a pixel: its columns first, which for a row is one addition of all. `columns` is memory that is
