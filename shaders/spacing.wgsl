@@ -1,5 +1,5 @@
 // In: the skeleton, lit pixels. Out: of each run of its pixels across the stripe the one in the middle, and every so many from it; a run's
-// pixels follow one another within that distance. Twin and reasons: src/stages/stripe/lines/spacing.rs. Frame and unit: pixels.
+// pixels follow one another within that distance. Lit pixels with no company are left out. Twin and reasons: src/stages/stripe/lines/spacing.rs. Frame and unit: pixels.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> listing: array<u32>;
 @group(0) @binding(2) var<storage, read> list: array<u32>;
@@ -29,12 +29,33 @@ fn beyond(shot: u32, x: i32, y: i32, across: vec2<i32>) -> i32 {
 }
 
 fn kept(shot: u32, x: i32, y: i32) -> bool {
-    let rows = i32(frame.spacing >> 16u);
+    if (frame.spacing & 0xffffu) == 0u {
+        return true;
+    }
+    let rows = i32((frame.spacing >> 16u) & 1u);
     let across = vec2(rows, 1 - rows);
     let before = beyond(shot, x, y, -across);
     let after = beyond(shot, x, y, across);
     let place = select(before - (before + after + 1) / 2, select(y, x, rows == 1), max(before, after) == FAR);
     return place % i32(frame.spacing & 0xffffu) == 0;
+}
+
+// Whether another pixel near one is lit, where that is asked for.
+fn in_company(shot: u32, x: i32, y: i32) -> bool {
+    if (frame.spacing & COMPANY) == 0u {
+        return true;
+    }
+    // Columns that lie in one word or in two beside each other; where they begin with a word, they lie in one.
+    let first = u32(max(x - NEAR, 0));
+    let last = u32(min(x + NEAR, i32(frame.width) - 1));
+    let wanted = (1u << (last - first + 1u)) - 1u;
+    var lights = 0u;
+    for (var v = max(y - NEAR, 0); v <= min(y + NEAR, i32(frame.height) - 1); v++) {
+        let low = lit[mask_word(shot, first, u32(v))] >> (first & 31u);
+        let high = lit[mask_word(shot, last, u32(v))] << ((32u - (first & 31u)) & 31u);
+        lights += countOneBits((low | high) & wanted);
+    }
+    return lights > 1u;
 }
 
 @compute @workgroup_size(64)
@@ -48,7 +69,9 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
             while bits != 0u {
                 let bit = countTrailingZeros(bits);
                 bits &= bits - 1u;
-                if kept(tile_shot(tile), i32(32u * tile_x(tile) + bit), i32(8u * tile_y(tile) + row)) {
+                let x = i32(32u * tile_x(tile) + bit);
+                let y = i32(8u * tile_y(tile) + row);
+                if kept(tile_shot(tile), x, y) && in_company(tile_shot(tile), x, y) {
                     some |= 1u << bit;
                 }
             }
@@ -59,3 +82,6 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
 
 // A run that goes on for longer has no middle that can be found from here: its pixels are counted from the picture's border.
 const FAR: i32 = 32;
+// A lit pixel with no other one this near, in columns and rows, is no stripe's; the setting's bit that asks for it.
+const NEAR: i32 = 3;
+const COMPANY: u32 = 0x20000u;

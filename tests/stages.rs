@@ -80,7 +80,7 @@ fn the_chain_of_twins_is_the_plain_definition() {
             let mut kept = thinned.clone();
             kept.intersect(&long);
             assert!(kept == thinned, "{}, shot {i}: carrying on takes nothing away", scene.name);
-            let chosen = if scene.spacing == 0 { long } else { spacing::twin(&long, scene.spacing) };
+            let chosen = if scene.spacing == 0 { long } else { spacing::twin(&lit, &long, scene.spacing) };
             let list = skeleton::twin(&chosen);
             let header = &walk.buffers["header"];
             let (from, to) = (header[skeleton::HEADER + i] as usize, header[skeleton::HEADER + 1 + i] as usize);

@@ -41,7 +41,8 @@ pub struct Frame {
     pub full_scale: u32,
     /// Most pixels added to an end of a line, and from bit 16 on the share of brightness in 4096ths; 0 is off.
     pub lengthen: u32,
-    /// Pixels from one of a run across the stripe to the next ([`crate::stages::stripe::spacing::word`]); 0 keeps all.
+    /// Pixels from one of a run across the stripe to the next ([`crate::stages::stripe::spacing::word`]), and whether lit pixels need
+    /// company ([`crate::stages::stripe::spacing::COMPANY`]); 0 keeps all.
     pub spacing: u32,
 }
 

@@ -47,5 +47,7 @@ pub const NUMBERS: &[(&str, &str, f64)] = &[
     ("peak", "NONE", turn::MIDDLE_ROW[1] as f64),
     ("point", "NEWTON", point::NEWTON as f64),
     ("spacing", "FAR", spacing::FAR as f64),
+    ("spacing", "NEAR", spacing::NEAR as f64),
+    ("spacing", "COMPANY", spacing::COMPANY as f64),
     ("support", "FAR", support::stage::FAR as f64),
 ];

@@ -5,7 +5,7 @@ use crate::camera::{Distortion, Intrinsics};
 use crate::geometry::{Plane, Vec3};
 use crate::raster::Image;
 use crate::stages::noise::Noise;
-use crate::stages::stripe::point;
+use crate::stages::stripe::{point, spacing};
 use crate::stages::{Thinning, ThresholdParams, Window, frame};
 
 /// Pictures of one batch with their settings.
@@ -124,7 +124,7 @@ pub fn scenes() -> Vec<Scene> {
         Scene {
             name: "noise, every tile",
             shots: vec![drawn(97, 69, 8, |_, _| noise.next() % 256)],
-            spacing: 2,
+            spacing: 2 | spacing::COMPANY,
             params: p(3, 0, 0),
             flags: frame::ALL_TILES,
             ..base.clone()
@@ -152,13 +152,14 @@ pub fn scenes() -> Vec<Scene> {
         Scene {
             name: "specks at all borders",
             shots: vec![specks(229, 122, 8), specks(229, 122, 8)],
+            spacing: spacing::COMPANY,
             params: p(31, 8, 0),
             ..base.clone()
         },
         Scene {
             name: "deep specks, window 9, region of interest",
             shots: vec![specks(170, 99, 12)],
-            spacing: 3 | 1 << 16,
+            spacing: 3 | 1 << 16 | spacing::COMPANY,
             params: p(9, 124, 160),
             flags: frame::HAS_ROI,
             ..base.clone()

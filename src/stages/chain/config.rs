@@ -31,7 +31,8 @@ pub struct ChainConfig {
     pub ambient: Option<Image>,
     /// How far the ends of lines are carried on ([`crate::stages::stripe::lengthen::LengthenParams::word`]); 0 is not at all.
     pub lengthen: u32,
-    /// One fit a crossing of a wide stripe ([`crate::stages::stripe::spacing::word`]); 0 is one for every skeleton pixel.
+    /// One fit a crossing of a wide stripe ([`crate::stages::stripe::spacing::word`]), none of what has no company
+    /// ([`crate::stages::stripe::spacing::COMPANY`]); 0 is one for every skeleton pixel.
     pub spacing: u32,
     /// Peaks, their choice and points for every skeleton pixel; `None` ends with the pixels.
     pub measure: Option<Measure>,

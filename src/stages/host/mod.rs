@@ -10,6 +10,7 @@ use super::peak::found::Peak;
 use super::peak::{self, PeakFrame};
 use super::stripe::choose::Lines;
 use super::stripe::point::Point;
+use super::stripe::spacing::COMPANY;
 use super::stripe::{ambient, choose, lengthen, point, skeleton, spacing, threshold};
 use super::{Thinning, ThresholdParams};
 use crate::fault::Result;
@@ -183,15 +184,20 @@ impl Host {
         }
     }
 
-    /// Keeps one pixel a crossing of a wide stripe.
+    /// Keeps one pixel a crossing of a wide stripe, and none without company.
     fn space(&self, work: &mut Work) {
         let (w, h) = (self.frame.width as i32, self.frame.height as i32);
-        let (thin, kept) = (&work.thin, &mut work.kept);
+        let (lit, thin, kept) = (&work.lit, &work.thin, &mut work.kept);
+        let (setting, near) = (self.frame.spacing, spacing::NEAR as usize);
         let get = |x: i32, y: i32| (0..w).contains(&x) && (0..h).contains(&y) && thin.get(x, y);
         kept.clear();
         kept.extend(work.list.iter().map(|&at| -> Tile {
             let (tx, ty) = thin.tile(at);
-            let alone = thin.alone(at as usize, self.frame.spacing);
+            let company = if setting & COMPANY == 0 { [u32::MAX; 8] } else { lit.in_company(at as usize, near) };
+            if setting & !COMPANY == 0 {
+                return std::array::from_fn(|r| thin.words[at as usize][r] & company[r]);
+            }
+            let alone = thin.alone(at as usize, setting & !COMPANY);
             std::array::from_fn(|r| {
                 // What has nothing near it is a run by itself.
                 let mut some = alone[r];
@@ -199,11 +205,11 @@ impl Host {
                 while left != 0 {
                     let bit = left.trailing_zeros();
                     left &= left - 1;
-                    if spacing::kept((32 * tx + bit) as i32, 8 * ty as i32 + r as i32, self.frame.spacing, get) {
+                    if spacing::kept((32 * tx + bit) as i32, 8 * ty as i32 + r as i32, setting, get) {
                         some |= 1 << bit;
                     }
                 }
-                some
+                some & company[r]
             })
         }));
         for (&at, tile) in work.list.iter().zip(&work.kept) {

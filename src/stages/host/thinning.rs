@@ -53,7 +53,7 @@ impl Tiles {
     /// that look along rows or beyond the tiles beside it.
     #[inline(always)]
     pub fn alone(&self, at: usize, spacing: u32) -> Tile {
-        if spacing > 8 {
+        if spacing == 0 || spacing > 8 {
             return [0; 8];
         }
         let column = [at - self.stride, at, at + self.stride].map(|at| self.words[at]);
@@ -61,6 +61,21 @@ impl Tiles {
         std::array::from_fn(|r| {
             let near = (1..=spacing as usize).fold(0, |near, d| near | row(8 + r - d) | row(8 + r + d));
             self.words[at][r] & !near
+        })
+    }
+    /// Pixels of a tile with another one within so many columns and rows, at most 8.
+    #[inline(always)]
+    pub fn in_company(&self, at: usize, near: usize) -> Tile {
+        let columns = [at - 1, at, at + 1].map(|at| [at - self.stride, at, at + self.stride].map(|at| self.words[at]));
+        // Of the rows of the tile and of those above and below it, 8 each: whether a pixel beside a place is set, or it too.
+        let beside: [u32; 24] = std::array::from_fn(|r| {
+            let [west, own, east] = columns.map(|rows| rows[r / 8][r % 8]);
+            (1..=near).fold(0, |near, d| near | own << d | west >> (32 - d) | own >> d | east << (32 - d))
+        });
+        let within: [u32; 24] = std::array::from_fn(|r| beside[r] | columns[1][r / 8][r % 8]);
+        std::array::from_fn(|r| {
+            let rows = (1..=near).fold(beside[8 + r], |rows, d| rows | within[8 + r - d] | within[8 + r + d]);
+            self.words[at][r] & rows
         })
     }
     /// The eight neighbours of every pixel of a tile, row by row.
