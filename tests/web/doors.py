@@ -195,8 +195,14 @@ def killed():
     assert whole["state"] == "done", whole
     again.json("DELETE", f"/jobs/{second}")
     refused("a job that was taken away", again.ask("GET", f"/api/v1/jobs/{second}")[0])
-    # Ended while it works: the job is stopped and can go on.
-    third = again.json("POST", "/jobs", {"procedure": "scan", "recording": "scan"})["id"]
+    # Ended while it works: the job is stopped and can go on. The same pictures a hundred times over, as the scan is too soon done.
+    longer = shutil.copytree(os.path.join(folder, "scan"), os.path.join(folder, "longer"))
+    with open(os.path.join(longer, "meta.json")) as f:
+        meta = json.load(f)
+    meta["frames"] *= 100
+    with open(os.path.join(longer, "meta.json"), "w") as f:
+        json.dump(meta, f)
+    third = again.json("POST", "/jobs", {"procedure": "scan", "recording": "longer"})["id"]
     while again.json("GET", f"/jobs/{third}")["done"] < 5:
         time.sleep(0.01)
     assert again.end() == 0
