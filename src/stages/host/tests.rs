@@ -120,7 +120,7 @@ fn masks_and_skeletons_of_random_pictures_are_those_of_the_twins() {
             thinning: if next(2) == 0 { Thinning::ZhangSuen } else { Thinning::GuoHall },
             region: roi.then(|| Mask::from_fn(w, h, |x, y| x + 2 * y > cut && x % 40 != 7)),
             lengthen: if next(2) == 0 { 0 } else { LengthenParams::default().word(WIDTH_PX) },
-            spacing: [0, 0, 2, 3, 7, 2 | 1 << 16, 4 | 1 << 16][next(7) as usize] | next(2) * spacing::COMPANY,
+            spacing: [0, 0, 2, 3, 7, 2 | 1 << 16, 4 | 1 << 16][next(7) as usize] | (next(2) * spacing::COMPANY),
             ambient: dim.then(|| drawn(w, h, bits, |x, y| ((x * 3 + y * 5) % 60) << (bits - 8))),
             ..ChainConfig::new(w, h, bits)
         };
