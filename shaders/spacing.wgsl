@@ -1,5 +1,6 @@
 // In: the skeleton, lit pixels. Out: of each run of its pixels across the stripe the one in the middle, and every so many from it; a run's
-// pixels follow one another within that distance. Lit pixels with no company are left out. Twin and reasons: src/stages/stripe/lines/spacing.rs. Frame and unit: pixels.
+// pixels follow one another within that distance. Lit pixels with no company are left out. Frame and unit: pixels.
+// Twin and reasons: src/stages/stripe/lines/spacing.rs.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<storage, read> listing: array<u32>;
 @group(0) @binding(2) var<storage, read> list: array<u32>;

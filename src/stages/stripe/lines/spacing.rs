@@ -17,7 +17,7 @@ pub(in crate::stages) const FAR: i32 = 32;
 
 /// Bit of the setting: a lit pixel with no other one near is no stripe's.
 ///
-/// One dark pixel in 740 exceeds three standard deviations of its noise. At 12 million pixels those are 17,000 fits, three times those of
+/// One dark pixel in 740 exceeds three standard deviations of its noise. At 12 million pixels those are 17,000 fits, four times those of
 /// a stripe; 94 % of them have no other within three columns and rows. A stripe lights its pixels along itself: where the brightest of a column are
 /// lit in no more than half of the cases, six neighbours along it leave one in 64 by itself, and its flanks fewer.
 pub const COMPANY: u32 = 1 << 17;
