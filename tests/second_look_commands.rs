@@ -206,6 +206,14 @@ fn a_second_look_is_planned_taken_and_brought_together() {
         figure(&seen, &["object", "looks", "ratio"]) < 3.0 && !seen["remarks"].to_string().contains("disagree"),
         "{seen}"
     );
+    // It did not move; planes continued from pieces millimetres away had it turned by 0.1 degrees.
+    let moved =
+        |path: &str| seen["object"]["looks"][path].as_array().unwrap().iter().map(|v| v.as_f64().unwrap().abs());
+    assert!(
+        moved("difference_mm").all(|d| d < 0.04) && moved("difference_deg").all(|d| d < 0.05),
+        "{}",
+        seen["object"]
+    );
     let (code, said) = b.fails("verify --station ./station --object scans/a --object scans/a");
     assert!(code == 2 && said.contains("one scan twice"), "{said}");
     let (code, said) = b.fails("verify --station ./station --object scans/a");

@@ -6,6 +6,7 @@ pub mod explain;
 pub mod levers;
 pub mod looks;
 pub mod part_seen;
+mod pieces;
 mod plan;
 pub mod register;
 pub mod size_check;

@@ -1,0 +1,109 @@
+//! In: a scan. Out: its nearly flat pieces of surface, and the one nearest to a place.
+//! Frame and unit: base frame, mm. docs/math.md, Registration.
+
+use crate::find::measure::points::Ordered;
+use crate::geometry::{Mat3, Vec3};
+use std::collections::HashMap;
+
+/// A nearly flat piece of surface.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Piece {
+    pub at: Vec3,
+    /// Towards the camera.
+    pub normal: Vec3,
+    /// From one sample to the next, the shorter way, mm; sine of the angle between normal and sight.
+    pub step: f64,
+    pub lean: f64,
+    /// The point in its middle, and the row of that.
+    pub point: usize,
+    pub row: u32,
+}
+
+/// Pieces of a scan; samples to each side of one; the least of them that must be there, and how flat it is: its thickness over
+/// its width, squared.
+const PIECES: usize = 4000;
+const BESIDE: i64 = 3;
+const MIN_SAMPLES: usize = 24;
+const FLAT: f64 = 0.01;
+/// Pieces that face each other by less than this are not of one surface, cosine.
+const FACING: f64 = 0.9;
+/// Farthest that two scans of one object lie apart, mm.
+pub(super) const FARTHEST: f64 = 5.0;
+
+pub(super) fn pieces(points: &Ordered) -> Vec<Piece> {
+    let stride = points.points.len().div_ceil(PIECES).max(1);
+    (0..points.points.len()).step_by(stride).filter_map(|i| piece(points, i)).collect()
+}
+
+fn piece(points: &Ordered, i: usize) -> Option<Piece> {
+    let (row, column) = (i64::from(points.row[i]), i64::from(points.column[i]));
+    let around: Vec<Vec3> = (-BESIDE..=BESIDE)
+        .flat_map(|r| (-BESIDE..=BESIDE).filter_map(move |c| points.at(row + r, column + c)))
+        .map(|k| points.points[k])
+        .collect();
+    if around.len() < MIN_SAMPLES {
+        return None;
+    }
+    let at = around.iter().sum::<Vec3>() / around.len() as f64;
+    let scatter: Mat3 = around.iter().map(|p| (p - at) * (p - at).transpose()).sum();
+    let eigen = scatter.symmetric_eigen();
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| eigen.eigenvalues[a].total_cmp(&eigen.eigenvalues[b]));
+    if !(eigen.eigenvalues[order[0]] < FLAT * eigen.eigenvalues[order[1]]) {
+        return None;
+    }
+    let normal: Vec3 = eigen.eigenvectors.column(order[0]).into();
+    let sight = points.from_camera[points.row[i] as usize].map_or(normal, |c| (c.translation - at).normalize());
+    let normal = if normal.dot(&sight) < 0.0 { -normal } else { normal };
+    // 2 BESIDE + 1 samples in a line scatter by twice their step.
+    let step = (eigen.eigenvalues[order[1]] / around.len() as f64).sqrt() / 2.0;
+    let lean = normal.cross(&sight).norm();
+    Some(Piece { at, normal, step, lean, point: i, row: points.row[i] })
+}
+
+/// The first scan: some of its pieces in cells, from which the nearest of all its points is walked to.
+pub(super) struct Surface<'a> {
+    points: &'a Ordered,
+    pieces: &'a [Piece],
+    cells: HashMap<[i32; 3], Vec<usize>>,
+}
+
+impl<'a> Surface<'a> {
+    pub fn key(p: &Vec3) -> [i32; 3] {
+        [p.x, p.y, p.z].map(|v| (v / FARTHEST).floor() as i32)
+    }
+    pub fn new(points: &'a Ordered, pieces: &'a [Piece]) -> Surface<'a> {
+        let mut cells = HashMap::<_, Vec<usize>>::new();
+        pieces.iter().enumerate().for_each(|(i, p)| cells.entry(Surface::key(&p.at)).or_default().push(i));
+        Surface { points, pieces, cells }
+    }
+    /// The flat piece about the nearest point within `gate` that faces as `normal`. The pieces in cells lie millimetres apart: a
+    /// plane continued so far leaves a curved surface by more than what is sought.
+    pub fn nearest(&self, p: &Vec3, normal: &Vec3, gate: f64) -> Option<Piece> {
+        let [x, y, z] = Surface::key(p);
+        let around = (-1..=1).flat_map(|a| (-1..=1).flat_map(move |b| (-1..=1).map(move |c| [x + a, y + b, z + c])));
+        let near = around.filter_map(|k| self.cells.get(&k)).flatten().map(|&i| &self.pieces[i]);
+        let close = near.filter(|q| (q.at - p).norm() < gate && faces(q, normal));
+        let from = close.min_by(|a, b| (a.at - p).norm_squared().total_cmp(&(b.at - p).norm_squared()))?;
+        let found = piece(self.points, self.walk(from.point, p)).filter(|q| faces(q, normal));
+        Some(found.unwrap_or(*from))
+    }
+    /// From a point to the nearest one, neighbour by neighbour.
+    fn walk(&self, from: usize, to: &Vec3) -> usize {
+        let off = |i: usize| (self.points.points[i] - to).norm_squared();
+        let mut here = from;
+        loop {
+            let (row, column) = (i64::from(self.points.row[here]), i64::from(self.points.column[here]));
+            let beside = (-BESIDE..=BESIDE)
+                .flat_map(|r| (-BESIDE..=BESIDE).filter_map(move |c| self.points.at(row + r, column + c)));
+            match beside.min_by(|&a, &b| off(a).total_cmp(&off(b))) {
+                Some(next) if off(next) < off(here) => here = next,
+                _ => return here,
+            }
+        }
+    }
+}
+
+fn faces(q: &Piece, normal: &Vec3) -> bool {
+    q.normal.dot(normal).abs() > FACING
+}
