@@ -1,6 +1,9 @@
 //! In: the reference pictures with their truth. Out: how well boards are found and cameras calibrated.
 //! Frame and unit: pixels, mm. Needs SHEETLIGHT_REFERENCE; says so loudly where it is missing.
 
+mod common;
+
+use common::rays::ray_error;
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
 use rayon::prelude::*;
@@ -9,7 +12,7 @@ use sheetlight::calibrate::camera::intrinsics::{Observation, SolveOptions, Solve
 use sheetlight::calibrate::camera::lens::Lens;
 use sheetlight::calibrate::camera::procedure::{CameraOptions, calibrate};
 use sheetlight::camera::{Intrinsics, NAMES};
-use sheetlight::geometry::{Board, Camera, Mat3, Rigid, Vec2, orthonormalise};
+use sheetlight::geometry::{Board, Camera, Rigid, Vec2};
 use sheetlight::raster::Channel;
 use sheetlight::recording::{BoardSpec, Recording};
 use sheetlight::rig::Verdict;
@@ -220,24 +223,6 @@ fn halves_of_real_photographs_differ_by_what_is_stated() {
             assert!((0.8..=most).contains(&stated), "{lens:?} {}: {stated:.2}", NAMES[i]);
         }
     }
-}
-
-/// Rms displacement of viewing rays over the image after the best rotation, px.
-fn ray_error(found: &Intrinsics, truth: &Intrinsics) -> f64 {
-    let mut pairs = Vec::new();
-    for y in (0..480).step_by(8) {
-        for x in (0..640).step_by(8) {
-            let px = Vec2::new(f64::from(x), f64::from(y));
-            pairs.push((found.ray_from_pixel(&px).unwrap().direction, truth.ray_from_pixel(&px).unwrap().direction));
-        }
-    }
-    let m = pairs.iter().map(|(f, t)| t * f.transpose()).sum::<Mat3>();
-    let r = orthonormalise(&m);
-    let sum: f64 = pairs
-        .iter()
-        .map(|(f, t)| (truth.pixel_from_point(&(r * f)).unwrap() - truth.pixel_from_point(t).unwrap()).norm_squared())
-        .sum();
-    (sum / pairs.len() as f64).sqrt()
 }
 
 #[test]

@@ -152,10 +152,8 @@ fn run(name: &str, file: &Path, at: &Path, width: Option<u32>, shots: Option<usi
 
     std::fs::create_dir_all(at.join("cell")).unwrap();
     std::fs::copy(at.join("station/station.toml"), at.join("cell/station.toml")).unwrap();
-    // A tilted sensor is known of whoever bought it.
-    let lens = if rig.camera.sensor_tilt_deg == [0.0; 2] { vec![] } else { vec!["--lens", "scheimpflug"] };
     let verdicts = [
-        calibrate("camera", &of("intrinsics"), &of("cell"), &lens),
+        calibrate("camera", &of("intrinsics"), &of("cell"), &[]),
         calibrate("laser-plane", &of("laserplane"), &of("cell"), &["--on", "cpu"]),
         calibrate("hand-eye", &of("handeye"), &of("cell"), &["--poses", "poses_exact"]),
         // What one recording tells badly the others tell: a long lens' distance, a small field's sheet.

@@ -56,13 +56,15 @@ impl Distortion {
     fn radial(&self, r2: f64) -> Radial {
         let [k1, k2, _, _, k3, k4, k5, k6, ..] = self.0;
         let denominator = 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6));
-        let factor = (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / denominator;
+        // Beyond a pole there is no picture: a solve that tries such a lens must not take it for one.
+        let numerator = if denominator > 0.0 { 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3)) } else { f64::NAN };
+        let factor = numerator / denominator;
         let falls = k4 + r2 * (2.0 * k5 + 3.0 * k6 * r2);
         let slope = (k1 + r2 * (2.0 * k2 + 3.0 * k3 * r2) - factor * falls) / denominator;
         Radial { factor, slope, denominator }
     }
 
-    /// The lens without the sensor's tilt.
+    /// The lens without the sensor's tilt; not a number beyond a pole of the rational factor.
     fn bent(&self, n: &Vec2) -> Vec2 {
         let [_, _, p1, p2, _, _, _, _, s1, s2, s3, s4, ..] = self.0;
         let (x, y) = (n.x, n.y);
@@ -79,10 +81,7 @@ impl Distortion {
         let [_, _, p1, p2, _, _, _, _, s1, s2, s3, s4, ..] = self.0;
         let (x, y) = (n.x, n.y);
         let r2 = x * x + y * y;
-        let Radial { factor, slope, denominator } = self.radial(r2);
-        if denominator <= 0.0 {
-            return Matrix2::repeat(f64::NAN);
-        }
+        let Radial { factor, slope, .. } = self.radial(r2);
         let cross = 2.0 * x * y * slope + 2.0 * p1 * x + 2.0 * p2 * y;
         let (px, py) = (2.0 * (s1 + 2.0 * s2 * r2), 2.0 * (s3 + 2.0 * s4 * r2));
         Matrix2::new(

@@ -7,6 +7,7 @@ pub mod hand_eye;
 pub mod judge;
 pub mod pose;
 pub mod process;
+pub mod rays;
 pub mod sheets;
 pub mod turned;
 

@@ -1,6 +1,7 @@
 //! In: boards' features in pictures. Out: the least-squares problem of camera and boards' poses.
 //! Frame and unit: camera_from_board, mm, rad; px (docs/math.md, Camera calibration).
 
+use super::lens::RATIONAL;
 use crate::calibrate::projection::project;
 use crate::camera::{Intrinsics, PARAMETERS, Parameters};
 use crate::geometry::{Board, Camera, LeftStep, Rigid, Vec2, Vec3};
@@ -11,6 +12,10 @@ pub(in crate::calibrate) type State = (Parameters, Vec<Rigid<Camera, Board>>);
 
 /// One corner: board frame, pixel, sigma.
 pub(in crate::calibrate) type Corner = (Vec3, Vec2, f64);
+
+/// Usual size of the rational terms. Numerator and denominator bend nearly alike: without it a solve walks along what they cancel
+/// until a pole stands at the picture's rim.
+const RATIONAL_SIGMA: f64 = 2.0;
 
 pub(in crate::calibrate) struct Bundle<'a> {
     pub pictures: &'a [Vec<Corner>],
@@ -70,6 +75,9 @@ impl Problem for Bundle<'_> {
                 let (r, [across, down]) = self.row(&camera, pose, corner)?;
                 out.group(&[r.x, r.y], &columns, &[across, down].concat());
             }
+        }
+        for &i in self.free.iter().filter(|i| RATIONAL.contains(i)) {
+            out.prior(&[k[i] / RATIONAL_SIGMA], &[i], &[1.0 / RATIONAL_SIGMA]);
         }
         Some(())
     }

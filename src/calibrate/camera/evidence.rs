@@ -12,6 +12,9 @@ use nalgebra::DVector;
 /// where estimating them would cost accuracy (expected ray error over the image).
 pub(in crate::calibrate) fn by_evidence(fit: &Fit<'_>, solution: &mut Solution<State>, held: &mut Vec<usize>) {
     for block in [&[8][..], &[6, 7], &[5], &[4]] {
+        if block.iter().all(|i| held.contains(i)) {
+            continue;
+        }
         if tells(fit, solution, block) > 4.0 * block.len() as f64 {
             return;
         }

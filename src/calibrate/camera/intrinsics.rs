@@ -4,6 +4,7 @@
 
 use super::bundle::{Corner, State};
 use super::evidence::by_evidence;
+use super::families::by_families;
 use super::fit::Fit;
 use super::lens::Lens;
 use super::zhang::{Seen, first_camera};
@@ -103,12 +104,13 @@ pub fn solve(pictures: &[Observation], width: u32, height: u32, options: &SolveO
     let first = fit.with(&rough, (start.parameters(), poses), coarse);
     let mut solution = fit.fine(&held, first.state);
     if options.lens == Lens::Evidence {
+        by_families(&fit, &mut solution, &mut held);
         by_evidence(&fit, &mut solution, &mut held);
     }
     if solution.stop == Stop::BadStart || solution.state.0.iter().any(|x| !x.is_finite()) {
         return Err(Fault::refused("the camera could not be solved")
-            .cause("the corners contradict each other")
-            .next("look at the pictures and leave out those where the board was misread"));
+            .cause("the corners contradict each other, or do not determine so many lens terms")
+            .next("look at the pictures and leave out those where the board was misread; ask for fewer lens terms (--lens five)"));
     }
     Ok(finish(&fit, solution, held))
 }

@@ -8,7 +8,8 @@ use crate::camera::{LENS, NAMES, SKEW};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr, strum::VariantArray)]
 #[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Lens {
-    /// k1 k2 p1 p2 k3; terms that the pictures do not determine are held at zero and said so.
+    /// k1 k2 p1 p2 k3; terms that the pictures do not determine are held at zero, and one of the families below is taken in where
+    /// pictures that it was not solved from fit better with it. Either is said.
     #[default]
     Evidence,
     /// A pinhole.
@@ -35,7 +36,7 @@ fn unknown(word: &str) -> String {
 }
 
 const BROWN: &[usize] = &[4, 5, 6, 7, 8];
-const RATIONAL: &[usize] = &[9, 10, 11];
+pub(super) const RATIONAL: &[usize] = &[9, 10, 11];
 const PRISM: &[usize] = &[12, 13, 14, 15];
 const TILT: &[usize] = &[16, 17];
 
@@ -59,4 +60,9 @@ impl Lens {
 /// Names of the terms of the plain lens that were held.
 pub fn held_names(held: &[usize]) -> Vec<&'static str> {
     BROWN.iter().filter(|i| held.contains(i)).map(|&i| NAMES[i]).collect()
+}
+
+/// Names of the terms beside the plain lens's that were estimated.
+pub fn further_names(held: &[usize]) -> Vec<&'static str> {
+    [RATIONAL, PRISM, TILT].concat().iter().filter(|i| !held.contains(i)).map(|&i| NAMES[i]).collect()
 }

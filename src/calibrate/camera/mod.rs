@@ -3,6 +3,7 @@
 
 mod bundle;
 mod evidence;
+mod families;
 mod fit;
 pub mod intrinsics;
 pub mod lens;

@@ -3,7 +3,7 @@
 //! Frame and unit: camera frame; pixels, mm, degrees where the name says so.
 
 use super::intrinsics::{Observation, SolveOptions, Solved, solve};
-use super::lens::{Lens, held_names};
+use super::lens::{Lens, further_names, held_names};
 use super::pictures::{Pictures, one_size, pictures};
 use super::quality;
 use super::ray_error::expected_ray_error;
@@ -231,6 +231,7 @@ fn judge(
     evidence.determined(&mut j);
     evidence.fits(&mut j);
     j.reasons.extend(held_parameters(solved, options.solve.lens));
+    j.reasons.extend(further_parameters(solved, options.solve.lens));
     j.reasons.extend(agreed.left_out.iter().map(|(name, why)| format!("{name} was left out: {why}")));
     if let Some((name, id, r)) = worst.first() {
         j.reasons.push(format!("worst corner: {name}, feature {id}, {r:.2} px ({} stand out)", worst.len()));
@@ -335,6 +336,13 @@ fn held_parameters(solved: &Solved, lens: Lens) -> Option<String> {
             if names.len() > 1 { "them" } else { "it" }
         )
     })
+}
+
+/// The terms that the evidence took in, in words.
+fn further_parameters(solved: &Solved, lens: Lens) -> Option<String> {
+    let names = further_names(&solved.held);
+    (lens == Lens::Evidence && !names.is_empty())
+        .then(|| format!("{} estimated too: pictures that were not solved from fit better with them", names.join(", ")))
 }
 
 fn advise(

@@ -32,6 +32,12 @@ fn ray_jacobian(k: &Intrinsics) -> DMatrix<f64> {
     turn.map_or(a.clone(), |t| a - b * t)
 }
 
+/// Rms distance of one camera's viewing rays from another's over the image, px, after the best rotation.
+pub(super) fn rays_apart(a: &Intrinsics, b: &Intrinsics) -> f64 {
+    let moved = ray_jacobian(a) * (b.parameters() - a.parameters());
+    (moved.norm_squared() / (moved.len() as f64 / 2.0)).sqrt()
+}
+
 /// Expected rms displacement of the viewing rays over the image, px, after the best rotation, from
 /// the covariance of the camera's parameters.
 pub fn expected_ray_error(k: &Intrinsics, covariance: &ParameterMatrix) -> f64 {

@@ -30,7 +30,7 @@ pub struct Args {
     /// Station folder that gets the calibration
     #[arg(long)]
     station: PathBuf,
-    /// Lens: evidence (what the pictures determine), none, one (k1), four (k1 k2 p1 p2), five (k3 too),
+    /// Lens: evidence (what the pictures determine, tilt, prism or rational terms too), none, one (k1), four (k1 k2 p1 p2), five (k3 too),
     /// rational (five and k4 k5 k6), prism (five and s1..s4), scheimpflug (k1 k2 k3 and the sensor's tilt),
     /// all (OpenCV's 14 terms)
     #[arg(long, default_value = "evidence", value_parser = crate::cli::terminal::arguments::parse::<Lens>)]
