@@ -259,6 +259,9 @@ fn summary(r: &ScanReport, out: &Path) -> String {
     for (fate, n) in &r.peaks {
         s += &format!("  {:>9} peaks {fate} ({:.2} %)\n", n, 100.0 * *n as f64 / all.max(1) as f64);
     }
+    if r.hot_pixels > 0 {
+        s += &format!("{} pixels of the sensor shine by themselves: their neighbours stand for them\n", r.hot_pixels);
+    }
     if let Some(v) = &r.working_volume {
         s += &format!("points were believed at depths of {v}\n");
     }

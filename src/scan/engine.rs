@@ -2,7 +2,7 @@
 //! or on this machine's processor, with the same results.
 //! Frame and unit: peaks in pixels and grey levels, points in the poses' frame, mm.
 
-use super::{Ambient, Extraction, Format, Place, Processor, Why};
+use super::{Along, Ambient, Extraction, Format, HotPixels, Place, Processor, Why};
 use crate::camera::Intrinsics;
 use crate::fault::Result;
 use crate::geometry::{Camera, Plane};
@@ -54,8 +54,17 @@ type Posed = (u32, Place);
 pub struct StripeSeen {
     /// Medians over the pictures.
     pub stripe: Stripe,
+    /// Pixels of the sensor that shine by themselves.
+    pub hot: HotPixels,
     /// Half of the pictures show a long piece of it.
     pub enough: bool,
+}
+
+impl StripeSeen {
+    /// A stripe that nobody looked for.
+    pub fn assumed(stripe: Stripe) -> StripeSeen {
+        StripeSeen { stripe, hot: HotPixels::default(), enough: false }
+    }
 }
 
 /// A piece of the stripe that tells its width is at least this share of what crosses the picture: beside a part a scan sees
@@ -78,6 +87,7 @@ pub struct Engine {
     asked: Extraction,
     extraction: Extraction,
     width_px: f32,
+    hot: HotPixels,
     pending: Vec<Job>,
     /// `None` runs on this machine's processor, and why.
     device: Option<Device>,
@@ -117,6 +127,7 @@ impl Engine {
             width_px: extraction.peak.width_px,
             asked: extraction.clone(),
             extraction: extraction.clone(),
+            hot: HotPixels::default(),
             pending: Vec::new(),
             device,
             why,
@@ -187,7 +198,8 @@ impl Engine {
         let speckle = median(|s| s.speckle)?;
         let [read_noise, gain] = [median(|s| s.read_noise.unwrap_or(0.0)), median(|s| s.gain.unwrap_or(0.0))];
         let stripe = Stripe { width_px, speckle, noise, read_noise, gain };
-        Some(StripeSeen { stripe, enough: 2 * telling >= images.len() })
+        let hot = HotPixels::find(&images.iter().map(|i| &**i).collect::<Vec<_>>(), noise);
+        Some(StripeSeen { stripe, hot, enough: 2 * telling >= images.len() })
     }
 
     /// Length of a stripe that crosses the region which is looked at, px.
@@ -204,6 +216,11 @@ impl Engine {
         self.extraction = self.asked.clone().for_stripe(stripe);
         self.extraction.peak.check()?;
         self.build()
+    }
+
+    /// In pictures that are submitted from now on these pixels are what stands beside them along the stripe.
+    pub fn set_hot(&mut self, hot: HotPixels) {
+        self.hot = hot;
     }
 
     /// The chain's settings for an extraction: the same on a GPU and without one.
@@ -230,7 +247,8 @@ impl Engine {
     }
 
     /// Takes a picture, and where the camera stood.
-    pub fn submit(&mut self, shot: u32, image: Image, place: Place) -> Result<()> {
+    pub fn submit(&mut self, shot: u32, mut image: Image, place: Place) -> Result<()> {
+        self.hot.fill(&mut image, Along::crossed(self.optics.across()));
         self.pending.push(Job { shot, place, image });
         let usual = match &self.way {
             Some(Way::Gpu(chain)) => chain.frame.shots as usize,

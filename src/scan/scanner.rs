@@ -3,7 +3,7 @@
 //! Frame and unit: points in the carrier's frame (mostly the robot's base), mm (docs/math.md, Stripe peak; the paper's eq. 5 and 6).
 
 use super::engine::{Engine, Measured, Optical, StripeSeen};
-use super::{Along, Ambient, Carrier, CloudPoint, Extraction, Format, Place, Processor, Shot};
+use super::{Along, Ambient, Carrier, CloudPoint, Extraction, Format, HotPixels, Place, Processor, Shot};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Camera, Plane, Rigid, Vec2, Vec3};
@@ -50,6 +50,7 @@ pub struct Scanner {
     /// Held until the stripe is measured.
     waiting: Vec<Shot>,
     stripe: Option<Stripe>,
+    hot: HotPixels,
     /// What the engine is built for: the stripe, or while all was dark the assumed one.
     built: Option<Stripe>,
     support: Option<Support<Place>>,
@@ -88,6 +89,7 @@ impl Scanner {
             extraction: extraction.clone(),
             waiting: Vec::new(),
             stripe: None,
+            hot: HotPixels::default(),
             built: None,
             support: None,
             early: Vec::new(),
@@ -97,8 +99,8 @@ impl Scanner {
     }
 
     /// Goes on with a scan of which an earlier part measured the stripe and began there: what follows from it stays what it was.
-    pub fn resumed(mut self, stripe: Option<Stripe>, first: Option<Rigid<Base, Camera>>) -> Scanner {
-        (self.stripe, self.first) = (stripe, first);
+    pub fn resumed(mut self, stripe: Option<Stripe>, hot: HotPixels, first: Option<Rigid<Base, Camera>>) -> Scanner {
+        (self.stripe, self.hot, self.first) = (stripe, hot, first);
         self
     }
 
@@ -123,7 +125,7 @@ impl Scanner {
             return self.release(stripe);
         }
         if !self.extraction.measure_stripe {
-            return self.settle(self.assumed());
+            return self.settle(StripeSeen::assumed(self.assumed()));
         }
         // Looked at again only when there are twice as many.
         let held = self.waiting.len();
@@ -132,7 +134,7 @@ impl Scanner {
             return Ok(());
         }
         match self.look() {
-            Some(seen) if seen.enough || full => self.settle(seen.stripe),
+            Some(seen) if seen.enough || full => self.settle(seen),
             None if full || self.built.is_some() => self.release(self.assumed()),
             _ => Ok(()),
         }
@@ -144,9 +146,9 @@ impl Scanner {
         self.engine.measure(&images)
     }
 
-    fn settle(&mut self, stripe: Stripe) -> Result<()> {
-        self.stripe = Some(stripe);
-        self.release(stripe)
+    fn settle(&mut self, seen: StripeSeen) -> Result<()> {
+        (self.stripe, self.hot) = (Some(seen.stripe), seen.hot);
+        self.release(seen.stripe)
     }
 
     fn assumed(&self) -> Stripe {
@@ -169,8 +171,9 @@ impl Scanner {
     /// All that is still under way, after the last shot.
     pub fn finish(&mut self) -> Result<Vec<Profile>> {
         if !self.waiting.is_empty() {
-            let stripe = self.stripe.or_else(|| self.look().map(|s| s.stripe)).unwrap_or(self.assumed());
-            self.settle(stripe)?;
+            let known = self.stripe.map(|stripe| StripeSeen { hot: self.hot.clone(), ..StripeSeen::assumed(stripe) });
+            let seen = known.or_else(|| self.look()).unwrap_or(StripeSeen::assumed(self.assumed()));
+            self.settle(seen)?;
         }
         self.stripe = self.stripe.or(self.built);
         self.collect(true)
@@ -179,6 +182,11 @@ impl Scanner {
     /// The stripe's width and speckle, once measured or assumed; a resumed scan needs them.
     pub fn stripe(&self) -> Option<Stripe> {
         self.stripe
+    }
+
+    /// Pixels of the sensor that shine by themselves, once looked for; a resumed scan needs them.
+    pub fn hot(&self) -> &HotPixels {
+        &self.hot
     }
 
     /// The image axis that the stripe runs along.
@@ -223,6 +231,7 @@ impl Scanner {
             self.early = self.collect(true)?;
         }
         self.engine.set_stripe(&stripe)?;
+        self.engine.set_hot(self.hot.clone());
         self.built = Some(stripe);
         let base_from_camera = self.first.expect("a shot was taken");
         let towards = -base_from_camera.direction(&Vec3::z());

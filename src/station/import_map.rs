@@ -68,6 +68,7 @@ pub fn import_map(file: &Path, light: Option<&Path>, stated: &Stated, out: &Path
         points,
         median_sigma_mm: Some(made.sigma_mm),
         stripe: None,
+        hot_pixels: 0,
         seen: Seen::default(),
         peaks: BTreeMap::new(),
         dark_shots: vec![],

@@ -140,6 +140,7 @@ fn stripes(
         && let Some(seen) = engine.measure(&images.iter().collect::<Vec<_>>())
     {
         engine.set_stripe(&seen.stripe)?;
+        engine.set_hot(seen.hot);
     }
     for (i, image) in images.iter().enumerate() {
         engine.submit(i as u32, image.clone(), Place::camera())?;

@@ -7,7 +7,7 @@ use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Camera, Rigid, Vec3};
 use crate::raster::{Image, Pixels};
 use crate::rig::{sealed, unsealed};
-use crate::scan::{CloudWriter, Profile};
+use crate::scan::{CloudWriter, HotPixels, Profile};
 use crate::stages::peak::Stripe;
 use crate::stages::peak::found::Reject;
 use std::collections::BTreeMap;
@@ -33,6 +33,8 @@ pub struct Checkpoint {
     pub cut: u64,
     /// What the first shots said of the stripe.
     pub stripe: Option<Stripe>,
+    /// Pixels that the first shots show to shine by themselves.
+    pub hot: HotPixels,
     /// Where the camera was at the first shot, as rows: from there the map's up and the stripe's axis follow.
     first_place: Option<[f64; 16]>,
     /// Fingerprint of the last shot done, which a resumed scan reads again.
@@ -63,6 +65,7 @@ impl Checkpoint {
             skipped: Vec::new(),
             cut: 0,
             stripe: None,
+            hot: HotPixels::default(),
             first_place: None,
             last_picture: None,
             sigma: vec![0; SIGMA_BINS],

@@ -60,6 +60,9 @@ pub struct ScanReport {
     pub median_sigma_mm: Option<f64>,
     /// Width (px) and speckle of the stripe, measured in the first shots or as set.
     pub stripe: Option<Stripe>,
+    /// Pixels of the sensor that shine by themselves; their neighbours stood for them.
+    #[serde(default)]
+    pub hot_pixels: usize,
     /// Levels of the pictures and where their light lies.
     pub seen: Seen,
     /// From the first shot to the closed cloud.

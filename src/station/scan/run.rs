@@ -189,8 +189,11 @@ impl<'a> Work<'a> {
         let (format, volume) = (source.format(), options.volume.as_ref());
         let carrier = Carrier::new(rig, &options.motion)?;
         let ambient = options.ambient.clone();
-        let scanner = Scanner::new(rig, carrier, format, &options.extraction, volume, ambient, processor)?
-            .resumed(state.stripe, state.first_place());
+        let scanner = Scanner::new(rig, carrier, format, &options.extraction, volume, ambient, processor)?.resumed(
+            state.stripe,
+            state.hot.clone(),
+            state.first_place(),
+        );
         let camera = camera_for(&rig.need_camera()?.value, format)?;
         let seen = Seen::new(&camera, &rig.need_laser_plane()?.value, Volume::depths(volume));
         let print = rig.fingerprint();
@@ -307,6 +310,7 @@ impl<'a> Work<'a> {
 
     fn save(&mut self) -> Result<()> {
         self.state.stripe = self.scanner.stripe();
+        self.state.hot = self.scanner.hot().clone();
         self.state.cut = self.cut_before + self.scanner.cut();
         self.shots.checkpoint()?;
         self.state.save(self.part, &mut self.cloud)
@@ -342,6 +346,7 @@ impl<'a> Work<'a> {
             points,
             median_sigma_mm: state.median_sigma(),
             stripe: scanner.stripe(),
+            hot_pixels: scanner.hot().count(),
             seen: self.seen,
             peaks: state.peaks,
             dark_shots: state.dark,

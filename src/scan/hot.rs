@@ -1,0 +1,154 @@
+//! In: a scan's first pictures. Out: pixels that shine by themselves, and pictures in which their neighbours along the stripe stand for
+//! them. Frame and unit: px; grey levels of the pictures' depth.
+
+use super::Along;
+use crate::raster::{Image, Pixels};
+
+/// Pixels that shine in every picture and whose neighbours do not. On the flank of a wide stripe one moves the centre of two dozen
+/// lines by a tenth of a pixel, in every shot of a flat surface. In rows from the top, each from the left.
+#[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(transparent)]
+pub struct HotPixels(Vec<[u32; 2]>);
+
+/// Pictures that tell a hot pixel from a glint, at least, and the share of them, in quarters, in which it must stand out: a stripe
+/// may lie on it in the others.
+const PICTURES: usize = 3;
+const QUARTERS: usize = 3;
+/// What stands out, over what is beside it: standard deviations of a dark pixel, share of full scale.
+const SIGMAS: f32 = 8.0;
+const SHARE: f32 = 0.02;
+/// More are no sensor's: what is looked at is not a stripe in the dark. Per million.
+const MOST: usize = 10_000;
+
+impl HotPixels {
+    /// Those of pictures whose dark pixels scatter by `noise` grey levels of an 8-bit picture. Empty for fewer than three pictures:
+    /// in one alone a speck of light on the part looks the same.
+    pub fn find(pictures: &[&Image], noise: f32) -> HotPixels {
+        let Some((first, others)) = pictures.split_first() else { return HotPixels::default() };
+        if pictures.len() < PICTURES {
+            return HotPixels::default();
+        }
+        let full = f32::from(first.full_scale());
+        let over = (SHARE * full).max(SIGMAS * noise * full / 255.0).ceil() as u32;
+        // Two pictures: where a stripe lies on it in the one it may not in the other.
+        let mut found = standing_out(first, over);
+        found.extend(standing_out(others[others.len() - 1], over));
+        found.sort_unstable_by_key(|[x, y]| (*y, *x));
+        found.dedup();
+        let needed = (QUARTERS * pictures.len()).div_ceil(4);
+        found.retain(|p| pictures.iter().filter(|i| stands_out(i, *p, over)).count() >= needed);
+        let most = MOST * first.pixel_count() / 1_000_000;
+        HotPixels(if found.len() > most { Vec::new() } else { found })
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Puts the mean of the two neighbours along the stripe in their places; of one that is hot itself the other one's. Pixels beyond
+    /// the picture are passed over.
+    pub fn fill(&self, image: &mut Image, along: Along) {
+        let (w, h) = (image.width, image.height);
+        for &[x, y] in &self.0 {
+            if x == 0 || y == 0 || x + 1 >= w || y + 1 >= h {
+                continue;
+            }
+            let beside = match along {
+                Along::U => [[x - 1, y], [x + 1, y]],
+                Along::V => [[x, y - 1], [x, y + 1]],
+            };
+            let good = |p: &[u32; 2]| self.0.binary_search_by_key(&(p[1], p[0]), |q| (q[1], q[0])).is_err();
+            let level = |p: &[u32; 2]| u32::from(image.get(p[0], p[1]));
+            let levels: Vec<u32> = beside.iter().filter(|p| good(p)).map(level).collect();
+            // Both hot: what stands there is no worse than either.
+            let Some(mean) = levels.iter().sum::<u32>().checked_div(levels.len() as u32) else { continue };
+            let i = (y * w + x) as usize;
+            match &mut image.pixels {
+                Pixels::U8(p) => p[i] = mean as u8,
+                Pixels::U16(p) => p[i] = mean as u16,
+            }
+        }
+    }
+}
+
+/// All pixels of a picture that stand out.
+fn standing_out(image: &Image, over: u32) -> Vec<[u32; 2]> {
+    let (w, h) = (image.width, image.height);
+    if w < 3 || h < 3 {
+        return Vec::new();
+    }
+    let mut out = Vec::new();
+    for y in 1..h - 1 {
+        let row = (y * w) as usize;
+        let bright = |x: &usize| match &image.pixels {
+            Pixels::U8(p) => u32::from(p[row + x]) >= over,
+            Pixels::U16(p) => u32::from(p[row + x]) >= over,
+        };
+        let those = (1..w as usize - 1).filter(bright).map(|x| [x as u32, y]);
+        out.extend(those.filter(|p| stands_out(image, *p, over)));
+    }
+    out
+}
+
+/// Brighter by so much than all its neighbours but one (hot pixels come in pairs), and more than twice as bright over the darkest as
+/// they are: a grain of speckle has others beside it.
+fn stands_out(image: &Image, [x, y]: [u32; 2], over: u32) -> bool {
+    let here = u32::from(image.get(x, y));
+    let (mut dark, mut first, mut second) = (u32::MAX, 0, 0);
+    for (dx, dy) in [(0, 0), (1, 0), (2, 0), (0, 1), (2, 1), (0, 2), (1, 2), (2, 2)] {
+        let level = u32::from(image.get(x + dx - 1, y + dy - 1));
+        dark = dark.min(level);
+        if level > first {
+            (first, second) = (level, first);
+        } else {
+            second = second.max(level);
+        }
+    }
+    here >= second + over && here - dark > 2 * (second - dark)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{Rng, SeedableRng};
+
+    /// A stripe that moves over a noisy sensor with hot pixels, one of them on its way, two beside each other.
+    fn pictures(hot: &[[u32; 2]], along: Along) -> Vec<Image> {
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(1);
+        (0..8)
+            .map(|k| {
+                let level = |x: u32, y: u32| {
+                    let across = if along == Along::U { y } else { x };
+                    let d = f64::from(across) - 20.0 - 2.0 * f64::from(k);
+                    let light = 180.0 * (-0.5 * (d / 3.0).powi(2)).exp() * rng.random_range(0.7..1.3);
+                    let own = if hot.contains(&[x, y]) { 90.0 } else { 0.0 };
+                    (light + own + rng.random_range(0.0..6.0)).min(255.0) as u8
+                };
+                let pixels = (0..64 * 48).map(|i| (i % 64, i / 64)).map({
+                    let mut level = level;
+                    move |(x, y)| level(x, y)
+                });
+                Image::from_u8(64, 48, pixels.collect())
+            })
+            .collect()
+    }
+
+    #[test]
+    fn pixels_that_shine_by_themselves_are_found_and_the_stripe_is_not() {
+        for along in [Along::U, Along::V] {
+            let hot = [[5, 40], [40, 5], [41, 5], [50, 28], [28, 44]];
+            let seen = pictures(&hot, along);
+            let all: Vec<&Image> = seen.iter().collect();
+            let found = HotPixels::find(&all, 2.0);
+            assert!([[5, 40], [40, 5], [41, 5]].iter().all(|p| found.0.contains(p)), "{found:?}");
+            assert!(found.0.iter().all(|p| hot.contains(p)), "{found:?}");
+            let mut image = seen[0].clone();
+            found.fill(&mut image, along);
+            assert!([[5, 40], [40, 5], [41, 5]].iter().all(|p| image.get(p[0], p[1]) < 8));
+            assert!(HotPixels::find(&all[..2], 2.0).0.is_empty(), "two pictures tell nothing");
+            let none = pictures(&[], along);
+            assert!(HotPixels::find(&none.iter().collect::<Vec<_>>(), 2.0).0.is_empty());
+        }
+    }
+}
