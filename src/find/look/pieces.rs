@@ -79,12 +79,16 @@ impl<'a> Surface<'a> {
     }
     /// The flat piece about the nearest point within `gate` that faces as `normal`. The pieces in cells lie millimetres apart: a
     /// plane continued so far leaves a curved surface by more than what is sought.
-    pub fn nearest(&self, p: &Vec3, normal: &Vec3, gate: f64) -> Option<Piece> {
+    /// `among_all` false stops at the nearest of some pieces: from afar that pulls over a wider range.
+    pub fn nearest(&self, p: &Vec3, normal: &Vec3, gate: f64, among_all: bool) -> Option<Piece> {
         let [x, y, z] = Surface::key(p);
         let around = (-1..=1).flat_map(|a| (-1..=1).flat_map(move |b| (-1..=1).map(move |c| [x + a, y + b, z + c])));
         let near = around.filter_map(|k| self.cells.get(&k)).flatten().map(|&i| &self.pieces[i]);
         let close = near.filter(|q| (q.at - p).norm() < gate && faces(q, normal));
         let from = close.min_by(|a, b| (a.at - p).norm_squared().total_cmp(&(b.at - p).norm_squared()))?;
+        if !among_all {
+            return Some(*from);
+        }
         let found = piece(self.points, self.walk(from.point, p)).filter(|q| faces(q, normal));
         Some(found.unwrap_or(*from))
     }

@@ -11,6 +11,7 @@ use crate::find::measure::points::Ordered;
 use crate::geometry::{Base, Part, Rigid, Vec3, exp};
 use crate::rig::Rig;
 use nalgebra::{Matrix6, SVector};
+use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
 
 type Vector6 = SVector<f64, 6>;
@@ -52,7 +53,14 @@ const LEVEL_BIAS: f64 = 0.01;
 const LEAN_BIAS: f64 = 0.07;
 /// Directions to a unit of a normal's length that are told apart.
 const FACINGS: f64 = 2.0;
+/// Rounds of one way to the optimum.
 const ROUNDS: i32 = 25;
+/// Where the ways begin, mm in x and y: surfaces of several directions have optima beside the right one.
+const STARTS: [[f64; 2]; 5] = [[0.0, 0.0], [2.0, 0.0], [-2.0, 0.0], [0.0, 2.0], [0.0, -2.0]];
+/// Of them, those that take the nearest of some pieces: from afar that pulls over a wider range.
+const COARSE: i32 = 15;
+/// Reach for a partner that the rounds end with, mm.
+const NEAREST: f64 = 1.5;
 const TUKEY: f64 = 4.0;
 
 /// A place with the normal along which a shift of it is seen.
@@ -97,30 +105,41 @@ fn scatter<K: Ord>(pairs: &[Pair], by: impl Fn(&Pair) -> K, score: impl Fn(&Pair
     scores.values().map(|g| g * g.transpose()).sum()
 }
 
-/// Brings pieces onto those of the first scan, point to plane [chen92]; what no surface tells stays where it is.
-fn fit(first: &Surface, moving: &[Piece], centre: &Vec3) -> Option<Fit> {
-    let mut step = Vector6::zeros();
+/// What the pieces of a scan say where it is brought to by this step.
+fn pairs(first: &Surface, moving: &[Piece], centre: &Vec3, step: &Vector6, gate: f64, among_all: bool) -> Vec<Pair> {
+    let turn = exp(&Vec3::new(step[3], step[4], step[5]));
+    let shift = Vec3::new(step[0], step[1], step[2]);
+    let pair = |p: &Piece| {
+        let at = centre + turn * (p.at - centre) + shift;
+        let q = first.nearest(&at, &(turn * p.normal), gate, among_all)?;
+        Some(Pair {
+            row: row(&at, &q.normal, centre),
+            off: -q.normal.dot(&(at - q.at)),
+            shots: [p.row, q.row],
+            cell: Surface::key(&q.at),
+            facing: (q.normal * FACINGS).map(|v| v.round() as i32).into(),
+            step: q.step,
+            lean: q.lean,
+        })
+    };
+    moving.par_iter().filter_map(pair).collect()
+}
+
+/// One way to an optimum.
+struct Way {
+    step: Vector6,
+    inverse: Matrix6<f64>,
+    pairs: Vec<Pair>,
+    sigma: f64,
+}
+
+/// Brings pieces onto those of the first scan, point to plane [chen92]; what no surface tells stays where it is. `coarse` rounds take
+/// the nearest of some pieces.
+fn walk(first: &Surface, moving: &[Piece], centre: &Vec3, mut step: Vector6, coarse: i32) -> Option<Way> {
     let mut last = None;
     for round in 0..ROUNDS {
-        let gate = (FARTHEST * 0.8f64.powi(round)).max(0.3 * FARTHEST);
-        let turn = exp(&Vec3::new(step[3], step[4], step[5]));
-        let shift = Vec3::new(step[0], step[1], step[2]);
-        let pairs: Vec<Pair> = moving
-            .iter()
-            .filter_map(|p| {
-                let at = centre + turn * (p.at - centre) + shift;
-                let q = first.nearest(&at, &(turn * p.normal), gate)?;
-                Some(Pair {
-                    row: row(&at, &q.normal, centre),
-                    off: -q.normal.dot(&(at - q.at)),
-                    shots: [p.row, q.row],
-                    cell: Surface::key(&q.at),
-                    facing: (q.normal * FACINGS).map(|v| v.round() as i32).into(),
-                    step: q.step,
-                    lean: q.lean,
-                })
-            })
-            .collect();
+        let gate = (FARTHEST * 0.8f64.powi(round)).max(NEAREST);
+        let pairs = pairs(first, moving, centre, &step, gate, round >= coarse);
         if pairs.len() < MIN_MATCHED {
             return None;
         }
@@ -135,9 +154,24 @@ fn fit(first: &Surface, moving: &[Piece], centre: &Vec3) -> Option<Fit> {
         }
         let inverse = normal.try_inverse()?;
         step += inverse * right;
-        last = Some((inverse, pairs, sigma));
+        last = Some(Way { step, inverse, pairs, sigma });
     }
-    let (inverse, pairs, sigma) = last?;
+    last
+}
+
+/// The best of the ways from several starts: that on which the least is left of all pieces' distances, those without a partner counted
+/// as far off, at the scale of the way that fits best.
+fn fit(first: &Surface, moving: &[Piece], centre: &Vec3) -> Option<Fit> {
+    let start = |[x, y]: [f64; 2]| Vector6::new(x, y, 0.0, 0.0, 0.0, 0.0);
+    let mut ways: Vec<Way> = STARTS.iter().filter_map(|&s| walk(first, moving, centre, start(s), COARSE)).collect();
+    ways.extend(walk(first, moving, centre, start([0.0; 2]), 0));
+    let scale = TUKEY * ways.iter().map(|w| w.sigma).min_by(f64::total_cmp)?;
+    let left = |w: &Way| {
+        let near: f64 = w.pairs.iter().map(|p| 1.0 - (p.off / scale).powi(2).min(1.0)).sum();
+        moving.len() as f64 - near
+    };
+    let way = ways.into_iter().min_by(|a, b| left(a).total_cmp(&left(b)))?;
+    let Way { step, inverse, pairs, sigma } = way;
     // Pieces of one shot share its pose's error, in either scan; those of one place share what its slope and its edges do to a
     // stripe's centre.
     let middle = clustered(&pairs, sigma, |p| p.shots[0])
