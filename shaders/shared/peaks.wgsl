@@ -12,7 +12,6 @@ struct PeakFrame {
     speckle2: f32,
     along_factor: f32,
     reach_along: i32,
-    stride_across: i32,
     lattice_u: i32,
     lattice_v: i32,
     stride: i32,

@@ -180,8 +180,7 @@ fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
     let right = select(x0 + frame.reach_along, left + 4 * frame.fours - 1, fours);
     let begin = max(left, 0);
     let end = min(right, width - 1);
-    let stride = frame.stride_across;
-    let tall = stride * frame.rows;
+    let tall = frame.rows;
     let nb = select(n.x, n.y, columns);
     let last = select(end, end & -4, fours);
     let across = u32(tall) * select(1u, frame.pitch << px_log2, columns);
@@ -190,7 +189,7 @@ fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
     let first_shift = shift(w, begin);
     let last_shift = shift(w, last);
     let low = -floor_div(y0 + min(first_shift, last_shift), tall);
-    let high = floor_div(height - 1 - max(first_shift, last_shift) - y0 - (tall - stride), tall);
+    let high = floor_div(height - 1 - max(first_shift, last_shift) - y0 - (tall - 1), tall);
     let size = select(1, 4, fours);
     // Samples are pixels side by side.
     let by_words = px_log2 == 2u && !columns && tall == 1;
@@ -202,7 +201,7 @@ fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
     clear_quad(5); clear_quad(6); clear_quad(7); clear_quad(8); clear_quad(9);
     for (var round = 0; round < 2; round++) {
         moments = vec4(0.0);
-        for (var row = 0; row < tall; row += stride) {
+        for (var row = 0; row < tall; row++) {
             for (var a = select(begin, end + 1, by_words); a <= end; a += 3 * size) {
                 groups = array(group(w, a, row), group(w, a + size, row), group(w, a + 2 * size, row));
                 moments += (groups[0].moments + groups[1].moments) + groups[2].moments;

@@ -34,8 +34,6 @@ pub struct PeakFrame {
     pub along_factor: f32,
     /// Half window along the stripe, px.
     pub reach_along: i32,
-    /// Step of the profile's samples across the stripe, px: a stripe wider than 8 px has light to spare.
-    pub stride_across: i32,
     /// Spacing of the grey levels that the direction is taken from along the picture's axes, px.
     pub lattice_u: i32,
     /// The same along the columns.
@@ -70,7 +68,7 @@ pub struct PeakFrame {
     pub fours: i32,
     /// Half of a profile that stands upright, samples.
     pub half_across: f32,
-    /// Rows of a sample of the profile, each `stride_across` from the next.
+    /// Rows of a sample of the profile, beside each other.
     pub rows: i32,
     /// Turn of the direction that was seen, rad: times sine of twice its angle.
     pub turn_2: f32,
@@ -90,7 +88,7 @@ pub struct PeakFrame {
 
 /// WGSL name, members and bytes of [`PeakFrame`], for the contract tests.
 pub const UNIFORM: (&str, &[Field], usize) = crate::stages::frame::uniform_fields!(PeakFrame: width, height, pitch, shot_words, s0, full_scale,
-    read2, gain, speckle2, along_factor, reach_along, stride_across, lattice_u, lattice_v, stride, steps, faintest, narrowest,
+    read2, gain, speckle2, along_factor, reach_along, lattice_u, lattice_v, stride, steps, faintest, narrowest,
     widest, uncertain, upright, across_u, across_v, lines, columns, entries,
     line_px, fours, half_across,
     rows, turn_2, turn_4, turn_6, turn_8, square_4, square_8, flat);
@@ -129,9 +127,9 @@ impl PeakFrame {
         let [turn_2, turn_4, turn_6, turn_8] = turn(s0, lattice, [2.0, 4.0, 6.0, 8.0], FLAT + 0.05, !columns);
         let square = (lattice_across, lattice_across);
         let [square_4, square_8] = turn(s0, square, [4.0, 8.0], std::f64::consts::FRAC_PI_4, false);
-        let stride_across = (0.25 * s0).floor().max(1.0);
-        // Rows within 0.4 widths are one sample: their spread is known and costs little of sigma.
-        let rows = (0.4 * s0 / stride_across).floor().max(1.0);
+        // Rows within 0.4 widths are one sample: their spread is known and costs little of sigma. More than two leave so few samples
+        // that their scatter says little of the noise.
+        let rows = (0.4 * s0).floor().clamp(1.0, 2.0);
         PeakFrame {
             width: width as i32,
             height: height as i32,
@@ -145,10 +143,10 @@ impl PeakFrame {
             // One line across the stripe needs no fading.
             along_factor: if p.along > 0.0 { 1.0 / (radius * radius) } else { 0.0 },
             reach_along,
-            stride_across: stride_across as i32,
             lattice_u: lattice.0,
             lattice_v: lattice.1,
-            stride: (0.7 * s0).round().max(1.0) as i32,
+            // A level that is less sure than a sample of the profile makes the fit look worse than it is.
+            stride: (0.7 * s0).round().clamp(1.0, 2.0) as i32,
             steps: p.steps,
             faintest: c.faintest * scale,
             narrowest: c.narrowest * s0,
@@ -165,7 +163,7 @@ impl PeakFrame {
             // 99 % of the weight, shall be there on the shorter side as well.
             fours: if reach_along >= 4 { (0.415 * radius + 1.5) as i32 } else { 0 },
             // The fit looks at three widths; the skeleton is a pixel beside the centre.
-            half_across: (4.0 * s0).min(3.0 * s0 + 1.0) / (stride_across * rows),
+            half_across: (4.0 * s0).min(3.0 * s0 + 1.0) / rows,
             rows: rows as i32,
             turn_2,
             turn_4,

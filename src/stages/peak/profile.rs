@@ -188,11 +188,11 @@ impl Profiles {
         let (begin, end) = (left.max(0), right.min(width - 1));
         let fade = s.along_factor / (nb * nb);
         let mut window = Window { columns, a0, b0, na, nb, begin, end, middle, fade, from: 0, to: 0 };
-        let (stride, tall) = (s.stride_across, s.stride_across * s.rows);
+        let tall = s.rows;
         let (first, last) = (window.shift(begin), window.shift(end & mask));
         // Samples whose rows all lie in the picture.
         let low = -(b0 + first.min(last)).div_euclid(tall);
-        let high = (height - 1 - first.max(last) - b0 - (tall - stride)).div_euclid(tall);
+        let high = (height - 1 - first.max(last) - b0 - (tall - 1)).div_euclid(tall);
         let half = self.half as i32;
         (window.from, window.to) = ((-half).max(low), half.min(high + 1));
         let none = [0.0; SAMPLES];
@@ -200,9 +200,9 @@ impl Profiles {
         let full_scale = s.full_scale as i32;
         for row in 0..s.rows {
             if fours {
-                seen.fours(place.image, &window, row * stride, tall, half, full_scale);
+                seen.fours(place.image, &window, row, tall, half, full_scale);
             } else {
-                seen.singles(place.image, &window, row * stride, tall, half, full_scale);
+                seen.singles(place.image, &window, row, tall, half, full_scale);
             }
         }
         let (sum, mean, scale) = (seen.sum, seen.moment / seen.sum, 1.0 / seen.sum);
