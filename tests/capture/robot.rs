@@ -8,7 +8,11 @@ use sheetlight::bcap::{Call, Client, ClientOptions, Handle, Network, Variant};
 use sheetlight::cell::{Cell, CellOptions, Served};
 use sheetlight::recording::Recording;
 use sheetlight::simulate::{RigSpec, SceneSpec};
+use std::io::{ErrorKind, Read, Write};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::process::{Child, Command, Stdio};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
 use std::time::{Duration, Instant};
 
 /// A cell in real time with a small camera, lasers on, motor on.
@@ -136,6 +140,89 @@ fn pictures_of_a_robot_that_moved_are_refused_and_those_at_rest_are_paired() {
     assert!(off < 0.1, "{off}");
     assert!(wrongly * 10 <= moved.len(), "{wrongly} of {}", moved.len());
     assert!(poses.iter().any(|p| (p.translation.x - mover.2[0] - 15.0).abs() < 0.01), "it stood at both ends");
+}
+
+/// A wire that can be cut: what comes in on its own port goes on to the robot's, while it is whole.
+struct Wire {
+    port: u16,
+    whole: Arc<AtomicBool>,
+}
+
+impl Wire {
+    fn to(robot: SocketAddr) -> Wire {
+        let entry = TcpListener::bind("127.0.0.1:0").unwrap();
+        let (port, whole) = (entry.local_addr().unwrap().port(), Arc::new(AtomicBool::new(true)));
+        let is = whole.clone();
+        std::thread::spawn(move || {
+            for near in entry.incoming().map_while(Result::ok) {
+                // A cut wire's other end: whoever calls is not heard.
+                if !is.load(SeqCst) {
+                    continue;
+                }
+                let far = TcpStream::connect(robot).unwrap();
+                for (from, to) in [(&near, &far), (&far, &near)] {
+                    let (mut from, mut to, is) = (from.try_clone().unwrap(), to.try_clone().unwrap(), is.clone());
+                    from.set_read_timeout(Some(Duration::from_millis(20))).unwrap();
+                    std::thread::spawn(move || {
+                        let mut bytes = [0; 4096];
+                        while is.load(SeqCst) {
+                            match from.read(&mut bytes) {
+                                Ok(0) => break,
+                                Ok(n) if to.write_all(&bytes[..n]).is_err() => break,
+                                Ok(_) => {}
+                                Err(e) if matches!(e.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut) => {}
+                                Err(_) => break,
+                            }
+                        }
+                        let _ = to.shutdown(Shutdown::Both);
+                    });
+                }
+            }
+        });
+        Wire { port, whole }
+    }
+}
+
+#[test]
+fn a_recording_goes_on_when_the_robots_wire_was_cut_and_mended() {
+    let served = cell(|_| {});
+    let wire = Wire::to(served.robot);
+    let dir = tempfile::tempdir().unwrap();
+    let (out, camera) = (dir.path().join("cut"), format!("cell://{}?rate=20", served.camera));
+    let robot = served.robot_uri().replace(&served.robot.port().to_string(), &wire.port.to_string());
+    let to = text(&out);
+    let record = spawn(&[
+        "record",
+        "--camera",
+        &camera,
+        "--pair",
+        "step",
+        "--pose-stream",
+        &robot,
+        "--seconds",
+        "8",
+        "--out",
+        &to,
+        "--json",
+    ]);
+    std::thread::sleep(Duration::from_secs(3));
+    let cut = served.cell.clock().now();
+    wire.whole.store(false, SeqCst);
+    std::thread::sleep(Duration::from_millis(1500));
+    let mended = served.cell.clock().now();
+    wire.whole.store(true, SeqCst);
+    let done = record.wait_with_output().unwrap();
+    let (report, said) = (String::from_utf8_lossy(&done.stdout), String::from_utf8_lossy(&done.stderr));
+    println!("{report}\n{said}");
+    assert!(done.status.success(), "{said}");
+    let recording = Recording::open(&out).unwrap();
+    let moments: Vec<f64> =
+        recording.meta.frames.iter().map(|f| f.taken.as_ref().unwrap().device_ns.unwrap() as f64 * 1e-9).collect();
+    let count = |from: f64, to: f64| moments.iter().filter(|t| (from..to).contains(*t)).count();
+    let (before, between, after) = (count(0.0, cut), count(cut + 0.2, mended - 0.1), count(mended, f64::INFINITY));
+    println!("{before} pictures before the cut, {between} while it was cut, {after} after it was mended");
+    assert!(before >= 10 && after >= 10, "{before} {after}");
+    assert!(between == 0, "no pose was told then: {between}");
 }
 
 #[test]
