@@ -29,8 +29,13 @@ impl Bench {
     fn new() -> Bench {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("sim").to_str().unwrap().to_owned();
-        let shots = SHOTS.to_string();
-        sheetlight(&["simulate", "--out", &out, "--width", "320", "--shots", &shots, "--quiet"]);
+        let (shots, rig) = (SHOTS.to_string(), dir.path().join("rig.toml"));
+        // Hundreds of hot pixels: what the first shots say of the sensor has to last over a resume.
+        let paper = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/data/rigs/paper.toml")).unwrap();
+        assert!(paper.contains("[sensor]"));
+        std::fs::write(&rig, paper.replace("[sensor]", "[sensor]\nhot_per_million = 5000")).unwrap();
+        let rig = rig.to_str().unwrap();
+        sheetlight(&["simulate", "--rig", rig, "--out", &out, "--width", "320", "--shots", &shots, "--quiet"]);
         Bench { dir }
     }
     fn at(&self, name: &str) -> PathBuf {
@@ -47,6 +52,9 @@ impl Bench {
     fn whole(&self) -> Vec<CloudPoint> {
         let args = self.command("whole", &[]);
         sheetlight(&args.iter().map(String::as_str).collect::<Vec<_>>());
+        let report = std::fs::read_to_string(self.at("whole/scan.json")).unwrap();
+        let hot = serde_json::from_str::<serde_json::Value>(&report).unwrap()["hot_pixels"].as_u64().unwrap();
+        assert!(hot > 50, "{hot} hot pixels found of 384");
         read_cloud(&self.at("whole/cloud.ply")).unwrap()
     }
     fn resumed(&self, out: &str) -> Vec<CloudPoint> {
