@@ -69,6 +69,12 @@ fn spawn(args: &[&str]) -> Child {
     Command::new(program).args(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
+/// A recording of a camera, each picture paired with what the robot tells.
+fn record(pair: &str, camera: &str, robot: &str, seconds: &str, out: &str) -> Child {
+    let paired = ["record", "--camera", camera, "--pair", pair, "--pose-stream", robot];
+    spawn(&[&paired[..], &["--seconds", seconds, "--out", out, "--json"]].concat())
+}
+
 fn recorded(child: Child) -> serde_json::Value {
     let done = child.wait_with_output().unwrap();
     assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
@@ -82,20 +88,7 @@ fn pictures_of_a_robot_that_moved_are_refused_and_those_at_rest_are_paired() {
     let (out, camera, robot) =
         (dir.path().join("step"), format!("cell://{}?rate=20", served.camera), served.robot_uri());
     let to = text(&out);
-    let record = spawn(&[
-        "record",
-        "--camera",
-        &camera,
-        "--pair",
-        "step",
-        "--pose-stream",
-        &robot,
-        "--seconds",
-        "6",
-        "--out",
-        &to,
-        "--json",
-    ]);
+    let record = record("step", &camera, &robot, "6", &to);
     let (mut mover, begun) = (Mover::new(&served), Instant::now());
     // Half a second's rest, a way at 20 mm/s or so, and back.
     let mut side = 0.0;
@@ -191,20 +184,7 @@ fn a_recording_goes_on_when_the_robots_wire_was_cut_and_mended() {
     let (out, camera) = (dir.path().join("cut"), format!("cell://{}?rate=20", served.camera));
     let robot = served.robot_uri().replace(&served.robot.port().to_string(), &wire.port.to_string());
     let to = text(&out);
-    let record = spawn(&[
-        "record",
-        "--camera",
-        &camera,
-        "--pair",
-        "step",
-        "--pose-stream",
-        &robot,
-        "--seconds",
-        "8",
-        "--out",
-        &to,
-        "--json",
-    ]);
+    let record = record("step", &camera, &robot, "8", &to);
     std::thread::sleep(Duration::from_secs(3));
     let cut = served.cell.clock().now();
     wire.whole.store(false, SeqCst);
@@ -243,20 +223,7 @@ fn a_delay_between_camera_and_controller_is_found_and_belongs_to_both() {
     let mut mover = Mover::new(&served);
     mover.to(-35.0, 5.0);
     let (seconds, passed) = ("60", at("passed"));
-    let record = spawn(&[
-        "record",
-        "--camera",
-        &camera,
-        "--pair",
-        "clock",
-        "--pose-stream",
-        &robot,
-        "--seconds",
-        seconds,
-        "--out",
-        &passed,
-        "--json",
-    ]);
+    let record = record("clock", &camera, &robot, seconds, &passed);
     let begun = Instant::now();
     let mut side = -35.0;
     while begun.elapsed().as_secs_f64() < seconds.parse::<f64>().unwrap() + 0.5 {
