@@ -15,6 +15,14 @@ override peak_method: u32 = 0u;
 
 // Samples for which the noise model counts.
 const BELIEF = 10.0;
+// Directions that are taken in turn beside a border.
+const BORDER_STEPS = 2u;
+// Share of a stripe's direction that leads out of the picture, from which on it leaves there.
+const LEAVES = 0.3;
+// Variances of a pixel by as many pixels a side that two sides of one level differ by, squared.
+const BY_NOISE = 8.0;
+// Share of the amplitude that sides of different levels are doubted by at most.
+const UNEVEN = 0.06;
 // Grey levels that are no light, but whose square is no denormal number: those take a CPU many times as long.
 const DARK = 1e-9;
 // Share of a number's information that is left at least where another number explains it.
@@ -90,7 +98,7 @@ fn turn_of(sc: vec2<f32>, c: vec4<f32>) -> f32 {
 }
 
 // Across the stripe; what so far differences make of the direction is put right.
-fn direction(x: i32, y: i32) -> vec2<f32> {
+fn direction_at(x: i32, y: i32) -> vec2<f32> {
     var t = tensor(x, y, frame.lattice_u, frame.lattice_v);
     let seen = twice(t);
     var turn = turn_of(seen, vec4(frame.turn_2, frame.turn_4, frame.turn_6, frame.turn_8));
@@ -110,6 +118,34 @@ fn direction(x: i32, y: i32) -> vec2<f32> {
     return select(vec2(sign * n.x / length, sign * n.y / length), vec2(0.0, 1.0), sqrt(m.x * m.x + m.y * m.y) < 1e-9);
 }
 
+// The next place along the stripe whose differences lie in the picture.
+fn inward(x: i32, y: i32, n: vec2<f32>) -> vec2<i32> {
+    let reach = 3 * max(frame.lattice_u, frame.lattice_v);
+    let du = max(min(x, frame.width - 1 - reach), reach) - x;
+    let dv = max(min(y, frame.height - 1 - reach), reach) - y;
+    let t = vec2(n.y, -n.x);
+    let by_u = select(0.0, f32(du) / t.x, abs(t.x) >= LEAVES);
+    let by_v = select(0.0, f32(dv) / t.y, abs(t.y) >= LEAVES);
+    let along = select(by_v, by_u, abs(by_u) >= abs(by_v));
+    // Not 0.5: rounding would decide.
+    return vec2(x + i32(floor(along * t.x + 0.47)), y + i32(floor(along * t.y + 0.47)));
+}
+
+// Beside the picture's border that of the stripe's next piece whose differences lie in the picture.
+fn direction(x: i32, y: i32) -> vec2<f32> {
+    var n = direction_at(x, y);
+    for (var i = 0u; i < BORDER_STEPS; i++) {
+        let inner = inward(x, y, n);
+        if all(inner == vec2(x, y)) {
+            break;
+        }
+        n = direction_at(inner.x, inner.y);
+    }
+    return n;
+}
+
+// Square of what the two sides' levels differ by beyond their noise.
+var<private> uneven2: f32;
 fn background(x: i32, y: i32, n: vec2<f32>) -> f32 {
     let start = i32(floor(4.0 * frame.s0 + 0.5));
     let end = start + max(i32(floor(2.0 * frame.s0 + 0.5)), 2);
@@ -127,7 +163,10 @@ fn background(x: i32, y: i32, n: vec2<f32>) -> f32 {
         high += (level(x + du, y + dv) + level(x + tu + du, y + tv + dv)) + level(x - tu + du, y - tv + dv);
         count += 3.0;
     }
-    return min(low, high) / count;
+    let darker = min(low, high) / count;
+    let apart = (high - low) / count;
+    uneven2 = max(apart * apart - BY_NOISE * (frame.read2 + frame.gain * darker) / count, 0.0);
+    return darker;
 }
 
 // Light above the background, by pairs of samples, and the samples that take part.
@@ -274,7 +313,8 @@ fn gaussian(at: vec2<i32>) -> Peak {
     window_pair(0); window_pair(1); window_pair(2); window_pair(3); window_pair(4); window_pair(5); window_pair(6);
     window_pair(7); window_pair(8); window_pair(9); window_pair(10); window_pair(11); window_pair(12); window_pair(13);
     window_pair(14); window_pair(15); window_pair(16); window_pair(17); window_pair(18); window_pair(19);
-    quiet = frame.read2 + frame.gain * base;
+    let doubt = UNEVEN * a;
+    quiet = (frame.read2 + frame.gain * base) + min(uneven2, doubt * doubt);
     gain = frame.gain;
     speckle2 = frame.speckle2;
     ceiling = frame.full_scale - base;

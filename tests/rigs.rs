@@ -3,6 +3,8 @@
 //! Frame and unit: scene frame of the simulated scan, mm; errors also in pixel footprints of the rig.
 
 mod common;
+#[path = "rigs/drawn.rs"]
+mod drawn;
 
 use common::clouds::{Apart, apart};
 use common::sheetlight;
@@ -72,9 +74,10 @@ impl Known {
     }
 
     /// Least standard deviation of a centre across a stripe of `sigma` px whose peak is `grey` of full scale, averaged along
-    /// the stripe as the fit does (docs/math.md, Stripe peak): H⁻¹ (sum w² F) H⁻¹, H = sum w F, F a pixel's Fisher information of
-    /// height, centre and width. A narrow stripe's centre is known better between two pixels than on one, and not apart from its
-    /// width: the mean over all places.
+    /// the stripe as the fit does, from the light that it reads, three sigmas to both sides (docs/math.md, Stripe peak): H⁻¹ (sum w² F) H⁻¹,
+    /// H = sum w F, F a pixel's Fisher information of height, centre and width. A narrow stripe's centre is known better between two
+    /// pixels than on one, and not apart from its width: the mean over all places. (Of a quiet sensor and speckle the fourth sigma, light of
+    /// 1 % and less of the peak, would halve the variance where nothing else sheds so little light.)
     fn bound_px(&self, sigma: f64, grey: f64) -> f64 {
         let peak = grey / self.full * self.full_well;
         let quantum = self.full_well / self.full;
@@ -90,11 +93,18 @@ impl Known {
                 let light = peak * (-0.5 * (d / sigma).powi(2)).exp();
                 let variance = light + self.read.powi(2) + quantum.powi(2) / 12.0 + (self.speckle * light).powi(2);
                 let slope = nalgebra::Vector3::new(1.0, d / (sigma * sigma), d * d / sigma.powi(3)) * light;
-                h += slope * slope.transpose() / variance;
+                let inside = (3.0 * sigma + 0.5 - d.abs()).clamp(0.0, 1.0);
+                h += slope * slope.transpose() * (inside / variance);
             }
             h.try_inverse().expect("a stripe")[(1, 1)] * twice / (once * once)
         };
         ((0..places).map(variance).sum::<f64>() / f64::from(places)).sqrt()
+    }
+
+    /// Tangent of the angle between the stripe's normal and the image axis that is nearer to it, in the picture's middle; 0..=1.
+    fn lean(&self) -> f64 {
+        let [x, y] = [self.plane.normal.x.abs(), self.plane.normal.y.abs()];
+        x.min(y) / x.max(y)
     }
 
     /// How far a point of a level surface moves up for one pixel across the stripe's picture, mm: the viewing ray of the
@@ -208,9 +218,11 @@ fn run(name: &str, file: &Path, at: &Path, width: Option<u32>, shots: Option<usi
             })
             .collect(),
     );
-    // Near a tread's edge a part of the stripe's profile falls beside it: the fit reads it as far as 2.4 sigma, and the lens blurs.
-    let profile = 3.0 * sigma * footprint;
-    let margin = [(0.2 * TREAD_MM[0] * u).max(profile), (0.15 * TREAD_MM[1] * u).max(profile)];
+    // Near a tread's edge a part of the stripe's profile falls beside it: the fit reads it as far as 2.4 sigma, and the lens blurs. A profile
+    // along an image axis that is not the stripe's normal reads its flanks, three sigmas out, farther along by the tangent.
+    let profile = |lean: f64| 3.0 * sigma * (1.0 + lean) * footprint;
+    let lean = known.lean();
+    let margin = [(0.2 * TREAD_MM[0] * u).max(profile(lean)), (0.15 * TREAD_MM[1] * u).max(profile(0.0))];
     let (mut square, mut predicted, mut counted) = (0.0, 0.0, 0usize);
     let mut tops = Vec::new();
     let mut top = 0.0;
@@ -282,7 +294,8 @@ fn find(at: &Path, truth: &Truth) -> Result<[f64; 3], String> {
     Ok([t.x.hypot(t.y), t.z.abs(), off.rotation_vector().norm().to_degrees()])
 }
 
-fn judged(row: &Row) -> Vec<String> {
+/// `over`: what own-plane rms may be over the prediction. `coarse`: a part may be refused, with its reason, but not misplaced.
+fn judged(row: &Row, over: f64, coarse: bool) -> Vec<String> {
     let mut faults = Vec::new();
     let mut want = |ok: bool, what: String| {
         if !ok {
@@ -293,12 +306,12 @@ fn judged(row: &Row) -> Vec<String> {
     for (what, v) in ["camera", "laser plane", "hand-eye"].iter().zip(&row.verdicts) {
         want(v == "good" || v == "usable", format!("{what} is {v}"));
     }
-    want(row.plane <= 1.15 * row.predicted, format!("own-plane rms {:.5} of {:.5} mm", row.plane, row.predicted));
+    want(row.plane <= over * row.predicted, format!("own-plane rms {:.5} of {:.5} mm", row.plane, row.predicted));
     match &row.part {
         Ok([place, height, turn]) => {
             want(*place < 0.5 * p && *height < 0.5 * p && *turn < 0.3, format!("part off by {:?}", row.part));
         }
-        Err(why) => want(false, format!("part not found: {why}")),
+        Err(why) => want(coarse && why.contains("no pose:"), format!("part not found: {why}")),
     }
     if let Some(Apart { alone, worst_mm, .. }) = row.gpu {
         // 0.001 mm at the reference rigs' pixel of 0.25 mm.
@@ -353,7 +366,7 @@ fn rigs_are_calibrated_scanned_and_searched() {
         let row = run(name, file, dir.path(), width, shots);
         println!("{}", table(std::slice::from_ref(&row)).lines().last().unwrap());
         println!("   steps in predicted sigmas {:.2?}, completeness {:.3}", row.step_sigmas, row.completeness);
-        faults.extend(judged(&row));
+        faults.extend(judged(&row, 1.15, false));
         rows.push(row);
     }
     if std::env::var_os("UPDATE_RIGS").is_some() {
@@ -384,4 +397,52 @@ fn the_shipped_designs_are_many_and_sound() {
     some("a plane behind the volume", &|r| r.crossing() > r.working.far_mm);
     some("1.5 m", &|r| r.working.distance_mm >= 1500.0);
     some("a field of 10 mm", &|r| r.field_mm()[0] <= 10.1);
+}
+
+/// Own-plane rms over the prediction that a drawn rig may have. Most have 1.0 to 1.15; a quiet sensor's speckled stripe has 1.2 where it is
+/// narrow and slanted (a sample's pixels lie up to half a pixel apart across it, and their light differs) and 1.3 to 1.45 where it is wider
+/// than 4 px (its skeleton wanders, and the window with it).
+const DRAWN: f64 = 1.5;
+
+/// Rigs drawn from the space that stations are built in, judged as the designed ones. `SHEETLIGHT_DRAWN=1-40`: these seeds at their own size.
+#[test]
+fn rigs_that_nobody_designed_are_as_good() {
+    let long = std::env::var("SHEETLIGHT_DRAWN").ok();
+    let (first, last) = match &long {
+        Some(seeds) => {
+            seeds.split_once('-').map(|(a, b)| (a.parse().unwrap(), b.parse().unwrap())).expect("first-last")
+        }
+        None => (1u64, 1u64),
+    };
+    let mut faults = Vec::new();
+    for seed in first..=last {
+        let dir = tempfile::tempdir().unwrap();
+        let spec = drawn::rig(seed);
+        spec.check().unwrap();
+        let file = dir.path().join("rig.toml");
+        std::fs::write(&file, toml::to_string(&spec).unwrap()).unwrap();
+        let (width, shots) = if long.is_some() { (None, 60) } else { (Some(400), 36) };
+        let row = run(&spec.name, &file, dir.path(), width, Some(shots));
+        let (c, l) = (&spec.camera, &spec.laser);
+        println!("{}", table(std::slice::from_ref(&row)).lines().last().unwrap());
+        println!(
+            "   {}x{} px, {:.0} px of focal length, side {:.0}, angle {:.0} degrees, stripe {:.1} px, speckle {:.2}; steps in predicted sigmas {:.2?}, completeness {:.3}",
+            c.width_px,
+            c.height_px,
+            spec.focal_px(),
+            l.side_deg,
+            l.angle_deg,
+            0.5 * l.waist_radius_mm / spec.footprint_mm(),
+            spec.sensor.speckle,
+            row.step_sigmas,
+            row.completeness
+        );
+        let found = judged(&row, DRAWN, true);
+        found.iter().for_each(|f| println!("   FAULT {f}"));
+        if !found.is_empty() {
+            println!("{}", toml::to_string(&spec).unwrap());
+        }
+        faults.extend(found);
+    }
+    assert!(faults.is_empty(), "{}", faults.join("\n"));
 }

@@ -44,6 +44,8 @@ struct Walk {
     // Last place, and last group's.
     end: i32,
     last: i32,
+    // How far from the skeleton's pixel a place may lie.
+    room: i32,
     fade: f32,
     // Between two samples, in pixels as they lie in memory.
     across: u32,
@@ -65,7 +67,7 @@ fn group(w: Walk, a: i32, row: i32) -> Group {
     let t = vec4(f32(a - w.x0)) + vec4(0.0, 1.0, 2.0, 3.0);
     let f = max(vec4(1.0) - w.fade * (t * t), vec4(0.0));
     let limit = f32(w.end - w.x0);
-    let inside = t <= vec4(limit, vec3(select(-1e9, limit, w.fours)));
+    let inside = t <= vec4(limit, vec3(select(-1e9, limit, w.fours))) & t >= vec4(f32(-w.room));
     let weights = select(vec4(0u), vec4<u32>(vec4(127.0) * (f * f) + vec4(0.5)), inside);
     let b = shift(w, place) + row;
     let at = vec2<u32>(select(vec2(w.y0 + b, place), vec2(place, w.y0 + b), w.columns));
@@ -178,13 +180,17 @@ fn profile_of(at: vec2<i32>, n: vec2<f32>) -> Profile {
     let height = select(frame.width, frame.height, columns);
     let left = select(x0 - frame.reach_along, (x0 - 2 * frame.fours + 2) & -4, fours);
     let right = select(x0 + frame.reach_along, left + 4 * frame.fours - 1, fours);
-    let begin = max(left, 0);
-    let end = min(right, width - 1);
-    let tall = frame.rows;
+    let na = select(n.y, n.x, columns);
     let nb = select(n.x, n.y, columns);
+    // At whole numbers rounding shall not decide.
+    let held = min(f32(min(y0, height - 1 - y0)) * abs(nb) / max(abs(na), 1e-6), 8192.0);
+    let room = min(min(x0, width - 1 - x0), i32(floor(held + 0.03)));
+    let begin = max(max(left, 0), (x0 - room) & select(-1, -4, fours));
+    let end = min(min(right, width - 1), x0 + room);
+    let tall = frame.rows;
     let last = select(end, end & -4, fours);
     let across = u32(tall) * select(1u, frame.pitch << px_log2, columns);
-    let w = Walk(columns, fours, select(n.y, n.x, columns), nb, x0, y0, end, last, frame.along_factor / (nb * nb), across);
+    let w = Walk(columns, fours, na, nb, x0, y0, end, last, room, frame.along_factor / (nb * nb), across);
     // Samples whose rows all lie in the picture.
     let first_shift = shift(w, begin);
     let last_shift = shift(w, last);

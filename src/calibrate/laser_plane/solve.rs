@@ -142,7 +142,9 @@ pub fn solve(
     let exact = &basis * &local * basis.transpose() * inflation;
     let follows = by_camera.plane * camera_covariance.matrix() * by_camera.plane.transpose();
     let covariance = &exact + &basis * DMatrix::from_column_slice(3, 3, follows.as_slice()) * basis.transpose();
-    let rest: Vec<Seen> = all.iter().filter(|p| uses[p.view][p.index] != PeakUse::Used).copied().collect();
+    // What lies in reach of this plane is its own light, displaced by an edge of the print or a hot pixel.
+    let rest = |p: &&Seen| uses[p.view][p.index] != PeakUse::Used && !near(p, &state.plane, &data.measured, o.gate_px);
+    let rest: Vec<Seen> = all.iter().filter(rest).copied().collect();
     let second = second_plane(&rest, &data, &state, views, camera, o);
     Ok(LaserPlaneFit {
         plane: state.plane,

@@ -9,10 +9,48 @@ use super::profile::{Profiles, by_columns};
 use super::scoring;
 use super::turn::{DIAGONAL, EVEN_ROW, MIDDLE_ROW};
 
-/// Direction across the stripe: the strongest eigenvector of the structure tensor, on grey levels so far apart that noise
-/// of single pixels does not turn it, and what so far differences make of it is put right (docs/math.md, Stripe peak (1)).
+/// Directions that are taken in turn beside a border, each at a place that the one before led to.
+pub(in crate::stages) const BORDER_STEPS: u32 = 2;
+/// Share of a stripe's direction that leads out of the picture, from which on it leaves there; below, it runs along the border.
+pub(in crate::stages) const LEAVES: f32 = 0.3;
+/// Variances of a pixel by as many pixels a side: what two sides of one level differ by, squared, is twice that on average, and hardly
+/// ever four times as much.
+pub(in crate::stages) const BY_NOISE: f32 = 8.0;
+
+/// Direction across the stripe. Beside the picture's border differences reach beyond it, where all levels go on as on the border, and a slanted
+/// stripe would seem less so: there the direction is that of the stripe's next piece whose differences lie in the picture.
 #[inline(always)]
 pub(super) fn direction<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> (f32, f32) {
+    let mut n = direction_at(image, x, y, s);
+    for _ in 0..BORDER_STEPS {
+        let (inner_x, inner_y) = inward(x, y, n, s);
+        if (inner_x, inner_y) == (x, y) {
+            break;
+        }
+        n = direction_at(image, inner_x, inner_y, s);
+    }
+    n
+}
+
+/// The next place along the stripe whose differences lie in the picture; the place itself where they do, or where the stripe runs along the
+/// border and there is none.
+#[inline(always)]
+fn inward(x: i32, y: i32, n: (f32, f32), s: &PeakFrame) -> (i32, i32) {
+    let reach = 3 * s.lattice_u.max(s.lattice_v);
+    let du = x.min(s.width - 1 - reach).max(reach) - x;
+    let dv = y.min(s.height - 1 - reach).max(reach) - y;
+    let (tu, tv) = (n.1, -n.0);
+    let by_u = if tu.abs() >= LEAVES { du as f32 / tu } else { 0.0 };
+    let by_v = if tv.abs() >= LEAVES { dv as f32 / tv } else { 0.0 };
+    let along = if by_u.abs() >= by_v.abs() { by_u } else { by_v };
+    // Not 0.5: rounding would decide.
+    (x + (along * tu + 0.47).floor() as i32, y + (along * tv + 0.47).floor() as i32)
+}
+
+/// The strongest eigenvector of the structure tensor, on grey levels so far apart that noise
+/// of single pixels does not turn it, and what so far differences make of it is put right (docs/math.md, Stripe peak (1)).
+#[inline(always)]
+fn direction_at<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> (f32, f32) {
     let deep = (s.full_scale as u32).count_ones().max(10) - 10;
     let (mut h, mut xy, mut q) = tensor(image, x, y, s.lattice_u, s.lattice_v, deep);
     // Sine and cosine of twice the angle that a tensor shows; sum of c sin(k a), k = 2, 4, 6, 8.
@@ -86,9 +124,10 @@ fn add(sums: &mut [i32; 3], weight: i32, gx: i32, gy: i32) {
 }
 
 /// Level beside the stripe, 4 to 6 widths out: the darker side, because a second stripe lights one side only. On three lines
-/// 1.2 widths apart: a level with the noise of three pixels would be the largest error of a profile averaged over many.
+/// 1.2 widths apart: a level with the noise of three pixels would be the largest error of a profile averaged over many. And by how
+/// much, squared, the sides differ beyond their noise: within the stripe nobody knows which of the two it is.
 #[inline(always)]
-pub(super) fn background<G: Grey>(image: G, x: i32, y: i32, nx: f32, ny: f32, s: &PeakFrame) -> f32 {
+pub(super) fn background<G: Grey>(image: G, x: i32, y: i32, nx: f32, ny: f32, s: &PeakFrame) -> (f32, f32) {
     let from = (4.0 * s.s0 + 0.5).floor() as i32;
     let to = from + ((2.0 * s.s0 + 0.5).floor() as i32).max(2);
     let along = 1.2 * s.s0;
@@ -105,7 +144,8 @@ pub(super) fn background<G: Grey>(image: G, x: i32, y: i32, nx: f32, ny: f32, s:
         n += 3.0;
         q += s.stride;
     }
-    low.min(high) as f32 / n
+    let (base, apart) = (low.min(high) as f32 / n, (high - low) as f32 / n);
+    (base, (apart * apart - BY_NOISE * (s.read2 + s.gain * base) / n).max(0.0))
 }
 
 /// What is known of a place before its profile is fitted.
@@ -115,6 +155,8 @@ pub(super) struct Seen {
     pub n: (f32, f32),
     /// Level beside the stripe.
     pub base: f32,
+    /// Square of what it differs by from side to side.
+    pub uneven2: f32,
 }
 
 /// Puts the profiles of up to [`LANES`] skeleton pixels side by side.
@@ -127,7 +169,7 @@ pub(super) fn look<G: Grey>(places: &[Place<G>], profiles: &mut Profiles, s: &Pe
     for (lane, (place, seen)) in places.iter().zip(&mut seen).enumerate() {
         let (x, y) = place.at();
         *seen = if inner(x, y) { beside(Inner(place.image), x, y, s) } else { beside(place.image, x, y, s) };
-        profiles.put(lane, place, seen.n, seen.base, s);
+        profiles.put(lane, place, seen, s);
     }
     seen
 }
@@ -135,7 +177,8 @@ pub(super) fn look<G: Grey>(places: &[Place<G>], profiles: &mut Profiles, s: &Pe
 #[inline(always)]
 fn beside<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Seen {
     let n = direction(image, x, y, s);
-    Seen { n, base: background(image, x, y, n.0, n.1, s) }
+    let (base, uneven2) = background(image, x, y, n.0, n.1, s);
+    Seen { n, base, uneven2 }
 }
 
 /// Peaks of up to [`LANES`] skeleton pixels: their profiles, then the Gaussians of all of them at once.
@@ -148,7 +191,7 @@ pub(super) fn gaussians<G: Grey>(
 ) {
     let seen = look(places, profiles, s);
     let found = scoring::gaussians(profiles, places.len(), s);
-    for (lane, (place, Seen { n, base })) in places.iter().zip(seen).enumerate() {
+    for (lane, (place, Seen { n, base, .. })) in places.iter().zip(seen).enumerate() {
         let (x, y) = place.at();
         let [m, a, width, sigma, clipped] =
             [found.m, found.a, found.width, found.sigma, found.clipped].map(|v| v.0[lane]);

@@ -2,7 +2,7 @@
 //! amplitude, background, signal-to-noise and its own standard deviation across the stripe.
 //! Frame and unit: image pixels (an integer is a pixel's centre), grey levels of the picture's depth.
 
-mod fit;
+pub(super) mod fit;
 pub mod found;
 pub mod frame;
 pub mod grey;

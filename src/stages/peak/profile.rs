@@ -2,6 +2,7 @@
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels. docs/math.md, Stripe peak (2).
 
 use super::PeakFrame;
+use super::fit::Seen;
 use super::grey::{Grey, Place};
 use super::lanes::Lanes;
 use super::params::SAMPLES;
@@ -30,13 +31,23 @@ pub(super) struct Profiles {
     pub square: Lanes,
     /// Variance of the pixels' offsets within a sample, px^2.
     pub blur2: Lanes,
-    /// Level beside the stripe.
+    /// Level beside the stripe, and the square of what it differs by from side to side.
     pub base: Lanes,
+    pub uneven2: Lanes,
 }
 
 /// Columns where the stripe is nearer to the horizontal, else rows; at 45 degrees rounding shall not decide.
 pub(super) fn by_columns((nx, ny): (f32, f32)) -> bool {
     1.001 * ny >= nx.abs()
+}
+
+/// How far a window may reach to both sides along a: no farther than the picture on one of them, as an error of the direction would move the
+/// centre of a window that reaches farther to one side; and no farther than the shifted columns hold the skeleton's pixel, without whose sample
+/// a profile has no crest. At whole numbers rounding shall not decide.
+#[inline(always)]
+fn room((a0, b0): (i32, i32), (na, nb): (f32, f32), (width, height): (i32, i32)) -> i32 {
+    let across = b0.min(height - 1 - b0) as f32 * nb.abs() / na.abs().max(1e-6);
+    a0.min(width - 1 - a0).min((across.min(8192.0) + 0.03).floor() as i32)
 }
 
 /// Number of sample j of a side.
@@ -66,9 +77,10 @@ struct Window {
     /// The normal along a and b.
     na: f32,
     nb: f32,
-    /// First and last a that lie in the picture; a group's middle.
+    /// First and last a that lie in the picture; how far from the skeleton's pixel they may; a group's middle.
     begin: i32,
     end: i32,
+    room: i32,
     middle: f32,
     /// 1 / R^2 along a.
     fade: f32,
@@ -82,7 +94,7 @@ impl Window {
     #[inline(always)]
     fn weight(&self, i: i32) -> i32 {
         let f = (1.0 - self.fade * (i * i) as f32).max(0.0);
-        if self.a0 + i <= self.end { (WEIGHT * (f * f) + 0.5) as i32 } else { 0 }
+        if self.a0 + i <= self.end && i.abs() <= self.room { (WEIGHT * (f * f) + 0.5) as i32 } else { 0 }
     }
     /// Whole pixels by which a group follows the line. Not + 0.5: at 45 degrees rounding would decide.
     #[inline(always)]
@@ -170,13 +182,15 @@ impl Profiles {
             square: one,
             blur2: zero,
             base: zero,
+            uneven2: zero,
         }
     }
 
-    /// Puts the profile at a place into a lane; `base` is the level beside the stripe.
+    /// Puts the profile at a place into a lane.
     #[inline(always)]
-    pub fn put<G: Grey>(&mut self, lane: usize, place: &Place<G>, (nx, ny): (f32, f32), base: f32, s: &PeakFrame) {
+    pub fn put<G: Grey>(&mut self, lane: usize, place: &Place<G>, seen: &Seen, s: &PeakFrame) {
         let (x, y) = place.at();
+        let Seen { n: (nx, ny), base, uneven2 } = *seen;
         let columns = by_columns((nx, ny));
         let (na, nb) = if columns { (nx, ny) } else { (ny, nx) };
         let (a0, b0, width, height) = if columns { (x, y, s.width, s.height) } else { (y, x, s.height, s.width) };
@@ -185,9 +199,10 @@ impl Profiles {
         let (mask, middle) = if fours { (!3, 1.5f32) } else { (!0, 0.0) };
         let left = if fours { (a0 - 2 * s.fours + 2) & !3 } else { a0 - s.reach_along };
         let right = if fours { left + 4 * s.fours - 1 } else { a0 + s.reach_along };
-        let (begin, end) = (left.max(0), right.min(width - 1));
+        let room = room((a0, b0), (na, nb), (width, height));
+        let (begin, end) = (left.max(0).max((a0 - room) & mask), right.min(width - 1).min(a0 + room));
         let fade = s.along_factor / (nb * nb);
-        let mut window = Window { columns, a0, b0, na, nb, begin, end, middle, fade, from: 0, to: 0 };
+        let mut window = Window { columns, a0, b0, na, nb, begin, end, room, middle, fade, from: 0, to: 0 };
         let tall = s.rows;
         let (first, last) = (window.shift(begin), window.shift(end & mask));
         // Samples whose rows all lie in the picture.
@@ -196,20 +211,20 @@ impl Profiles {
         let half = self.half as i32;
         (window.from, window.to) = ((-half).max(low), half.min(high + 1));
         let none = [0.0; SAMPLES];
-        let mut seen = Gathered { levels: none, clipped: none, sum: 0.0, square: 0.0, moment: 0.0, second: 0.0 };
+        let mut sums = Gathered { levels: none, clipped: none, sum: 0.0, square: 0.0, moment: 0.0, second: 0.0 };
         let full_scale = s.full_scale as i32;
         for row in 0..s.rows {
             if fours {
-                seen.fours(place.image, &window, row, tall, half, full_scale);
+                sums.fours(place.image, &window, row, tall, half, full_scale);
             } else {
-                seen.singles(place.image, &window, row, tall, half, full_scale);
+                sums.singles(place.image, &window, row, tall, half, full_scale);
             }
         }
-        let (sum, mean, scale) = (seen.sum, seen.moment / seen.sum, 1.0 / seen.sum);
+        let (sum, mean, scale) = (sums.sum, sums.moment / sums.sum, 1.0 / sums.sum);
         for j in 0..self.half {
             for (side, at) in [(0, self.half + j), (1, self.half - 1 - j)] {
-                self.levels[side][j].0[lane] = seen.levels[at] * scale;
-                self.clipped[side][j].0[lane] = seen.clipped[at] * scale;
+                self.levels[side][j].0[lane] = sums.levels[at] * scale;
+                self.clipped[side][j].0[lane] = sums.clipped[at] * scale;
             }
         }
         self.low.0[lane] = low as f32;
@@ -217,9 +232,10 @@ impl Profiles {
         self.offset.0[lane] = mean;
         self.step.0[lane] = tall as f32 * nb;
         self.weight.0[lane] = sum / WEIGHT;
-        self.square.0[lane] = seen.square / (WEIGHT * WEIGHT);
-        self.blur2.0[lane] = (seen.second / sum - mean * mean).max(0.0);
+        self.square.0[lane] = sums.square / (WEIGHT * WEIGHT);
+        self.blur2.0[lane] = (sums.second / sum - mean * mean).max(0.0);
         self.base.0[lane] = base;
+        self.uneven2.0[lane] = uneven2;
     }
 
     /// Where the samples begin and end that lie within `reach` of m, in their numbers; not whole.

@@ -11,6 +11,9 @@ pub(in crate::stages) const BELIEF: f32 = 10.0;
 pub(in crate::stages) const DARK: f32 = 1e-9;
 /// Share of a number's information that is left at least where another number explains it: what f32 can tell from nothing.
 pub(in crate::stages) const LEAST: f32 = 1e-5;
+/// Share of the amplitude that sides of different levels are doubted by at most: what differs more is another stripe's light, and its
+/// side is not believed anyhow.
+pub(in crate::stages) const UNEVEN: f32 = 0.06;
 /// Share of the ceiling over which clipped pixels fall silent: at once, and rounding would decide.
 pub(in crate::stages) const SOFT: f32 = 0.05;
 const ONE: Lanes = Lanes::all(1.0);
@@ -57,7 +60,8 @@ struct Scoring<'a> {
     /// The first guess of the centre; the width that is expected of the profile.
     m0: Lanes,
     s0: Lanes,
-    /// Variance of a pixel: `quiet` + `gain` light + `speckle2` light^2.
+    /// Variance of a pixel: `quiet` + `gain` light + `speckle2` light^2. What the level beside the stripe may be off by is noise too:
+    /// on a flank, whose speckle is faint, it would count as light.
     quiet: Lanes,
     gain: Lanes,
     speckle2: f32,
@@ -76,12 +80,13 @@ pub(super) fn gaussians(profiles: &Profiles, lanes: usize, s: &PeakFrame) -> Fou
     let s0 = (Lanes::all(s.s0 * s.s0) + profiles.blur2).sqrt();
     let near = profiles.span(m0, 3.0 * s0);
     let ceiling = Lanes::all(s.full_scale) - profiles.base;
+    let doubt = UNEVEN * a0;
     let scoring = Scoring {
         profiles,
         near,
         m0,
         s0,
-        quiet: Lanes::all(s.read2) + s.gain * profiles.base,
+        quiet: (Lanes::all(s.read2) + s.gain * profiles.base) + profiles.uneven2.min(doubt * doubt),
         gain: Lanes::all(s.gain),
         speckle2: s.speckle2,
         ceiling,

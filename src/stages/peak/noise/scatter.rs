@@ -24,6 +24,7 @@ pub(in super::super) struct Sums {
     right: Vector3<f64>,
     squares: f64,
     expected: f64,
+    expected2: f64,
 }
 
 impl Sums {
@@ -38,10 +39,15 @@ impl Sums {
         self.right += row * (weight * seen);
         self.squares += weight * seen;
         self.expected += weight * left;
+        self.expected2 += (weight * left).powi(2);
     }
     /// Squares over what was expected of them.
     pub fn misfit(&self) -> f64 {
         self.squares / self.expected.max(1e-9)
+    }
+    /// As many squares of equal weight would scatter as these do.
+    pub fn freedom(&self) -> f64 {
+        self.expected.powi(2) / self.expected2.max(1e-9)
     }
 }
 
