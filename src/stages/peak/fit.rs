@@ -5,7 +5,7 @@ use super::PeakFrame;
 use super::found::{Peak, SATURATED};
 use super::grey::{Grey, Inner, Place};
 use super::lanes::LANES;
-use super::profile::{Profiles, by_columns};
+use super::profile::{Profiles, Seen, by_columns};
 use super::scoring;
 use super::turn::{DIAGONAL, EVEN_ROW, MIDDLE_ROW};
 
@@ -146,17 +146,6 @@ pub(super) fn background<G: Grey>(image: G, x: i32, y: i32, nx: f32, ny: f32, s:
     }
     let (base, apart) = (low.min(high) as f32 / n, (high - low) as f32 / n);
     (base, (apart * apart - BY_NOISE * (s.read2 + s.gain * base) / n).max(0.0))
-}
-
-/// What is known of a place before its profile is fitted.
-#[derive(Clone, Copy, Default)]
-pub(super) struct Seen {
-    /// Unit vector across the stripe.
-    pub n: (f32, f32),
-    /// Level beside the stripe.
-    pub base: f32,
-    /// Square of what it differs by from side to side.
-    pub uneven2: f32,
 }
 
 /// Puts the profiles of up to [`LANES`] skeleton pixels side by side.

@@ -2,11 +2,11 @@
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels.
 
 use super::PeakFrame;
-use super::fit::{Seen, background, finish, look};
+use super::fit::{background, finish, look};
 use super::found::Peak;
 use super::grey::{Grey, Place};
 use super::lanes::{Lanes, exponential};
-use super::profile::{Profiles, clipped_within, number, share};
+use super::profile::{Profiles, Seen, clipped_within, number, share};
 
 /// Centre of gravity of the light above the background, within three widths of a first guess.
 #[inline(always)]

@@ -2,7 +2,6 @@
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels. docs/math.md, Stripe peak (2).
 
 use super::PeakFrame;
-use super::fit::Seen;
 use super::grey::{Grey, Place};
 use super::lanes::Lanes;
 use super::params::SAMPLES;
@@ -34,6 +33,17 @@ pub(super) struct Profiles {
     /// Level beside the stripe, and the square of what it differs by from side to side.
     pub base: Lanes,
     pub uneven2: Lanes,
+}
+
+/// What is known of a place before its profile is fitted.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Seen {
+    /// Unit vector across the stripe.
+    pub n: (f32, f32),
+    /// Level beside the stripe.
+    pub base: f32,
+    /// Square of what it differs by from side to side.
+    pub uneven2: f32,
 }
 
 /// Columns where the stripe is nearer to the horizontal, else rows; at 45 degrees rounding shall not decide.
