@@ -15,6 +15,8 @@ override peak_method: u32 = 0u;
 
 // Samples for which the noise model counts.
 const BELIEF = 10.0;
+// Nearer than so many pixels lies a narrow stripe's own light.
+const BESIDE = 4;
 // Directions that are taken in turn beside a border.
 const BORDER_STEPS = 2u;
 // Share of a stripe's direction that leads out of the picture, from which on it leaves there.
@@ -165,7 +167,8 @@ fn background(x: i32, y: i32, n: vec2<f32>) -> f32 {
     }
     let darker = min(low, high) / count;
     let apart = (high - low) / count;
-    uneven2 = max(apart * apart - BY_NOISE * (frame.read2 + frame.gain * darker) / count, 0.0);
+    let uneven = max(apart * apart - BY_NOISE * (frame.read2 + frame.gain * darker) / count, 0.0);
+    uneven2 = select(0.0, uneven, start >= BESIDE);
     return darker;
 }
 

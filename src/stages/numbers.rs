@@ -37,6 +37,7 @@ pub const NUMBERS: &[(&str, &str, f64)] = &[
     ("", "BEYOND", grid::BEYOND as f64),
     ("", "Z_MOST", grid::Z_MOST as f64),
     ("peak", "BELIEF", scoring::BELIEF as f64),
+    ("peak", "BESIDE", fit::BESIDE as f64),
     ("peak", "BORDER_STEPS", fit::BORDER_STEPS as f64),
     ("peak", "LEAVES", fit::LEAVES as f64),
     ("peak", "BY_NOISE", fit::BY_NOISE as f64),

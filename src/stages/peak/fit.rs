@@ -9,6 +9,8 @@ use super::profile::{Profiles, Seen, by_columns};
 use super::scoring;
 use super::turn::{DIAGONAL, EVEN_ROW, MIDDLE_ROW};
 
+/// Nearer than so many pixels lies a narrow stripe's own light, more on the side that its centre is nearer to.
+pub(in crate::stages) const BESIDE: i32 = 4;
 /// Directions that are taken in turn beside a border, each at a place that the one before led to.
 pub(in crate::stages) const BORDER_STEPS: u32 = 2;
 /// Share of a stripe's direction that leads out of the picture, from which on it leaves there; below, it runs along the border.
@@ -145,7 +147,8 @@ pub(super) fn background<G: Grey>(image: G, x: i32, y: i32, nx: f32, ny: f32, s:
         q += s.stride;
     }
     let (base, apart) = (low.min(high) as f32 / n, (high - low) as f32 / n);
-    (base, (apart * apart - BY_NOISE * (s.read2 + s.gain * base) / n).max(0.0))
+    let uneven2 = (apart * apart - BY_NOISE * (s.read2 + s.gain * base) / n).max(0.0);
+    (base, if from >= BESIDE { uneven2 } else { 0.0 })
 }
 
 /// Puts the profiles of up to [`LANES`] skeleton pixels side by side.
