@@ -11,9 +11,10 @@ use std::path::Path;
 /// Lying, upright, askew, bent by a barrel lens, behind a tilted sensor, narrower than a pixel.
 const SHORT: [&str; 6] = ["barrel", "behind", "fine", "scheimpflug", "slant45", "upright"];
 /// Of a footprint: 0.001 mm at the reference rigs' pixel of 0.25 mm. What the fit's rule of ending leaves beyond it: a fit whose last
-/// step is as long as the rule's limit, a hundredth of the stripe's width, ends a step earlier on one side.
+/// step is as long as the rule's limit, a hundredth of the stripe's width, ends a step earlier on one side. Stripes are up to a pixel wide
+/// here, and a pixel moves a point on a sheet at 30 degrees by two footprints.
 const APART: f64 = 0.004;
-const ONE_STEP: f64 = 0.01;
+const ONE_STEP: f64 = 0.02;
 /// So few points may have ended so, of a thousand.
 const ENDED_EARLIER: usize = 1;
 
