@@ -1,5 +1,5 @@
 // In: the pictures of a batch and their skeleton pixels. Out: one peak a pixel, with the reason where it fails by itself; the
-// strongest of the others on each line across the stripe. Twin: src/stages/peak/fit.rs, profile.rs, scoring.rs, methods.rs, stripe/choose.rs,
+// strongest of the others on each line across the stripe. Twin: src/stages/peak/fit.rs, direction.rs, profile.rs, scoring.rs, methods.rs, stripe/choose.rs,
 // where the reasons stand; docs/math.md, Stripe peak (1) to (5). Frame and unit: pixels, grey levels.
 @group(0) @binding(0) var<uniform> frame: PeakFrame;
 @group(0) @binding(1) var<storage, read> image: array<u32>;
@@ -17,10 +17,6 @@ override peak_method: u32 = 0u;
 const BELIEF = 10.0;
 // Nearer than so many pixels lies a narrow stripe's own light.
 const BESIDE = 4;
-// Directions that are taken in turn beside a border.
-const BORDER_STEPS = 2u;
-// Share of a stripe's direction that leads out of the picture, from which on it leaves there.
-const LEAVES = 0.3;
 // Variances of a pixel by as many pixels a side that two sides of one level differ by, squared.
 const BY_NOISE = 8.0;
 // Share of the amplitude that sides of different levels are doubted by at most.
@@ -34,117 +30,6 @@ const SOFT = 0.05;
 
 // First word of the picture; set once.
 var<private> first: u32;
-
-fn whole(x: i32, y: i32) -> i32 {
-    let a = u32(clamp(x, 0, frame.width - 1));
-    let b = u32(clamp(y, 0, frame.height - 1));
-    let bits = 32u >> px_log2;
-    let place = a & ((1u << px_log2) - 1u);
-    return i32((image[first + b * frame.pitch + (a >> px_log2)] >> (place * bits)) & ((1u << bits) - 1u));
-}
-
-fn level(x: i32, y: i32) -> f32 {
-    return f32(whole(x, y));
-}
-
-// Weights (1 - r^2 / 16)^2 in 64ths of gradients one step away along both axes; two along one; two along both; none.
-const ONE = 49;
-const TWO = 36;
-const FAR = 16;
-const NONE = 64;
-
-// The structure tensor from 13 gradients on 24 grey levels, every other place of a lattice, in whole numbers: half the difference of
-// its diagonal, the other element, half the difference of its eigenvalues.
-fn tensor(x: i32, y: i32, u: i32, v: i32) -> vec3<f32> {
-    let a = vec3(whole(x - 2 * u, y - 3 * v), whole(x, y - 3 * v), whole(x + 2 * u, y - 3 * v));
-    let b = vec4(whole(x - 3 * u, y - 2 * v), whole(x - u, y - 2 * v), whole(x + u, y - 2 * v), whole(x + 3 * u, y - 2 * v));
-    let c = vec3(whole(x - 2 * u, y - v), whole(x, y - v), whole(x + 2 * u, y - v));
-    let d = vec4(whole(x - 3 * u, y), whole(x - u, y), whole(x + u, y), whole(x + 3 * u, y));
-    let e = vec3(whole(x - 2 * u, y + v), whole(x, y + v), whole(x + 2 * u, y + v));
-    let f = vec4(whole(x - 3 * u, y + 2 * v), whole(x - u, y + 2 * v), whole(x + u, y + 2 * v), whole(x + 3 * u, y + 2 * v));
-    let g = vec3(whole(x - 2 * u, y + 3 * v), whole(x, y + 3 * v), whole(x + 2 * u, y + 3 * v));
-    // Ten bits a gradient.
-    let deep = max(countOneBits(u32(frame.full_scale)), 10u) - 10u;
-    let half = vec4(i32((1u << deep) >> 1u));
-    let by = vec4(deep);
-    // In the rows two above, of the pixel, two below; then the diagonals.
-    let ax = ((b.yzw - b.xyz) + half.xyz) >> by.xyz;
-    let ay = ((c - a) + half.xyz) >> by.xyz;
-    let rx = ((d.yzw - d.xyz) + half.xyz) >> by.xyz;
-    let ry = ((e - c) + half.xyz) >> by.xyz;
-    let bx = ((f.yzw - f.xyz) + half.xyz) >> by.xyz;
-    let wy = ((g - e) + half.xyz) >> by.xyz;
-    let dx = (vec4(c.yz - c.xy, e.yz - e.xy) + half) >> by;
-    let dy = (vec4(d.yz - b.yz, f.yz - d.yz) + half) >> by;
-    let far = vec3(FAR, TWO, FAR);
-    let row = vec3(TWO, NONE, TWO);
-    let sxx = (dot(far, ax * ax) + dot(far, bx * bx)) + (dot(row, rx * rx) + ONE * dot(dx, dx));
-    let sxy = (dot(far, ax * ay) + dot(far, bx * wy)) + (dot(row, rx * ry) + ONE * dot(dx, dy));
-    let syy = (dot(far, ay * ay) + dot(far, wy * wy)) + (dot(row, ry * ry) + ONE * dot(dy, dy));
-    let ratio = f32(v) / f32(u);
-    let h = 0.5 * ((ratio * ratio) * f32(sxx) - f32(syy));
-    let xy = ratio * f32(sxy);
-    return vec3(h, xy, sqrt(h * h + xy * xy));
-}
-
-// Sine and cosine of twice the angle that a tensor shows.
-fn twice(t: vec3<f32>) -> vec2<f32> {
-    return vec2(t.y, -t.x) / vec2(max(t.z, 1e-12));
-}
-
-// Sum of c sin(k a), k = 2, 4, 6, 8.
-fn turn_of(sc: vec2<f32>, c: vec4<f32>) -> f32 {
-    let s4 = 2.0 * sc.x * sc.y;
-    let c4 = sc.y * sc.y - sc.x * sc.x;
-    return c.x * sc.x + (c.y * s4 + (c.z * (s4 * sc.y + c4 * sc.x) + c.w * (2.0 * (s4 * c4))));
-}
-
-// Across the stripe; what so far differences make of the direction is put right.
-fn direction_at(x: i32, y: i32) -> vec2<f32> {
-    var t = tensor(x, y, frame.lattice_u, frame.lattice_v);
-    let seen = twice(t);
-    var turn = turn_of(seen, vec4(frame.turn_2, frame.turn_4, frame.turn_6, frame.turn_8));
-    // On a steep stripe the longer differences would span its whole width.
-    if select(-seen.y, seen.y, frame.lattice_u > frame.lattice_v) < frame.flat {
-        let side = min(frame.lattice_u, frame.lattice_v);
-        t = tensor(x, y, side, side);
-        turn = turn_of(twice(t), vec4(0.0, frame.square_4, 0.0, frame.square_8));
-    }
-    let h = t.x;
-    let xy = t.y;
-    let q = t.z;
-    let m = select(vec2(xy, q - h), vec2(h + q, xy), h > 0.0);
-    let n = vec2(m.x + turn * m.y, m.y - turn * m.x);
-    let length = sqrt(n.x * n.x + n.y * n.y);
-    let sign = select(1.0, -1.0, n.y < 0.0);
-    return select(vec2(sign * n.x / length, sign * n.y / length), vec2(0.0, 1.0), sqrt(m.x * m.x + m.y * m.y) < 1e-9);
-}
-
-// The next place along the stripe whose differences lie in the picture.
-fn inward(x: i32, y: i32, n: vec2<f32>) -> vec2<i32> {
-    let reach = 3 * max(frame.lattice_u, frame.lattice_v);
-    let du = max(min(x, frame.width - 1 - reach), reach) - x;
-    let dv = max(min(y, frame.height - 1 - reach), reach) - y;
-    let t = vec2(n.y, -n.x);
-    let by_u = select(0.0, f32(du) / t.x, abs(t.x) >= LEAVES);
-    let by_v = select(0.0, f32(dv) / t.y, abs(t.y) >= LEAVES);
-    let along = select(by_v, by_u, abs(by_u) >= abs(by_v));
-    // Not 0.5: rounding would decide.
-    return vec2(x + i32(floor(along * t.x + 0.47)), y + i32(floor(along * t.y + 0.47)));
-}
-
-// Beside the picture's border that of the stripe's next piece whose differences lie in the picture.
-fn direction(x: i32, y: i32) -> vec2<f32> {
-    var n = direction_at(x, y);
-    for (var i = 0u; i < BORDER_STEPS; i++) {
-        let inner = inward(x, y, n);
-        if all(inner == vec2(x, y)) {
-            break;
-        }
-        n = direction_at(inner.x, inner.y);
-    }
-    return n;
-}
 
 // Square of what the two sides' levels differ by beyond their noise.
 var<private> uneven2: f32;

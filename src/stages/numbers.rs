@@ -4,7 +4,7 @@
 use super::frame::{ALL_TILES, GAUSSIAN, HAS_ROI};
 use super::listing::{self, HEADER_WORDS};
 use super::peak::found::{REASON, Reject, SATURATED};
-use super::peak::{fit, methods, scoring, turn};
+use super::peak::{direction, fit, methods, scoring, turn};
 use super::stripe::{point, skeleton, spacing};
 use super::{grid, support};
 
@@ -38,8 +38,8 @@ pub const NUMBERS: &[(&str, &str, f64)] = &[
     ("", "Z_MOST", grid::Z_MOST as f64),
     ("peak", "BELIEF", scoring::BELIEF as f64),
     ("peak", "BESIDE", fit::BESIDE as f64),
-    ("peak", "BORDER_STEPS", fit::BORDER_STEPS as f64),
-    ("peak", "LEAVES", fit::LEAVES as f64),
+    ("peak", "BORDER_STEPS", direction::BORDER_STEPS as f64),
+    ("peak", "LEAVES", direction::LEAVES as f64),
     ("peak", "BY_NOISE", fit::BY_NOISE as f64),
     ("peak", "UNEVEN", scoring::UNEVEN as f64),
     ("peak", "DARK", scoring::DARK as f64),

@@ -20,20 +20,9 @@ pub(super) struct Judged {
     pub measured: Measured,
 }
 
-/// Where the measuring of a match starts.
-enum From {
-    /// A pose that somebody expects, shifted along the part to where its surfaces end.
-    Expected(Rigid<Base, Part>),
-    /// The match itself, shifted the same way.
-    Match,
-    /// Where the points say that the match lies.
-    Settled,
-}
-
 /// Measures at the best match and, where the points do not agree with the drawing there, at its rivals
 /// and at the other matches: a long part shifted along itself scores nearly as well in the search, but
-/// its surfaces do not end where they should. A rival that scores as well is measured in any case: a part that looks nearly the same from
-/// behind is told by its points, not by the last digit of a score.
+/// its surfaces do not end where they should.
 pub(super) fn best_hypothesis(
     points: &Ordered,
     map: &HeightMap,
@@ -43,7 +32,6 @@ pub(super) fn best_hypothesis(
     matches: &[Match],
 ) -> Result<Judged> {
     const MOST: usize = 12;
-    const AS_WELL: f64 = 0.95;
     let drawing = recipe.drawing();
     let rivals = best.rivals.iter().filter(|r| r.1 > 0.6 * best.score).map(|&(pose, score)| {
         let second_score = best.score;
@@ -53,27 +41,18 @@ pub(super) fn best_hypothesis(
     });
     let mut kept: Option<(f64, Judged)> = None;
     let mut trouble = None;
-    let start_of = |found: &Match, from: &From| {
-        let lifted = || lift(&found.pose, map, points, recipe);
-        match from {
-            From::Expected(pose) => slide(points, &drawing, *pose, &recipe.measure),
-            From::Match => slide(points, &drawing, lifted(), &recipe.measure),
-            From::Settled => settle(points, &drawing, lifted(), &recipe.measure),
-        }
-    };
-    let as_well = |m: &Match| m.score >= AS_WELL * best.score;
-    let starts = expected.map(|e| (best.clone(), From::Expected(*e), false));
+    let searched = std::iter::once(best.clone()).chain(rivals).chain(matches.iter().skip(1).cloned()).take(MOST);
+    let slid = |(m, start): (Match, Rigid<Base, Part>)| (m, slide(points, &drawing, start, &recipe.measure));
+    let starts = expected.map(|e| slid((best.clone(), *e))).into_iter();
     // Before its rivals the best match itself, where the points say that it lies.
-    let first = [From::Match, From::Settled].map(|from| (best.clone(), from, false));
-    let rivals = rivals.map(|m| (as_well(&m), m)).map(|(always, m)| (m, From::Match, always));
-    let others = matches.iter().skip(1).map(|m| (m.clone(), From::Match, false));
-    let tried = starts.into_iter().chain(first).chain(rivals.chain(others).take(MOST - 1));
-    let mut good = false;
-    for (found, from, always) in tried {
-        if good && !always {
-            continue;
-        }
-        let measured = match measure(points, &drawing, start_of(&found, &from), &recipe.measure) {
+    let settled = std::iter::once_with(|| {
+        let start = settle(points, &drawing, lift(&best.pose, map, points, recipe), &recipe.measure);
+        (best.clone(), start)
+    });
+    let mut searched = searched.map(|m| (m.clone(), lift(&m.pose, map, points, recipe))).map(slid);
+    let first = searched.next();
+    for (found, start) in starts.chain(first).chain(settled).chain(searched) {
+        let measured = match measure(points, &drawing, start, &recipe.measure) {
             Ok(measured) => measured,
             Err(e) => {
                 trouble.get_or_insert_with(|| {
@@ -90,9 +69,12 @@ pub(super) fn best_hypothesis(
         };
         let a = judge(points, &drawing, &measured, &recipe.measure);
         let value = a.agreement * a.edges * found.score;
-        good |= a.agreement >= recipe.gates.min_agreement && a.edges >= 0.5 && a.crossed <= recipe.gates.max_crossed;
+        let good = a.agreement >= recipe.gates.min_agreement && a.edges >= 0.5 && a.crossed <= recipe.gates.max_crossed;
         if kept.as_ref().is_none_or(|k| value > k.0) {
             kept = Some((value, Judged { found, measured }));
+        }
+        if good {
+            break;
         }
     }
     kept.map(|k| k.1).ok_or_else(|| trouble.expect("every hypothesis failed, and there was one"))

@@ -2,7 +2,8 @@
 //! amplitude, background, signal-to-noise and its own standard deviation across the stripe.
 //! Frame and unit: image pixels (an integer is a pixel's centre), grey levels of the picture's depth.
 
-pub(super) mod fit;
+pub(in crate::stages) mod direction;
+pub(in crate::stages) mod fit;
 pub mod found;
 pub mod frame;
 pub mod grey;

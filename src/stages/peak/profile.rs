@@ -104,7 +104,7 @@ impl Window {
     #[inline(always)]
     fn weight(&self, i: i32) -> i32 {
         let f = (1.0 - self.fade * (i * i) as f32).max(0.0);
-        if self.a0 + i <= self.end && i.abs() <= self.room { (WEIGHT * (f * f) + 0.5) as i32 } else { 0 }
+        if (-self.room..=self.end - self.a0).contains(&i) { (WEIGHT * (f * f) + 0.5) as i32 } else { 0 }
     }
     /// Whole pixels by which a group follows the line. Not + 0.5: at 45 degrees rounding would decide.
     #[inline(always)]

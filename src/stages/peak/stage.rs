@@ -22,13 +22,14 @@ pub const METHOD: &str = "peak_method";
 /// Quads of samples of a profile, written out when the pipeline is built: [`super::PeakFrame::quads`].
 pub const QUADS: &str = "quads";
 
+const DIRECTION: &str = include_str!("../../../shaders/shared/direction.wgsl");
 const PROFILE: &str = include_str!("../../../shaders/shared/profile.wgsl");
 
 /// One peak a skeleton pixel, and the strongest of each line across the stripe; one invocation a pixel.
 pub const STAGE: Stage = Stage {
     name: "peak",
     wgsl: include_str!("../../../shaders/peak.wgsl"),
-    shared: &[SHARED, PROFILE, choose::LINE_OF, listing::SHARED],
+    shared: &[SHARED, DIRECTION, PROFILE, choose::LINE_OF, listing::SHARED],
     workgroup: [64, 1, 1],
     bindings: &[
         Binding { name: "frame", access: Uniform },
