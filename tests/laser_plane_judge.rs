@@ -288,6 +288,23 @@ fn reflections_on_and_beside_the_board_do_not_enter() {
     assert!((0..3).all(|i| e[i].abs() < 0.7 * c[(i, i)].sqrt()), "{e}");
 }
 
+/// Light that an edge of the print or a hot pixel moved by a part of a pixel, eight of its sigmas, in a piece of each stripe: it is left out,
+/// and is no second plane.
+#[test]
+fn moved_pieces_of_the_stripe_are_no_second_plane() {
+    let rng = &mut Pcg64::seed_from_u64(7);
+    let s = station(rng, 8);
+    let mut v = views(rng, &s, &s.camera, 0.03, 0.05);
+    for view in &mut v {
+        let middle = view.peaks.len() / 2;
+        view.peaks[middle..middle + 15].iter_mut().for_each(|p| p.pixel.y += 0.4);
+    }
+    let found = run(&s, &v, &CameraCovariance::exact(), 0.03).unwrap();
+    let left_out = found.uses.iter().flatten().filter(|u| **u != PeakUse::Used).count();
+    assert!(left_out >= 100, "{left_out} of 120 moved peaks were left out");
+    assert!(found.second.is_none(), "{:?}", found.second);
+}
+
 #[test]
 fn stripes_on_one_line_are_refused() {
     let rng = &mut Pcg64::seed_from_u64(6);

@@ -404,15 +404,17 @@ fn the_shipped_designs_are_many_and_sound() {
 /// than 4 px (its skeleton wanders, and the window with it).
 const DRAWN: f64 = 1.5;
 
-/// Rigs drawn from the space that stations are built in, judged as the designed ones. `SHEETLIGHT_DRAWN=1-40`: these seeds at their own size.
+/// Rigs drawn from the space that stations are built in, calibrated, scanned and searched as the designed ones. `SHEETLIGHT_DRAWN=1-40`: these seeds.
 #[test]
 fn rigs_that_nobody_designed_are_as_good() {
     let long = std::env::var("SHEETLIGHT_DRAWN").ok();
-    let (first, last) = match &long {
+    // The short form's: a small picture on which noise that is measured across edges makes the error 1.9 of the prediction.
+    let (first, last, shots, over) = match &long {
         Some(seeds) => {
-            seeds.split_once('-').map(|(a, b)| (a.parse().unwrap(), b.parse().unwrap())).expect("first-last")
+            let (first, last) = seeds.split_once('-').expect("first-last");
+            (first.parse().unwrap(), last.parse().unwrap(), 60, DRAWN)
         }
-        None => (1u64, 1u64),
+        None => (2u64, 2u64, 36, 1.15),
     };
     let mut faults = Vec::new();
     for seed in first..=last {
@@ -421,8 +423,7 @@ fn rigs_that_nobody_designed_are_as_good() {
         spec.check().unwrap();
         let file = dir.path().join("rig.toml");
         std::fs::write(&file, toml::to_string(&spec).unwrap()).unwrap();
-        let (width, shots) = if long.is_some() { (None, 60) } else { (Some(400), 36) };
-        let row = run(&spec.name, &file, dir.path(), width, Some(shots));
+        let row = run(&spec.name, &file, dir.path(), None, Some(shots));
         let (c, l) = (&spec.camera, &spec.laser);
         println!("{}", table(std::slice::from_ref(&row)).lines().last().unwrap());
         println!(
@@ -437,7 +438,7 @@ fn rigs_that_nobody_designed_are_as_good() {
             row.step_sigmas,
             row.completeness
         );
-        let found = judged(&row, DRAWN, true);
+        let found = judged(&row, over, true);
         found.iter().for_each(|f| println!("   FAULT {f}"));
         if !found.is_empty() {
             println!("{}", toml::to_string(&spec).unwrap());
