@@ -414,7 +414,7 @@ fn rigs_that_nobody_designed_are_as_good() {
             let (first, last) = seeds.split_once('-').expect("first-last");
             (first.parse().unwrap(), last.parse().unwrap(), 60, DRAWN)
         }
-        None => (2u64, 2u64, 36, 1.15),
+        None => (2u64, 2u64, 60, 1.15),
     };
     let mut faults = Vec::new();
     for seed in first..=last {
