@@ -13,8 +13,6 @@ override px_log2: u32 = 2u;
 // 0 Gaussian, 1 centroid, 2 derivative, 3 the pixel itself.
 override peak_method: u32 = 0u;
 
-// Samples for which the noise model counts.
-const BELIEF = 10.0;
 // Nearer than so many pixels lies a narrow stripe's own light.
 const BESIDE = 4;
 // Variances of a pixel by as many pixels a side that two sides of one level differ by, squared.
@@ -267,7 +265,7 @@ fn gaussian(at: vec2<i32>) -> Peak {
     let share = profile.square / profile.weight;
     let free = max((believed.x + believed.y) / profile.weight - 3.0, 1.0);
     let chi2 = max(squares.x + squares.y - drop, 0.0) / share;
-    let noise = max(chi2 / free, (BELIEF + chi2) / (BELIEF + free));
+    let noise = max(chi2 / free, (frame.belief + chi2) / (frame.belief + free));
     let sigma = sqrt(max(i11 * share * noise, 0.0));
     let own_width = sqrt(max(width * width - profile.blur2, 0.01 * frame.s0 * frame.s0));
     return finish(at, n, m, a, own_width, sigma, clipped.x + clipped.y > 0.0);

@@ -89,6 +89,23 @@ fn a_noisy_sensor_gives_fewer_points_and_no_false_ones() {
     assert!((0.6..0.85).contains(&judged.within_sigmas[0]), "{:?}", judged.within_sigmas);
 }
 
+/// A real laser's speckle goes over several pixels: errors are larger than pixel noise would make them, and the points say so.
+#[test]
+fn speckle_with_grains_is_in_what_the_points_state() {
+    for (seed, grain_px) in [(6, 0.7), (7, 1.3)] {
+        let dir = tempfile::tempdir().unwrap();
+        let mut options = SimulateOptions { seed, shots: 30, ..SimulateOptions::default() };
+        (options.sensor.grain_px, options.sensor.speckle, options.sensor.blur_px) = (grain_px, 0.2, 1.5);
+        let judged = scanned(dir.path(), &options);
+        let report: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(dir.path().join("result/scan.json")).unwrap()).unwrap();
+        println!("grains of {grain_px} px, {}: within sigmas {:.3?}", report["stripe"], judged.within_sigmas);
+        let seen = report["stripe"]["grain_px"].as_f64().unwrap();
+        assert!((seen / grain_px - 1.0).abs() < 0.3, "grains of {grain_px} px, seen {seen}");
+        assert!((0.6..0.8).contains(&judged.within_sigmas[0]), "{grain_px}: {:?}", judged.within_sigmas);
+    }
+}
+
 #[test]
 fn steps_are_right_to_four_micrometres() {
     let dir = tempfile::tempdir().unwrap();

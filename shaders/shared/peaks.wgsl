@@ -10,6 +10,7 @@ struct PeakFrame {
     read2: f32,
     gain: f32,
     speckle2: f32,
+    belief: f32,
     along_factor: f32,
     reach_along: i32,
     lattice_u: i32,

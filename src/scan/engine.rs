@@ -197,7 +197,8 @@ impl Engine {
         let width_px = median(|s| s.width_px)?;
         let speckle = median(|s| s.speckle)?;
         let [read_noise, gain] = [median(|s| s.read_noise.unwrap_or(0.0)), median(|s| s.gain.unwrap_or(0.0))];
-        let stripe = Stripe { width_px, speckle, noise, read_noise, gain };
+        let [grain_px, grain_factor] = [median(|s| s.grain_px)?, median(|s| s.grain_factor)?];
+        let stripe = Stripe { width_px, speckle, grain_px, grain_factor, noise, read_noise, gain };
         let hot = HotPixels::find(&images.iter().map(|i| &**i).collect::<Vec<_>>(), noise);
         Some(StripeSeen { stripe, hot, enough: 2 * telling >= images.len() })
     }

@@ -117,6 +117,39 @@ pub fn hot_pixels(sensor: &Sensor, pixels: usize, rng: &mut Pcg64) -> Vec<(usize
 /// A speckle contrast below this changes no level of 16 bits, and the Gamma distribution's shape leaves what f32 holds.
 const FAINTEST_SPECKLE: f64 = 1e-6;
 
+/// What coherent light is multiplied by: Gamma distributed, of mean one [goodman07, 4.6].
+enum Speckle {
+    /// Each pixel's is its own.
+    Pixels(Gamma<f32>),
+    /// Grains: correlated normal numbers, a pixel each, and the Gamma distribution's shape.
+    Grains(Vec<f32>, f32),
+}
+
+impl Speckle {
+    fn new(sensor: &Sensor, (width, height): (u32, u32), rng: &mut Pcg64) -> Speckle {
+        let shape = (1.0 / (sensor.speckle * sensor.speckle)) as f32;
+        if sensor.grain_px == 0.0 {
+            return Speckle::Pixels(Gamma::new(shape, 1.0 / shape).expect("positive"));
+        }
+        let mut field = Canvas::new(width, height);
+        field.pixels.iter_mut().for_each(|p| *p = StandardNormal.sample(rng));
+        blur(&mut field, sensor.grain_px);
+        let rms = (field.pixels.iter().map(|p| p * p).sum::<f32>() / field.pixels.len() as f32).sqrt();
+        field.pixels.iter_mut().for_each(|p| *p /= rms);
+        Speckle::Grains(field.pixels, shape)
+    }
+    fn at(&self, pixel: usize, rng: &mut Pcg64) -> f32 {
+        match self {
+            Speckle::Pixels(gamma) => gamma.sample(rng),
+            // Wilson and Hilferty: the cube root of a Gamma number is nearly normal.
+            Speckle::Grains(field, shape) => {
+                let root = 1.0 - 1.0 / (9.0 * shape) + field[pixel] / (3.0 * shape.sqrt());
+                root.max(0.0).powi(3)
+            }
+        }
+    }
+}
+
 /// Turns light (share of full scale) into grey levels. `laser` has speckle, `room` has none.
 pub fn expose(
     sensor: &Sensor,
@@ -126,10 +159,7 @@ pub fn expose(
     hot: &[(usize, f32)],
     rng: &mut Pcg64,
 ) -> Image {
-    let speckle = (sensor.speckle > FAINTEST_SPECKLE).then(|| {
-        let grains = 1.0 / (sensor.speckle * sensor.speckle);
-        Gamma::new(grains as f32, (1.0 / grains) as f32).expect("positive")
-    });
+    let speckle = (sensor.speckle > FAINTEST_SPECKLE).then(|| Speckle::new(sensor, (laser.width, laser.height), rng));
     let well = sensor.full_well_e as f32;
     let read = (sensor.read_noise_e * sensor.read_noise_e) as f32;
     let full = ((1u32 << sensor.bits) - 1) as f32;
@@ -137,8 +167,9 @@ pub fn expose(
         .pixels
         .iter()
         .zip(&room.pixels)
-        .map(|(&l, &r)| match &speckle {
-            Some(gamma) if l > 1e-4 => l * gamma.sample(rng) + r * room_gain,
+        .enumerate()
+        .map(|(i, (&l, &r))| match &speckle {
+            Some(speckle) if l > 1e-4 => l * speckle.at(i, rng) + r * room_gain,
             _ => l + r * room_gain,
         })
         .collect();
@@ -159,6 +190,35 @@ pub fn expose(
 mod tests {
     use super::*;
     use rand::SeedableRng;
+
+    /// Contrast as stated, and neighbours correlated as light through a blur is: exp(-d² / (4 s²)).
+    #[test]
+    fn speckle_has_the_stated_contrast_and_grains() {
+        for (speckle, grain_px) in [(0.12, 0.0), (0.12, 1.5), (0.4, 0.8), (0.4, 2.5)] {
+            let sensor =
+                Sensor { speckle, grain_px, full_well_e: 1e6, read_noise_e: 0.0, bits: 16, ..Sensor::default() };
+            let mut laser = Canvas::new(300, 300);
+            laser.pixels.fill(0.2);
+            let none = Canvas::new(300, 300);
+            let grey = expose(&sensor, &laser, &none, 0.0, &[], &mut Pcg64::seed_from_u64(1)).to_f32();
+            let mean = grey.iter().sum::<f32>() / 9e4;
+            let apart = |d: usize| {
+                let pairs = (0..300 * 300).filter(|i| i % 300 + d < 300);
+                pairs.map(|i| (grey[i] - mean) * (grey[i + d] - mean)).sum::<f32>() / ((300 - d) * 300) as f32
+            };
+            let contrast = f64::from(apart(0).sqrt() / mean);
+            let few = 1.0 + grain_px * grain_px;
+            assert!((contrast / speckle - 1.0).abs() < 0.01 * few, "{speckle}, {grain_px}: {contrast}");
+            for d in [1, 2, 4] {
+                let expected = if grain_px > 0.0 { (-0.25 * (d as f64 / grain_px).powi(2)).exp() } else { 0.0 };
+                let seen = f64::from(apart(d) / apart(0));
+                assert!(
+                    (seen - expected).abs() < 0.02 * few,
+                    "{speckle}, {grain_px}, {d} px apart: {seen}, not {expected}"
+                );
+            }
+        }
+    }
 
     #[test]
     fn noise_has_the_stated_size() {

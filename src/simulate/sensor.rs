@@ -17,6 +17,9 @@ pub struct Sensor {
     pub read_noise_e: f64,
     /// Speckle contrast per pixel, 0..=0.6 (0 = none).
     pub speckle: f64,
+    /// Sigma of the blur that makes the speckle's grains, px, 0..=9; 0: each pixel's speckle is its own. A diffraction-limited lens has
+    /// 0.42 wavelengths times its f-number.
+    pub grain_px: f64,
     /// Room light that leaks into laser pictures: grey of a white surface as share of full scale, 0..=0.9.
     pub ambient_leak: f64,
     /// Grey of a white surface in ambient pictures, share of full scale, 0.05..=0.98.
@@ -35,6 +38,7 @@ impl Default for Sensor {
             full_well_e: 10_000.0,
             read_noise_e: 20.0,
             speckle: 0.12,
+            grain_px: 0.0,
             ambient_leak: 0.01,
             ambient_white: 0.78,
             laser_white: 0.95,
@@ -52,6 +56,7 @@ impl Sensor {
             ("full_well_e", self.full_well_e, 500.0, 1e6),
             ("read_noise_e", self.read_noise_e, 0.0, 1000.0),
             ("speckle", self.speckle, 0.0, 0.6),
+            ("grain_px", self.grain_px, 0.0, 9.0),
             ("ambient_leak", self.ambient_leak, 0.0, 0.9),
             ("ambient_white", self.ambient_white, 0.05, 0.98),
             ("laser_white", self.laser_white, 0.02, 20.0),

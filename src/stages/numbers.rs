@@ -36,7 +36,6 @@ pub const NUMBERS: &[(&str, &str, f64)] = &[
     ("", "RECORD", grid::RECORD as f64),
     ("", "BEYOND", grid::BEYOND as f64),
     ("", "Z_MOST", grid::Z_MOST as f64),
-    ("peak", "BELIEF", scoring::BELIEF as f64),
     ("peak", "BESIDE", fit::BESIDE as f64),
     ("peak", "BORDER_STEPS", direction::BORDER_STEPS as f64),
     ("peak", "LEAVES", direction::LEAVES as f64),

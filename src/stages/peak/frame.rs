@@ -8,6 +8,11 @@ use crate::stages::frame::px_log2;
 use crate::stages::stripe::choose_params::ChooseParams;
 use glam::Vec2;
 
+/// Samples for which the noise model counts: of a profile's own scatter a few samples tell little.
+const BELIEF: f32 = 10.0;
+/// The same where the noise is correlated from sample to sample.
+const GRAINED: f32 = 1e4;
+
 /// The WGSL struct of the same name, shaders/shared/peaks.wgsl.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -28,8 +33,10 @@ pub struct PeakFrame {
     pub read2: f32,
     /// Variance per grey level.
     pub gain: f32,
-    /// Square of the speckle contrast, 0..=1.
+    /// Square of the speckle contrast, 0..=1, times what its grains add.
     pub speckle2: f32,
+    /// Samples for which the noise model counts.
+    pub belief: f32,
     /// 1 / R², px⁻²; the weight along the stripe is (1 - t² / R²)², close to a Gaussian of sigma R / 2.4.
     pub along_factor: f32,
     /// Half window along the stripe, px.
@@ -88,7 +95,7 @@ pub struct PeakFrame {
 
 /// WGSL name, members and bytes of [`PeakFrame`], for the contract tests.
 pub const UNIFORM: (&str, &[Field], usize) = crate::stages::frame::uniform_fields!(PeakFrame: width, height, pitch, shot_words, s0, full_scale,
-    read2, gain, speckle2, along_factor, reach_along, lattice_u, lattice_v, stride, steps, faintest, narrowest,
+    read2, gain, speckle2, belief, along_factor, reach_along, lattice_u, lattice_v, stride, steps, faintest, narrowest,
     widest, uncertain, upright, across_u, across_v, lines, columns, entries,
     line_px, fours, half_across,
     rows, turn_2, turn_4, turn_6, turn_8, square_4, square_8, flat);
@@ -139,7 +146,9 @@ impl PeakFrame {
             full_scale,
             read2: p.read_noise * p.read_noise * scale * scale,
             gain: p.gain * scale,
-            speckle2: p.speckle * p.speckle,
+            speckle2: (p.speckle * p.grain).powi(2),
+            // One profile's scatter says nothing of noise whose grains lie over several of its samples.
+            belief: if p.grain > 1.0 { GRAINED } else { BELIEF },
             // One line across the stripe needs no fading.
             along_factor: if p.along > 0.0 { 1.0 / (radius * radius) } else { 0.0 },
             reach_along,

@@ -3,21 +3,21 @@
 
 use super::found::Peak;
 use super::grey::{Grey, View};
-use super::noise::scatter::{Scatter, Sums};
+use super::noise::grain::{self, Cell, Grains};
+use super::noise::scatter::{Scatter, Sums, most};
 use super::params::{Method, PeakParams, Stripe};
 use super::{PeakFrame, twin};
 use crate::raster::{Image, Pixels};
 use crate::stages::stripe::choose_params::ChooseParams;
 use glam::Vec2;
+use nalgebra::{Matrix3, Vector3};
 
 /// Skeleton pixels looked at, spread over the picture; the median of 400 is good to 6 % of the spread.
 const SAMPLES: usize = 400;
 /// Fewer than this many usable peaks say nothing.
 const FEWEST: usize = 20;
-/// A sum of squares farther out than so many of its standard deviations is not noise alone.
-const SURE: f64 = 3.0;
-/// The lower quarter of a normal distribution ends so many standard deviations below its middle.
-const QUARTILE: f64 = 0.674;
+/// Pairs of pixels that are looked at where grains correlate them, over all windows.
+const PAIRS: usize = 8_000_000;
 
 /// Width, speckle and noise of the stripe in one picture, and the dark pixels' noise as it was assumed; `None` where there is too little of it.
 /// `across` is the unit image direction of depth. Start: half the pixels above half maximum. Then three rounds of fitting with the medians of the round before.
@@ -35,120 +35,187 @@ pub fn measure(image: &Image, skeleton: &[u32], p: &PeakParams, across: Vec2) ->
         let size = (image.width, image.height, image.bits);
         let setup = PeakFrame::new(size, 1, &p.with(&stripe), &ChooseParams::default(), across);
         let (width, height) = (setup.width, setup.height);
-        let fits = match &image.pixels {
-            Pixels::U8(pixels) => fits(View { pixels, width, height }, &sample, &setup),
-            Pixels::U16(pixels) => fits(View { pixels, width, height }, &sample, &setup),
-        };
-        if fits.len() < FEWEST {
-            return None;
-        }
-        let fits = of_one_surface(fits);
-        let width_px = median(fits.iter().map(|f| f.0).collect());
-        let sums: Vec<Sums> = fits.iter().map(|f| f.1).collect();
-        let found = Scatter::fit(&sums, &Scatter::of(p), setup.full_scale);
-        stripe = Stripe {
-            width_px: width_px.clamp(0.4, 12.0),
-            speckle: found.speckle,
-            read_noise: Some(found.read_noise),
-            gain: Some(found.gain),
-            ..stripe
+        stripe = match &image.pixels {
+            Pixels::U8(pixels) => look(View { pixels, width, height }, &sample, &setup, p, stripe)?,
+            Pixels::U16(pixels) => look(View { pixels, width, height }, &sample, &setup, p, stripe)?,
         };
     }
     Some(stripe)
 }
 
-/// Width and squared residuals of the peaks that can be believed: clipped light hides both, and a spot of one pixel is a hot pixel.
-fn fits<G: Grey>(image: G, sample: &[(i32, i32)], s: &PeakFrame) -> Vec<(f32, Sums)> {
-    let (mut pixels, mut fits) = (Vec::new(), Vec::new());
-    let skeleton: Vec<u32> = sample.iter().map(|&(x, y)| x as u32 | (y as u32) << 16).collect();
-    for (k, &(x, y)) in twin::each(image, &skeleton, 0, s, Method::Gaussian).iter().zip(sample) {
-        let usable = k.flags == 0 && k.snr > 10.0 && (0.4 * s.s0..2.5 * s.s0).contains(&k.width_px);
-        if usable && let Some(sums) = residuals(image, x, y, k, s, &mut pixels) {
-            fits.push((k.width_px, sums));
-        }
+/// One round: what the fits say whose sizes and weights follow from the stripe as it was known `before`.
+fn look<G: Grey>(image: G, sample: &[(i32, i32)], s: &PeakFrame, p: &PeakParams, before: Stripe) -> Option<Stripe> {
+    let fits = fits(image, sample, s);
+    if fits.len() < FEWEST {
+        return None;
     }
-    fits
+    let mut fits = of_one_surface(fits, before.grain_px);
+    let width_px = median(fits.iter().map(|f| f.peak.width_px).collect());
+    let grain_px = Grains::sigma(fits.iter().map(|f| grains(image, f.at, &f.peak, s)).collect(), before.grain_px);
+    let mut more = vec![1.0];
+    if grain_px > 0.0 {
+        // Pixels times pixels are walked over.
+        let pixels = (6.0 * s.s0 * (2 * s.reach_along + 1) as f32) as usize;
+        let few = (PAIRS / (pixels * pixels)).clamp(FEWEST, SAMPLES);
+        let step = fits.len().div_ceil(few);
+        fits = fits.into_iter().step_by(step).collect();
+        let mut cells = Vec::new();
+        more = fits.iter_mut().filter_map(|f| f.with_grains(image, s, grain_px, &mut cells)).collect();
+    }
+    let sums: Vec<Sums> = fits.iter().map(|f| f.sums).collect();
+    let found = Scatter::fit(&sums, &Scatter::of(p), s.full_scale);
+    Some(Stripe {
+        width_px: width_px.clamp(0.4, 12.0),
+        speckle: found.speckle,
+        grain_px,
+        grain_factor: median(more).max(1.0).sqrt(),
+        read_noise: Some(found.read_noise),
+        gain: Some(found.gain),
+        ..before
+    })
+}
+
+/// A peak that can be believed, the skeleton pixel that it was fitted at, and its squared residuals.
+struct Fit {
+    at: (i32, i32),
+    peak: Peak,
+    sums: Sums,
+}
+
+/// Clipped light hides width and noise, and a spot of one pixel is a hot pixel.
+fn fits<G: Grey>(image: G, sample: &[(i32, i32)], s: &PeakFrame) -> Vec<Fit> {
+    let mut pixels = Vec::new();
+    let skeleton: Vec<u32> = sample.iter().map(|&(x, y)| x as u32 | (y as u32) << 16).collect();
+    let peaks = twin::each(image, &skeleton, 0, s, Method::Gaussian);
+    let usable = |k: &Peak| k.flags == 0 && k.snr > 10.0 && (0.4 * s.s0..2.5 * s.s0).contains(&k.width_px);
+    let peaks = peaks.into_iter().zip(sample).filter(|(k, _)| usable(k));
+    peaks.filter_map(|(peak, &at)| Some(Fit { at, sums: residuals(image, at, &peak, s, &mut pixels)?, peak })).collect()
 }
 
 /// Fits whose residuals are noise. Where a stripe falls over an edge two pieces of it lie in one window, and on parts with many small
-/// faces such windows are the greater number: what they leave grows with the light as speckle does. A quarter shows what is usual;
-/// a sum of n squares of noise, in units of n, scatters by sqrt(2 / n).
-fn of_one_surface(mut fits: Vec<(f32, Sums)>) -> Vec<(f32, Sums)> {
-    fits.sort_by(|a, b| a.1.misfit().total_cmp(&b.1.misfit()));
-    let usual = fits[fits.len() / 4].1.misfit();
-    fits.retain(|(_, sums)| {
-        let scatter = (2.0 / sums.freedom().max(1.0)).sqrt().min(1.0);
-        sums.misfit() <= usual * (1.0 + SURE * scatter) / (1.0 - QUARTILE * scatter)
+/// faces such windows are the greater number: what they leave grows with the light as speckle does. A quarter shows what is usual.
+fn of_one_surface(mut fits: Vec<Fit>, grain: f32) -> Vec<Fit> {
+    fits.sort_by(|a, b| a.sums.misfit().total_cmp(&b.sums.misfit()));
+    let usual = fits[fits.len() / 4].sums.misfit();
+    fits.retain(|f| {
+        let free = f.sums.freedom() / grain::columns_of_a_grain(grain).powi(2);
+        f.sums.misfit() <= usual * most(free)
     });
     fits
 }
 
-/// A pixel that takes part: its weight, its residual, and what the model says of it: derivatives, light, variance.
+/// A pixel that takes part: its weight, its residual, its variance, and the rest.
 struct Pixel {
     weight: f32,
     residual: f32,
-    j: nalgebra::Vector3<f32>,
-    light: f32,
     variance: f32,
+    cell: Cell,
 }
 
-/// The squared residuals of the window. Three fitted numbers have eaten part of the noise, most where the light is: pixel by
-/// pixel the share that is left is 1 - leverage. `pixels` is memory that is used again.
-fn residuals<G: Grey>(image: G, x: i32, y: i32, k: &Peak, s: &PeakFrame, pixels: &mut Vec<Pixel>) -> Option<Sums> {
+/// The window's pixels, and what the fit's three numbers scatter by: pixel by pixel the share of the noise that is left is 1 - leverage.
+fn pixels<G: Grey>(image: G, at: (i32, i32), k: &Peak, s: &PeakFrame, all: &mut Vec<Pixel>) -> Option<Matrix3<f32>> {
     let n = (k.normal_u, k.normal_v);
-    let m = (k.u - x as f32) * n.0 + (k.v - y as f32) * n.1;
-    pixels.clear();
-    window(image, (x, y), n, m, s, |d, weight, level| {
+    let m = middle(at, k);
+    all.clear();
+    window(image, at, n, m, s.reach_along, s, |_, d, t, level| {
+        let fade = (1.0 - s.along_factor * (t * t)).max(0.0);
+        let weight = fade * fade;
         let z = (d - m) / k.width_px;
         let shape = (-0.5 * z * z).exp();
         let light = k.amplitude * shape;
-        let j = nalgebra::Vector3::new(shape, light * z / k.width_px, light * z * z / k.width_px);
+        let j = Vector3::new(shape, light * z / k.width_px, light * z * z / k.width_px);
         let variance = s.read2 + s.gain * (light + k.background) + s.speckle2 * light * light;
-        pixels.push(Pixel { weight, residual: level - k.background - light, j, light, variance });
+        let cell = Cell { at: [d, t], j, light, certainty: weight / variance };
+        all.push(Pixel { weight, residual: level - k.background - light, variance, cell });
     });
-    let mut normal = nalgebra::Matrix3::zeros();
-    for p in pixels.iter() {
-        normal += p.j * p.j.transpose() * (p.weight / p.variance);
+    let mut normal = Matrix3::zeros();
+    for Pixel { cell, .. } in all.iter() {
+        normal += cell.j * cell.j.transpose() * cell.certainty;
     }
-    let inverse = normal.try_inverse()?;
+    normal.try_inverse()
+}
+
+/// The squared residuals of the window. `pixels` is memory that is used again.
+fn residuals<G: Grey>(image: G, at: (i32, i32), k: &Peak, s: &PeakFrame, all: &mut Vec<Pixel>) -> Option<Sums> {
+    let inverse = pixels(image, at, k, s, all)?;
     let mut sums = Sums::default();
-    for p in pixels.iter() {
-        let left = (1.0 - p.weight / p.variance * (inverse * p.j).dot(&p.j)).max(0.0);
-        sums.add(p.weight, left, p.residual, (p.light, k.background), p.variance);
+    for p in all.iter() {
+        let left = (1.0 - p.cell.certainty * (inverse * p.cell.j).dot(&p.cell.j)).max(0.0);
+        sums.add(p.weight, (left, left), p.residual, (p.cell.light, k.background), p.variance);
     }
     Some(sums)
 }
 
-/// The pixels that take part: columns (or rows) along the stripe, in each those within three widths of the line.
-/// `visit` gets offset across, offset along, weight, grey level.
+impl Fit {
+    /// The same squared residuals where the speckle has grains, of which a fit takes more; the centre's variance over that without them.
+    fn with_grains<G: Grey>(&mut self, image: G, s: &PeakFrame, grain: f32, all: &mut Vec<Pixel>) -> Option<f32> {
+        let inverse = pixels(image, self.at, &self.peak, s, all)?;
+        let cells: Vec<&Cell> = all.iter().map(|p| &p.cell).collect();
+        let (grained, more) = grain::grained(&cells, &inverse, grain);
+        self.sums = Sums::default();
+        for (p, grained) in all.iter().zip(grained) {
+            let left = (1.0 - p.cell.certainty * (inverse * p.cell.j).dot(&p.cell.j)).max(0.0);
+            let light = (p.cell.light, self.peak.background);
+            self.sums.add(p.weight, (left, grained), p.residual, light, p.variance);
+        }
+        Some(more)
+    }
+}
+
+/// Offset of a peak's line from its skeleton pixel.
+fn middle((x, y): (i32, i32), k: &Peak) -> f32 {
+    (k.u - x as f32) * k.normal_u + (k.v - y as f32) * k.normal_v
+}
+
+/// The centres of the columns (or rows) along a peak's line, from its model's, and their variance without the speckle's. The light fades
+/// out of what is added up: at a sharp end each pixel that comes in or leaves would move the centre.
+fn grains<G: Grey>(image: G, at: (i32, i32), k: &Peak, s: &PeakFrame) -> Grains {
+    let (n, m) = ((k.normal_u, k.normal_v), middle(at, k));
+    let reach = Grains::reach(s.reach_along);
+    let mut columns = vec![(0.0, 0.0, 0.0, 0); 2 * reach as usize + 1];
+    window(image, at, n, m, reach, s, |i, d, _, level| {
+        let (light, moment, white, inside) = &mut columns[(i + reach) as usize];
+        let z = (d - m) / k.width_px;
+        let fade = (-0.25 * z * z).exp();
+        *light += fade * (level - k.background);
+        *moment += fade * z * (level - k.background);
+        *white += (fade * z).powi(2) * (s.read2 + s.gain * level);
+        *inside += 1;
+    });
+    if columns.iter().any(|c| c.0 <= 0.0 || c.3 == 0) {
+        return Grains::default();
+    }
+    Grains::new(&columns.iter().map(|c| (c.1 / c.0, c.2 / (c.0 * c.0))).collect::<Vec<_>>())
+}
+
+/// The pixels that take part: `reach` columns (or rows) along the stripe to both sides, in each those within three widths of the line.
+/// `visit` gets the column, offset across, offset along, grey level.
 #[inline(always)]
 fn window<G: Grey>(
     image: G,
     (x, y): (i32, i32),
     (nx, ny): (f32, f32),
     m0: f32,
+    reach: i32,
     s: &PeakFrame,
-    mut visit: impl FnMut(f32, f32, f32),
+    mut visit: impl FnMut(i32, f32, f32, f32),
 ) {
     // Walk along the image axis that is nearer to the stripe.
     let rows = ny >= nx.abs();
     let (na, nb) = if rows { (nx, ny) } else { (ny, nx) };
     let half = 3.0 * s.s0;
-    let reach = (half / nb.abs()).ceil() as i32;
-    let mut i = -s.reach_along;
-    while i <= s.reach_along {
+    let reach_across = (half / nb.abs()).ceil() as i32;
+    for i in -reach..=reach {
         let centre = ((m0 - i as f32 * na) / nb + 0.5).floor() as i32;
-        for j in centre - reach..=centre + reach {
+        for j in centre - reach_across..=centre + reach_across {
             let (di, dj) = if rows { (i, j) } else { (j, i) };
             let d = di as f32 * nx + dj as f32 * ny;
             let t = dj as f32 * nx - di as f32 * ny;
             let (a, b) = (x + di, y + dj);
             if (d - m0).abs() <= half && a >= 0 && b >= 0 && a < s.width && b < s.height {
-                let fade = (1.0 - s.along_factor * (t * t)).max(0.0);
-                visit(d, fade * fade, image.inside(a, b) as f32);
+                visit(i, d, t, image.inside(a, b) as f32);
             }
         }
-        i += 1;
     }
 }
 

@@ -36,6 +36,9 @@ pub struct PeakParams {
     /// Speckle contrast of one pixel, 0..=1: standard deviation over mean of coherent light. 0 is a stripe without
     /// speckle; larger trusts the flanks more and the top less.
     pub speckle: f32,
+    /// How much more a centre scatters by speckle of large grains than by one of single pixels, 1..=20; measured on the first shots.
+    #[serde(skip, default = "one")]
+    pub grain: f32,
     /// Read and quantisation noise, 0.1..=20 grey levels of an 8-bit picture.
     pub read_noise: f32,
     /// Shot noise: grey levels (8-bit) per photo-electron, 0..=5; its variance is this times the level.
@@ -53,6 +56,7 @@ impl Default for PeakParams {
             method: Method::Gaussian,
             width_px: 0.75,
             speckle: 0.18,
+            grain: 1.0,
             read_noise: 0.7,
             gain: 0.05,
             along: 1.0,
@@ -82,18 +86,31 @@ impl PeakParams {
     /// The same settings with the stripe's measured width, speckle and noise.
     pub fn with(self, stripe: &Stripe) -> PeakParams {
         let (read_noise, gain) = (stripe.read_noise.unwrap_or(self.read_noise), stripe.gain.unwrap_or(self.gain));
-        PeakParams { width_px: stripe.width_px, speckle: stripe.speckle, read_noise, gain, ..self }
+        PeakParams {
+            width_px: stripe.width_px,
+            speckle: stripe.speckle,
+            grain: stripe.grain_factor,
+            read_noise,
+            gain,
+            ..self
+        }
     }
 }
 
 /// What laser, lens and sensor make of a stripe: constant over a scan.
-#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Stripe {
     /// Gaussian sigma of the profile, px.
     pub width_px: f32,
     /// Standard deviation over mean of the stripe's light from pixel to pixel.
     pub speckle: f32,
+    /// Sigma of the blur that makes the speckle's grains, px; 0 where each pixel's speckle is its own.
+    #[serde(default)]
+    pub grain_px: f32,
+    /// How much more a centre scatters by such speckle than by one of single pixels; 1 where it is one of single pixels.
+    #[serde(default = "one")]
+    pub grain_factor: f32,
     /// Standard deviation of a dark pixel, grey levels of an 8-bit picture; 0 where nothing is known of it.
     #[serde(default)]
     pub noise: f32,
@@ -103,6 +120,24 @@ pub struct Stripe {
     /// Grey levels (8-bit) per photo-electron, as [`PeakParams::gain`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub gain: Option<f32>,
+}
+
+fn one() -> f32 {
+    1.0
+}
+
+impl Default for Stripe {
+    fn default() -> Stripe {
+        Stripe {
+            width_px: 0.0,
+            speckle: 0.0,
+            grain_px: 0.0,
+            grain_factor: 1.0,
+            noise: 0.0,
+            read_noise: None,
+            gain: None,
+        }
+    }
 }
 
 /// Most samples of a profile, as many as the shader has written out.

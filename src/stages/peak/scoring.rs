@@ -5,8 +5,6 @@ use super::PeakFrame;
 use super::lanes::{LANES, Lanes, exponential};
 use super::profile::{Profiles, clipped_within, number, share};
 
-/// Samples for which the noise model counts.
-pub(in crate::stages) const BELIEF: f32 = 10.0;
 /// Grey levels that are no light, but whose square is no denormal number: those take a CPU many times as long.
 pub(in crate::stages) const DARK: f32 = 1e-9;
 /// Share of a number's information that is left at least where another number explains it: what f32 can tell from nothing.
@@ -104,9 +102,9 @@ pub(super) fn gaussians(profiles: &Profiles, lanes: usize, s: &PeakFrame) -> Fou
     // A sample is the weighted mean of pixels that err independently: its variance is a pixel's times this.
     let share = profiles.square / profiles.weight;
     // Where the noise is larger than the model says, the centre is less certain by the same factor. Few samples tell
-    // little of it, so where it seems smaller the model counts for ten samples.
+    // little of it, so where it seems smaller the model counts for as many.
     let free = (fit.believed - Lanes::all(3.0)).max(ONE);
-    let (chi2, belief) = (fit.squares / share, Lanes::all(BELIEF));
+    let (chi2, belief) = (fit.squares / share, Lanes::all(s.belief));
     let noise = (chi2 / free).max((belief + chi2) / (belief + free));
     Found {
         m: fit.m,

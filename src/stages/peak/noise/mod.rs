@@ -1,6 +1,7 @@
 //! In: a picture, most of it dark or smooth. Out: by how much a dark pixel scatters.
 //! Frame and unit: standard deviation, grey levels of an 8-bit picture. docs/math.md, Stripe peak (6).
 
+pub(super) mod grain;
 pub(super) mod scatter;
 
 use crate::raster::Image;

@@ -17,6 +17,18 @@ const ROUNDING: f32 = 0.3;
 /// So many pixels' worth of belief in the settings: where the light is the same everywhere, shot noise and speckle cannot be told apart.
 const BELIEF: f64 = 10.0;
 
+/// A sum of squares farther out than so many of its standard deviations is not noise alone.
+const SURE: f64 = 3.0;
+/// The lower quarter of a normal distribution ends so many standard deviations below its middle.
+const QUARTILE: f64 = 0.674;
+
+/// Squares that noise alone leaves at most, over those that it leaves the lower quarter at most: a sum of `free` squares, in units of
+/// that, scatters by sqrt(2 / free).
+pub(in super::super) fn most(free: f64) -> f64 {
+    let scatter = (2.0 / free.max(1.0)).sqrt().min(1.0);
+    (1.0 + SURE * scatter) / (1.0 - QUARTILE * scatter)
+}
+
 /// Least squares of e² against left (r² + k level + c² light²) over some pixels, each in units of its expected variance.
 #[derive(Clone, Copy, Debug, Default)]
 pub(in super::super) struct Sums {
@@ -28,12 +40,19 @@ pub(in super::super) struct Sums {
 }
 
 impl Sums {
-    /// A pixel of this `weight`: the share of its variance that a fit has left, its residual, its light above the background and
+    /// A pixel of this `weight`: the shares of its variance and of its speckle's that a fit has left, its residual, its light above the background and
     /// that, its variance as it was assumed.
-    pub fn add(&mut self, weight: f32, left: f32, residual: f32, (light, background): (f32, f32), variance: f32) {
-        let [weight, left, residual, light, background, variance] =
-            [weight, left, residual, light, background, variance].map(f64::from);
-        let row = Vector3::new(1.0, light + background, light * light) * (left / variance);
+    pub fn add(
+        &mut self,
+        weight: f32,
+        left: (f32, f32),
+        residual: f32,
+        (light, background): (f32, f32),
+        variance: f32,
+    ) {
+        let [weight, left, grained, residual, light, background, variance] =
+            [weight, left.0, left.1, residual, light, background, variance].map(f64::from);
+        let row = Vector3::new(left, left * (light + background), grained * (light * light)) / variance;
         let seen = residual * residual / variance;
         self.normal += row * row.transpose() * weight;
         self.right += row * (weight * seen);
@@ -122,7 +141,7 @@ mod tests {
                     for i in 0..30 {
                         let (light, base) = (full * 0.8 * (-0.01 * (i * i) as f32).exp(), 0.02 * full);
                         let e = noise.normal() as f32 * variance(&truth, light, base).sqrt();
-                        s.add(1.0, 1.0, e, (light, base), variance(&assumed, light, base));
+                        s.add(1.0, (1.0, 1.0), e, (light, base), variance(&assumed, light, base));
                     }
                     s
                 })

@@ -1,0 +1,134 @@
+//! In: light of a stripe, column by column along it, and the pixels of a fit. Out: how large the grains of its speckle are, and what they
+//! do to the fit: how much more a centre scatters than by pixels that are speckled by themselves.
+//! Frame and unit: sigma of the blur that makes the grains, px. docs/math.md, Stripe peak (6).
+
+use super::scatter::most;
+use nalgebra::{Matrix3, Vector3};
+
+/// Distances between two columns that are compared, at most.
+const LAGS: usize = 12;
+/// Columns on both sides of a peak at least, so that a narrow stripe's grains are seen to end.
+const FEWEST: i32 = 4;
+/// Steps of the search for the grains' size, and the largest one, px.
+const FINE: f32 = 0.05;
+const LARGEST: f32 = 6.0;
+/// Share of the differences' squares that grains must explain before they are believed.
+const TELLING: f64 = 0.03;
+
+/// Correlation of the speckle of two pixels so far apart (square, px²): light through a blur of sigma s has intensities correlated as
+/// exp(-d² / (4 s²)).
+fn correlation(apart2: f32, grain: f32) -> f32 {
+    (-0.25 * apart2 / (grain * grain)).exp()
+}
+
+/// Second differences of the centres of a stripe's columns at every distance along it, in squares. A slope of the line falls out of them,
+/// and so does what the surface makes of all of a column's light, as edges between dark and bright do.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in super::super) struct Grains {
+    squares: [f64; LAGS],
+    white: [f64; LAGS],
+    n: [f64; LAGS],
+}
+
+impl Grains {
+    /// Columns on both sides of a peak that are looked at, where its window reaches so far along the stripe.
+    pub fn reach(window: i32) -> i32 {
+        window.clamp(FEWEST, 2 * LAGS as i32)
+    }
+    /// Columns beside each other: their centre, and its variance without the speckle's; any one unit of length.
+    pub fn new(columns: &[(f32, f32)]) -> Grains {
+        let mut grains = Grains::default();
+        for k in 1..=LAGS.min((columns.len() - 1) / 2) {
+            for i in k..columns.len() - k {
+                let [a, b, c] = [columns[i - k], columns[i], columns[i + k]];
+                grains.squares[k - 1] += f64::from((a.0 - 2.0 * b.0 + c.0).powi(2) / 6.0);
+                grains.white[k - 1] += f64::from((a.1 + 4.0 * b.1 + c.1) / 6.0);
+                grains.n[k - 1] += 1.0;
+            }
+        }
+        grains
+    }
+    /// Mean square over all distances.
+    fn whole(&self) -> f64 {
+        (0..LAGS).filter(|&k| self.n[k] > 0.0).map(|k| self.squares[k] / self.n[k]).sum()
+    }
+    /// Sigma of all their grains, px; 0 where pixels scatter by themselves or nothing is told. A square is v (1 - (4 r(k) - r(2k)) / 3) on
+    /// average, r the correlation k columns apart: least squares over v and the grains' size. Peaks whose columns scatter more than noise
+    /// does, with grains as they were known `before`, lie over an edge.
+    pub fn sigma(mut all: Vec<Grains>, before: f32) -> f32 {
+        all.retain(|g| g.n[0] > 0.0);
+        all.sort_by(|a, b| a.whole().total_cmp(&b.whole()));
+        let Some(usual) = all.get(all.len() / 4).map(Grains::whole) else { return 0.0 };
+        let mut sum = Grains::default();
+        let free = |g: &Grains| (g.n[0] + 2.0) / columns_of_a_grain(before);
+        for g in all.iter().filter(|g| g.whole() <= usual * most(0.7 * free(g))) {
+            for k in 0..LAGS {
+                sum.squares[k] += g.squares[k];
+                sum.white[k] += g.white[k];
+                sum.n[k] += g.n[k];
+            }
+        }
+        let explained = |shape: &dyn Fn(f32) -> f64| {
+            let [mut across, mut square, mut whole] = [0.0; 3];
+            for k in (0..LAGS).filter(|&k| sum.n[k] > 0.0) {
+                let (seen, shape) = ((sum.squares[k] - sum.white[k]) / sum.n[k], shape((k + 1) as f32));
+                across += sum.n[k] * shape * seen;
+                square += sum.n[k] * shape * shape;
+                whole += sum.n[k] * seen * seen;
+            }
+            if across > 0.0 { across * across / (square * whole) } else { 0.0 }
+        };
+        let grained =
+            |s: f32| move |k: f32| 1.0 - f64::from(4.0 * correlation(k * k, s) - correlation(4.0 * k * k, s)) / 3.0;
+        let sizes = (1..=(LARGEST / FINE) as u32).map(|i| i as f32 * FINE);
+        let best = sizes.map(|s| (s, explained(&grained(s)))).max_by(|a, b| a.1.total_cmp(&b.1));
+        best.filter(|b| b.1 - explained(&|_| 1.0) > TELLING).map_or(0.0, |b| b.0)
+    }
+}
+
+/// Squares of noise with such grains are correlated by r²: so many columns tell as much as one that is by itself. Of pixels, the square.
+pub(in super::super) fn columns_of_a_grain(grain: f32) -> f64 {
+    // Sum of exp(-d² / (2 s²)).
+    (std::f64::consts::TAU.sqrt() * f64::from(grain)).max(1.0)
+}
+
+/// A pixel of a fit: where it is, the derivatives of its model by the three fitted numbers, its light, and its certainty, the weight
+/// over the variance.
+pub(in super::super) struct Cell {
+    pub at: [f32; 2],
+    pub j: Vector3<f32>,
+    pub light: f32,
+    pub certainty: f32,
+}
+
+/// What a fit makes of speckle with grains: the share of each pixel's squares that it leaves, and the centre's variance over that from
+/// pixels that are speckled by themselves. `inverse` is the fit's (Jᵀ W J)⁻¹; its estimate is that times Jᵀ W e.
+pub(in super::super) fn grained(cells: &[&Cell], inverse: &Matrix3<f32>, grain: f32) -> (Vec<f32>, f32) {
+    let far2 = (6.0 * grain).powi(2);
+    // (Jᵀ W S) of each pixel, S the speckle's covariance over the contrast's square.
+    let seen: Vec<Vector3<f32>> = cells
+        .iter()
+        .map(|a| {
+            let mut sum = Vector3::zeros();
+            for b in cells {
+                let apart2 = (a.at[0] - b.at[0]).powi(2) + (a.at[1] - b.at[1]).powi(2);
+                if apart2 < far2 {
+                    sum += b.j * (b.certainty * b.light * correlation(apart2, grain));
+                }
+            }
+            sum * a.light
+        })
+        .collect();
+    let (mut together, mut alone) = (Matrix3::zeros(), Matrix3::zeros());
+    for (c, q) in cells.iter().zip(&seen) {
+        together += c.j * q.transpose() * c.certainty;
+        alone += c.j * c.j.transpose() * (c.certainty * c.light).powi(2);
+    }
+    let [together, alone] = [together, alone].map(|m| inverse * m * inverse);
+    let left = cells.iter().zip(&seen).map(|(c, q)| {
+        let square = (c.light * c.light).max(1e-6);
+        let taken = 2.0 * (inverse * c.j).dot(q) - (together * c.j).dot(&c.j);
+        (1.0 - taken / square).clamp(0.0, 1.0)
+    });
+    (left.collect(), together[(1, 1)] / alone[(1, 1)].max(1e-12))
+}
