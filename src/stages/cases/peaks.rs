@@ -109,7 +109,9 @@ fn cases(name: &str, scene: &Scene, told: &Told, methods: &[Method], wanted: &st
     let (f, bits) = (walk.frame, scene.shots[0].bits);
     let mut cases = Vec::new();
     for &method in methods {
-        let p = PeakParams { method, width_px: told.width_px, speckle: 0.05, ..Default::default() };
+        // Wide stripes' speckle has grains.
+        let grain = if told.width_px > 3.0 { 2.5 } else { 1.0 };
+        let p = PeakParams { method, width_px: told.width_px, speckle: 0.05, grain, ..Default::default() };
         let choice = crate::stages::stripe::choose_params::ChooseParams { echo: 0.4, ..Default::default() };
         let frame = peak::PeakFrame::new((f.width, f.height, bits), f.shots, &p, &choice, told.optics.across());
         let quads = f64::from(frame.quads());

@@ -17,7 +17,7 @@ const SAMPLES: usize = 400;
 /// Fewer than this many usable peaks say nothing.
 const FEWEST: usize = 20;
 /// Pairs of pixels that are looked at where grains correlate them, over all windows.
-const PAIRS: usize = 8_000_000;
+const PAIRS: usize = 1_000_000;
 
 /// Width, speckle and noise of the stripe in one picture, and the dark pixels' noise as it was assumed; `None` where there is too little of it.
 /// `across` is the unit image direction of depth. Start: half the pixels above half maximum. Then three rounds of fitting with the medians of the round before.
@@ -52,23 +52,24 @@ fn look<G: Grey>(image: G, sample: &[(i32, i32)], s: &PeakFrame, p: &PeakParams,
     let mut fits = of_one_surface(fits, before.grain_px);
     let width_px = median(fits.iter().map(|f| f.peak.width_px).collect());
     let grain_px = Grains::sigma(fits.iter().map(|f| grains(image, f.at, &f.peak, s)).collect(), before.grain_px);
-    let mut more = vec![1.0];
+    let mut more = Vec::new();
     if grain_px > 0.0 {
-        // Pixels times pixels are walked over.
-        let pixels = (6.0 * s.s0 * (2 * s.reach_along + 1) as f32) as usize;
-        let few = (PAIRS / (pixels * pixels)).clamp(FEWEST, SAMPLES);
+        let columns = (2 * s.reach_along + 1) as usize;
+        let pairs = grain::pairs((6.0 * s.s0) as usize * columns, columns, grain_px);
+        let few = (PAIRS / pairs.max(1)).clamp(FEWEST, SAMPLES);
         let step = fits.len().div_ceil(few);
         fits = fits.into_iter().step_by(step).collect();
-        let mut cells = Vec::new();
-        more = fits.iter_mut().filter_map(|f| f.with_grains(image, s, grain_px, &mut cells)).collect();
+        let mut all = Vec::new();
+        more = fits.iter_mut().filter_map(|f| f.with_grains(image, s, grain_px, &mut all)).collect();
     }
+    let factor = if more.is_empty() { 1.0 } else { median(more).max(1.0).sqrt() };
     let sums: Vec<Sums> = fits.iter().map(|f| f.sums).collect();
     let found = Scatter::fit(&sums, &Scatter::of(p), s.full_scale);
     Some(Stripe {
         width_px: width_px.clamp(0.4, 12.0),
         speckle: found.speckle,
         grain_px,
-        grain_factor: median(more).max(1.0).sqrt(),
+        grain_factor: factor,
         read_noise: Some(found.read_noise),
         gain: Some(found.gain),
         ..before
@@ -117,7 +118,7 @@ fn pixels<G: Grey>(image: G, at: (i32, i32), k: &Peak, s: &PeakFrame, all: &mut 
     let n = (k.normal_u, k.normal_v);
     let m = middle(at, k);
     all.clear();
-    window(image, at, n, m, s.reach_along, s, |_, d, t, level| {
+    window(image, at, n, m, s.reach_along, s, |at, d, t, level| {
         let fade = (1.0 - s.along_factor * (t * t)).max(0.0);
         let weight = fade * fade;
         let z = (d - m) / k.width_px;
@@ -125,7 +126,7 @@ fn pixels<G: Grey>(image: G, at: (i32, i32), k: &Peak, s: &PeakFrame, all: &mut 
         let light = k.amplitude * shape;
         let j = Vector3::new(shape, light * z / k.width_px, light * z * z / k.width_px);
         let variance = s.read2 + s.gain * (light + k.background) + s.speckle2 * light * light;
-        let cell = Cell { at: [d, t], j, light, certainty: weight / variance };
+        let cell = Cell { at, j, light, certainty: weight / variance };
         all.push(Pixel { weight, residual: level - k.background - light, variance, cell });
     });
     let mut normal = Matrix3::zeros();
@@ -150,6 +151,8 @@ impl Fit {
     /// The same squared residuals where the speckle has grains, of which a fit takes more; the centre's variance over that without them.
     fn with_grains<G: Grey>(&mut self, image: G, s: &PeakFrame, grain: f32, all: &mut Vec<Pixel>) -> Option<f32> {
         let inverse = pixels(image, self.at, &self.peak, s, all)?;
+        let stride = grain::stride(grain);
+        all.retain(|p| p.cell.at.iter().all(|k| k.rem_euclid(stride) == 0));
         let cells: Vec<&Cell> = all.iter().map(|p| &p.cell).collect();
         let (grained, more) = grain::grained(&cells, &inverse, grain);
         self.sums = Sums::default();
@@ -172,24 +175,23 @@ fn middle((x, y): (i32, i32), k: &Peak) -> f32 {
 fn grains<G: Grey>(image: G, at: (i32, i32), k: &Peak, s: &PeakFrame) -> Grains {
     let (n, m) = ((k.normal_u, k.normal_v), middle(at, k));
     let reach = Grains::reach(s.reach_along);
-    let mut columns = vec![(0.0, 0.0, 0.0, 0); 2 * reach as usize + 1];
-    window(image, at, n, m, reach, s, |i, d, _, level| {
-        let (light, moment, white, inside) = &mut columns[(i + reach) as usize];
+    let mut columns = vec![(0.0, 0.0, 0.0); 2 * reach as usize + 1];
+    window(image, at, n, m, reach, s, |[i, _], d, _, level| {
+        let (light, moment, white) = &mut columns[(i + reach) as usize];
         let z = (d - m) / k.width_px;
         let fade = (-0.25 * z * z).exp();
         *light += fade * (level - k.background);
         *moment += fade * z * (level - k.background);
         *white += (fade * z).powi(2) * (s.read2 + s.gain * level);
-        *inside += 1;
     });
-    if columns.iter().any(|c| c.0 <= 0.0 || c.3 == 0) {
+    if columns.iter().any(|c| c.0 <= 0.0) {
         return Grains::default();
     }
     Grains::new(&columns.iter().map(|c| (c.1 / c.0, c.2 / (c.0 * c.0))).collect::<Vec<_>>())
 }
 
 /// The pixels that take part: `reach` columns (or rows) along the stripe to both sides, in each those within three widths of the line.
-/// `visit` gets the column, offset across, offset along, grey level.
+/// `visit` gets column and row from the skeleton pixel, offset across, offset along, grey level.
 #[inline(always)]
 fn window<G: Grey>(
     image: G,
@@ -198,7 +200,7 @@ fn window<G: Grey>(
     m0: f32,
     reach: i32,
     s: &PeakFrame,
-    mut visit: impl FnMut(i32, f32, f32, f32),
+    mut visit: impl FnMut([i32; 2], f32, f32, f32),
 ) {
     // Walk along the image axis that is nearer to the stripe.
     let rows = ny >= nx.abs();
@@ -213,7 +215,7 @@ fn window<G: Grey>(
             let t = dj as f32 * nx - di as f32 * ny;
             let (a, b) = (x + di, y + dj);
             if (d - m0).abs() <= half && a >= 0 && b >= 0 && a < s.width && b < s.height {
-                visit(i, d, t, image.inside(a, b) as f32);
+                visit([i, j], d, t, image.inside(a, b) as f32);
             }
         }
     }
@@ -249,15 +251,17 @@ mod tests {
     const WIDE: f64 = 3.0;
     const SPECKLE: f64 = 0.08;
 
-    /// A stripe that falls over an edge every `face` px, and its middle.
-    fn falling(face: u32) -> (Image, Vec<u32>) {
+    /// A stripe that falls over an edge every `face` px, and its middle. Every `print` px it is half as bright, over 2 px.
+    fn falling(face: u32, print: f64) -> (Image, Vec<u32>) {
         let mut noise = Noise(5);
         let middle = |x: u32| 60.0 + [0.0, 7.0, 3.0, 12.0][(x / face) as usize % 4];
         let (width, height) = (1200, 140);
         let pixels = (0..width * height)
             .map(|i| {
                 let (x, y) = (i % width, f64::from(i / width));
-                let light = 150.0 * (-0.5 * ((y - middle(x)) / WIDE).powi(2)).exp();
+                let edge = (0.5 * print - (f64::from(x) % print - 0.5 * print).abs()) - 0.25 * print;
+                let white = 0.75 + 0.25 * (0.5 * edge).tanh();
+                let light = 150.0 * white * (-0.5 * ((y - middle(x)) / WIDE).powi(2)).exp();
                 let scatter = (0.5f64.powi(2) + 0.02 * (light + 4.0) + (SPECKLE * light).powi(2)).sqrt();
                 (4.0 + light + noise.normal() * scatter).round().clamp(0.0, 255.0) as u8
             })
@@ -266,16 +270,17 @@ mod tests {
         (Image::from_u8(width, height, pixels), skeleton)
     }
 
-    /// Half of the windows hold an edge on faces of 30 px.
+    /// Half of the windows hold an edge on faces of 30 px, and as many one of the print.
     #[test]
     fn edges_are_not_taken_for_speckle() {
-        for face in [1200, 60, 30] {
-            let (image, skeleton) = falling(face);
+        for (face, print) in [(1200, 1e6), (60, 1e6), (30, 1e6), (1200, 60.0), (60, 90.0)] {
+            let (image, skeleton) = falling(face, print);
             let p = PeakParams { width_px: WIDE as f32, ..PeakParams::default() };
             let found = measure(&image, &skeleton, &p, Vec2::Y).unwrap();
             let off = |is: f32, of: f64| (f64::from(is) / of - 1.0).abs();
-            assert!(off(found.width_px, WIDE) < 0.05, "faces of {face} px: {found:?}");
-            assert!(off(found.speckle, SPECKLE) < 0.15, "faces of {face} px: {found:?}");
+            assert!(off(found.width_px, WIDE) < 0.05, "faces of {face} px, print of {print}: {found:?}");
+            assert!(off(found.speckle, SPECKLE) < 0.15, "faces of {face} px, print of {print}: {found:?}");
+            assert_eq!(found.grain_px, 0.0, "faces of {face} px, print of {print}: {found:?}");
         }
     }
 }

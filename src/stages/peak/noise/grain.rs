@@ -68,13 +68,15 @@ impl Grains {
                 sum.n[k] += g.n[k];
             }
         }
+        // What a shape of the squares over the distance leaves less of, of all squares with white noise's.
+        let lags: Vec<usize> = (0..LAGS).filter(|&k| sum.n[k] > 0.0).collect();
+        let whole: f64 = lags.iter().map(|&k| sum.squares[k].powi(2) / sum.n[k]).sum();
         let explained = |shape: &dyn Fn(f32) -> f64| {
-            let [mut across, mut square, mut whole] = [0.0; 3];
-            for k in (0..LAGS).filter(|&k| sum.n[k] > 0.0) {
-                let (seen, shape) = ((sum.squares[k] - sum.white[k]) / sum.n[k], shape((k + 1) as f32));
-                across += sum.n[k] * shape * seen;
+            let [mut across, mut square] = [0.0; 2];
+            for &k in &lags {
+                let shape = shape((k + 1) as f32);
+                across += shape * (sum.squares[k] - sum.white[k]);
                 square += sum.n[k] * shape * shape;
-                whole += sum.n[k] * seen * seen;
             }
             if across > 0.0 { across * across / (square * whole) } else { 0.0 }
         };
@@ -92,37 +94,56 @@ pub(in super::super) fn columns_of_a_grain(grain: f32) -> f64 {
     (std::f64::consts::TAU.sqrt() * f64::from(grain)).max(1.0)
 }
 
-/// A pixel of a fit: where it is, the derivatives of its model by the three fitted numbers, its light, and its certainty, the weight
-/// over the variance.
+/// A pixel of a fit: where it is, column and row, the derivatives of its model by the three fitted numbers, its light, and its certainty,
+/// the weight over the variance.
 pub(in super::super) struct Cell {
-    pub at: [f32; 2],
+    pub at: [i32; 2],
     pub j: Vector3<f32>,
     pub light: f32,
     pub certainty: f32,
 }
 
+/// Every so many columns and rows tell what such grains do.
+pub(in super::super) fn stride(grain: f32) -> i32 {
+    (grain as i32).max(1)
+}
+
+/// So many standard deviations of the blur apart two pixels have nothing in common.
+const FAR: f32 = 4.5;
+
+/// Pairs of pixels that [`grained`] walks over, of a fit with so many.
+pub(in super::super) fn pairs(pixels: usize, columns: usize, grain: f32) -> usize {
+    let stride = stride(grain) as usize;
+    let near = (2.0 * FAR * grain).ceil() as usize;
+    (pixels / (stride * stride)) * (pixels * near.min(columns) / columns / (stride * stride)).max(1)
+}
+
 /// What a fit makes of speckle with grains: the share of each pixel's squares that it leaves, and the centre's variance over that from
-/// pixels that are speckled by themselves. `inverse` is the fit's (Jᵀ W J)⁻¹; its estimate is that times Jᵀ W e.
+/// pixels that are speckled by themselves. The cells are those of every [`stride`], in order of their columns. `inverse` is the fit's
+/// (Jᵀ W J)⁻¹; its estimate is that times Jᵀ W e.
 pub(in super::super) fn grained(cells: &[&Cell], inverse: &Matrix3<f32>, grain: f32) -> (Vec<f32>, f32) {
-    let far2 = (6.0 * grain).powi(2);
+    let far = FAR * grain;
+    let each = stride(grain).pow(2) as f32;
+    let mut first = 0;
     // (Jᵀ W S) of each pixel, S the speckle's covariance over the contrast's square.
-    let seen: Vec<Vector3<f32>> = cells
-        .iter()
-        .map(|a| {
-            let mut sum = Vector3::zeros();
-            for b in cells {
-                let apart2 = (a.at[0] - b.at[0]).powi(2) + (a.at[1] - b.at[1]).powi(2);
-                if apart2 < far2 {
-                    sum += b.j * (b.certainty * b.light * correlation(apart2, grain));
-                }
+    let mut seen = Vec::with_capacity(cells.len());
+    for a in cells {
+        while ((a.at[0] - cells[first].at[0]) as f32) > far {
+            first += 1;
+        }
+        let mut sum = Vector3::zeros();
+        for b in cells[first..].iter().take_while(|b| ((b.at[0] - a.at[0]) as f32) <= far) {
+            let [i, j] = [0, 1].map(|k| (a.at[k] - b.at[k]) as f32);
+            if j.abs() <= far {
+                sum += b.j * (b.certainty * b.light * correlation(i * i + j * j, grain));
             }
-            sum * a.light
-        })
-        .collect();
+        }
+        seen.push(sum * (each * a.light));
+    }
     let (mut together, mut alone) = (Matrix3::zeros(), Matrix3::zeros());
     for (c, q) in cells.iter().zip(&seen) {
-        together += c.j * q.transpose() * c.certainty;
-        alone += c.j * c.j.transpose() * (c.certainty * c.light).powi(2);
+        together += c.j * q.transpose() * (each * c.certainty);
+        alone += c.j * c.j.transpose() * (each * (c.certainty * c.light).powi(2));
     }
     let [together, alone] = [together, alone].map(|m| inverse * m * inverse);
     let left = cells.iter().zip(&seen).map(|(c, q)| {
