@@ -186,14 +186,14 @@ fn camera_from_axis(axis: &Value) -> Rigid<Camera, Base> {
     Rigid::from_rows(&m).unwrap().0
 }
 
-/// Of the direction, both angles together, as stated, rad.
+/// Of the direction, along the angle that is known worst, as stated, rad: a carriage that rides over a long board tells one of the two
+/// far better than the other.
 fn direction_sigma(axis: &Value) -> f64 {
     let of = &axis["covariance"];
-    let variance = |name: &&str| {
-        let k = of["parameters"].as_array().unwrap().iter().position(|p| p == *name).unwrap();
-        of["matrix"][k][k].as_f64().unwrap()
-    };
-    ["dx", "dy", "dz"].iter().map(variance).sum::<f64>().sqrt()
+    let at =
+        ["dx", "dy", "dz"].map(|name| of["parameters"].as_array().unwrap().iter().position(|p| p == name).unwrap());
+    let covariance = nalgebra::Matrix3::from_fn(|i, j| of["matrix"][at[i]][at[j]].as_f64().unwrap());
+    covariance.symmetric_eigenvalues().max().sqrt()
 }
 
 /// Robust deviation: which points a running camera gets beside an edge differs from run to run.
@@ -244,8 +244,8 @@ fn an_axis_before_a_running_camera_scans_as_accurately_as_a_robot() {
             found["quality"]["verdict"],
             pitch / true_pitch - 1.0
         );
-        // Two angles: 4 sigmas of one are passed by 3 in ten thousand.
-        assert!(turned < 4.0 / 2f64.sqrt() * sigma, "{turned} degrees off, {sigma} stated");
+        // Two angles, of which one is known as badly as this: 4 sigmas are passed by 1 to 3 in ten thousand.
+        assert!(turned < 4.0 * sigma, "{turned} degrees off, {sigma} stated");
         assert!(turned < 0.1 && (pitch / true_pitch - 1.0).abs() < 1e-3, "{found}");
         assert!(["good", "usable"].contains(&found["quality"]["verdict"].as_str().unwrap()), "{}", found["quality"]);
         assert!(found["covariance"]["matrix"].as_array().is_some_and(|v| !v.is_empty()), "{}", found["covariance"]);
