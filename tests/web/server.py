@@ -25,10 +25,15 @@ class Server:
         # A test that fails leaves nobody serving.
         atexit.register(self.process.kill)
         self.said = []
-        threading.Thread(target=lambda: self.said.extend(line.decode() for line in self.process.stderr), daemon=True).start()
+        reader = threading.Thread(target=lambda: self.said.extend(line.decode() for line in self.process.stderr), daemon=True)
+        reader.start()
         text = ""
         while text.count("{") != text.count("}") or not text:
             line = self.process.stdout.readline().decode()
+            if not line:
+                # What it said may still be on its way.
+                self.process.wait(20)
+                reader.join(20)
             assert line, f"the server ended: {''.join(self.said)}"
             text += line
         assert "url" in json.loads(text), text

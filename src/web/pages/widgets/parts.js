@@ -57,7 +57,8 @@ export function gallery(list, current, chosen) {
 export async function order(what) {
   if (!operating()) await operate(false);
   const job = await post("/jobs", what);
-  store.jobs.set(job.id, job);
+  // A short job may have ended, and been told of over the socket, before this answer was read.
+  if (!store.jobs.has(job.id)) store.jobs.set(job.id, job);
   return job;
 }
 
