@@ -423,21 +423,21 @@ fn rigs_that_nobody_designed_are_as_good() {
         spec.check().unwrap();
         let file = dir.path().join("rig.toml");
         std::fs::write(&file, toml::to_string(&spec).unwrap()).unwrap();
-        let row = run(&spec.name, &file, dir.path(), None, Some(shots));
         let (c, l) = (&spec.camera, &spec.laser);
-        println!("{}", table(std::slice::from_ref(&row)).lines().last().unwrap());
         println!(
-            "   {}x{} px, {:.0} px of focal length, side {:.0}, angle {:.0} degrees, stripe {:.1} px, speckle {:.2}; steps in predicted sigmas {:.2?}, completeness {:.3}",
+            "{}: {}x{} px, {:.0} px of focal length, side {:.0}, angle {:.0} degrees, stripe {:.1} px, speckle {:.2}",
+            spec.name,
             c.width_px,
             c.height_px,
             spec.focal_px(),
             l.side_deg,
             l.angle_deg,
             0.5 * l.waist_radius_mm / spec.footprint_mm(),
-            spec.sensor.speckle,
-            row.step_sigmas,
-            row.completeness
+            spec.sensor.speckle
         );
+        let row = run(&spec.name, &file, dir.path(), None, Some(shots));
+        println!("{}", table(std::slice::from_ref(&row)).lines().last().unwrap());
+        println!("   steps in predicted sigmas {:.2?}, completeness {:.3}", row.step_sigmas, row.completeness);
         let found = judged(&row, over, true);
         found.iter().for_each(|f| println!("   FAULT {f}"));
         if !found.is_empty() {

@@ -3,6 +3,7 @@
 
 use rand::{Rng, SeedableRng};
 use sheetlight::simulate::RigSpec;
+use sheetlight::simulate::rig_scene::TREAD_MM;
 
 /// Half-width of the sheet, px of the camera at the working distance (1 sigma), is drawn from here; and, for the widest, the share of the
 /// picture's shorter side that it may be: a stripe wider than half of a face of the part sees no face.
@@ -55,7 +56,8 @@ pub fn rig(seed: u64) -> RigSpec {
     laser.baseline_mm = crossing * laser.angle_deg.to_radians().tan();
     laser.fan_deg = even(40.0, 90.0);
     let stripe = log(&mut even, STRIPE_PX[0], STRIPE_PX[1].min(STRIPE_SHARE * short));
-    let range = crossing / laser.angle_deg.to_radians().cos();
+    let slope = laser.angle_deg.to_radians().cos();
+    let range = crossing / slope;
     laser.waist_radius_mm = 2.0 * stripe * distance / (camera.focal_mm / (camera.pixel_um * 1e-3));
     laser.waist_at_mm = range;
     laser.wavelength_nm = even(405.0, 660.0);
@@ -66,5 +68,13 @@ pub fn rig(seed: u64) -> RigSpec {
     working.far_mm = distance * even(1.15, 1.3);
     working.lean_deg = 0.0;
     spec.mount.turn_deg = even(-180.0, 180.0);
+
+    // On a level face the sheet's width is 1 / cos wider, and profiles along an image axis go farther along a slanted stripe (the judge's
+    // margin): what is left of a tread of the part is a quarter at least.
+    let (s, c) = spec.laser.side_deg.to_radians().sin_cos();
+    let lean = s.abs().min(c.abs()) / s.abs().max(c.abs());
+    let widest = 0.75 * 0.5 * TREAD_MM[0] * spec.scale() / (3.0 * (1.0 + lean));
+    let blur = spec.sensor.blur_px * spec.footprint_mm();
+    spec.laser.waist_radius_mm = spec.laser.waist_radius_mm.min(2.0 * slope * (widest * widest - blur * blur).sqrt());
     spec
 }
