@@ -45,16 +45,19 @@ mod tests {
         let background = Background::default();
         background.begin(|| panic!("expected by the test"));
         let done = Arc::new(AtomicBool::new(false));
-        let (told, begun) = channel();
+        let ((told, begun), (go, may_end)) = (channel(), channel());
         let ends = done.clone();
         background.begin(move || {
             told.send(()).unwrap();
-            std::thread::sleep(Duration::from_millis(100));
+            may_end.recv().unwrap();
             ends.store(true, Ordering::SeqCst);
         });
         begun.recv_timeout(Duration::from_secs(60)).unwrap();
-        assert!(!done.load(Ordering::SeqCst));
-        drop(background);
+        let gone = std::thread::spawn(move || drop(background));
+        std::thread::sleep(Duration::from_millis(100));
+        assert!(!gone.is_finished() && !done.load(Ordering::SeqCst), "it goes while work is under way");
+        go.send(()).unwrap();
+        gone.join().unwrap();
         assert!(done.load(Ordering::SeqCst));
     }
 }

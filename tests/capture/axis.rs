@@ -4,6 +4,7 @@
 
 use super::{json, text};
 use crate::common::sheetlight;
+use crate::common::tries::{judged, tries};
 use serde_json::Value;
 use sheetlight::capture::CameraUri;
 use sheetlight::capture::source::sim::SimMotion;
@@ -80,11 +81,22 @@ impl Live<'_> {
         format!("sim:4?rate={rate}&speed={speed}&size=320x240&scene={}{}{more}", self.scene, self.axis())
     }
 
-    /// Scans while it moves, and looks at the points and at each picture's pairing. `true_from_own`: the station's frame in the truth's.
+    /// Scans while it moves; again where a machine that stood still told poses late, or took few pictures.
     fn scan(&self, out: &str, speed: &str, shots: &str, true_from_own: Option<Rigid<Base, Base>>) -> Found {
+        tries(3, || {
+            let found = self.scan_once(out, speed, shots, true_from_own);
+            let told = format!("{}, {out}: paired {:.4} mm off, {} points", self.motion, found.off[0], found.points);
+            let right = found.off[0] < PAIRED && found.points > 1000;
+            judged(found, right, told)
+        })
+    }
+
+    /// Looks at the points and at each picture's pairing. `true_from_own`: the station's frame in the truth's.
+    fn scan_once(&self, out: &str, speed: &str, shots: &str, true_from_own: Option<Rigid<Base, Base>>) -> Found {
         let camera = self.camera("24", speed, "");
         let (station, truth, to) = (self.path("station"), self.path("scan/truth.json"), self.path(out));
         let kept = self.path(&format!("{out} kept"));
+        let _ = [&to, &kept].map(std::fs::remove_dir_all);
         let source = ["--camera", &camera, "--pair", "clock", "--pose-stream", "sim:4", "--shots", shots];
         let made = ["--station", &station, "--truth", &truth, "--out", &to, "--record", &kept];
         sheetlight(&[&["scan"][..], &source, &made, &["--on", "cpu", "--overlays", "0", "--quiet"]].concat());
@@ -216,16 +228,11 @@ fn an_axis_before_a_running_camera_scans_as_accurately_as_a_robot() {
     let robot = live("robot");
     robot.simulate("2");
     let want = robot.scan("out", "20", "65", None);
+    // Two draws, of different moments: an axis' is 1.04 of the robot's with a deviation of 0.026, so that one in a hundred thousand is
+    // beyond by chance.
     let judge = |is: &Found, what: &str| {
-        assert!(is.off[0] < PAIRED, "{what}: pictures are paired {:.4} mm off", is.off[0]);
-        assert!(
-            is.points > 1000 && is.faces < 1.15 * want.faces,
-            "{what}: {:.4} mm, {:.4} robot",
-            is.faces,
-            want.faces
-        );
+        assert!(is.faces < 1.15 * want.faces, "{what}: {:.4} mm, {:.4} robot", is.faces, want.faces);
     };
-    judge(&want, "robot");
     // A direction is known well once the board has gone far, or round (which `calibrate axis` advises where it has not).
     let axes = [("linear", "20", "12", "65"), ("turntable", "100", "110", "100")];
     let long = std::env::var("SHEETLIGHT_LONG").is_ok();

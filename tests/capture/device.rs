@@ -349,7 +349,8 @@ fn stream(
         }
         let due = *next.get_or_insert_with(Instant::now);
         std::thread::sleep(due.saturating_duration_since(Instant::now()));
-        next = Some(due + period);
+        // A camera does not stand still with the machine that plays it: what it did not take in time it takes later, never at once.
+        next = Some((due + period).max(Instant::now()));
         taken.store(done + 1, Ordering::Relaxed);
         if faults.skips > 0 && done % faults.skips == faults.skips - 1 {
             continue;

@@ -3,6 +3,8 @@
 //! Frame and unit: base frame, mm; s of the cell.
 
 use super::{json, text};
+use crate::common::tries::{judged, tries};
+use crate::common::wait::until;
 use crate::common::{sheetlight, sheetlight_fails};
 use sheetlight::bcap::{Call, Client, ClientOptions, Handle, Network, Variant};
 use sheetlight::cell::{Cell, CellOptions, Served};
@@ -13,7 +15,7 @@ use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::SeqCst};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// A cell in real time with a small camera, lasers on, motor on.
 fn cell(change: impl FnOnce(&mut CellOptions)) -> Served {
@@ -69,10 +71,10 @@ fn spawn(args: &[&str]) -> Child {
     Command::new(program).args(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
-/// A recording of a camera, each picture paired with what the robot tells.
-fn record(pair: &str, camera: &str, robot: &str, seconds: &str, out: &str) -> Child {
+/// A recording of a camera, each picture paired with what the robot tells; `ends` with so much: `--shots 20`.
+fn record(pair: &str, camera: &str, robot: &str, ends: [&str; 2], out: &str) -> Child {
     let paired = ["record", "--camera", camera, "--pair", pair, "--pose-stream", robot];
-    spawn(&[&paired[..], &["--seconds", seconds, "--out", out, "--json"]].concat())
+    spawn(&[&paired[..], &ends, &["--out", out, "--json"]].concat())
 }
 
 fn recorded(child: Child) -> serde_json::Value {
@@ -83,21 +85,27 @@ fn recorded(child: Child) -> serde_json::Value {
 
 #[test]
 fn pictures_of_a_robot_that_moved_are_refused_and_those_at_rest_are_paired() {
+    // Where poses come late a picture at rest may be refused, and too few come of either kind.
+    tries(5, to_and_fro);
+}
+
+fn to_and_fro() -> Result<(), String> {
     let served = cell(|_| {});
     let dir = tempfile::tempdir().unwrap();
     let (out, camera, robot) =
         (dir.path().join("step"), format!("cell://{}?rate=20", served.camera), served.robot_uri());
     let to = text(&out);
-    let record = record("step", &camera, &robot, "6", &to);
-    let (mut mover, begun) = (Mover::new(&served), Instant::now());
+    let record = record("step", &camera, &robot, ["--shots", "120"], &to);
+    let recording = std::thread::spawn(move || recorded(record));
+    let mut mover = Mover::new(&served);
     // Half a second's rest, a way at 20 mm/s or so, and back.
     let mut side = 0.0;
-    while begun.elapsed() < Duration::from_secs_f64(6.5) {
+    while !recording.is_finished() {
         std::thread::sleep(Duration::from_millis(600));
         side = 15.0 - side;
         mover.to(side, 2.0);
     }
-    let report = recorded(record);
+    let report = recording.join().unwrap();
     let (account, left) = (&report["account"], report["left_out"].as_array().unwrap());
     let recording = Recording::open(&out).unwrap();
     let poses = recording.poses(None).unwrap();
@@ -127,12 +135,12 @@ fn pictures_of_a_robot_that_moved_are_refused_and_those_at_rest_are_paired() {
     );
     let others: Vec<_> = left.iter().filter(|l| !l["why"].as_str().unwrap().contains("moved by")).take(4).collect();
     println!("{} left out for another reason, the first {others:?}", left.len() - moved.len());
-    assert!(taken.len() >= 8 && moved.len() >= 8, "{account}");
     assert!(farthest < 0.002, "a picture of an arm on its way: {farthest} mm in a millisecond");
     // The arm's repeatability is 0.02 mm an axis.
     assert!(off < 0.1, "{off}");
-    assert!(wrongly * 10 <= moved.len(), "{wrongly} of {}", moved.len());
-    assert!(poses.iter().any(|p| (p.translation.x - mover.2[0] - 15.0).abs() < 0.01), "it stood at both ends");
+    let both_ends = poses.iter().any(|p| (p.translation.x - mover.2[0] - 15.0).abs() < 0.01);
+    let enough = taken.len() >= 8 && moved.len() >= 8 && both_ends;
+    judged((), enough && wrongly * 10 <= moved.len(), format!("{wrongly} of {} at rest: {account}", moved.len()))
 }
 
 /// A wire that can be cut: what comes in on its own port goes on to the robot's, while it is whole.
@@ -160,6 +168,8 @@ impl Wire {
                         let mut bytes = [0; 4096];
                         while is.load(SeqCst) {
                             match from.read(&mut bytes) {
+                                // It may have been cut while it was read.
+                                Ok(_) if !is.load(SeqCst) => break,
                                 Ok(0) => break,
                                 Ok(n) if to.write_all(&bytes[..n]).is_err() => break,
                                 Ok(_) => {}
@@ -184,21 +194,24 @@ fn a_recording_goes_on_when_the_robots_wire_was_cut_and_mended() {
     let (out, camera) = (dir.path().join("cut"), format!("cell://{}?rate=20", served.camera));
     let robot = served.robot_uri().replace(&served.robot.port().to_string(), &wire.port.to_string());
     let to = text(&out);
-    let record = record("step", &camera, &robot, "8", &to);
-    std::thread::sleep(Duration::from_secs(3));
-    let cut = served.cell.clock().now();
+    let record = record("step", &camera, &robot, ["--seconds", "300"], &to);
+    let moments = || -> Vec<f64> {
+        let Ok(recording) = Recording::open(&out) else { return vec![] };
+        recording.meta.frames.iter().map(|f| f.taken.as_ref().unwrap().device_ns.unwrap() as f64 * 1e-9).collect()
+    };
+    let count = |from: f64, to: f64| moments().iter().filter(|t| (from..to).contains(*t)).count();
+    let begun = until(|| count(0.0, f64::INFINITY) >= 20);
     wire.whole.store(false, SeqCst);
+    let cut = served.cell.clock().now();
     std::thread::sleep(Duration::from_millis(1500));
     let mended = served.cell.clock().now();
     wire.whole.store(true, SeqCst);
+    let went_on = until(|| count(mended, f64::INFINITY) >= 20);
+    assert!(Command::new("kill").args(["-INT", &record.id().to_string()]).status().unwrap().success());
     let done = record.wait_with_output().unwrap();
     let (report, said) = (String::from_utf8_lossy(&done.stdout), String::from_utf8_lossy(&done.stderr));
     println!("{report}\n{said}");
-    assert!(done.status.success(), "{said}");
-    let recording = Recording::open(&out).unwrap();
-    let moments: Vec<f64> =
-        recording.meta.frames.iter().map(|f| f.taken.as_ref().unwrap().device_ns.unwrap() as f64 * 1e-9).collect();
-    let count = |from: f64, to: f64| moments.iter().filter(|t| (from..to).contains(*t)).count();
+    assert!(done.status.success() && begun && went_on, "{said}");
     let (before, between, after) = (count(0.0, cut), count(cut + 0.2, mended - 0.1), count(mended, f64::INFINITY));
     println!("{before} pictures before the cut, {between} while it was cut, {after} after it was mended");
     assert!(before >= 10 && after >= 10, "{before} {after}");
@@ -222,15 +235,15 @@ fn a_delay_between_camera_and_controller_is_found_and_belongs_to_both() {
     let (camera, robot) = (format!("cell://{}?rate=25", served.camera), served.robot_uri());
     let mut mover = Mover::new(&served);
     mover.to(-35.0, 5.0);
-    let (seconds, passed) = ("60", at("passed"));
-    let record = record("clock", &camera, &robot, seconds, &passed);
-    let begun = Instant::now();
+    let passed = at("passed");
+    let record = record("clock", &camera, &robot, ["--seconds", "60"], &passed);
+    let recording = std::thread::spawn(move || recorded(record));
     let mut side = -35.0;
-    while begun.elapsed().as_secs_f64() < seconds.parse::<f64>().unwrap() + 0.5 {
+    while !recording.is_finished() {
         side = -side;
         mover.to(side, 5.0);
     }
-    let report = recorded(record);
+    let report = recording.join().unwrap();
     let found = sheetlight(&["calibrate", "latency", &passed, "--station", &text(&station), "--on", "cpu", "--json"]);
     let found: serde_json::Value = serde_json::from_str(&found).unwrap();
     let is = |key: &str| found["latency"][key].as_f64().unwrap();

@@ -166,16 +166,12 @@ fn all_confirmed(log: &[Entry], plans: &[Vec<Rigid<Base, Flange>>]) -> Result<us
 /// The arm stands still, and stays so.
 fn stands(set: &Set) -> bool {
     let at = || set.served.cell.true_flange(set.served.cell.clock().now());
-    // What was under way when a job was killed comes to its own end.
-    let ended = Instant::now() + Duration::from_secs(3);
-    while Instant::now() < ended {
+    // What was under way when a job was killed comes to its own end, three seconds later at most.
+    (0..75).any(|_| {
         let before = at();
         std::thread::sleep(Duration::from_millis(40));
-        if before.difference(&at()).1 < 1e-9 {
-            return true;
-        }
-    }
-    false
+        before.difference(&at()).1 < 1e-9
+    })
 }
 
 /// One job with one fault at a random moment, then again without until it has ended. What came of it: first and last.

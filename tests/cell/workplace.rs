@@ -85,7 +85,7 @@ pub fn set_but(mut spec: SceneSpec, seed: u64, tilt_deg: f64, but: impl FnOnce(&
     let workspace = Space { from_mm: [150.0, -300.0, 250.0], to_mm: [600.0, 300.0, 700.0] };
     let tool = Some(ToolSpec { flange_from_tool: served.cell.flange_from_tool() });
     // Two busy cores may keep the link's threads waiting for long; that a silent link halts is shown by the rules' own test.
-    let motion = Limits { max_silence_ms: 3000.0, ..Limits::within(workspace) };
+    let motion = Limits { max_silence_ms: 5000.0, ..Limits::within(workspace) };
     Settings { motion: Some(motion), tool, ..Settings::default() }.store(&station).unwrap();
     Set { served, station, dir }
 }

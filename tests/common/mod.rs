@@ -9,7 +9,10 @@ pub mod pose;
 pub mod process;
 pub mod rays;
 pub mod sheets;
+pub mod stall;
+pub mod tries;
 pub mod turned;
+pub mod wait;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -41,17 +41,17 @@ def main():
             views = [s.json("GET", f"/view?recording=axis&frame={i}") for i in range(frames)]
             counts = [v["count"] for v in views if v["corners"]]
             assert len(counts) > 5 and all(c is not None for c in counts), counts
-            b.until("every stop", "return Number(document.querySelector('[data-stops]')?.dataset.stops) === arguments[0]", 60, len(counts))
+            b.until("every stop", "return Number(document.querySelector('[data-stops]')?.dataset.stops) === arguments[0]", len(counts))
             shown = float(b.run("return document.querySelector('[data-next]').dataset.next"))
             assert abs(shown - widest(counts)) <= 1, (shown, widest(counts))
             assert b.run("return document.querySelectorAll('[data-stops] rect.bar').length") == len(counts)
             b.click("#calibrate")
-            b.until("a verdict", "return document.querySelector('#accept')", 90)
+            b.until("a verdict", "return document.querySelector('#accept')")
             o = s.json("GET", "/jobs")[0]["outcome"]
             assert o["verdict"] in ("good", "usable") and not o["accepted"], o
             assert not os.path.exists(axis), "stored before anybody accepted it"
             b.click("#accept")
-            b.until("accepted", "return /accepted/.test(document.getElementById('main').innerText)", 20)
+            b.until("accepted", "return /accepted/.test(document.getElementById('main').innerText)")
             kinds = {c["kind"]: c["verdict"] for c in s.json("GET", "/station")["calibrations"]}
             assert kinds["linear_axis"] == o["verdict"] and os.path.exists(camera), kinds
             with open(axis) as f:

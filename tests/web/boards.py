@@ -26,7 +26,9 @@ def boards(s, b, folder, shot):
     assert off < 1.0, f"a board leans {off:.2f} degrees otherwise"
     b.page("calibrate")
     b.click("[data-target=camera]")
-    b.until("all pictures", "return Number(document.querySelector('[data-views]')?.dataset.views) === arguments[0]", 60, len(seen))
+    b.until("all pictures", "return Number(document.querySelector('[data-views]')?.dataset.views) === arguments[0]", len(seen))
+    # Those without a board come into no gauge: the last of them may be shown after all that do.
+    b.until("every picture's corners", "return document.querySelectorAll('.thumb .over').length === arguments[0]", len(views))
     shown = b.run("return [...document.querySelectorAll('.thumb .over')].map((e) => e.querySelectorAll('circle').length)")
     assert shown == [len(v["corners"]) for v in views], shown
     cells = {(int((x + 0.5) / v["width"] * 8), int((y + 0.5) / v["height"] * 6)) for v, _ in seen for x, y in v["corners"]}
@@ -36,6 +38,6 @@ def boards(s, b, folder, shot):
     shot(b, "calibrate")
     # A picture that is left out covers nothing.
     b.click(".thumb")
-    b.until("one less", "return Number(document.querySelector('[data-views]')?.dataset.views) === arguments[0]", 60, len(seen) - bool(views[0]["corners"]))
+    b.until("one less", "return Number(document.querySelector('[data-views]')?.dataset.views) === arguments[0]", len(seen) - bool(views[0]["corners"]))
     print(f"boards: {len(seen)} of {len(truth)} pictures, {100 * covered:.0f} % covered, leans within {off:.2f} degrees of the truth")
     quiet(b, "calibrate")

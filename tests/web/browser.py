@@ -4,16 +4,26 @@ Frame and unit: CSS pixels, seconds."""
 
 import base64
 import json
+import re
 import shutil
-import socket
+import struct
 import subprocess
-import time
+import threading
 import urllib.error
 import urllib.request
 import zlib
-import struct
+
+import waits
+from waits import PATIENCE
 
 ELEMENT = "element-6066-11e4-a52e-4f735466cecf"
+STANDS = """
+  const css = arguments[0], now = () => { const r = document.querySelector(css).getBoundingClientRect(); return [r.left, r.top, r.width, r.height]; };
+  return new Promise((stands) => {
+    let before = now();
+    const look = () => { const r = now(); if (r.every((v, k) => v === before[k])) return stands(r); before = r; requestAnimationFrame(look); };
+    requestAnimationFrame(look);
+  });"""
 
 
 class Browser:
@@ -24,11 +34,12 @@ class Browser:
         return shutil.which("chromedriver") and (shutil.which("chromium") or shutil.which("google-chrome"))
 
     def __init__(self, folder, width=1280, height=800, flags=()):
-        with socket.socket() as s:
-            s.bind(("127.0.0.1", 0))
-            port = s.getsockname()[1]
-        self.driver = subprocess.Popen(["chromedriver", f"--port={port}"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.driver = subprocess.Popen(["chromedriver", "--port=0"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+        # It chooses a port that is free and says which.
+        port = next((m[1] for m in map(re.compile(r"success.* port (\d+)").search, self.driver.stdout) if m), None)
+        assert port, "chromedriver does not say its port"
         self.root = f"http://127.0.0.1:{port}"
+        threading.Thread(target=self.driver.stdout.read, daemon=True).start()
         self.clicks, self.session = 0, ""
         arguments = [
             "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", f"--window-size={width},{height}", "--hide-scrollbars",
@@ -36,15 +47,7 @@ class Browser:
             "--force-device-scale-factor=1", "--force-prefers-reduced-motion", *flags,
         ]
         wanted = {"alwaysMatch": {"browserName": "chrome", "goog:loggingPrefs": {"browser": "ALL"}, "goog:chromeOptions": {"args": arguments}}}
-        until = time.time() + 30
-        while True:
-            try:
-                self.session = "/session/" + self.ask("POST", "/session", {"capabilities": wanted})["sessionId"]
-                break
-            except (urllib.error.URLError, ConnectionError):
-                if time.time() > until:
-                    raise
-                time.sleep(0.1)
+        self.session = "/session/" + self.ask("POST", "/session", {"capabilities": wanted})["sessionId"]
         # The window's own frame is not the page's.
         inner = self.run("return [innerWidth, innerHeight]")
         self.ask("POST", "/window/rect", {"width": 2 * width - inner[0], "height": 2 * height - inner[1]})
@@ -53,7 +56,7 @@ class Browser:
         data = None if method == "GET" else json.dumps(body or {}).encode()
         request = urllib.request.Request(self.root + self.session + path, data, {"Content-Type": "application/json"}, method=method)
         try:
-            with urllib.request.urlopen(request, timeout=120) as answer:
+            with urllib.request.urlopen(request, timeout=2 * PATIENCE) as answer:
                 return json.load(answer)["value"]
         except urllib.error.HTTPError as e:
             raise AssertionError(f"{method} {path}: {json.load(e)['value']['message']}") from None
@@ -64,22 +67,29 @@ class Browser:
     def run(self, script, *args):
         return self.ask("POST", "/execute/sync", {"script": script, "args": list(args)})
 
-    def until(self, what, script, seconds=30, *args):
+    def until(self, what, script, *args, seconds=PATIENCE):
         """Waits until a script gives something true, and gives it."""
-        end = time.time() + seconds
-        while time.time() < end:
-            value = self.run(script, *args)
-            if value:
-                return value
-            time.sleep(0.05)
-        raise AssertionError(f"{what}: not within {seconds} s; the page says: {self.run('return document.body.innerText')[:1500]}")
+        try:
+            return waits.until(what, lambda: self.run(script, *args), seconds)
+        except AssertionError as e:
+            raise AssertionError(f"{e}; the page says: {self.run('return document.body.innerText')[:1500]}") from None
 
-    def find(self, css):
-        return self.until(css, "return document.querySelector(arguments[0])", 20, css)[ELEMENT]
+    def pressable(self, css):
+        return self.until(f"{css} can be pressed", "const e = document.querySelector(arguments[0]); return e && !e.disabled && !e.closest('[hidden]') && e", css)[ELEMENT]
 
     def click(self, css):
-        self.until(f"{css} can be pressed", "const e = document.querySelector(arguments[0]); return e && !e.disabled && !e.closest('[hidden]')", 20, css)
-        self.ask("POST", f"/element/{self.find(css)}/click")
+        def pressed():
+            button = self.pressable(css)
+            try:
+                self.place(css)
+                self.ask("POST", f"/element/{button}/click")
+                return True
+            except AssertionError as e:
+                # The page drew itself anew between the look and the press: nothing was pressed.
+                if not any(why in str(e) for why in ("stale element", "click intercepted", "reading 'getBoundingClientRect'")):
+                    raise
+
+        waits.until(f"{css} stands to be pressed", pressed)
         self.clicks += 1
 
     def page(self, name):
@@ -88,11 +98,20 @@ class Browser:
         self.ready(name)
 
     def ready(self, name):
-        self.until(f"page {name}", "return document.getElementById('main').dataset.ready === arguments[0]", 20, name)
+        # The bar is filled by the server's first word, by which the other pages are shown.
+        self.until(f"page {name}", "return document.getElementById('main').dataset.ready === arguments[0] && document.querySelector('#bar .badge')?.textContent", name)
+
+    def reload(self, name):
+        self.ask("POST", "/refresh")
+        self.ready(name)
+
+    def place(self, css):
+        """Left, top, width and height of an element once it stays where it is from one picture of the page to the next."""
+        return self.run(STANDS, css)
 
     def drag(self, css, a, b, hold=0.0):
         """Presses at a, moves to b, lets go; shares of the element's width and height."""
-        r = self.run("const r = document.querySelector(arguments[0]).getBoundingClientRect(); return [r.left, r.top, r.width, r.height]", css)
+        r = self.place(css)
         at = lambda p: {"x": round(r[0] + p[0] * r[2]), "y": round(r[1] + p[1] * r[3])}
         steps = [
             {"type": "pointerMove", "duration": 0, **at(a)}, {"type": "pointerDown", "button": 0},
@@ -105,10 +124,10 @@ class Browser:
 
     def hold(self, css):
         """Presses and keeps pressing until `let_go`."""
-        self.until(f"{css} can be pressed", "const e = document.querySelector(arguments[0]); return e && !e.disabled", 20, css)
+        self.pressable(css)
         self.run("document.querySelector(arguments[0]).scrollIntoView({ block: 'center' })", css)
-        x, y = self.run("const r = document.querySelector(arguments[0]).getBoundingClientRect(); return [r.left + r.width / 2, r.top + r.height / 2]", css)
-        self.mouse({"type": "pointerMove", "duration": 0, "x": round(x), "y": round(y)}, {"type": "pointerDown", "button": 0})
+        left, top, width, height = self.place(css)
+        self.mouse({"type": "pointerMove", "duration": 0, "x": round(left + width / 2), "y": round(top + height / 2)}, {"type": "pointerDown", "button": 0})
         self.clicks += 1
 
     def let_go(self):
@@ -136,7 +155,7 @@ class Browser:
             self.ask("DELETE", "")
         finally:
             self.driver.terminate()
-            self.driver.wait(10)
+            self.driver.wait(PATIENCE)
 
 
 def levels(png, shades=48):

@@ -34,10 +34,10 @@ def main():
             for press in ("#nav a[href='#/calibrate']", "[data-target=auto]", "#over-board", "#arm"):
                 b.click(press)
                 time.sleep(PAUSE)
-            b.until("armed", "return document.querySelector('#arm')?.getAttribute('aria-pressed') === 'true'", 20)
+            b.until("armed", "return document.querySelector('#arm')?.getAttribute('aria-pressed') === 'true'")
             before = len(events(folder))
             b.click("#auto")
-            b.until("the first motion", "return document.querySelector('.ask').dataset.step === 'calibrate'", 60)
+            b.until("the first motion", "return document.querySelector('.ask').dataset.step === 'calibrate'")
             time.sleep(PAUSE)
             b.hold("#send")
             shown = False
@@ -56,7 +56,7 @@ def main():
             took = log[-1]["t_s"] - log[0]["t_s"]
             assert b.run("return !document.querySelector('#accept').disabled"), b.text("#main")[:2000]
             b.click("#accept")
-            b.until("accepted", "return /accepted/.test(document.getElementById('main').innerText)", 20)
+            b.until("accepted", "return /accepted/.test(document.getElementById('main').innerText)")
             job = s.json("GET", "/jobs")[0]
             o = job["outcome"]
             print(f"{o['verdict']}: expected {o['figures'].get('expected_error_mm')} mm; {b.clicks} clicks, {took:.1f} s of the cell, {time.time() - begun:.1f} s in all; {o['reasons']}")

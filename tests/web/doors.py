@@ -11,7 +11,9 @@ import subprocess
 import sys
 import time
 
+from recordings import longer
 from server import Server, frame
+from waits import PATIENCE, until
 
 program, folder = sys.argv[1:3]
 
@@ -78,7 +80,7 @@ def bodies(s):
     refused("a body of 1 GB by its length", s.ask("POST", "/api/v1/jobs", b"{", Content_Length=str(1 << 30))[0])
     name, port = s.host.rsplit(":", 1)
     # The same without saying so: in chunks, until the server has enough of it.
-    with socket.create_connection((name, int(port)), timeout=20) as c:
+    with socket.create_connection((name, int(port)), timeout=PATIENCE) as c:
         c.sendall(f"POST /api/v1/jobs HTTP/1.1\r\nHost: {s.host}\r\nAuthorization: Bearer {s.token}\r\nX-Sheetlight-Tab: tests\r\nTransfer-Encoding: chunked\r\n\r\n".encode())
         sent, answer = 0, b""
         try:
@@ -90,7 +92,7 @@ def bodies(s):
                     answer = c.recv(4096)
                     break
                 except (TimeoutError, BlockingIOError):
-                    c.settimeout(20)
+                    c.settimeout(PATIENCE)
         except (BrokenPipeError, ConnectionResetError):
             pass
         assert sent < 64 << 20, f"{sent} bytes were taken"
@@ -139,7 +141,6 @@ def viewers(s):
     s.json("POST", "/lease")
     job = s.json("POST", "/jobs", {"procedure": "scan", "recording": "scan"})
     seen, rows, total = set(), 0, None
-    sockets[1].settimeout(30)
     while True:
         kind, data = frame(sockets[1])
         if kind == 2:
@@ -167,16 +168,31 @@ def viewers(s):
         c.close()
 
 
+def begun(s, job, least):
+    """Waits until so much of a job is done, or all."""
+    now = lambda: s.json("GET", f"/jobs/{job}")
+    until(f"{least} of {job}", lambda: (lambda j: j["done"] >= least or j["state"] not in ("queued", "running"))(now()))
+
+
+def killed_in(order, least, *behind):
+    """The server that was killed in the middle of a job, its next start, the job, those that waited behind it. One that ended before the
+    server did was not killed in its middle: another one is."""
+    for _ in range(10):
+        s = Server(program, folder, "--recordings", folder)
+        s.json("POST", "/lease")
+        job, *others = [s.json("POST", "/jobs", o)["id"] for o in (order, *behind)]
+        begun(s, job, least)
+        s.kill()
+        again = Server(program, folder, "--recordings", folder)
+        if again.json("GET", f"/jobs/{job}")["state"] != "done":
+            return s, again, job, *others
+        assert again.end() == 0
+    raise AssertionError(f"{order} always ends before the server can be killed")
+
+
 def killed():
     """Killed in a scan: the job is offered to be resumed, and comes to the same; a former start's token is no good."""
-    s = Server(program, folder, "--recordings", folder)
-    s.json("POST", "/lease")
-    job = s.json("POST", "/jobs", {"procedure": "scan", "recording": "scan"})["id"]
-    second = s.json("POST", "/jobs", {"procedure": "check"})["id"]
-    while s.json("GET", f"/jobs/{job}")["done"] < 5:
-        time.sleep(0.01)
-    s.kill()
-    again = Server(program, folder, "--recordings", folder)
+    s, again, job, second = killed_in({"procedure": "scan", "recording": "scan"}, 5, {"procedure": "check"})
     refused("the token of a former start", again.ask("GET", "/api/v1/bar", token=s.token)[0])
     cut = again.json("GET", f"/jobs/{job}")
     assert cut["state"] == "cut_off" and cut["outcome"] is None and cut["resumable"], cut
@@ -195,16 +211,9 @@ def killed():
     assert whole["state"] == "done", whole
     again.json("DELETE", f"/jobs/{second}")
     refused("a job that was taken away", again.ask("GET", f"/api/v1/jobs/{second}")[0])
-    # Ended while it works: the job is stopped and can go on. The same pictures a hundred times over, as the scan is too soon done.
-    longer = shutil.copytree(os.path.join(folder, "scan"), os.path.join(folder, "longer"))
-    with open(os.path.join(longer, "meta.json")) as f:
-        meta = json.load(f)
-    meta["frames"] *= 100
-    with open(os.path.join(longer, "meta.json"), "w") as f:
-        json.dump(meta, f)
-    third = again.json("POST", "/jobs", {"procedure": "scan", "recording": "longer"})["id"]
-    while again.json("GET", f"/jobs/{third}")["done"] < 5:
-        time.sleep(0.01)
+    # Ended while it works: the job is stopped and can go on.
+    third = again.json("POST", "/jobs", {"procedure": "scan", "recording": longer(folder, 100)})["id"]
+    begun(again, third, 5)
     assert again.end() == 0
     with open(os.path.join(folder, "station", "jobs", third, "job.json")) as f:
         assert json.load(f)["state"] == "stopped"
@@ -213,16 +222,10 @@ def killed():
 
 def killed_in_a_calibration():
     """What a killed calibration had found so far is not in the station; it is offered again, and accepted by a person alone."""
-    s = Server(program, folder, "--recordings", folder)
-    camera = os.path.join(s.station, "calibration", "camera.json")
+    camera = os.path.join(folder, "station", "calibration", "camera.json")
     with open(camera, "rb") as f:
         before = f.read()
-    s.json("POST", "/lease")
-    job = s.json("POST", "/jobs", {"procedure": "calibrate", "target": "camera", "recording": "intrinsics"})["id"]
-    while s.json("GET", f"/jobs/{job}")["done"] < 2:
-        time.sleep(0.01)
-    s.kill()
-    again = Server(program, folder, "--recordings", folder)
+    _, again, job = killed_in({"procedure": "calibrate", "target": "camera", "recording": "intrinsics"}, 2)
     cut = again.json("GET", f"/jobs/{job}")
     assert cut["state"] == "cut_off" and cut["outcome"] is None and cut["resumable"], cut
     again.json("POST", "/lease")
@@ -237,7 +240,7 @@ def killed_in_a_calibration():
 
 def starts():
     """Folders that are no station, a port that is taken, a station that is broken, links that are not there: said, with what to do."""
-    run = lambda station, *more: subprocess.run([program, "station", "serve", "--station", station, "--port", "0", *more], capture_output=True, text=True, timeout=30)
+    run = lambda station, *more: subprocess.run([program, "station", "serve", "--station", station, "--port", "0", *more], capture_output=True, text=True, timeout=PATIENCE)
     empty = os.path.join(folder, "empty")
     os.makedirs(empty)
     for station in (os.path.join(folder, "nothing"), empty, os.path.join(folder, "scan")):
@@ -259,17 +262,12 @@ def starts():
         s = Server(program, folder, "--port", str(port))
         assert port < int(s.host.rsplit(":", 1)[1]) <= port + 20, s.host
         # What it says and its address come by two pipes.
-        wanted, end = (f"port {port} is taken by python", f"(process {os.getpid()})"), time.time() + 10
-        while not all(w in "".join(s.said) for w in wanted):
-            assert time.time() < end, "".join(s.said)
-            time.sleep(0.05)
+        wanted = (f"port {port} is taken by python", f"(process {os.getpid()})")
+        until("who has the port", lambda: all(w in "".join(s.said) for w in wanted))
         assert s.end() == 0
     # Neither camera nor robot is there: the screen is, and says so.
     s = Server(program, folder, "--camera", "cell://127.0.0.1:1", "--robot", "bcap://127.0.0.1:1")
-    end = time.time() + 20
-    while len(s.json("GET", "/bar")["alarms"]) < 2:
-        assert time.time() < end, s.json("GET", "/bar")
-        time.sleep(0.1)
+    until("both alarms", lambda: len(s.json("GET", "/bar")["alarms"]) >= 2)
     bar = s.json("GET", "/bar")
     assert bar["robot"] == "no_link" and bar["camera"] and bar["laser"] is None, bar
     assert s.ask("GET", "/api/v1/camera/newest")[0] == 204 and s.ask("GET", "/")[0] == 200

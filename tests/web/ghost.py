@@ -7,6 +7,8 @@ import os
 import struct
 import subprocess
 
+import waits
+
 # Outlines that are moved aside by so much lie on fewer edges, px.
 ASIDE = 6
 
@@ -41,12 +43,18 @@ def steep(lines, columns, rows, grey, du=0, dv=0):
 def lies_on_the_part(s, b):
     """Before the arm goes above the part: the page draws its outlines over the picture, on the edges that the picture shows."""
     job = s.json("GET", "/motion")["asked"]["job"]
-    b.until("the part over the picture", "return Number(document.querySelector('canvas.live')?.dataset.ghost) > 0", 20)
-    number, columns, rows, grey = picture(s)
-    ghost = s.json("GET", f"/jobs/{job}/ghost?number={number}")
-    assert ghost["number"] == number and ghost["moved_px"] == 0, (ghost["number"], ghost["moved_px"])
-    shown = b.run("return [Number(document.querySelector('canvas.live').dataset.ghost), Number(document.querySelector('canvas.live').dataset.number)]")
-    assert shown == [len(ghost["lines"]), number], (shown, len(ghost["lines"]), number)
+    b.until("the part over the picture", "return Number(document.querySelector('canvas.live')?.dataset.ghost) > 0")
+
+    def both():
+        """The same picture at the page and here, and the part in it: newer pictures come at any time, poses a moment after them."""
+        number, columns, rows, grey = picture(s)
+        status, _, said = s.ask("GET", f"/api/v1/jobs/{job}/ghost?number={number}")
+        ghost = json.loads(said)
+        lines, shown = b.run("const { ghost, number } = document.querySelector('canvas.live').dataset; return [Number(ghost), Number(number)]")
+        return (ghost, lines, columns, rows, grey) if status == 200 and shown == number else None
+
+    ghost, lines, columns, rows, grey = waits.until("one picture at the page and here", both)
+    assert ghost["moved_px"] == 0 and lines == len(ghost["lines"]), (ghost["moved_px"], lines, len(ghost["lines"]))
     here = steep(ghost["lines"], columns, rows, grey)
     assert here, "the part is not in the picture"
     aside = {(du, dv): steep(ghost["lines"], columns, rows, grey, du, dv) for du in (-ASIDE, 0, ASIDE) for dv in (-ASIDE, 0, ASIDE) if du or dv}

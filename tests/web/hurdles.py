@@ -4,8 +4,8 @@ Frame and unit: none."""
 
 import sys
 import tempfile
-import time
 
+import waits
 from browser import Browser
 from server import Server
 from shots import quiet
@@ -25,11 +25,12 @@ def old_browser(url, scanned):
             assert b.run("return document.createElement('canvas').getContext('webgl2') === null"), "this browser is none of the old ones"
             for page in (f"surface?job={scanned}", "position"):
                 b.run("location.hash = arguments[0]", f"#/{page}")
-                b.until("the map", "return document.querySelector('.map canvas')?.width > 300", 30)
+                b.ready(page.split("?")[0])
+                b.until("the map", "return document.querySelector('.map canvas')?.width > 300")
                 b.click("#three")
-                b.until("that there is no WebGL2", "return /no WebGL2/.test(document.getElementById('main').innerText)", 10)
+                b.until("that there is no WebGL2", "return /no WebGL2/.test(document.getElementById('main').innerText)")
             b.page("surface")
-            b.until("the map again", "return document.querySelector('.map canvas')?.width > 300", 20)
+            b.until("the map again", "return document.querySelector('.map canvas')?.width > 300")
             # What a browser without it says of that by itself is none of the page's.
             said = [m for m in b.console() if "WebGL" not in m and "GPU" not in m]
             assert not said, said
@@ -49,11 +50,8 @@ def full_disk():
             b.page("scan")
             b.click("#start")
             ends = lambda: [j["state"] for j in s.json("GET", "/jobs")[:1] if j["id"] != former]
-            end = time.time() + 60
-            while not (said := b.text("#main .problem")) and ends() != ["done"]:
-                assert time.time() < end, b.text("#main")
-                time.sleep(0.1)
-            if not said:
+            waits.until("the end of the scan", lambda: b.text("#main .problem") or ends() == ["done"])
+            if not (said := b.text("#main .problem")):
                 print("this build knows no full disks: a release")
                 return
             assert "the disk is full" in said and "take old jobs away on the page Replay" in said and "--out" not in said, said

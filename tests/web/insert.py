@@ -11,6 +11,8 @@ import time
 import ghost
 import plan
 import settings
+import stalls
+import waits
 from browser import Browser
 from server import Server, events
 from shots import quiet, shot
@@ -33,16 +35,24 @@ PULSES = """
   };
   addEventListener('pointerup', () => (last = 0), true);"""
 SILENT = "return Math.round(window.silent)"
-# What a page would say that takes the held button for a new press.
+# Notes the longest that the page was kept from its work.
+KEPT = """
+  window.kept = 0;
+  let due = performance.now() + 50;
+  setInterval(() => { const now = performance.now(); window.kept = Math.max(window.kept, now - due); due = now + 50; }, 50);"""
+# What a page would say that takes the held button for a new press; beside the pulses, which go on.
 PRESS = """
-  const ask = new XMLHttpRequest(), m = new XMLHttpRequest();
-  m.open('GET', '/api/v1/motion', false);
-  m.send();
-  const { job, hash } = JSON.parse(m.responseText).asked;
-  ask.open('POST', '/api/v1/motion/press', false);
-  ask.setRequestHeader('X-Sheetlight-Tab', sessionStorage.tab);
-  ask.send(JSON.stringify({ job, hash }));
-  return [ask.status, ask.responseText];"""
+  const tab = { 'X-Sheetlight-Tab': sessionStorage.tab };
+  return fetch('/api/v1/motion').then((m) => m.json()).then(({ asked: { job, hash } }) =>
+    fetch('/api/v1/motion/press', { method: 'POST', headers: tab, body: JSON.stringify({ job, hash }) })).then(async (a) => [a.status, await a.text()]);"""
+METER = stalls.Meter()
+
+
+def stalled(b, why):
+    """A button that was held, and not heard for a second because the machine stood still, judges nothing."""
+    longest = max(METER.longest, b.run("return window.kept") / 1000)
+    if longest > stalls.LONG and "lease ran out" in why:
+        raise stalls.Stalled(f"the machine stood still for {longest:.2f} s: {why}")
 
 
 def step(b, *names):
@@ -52,7 +62,9 @@ def step(b, *names):
       if (problem) return 'problem: ' + problem;
       if (document.querySelector('[data-inserted]')) return 'inserted';
       return ask.dataset.moving === 'false' && arguments[0].includes(ask.dataset.step) ? ask.dataset.step : null;"""
-    got = b.until(f"one of {names}", script, PATIENCE, list(names))
+    got = b.until(f"one of {names}", script, list(names), seconds=PATIENCE)
+    if got not in names:
+        stalled(b, got)
     assert got in names, f"{names} were waited for: {got}; the page was silent for {b.run(SILENT)} ms at the longest while the button was down"
     return got
 
@@ -60,29 +72,44 @@ def step(b, *names):
 def held(s, b, *names):
     """Holds the button until one of these is asked for; gives the longest that the server heard nothing of it, ms."""
     time.sleep(PAUSE)
+    METER.clear()
+    b.run("window.kept = 0")
     b.hold("#send")
     try:
         step(b, *names)
         if names == ("approach",):
             # Still down from what only looked: at the part the button is pressed anew, whatever a page says.
             said = b.run(PRESS)
+            if said[0] == 200:
+                stalled(b, "the held button's lease ran out")
             assert said[0] == 409 and "pressed anew" in said[1], said
         return s.json("GET", "/motion")["silence_ms"]
     finally:
         b.let_go()
 
 
+def log():
+    """What happened since the arm was jogged over the part."""
+    all_ = events(folder)
+    return all_[max(k for k, e in enumerate(all_) if e["what"] == "jogged"):]
+
+
+def legs(s):
+    """Of the motion that waits."""
+    return s.json("GET", "/motion")["asked"]["motions"]
+
+
 def insert(s, b, part):
     b.page("station")
     state = s.json("GET", "/motion")
     assert state["armed"] is None and state["asked"] is None, state
-    before, b.clicks, begun = len(events(folder)), 0, time.time()
+    b.clicks, begun = 0, time.time()
     b.page("position")
     time.sleep(PAUSE)
     b.click(f"[data-part={part}]")
     time.sleep(PAUSE)
     b.click("#arm")
-    b.until("armed", "return document.querySelector('#arm')?.getAttribute('aria-pressed') === 'true'", 20)
+    b.until("armed", "return document.querySelector('#arm')?.getAttribute('aria-pressed') === 'true'")
     if float(sweep):
         b.run("document.querySelector('#sweep').value = arguments[0]", sweep)
     time.sleep(PAUSE)
@@ -96,16 +123,20 @@ def insert(s, b, part):
         shot(b, pictures, "ghost")
     ghost.as_on_the_command_line(program, folder if os.path.isdir(os.path.join(folder, "jobs")) else os.path.join(folder, "station"), asks)
     silence.append(held(s, b, "insert"))
-    time.sleep(0.3)
-    log = events(folder)[before:]
-    to_position = [e for e in log if e["what"] == "arrived"][-1]["t_s"] - log[0]["t_s"]
-    silence += [held(s, b, "retract"), held(s, b, "inserted")]
+    down = legs(s)
+    silence.append(held(s, b, "retract"))
+    up = legs(s)
+    silence.append(held(s, b, "inserted"))
     clicks = b.clicks
-    time.sleep(0.3)
-    log = events(folder)[before:]
-    judged = [e for e in log if e["what"] == "released"]
+    # The cell writes its log in its own time: all of it is there when the arm is back up.
+    arrivals = lambda part: [e["t_s"] for e in part if e["what"] == "arrived"]
+    let_go = lambda: next((k for k, e in enumerate(log()) if e["what"] == "released"), None)
+    waits.until("the log to its end", lambda: let_go() and len(arrivals(log()[let_go():])) >= up)
+    all_ = log()
+    judged = [e for e in all_ if e["what"] == "released"]
     assert len(judged) == 1 and judged[0]["inserted"], judged
-    assert not any(e["what"] == "collision" for e in log), [e for e in log if e["what"] == "collision"]
+    assert not any(e["what"] == "collision" for e in all_), [e for e in all_ if e["what"] == "collision"]
+    to_position = arrivals(all_[:let_go()])[-down - 1] - all_[0]["t_s"]
     job = s.json("GET", "/jobs")[0]
     assert job["state"] == "done" and job["outcome"]["confirmations"] == 5, job["state"]
     print(
@@ -120,13 +151,30 @@ def insert(s, b, part):
         assert to_position <= 120, f"{to_position} s of the cell"
     if part == "osc":
         b.click("#to-found")
-        b.until("what was found", "return document.querySelector('.found-pose')", 20)
+        b.until("what was found", "return document.querySelector('.found-pose')")
         shot(b, pictures, "inserted")
-    # The arm is given back: the next one begins as the first did.
+    given_back(s)
+    # The part is drawn where the arm is known to stand: a controller that was not heard for a second is told, and refused.
+    quiet(b, part, refused=1, aside="/ghost?")
+
+
+def given_back(s):
+    """The next one begins as the first did."""
     s.json("POST", "/lease", {"firmly": True})
     s.json("POST", "/robot", {"armed": False})
     s.json("POST", "/lease/release")
-    quiet(b, part, refused=1)
+
+
+def taken_away(s, b):
+    """The job that was halted is no more, and somebody has looked at the arm."""
+    job = s.json("GET", "/jobs")[0]["id"]
+    s.ended(job)
+    s.json("POST", "/lease", {"firmly": True})
+    s.json("DELETE", f"/jobs/{job}")
+    s.json("POST", "/robot/looked")
+    given_back(s)
+    said = [m for m in b.console() if "status of 4" not in m]
+    assert not said, f"a trial that is made again: the console says {said}"
 
 
 def main():
@@ -137,8 +185,9 @@ def main():
             b.open(s.url)
             b.ready("station")
             b.run(PULSES)
+            b.run(KEPT)
             for part in parts.split(","):
-                insert(s, b, part)
+                stalls.again(part, lambda: insert(s, b, part), lambda: taken_away(s, b))
             plan.drawn(s, b, "osc")
             settings.outputs(s, b, lambda: events(folder))
         finally:

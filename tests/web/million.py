@@ -60,7 +60,7 @@ def turns(b, seconds):
         requestAnimationFrame(move);
       };
       move();""", seconds, x + 0.5 * w, y + 0.5 * h)
-    b.until("the end of the turn", "return !window.turning", 60)
+    b.until("the end of the turn", "return !window.turning")
     b.let_go()
     drawn = b.run("return window.drawn")
     # The first second it learns how many points this machine turns.
@@ -81,7 +81,7 @@ def main():
             b.page("surface")
             begun = time.time()
             b.click("#three")
-            b.until("points", "return document.querySelector('[data-shown]')", 60)
+            b.until("points", "return document.querySelector('[data-shown]')")
             first = time.time() - begun
             both = lambda: b.run("const e = document.querySelector('[data-shown]'); return [Number(e.dataset.shown), e.querySelector('.read').innerText]")
 
@@ -94,14 +94,14 @@ def main():
 
             print(f"first view after {first:.2f} s with {said()[0]} of {all_} points")
             whole = f"return Number(document.querySelector('[data-shown]').dataset.shown) === {all_}"
-            b.until("every point", whole, 120)
+            b.until("every point", whole)
             print(f"{said()[0]} of {said()[1]} points after {time.time() - begun:.2f} s")
             rate, numbers = turns(b, 5)
             print(f"turning: {rate:.1f} pictures/s with {min(numbers)} to {max(numbers)} points, {numbers[-1]} at the end of it")
             assert min(numbers) >= 5000 and said()[1] == all_
-            b.until("every point again", whole, 60)
+            b.until("every point again", whole)
             b.drag("[data-shown] canvas", (0.5, 0.5), (0.5, 0.5))
-            b.until("a picked point with its sigma", "return /σ 0\\.\\d+/.test(document.querySelector('[data-shown] .read').innerText)", 30)
+            b.until("a picked point with its sigma", "return /σ 0\\.\\d+/.test(document.querySelector('[data-shown] .read').innerText)")
             quiet(b, "a million points")
         finally:
             b.close()

@@ -69,7 +69,7 @@ def main():
                 b.open(s.url)
                 b.ready("station")
                 b.page("picture")
-                b.until("a picture", "return document.querySelector('.map')?.dataset.number", 30)
+                b.until("a picture", "return document.querySelector('.map')?.dataset.number")
                 b.run(WATCH)
             said("two browsers look on", *scans(s))
             for k, b in enumerate(browsers):

@@ -12,6 +12,7 @@ import sys
 import time
 
 from server import Server
+from waits import PATIENCE
 
 program, folder = sys.argv[1:3]
 PASSWORD = "correct horse battery"
@@ -39,7 +40,7 @@ def main():
         ((*secured[:-1], file("plain"), "--tls-cert", file("cert.pem"), "--tls-key", file("key.pem")), "no Argon2 hash"),
         ((*secured, "--tls-cert", file("cert.pem"), "--tls-key", file("pw")), "cannot be used for TLS"),
     ):
-        bad = subprocess.run([program, "station", "serve", "--station", file("station"), "--port", "0", *more], capture_output=True, text=True, timeout=20)
+        bad = subprocess.run([program, "station", "serve", "--station", file("station"), "--port", "0", *more], capture_output=True, text=True, timeout=PATIENCE)
         assert bad.returncode != 0 and why in bad.stderr, (more, bad.stderr)
     s = Server(program, folder, *secured, "--tls-cert", file("cert.pem"), "--tls-key", file("key.pem"))
     assert s.url.startswith("https://"), s.url
@@ -47,7 +48,7 @@ def main():
     context = ssl.create_default_context(cafile=file("cert.pem"))
 
     def ask(method, path, body=None, host=None, **headers):
-        c = http.client.HTTPSConnection("127.0.0.1", port, timeout=30, context=context)
+        c = http.client.HTTPSConnection("127.0.0.1", port, timeout=PATIENCE, context=context)
         c.request(method, path, None if body is None else json.dumps(body), {"Host": host or f"127.0.0.1:{port}", "X-Sheetlight-Tab": "tests", **headers})
         answer = c.getresponse()
         data = answer.read()
@@ -72,7 +73,7 @@ def main():
     assert 400 <= ask("POST", "/api/v1/lease", {}, Cookie=cookie, Origin=f"http://cell3.plant:{port}")[0] < 500, "a page without TLS"
     assert ask("POST", "/api/v1/lease", {}, Cookie=cookie, Origin=f"https://cell3.plant:{port}")[0] == 200
     # Plain HTTP on the same port gets no answer.
-    plain = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    plain = http.client.HTTPConnection("127.0.0.1", port, timeout=PATIENCE)
     try:
         plain.request("GET", "/", headers={"Host": f"127.0.0.1:{port}"})
         raise SystemExit(f"plain HTTP was answered: {plain.getresponse().status}")

@@ -10,7 +10,8 @@ import socket
 import struct
 import subprocess
 import threading
-import time
+
+from waits import PATIENCE, until
 
 
 class Server:
@@ -32,8 +33,8 @@ class Server:
             line = self.process.stdout.readline().decode()
             if not line:
                 # What it said may still be on its way.
-                self.process.wait(20)
-                reader.join(20)
+                self.process.wait(PATIENCE)
+                reader.join(PATIENCE)
             assert line, f"the server ended: {''.join(self.said)}"
             text += line
         assert "url" in json.loads(text), text
@@ -44,7 +45,7 @@ class Server:
     def ask(self, method, path, body=None, host=None, token=True, tab="tests", **headers):
         """Status, headers, body; nothing is added that was not asked for."""
         name, port = self.host.rsplit(":", 1)
-        c = http.client.HTTPConnection(name, int(port), timeout=30)
+        c = http.client.HTTPConnection(name, int(port), timeout=PATIENCE)
         head = {"Host": host or self.host, **{k.replace("_", "-"): v for k, v in headers.items()}}
         if token:
             head["Authorization"] = f"Bearer {self.token if token is True else token}"
@@ -68,25 +69,23 @@ class Server:
         assert status < 300, f"{method} {path}: {status} {data[:600]}"
         return json.loads(data)
 
-    def job(self, order, seconds=120):
+    def job(self, order, seconds=PATIENCE):
         """Orders a job and waits for its end."""
         self.json("POST", "/lease")
         job = self.json("POST", "/jobs", order)
         return self.ended(job["id"], seconds)
 
-    def ended(self, name, seconds=120):
-        end = time.time() + seconds
-        while time.time() < end:
+    def ended(self, name, seconds=PATIENCE):
+        def over():
             job = self.json("GET", f"/jobs/{name}")
-            if job["state"] not in ("queued", "running"):
-                return job
-            time.sleep(0.05)
-        raise AssertionError(f"{name} did not end in {seconds} s: {job}")
+            return job if job["state"] not in ("queued", "running") else None
+
+        return until(f"the end of {name}", over, seconds)
 
     def socket(self, token=True, tab=None, **headers):
         """A WebSocket after its handshake: status and the socket."""
         name, port = self.host.rsplit(":", 1)
-        s = socket.create_connection((name, int(port)), timeout=20)
+        s = socket.create_connection((name, int(port)), timeout=PATIENCE)
         head = {"Host": self.host, "Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": base64.b64encode(os.urandom(16)).decode(), **{k.replace("_", "-"): v for k, v in headers.items()}}
         if token:
             head["Authorization"] = f"Bearer {self.token if token is True else token}"
@@ -105,12 +104,12 @@ class Server:
 
     def kill(self):
         self.process.kill()
-        self.process.wait(10)
+        self.process.wait(PATIENCE)
 
     def end(self):
         """Ends it as Ctrl-C does."""
         self.process.terminate()
-        return self.process.wait(20)
+        return self.process.wait(PATIENCE)
 
 
 def say(s, text):

@@ -5,8 +5,9 @@ Frame and unit: as the settings."""
 import json
 import os
 import subprocess
-import time
 
+import stalls
+import waits
 from shots import quiet
 
 
@@ -31,7 +32,7 @@ def settings(program, s, b, shot):
     change(b, "robot", "ur")
     change(b, "tolerance_mm", "0.08")
     b.click("#save-settings")
-    b.until("saved", "return /Saved/.test(document.querySelector('.head').innerText)", 10)
+    b.until("saved", "return /Saved/.test(document.querySelector('.head').innerText)")
     now = text(s)
     assert now.startswith("# by the window\n") and 'robot = "ur"' in now and "tolerance_mm = 0.08" in now, now
     assert s.json("GET", "/station")["robot"] == "ur" and s.json("GET", "/bar")["station"] == "cell 3"
@@ -39,14 +40,14 @@ def settings(program, s, b, shot):
     # What cannot be is named, and nothing is changed.
     b.run("const e = document.querySelector('textarea'); e.value = e.value.replace('robot', 'robbot')")
     b.click("#save-text")
-    b.until("the line of a broken setting", "return /robbot/.test(document.querySelector('#main .problem')?.innerText ?? '')", 10)
+    b.until("the line of a broken setting", "return /robbot/.test(document.querySelector('#main .problem')?.innerText ?? '')")
     assert text(s) == now
     # An editor has changed the file since: the page's change would undo that.
     with open(os.path.join(s.station, "station.toml"), "a") as f:
         f.write("# later\n")
     change(b, "tolerance_mm", "0.5")
     b.click("#save-settings")
-    b.until("that the file is another one", "return /other ones by now/.test(document.querySelector('#main .problem')?.innerText ?? '')", 10)
+    b.until("that the file is another one", "return /other ones by now/.test(document.querySelector('#main .problem')?.innerText ?? '')")
     assert text(s) == now + "# later\n"
     # The backup from before the first change comes back, calibrations and all; what is put away for it is a backup too.
     kept = s.json("GET", "/settings")["backups"]
@@ -60,10 +61,10 @@ def settings(program, s, b, shot):
     b.page("station")
     b.page("settings")
     b.click(".restore")
-    time.sleep(0.5)
+    b.until("the question", "return document.querySelector('.restore').innerText === 'Really restore?'")
     assert text(s) == now + "# later\n", "it came back without being asked for twice"
     b.click(".restore")
-    b.until("restored", "return /Restored/.test(document.querySelector('.head').innerText)", 10)
+    b.until("restored", "return /Restored/.test(document.querySelector('.head').innerText)")
     assert text(s) == first
     with open(calibration, "rb") as f:
         assert f.read() == camera
@@ -92,27 +93,42 @@ def outputs(s, b, events):
     assert refused[0] in (403, 409), refused
     before = len(events())
     b.click("#arm")
-    b.click("[data-output=line]")
-    lit = time.time() + 10
-    while s.json("GET", "/bar")["laser"] is not True:
-        assert time.time() < lit, "the bar says nothing of a laser that is on"
-        time.sleep(0.05)
-    b.until("that it was switched", "return /was switched/.test(document.getElementById('main').innerText)", 20)
+    meter = stalls.Meter()
+    presses = 0
+
+    def lit():
+        """The line is on for a second and a half, which the bar says, where the machine lets it look."""
+        nonlocal presses
+        presses += 1
+        meter.clear()
+        b.click("[data-output=line]")
+        over = lambda: b.run("return /was switched/.test(document.getElementById('main').innerText)")
+        said = waits.until("a laser that is on, or was", lambda: s.json("GET", "/bar")["laser"] and "on" or over() and "was")
+        if said == "was" and meter.longest > stalls.LONG:
+            raise stalls.Stalled(f"the machine stood still for {meter.longest:.2f} s")
+        assert said == "on", "the bar says nothing of a laser that is on"
+        waits.until("that it was switched", over)
+
+    def seen_anew():
+        b.page("station")
+        b.page("settings")
+
+    stalls.again("the line", lit, seen_anew)
     b.click("[data-output=open]")
-    time.sleep(0.3)
-    assert "falls" in b.text("[data-output=open]")
-    switched = [(e["number"], e["on"]) for e in events()[before:] if e["what"] == "output"]
-    assert switched == [(24, True), (24, False)], switched
+    b.until("the question", "return document.querySelector('[data-output=open]').innerText.includes('falls')")
+    switched = lambda: [(e["number"], e["on"]) for e in events()[before:] if e["what"] == "output"]
+    waits.until("the line's end in the cell's log", lambda: len(switched()) >= 2 * presses)
+    assert switched() == [(24, True), (24, False)] * presses, switched()
     # Settings wait while the robot is armed: its limits were read then.
     before = text(s)
     change(b, "motion.speed_mm_s", "20")
     b.click("#save-settings")
-    b.until("that the robot is armed", "return /robot is armed/.test(document.querySelector('#main .problem')?.innerText ?? '')", 10)
+    b.until("that the robot is armed", "return /robot is armed/.test(document.querySelector('#main .problem')?.innerText ?? '')")
     assert text(s) == before
     b.click("#arm")
-    b.until("given back", "return document.querySelector('#arm')?.getAttribute('aria-pressed') === 'false'", 20)
+    b.until("given back", "return document.querySelector('#arm')?.getAttribute('aria-pressed') === 'false'")
     change(b, "motion.speed_mm_s", "45")
     b.click("#save-settings")
-    b.until("saved", "return /Saved/.test(document.querySelector('.head').innerText)", 10)
+    b.until("saved", "return /Saved/.test(document.querySelector('.head').innerText)")
     assert "speed_mm_s = 45" in text(s), text(s)
     quiet(b, "outputs", refused=1)

@@ -3,12 +3,21 @@
 
 const ROOT = "/api/v1";
 
-/** A copy of a tab waits so long for the name that it came with, ms; a page that is loaded again gets it at once. */
-const COPY = 700;
-/** Takes a name for as long as this page lives; false where another page lives under it. */
+/** A page that is stuck does not say that it lives under a name: it is waited for so long, ms. */
+const STUCK = 10000;
+/** Takes a name for as long as this page lives; false where another page lives under it, which says so. One that is being left says nothing, and
+ * its name is free in a moment. */
 const takes = (name) => new Promise((done) => {
-  const taken = () => { done(true); return new Promise(() => {}); };
-  navigator.locks.request(`tab-${name}`, { signal: AbortSignal.timeout(COPY) }, taken).catch(() => done(false));
+  const others = new BroadcastChannel(`tab-${name}`), lives = new AbortController();
+  const taken = () => {
+    others.onmessage = (m) => m.data === "whose" && others.postMessage("mine");
+    done(true);
+    return new Promise(() => {});
+  };
+  navigator.locks.request(`tab-${name}`, { signal: lives.signal }, taken).catch(() => { others.close(); done(false); });
+  others.onmessage = (m) => m.data === "mine" && lives.abort();
+  others.postMessage("whose");
+  setTimeout(() => lives.abort(), STUCK);
 });
 /** This tab's name: it operates or watches by it, also after a reload. A copied tab gets one of its own: two that share a name would hold
  * one button. */
@@ -53,7 +62,6 @@ export const url = (path) => ROOT + path;
 export const picture = (recording, frame, width, light) =>
   url(`/picture?recording=${encodeURIComponent(recording)}&frame=${frame}${width ? `&width=${width}` : ""}${light ? `&light=${light}` : ""}`);
 
-/** Listens to the server for as long as the page is open; opens the socket again where it breaks. */
 let socket = null;
 /** Says something over the socket; false where it is not open. */
 export function say(text) {
@@ -61,15 +69,22 @@ export function say(text) {
   socket.send(text);
   return true;
 }
-export function listen({ event, rows, lost }) {
+/** Listens to the server for as long as the page is open; opens the socket again where it breaks. Done when the server has told how things
+ * stand, or the socket broke: a page that is drawn before would say that there is nothing. */
+export const listen = ({ event, rows, lost }) => new Promise((told) => {
   let wait = 300;
   const open = () => {
     socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}${ROOT}/events?tab=${tab}`);
     socket.binaryType = "arraybuffer";
     socket.onopen = () => { wait = 300; lost(false); };
-    socket.onmessage = (m) => (typeof m.data === "string" ? event(JSON.parse(m.data)) : rows(m.data));
+    socket.onmessage = (m) => {
+      if (typeof m.data !== "string") return rows(m.data);
+      event(JSON.parse(m.data));
+      told();
+    };
     socket.onclose = async () => {
       lost(true);
+      told();
       try {
         await get("/session");
       } catch (e) {
@@ -80,4 +95,4 @@ export function listen({ event, rows, lost }) {
     };
   };
   open();
-}
+});

@@ -99,7 +99,7 @@ async function start() {
     return;
   }
   bar(document.getElementById("bar"));
-  listen({ event: take, rows: takeRows, lost });
+  const told = listen({ event: take, rows: takeRows, lost });
   addEventListener("hashchange", page);
   addEventListener("keydown", keys);
   // Touching the screen keeps the lease; a screen that nobody touches loses it after a minute.
@@ -112,6 +112,7 @@ async function start() {
   };
   for (const kind of ["pointerdown", "keydown", "wheel"]) addEventListener(kind, touch, { passive: true });
   addEventListener("language", page);
+  await told;
   await page();
 }
 
