@@ -110,8 +110,10 @@ fn modules(folder: &Path, at: &[String], out: &mut BTreeMap<Module, String>) {
         let inside = || at.iter().cloned().chain([name.clone()]).collect::<Vec<_>>();
         if entry.is_dir() {
             modules(&entry, &inside(), out);
-        } else if entry.extension().is_some_and(|e| e == "rs") {
-            files += 1;
+            continue;
+        }
+        files += 1;
+        if entry.extension().is_some_and(|e| e == "rs") {
             let module = if name == "mod" || name == "lib" { at.to_vec() } else { inside() };
             out.insert(module, code(&std::fs::read_to_string(&entry).unwrap()));
         }

@@ -224,9 +224,10 @@ fn every_text_has_its_translations() {
     let rows: Vec<&str> = table.lines().filter(|l| l.starts_with("  \"")).collect();
     let whole = |row: &&str| row.matches("\", \"").count() >= 2;
     assert!(rows.len() > 500 && rows.iter().all(whole), "{:?}", rows.iter().find(|r| !whole(r)));
-    let scripts = ["base", "pages", "widgets"].map(|f| std::fs::read_dir(pages.join(f)).unwrap());
+    let scripts = ["base", "pages", "widgets", "widgets/view", "widgets/rig", "widgets/part"];
+    let scripts = scripts.map(|f| std::fs::read_dir(pages.join(f)).unwrap());
     let mut missing = Vec::new();
-    for path in scripts.into_iter().flatten().map(|e| e.unwrap().path()).filter(|p| p.extension().unwrap() == "js") {
+    for path in scripts.into_iter().flatten().map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "js")) {
         let words = own_words(&std::fs::read_to_string(&path).unwrap());
         let known = |w: &String| rows.iter().any(|r| r.starts_with(&format!("  \"{w}\": [")));
         missing.extend(words.into_iter().filter(|w| !known(w)).map(|w| format!("{}: {w}", path.display())));

@@ -178,7 +178,7 @@ def grid(s, b):
     b.drag(".map canvas", (0.4, 0.6), (0.41, 0.6))
     b.until("its fields", "return document.getElementById('grid-columns')")
     b.run("for (const [id, v] of [['grid-columns', 3], ['grid-rows', 2], ['grid-x', 2.54], ['grid-y', 15.24]]) { const e = document.getElementById(id); e.value = v; e.dispatchEvent(new Event('input')); }")
-    made = b.run("return import('/widgets/holegrid.js').then((m) => m.places({ first: [10, 20], radius: 0.7, columns: 3, rows: 2, pitch: [2.54, 15.24] }, 30))")
+    made = b.run("return import('/widgets/part/holegrid.js').then((m) => m.places({ first: [10, 20], radius: 0.7, columns: 3, rows: 2, pitch: [2.54, 15.24] }, 30))")
     assert len(made) == 6 and made[0] == [10, 20, 0.7], made
     far = math.hypot(made[5][0] - 10, made[5][1] - 20)
     assert abs(far - math.hypot(2 * 2.54, 15.24)) < 1e-9, made

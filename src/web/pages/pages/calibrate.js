@@ -5,10 +5,10 @@ import { fill, h, num, svg } from "../base/dom.js";
 import { jobs, store } from "../base/store.js";
 import { t } from "../base/text.js";
 import { operate, operating } from "../widgets/bar.js";
-import { byTheRobot } from "../widgets/auto.js";
-import { axisGauge } from "../widgets/axisgauge.js";
-import { gauges } from "../widgets/boards.js";
-import { livePicture } from "../widgets/live.js";
+import { byTheRobot } from "../widgets/rig/auto.js";
+import { axisGauge } from "../widgets/rig/axisgauge.js";
+import { gauges } from "../widgets/rig/boards.js";
+import { livePicture } from "../widgets/view/live.js";
 import { attempt } from "../widgets/problem.js";
 import { choice, follow, order, panel, recordings, table } from "../widgets/parts.js";
 

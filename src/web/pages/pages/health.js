@@ -5,7 +5,7 @@ import { fill, h, num } from "../base/dom.js";
 import { done, on, store } from "../base/store.js";
 import { t } from "../base/text.js";
 import { attempt } from "../widgets/problem.js";
-import { bars } from "../widgets/plot.js";
+import { bars } from "../widgets/view/plot.js";
 import { field, figures, follow, nothing, order, panel, table } from "../widgets/parts.js";
 
 const WORDS = { start_s: "start", first_profile_s: "first profile", pictures_s: "waiting for pictures", stages_s: "waiting for stages", writing_s: "writing", products_s: "height map and pictures" };

@@ -8,10 +8,10 @@ import { t } from "../base/text.js";
 import { attempt, fault } from "../widgets/problem.js";
 import { choice, field, figures, follow, nothing, order, panel, scanChoice } from "../widgets/parts.js";
 import { operate, operating } from "../widgets/bar.js";
-import { constructions } from "../widgets/constructions.js";
-import { drawing } from "../widgets/drawing.js";
-import { places } from "../widgets/holegrid.js";
-import { scanMap } from "../widgets/scanmap.js";
+import { constructions } from "../widgets/part/constructions.js";
+import { drawing } from "../widgets/part/drawing.js";
+import { places } from "../widgets/part/holegrid.js";
+import { scanMap } from "../widgets/view/scanmap.js";
 
 export async function show(place, query) {
   const [choose, scan] = scanChoice(query, (id) => (location.hash = `#/part?job=${id}`));

@@ -5,12 +5,12 @@ import { bytes, get, picture } from "../base/api.js";
 import { fill, h, num, svg } from "../base/dom.js";
 import { busy, store } from "../base/store.js";
 import { t } from "../base/text.js";
-import { exposure } from "../widgets/exposure.js";
-import { map } from "../widgets/map.js";
+import { exposure } from "../widgets/rig/exposure.js";
+import { map } from "../widgets/view/map.js";
 import { choice, figures, panel, recordings } from "../widgets/parts.js";
 import { attempt } from "../widgets/problem.js";
-import { region } from "../widgets/region.js";
-import { stripe } from "../widgets/stripe.js";
+import { region } from "../widgets/rig/region.js";
+import { stripe } from "../widgets/rig/stripe.js";
 
 /** Fates of peaks by number (src/stages/peak/found.rs): word and colour. */
 const FATES = [["kept", "#3ddc84"], ["outside the working volume", "#5aa9ff"], ["faint", "#b0b0b0"], ["narrow", "#ff5ac8"], ["wide", "#ffb02e"], ["uncertain", "#c78bff"], ["steep", "#ff8a5a"], ["echo", "#ff5252"], ["without neighbour", "#ffe14d"], ["no point", "#7fd6d6"]];

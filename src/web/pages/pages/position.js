@@ -9,9 +9,9 @@ import { operate, operating } from "../widgets/bar.js";
 import { arming, ask, gate, inTheCell } from "../widgets/ask.js";
 import { attempt, fault } from "../widgets/problem.js";
 import { choice, figure, figures, follow, nothing, order, panel, table } from "../widgets/parts.js";
-import { scanMap } from "../widgets/scanmap.js";
-import { cloud } from "../widgets/cloud.js";
-import { livePicture } from "../widgets/live.js";
+import { scanMap } from "../widgets/view/scanmap.js";
+import { cloud } from "../widgets/view/cloud.js";
+import { livePicture } from "../widgets/view/live.js";
 
 const moves = (j) => j.order.procedure === "insert";
 /** Jobs that found a position: in a scan, or with the robot. */

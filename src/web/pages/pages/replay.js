@@ -4,10 +4,10 @@ import { bytes, get, post, remove } from "../base/api.js";
 import { fill, h, num, thousands } from "../base/dom.js";
 import { jobs, on, scans as finished } from "../base/store.js";
 import { t } from "../base/text.js";
-import { batch } from "../widgets/batch.js";
+import { batch } from "../widgets/part/batch.js";
 import { operate, operating, pageOf } from "../widgets/bar.js";
-import { span } from "../widgets/colour.js";
-import { map } from "../widgets/map.js";
+import { span } from "../widgets/view/colour.js";
+import { map } from "../widgets/view/map.js";
 import { attempt, fault } from "../widgets/problem.js";
 import { choice, field, follow, order, panel } from "../widgets/parts.js";
 

@@ -3,10 +3,10 @@
 import { fill, h, num, thousands } from "../base/dom.js";
 import { jobs, on, store } from "../base/store.js";
 import { t } from "../base/text.js";
-import { span } from "../widgets/colour.js";
-import { map } from "../widgets/map.js";
+import { span } from "../widgets/view/colour.js";
+import { map } from "../widgets/view/map.js";
 import { attempt } from "../widgets/problem.js";
-import { sweep } from "../widgets/sweep.js";
+import { sweep } from "../widgets/part/sweep.js";
 import { choice, field, follow, gallery, order, panel, recordings, scanFigures } from "../widgets/parts.js";
 
 export async function show(place, query) {

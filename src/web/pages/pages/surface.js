@@ -3,12 +3,12 @@
 import { post, url } from "../base/api.js";
 import { fill, h, num, withSigma } from "../base/dom.js";
 import { t } from "../base/text.js";
-import { cloud } from "../widgets/cloud.js";
-import { filters } from "../widgets/filters.js";
-import { section } from "../widgets/plot.js";
+import { cloud } from "../widgets/view/cloud.js";
+import { filters } from "../widgets/part/filters.js";
+import { section } from "../widgets/view/plot.js";
 import { attempt } from "../widgets/problem.js";
 import { nothing, panel, scanChoice, scanFigures, table } from "../widgets/parts.js";
-import { scanMap } from "../widgets/scanmap.js";
+import { scanMap } from "../widgets/view/scanmap.js";
 
 const FILES = [["scan/cloud.ply", "PLY"], ["scan/cloud.pcd", "PCD"], ["scan/height.tif", "TIFF"], ["scan/height.png", "PNG 16"], ["scan/scan.json", "JSON"]];
 

@@ -1,7 +1,7 @@
 // In: pictures of a board that rides on an axis, with the axis' counts. Out: where it stopped, and where it should stop next.
 
-import { fill, h, num, svg, thousands } from "../base/dom.js";
-import { t } from "../base/text.js";
+import { fill, h, num, svg, thousands } from "../../base/dom.js";
+import { t } from "../../base/text.js";
 
 /** As many stops tell an axis from its noise. */
 const WANTED = 8;

@@ -1,8 +1,8 @@
 // In: a scan. Out: its height map with layers to choose, in the map widget.
 
-import { bytes, get } from "../base/api.js";
-import { fill, h, num } from "../base/dom.js";
-import { t } from "../base/text.js";
+import { bytes, get } from "../../base/api.js";
+import { fill, h, num } from "../../base/dom.js";
+import { t } from "../../base/text.js";
 import { map } from "./map.js";
 
 const LAYERS = { height: ["Height", "mm", 2], intensity: ["Intensity", "grey", 0], sigma: ["σ", "mm", 4], both: ["Both", "mm", 2] };

@@ -1,11 +1,11 @@
 // In: a drawing of a part (DXF), chosen or dropped here. Out: a recipe of it, made by the program.
 
-import { post } from "../base/api.js";
-import { fill, h, num } from "../base/dom.js";
-import { t } from "../base/text.js";
-import { operate, operating } from "./bar.js";
-import { choice, field, panel } from "./parts.js";
-import { attempt } from "./problem.js";
+import { post } from "../../base/api.js";
+import { fill, h, num } from "../../base/dom.js";
+import { t } from "../../base/text.js";
+import { operate, operating } from "../bar.js";
+import { choice, field, panel } from "../parts.js";
+import { attempt } from "../problem.js";
 
 const UNITS = ["mm", "inch", "cm", "m", "um", "mil", "foot"];
 /** The server takes requests of 1 MiB. */

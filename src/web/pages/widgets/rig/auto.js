@@ -1,14 +1,14 @@
 // In: an armed robot with a board below it. Out: a calibration that drives itself: next pose, what it has seen, how the expected error
 // falls.
 
-import { get, picture, url } from "../base/api.js";
-import { fill, h, num, svg } from "../base/dom.js";
-import { jobs, on, store } from "../base/store.js";
-import { t } from "../base/text.js";
-import { arming, ask, inTheCell } from "./ask.js";
-import { livePicture } from "./live.js";
-import { choice, follow, order, panel } from "./parts.js";
-import { attempt } from "./problem.js";
+import { get, picture, url } from "../../base/api.js";
+import { fill, h, num, svg } from "../../base/dom.js";
+import { jobs, on, store } from "../../base/store.js";
+import { t } from "../../base/text.js";
+import { arming, ask, inTheCell } from "../ask.js";
+import { livePicture } from "../view/live.js";
+import { choice, follow, order, panel } from "../parts.js";
+import { attempt } from "../problem.js";
 
 /** Shows it in `place`; `done(job)` hears of the finished job. Returns what ends it. */
 export function byTheRobot(place, done) {

@@ -1,8 +1,8 @@
 // In: numbers on a grid. Out: a picture of them to move, enlarge and point at, by mouse, touch and keyboard: arrows move the
 // cross (Shift: faster), Enter puts a point, + - 0 enlarge. Coordinates are the grid's, mm, y up.
 
-import { fill, h, num } from "../base/dom.js";
-import { t } from "../base/text.js";
+import { fill, h, num } from "../../base/dom.js";
+import { t } from "../../base/text.js";
 import { SCALES, paint } from "./colour.js";
 
 /** Levels of a picture as pixels, in the colours of the scale beside it. */

@@ -1,13 +1,13 @@
 // In: a recipe, what the operator states. Out: how the line will go over the part before it is scanned, drawn as the camera sees the board and
 // into the live picture; which speed goes with which step, and what limits it. The program plans it: the job moves by the same.
 
-import { get } from "../base/api.js";
-import { fill, h, num, svg } from "../base/dom.js";
-import { on, store } from "../base/store.js";
-import { t } from "../base/text.js";
-import { livePicture } from "./live.js";
-import { choice, field, figures, table } from "./parts.js";
-import { fault } from "./problem.js";
+import { get } from "../../base/api.js";
+import { fill, h, num, svg } from "../../base/dom.js";
+import { on, store } from "../../base/store.js";
+import { t } from "../../base/text.js";
+import { livePicture } from "../view/live.js";
+import { choice, field, figures, table } from "../parts.js";
+import { fault } from "../problem.js";
 
 /** Without these nothing says where the line goes. */
 const NEEDED = ["camera", "laser_plane", "hand_eye"];

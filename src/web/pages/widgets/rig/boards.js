@@ -1,8 +1,8 @@
 // In: pictures of a calibration board with their corners. Out: which places of the picture the boards covered, how they leaned, and where to
 // hold the board next, also drawn into a picture.
 
-import { fill, h, svg } from "../base/dom.js";
-import { t } from "../base/text.js";
+import { fill, h, svg } from "../../base/dom.js";
+import { t } from "../../base/text.js";
 
 /** Places of the picture that are counted, as the camera's calibration counts them. */
 const COLUMNS = 8, ROWS = 6;

@@ -1,11 +1,11 @@
 // In: a scan and its map. Out: what takes glints and what does not matter out of what is looked at; undone one by one; kept as a scan.
 
-import { get, put } from "../base/api.js";
-import { fill, h, num, thousands } from "../base/dom.js";
-import { t } from "../base/text.js";
-import { operate, operating } from "./bar.js";
-import { field, follow, order } from "./parts.js";
-import { attempt } from "./problem.js";
+import { get, put } from "../../base/api.js";
+import { fill, h, num, thousands } from "../../base/dom.js";
+import { t } from "../../base/text.js";
+import { operate, operating } from "../bar.js";
+import { field, follow, order } from "../parts.js";
+import { attempt } from "../problem.js";
 
 /** A filter in words. */
 function words(f) {

@@ -1,10 +1,10 @@
 // In: a recipe's text. Out: its constructed points beside the picture: built of pins and of each other, chosen for the tool, written into
 // the text.
 
-import { post } from "../base/api.js";
-import { fill, h, num } from "../base/dom.js";
-import { t } from "../base/text.js";
-import { choice, field, table } from "./parts.js";
+import { post } from "../../base/api.js";
+import { fill, h, num } from "../../base/dom.js";
+import { t } from "../../base/text.js";
+import { choice, field, table } from "../parts.js";
 
 const KINDS = { midpoint: "Midpoint", line: "Line", offset: "Offset", lattice: "Lattice" };
 

@@ -1,7 +1,7 @@
 // In: numbers along a line. Out: a curve with its band of standard deviations; pieces of it are chosen by dragging, or by arrows and Enter.
 
-import { fill, h, num, svg } from "../base/dom.js";
-import { t } from "../base/text.js";
+import { fill, h, num, svg } from "../../base/dom.js";
+import { t } from "../../base/text.js";
 import { nice } from "./map.js";
 
 const W = 900, H = 190, LEFT = 54, RIGHT = 10, TOP = 10, BOTTOM = 26;

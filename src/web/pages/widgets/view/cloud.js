@@ -2,9 +2,9 @@
 // the wheel; a click gives the point's coordinates and sigma. Points come spread over the scan, so that the first share of them
 // shows all of it coarsely: while it turns, as many are drawn as the machine draws fluently, and that number is said.
 
-import { bytes, get } from "../base/api.js";
-import { fill, h, num, thousands } from "../base/dom.js";
-import { t } from "../base/text.js";
+import { bytes, get } from "../../base/api.js";
+import { fill, h, num, thousands } from "../../base/dom.js";
+import { t } from "../../base/text.js";
 import { span } from "./colour.js";
 
 const FIRST = 150000, MOST = 2000000;

@@ -1,12 +1,12 @@
 // In: recordings, a recipe, settings. Out: each of them scanned and searched, one job after the other; how far the places that were found lie
 // apart, beside what each said of itself.
 
-import { get, post } from "../base/api.js";
-import { fill, h, num, svg } from "../base/dom.js";
-import { done, on } from "../base/store.js";
-import { t } from "../base/text.js";
-import { choice, order, recordings, table } from "./parts.js";
-import { attempt } from "./problem.js";
+import { get, post } from "../../base/api.js";
+import { fill, h, num, svg } from "../../base/dom.js";
+import { done, on } from "../../base/store.js";
+import { t } from "../../base/text.js";
+import { choice, order, recordings, table } from "../parts.js";
+import { attempt } from "../problem.js";
 
 /** Pairs of jobs that the server lets wait. */
 const MOST = 15;

@@ -1,9 +1,9 @@
 // In: the camera, maybe a job that found a part. Out: the camera's newest picture, small, again and again, with the part's outlines where the
 // robot's pose at that picture says; one that is slow gets fewer.
 
-import { bytes, get } from "../base/api.js";
-import { fill, h } from "../base/dom.js";
-import { t } from "../base/text.js";
+import { bytes, get } from "../../base/api.js";
+import { fill, h } from "../../base/dom.js";
+import { t } from "../../base/text.js";
 
 /** Outlines that moved more than this between two readings of the robot's pose are drawn broken, px. */
 const MOVES = 1.5;

@@ -1,10 +1,10 @@
 // In: a picture on a map. Out: the part of it in which the stripe is looked for, drawn by its corners and edges, kept in the station's settings.
 
-import { get, put } from "../base/api.js";
-import { fill, h } from "../base/dom.js";
-import { t } from "../base/text.js";
-import { operate, operating } from "./bar.js";
-import { attempt } from "./problem.js";
+import { get, put } from "../../base/api.js";
+import { fill, h } from "../../base/dom.js";
+import { t } from "../../base/text.js";
+import { operate, operating } from "../bar.js";
+import { attempt } from "../problem.js";
 
 const WHOLE = [0, 0, 1, 1], KEY = "extraction.region";
 /** Grips by what they move: -1 left or top, 1 right or bottom, 0 neither. */

@@ -1,8 +1,8 @@
 // In: what a picture shows. Out: its stripe along its length: peak, width, contrast, and where it is dark.
 
-import { fill, h, num, svg } from "../base/dom.js";
-import { t } from "../base/text.js";
-import { figures } from "./parts.js";
+import { fill, h, num, svg } from "../../base/dom.js";
+import { t } from "../../base/text.js";
+import { figures } from "../parts.js";
 
 const W = 320, H = 44;
 

@@ -1,12 +1,12 @@
 // In: what the camera can be set to. Out: its exposure and gain by handle, all else by name; the exposure that suits the stripe, found by the
 // program.
 
-import { get, put } from "../base/api.js";
-import { fill, h, num } from "../base/dom.js";
-import { t } from "../base/text.js";
-import { operate, operating } from "./bar.js";
-import { choice, field, follow, order } from "./parts.js";
-import { attempt } from "./problem.js";
+import { get, put } from "../../base/api.js";
+import { fill, h, num } from "../../base/dom.js";
+import { t } from "../../base/text.js";
+import { operate, operating } from "../bar.js";
+import { choice, field, follow, order } from "../parts.js";
+import { attempt } from "../problem.js";
 
 /** What has a handle of its own, in this order; the second name is that of cameras from before the standard's second version. */
 const HANDLES = [["Exposure", ["ExposureTime", "ExposureTimeAbs"]], ["Gain", ["Gain", "GainRaw"]], ["Pictures a second", ["AcquisitionFrameRate", "AcquisitionFrameRateAbs"]]];
