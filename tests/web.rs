@@ -227,7 +227,9 @@ fn every_text_has_its_translations() {
     let scripts = ["base", "pages", "widgets", "widgets/view", "widgets/rig", "widgets/part"];
     let scripts = scripts.map(|f| std::fs::read_dir(pages.join(f)).unwrap());
     let mut missing = Vec::new();
-    for path in scripts.into_iter().flatten().map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "js")) {
+    for path in
+        scripts.into_iter().flatten().map(|e| e.unwrap().path()).filter(|p| p.extension().is_some_and(|e| e == "js"))
+    {
         let words = own_words(&std::fs::read_to_string(&path).unwrap());
         let known = |w: &String| rows.iter().any(|r| r.starts_with(&format!("  \"{w}\": [")));
         missing.extend(words.into_iter().filter(|w| !known(w)).map(|w| format!("{}: {w}", path.display())));

@@ -38,18 +38,25 @@ impl Along {
 pub struct Shots {
     /// How the stripe lies in the pictures.
     pub along: Along,
+    /// Width of the stripe across it, px (1 sigma); `None` where nobody measured it.
+    pub stripe_px: Option<f32>,
     places: BTreeMap<u32, Rigid<Base, Camera>>,
 }
 
 impl Shots {
     /// Shots and where the camera stood, cloud's frame.
     pub fn new(along: Along, places: impl IntoIterator<Item = (u32, Rigid<Base, Camera>)>) -> Shots {
-        Shots { along, places: places.into_iter().collect() }
+        Shots { along, stripe_px: None, places: places.into_iter().collect() }
     }
 
     /// Of a sensor that nobody knows the places of: an imported map.
     pub fn unplaced(along: Along) -> Shots {
-        Shots { along, places: BTreeMap::new() }
+        Shots { along, stripe_px: None, places: BTreeMap::new() }
+    }
+
+    /// The same shots, of a stripe so wide, px (1 sigma).
+    pub fn with_stripe(self, stripe_px: Option<f32>) -> Shots {
+        Shots { stripe_px, ..self }
     }
 
     /// Where the camera stood, cloud's frame; `None` for a shot that is not listed.

@@ -14,6 +14,10 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Fewer points do not give a datum.
 const MIN_SURFACE: usize = 60;
+/// Farther from an edge than this share of the points no more of them are left out.
+const INNERMOST: usize = 3;
+/// Nothing reaches farther along a surface, units of length.
+const FARTHEST: f64 = 6.0;
 
 pub(in crate::find) struct Datum {
     pub step: Vector3<f64>,
@@ -58,16 +62,28 @@ pub(in crate::find) fn fit_datum(
     round: usize,
 ) -> Result<Datum> {
     let gate = if round == 0 { 4.0 * options.height_gate_mm } else { 2.0 * options.height_gate_mm };
-    let mut rows: Vec<(Vector3<f64>, f64, u32)> = Vec::new();
+    // Nearer to an edge than a point's light reaches it is not all of this face: the centre is off, to the other side at the other end.
+    let reach = points.reach_mm.min(FARTHEST * options.unit()).max(options.margin_mm);
+    let mut inside: Vec<(Vector3<f64>, f64, u32)> = Vec::new();
+    let mut from_edge = Vec::new();
     for (i, q) in local.iter().enumerate() {
         let Some(q) = q else { continue };
         let Some(face) = faces.iter().filter(|f| (q.z - f.z).abs() < gate).find(|f| f.material(q.x, q.y)) else {
             continue;
         };
-        if edges.nearest(q.x, q.y, options.margin_mm, |s| s.z == face.z).is_none() {
-            rows.push((Vector3::new(1.0, q.y, -q.x), q.z - face.z, points.row[i]));
+        let edge = edges.nearest(q.x, q.y, reach, |s| s.z == face.z);
+        let d = edge.map_or(f64::MAX, |s| (s.x - q.x).hypot(s.y - q.y));
+        if d > options.margin_mm {
+            inside.push((Vector3::new(1.0, q.y, -q.x), q.z - face.z, points.row[i]));
+            from_edge.push(d);
         }
     }
+    let mut farthest = from_edge.clone();
+    farthest.sort_unstable_by(|a, b| b.total_cmp(a));
+    // On narrow faces what lies farthest inside.
+    let kept = (farthest.len() / INNERMOST).max(MIN_SURFACE);
+    let margin = farthest.get(kept).map_or(0.0, |d| d.min(reach));
+    let rows: Vec<_> = inside.into_iter().zip(from_edge).filter(|(_, d)| *d >= margin).map(|(row, _)| row).collect();
     if rows.len() < MIN_SURFACE {
         return Err(Fault::refused(format!(
             "{} points lie on the part's level surfaces (to {} mm, from height_gate_mm), at least {MIN_SURFACE} are needed",
@@ -84,4 +100,45 @@ pub(in crate::find) fn fit_datum(
                 .cause("they lie on one line")
                 .next("scan more of the part")
         })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scan::{Along, CloudPoint, Shots};
+    use rand::{Rng, SeedableRng};
+
+    /// A level plate of 24 x 16 mm in steps of 0.2 mm, its stripe slanted by `lean`: its light reaches 1.5 mm, and so near to the plate's two
+    /// ends along the stripe half of a profile is of what lies beside it. The centre is off by up to 0.1 mm, up at one end, down at the other.
+    fn plate(lean: f32, stripe_px: Option<f32>) -> Ordered {
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(3);
+        let mut cloud = Vec::new();
+        for shot in 0..80u32 {
+            for column in 0..120u32 {
+                let (x, y) = (0.2 * f64::from(column) - 11.9, 0.2 * f64::from(shot) - 7.9);
+                let cut = (1.0 - (12.0 - x.abs()) / 1.5).max(0.0);
+                let z = 0.1 * cut * x.signum() + rng.random_range(-0.05..0.05);
+                let position = glam::Vec3::new(x as f32, y as f32, z as f32);
+                let (u, v) = (column as f32, 200.0 + lean * column as f32);
+                cloud.push(CloudPoint { position, sigma_mm: 0.02, intensity: 100.0, quality: 1.0, shot, u, v });
+            }
+        }
+        Ordered::new(&cloud, &Shots::unplaced(Along::U).with_stripe(stripe_px)).unwrap()
+    }
+
+    #[test]
+    fn what_a_slanted_stripe_reads_beyond_an_edge_does_not_tilt_a_part() {
+        let drawing = Drawing::parse("[[shape]]\nkind = \"rectangle\"\ncentre = [0, 0]\nsize = [24, 16]\n").unwrap();
+        let options = MeasureOptions::default();
+        let (faces, edges) = (drawing.faces(), EdgeIndex::new(&drawing, options.unit()));
+        let tilt = |points: &Ordered| {
+            let local = localise(points, &drawing, &Rigid::identity(), &options);
+            fit_datum(points, &local, &faces, &edges, &options, 3).unwrap().step.z.abs()
+        };
+        // Two widths and half as much again: 3 px of 0.2 mm, of a step that is longer by the slant.
+        let known = plate(0.5, Some(2.8));
+        assert!((known.reach_mm - 2.0 * 1.5 * 2.8 * 0.2 / 1.25f64.sqrt()).abs() < 0.02, "{}", known.reach_mm);
+        let [with, without] = [tilt(&known), tilt(&plate(0.5, None))];
+        assert!(with < 2e-4 && without > 6e-4, "tilt {with} rad, {without} where the stripe's width is unknown");
+    }
 }

@@ -28,6 +28,8 @@ pub struct Ordered {
     pub from_camera: Vec<Option<Rigid<Base, Camera>>>,
     /// Pixel (u, v) of each point.
     pub pixel: Vec<[f32; 2]>,
+    /// How far along a surface the light lies that a point was measured from, mm; 0 where nobody measured the stripe's width.
+    pub reach_mm: f64,
     columns: usize,
     index: Vec<u32>,
 }
@@ -49,7 +51,9 @@ impl Ordered {
         shot.dedup();
         let from_camera = places(&shot, shots)?;
         let table = Table::of(cloud, &shot, shots.along)?;
-        Ok(Ordered::filled(cloud, table, shot, from_camera))
+        let mut ordered = Ordered::filled(cloud, table, shot, from_camera);
+        ordered.reach_mm = shots.stripe_px.map_or(0.0, |width| ordered.reach(width, shots.along));
+        Ok(ordered)
     }
 
     /// The points of a table in its order; its indices into the cloud become such into these.
@@ -66,6 +70,7 @@ impl Ordered {
             row: vec![],
             column: vec![],
             pixel: vec![],
+            reach_mm: 0.0,
             shot,
             from_camera,
             columns,
@@ -85,6 +90,21 @@ impl Ordered {
         }
         out.index = index;
         out
+    }
+
+    /// Two widths of the stripe, and along a slanted one what profiles along an image axis go farther, in the usual steps between
+    /// neighbours along it.
+    fn reach(&self, stripe_px: f32, along: Along) -> f64 {
+        let across = |i: usize| self.pixel[i][usize::from(along == Along::U)];
+        let beside = |i: usize| self.at(i64::from(self.row[i]), i64::from(self.column[i]) + 1);
+        let pairs: Vec<(usize, usize)> = (0..self.points.len()).filter_map(|i| Some((i, beside(i)?))).collect();
+        let median = |mut v: Vec<f64>| {
+            let middle = v.len() / 2;
+            if v.is_empty() { 0.0 } else { *v.select_nth_unstable_by(middle, f64::total_cmp).1 }
+        };
+        let step = median(pairs.iter().map(|&(i, j)| (self.points[j] - self.points[i]).norm()).collect());
+        let lean = median(pairs.iter().map(|&(i, j)| f64::from(across(j) - across(i)).abs()).collect());
+        2.0 * (1.0 + lean) * f64::from(stripe_px) * step / 1.0f64.hypot(lean)
     }
 
     /// The point in a row and column, if there is one.

@@ -235,7 +235,8 @@ pub fn shots_of(scan: &Path) -> Result<Shots> {
     if report.imported.is_some() {
         return Ok(Shots::unplaced(Along::U));
     }
-    Shots::load(scan, &report.frame, &report.rig_fingerprint)
+    let shots = Shots::load(scan, &report.frame, &report.rig_fingerprint)?;
+    Ok(shots.with_stripe(report.stripe.map(|s| s.width_px)))
 }
 
 /// The points of a finished scan, checked to be those that the scan wrote.
