@@ -14,7 +14,7 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Fewer points do not give a datum.
 const MIN_SURFACE: usize = 60;
-/// Farther from an edge than this share of the points no more of them are left out.
+/// One point in so many, those farthest from an edge, is kept however far the light reaches.
 const INNERMOST: usize = 3;
 /// Nothing reaches farther along a surface, units of length.
 const FARTHEST: f64 = 6.0;
@@ -62,7 +62,8 @@ pub(in crate::find) fn fit_datum(
     round: usize,
 ) -> Result<Datum> {
     let gate = if round == 0 { 4.0 * options.height_gate_mm } else { 2.0 * options.height_gate_mm };
-    // Nearer to an edge than a point's light reaches it is not all of this face: the centre is off, to the other side at the other end.
+    // Of a point that is nearer to an edge than its light reaches some comes from beside the face: its centre is off, up at one end of the
+    // stripe and down at the other.
     let reach = points.reach_mm.min(FARTHEST * options.unit()).max(options.margin_mm);
     let mut inside: Vec<(Vector3<f64>, f64, u32)> = Vec::new();
     let mut from_edge = Vec::new();

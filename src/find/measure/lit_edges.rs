@@ -5,6 +5,7 @@
 use super::edge_pieces::{N, Prior, Row, Unknowns, solve};
 use super::options::MeasureOptions;
 use super::points::Ordered;
+use super::robust::median;
 use super::shape::{Shape, shape_row};
 use crate::find::model::drawn_edges::EdgeSample;
 use crate::find::model::edge_index::EdgeIndex;
@@ -157,10 +158,6 @@ fn sampling(
     on: &[Option<f64>],
     turns: &[Rotation2<f64>],
 ) -> Option<[Vector2<f64>; 2]> {
-    let median = |mut v: Vec<f64>| {
-        let middle = v.len() / 2;
-        *v.select_nth_unstable_by(middle, f64::total_cmp).1
-    };
     let step = |dr: i64, dc: i64| {
         let (mut x, mut y) = (vec![], vec![]);
         for i in (0..on.len()).filter(|&i| on[i].is_some()) {
@@ -254,11 +251,7 @@ fn pose_scatter(points: &Ordered, local: &[Option<Vec3>], deep: &[bool], on: &[O
     if means.len() < MIN_SHOTS {
         return 0.0;
     }
-    let median = |v: &mut Vec<f64>| {
-        let middle = v.len() / 2;
-        *v.select_nth_unstable_by(middle, f64::total_cmp).1
-    };
-    let (all, own) = (1.4826 * median(&mut means), median(&mut noise));
+    let (all, own) = (1.4826 * median(means), median(noise));
     (all * all - own).max(0.0).sqrt()
 }
 

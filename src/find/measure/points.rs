@@ -3,6 +3,7 @@
 //! Frame and unit: base frame, mm.
 
 use super::options::MeasureOptions;
+use super::robust::median;
 use crate::fault::{Fault, Result};
 use crate::find::model::drawing::Drawing;
 use crate::geometry::{Base, Camera, Part, Rigid, Vec3};
@@ -98,10 +99,6 @@ impl Ordered {
         let across = |i: usize| self.pixel[i][usize::from(along == Along::U)];
         let beside = |i: usize| self.at(i64::from(self.row[i]), i64::from(self.column[i]) + 1);
         let pairs: Vec<(usize, usize)> = (0..self.points.len()).filter_map(|i| Some((i, beside(i)?))).collect();
-        let median = |mut v: Vec<f64>| {
-            let middle = v.len() / 2;
-            if v.is_empty() { 0.0 } else { *v.select_nth_unstable_by(middle, f64::total_cmp).1 }
-        };
         let step = median(pairs.iter().map(|&(i, j)| (self.points[j] - self.points[i]).norm()).collect());
         let lean = median(pairs.iter().map(|&(i, j)| f64::from(across(j) - across(i)).abs()).collect());
         2.0 * (1.0 + lean) * f64::from(stripe_px) * step / 1.0f64.hypot(lean)

@@ -1,5 +1,5 @@
 //! In: rows of a linear problem with the shot that each came from. Out: its robust solution with the sandwich
-//! covariance over shots (docs/math.md, Insertion (4)).
+//! covariance over shots (docs/math.md, Insertion (4)); a median.
 //! Frame and unit: the rows' own.
 
 use nalgebra::{SMatrix, SVector};
@@ -11,6 +11,15 @@ pub(in crate::find) struct Fit<const N: usize> {
     pub used: usize,
     pub sigma: f64,
     pub weights: Vec<f64>,
+}
+
+/// 0 of none.
+pub(super) fn median(mut values: Vec<f64>) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// Tukey-weighted least squares of `residual = j . step` with priors (unknown, sigma) around zero. Rows

@@ -4,6 +4,7 @@
 
 use super::options::MeasureOptions;
 use super::points::Ordered;
+use super::robust::median;
 use crate::find::model::edge_index::EdgeIndex;
 use crate::find::model::face::Face;
 use crate::geometry::Vec3;
@@ -108,15 +109,6 @@ pub(in crate::find) fn surface_ends(
     let rulers = last_steps.map(median);
     let observations = found.iter().filter_map(|end| end.at_edge(rulers[end.side], edges, gate)).collect();
     (observations, steps.map(median))
-}
-
-/// 0 for none.
-fn median(mut s: Vec<f64>) -> f64 {
-    if s.is_empty() {
-        return 0.0;
-    }
-    let middle = s.len() / 2;
-    *s.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// A scan's samples in the part frame.
