@@ -5,8 +5,8 @@ use rand::{Rng, SeedableRng};
 use sheetlight::simulate::RigSpec;
 use sheetlight::simulate::rig_scene::TREAD_MM;
 
-/// Half-width of the sheet, px of the camera at the working distance (1 sigma), is drawn from here; and, for the widest, the share of the
-/// picture's shorter side that it may be: a stripe wider than half of a face of the part sees no face.
+/// Half-width of the sheet, px of the camera at the working distance (1 sigma), is drawn from here, the widest by their share of the picture's
+/// shorter side; the part's treads may ask for less (at the end).
 const STRIPE_PX: [f64; 2] = [0.8, 6.0];
 const STRIPE_SHARE: f64 = 0.006;
 
