@@ -8,6 +8,9 @@ use common::{figure, sheetlight, sheetlight_fails};
 use nalgebra::Matrix4;
 use serde_json::Value;
 use sheetlight::raster::{Channel, load};
+use sheetlight::recording::Recording;
+use sheetlight::rig::Rig;
+use sheetlight::station::{RangeRun, measure_range};
 use std::path::{Path, PathBuf};
 
 fn text(path: &Path) -> &str {
@@ -90,6 +93,31 @@ fn with_lamps_on(from: &Path, to: &Path) {
     std::fs::write(to.join("meta.json"), meta.to_string()).unwrap();
 }
 
+/// The pointer's pictures as they are where an edge along the beam's image hides one half of each spot.
+fn with_spots_cut(from: &Path, to: &Path, spots: &[[f64; 2]]) {
+    std::fs::create_dir_all(to).unwrap();
+    let mut meta = json(&from.join("meta.json"));
+    let (a, b) = (spots[0], spots[spots.len() - 1]);
+    let beam = nalgebra::Vector2::new(b[0] - a[0], b[1] - a[1]).normalize();
+    for (i, (frame, spot)) in meta["frames"].as_array_mut().unwrap().iter_mut().zip(spots).enumerate() {
+        let picture = load(&from.join(frame["laser"].as_str().unwrap()), Channel::Luma, 8).unwrap();
+        let mut bytes = picture.to_u8();
+        let dark = *bytes.clone().select_nth_unstable(picture.width as usize * picture.height as usize / 2).1;
+        for (k, byte) in bytes.iter_mut().enumerate() {
+            let [x, y] = [k % picture.width as usize, k / picture.width as usize].map(|p| p as f64);
+            let (dx, dy) = (x - spot[0], y - spot[1]);
+            if beam.x * dy - beam.y * dx > 0.0 && dx.hypot(dy) < 20.0 {
+                *byte = dark;
+            }
+        }
+        let name = format!("cut{i}.pgm");
+        let header = format!("P5\n{} {}\n255\n", picture.width, picture.height).into_bytes();
+        std::fs::write(to.join(&name), [header, bytes].concat()).unwrap();
+        frame["laser"] = name.into();
+    }
+    std::fs::write(to.join("meta.json"), meta.to_string()).unwrap();
+}
+
 /// Distance in mm and angle in degrees between two poses.
 fn apart(a: &Value, b: &Value) -> (f64, f64) {
     let (a, b) = (pose(a), pose(b));
@@ -159,6 +187,18 @@ fn a_station_is_calibrated_ranged_and_verified_by_its_commands() {
         let e = figure(d, &["along_axis_mm"]) - z;
         let sigma = figure(d, &["along_axis_sigma_mm"]);
         assert!(e.abs() < 4.0 * sigma.max(0.005), "at {z} mm: {e:+.4} mm, sigma {sigma:.4}");
+    }
+    // Half a spot is not where the beam is, and is refused; asked roughly it tells how far the surface is.
+    let spots: Vec<[f64; 2]> =
+        distances.iter().map(|d| serde_json::from_value(d["spot_px"].clone()).unwrap()).collect();
+    with_spots_cut(&s.at.join("pointer"), &s.at.join("cut"), &spots);
+    let (recording, rig) = (Recording::open(&s.at.join("cut")).unwrap(), Rig::load(Path::new(&s.station)).unwrap());
+    let refused = measure_range(&recording, &rig, &RangeRun::default()).unwrap_err().to_string();
+    assert!(refused.contains("beside the beam's image"), "{refused}");
+    let roughly = measure_range(&recording, &rig, &RangeRun { coarse: true, ..RangeRun::default() }).unwrap();
+    assert!(roughly.missing.is_empty(), "{:?}", roughly.missing);
+    for (d, z) in roughly.distances.iter().zip(&wanted) {
+        assert!((d.along_axis_mm / z - 1.0).abs() < 0.01, "{:.2} mm at {z}", d.along_axis_mm);
     }
     // Without robot poses there is no surface; with them the scene's normal is the board's.
     let (code, said) = sheetlight_fails(&["range", text(&s.at.join("pointer")), "--station", &s.station, "--surface"]);

@@ -14,6 +14,12 @@ use crate::raster::{Image, Light};
 use crate::recording::{Beam, Recording};
 use crate::rig::{Calibration, HandEye, Rig};
 
+/// A beam can be wrong by its calibration, too: so far beside its image a spot is forgiven, px.
+const FORGIVEN_PX: f64 = 1.0;
+/// A spot that an edge cuts lies beside its beam by less than this many sigmas of its profile: with nine tenths of it cut away,
+/// what is left of a normal profile has its middle at 1.75.
+const CUT: f64 = 2.0;
+
 /// How [`measure_range`] is run.
 #[derive(Clone, Debug)]
 pub struct RangeRun {
@@ -23,6 +29,8 @@ pub struct RangeRun {
     pub poses: Option<String>,
     /// A spot farther than this from the beam's image is no spot of this beam, sigmas; 3..=100.
     pub max_off_beam: f64,
+    /// Asked is only about how far the surface is: a spot that an edge cuts counts too.
+    pub coarse: bool,
     /// The shots are all of one plane surface: work out its normal.
     pub one_surface: bool,
     /// Where the tool is on the flange: its tilt against the surface, and how to stand square to it.
@@ -31,7 +39,14 @@ pub struct RangeRun {
 
 impl Default for RangeRun {
     fn default() -> Self {
-        RangeRun { spots: SpotOptions::default(), poses: None, max_off_beam: 12.0, one_surface: false, tool: None }
+        RangeRun {
+            spots: SpotOptions::default(),
+            poses: None,
+            max_off_beam: 12.0,
+            coarse: false,
+            one_surface: false,
+            tool: None,
+        }
     }
 }
 
@@ -171,7 +186,8 @@ pub(super) fn touched(recording: &Recording, rig: &Rig, run: &RangeRun) -> Resul
         let name = frame.name;
         let found = spot.and_then(|s| {
             let r = range(&s.pixel, &s.covariance, &camera.value, &pointer.value, &joint)?;
-            on_beam(&r, run.max_off_beam).map(|()| (s, r))
+            let forgiven = if run.coarse { FORGIVEN_PX.max(CUT * s.width_px) } else { FORGIVEN_PX };
+            on_beam(&r, run.max_off_beam, forgiven).map(|()| (s, r))
         });
         let (spot, ranged) = match found {
             Ok(f) => f,
@@ -281,9 +297,8 @@ fn square(s: &Surface, flange_from_tool: &Rigid<Flange, Tool>, flange: &Rigid<Ba
     }
 }
 
-fn on_beam(r: &Ranged, limit: f64) -> Result<()> {
-    // A beam can be wrong by its calibration, too: a pixel is forgiven.
-    if r.off_beam_sigmas > limit && r.off_beam_px > 1.0 {
+fn on_beam(r: &Ranged, limit: f64, forgiven_px: f64) -> Result<()> {
+    if r.off_beam_sigmas > limit && r.off_beam_px > forgiven_px {
         return Err(Fault::refused(format!(
             "the spot is {:.1} px ({:.0} sigmas) beside the beam's image, limit {limit} sigmas",
             r.off_beam_px, r.off_beam_sigmas

@@ -17,9 +17,12 @@ const FATES = [["kept", "#3ddc84"], ["outside the working volume", "#5aa9ff"], [
 
 /** A picture that is drawn in less than this leaves the machine its time, ms. */
 const FLUENT = 15;
-/** Between two pictures while a job runs, ms. On the station itself a browser without a GPU spends some 20 ms of a core on each, which a scan
- * on all cores lacks (tests/web/rates.py); elsewhere a picture costs the station its measuring alone. */
-const BESIDE = ["localhost", "127.0.0.1", "[::1]"].includes(location.hostname) ? 500 : 250;
+/** Browsers on the station itself. */
+const HERE = ["localhost", "127.0.0.1", "[::1]"].includes(location.hostname);
+/** Between two pictures while a job runs, ms. A browser without a GPU spends some 20 ms of a core on each, which a scan on all cores lacks
+ * (tests/web/rates.py): all that look on from the station itself have two a second among them. Elsewhere a picture costs the station its
+ * measuring alone. */
+const beside = () => (HERE ? Math.min(2000, 500 * (store.bar?.viewers ?? 1)) : 250);
 
 export async function show(place) {
   const list = await recordings(() => true);
@@ -66,8 +69,8 @@ export async function show(place) {
       await new Promise(requestAnimationFrame);
       // Drawing takes its share of this machine, not what a scan needs: where it is slow, fewer pictures are shown, each the newest.
       const took = performance.now() - begun;
-      const rest = busy() ? Math.max(BESIDE, 10 * took) : took > FLUENT ? took : 0;
-      if (rest) await new Promise((go) => setTimeout(go, Math.min(1000, rest)));
+      const rest = busy() ? Math.max(beside(), Math.min(1000, 10 * took)) : took > FLUENT ? Math.min(1000, took) : 0;
+      if (rest) await new Promise((go) => setTimeout(go, rest));
     }
   }
   /** What the newest picture shows is reckoned where the pictures are: once in a while is enough for people. */
