@@ -70,7 +70,6 @@ fn broken(what: impl std::fmt::Display) -> Fault {
 
 /// Serves one peer until it says quit or closes the pipe.
 pub fn serve(device: &Device, mut input: impl BufRead, mut output: impl Write) -> Result<()> {
-    let lost = |e: std::io::Error| broken(e);
     let mut line = String::new();
     input.read_line(&mut line).map_err(lost)?;
     let setup: Setup = serde_json::from_str(&line).map_err(broken)?;
@@ -80,38 +79,7 @@ pub fn serve(device: &Device, mut input: impl BufRead, mut output: impl Write) -
         input.read_exact(&mut pixels).map_err(lost)?;
         images.push(Image::from_u8(setup.width, setup.height, pixels));
     }
-    let optics = Optics {
-        pinhole: setup.pinhole,
-        distortion: std::array::from_fn(|i| setup.distortion.get(i).copied().unwrap_or(0.0)),
-        untilt: FLAT,
-        normal: setup.normal.into(),
-        offset: setup.offset_mm,
-    };
-    let peak = PeakParams { width_px: setup.width_px, ..PeakParams::default() };
-    // The other side refuses nothing either.
-    let pixels =
-        Measure { peak: PeakParams { method: Method::Pixel, ..peak }, choose: ChooseParams::lenient(), optics };
-    let config = ChainConfig {
-        shots: setup.shots_per_batch,
-        measure: Some(pixels),
-        threshold: ThresholdParams {
-            window: Window::Mean,
-            size: setup.size,
-            offset: setup.offset,
-            minimum: setup.minimum,
-        },
-        ..ChainConfig::new(setup.width, setup.height, 8)
-    };
-    let mut chain = Chain::new(device, &config)?;
-    run(&mut chain, &images, 1)?;
-    let mut single = Chain::new(device, &ChainConfig { shots: 1, slots: 1, ..config })?;
-    let stripe =
-        Stripe { width_px: setup.width_px, speckle: peak.speckle, noise: noise(&images[0]), ..Stripe::default() };
-    let format = Format { width: setup.width, height: setup.height, bits: 8 };
-    let scan = Extraction::default().for_stripe(&stripe).chain(format, optics, setup.width_px);
-    let host = Host::new(&scan)?;
-    let mut full = Chain::new(device, &ChainConfig { shots: setup.shots_per_batch, ..scan })?;
-    run(&mut full, &images, 1)?;
+    let mut ours = Ours::new(device, &setup, images)?;
     writeln!(output, "{}", serde_json::json!({"ready": device.info.name})).map_err(lost)?;
     output.flush().map_err(lost)?;
     loop {
@@ -119,41 +87,106 @@ pub fn serve(device: &Device, mut input: impl BufRead, mut output: impl Write) -
         if input.read_line(&mut line).map_err(lost)? == 0 {
             return Ok(());
         }
-        let command = serde_json::from_str(&line).map_err(broken)?;
-        match command {
+        match serde_json::from_str(&line).map_err(broken)? {
             Command::Quit => return Ok(()),
-            Command::Run(times) | Command::RunFull(times) | Command::RunHost(times) | Command::RunHostSingly(times) => {
-                let (cpu, start) = (machine::cpu_seconds(), Instant::now());
-                let points = match command {
-                    Command::Run(_) => run(&mut chain, &images, times)?,
-                    Command::RunFull(_) => run(&mut full, &images, times)?,
-                    _ => run_host(&host, &images, times, matches!(command, Command::RunHost(_)))?,
-                };
-                let wall = start.elapsed().as_secs_f64();
-                let cpu = cpu.and_then(|c| Some(machine::cpu_seconds()? - c));
-                let answer =
-                    serde_json::json!({"wall_s": wall, "cpu_s": cpu, "shots": times * images.len(), "points": points});
+            Command::Points(i) => ours.points(i, &mut output)?,
+            Command::Masks(i) => ours.masks(i, &mut output)?,
+            command @ (Command::Run(times)
+            | Command::RunFull(times)
+            | Command::RunHost(times)
+            | Command::RunHostSingly(times)) => {
+                let answer = ours.timed(&command, times)?;
                 writeln!(output, "{answer}").map_err(lost)?;
-            }
-            Command::Points(i) => {
-                single.submit_posed(0, &[&images[i]], &[STILL])?;
-                let mut batch = Batch::default();
-                single.collect_into(true, &mut batch)?;
-                writeln!(output, "{}", serde_json::json!({"points": batch.points.len()})).map_err(lost)?;
-                for (k, p) in batch.peaks.iter().zip(&batch.points) {
-                    let [x, y, z] = p.position.to_array();
-                    let row = [(k.pixel & 0xffff) as f32, (k.pixel >> 16) as f32, x, y, z];
-                    output.write_all(&row.map(f32::to_le_bytes).concat()).map_err(lost)?;
-                }
-            }
-            Command::Masks(i) => {
-                single.submit_posed(0, &[&images[i]], &[STILL])?;
-                single.collect(true)?;
-                output.write_all(&single.lit(0)?.to_u8()).map_err(lost)?;
-                output.write_all(&single.mask(0)?.to_u8()).map_err(lost)?;
             }
         }
         output.flush().map_err(lost)?;
+    }
+}
+
+fn lost(e: std::io::Error) -> Fault {
+    broken(e)
+}
+
+/// The peer's pictures, and this program's chains under its settings.
+struct Ours {
+    images: Vec<Image>,
+    /// To a point for every skeleton pixel's middle; and one picture at a time.
+    chain: Chain,
+    single: Chain,
+    /// With the settings of a scan; and on the processor.
+    full: Chain,
+    host: Host,
+}
+
+impl Ours {
+    /// Compiles all of them and runs those once that will be timed on the device.
+    fn new(device: &Device, setup: &Setup, images: Vec<Image>) -> Result<Ours> {
+        let optics = Optics {
+            pinhole: setup.pinhole,
+            distortion: std::array::from_fn(|i| setup.distortion.get(i).copied().unwrap_or(0.0)),
+            untilt: FLAT,
+            normal: setup.normal.into(),
+            offset: setup.offset_mm,
+        };
+        let peak = PeakParams { width_px: setup.width_px, ..PeakParams::default() };
+        // The other side refuses nothing either.
+        let pixels =
+            Measure { peak: PeakParams { method: Method::Pixel, ..peak }, choose: ChooseParams::lenient(), optics };
+        let config = ChainConfig {
+            shots: setup.shots_per_batch,
+            measure: Some(pixels),
+            threshold: ThresholdParams {
+                window: Window::Mean,
+                size: setup.size,
+                offset: setup.offset,
+                minimum: setup.minimum,
+            },
+            ..ChainConfig::new(setup.width, setup.height, 8)
+        };
+        let mut chain = Chain::new(device, &config)?;
+        run(&mut chain, &images, 1)?;
+        let single = Chain::new(device, &ChainConfig { shots: 1, slots: 1, ..config })?;
+        let stripe =
+            Stripe { width_px: setup.width_px, speckle: peak.speckle, noise: noise(&images[0]), ..Stripe::default() };
+        let format = Format { width: setup.width, height: setup.height, bits: 8 };
+        let scan = Extraction::default().for_stripe(&stripe).chain(format, optics, setup.width_px);
+        let host = Host::new(&scan)?;
+        let mut full = Chain::new(device, &ChainConfig { shots: setup.shots_per_batch, ..scan })?;
+        run(&mut full, &images, 1)?;
+        Ok(Ours { images, chain, single, full, host })
+    }
+
+    /// Seconds of all pictures so many times over, on the chain that the command names.
+    fn timed(&mut self, command: &Command, times: usize) -> Result<serde_json::Value> {
+        let (cpu, start) = (machine::cpu_seconds(), Instant::now());
+        let points = match command {
+            Command::Run(_) => run(&mut self.chain, &self.images, times)?,
+            Command::RunFull(_) => run(&mut self.full, &self.images, times)?,
+            _ => run_host(&self.host, &self.images, times, matches!(command, Command::RunHost(_)))?,
+        };
+        let wall = start.elapsed().as_secs_f64();
+        let cpu = cpu.and_then(|c| Some(machine::cpu_seconds()? - c));
+        Ok(serde_json::json!({"wall_s": wall, "cpu_s": cpu, "shots": times * self.images.len(), "points": points}))
+    }
+
+    fn points(&mut self, i: usize, output: &mut impl Write) -> Result<()> {
+        self.single.submit_posed(0, &[&self.images[i]], &[STILL])?;
+        let mut batch = Batch::default();
+        self.single.collect_into(true, &mut batch)?;
+        writeln!(output, "{}", serde_json::json!({"points": batch.points.len()})).map_err(lost)?;
+        for (k, p) in batch.peaks.iter().zip(&batch.points) {
+            let [x, y, z] = p.position.to_array();
+            let row = [(k.pixel & 0xffff) as f32, (k.pixel >> 16) as f32, x, y, z];
+            output.write_all(&row.map(f32::to_le_bytes).concat()).map_err(lost)?;
+        }
+        Ok(())
+    }
+
+    fn masks(&mut self, i: usize, output: &mut impl Write) -> Result<()> {
+        self.single.submit_posed(0, &[&self.images[i]], &[STILL])?;
+        self.single.collect(true)?;
+        output.write_all(&self.single.lit(0)?.to_u8()).map_err(lost)?;
+        output.write_all(&self.single.mask(0)?.to_u8()).map_err(lost)
     }
 }
 

@@ -137,28 +137,13 @@ fn row(
         Some(full_chain(device, &config, scene, &mut chain, &batch_of, options)?)
     };
 
-    let mut single = Chain::new(device, &ChainConfig { shots: 1, slots: 1, ..config.clone() })?;
-    single.submit(0, &refs[..1])?;
-    single.collect(true)?;
-    let (mut waits, mut batch) = (Vec::new(), Batch::default());
-    let start = Instant::now();
-    while start.elapsed().as_secs_f64() < options.seconds / 2.0 || waits.len() < 5 {
-        let one = Instant::now();
-        single.submit(0, &refs[waits.len() % refs.len()..][..1])?;
-        single.collect_into(true, &mut batch)?;
-        waits.push(one.elapsed().as_secs_f64());
-    }
-    let latency = Latency { p50_ms: percentile(&mut waits.clone(), 0.5), p99_ms: percentile(&mut waits, 0.99) };
-    drop(single);
-
+    let latency = latency(device, &config, &refs, options.seconds / 2.0)?;
     let soak = if options.soak == 0 { None } else { soak(device, &config, scene, &batch_of, options.soak)? };
 
     let px = f64::from(width) * f64::from(height);
     let tiles = f64::from(chain.frame.tiles());
     let listed = steady.listed / tiles;
-    // Written at upload, read once by the statistics; 32 bytes a tile of them written and read by 3 x 5 blocks
-    // out of the cache; a listed tile's surroundings and masks.
-    let bytes_per_px = 2.0 + 64.0 / 256.0 + listed * (62.0 * 38.0 / 256.0 + 1.0);
+    let bytes_per_px = bytes_per_px(listed);
     let mpx = px / (ms_per_shot * 1e3);
     let share_of_memory = match ceilings.device_gb_s {
         None => 1e-3 * mpx * bytes_per_px / ceilings.read_all_gb_s,
@@ -191,6 +176,29 @@ fn row(
         host_peak_mb: machine::peak_memory_bytes().map(|b| b as f64 / 1e6),
         stages: stage_times(device, &config, &batch_of(0))?,
     })
+}
+
+/// Of one shot after the other with nothing else under way, for so many seconds.
+fn latency(device: &Device, config: &ChainConfig, images: &[&Image], seconds: f64) -> Result<Latency> {
+    let mut single = Chain::new(device, &ChainConfig { shots: 1, slots: 1, ..config.clone() })?;
+    single.submit(0, &images[..1])?;
+    single.collect(true)?;
+    let (mut waits, mut batch) = (Vec::new(), Batch::default());
+    let start = Instant::now();
+    while start.elapsed().as_secs_f64() < seconds || waits.len() < 5 {
+        let one = Instant::now();
+        single.submit(0, &images[waits.len() % images.len()..][..1])?;
+        single.collect_into(true, &mut batch)?;
+        waits.push(one.elapsed().as_secs_f64());
+    }
+    Ok(Latency { p50_ms: percentile(&mut waits.clone(), 0.5), p99_ms: percentile(&mut waits, 0.99) })
+}
+
+/// Bytes that the stages move through memory a pixel, where this share of the tiles is listed.
+fn bytes_per_px(listed: f64) -> f64 {
+    // Written at upload, read once by the statistics; 32 bytes a tile of them written and read by 3 x 5 blocks
+    // out of the cache; a listed tile's surroundings and masks.
+    2.0 + 64.0 / 256.0 + listed * (62.0 * 38.0 / 256.0 + 1.0)
 }
 
 /// Time a shot, ms, of the pictures that lie in the ring's places since a run before, every place busy.

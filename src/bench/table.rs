@@ -1,69 +1,16 @@
 //! In: a report. Out: the table of it that a person reads.
 //! Frame and unit: as the columns say.
 
+use super::rows::Row;
 use super::run::Report;
 
 /// The report as a table that a person reads.
 pub fn table(report: &Report) -> String {
     use std::fmt::Write;
-    let mut out = String::new();
-    let c = &report.ceilings;
-    let a = &report.adapter;
-    let _ = writeln!(out, "{} ({}), {}, {} threads", a.name, a.kind, a.driver, report.threads);
-    let _ = writeln!(
-        out,
-        "plain read {:.1} GB/s on one thread, {:.1} on all; upload {:.1}, readback {:.1} GB/s{}",
-        c.read_gb_s,
-        c.read_all_gb_s,
-        c.upload_gb_s.unwrap_or(f64::NAN),
-        c.readback_gb_s.unwrap_or(f64::NAN),
-        c.device_gb_s.map_or(String::new(), |own| format!("; within the device {own:.0} GB/s"))
-    );
-    let _ = writeln!(
-        out,
-        "{:11} {:16} {:>5} {:>8} {:>8} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7} {:>7} {:>7} {:>7} {:>8} {:>8}",
-        "size",
-        "scene",
-        "batch",
-        "ms/shot",
-        "full ms",
-        "ratio",
-        "shots/s",
-        "Mpx/s",
-        "resident",
-        "and full",
-        "CPU ms",
-        "x read",
-        "memory",
-        "upload",
-        "tiles",
-        "p50 ms",
-        "p99 ms"
-    );
+    let mut out = machine(report);
+    out += &columns();
     for r in &report.rows {
-        // Mpx/s.
-        let rate = |ms: f64| f64::from(r.width) * f64::from(r.height) / (1e3 * ms);
-        let _ = writeln!(
-            out,
-            "{:11} {:16} {:>5} {:>8.3} {:>8.3} {:>6.2} {:>8.1} {:>8.0} {:>8.0} {:>8.0} {:>8.2} {:>7.1} {:>6.1}% {:>6.1}% {:>6.1}% {:>8.2} {:>8.2}",
-            format!("{}x{}", r.width, r.height),
-            r.scene.name(),
-            r.shots_per_batch,
-            r.ms_per_shot,
-            r.full_ms_per_shot.unwrap_or(f64::NAN),
-            r.full_over_skeleton.unwrap_or(f64::NAN),
-            r.shots_per_s,
-            r.mpx_per_s,
-            rate(r.device_ms_per_shot),
-            r.full_device_ms_per_shot.map_or(f64::NAN, rate),
-            r.cpu_ms_per_shot.unwrap_or(f64::NAN),
-            r.cpu_over_plain_read.unwrap_or(f64::NAN),
-            100.0 * r.share_of_memory,
-            100.0 * r.share_of_upload.unwrap_or(f64::NAN),
-            100.0 * r.listed,
-            r.latency.p50_ms,
-            r.latency.p99_ms
-        );
+        out += &row(r);
     }
     for s in report.with_pixels.iter().chain(&report.with_light) {
         let _ = writeln!(
@@ -92,4 +39,71 @@ pub fn table(report: &Report) -> String {
         let _ = writeln!(out);
     }
     out
+}
+
+/// What was measured on, and what it can carry.
+fn machine(report: &Report) -> String {
+    let (a, c) = (&report.adapter, &report.ceilings);
+    format!(
+        "{} ({}), {}, {} threads\n\
+         plain read {:.1} GB/s on one thread, {:.1} on all; upload {:.1}, readback {:.1} GB/s{}\n",
+        a.name,
+        a.kind,
+        a.driver,
+        report.threads,
+        c.read_gb_s,
+        c.read_all_gb_s,
+        c.upload_gb_s.unwrap_or(f64::NAN),
+        c.readback_gb_s.unwrap_or(f64::NAN),
+        c.device_gb_s.map_or(String::new(), |own| format!("; within the device {own:.0} GB/s"))
+    )
+}
+
+/// Their names over the columns of [`row`].
+fn columns() -> String {
+    format!(
+        "{:11} {:16} {:>5} {:>8} {:>8} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7} {:>7} {:>7} {:>7} {:>8} {:>8}\n",
+        "size",
+        "scene",
+        "batch",
+        "ms/shot",
+        "full ms",
+        "ratio",
+        "shots/s",
+        "Mpx/s",
+        "resident",
+        "and full",
+        "CPU ms",
+        "x read",
+        "memory",
+        "upload",
+        "tiles",
+        "p50 ms",
+        "p99 ms"
+    )
+}
+
+fn row(r: &Row) -> String {
+    // Mpx/s.
+    let rate = |ms: f64| f64::from(r.width) * f64::from(r.height) / (1e3 * ms);
+    format!(
+        "{:11} {:16} {:>5} {:>8.3} {:>8.3} {:>6.2} {:>8.1} {:>8.0} {:>8.0} {:>8.0} {:>8.2} {:>7.1} {:>6.1}% {:>6.1}% {:>6.1}% {:>8.2} {:>8.2}\n",
+        format!("{}x{}", r.width, r.height),
+        r.scene.name(),
+        r.shots_per_batch,
+        r.ms_per_shot,
+        r.full_ms_per_shot.unwrap_or(f64::NAN),
+        r.full_over_skeleton.unwrap_or(f64::NAN),
+        r.shots_per_s,
+        r.mpx_per_s,
+        rate(r.device_ms_per_shot),
+        r.full_device_ms_per_shot.map_or(f64::NAN, rate),
+        r.cpu_ms_per_shot.unwrap_or(f64::NAN),
+        r.cpu_over_plain_read.unwrap_or(f64::NAN),
+        100.0 * r.share_of_memory,
+        100.0 * r.share_of_upload.unwrap_or(f64::NAN),
+        100.0 * r.listed,
+        r.latency.p50_ms,
+        r.latency.p99_ms
+    )
 }

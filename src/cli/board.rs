@@ -69,37 +69,7 @@ impl std::str::FromStr for Size {
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
-    let border_mm = args.border_mm.unwrap_or(0.6 * args.square_mm);
-    let board = match args.kind.as_str() {
-        "chessboard" => BoardSpec::Chessboard {
-            inner_corners: args.size.0,
-            square_mm: args.square_mm,
-            border_mm,
-            first_square: "black".into(),
-        },
-        "charuco" => BoardSpec::Charuco {
-            squares: args.size.0,
-            square_mm: args.square_mm,
-            marker_mm: args.marker_mm.unwrap_or(0.7 * args.square_mm),
-            dictionary: args.dictionary.clone(),
-            border_mm,
-        },
-        "markers" => BoardSpec::MarkerGrid {
-            markers: args.size.0,
-            marker_mm: args.square_mm,
-            gap_mm: args.gap_mm.unwrap_or(0.3 * args.square_mm),
-            dictionary: args.dictionary.clone(),
-            first_id: args.first_id,
-            border_mm,
-        },
-        _ => BoardSpec::Circles {
-            dots: args.size.0,
-            pitch_mm: args.square_mm,
-            diameter_mm: Some(args.dot_mm.unwrap_or(0.5 * args.square_mm)),
-            asymmetric: args.asymmetric,
-            border_mm,
-        },
-    };
+    let board = asked(args);
     let drawn = sheet(&board)?;
     if let Some(folder) = args.out.parent().filter(|p| !p.as_os_str().is_empty()) {
         crate::files::make_folder(folder)?;
@@ -130,4 +100,39 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         console.result(&board, "");
     }
     Ok(())
+}
+
+/// The board of the arguments, with what they leave out.
+fn asked(args: &Args) -> BoardSpec {
+    let border_mm = args.border_mm.unwrap_or(0.6 * args.square_mm);
+    match args.kind.as_str() {
+        "chessboard" => BoardSpec::Chessboard {
+            inner_corners: args.size.0,
+            square_mm: args.square_mm,
+            border_mm,
+            first_square: "black".into(),
+        },
+        "charuco" => BoardSpec::Charuco {
+            squares: args.size.0,
+            square_mm: args.square_mm,
+            marker_mm: args.marker_mm.unwrap_or(0.7 * args.square_mm),
+            dictionary: args.dictionary.clone(),
+            border_mm,
+        },
+        "markers" => BoardSpec::MarkerGrid {
+            markers: args.size.0,
+            marker_mm: args.square_mm,
+            gap_mm: args.gap_mm.unwrap_or(0.3 * args.square_mm),
+            dictionary: args.dictionary.clone(),
+            first_id: args.first_id,
+            border_mm,
+        },
+        _ => BoardSpec::Circles {
+            dots: args.size.0,
+            pitch_mm: args.square_mm,
+            diameter_mm: Some(args.dot_mm.unwrap_or(0.5 * args.square_mm)),
+            asymmetric: args.asymmetric,
+            border_mm,
+        },
+    }
 }

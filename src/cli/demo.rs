@@ -57,6 +57,30 @@ struct Demo {
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     crate::cli::terminal::outputs::check_simulation(&args.out.join("simulated"))?;
     crate::cli::terminal::outputs::check_scan(&args.out, LABEL)?;
+    let (station, folder) = simulated(args, console)?;
+    let out = args.out.clone();
+    let (settings, rig) = (Settings::load(&station)?, Rig::load(&station)?);
+    let scan = ScanOptions { place: args.on, overlays: 4, ..ScanOptions::for_station(&settings, &rig, &out) };
+    console.say("scanning it through the whole chain");
+    let bar = console.bar("scanning", args.shots as u64);
+    let recording = Recording::open(&folder)?;
+    let open = |first| Ok(Box::new(RecordingSource::open(&recording, None, first)?) as Box<_>);
+    let report = crate::station::scan("demo", LABEL, open, &rig, &scan, |done, _| bar.set_position(done as u64))?;
+    bar.finish_and_clear();
+    console.say("finding the parts, comparing every point with the truth");
+    let truth = folder.join("truth.json");
+    let recipes = RECIPES.iter().map(|text| Recipe::parse(text)).collect::<Result<Vec<_>>>()?;
+    let parts = judge_parts(&out, &station, &truth, &recipes)?;
+    let errors = judge(&out, &truth, &parts)?;
+    let page = out.join("index.html");
+    let mut text = words(&report, &errors, &parts);
+    text += &format!("open {}", page.display());
+    console.result(&Demo { page, scan: report, errors, parts }, &text);
+    Ok(())
+}
+
+/// Simulates the station and a scan: their folders.
+fn simulated(args: &Args, console: &Console) -> Result<(PathBuf, PathBuf)> {
     let options = SimulateOptions {
         seed: args.seed,
         shots: args.shots,
@@ -76,21 +100,11 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let folder = folder.ok_or_else(|| {
         Fault::output("nothing was simulated").next("choose an --out folder that you may write to, and run it again")
     })?;
-    let out = args.out.clone();
-    let (settings, rig) = (Settings::load(&made.station)?, Rig::load(&made.station)?);
-    let scan = ScanOptions { place: args.on, overlays: 4, ..ScanOptions::for_station(&settings, &rig, &out) };
-    console.say("scanning it through the whole chain");
-    let bar = console.bar("scanning", options.shots as u64);
-    let recording = Recording::open(&folder)?;
-    let open = |first| Ok(Box::new(RecordingSource::open(&recording, None, first)?) as Box<_>);
-    let report = crate::station::scan("demo", LABEL, open, &rig, &scan, |done, _| bar.set_position(done as u64))?;
-    bar.finish_and_clear();
-    console.say("finding the parts, comparing every point with the truth");
-    let truth = folder.join("truth.json");
-    let recipes = RECIPES.iter().map(|text| Recipe::parse(text)).collect::<Result<Vec<_>>>()?;
-    let parts = judge_parts(&out, &made.station, &truth, &recipes)?;
-    let errors = judge(&out, &truth, &parts)?;
-    let page = out.join("index.html");
+    Ok((made.station, folder))
+}
+
+/// How good the scan and the poses found in it are.
+fn words(report: &ScanReport, errors: &Judged, parts: &[FoundPart]) -> String {
     let e = &errors.cloud;
     let mut text = format!(
         "{} points from {} shots in {:.1} s on {}\n\
@@ -103,7 +117,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         e.rms_without_outliers_mm,
         100.0 * e.outliers_share
     );
-    for p in &parts {
+    for p in parts {
         text += &match (p.passed, p.error_mm, p.error_deg) {
             (true, Some([x, y, z]), Some(deg)) => format!(
                 "{}: insertion pose {:.3} mm in the plane, {:.3} mm in height, {deg:.3} degrees from the truth\n",
@@ -114,7 +128,5 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
             _ => format!("{}: no pose: {}\n", p.title, p.reasons.join("; ")),
         };
     }
-    text += &format!("open {}", page.display());
-    console.result(&Demo { page, scan: report, errors, parts }, &text);
-    Ok(())
+    text
 }

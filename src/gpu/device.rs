@@ -124,23 +124,46 @@ fn sorted(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
     all
 }
 
+/// The best adapter whose name holds `wanted`.
+fn chosen(wanted: Option<&str>) -> Result<wgpu::Adapter> {
+    let all = sorted(&instance());
+    let names: Vec<String> = all.iter().map(|a| a.get_info().name).collect();
+    all
+        .into_iter()
+        .find(|a| wanted.is_none_or(|w| a.get_info().name.to_lowercase().contains(&w.to_lowercase())))
+        .ok_or_else(|| match wanted {
+            Some(w) if !names.is_empty() => {
+                Fault::device(format!("no adapter's name holds '{w}'; there are: {}", names.join(", ")))
+                    .next("correct SHEETLIGHT_ADAPTER or unset it")
+            }
+            _ => Fault::device("0 Vulkan, Metal or DX12 adapters found, 1 needed")
+                .cause("no GPU driver is installed")
+                .next("install one (Debian: apt install mesa-vulkan-drivers); what has --on runs without one, with --on cpu"),
+        })
+}
+
+/// Where a lost device leaves the reason.
+fn heard(raw: &wgpu::Device) -> Arc<Mutex<Option<String>>> {
+    let lost = Arc::new(Mutex::new(None::<String>));
+    let note = lost.clone();
+    raw.set_device_lost_callback(move |reason, message| {
+        note.lock().unwrap().get_or_insert(format!("{reason:?}: {message}"));
+    });
+    // Out of memory and driver errors surface here; a validation error is our bug and panics.
+    let note = lost.clone();
+    raw.on_uncaptured_error(Arc::new(move |e: wgpu::Error| match e {
+        wgpu::Error::Validation { .. } if note.lock().unwrap().is_none() => panic!("{e}"),
+        e => {
+            note.lock().unwrap().get_or_insert(e.to_string());
+        }
+    }));
+    lost
+}
+
 impl Device {
     /// Opens the best adapter whose name holds `wanted`; it reads arrays as every other adapter does.
     pub(super) fn opened(wanted: Option<&str>) -> Result<Device> {
-        let all = sorted(&instance());
-        let names: Vec<String> = all.iter().map(|a| a.get_info().name).collect();
-        let chosen = all
-            .into_iter()
-            .find(|a| wanted.is_none_or(|w| a.get_info().name.to_lowercase().contains(&w.to_lowercase())))
-            .ok_or_else(|| match wanted {
-                Some(w) if !names.is_empty() => {
-                    Fault::device(format!("no adapter's name holds '{w}'; there are: {}", names.join(", ")))
-                        .next("correct SHEETLIGHT_ADAPTER or unset it")
-                }
-                _ => Fault::device("0 Vulkan, Metal or DX12 adapters found, 1 needed")
-                    .cause("no GPU driver is installed")
-                    .next("install one (Debian: apt install mesa-vulkan-drivers); what has --on runs without one, with --on cpu"),
-            })?;
+        let chosen = chosen(wanted)?;
         let info = describe(&chosen);
         let offered = chosen.limits();
         // Only what the stages use is raised above the portable defaults, to what the adapter has.
@@ -171,19 +194,7 @@ impl Device {
                 .cause("the driver is broken or its memory is taken")
                 .next("run `sheetlight doctor`, or choose another adapter with SHEETLIGHT_ADAPTER")
         })?;
-        let lost = Arc::new(Mutex::new(None::<String>));
-        let note = lost.clone();
-        raw.set_device_lost_callback(move |reason, message| {
-            note.lock().unwrap().get_or_insert(format!("{reason:?}: {message}"));
-        });
-        // Out of memory and driver errors surface here; a validation error is our bug and panics.
-        let note = lost.clone();
-        raw.on_uncaptured_error(Arc::new(move |e: wgpu::Error| match e {
-            wgpu::Error::Validation { .. } if note.lock().unwrap().is_none() => panic!("{e}"),
-            e => {
-                note.lock().unwrap().get_or_insert(e.to_string());
-            }
-        }));
+        let lost = heard(&raw);
         let image_rows = raw.limits().max_texture_dimension_2d;
         let tick_ns = info.timestamps.then(|| queue.get_timestamp_period());
         Ok(Device {

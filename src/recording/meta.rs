@@ -82,6 +82,36 @@ pub struct ImageSpec {
     pub pixel_centre: String,
 }
 
+impl ImageSpec {
+    /// Refuses pixel conventions, depths and sizes that are not read.
+    fn check(&self) -> Result<()> {
+        if self.pixel_centre != "integer coordinates" {
+            return refuse(
+                format!("pixel_centre is '{}', only 'integer coordinates' is read", self.pixel_centre),
+                "say where the pixel centres are",
+            );
+        }
+        if !(8..=16).contains(&self.bits) || self.width == 0 || self.height == 0 {
+            return refuse(
+                format!("image {}x{} with {} bits is out of range", self.width, self.height, self.bits),
+                "bits must be 8 to 16 and the size at least 1x1",
+            );
+        }
+        let [w, h] = [self.width, self.height];
+        if w.max(h) > MOST_SIDE || u64::from(w) * u64::from(h) > MOST_PIXELS {
+            return refuse(
+                format!("image {w}x{h} is too large: limit {MOST_SIDE} a side, {MOST_PIXELS} pixels in all"),
+                "give the size of the sensor's pictures",
+            );
+        }
+        Ok(())
+    }
+}
+
+fn refuse(what: String, next: &str) -> Result<()> {
+    Err(Fault::input(what).cause("written by another program or by hand").next(next))
+}
+
 /// What the laser is: a sheet or a pointer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -146,9 +176,6 @@ impl Meta {
 
     /// [`Meta::parse`]'s, of frames that were read from their own file.
     pub(super) fn check(&self) -> Result<()> {
-        let refuse = |what: String, next: &str| {
-            Err(Fault::input(what).cause("written by another program or by hand").next(next))
-        };
         if self.format != 1 {
             return refuse(
                 format!("format is {}, this version reads 1", self.format),
@@ -161,34 +188,29 @@ impl Meta {
                 "convert boards and poses to millimetres",
             );
         }
-        if self.image.pixel_centre != "integer coordinates" {
-            return refuse(
-                format!("pixel_centre is '{}', only 'integer coordinates' is read", self.image.pixel_centre),
-                "say where the pixel centres are",
-            );
-        }
-        if !(8..=16).contains(&self.image.bits) || self.image.width == 0 || self.image.height == 0 {
-            return refuse(
-                format!(
-                    "image {}x{} with {} bits is out of range",
-                    self.image.width, self.image.height, self.image.bits
-                ),
-                "bits must be 8 to 16 and the size at least 1x1",
-            );
-        }
-        let [w, h] = [self.image.width, self.image.height];
-        if w.max(h) > MOST_SIDE || u64::from(w) * u64::from(h) > MOST_PIXELS {
-            return refuse(
-                format!("image {w}x{h} is too large: limit {MOST_SIDE} a side, {MOST_PIXELS} pixels in all"),
-                "give the size of the sensor's pictures",
-            );
-        }
+        self.image.check()?;
         if self.frames.is_empty() {
             return refuse("the recording has no frames".into(), "record at least one shot");
         }
         for board in self.boards.iter().chain(&self.board) {
             board.check()?;
         }
+        self.check_poses()?;
+        match &self.motion {
+            Some(motion) => motion.check(&self.frames)?,
+            None if self.frames.iter().any(|f| f.count.is_some() || f.trigger.is_some()) => {
+                return refuse(
+                    "frames have a 'count' or 'trigger', and 'motion' does not say of what".into(),
+                    "state \"motion\": its kind, unit and what it carries (docs/file-formats.md)",
+                );
+            }
+            None => {}
+        }
+        self.check_references()
+    }
+
+    /// A picture was taken at one pose.
+    fn check_poses(&self) -> Result<()> {
         let mut taken: BTreeMap<&str, (usize, Option<usize>)> = BTreeMap::new();
         for (i, f) in self.frames.iter().enumerate() {
             let Some(name) = &f.laser else { continue };
@@ -202,16 +224,11 @@ impl Meta {
                 _ => {}
             }
         }
-        match &self.motion {
-            Some(motion) => motion.check(&self.frames)?,
-            None if self.frames.iter().any(|f| f.count.is_some() || f.trigger.is_some()) => {
-                return refuse(
-                    "frames have a 'count' or 'trigger', and 'motion' does not say of what".into(),
-                    "state \"motion\": its kind, unit and what it carries (docs/file-formats.md)",
-                );
-            }
-            None => {}
-        }
+        Ok(())
+    }
+
+    /// Every frame has a picture, and its board is there.
+    fn check_references(&self) -> Result<()> {
         let boards = self.boards.len() + usize::from(self.board.is_some());
         for (i, f) in self.frames.iter().enumerate() {
             if f.laser.is_none() && f.ambient.is_none() {

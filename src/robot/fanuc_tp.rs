@@ -23,11 +23,6 @@ pub struct TpPosition<To: Frame, From: Frame> {
 /// Reads every position of a listing, ascending by number. Joint positions, positions that were
 /// never taught (asterisks), a missing unit and doubled numbers are refused.
 pub fn read<To: Frame, From: Frame>(text: &str) -> Result<Vec<TpPosition<To, From>>> {
-    let bad = |what: String| {
-        Fault::input(what)
-            .cause("the listing holds something else than taught Cartesian positions")
-            .next("touch up the positions as Cartesian ones and export the program as .LS again")
-    };
     // Only the position section counts: comments in the program may look like positions.
     let section = text.find("/POS").map_or(text, |at| &text[at + 4..]);
     let section = section.find("/END").map_or(section, |at| &section[..at]);
@@ -43,49 +38,12 @@ pub fn read<To: Frame, From: Frame>(text: &str) -> Result<Vec<TpPosition<To, Fro
             let begins: String = after[..close].chars().take(12).collect();
             return Err(bad(format!("P[{begins}: brackets do not match")));
         }
-        let (number, comment) = after[..close].split_once(':').unwrap_or((&after[..close], ""));
-        let number: u32 = number.trim().parse().map_err(|_| bad(format!("P[{number}]: is no position number")))?;
-        let body = &after[open + 1..end];
+        let position: TpPosition<To, From> = position(&after[..close], &after[open + 1..end])?;
         rest = &after[end + 1..];
-        // Further motion groups (a positioner) follow the robot's.
-        let group = body.find("GP2").map_or(body, |g| &body[..g]);
-        if body.contains('*') {
-            return Err(bad(format!("P[{number}]: was never taught (asterisks)")));
+        if out.iter().any(|p| p.number == position.number) {
+            return Err(bad(format!("P[{}] is there twice", position.number)));
         }
-        let fields: Vec<(&str, &str)> =
-            group.split([',', '\n']).filter_map(|f| f.split_once('=')).map(|(k, v)| (k.trim(), v.trim())).collect();
-        if fields.iter().any(|(k, _)| *k == "J1") {
-            return Err(bad(format!("P[{number}]: holds joint angles")));
-        }
-        let numbers = [("X", "mm"), ("Y", "mm"), ("Z", "mm"), ("W", "deg"), ("P", "deg"), ("R", "deg")]
-            .iter()
-            .map(|(key, unit)| {
-                let value =
-                    fields.iter().find(|(k, _)| k == key).ok_or_else(|| bad(format!("P[{number}]: has no {key}")))?.1;
-                let digits = value
-                    .strip_suffix(unit)
-                    .ok_or_else(|| bad(format!("P[{number}]: {key} = {value} is not in {unit}")))?;
-                digits.trim().parse::<f64>().map_err(|_| bad(format!("P[{number}]: {key} = {value} is no number")))
-            })
-            .collect::<Result<Vec<f64>>>()?;
-        let frame = |key: &str| -> u32 {
-            group
-                .split([',', '\n'])
-                .filter_map(|f| f.split_once(':'))
-                .find(|(k, _)| k.trim() == key)
-                .and_then(|(_, v)| v.trim().parse().ok())
-                .unwrap_or(0)
-        };
-        if out.iter().any(|p| p.number == number) {
-            return Err(bad(format!("P[{number}] is there twice")));
-        }
-        out.push(TpPosition {
-            number,
-            comment: comment.trim().trim_matches('"').to_owned(),
-            user_frame: frame("UF"),
-            tool_frame: frame("UT"),
-            pose: Convention::Fanuc.read(&numbers).map_err(|e| e.at(format!("P[{number}]")))?,
-        });
+        out.push(position);
     }
     if out.is_empty() {
         return Err(bad("no position P[n] was found".into()));
@@ -99,6 +57,58 @@ pub fn read<To: Frame, From: Frame>(text: &str) -> Result<Vec<TpPosition<To, Fro
         )));
     }
     Ok(out)
+}
+
+fn bad(what: String) -> Fault {
+    Fault::input(what)
+        .cause("the listing holds something else than taught Cartesian positions")
+        .next("touch up the positions as Cartesian ones and export the program as .LS again")
+}
+
+/// One position: what stands in its brackets and in its braces.
+fn position<To: Frame, From: Frame>(head: &str, body: &str) -> Result<TpPosition<To, From>> {
+    let (number, comment) = head.split_once(':').unwrap_or((head, ""));
+    let number: u32 = number.trim().parse().map_err(|_| bad(format!("P[{number}]: is no position number")))?;
+    // Further motion groups (a positioner) follow the robot's.
+    let group = body.find("GP2").map_or(body, |g| &body[..g]);
+    if body.contains('*') {
+        return Err(bad(format!("P[{number}]: was never taught (asterisks)")));
+    }
+    let frame = |key: &str| -> u32 {
+        group
+            .split([',', '\n'])
+            .filter_map(|f| f.split_once(':'))
+            .find(|(k, _)| k.trim() == key)
+            .and_then(|(_, v)| v.trim().parse().ok())
+            .unwrap_or(0)
+    };
+    Ok(TpPosition {
+        number,
+        comment: comment.trim().trim_matches('"').to_owned(),
+        user_frame: frame("UF"),
+        tool_frame: frame("UT"),
+        pose: Convention::Fanuc.read(&numbers(number, group)?).map_err(|e| e.at(format!("P[{number}]")))?,
+    })
+}
+
+/// X Y Z in mm and W P R in degrees of a position's motion group.
+fn numbers(number: u32, group: &str) -> Result<Vec<f64>> {
+    let fields: Vec<(&str, &str)> =
+        group.split([',', '\n']).filter_map(|f| f.split_once('=')).map(|(k, v)| (k.trim(), v.trim())).collect();
+    if fields.iter().any(|(k, _)| *k == "J1") {
+        return Err(bad(format!("P[{number}]: holds joint angles")));
+    }
+    [("X", "mm"), ("Y", "mm"), ("Z", "mm"), ("W", "deg"), ("P", "deg"), ("R", "deg")]
+        .iter()
+        .map(|(key, unit)| {
+            let value =
+                fields.iter().find(|(k, _)| k == key).ok_or_else(|| bad(format!("P[{number}]: has no {key}")))?.1;
+            let digits = value
+                .strip_suffix(unit)
+                .ok_or_else(|| bad(format!("P[{number}]: {key} = {value} is not in {unit}")))?;
+            digits.trim().parse::<f64>().map_err(|_| bad(format!("P[{number}]: {key} = {value} is no number")))
+        })
+        .collect()
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use super::rig::RigSpec;
 use super::sensor::Sensor;
 use crate::camera::{ALWAYS_NAMED, Distortion, Intrinsics, NAMES};
 use crate::fault::Result;
-use crate::geometry::{Base, Camera, Flange, Plane, Ray, Rigid, Vec3, exp};
+use crate::geometry::{Base, Camera, Plane, Ray, Rigid, Vec3, exp};
 use crate::rig::{Calibration, Covariance, HandEye, Kind, Quality, Rig, Verdict};
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
@@ -117,75 +117,12 @@ impl Station {
     pub fn of(rig: &RigSpec, seed: u64) -> Station {
         let mut rng = Pcg64::seed_from_u64(seed ^ 0x57a7_1011);
         let mut off = |x: f64, by: f64| if seed == 0 { x } else { x + by * rng.random_range(-1.0..1.0) };
-        let (c, l, m) = (&rig.camera, &rig.laser, &rig.mount);
-        let (width, height) = (f64::from(c.width_px), f64::from(c.height_px));
-        let f = off(rig.focal_px(), 30.0 / 611.6 * rig.focal_px());
-        let [k1, k2, p1, p2, k3] = c.distortion;
-        let [tau_x, tau_y] = c.sensor_tilt_deg.map(f64::to_radians);
-        let camera = Intrinsics {
-            fx: f,
-            fy: f * off(1.0, 0.002),
-            cx: off((width - 1.0) / 2.0, width / 80.0),
-            cy: off((height - 1.0) / 2.0, height / 60.0),
-            skew: 0.0,
-            distortion: Distortion([
-                off(k1, 3.0 / 11.0 * k1.abs()),
-                off(k2, 3.0 / 8.0 * k2.abs()),
-                off(p1, 8e-4),
-                off(p2, 8e-4),
-                off(k3, 2.0 / 3.0 * k3.abs()),
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-                0.0,
-                tau_x,
-                tau_y,
-            ]),
-            width: c.width_px,
-            height: c.height_px,
-        };
-        // The sheet crosses the optical axis at the design's distance for it; the source lies on the laser's side.
-        let (baseline, angle) =
-            (off(l.baseline_mm, 4.0 / 77.0 * l.baseline_mm), off(l.angle_deg, (l.angle_deg / 14.0).min(2.0)));
-        let (angle, roll) = (angle.to_radians(), off(0.0, 1.5).to_radians());
-        let crossing = rig.crossing();
-        let crossing = off(crossing, 4.0 / 155.0 * crossing);
+        let camera = camera(rig, &mut off);
+        let (laser, crossing) = laser(rig, &mut off);
         let working_distance = crossing * rig.working.distance_mm / rig.crossing();
-        let side = exp(&(Vec3::z() * (l.side_deg - 90.0).to_radians()));
-        let source =
-            side * Vec3::new(off(0.0, 3.0 / 77.0 * l.baseline_mm), baseline, crossing - baseline / angle.tan());
-        let axis = side * Vec3::new(0.0, -angle.sin(), angle.cos());
-        let normal = exp(&(axis * roll)) * (side * Vec3::new(0.0, angle.cos(), angle.sin()));
-        let laser = LineLaser {
-            source,
-            axis,
-            normal,
-            half_fan_deg: l.fan_deg / 2.0,
-            waist_radius: off(l.waist_radius_mm, 2.0 / 21.0 * l.waist_radius_mm),
-            waist_distance: off(l.waist_at_mm, 8.0 / 170.0 * l.waist_at_mm),
-            wavelength_nm: l.wavelength_nm,
-        };
+        let pointer = pointer(rig, &mut off);
+        let flange_from_camera = mount(rig, &mut off);
         let p = rig.pointer_spec();
-        let (wide, far) = (rig.board_scale(), rig.working.distance_mm / 155.0);
-        let scales = [wide, wide, far];
-        let mut near =
-            |at: [f64; 3], by: [f64; 3]| Vec3::from(std::array::from_fn::<_, 3, _>(|i| off(at[i], by[i] * scales[i])));
-        let (spot, aim) = (near(p.source_mm, [2.0, 3.0, 2.0]), near(p.aim_mm, [3.0, 2.0, 8.0]));
-        let pointer = Pointer {
-            source: spot,
-            axis: (aim - spot).normalize(),
-            waist_radius: p.waist_radius_mm,
-            waist_distance: p.waist_at_mm,
-            wavelength_nm: p.wavelength_nm,
-        };
-        let quarter = off(m.turn_deg, 4.0).to_radians();
-        let tilt = Vec3::new(off(0.0, 0.02), off(0.0, 0.02), 0.0);
-        let [x, y, z] = m.at_mm;
-        let flange_from_camera: Rigid<Flange, Camera> =
-            Rigid::new(exp(&tilt) * exp(&(Vec3::z() * quarter)), Vec3::new(off(x, 6.0), off(y, 5.0), off(z, 6.0)));
         let (sensor, pointer_range) = (rig.sensor, [p.near_mm, p.far_mm]);
         let rig = rig.clone();
         Station { rig, camera, sensor, flange_from_camera, laser, pointer, pointer_range, working_distance, seed }
@@ -247,6 +184,89 @@ impl Station {
         }
         Pcg64::seed_from_u64(seed)
     }
+}
+
+/// The camera; `off` draws how far a value lies from the design's, here and below.
+fn camera(rig: &RigSpec, off: &mut impl FnMut(f64, f64) -> f64) -> Intrinsics {
+    let c = &rig.camera;
+    let (width, height) = (f64::from(c.width_px), f64::from(c.height_px));
+    let f = off(rig.focal_px(), 30.0 / 611.6 * rig.focal_px());
+    let [k1, k2, p1, p2, k3] = c.distortion;
+    let [tau_x, tau_y] = c.sensor_tilt_deg.map(f64::to_radians);
+    Intrinsics {
+        fx: f,
+        fy: f * off(1.0, 0.002),
+        cx: off((width - 1.0) / 2.0, width / 80.0),
+        cy: off((height - 1.0) / 2.0, height / 60.0),
+        skew: 0.0,
+        distortion: Distortion([
+            off(k1, 3.0 / 11.0 * k1.abs()),
+            off(k2, 3.0 / 8.0 * k2.abs()),
+            off(p1, 8e-4),
+            off(p2, 8e-4),
+            off(k3, 2.0 / 3.0 * k3.abs()),
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            tau_x,
+            tau_y,
+        ]),
+        width: c.width_px,
+        height: c.height_px,
+    }
+}
+
+/// The sheet of light, and the depth at which it crosses the optical axis, mm: the design's but for what `off` adds; the
+/// source lies on the laser's side.
+fn laser(rig: &RigSpec, off: &mut impl FnMut(f64, f64) -> f64) -> (LineLaser, f64) {
+    let l = &rig.laser;
+    let (baseline, angle) =
+        (off(l.baseline_mm, 4.0 / 77.0 * l.baseline_mm), off(l.angle_deg, (l.angle_deg / 14.0).min(2.0)));
+    let (angle, roll) = (angle.to_radians(), off(0.0, 1.5).to_radians());
+    let crossing = rig.crossing();
+    let crossing = off(crossing, 4.0 / 155.0 * crossing);
+    let side = exp(&(Vec3::z() * (l.side_deg - 90.0).to_radians()));
+    let source = side * Vec3::new(off(0.0, 3.0 / 77.0 * l.baseline_mm), baseline, crossing - baseline / angle.tan());
+    let axis = side * Vec3::new(0.0, -angle.sin(), angle.cos());
+    let normal = exp(&(axis * roll)) * (side * Vec3::new(0.0, angle.cos(), angle.sin()));
+    let laser = LineLaser {
+        source,
+        axis,
+        normal,
+        half_fan_deg: l.fan_deg / 2.0,
+        waist_radius: off(l.waist_radius_mm, 2.0 / 21.0 * l.waist_radius_mm),
+        waist_distance: off(l.waist_at_mm, 8.0 / 170.0 * l.waist_at_mm),
+        wavelength_nm: l.wavelength_nm,
+    };
+    (laser, crossing)
+}
+
+fn pointer(rig: &RigSpec, off: &mut impl FnMut(f64, f64) -> f64) -> Pointer {
+    let p = rig.pointer_spec();
+    let (wide, far) = (rig.board_scale(), rig.working.distance_mm / 155.0);
+    let scales = [wide, wide, far];
+    let mut near =
+        |at: [f64; 3], by: [f64; 3]| Vec3::from(std::array::from_fn::<_, 3, _>(|i| off(at[i], by[i] * scales[i])));
+    let (spot, aim) = (near(p.source_mm, [2.0, 3.0, 2.0]), near(p.aim_mm, [3.0, 2.0, 8.0]));
+    Pointer {
+        source: spot,
+        axis: (aim - spot).normalize(),
+        waist_radius: p.waist_radius_mm,
+        waist_distance: p.waist_at_mm,
+        wavelength_nm: p.wavelength_nm,
+    }
+}
+
+fn mount(rig: &RigSpec, off: &mut impl FnMut(f64, f64) -> f64) -> HandEye {
+    let m = &rig.mount;
+    let quarter = off(m.turn_deg, 4.0).to_radians();
+    let tilt = Vec3::new(off(0.0, 0.02), off(0.0, 0.02), 0.0);
+    let [x, y, z] = m.at_mm;
+    Rigid::new(exp(&tilt) * exp(&(Vec3::z() * quarter)), Vec3::new(off(x, 6.0), off(y, 5.0), off(z, 6.0)))
 }
 
 #[cfg(test)]

@@ -87,9 +87,28 @@ fn store_axis(ride: &Ride, station: &Path) -> Result<()> {
 }
 
 impl Plan {
+    /// What belongs to one shot.
+    fn frame(&self, i: usize) -> FrameRef {
+        let shot = &self.shots[i];
+        FrameRef {
+            laser: shot.laser.map(|_| format!("laser_{i:04}.png")),
+            ambient: (shot.ambient && self.set != Set::Scan).then(|| format!("ambient_{i:04}.png")),
+            pose: self.pose(i),
+            board: shot.board,
+            count: self.counts.get(i).copied(),
+            ..FrameRef::default()
+        }
+    }
+
+    fn pose(&self, i: usize) -> Option<usize> {
+        (!self.poses.is_empty()).then_some(i)
+    }
+
     fn meta(&self, station: &Station) -> Meta {
         let single = self.boards.len() == 1 && matches!(self.set, Set::Intrinsics | Set::Handeye | Set::Axis);
         let beam = self.shots.first().and_then(|s| s.laser);
+        // A scan has one picture in room light for the whole recording, not one a frame.
+        let ambient = self.shots.iter().rposition(|s| s.ambient && self.set == Set::Scan);
         let mut meta = Meta {
             format: 1,
             set: self.set.name().into(),
@@ -105,8 +124,8 @@ impl Plan {
             beam,
             board: single.then(|| self.boards[0].clone()),
             boards: if single { vec![] } else { self.boards.clone() },
-            ambient: None,
-            frames: vec![],
+            ambient: ambient.map(|i| AmbientRef { file: "ambient.png".into(), pose: self.pose(i) }),
+            frames: (0..self.shots.len()).map(|i| self.frame(i)).collect(),
             frames_file: None,
             sources: None,
             motion: self.motion.clone(),
@@ -117,22 +136,6 @@ impl Plan {
             target: None,
             distance_definition: None,
         };
-        for (i, shot) in self.shots.iter().enumerate() {
-            // A scan has one picture in room light for the whole recording, not one a frame.
-            let lone = self.set == Set::Scan;
-            let pose = (!self.poses.is_empty()).then_some(i);
-            if shot.ambient && lone {
-                meta.ambient = Some(AmbientRef { file: "ambient.png".into(), pose });
-            }
-            meta.frames.push(FrameRef {
-                laser: shot.laser.map(|_| format!("laser_{i:04}.png")),
-                ambient: (shot.ambient && !lone).then(|| format!("ambient_{i:04}.png")),
-                pose,
-                board: shot.board,
-                count: self.counts.get(i).copied(),
-                ..FrameRef::default()
-            });
-        }
         match self.set {
             Set::Handeye => {
                 meta.pose_files.insert("poses_exact".into(), "encoder readings without error".into());

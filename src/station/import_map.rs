@@ -11,7 +11,7 @@ use crate::files::Lock;
 use crate::geometry::Vec3;
 use crate::recording::Motion;
 use crate::rig::hash_text;
-use crate::scan::{CloudWriter, Extraction, Format, GridOptions, Stated, lines, read_foreign};
+use crate::scan::{CloudWriter, Extraction, Format, GridOptions, Lines, Stated, lines, read_foreign};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
@@ -51,15 +51,35 @@ pub fn import_map(file: &Path, light: Option<&Path>, stated: &Stated, out: &Path
     cloud.append(&made.points)?;
     let points = cloud.finish()?;
     let (height_map, files) = products::write(&part, &cloud_path, points, &GridOptions::default(), Vec3::z(), None)?;
-    let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let report = ScanReport {
+    let imported = Imported {
+        file: file.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+        sha256,
+        light_sha256: light.map(|l| l.1),
+        unit_mm: stated.unit_mm.unwrap_or(f64::NAN),
+        spacing_mm: stated.spacing_mm,
+        offset_mm: stated.offset_mm,
+        missing: stated.missing.flatten(),
+        rows_up: stated.rows_up,
+        sigma_mm: made.sigma_mm,
+    };
+    let report =
+        ScanReport { height_map, files, seconds: begun.elapsed().as_secs_f64(), ..report(made, points, imported) };
+    let text = serde_json::to_string_pretty(&report).expect("plain data");
+    crate::files::write(&part.join("scan.json"), text.as_bytes())?;
+    folder.commit()?;
+    Ok(report)
+}
+
+/// The report of a scan that nobody here made: what was not measured is empty.
+fn report(made: Lines, points: u64, imported: Imported) -> ScanReport {
+    ScanReport {
         format: FORMAT,
         program: format!("sheetlight {}", env!("CARGO_PKG_VERSION")),
         created: jiff::Timestamp::now().to_string(),
         units: "mm".into(),
         frame: FRAME.into(),
         motion: Motion::default(),
-        recording: name.clone(),
+        recording: imported.file.clone(),
         rig_fingerprint: NO_RIG.into(),
         working_volume: None,
         ran_on: "nothing: imported".into(),
@@ -75,30 +95,16 @@ pub fn import_map(file: &Path, light: Option<&Path>, stated: &Stated, out: &Path
         camera: None,
         delay: None,
         skipped: vec![],
-        seconds: begun.elapsed().as_secs_f64(),
+        seconds: 0.0,
         shots_per_second: 0.0,
         spent: Spent::default(),
         settings: Extraction::default(),
-        height_map,
+        height_map: None,
         remarks: made.notes.into_iter().chain([NO_BUDGET.to_owned()]).collect(),
-        files,
-        imported: Some(Imported {
-            file: name,
-            sha256,
-            light_sha256: light.map(|l| l.1),
-            unit_mm: stated.unit_mm.unwrap_or(f64::NAN),
-            spacing_mm: stated.spacing_mm,
-            offset_mm: stated.offset_mm,
-            missing: stated.missing.flatten(),
-            rows_up: stated.rows_up,
-            sigma_mm: made.sigma_mm,
-        }),
+        files: BTreeMap::new(),
+        imported: Some(imported),
         filtered: None,
-    };
-    let text = serde_json::to_string_pretty(&report).expect("plain data");
-    crate::files::write(&part.join("scan.json"), text.as_bytes())?;
-    folder.commit()?;
-    Ok(report)
+    }
 }
 
 const NO_BUDGET: &str =

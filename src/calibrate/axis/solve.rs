@@ -4,8 +4,9 @@
 
 use super::checks::{self, Suspects};
 use super::fit::{AxisFit, Stop};
-use super::terms::{self, Seen, fitted};
-use super::{noise, start};
+use super::noise;
+use super::start::{Start, start};
+use super::terms::{self, Fit, Scatter, Seen, fitted};
 use crate::calibrate::measured_pose::pooled_factor;
 use crate::calibrate::scatter::inflation;
 use crate::camera::CameraCovariance;
@@ -64,39 +65,13 @@ pub fn solve(
     if !(high > low) {
         return Err(refused(format!("all {} stops have the count {low}", stops.len())));
     }
-    let first = start::start(&seen, kind, unit).ok_or_else(|| refused("no two stops tell a motion".into()))?;
+    let first = start(&seen, kind, unit).ok_or_else(|| refused("no two stops tell a motion".into()))?;
     let order = checks::order(&seen, &first, unit, o.seed);
-    let mut used = first.agreeing.clone();
-    let (mut state, mut scatter) = (first.state, first.scatter);
-    let mut settled = None;
-    for round in 0..12 {
-        let chosen: Vec<&Seen> = used.iter().map(|&i| &seen[i]).collect();
-        if chosen.len() < 3 {
-            return Err(refused(format!("{} of {} stops agree on one motion, 3 are needed", chosen.len(), seen.len())));
-        }
-        let fit =
-            fitted(&chosen, &state, &scatter).ok_or_else(|| refused("the stops do not determine the axis".into()))?;
-        scatter = noise::estimate(&chosen, &fit);
-        let fit = fitted(&chosen, &fit.state, &scatter)
-            .ok_or_else(|| refused("the stops do not determine the axis".into()))?;
-        state = fit.state;
-        let suspects = Suspects::of(&seen, &used, &fit, &scatter);
-        let next = suspects.within(o.gate, &used, round);
-        settled = Some((fit, suspects));
-        if next == used {
-            break;
-        }
-        used = next;
-    }
-    let (fit, suspects) = settled.expect("at least one round");
+    let Settled { fit, scatter, suspects } = settle(&seen, first, o.gate)?;
+    let state = fit.state;
     let used: Vec<usize> = suspects.used.clone();
     let chosen: Vec<&Seen> = used.iter().map(|&i| &seen[i]).collect();
-    let freedom = (6 * chosen.len()) as f64 - fit.covariance.nrows() as f64;
-    let chi2 = if freedom > 0.0 { fit.cost / freedom } else { 1.0 };
-    // Of places alone: turns say little of a line.
-    let few = 3.0 * chosen.len() as f64 - (fit.covariance.nrows() as f64 - 3.0);
-    let share = noise::share(&chosen, &scatter);
-    let inflation = inflation(chi2.max(1.0) + share, few) / (1.0 + share);
+    let (chi2, inflation) = misfit(&chosen, &fit, &scatter);
     let exact = &fit.covariance * inflation;
     let by = terms::by_camera(&chosen, &fit, &scatter);
     let follows = &by * camera_covariance.matrix() * by.transpose();
@@ -119,4 +94,47 @@ pub fn solve(
         order,
         axis,
     })
+}
+
+/// Motion and scatter that fit each other, and what the stops then say of each other.
+struct Settled {
+    fit: Fit,
+    scatter: Scatter,
+    suspects: Suspects,
+}
+
+/// Fits, leaves out what lies beyond the gate, and fits again until the same stops stay.
+fn settle(seen: &[Seen], first: Start, gate: f64) -> Result<Settled> {
+    let undetermined = || refused("the stops do not determine the axis".into());
+    let mut used = first.agreeing;
+    let (mut state, mut scatter) = (first.state, first.scatter);
+    let mut settled = None;
+    for round in 0..12 {
+        let chosen: Vec<&Seen> = used.iter().map(|&i| &seen[i]).collect();
+        if chosen.len() < 3 {
+            return Err(refused(format!("{} of {} stops agree on one motion, 3 are needed", chosen.len(), seen.len())));
+        }
+        let fit = fitted(&chosen, &state, &scatter).ok_or_else(undetermined)?;
+        scatter = noise::estimate(&chosen, &fit);
+        let fit = fitted(&chosen, &fit.state, &scatter).ok_or_else(undetermined)?;
+        state = fit.state;
+        let suspects = Suspects::of(seen, &used, &fit, &scatter);
+        let next = suspects.within(gate, &used, round);
+        settled = Some(Settled { fit, scatter, suspects });
+        if next == used {
+            break;
+        }
+        used = next;
+    }
+    Ok(settled.expect("at least one round"))
+}
+
+/// Squared distances over their degrees of freedom, and what the variance is multiplied by for being known from few stops.
+fn misfit(chosen: &[&Seen], fit: &Fit, scatter: &Scatter) -> (f64, f64) {
+    let freedom = (6 * chosen.len()) as f64 - fit.covariance.nrows() as f64;
+    let chi2 = if freedom > 0.0 { fit.cost / freedom } else { 1.0 };
+    // Of places alone: turns say little of a line.
+    let few = 3.0 * chosen.len() as f64 - (fit.covariance.nrows() as f64 - 3.0);
+    let share = noise::share(chosen, scatter);
+    (chi2, inflation(chi2.max(1.0) + share, few) / (1.0 + share))
 }

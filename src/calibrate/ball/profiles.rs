@@ -45,11 +45,41 @@ fn load_file(path: &Path) -> Result<Vec<Profile>> {
     read.map_err(|e| e.at(path.display()))
 }
 
+/// What the columns of a table hold.
+enum Columns {
+    /// A point a line, of one profile or of the one that the line names.
+    Point { profile: Option<usize>, x: usize, z: usize },
+    /// A profile a line: x and z by turns.
+    Profile,
+}
+
+impl Columns {
+    /// By a header; `None` where it names no x and z.
+    fn named(cells: &[String]) -> Option<Columns> {
+        let find = |key: &str| {
+            cells.iter().position(|c| {
+                let c = c.to_lowercase();
+                c == key || c == format!("{key}_mm") || c == format!("{key} mm") || c == format!("{key} [mm]")
+            })
+        };
+        let profile = find("profile").or(find("frame")).or(find("index"));
+        Some(Columns::Point { profile, x: find("x")?, z: find("z")? })
+    }
+
+    fn counted(cells: usize) -> Columns {
+        match cells {
+            2 => Columns::Point { profile: None, x: 0, z: 1 },
+            3 => Columns::Point { profile: Some(0), x: 1, z: 2 },
+            _ => Columns::Profile,
+        }
+    }
+}
+
 /// Columns x, z (one profile), or profile, x, z (many). A header may name them in another order.
 pub fn from_csv(text: &str, stem: &str) -> Result<Vec<Profile>> {
     let first = text.lines().map(str::trim).find(|l| !l.is_empty() && !l.starts_with('#')).unwrap_or_default();
     let separator = [';', ','].into_iter().find(|c| first.contains(*c)).unwrap_or(' ');
-    let mut columns: Option<[Option<usize>; 3]> = None;
+    let mut columns: Option<Columns> = None;
     let mut out: Vec<Profile> = Vec::new();
     for TableRow { line: number, text: line, mut cells } in table(text, separator) {
         // A separator at a line's end parts nothing.
@@ -62,31 +92,14 @@ pub fn from_csv(text: &str, stem: &str) -> Result<Vec<Profile>> {
                 .cause(if commas { "numbers with decimal commas" } else { "not a list of x, z points in mm" })
                 .next("write x and z (mm) a line, or profile, x and z with a header")
         };
-        let is_number = |c: &str| c.parse::<f64>().is_ok();
         if columns.is_none() {
-            if cells.iter().any(|c| !is_number(c)) {
-                let find = |key: &str| {
-                    cells.iter().position(|c| {
-                        let c = c.to_lowercase();
-                        c == key || c == format!("{key}_mm") || c == format!("{key} mm") || c == format!("{key} [mm]")
-                    })
-                };
-                let profile = find("profile").or(find("frame")).or(find("index"));
-                columns = Some([profile, find("x"), find("z")]);
-                if find("x").is_none() || find("z").is_none() {
-                    return Err(bad("names no columns x and z"));
-                }
+            if cells.iter().any(|c| c.parse::<f64>().is_err()) {
+                columns = Some(Columns::named(&cells).ok_or_else(|| bad("names no columns x and z"))?);
                 continue;
             }
-            columns = Some(match cells.len() {
-                2 => [None, Some(0), Some(1)],
-                3 => [Some(0), Some(1), Some(2)],
-                // A profile a line.
-                _ => [None, None, None],
-            });
+            columns = Some(Columns::counted(cells.len()));
         }
-        let [profile, x, z] = columns.expect("set above");
-        if x.is_none() {
+        let Columns::Point { profile, x, z } = *columns.as_ref().expect("set above") else {
             let numbers = cells.iter().map(|c| c.parse()).collect::<std::result::Result<Vec<f64>, _>>();
             let name = format!("{stem} line {number}");
             let points = by_turns(&numbers.map_err(|_| bad("is no row of numbers"))?, &name)?;
@@ -95,10 +108,10 @@ pub fn from_csv(text: &str, stem: &str) -> Result<Vec<Profile>> {
                 points: points.into_iter().filter(|p| p.iter().all(|v| v.is_finite())).collect(),
             });
             continue;
-        }
+        };
         let cell = |i: usize| cells.get(i).map(String::as_str).ok_or_else(|| bad("is too short"));
         let value = |i: usize| cell(i).and_then(|c| c.parse::<f64>().map_err(|_| bad("is no row of numbers")));
-        let point = [value(x.expect("checked"))?, value(z.expect("checked"))?];
+        let point = [value(x)?, value(z)?];
         let name = match profile {
             Some(i) => format!("{stem} {}", cell(i)?),
             None => stem.to_owned(),
@@ -133,36 +146,7 @@ pub fn from_yaml(text: &str, stem: &str) -> Result<Vec<Profile>> {
         let name = before.lines().last().unwrap_or("").trim().trim_start_matches("- ").trim().to_owned();
         let name =
             if name.is_empty() || name == "-" { format!("{stem} {}", out.len()) } else { format!("{stem} {name}") };
-        let field = |key: &str| {
-            body.lines().find_map(|l| l.trim().strip_prefix(key)?.trim_start().strip_prefix(':').map(str::trim))
-        };
-        let size = |key: &str| {
-            field(key).and_then(|v| v.parse::<usize>().ok()).ok_or_else(|| bad(&name, format!("has no {key}")))
-        };
-        let (rows, cols) = (size("rows")?, size("cols")?);
-        let kind = field("dt").unwrap_or("d").trim_matches('"');
-        let channels: usize = kind.chars().take_while(char::is_ascii_digit).collect::<String>().parse().unwrap_or(1);
-        let data = body
-            .split_once("data:")
-            .and_then(|(_, d)| d.split_once('[')?.1.split_once(']'))
-            .ok_or_else(|| bad(&name, "has no data".into()))?
-            .0;
-        let numbers = data
-            .split(|c: char| c == ',' || c.is_whitespace())
-            .filter(|t| !t.is_empty())
-            .map(value)
-            .collect::<Option<Vec<f64>>>()
-            .ok_or_else(|| bad(&name, "holds something that is no number".into()))?;
-        let wanted = rows.checked_mul(cols).and_then(|n| n.checked_mul(channels));
-        if wanted != Some(numbers.len()) {
-            return Err(bad(&name, format!("{} numbers for {rows}x{cols} of {channels} channels", numbers.len())));
-        }
-        let points: Vec<[f64; 2]> = match (rows, cols, channels) {
-            (_, 2, 1) if rows != 2 => numbers.chunks(2).map(|c| [c[0], c[1]]).collect(),
-            (2, n, 1) if n != 2 => (0..n).map(|k| [numbers[k], numbers[n + k]]).collect(),
-            (_, _, 2) if rows == 1 || cols == 1 => numbers.chunks(2).map(|c| [c[0], c[1]]).collect(),
-            _ => return Err(bad(&name, format!("{rows}x{cols} of {channels} channels is no list of x, z"))),
-        };
+        let points = matrix(body).map_err(|what| bad(&name, what))?;
         out.push(Profile { name, points: points.into_iter().filter(|p| p.iter().all(|v| v.is_finite())).collect() });
     }
     if out.is_empty() {
@@ -171,6 +155,38 @@ pub fn from_yaml(text: &str, stem: &str) -> Result<Vec<Profile>> {
             .next("write it with cv::FileStorage"));
     }
     Ok(out)
+}
+
+/// The points of one matrix, or what is wrong with it.
+fn matrix(body: &str) -> std::result::Result<Vec<[f64; 2]>, String> {
+    let field = |key: &str| {
+        body.lines().find_map(|l| l.trim().strip_prefix(key)?.trim_start().strip_prefix(':').map(str::trim))
+    };
+    let size = |key: &str| field(key).and_then(|v| v.parse::<usize>().ok()).ok_or_else(|| format!("has no {key}"));
+    let (rows, cols) = (size("rows")?, size("cols")?);
+    let kind = field("dt").unwrap_or("d").trim_matches('"');
+    let channels: usize = kind.chars().take_while(char::is_ascii_digit).collect::<String>().parse().unwrap_or(1);
+    let data = body
+        .split_once("data:")
+        .and_then(|(_, d)| d.split_once('[')?.1.split_once(']'))
+        .ok_or_else(|| "has no data".to_owned())?
+        .0;
+    let numbers = data
+        .split(|c: char| c == ',' || c.is_whitespace())
+        .filter(|t| !t.is_empty())
+        .map(value)
+        .collect::<Option<Vec<f64>>>()
+        .ok_or_else(|| "holds something that is no number".to_owned())?;
+    let wanted = rows.checked_mul(cols).and_then(|n| n.checked_mul(channels));
+    if wanted != Some(numbers.len()) {
+        return Err(format!("{} numbers for {rows}x{cols} of {channels} channels", numbers.len()));
+    }
+    Ok(match (rows, cols, channels) {
+        (_, 2, 1) if rows != 2 => numbers.chunks(2).map(|c| [c[0], c[1]]).collect(),
+        (2, n, 1) if n != 2 => (0..n).map(|k| [numbers[k], numbers[n + k]]).collect(),
+        (_, _, 2) if rows == 1 || cols == 1 => numbers.chunks(2).map(|c| [c[0], c[1]]).collect(),
+        _ => return Err(format!("{rows}x{cols} of {channels} channels is no list of x, z")),
+    })
 }
 
 #[cfg(test)]

@@ -60,9 +60,6 @@ pub fn sheet(board: &BoardSpec) -> Result<Sheet> {
 }
 
 fn check(board: &BoardSpec) -> Result<()> {
-    let bad = |what: String, next: &str| {
-        Err(Fault::usage(what).cause("a slip of typing, or another unit than mm").next(next))
-    };
     let (n, of, cell, name, border) = match board {
         BoardSpec::Chessboard { inner_corners, square_mm, border_mm, .. } => {
             (*inner_corners, "inner corners", *square_mm, "squares", *border_mm)
@@ -94,6 +91,15 @@ fn check(board: &BoardSpec) -> Result<()> {
             "give --border-mm in millimetres, or leave it out",
         );
     }
+    fits(board)
+}
+
+fn bad(what: String, next: &str) -> Result<()> {
+    Err(Fault::usage(what).cause("a slip of typing, or another unit than mm").next(next))
+}
+
+/// Markers fit in their squares with white around them, dots in their pitch.
+fn fits(board: &BoardSpec) -> Result<()> {
     match board {
         BoardSpec::Charuco { square_mm, marker_mm, .. } if !(*marker_mm > 0.0 && *marker_mm < 0.95 * square_mm) => bad(
             format!(

@@ -147,49 +147,12 @@ fn fit(pixels: &[[f64; 3]], u: &Vec2, v: &Vec2) -> Option<Corner> {
     // A square pixel seen across an edge at angle a is a trapezoid; its wider part is the box, the rest blur.
     let widths = [a1, a2].map(|a: f64| a.sin().abs().max(a.cos().abs()));
     let mut p = [0.0, 0.0, a1, a2, 0.0, mean, 0.0, 0.0, 0.0];
-    // Contrast by projection on the start's own pattern.
-    let mut scratch = [0.0; PARAMETERS];
-    let (mut top, mut bottom) = (0.0, 0.0);
-    for q in pixels {
-        model(&p, &widths, q[0], q[1], &mut scratch);
-        top += scratch[6] * (q[2] - mean);
-        bottom += scratch[6] * scratch[6];
-    }
-    p[6] = top / bottom;
+    p[6] = contrast(&p, &widths, pixels, mean);
     if !p[6].is_finite() || p[6] == 0.0 {
         return None;
     }
     let limit = 0.35 * u.norm().min(v.norm());
-    let (mut cost, mut damping) = (f64::INFINITY, 1e-3);
-    let (mut h, mut g) = normal_equations(&p, &widths, pixels, &mut cost);
-    for _ in 0..30 {
-        let mut damped = h;
-        for i in 0..PARAMETERS {
-            damped[(i, i)] *= 1.0 + damping;
-        }
-        let step = damped.cholesky()?.solve(&g);
-        let mut next = p;
-        for i in 0..PARAMETERS {
-            next[i] += step[i];
-        }
-        // The blur stays between a sharp lens's pixel and half of a square.
-        next[4] = next[4].clamp(0.1f64.ln(), limit.max(0.3).ln());
-        let mut there = 0.0;
-        let (h2, g2) = normal_equations(&next, &widths, pixels, &mut there);
-        if there <= cost {
-            let done = step[0].abs().max(step[1].abs()) < 1e-4 && (cost - there) < 1e-4 * cost;
-            (p, cost, h, g) = (next, there, h2, g2);
-            damping = (damping * 0.1).max(1e-9);
-            if done {
-                break;
-            }
-        } else {
-            damping *= 10.0;
-            if damping > 1e9 {
-                break;
-            }
-        }
-    }
+    let (p, h, cost) = settle(p, &widths, pixels, limit)?;
     let variance = cost / (n - PARAMETERS as f64);
     let c = h.try_inverse()?;
     let moved = Vec2::new(p[0], p[1]);
@@ -210,6 +173,58 @@ fn fit(pixels: &[[f64; 3]], u: &Vec2, v: &Vec2) -> Option<Corner> {
         blur_px: p[4].exp(),
         contrast,
     })
+}
+
+/// By projection on the start's own pattern.
+fn contrast(p: &[f64; PARAMETERS], widths: &[f64; 2], pixels: &[[f64; 3]], mean: f64) -> f64 {
+    let mut scratch = [0.0; PARAMETERS];
+    let (mut top, mut bottom) = (0.0, 0.0);
+    for q in pixels {
+        model(p, widths, q[0], q[1], &mut scratch);
+        top += scratch[6] * (q[2] - mean);
+        bottom += scratch[6] * scratch[6];
+    }
+    top / bottom
+}
+
+/// Least squares from a start: parameters, normal matrix and cost there. `limit` is the widest blur, px.
+fn settle(
+    mut p: [f64; PARAMETERS],
+    widths: &[f64; 2],
+    pixels: &[[f64; 3]],
+    limit: f64,
+) -> Option<([f64; PARAMETERS], SMatrix<f64, PARAMETERS, PARAMETERS>, f64)> {
+    let (mut cost, mut damping) = (f64::INFINITY, 1e-3);
+    let (mut h, mut g) = normal_equations(&p, widths, pixels, &mut cost);
+    for _ in 0..30 {
+        let mut damped = h;
+        for i in 0..PARAMETERS {
+            damped[(i, i)] *= 1.0 + damping;
+        }
+        let step = damped.cholesky()?.solve(&g);
+        let mut next = p;
+        for i in 0..PARAMETERS {
+            next[i] += step[i];
+        }
+        // The blur stays between a sharp lens's pixel and half of a square.
+        next[4] = next[4].clamp(0.1f64.ln(), limit.max(0.3).ln());
+        let mut there = 0.0;
+        let (h2, g2) = normal_equations(&next, widths, pixels, &mut there);
+        if there <= cost {
+            let done = step[0].abs().max(step[1].abs()) < 1e-4 && (cost - there) < 1e-4 * cost;
+            (p, cost, h, g) = (next, there, h2, g2);
+            damping = (damping * 0.1).max(1e-9);
+            if done {
+                break;
+            }
+        } else {
+            damping *= 10.0;
+            if damping > 1e9 {
+                break;
+            }
+        }
+    }
+    Some((p, h, cost))
 }
 
 type Normal = (SMatrix<f64, PARAMETERS, PARAMETERS>, SVector<f64, PARAMETERS>);

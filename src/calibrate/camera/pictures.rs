@@ -115,16 +115,7 @@ pub(in crate::calibrate) fn pictures(
         }
     }
     if pictures.len() < 2 {
-        // The reason that most pictures give; of equal ones the first.
-        let votes = |l: &(String, Fault)| left_out.iter().filter(|o| o.1.cause == l.1.cause).count();
-        let first = left_out.iter().rev().max_by_key(|l| votes(l)).map(|l| l.1.clone());
-        let listed: String = left_out.iter().map(|(n, f)| format!("\n    {n}: {}", f.what)).collect();
-        return Err(Fault::refused(format!(
-            "the board was found in {} of {all} pictures, 3 or more are needed{listed}",
-            pictures.len(),
-        ))
-        .cause(first.as_ref().map_or("too few pictures", |f| f.cause.as_str()))
-        .next(first.as_ref().map_or("take 10 to 20 pictures of the board", |f| f.next.as_str())));
+        return Err(too_few(pictures.len(), all, &left_out));
     }
     let found = |name: &String| pictures.iter().any(|o| o.name == *name);
     let mut inputs: BTreeMap<String, String> =
@@ -140,4 +131,15 @@ fn no_board() -> Fault {
     Fault::input("the recording describes no board")
         .cause("meta.json has neither 'board' nor 'boards'")
         .next("describe the board in meta.json; sheetlight board writes such a description")
+}
+
+/// The fault of recordings that show their board in too few pictures.
+fn too_few(found: usize, all: usize, left_out: &[(String, Fault)]) -> Fault {
+    // The reason that most pictures give; of equal ones the first.
+    let votes = |l: &(String, Fault)| left_out.iter().filter(|o| o.1.cause == l.1.cause).count();
+    let first = left_out.iter().rev().max_by_key(|l| votes(l)).map(|l| l.1.clone());
+    let listed: String = left_out.iter().map(|(n, f)| format!("\n    {n}: {}", f.what)).collect();
+    Fault::refused(format!("the board was found in {} of {all} pictures, 3 or more are needed{listed}", found,))
+        .cause(first.as_ref().map_or("too few pictures", |f| f.cause.as_str()))
+        .next(first.as_ref().map_or("take 10 to 20 pictures of the board", |f| f.next.as_str()))
 }

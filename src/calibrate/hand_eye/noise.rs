@@ -23,6 +23,49 @@ fn components(
     camera: &CameraBelief,
     o: &HandEyeOptions,
 ) -> Option<Noise> {
+    let boards_open = open(pairs);
+    let (mut model, parts) = model(pairs, chain, noise, mount, camera, o);
+    // Below these the robot's noise no longer matters beside any camera's.
+    let (floor_mm, floor_rad) = (1e-4f64, 1e-6f64);
+    let (mut theta, mut floor) = (Vec::new(), Vec::new());
+    let mut estimated = Vec::new();
+    for (k, part) in parts.into_iter().enumerate() {
+        let (given, now, low) = [
+            (o.robot_sigma_mm.is_some(), noise.robot_mm, floor_mm),
+            (o.robot_sigma_deg.is_some(), noise.robot_rad, floor_rad),
+            (!boards_open, noise.feature_factor, floor_rad),
+        ][k];
+        if !given {
+            model.parts.push(part);
+            theta.push(now * now);
+            floor.push(low * low);
+            estimated.push(k);
+        }
+    }
+    let mut out = Noise {
+        robot_mm: o.robot_sigma_mm.unwrap_or(noise.robot_mm),
+        robot_rad: o.robot_sigma_deg.map_or(noise.robot_rad, f64::to_radians),
+        ..*noise
+    };
+    if !theta.is_empty() {
+        let next = model.step(&theta, &floor)?;
+        for (k, t) in estimated.iter().zip(next) {
+            *[&mut out.robot_mm, &mut out.robot_rad, &mut out.feature_factor][*k] = t.sqrt();
+        }
+    }
+    Some(out)
+}
+
+/// The model of a chain's residuals without its parts, and the parts of the robot's places, its turns and the boards for a
+/// variance of 1.
+fn model(
+    pairs: &[&Pair],
+    chain: &Chain,
+    noise: &Noise,
+    mount: Mount,
+    camera: &CameraBelief,
+    o: &HandEyeOptions,
+) -> (Components, [DMatrix<f64>; 3]) {
     let n = pairs.len() * 6;
     let mut model = Components {
         residual: DVector::zeros(n),
@@ -57,35 +100,7 @@ fn components(
         model.known.view_mut((at, at), (6, 6)).copy_from(&known);
     }
     model.known += &by_camera * by_camera.transpose();
-    // Below these the robot's noise no longer matters beside any camera's.
-    let (floor_mm, floor_rad) = (1e-4f64, 1e-6f64);
-    let (mut theta, mut floor) = (Vec::new(), Vec::new());
-    let mut estimated = Vec::new();
-    for (k, part) in parts.into_iter().enumerate() {
-        let (given, now, low) = [
-            (o.robot_sigma_mm.is_some(), noise.robot_mm, floor_mm),
-            (o.robot_sigma_deg.is_some(), noise.robot_rad, floor_rad),
-            (!boards_open, noise.feature_factor, floor_rad),
-        ][k];
-        if !given {
-            model.parts.push(part);
-            theta.push(now * now);
-            floor.push(low * low);
-            estimated.push(k);
-        }
-    }
-    let mut out = Noise {
-        robot_mm: o.robot_sigma_mm.unwrap_or(noise.robot_mm),
-        robot_rad: o.robot_sigma_deg.map_or(noise.robot_rad, f64::to_radians),
-        ..*noise
-    };
-    if !theta.is_empty() {
-        let next = model.step(&theta, &floor)?;
-        for (k, t) in estimated.iter().zip(next) {
-            *[&mut out.robot_mm, &mut out.robot_rad, &mut out.feature_factor][*k] = t.sqrt();
-        }
-    }
-    Some(out)
+    (model, parts)
 }
 
 /// Whether the boards' own scatter is left open: their poses were given without sigmas.

@@ -256,27 +256,7 @@ fn in_pixels(pairs: &[Pair]) -> bool {
 pub fn page(fit: &HandEyeFit, pairs: &[Pair], quality: &Quality, carrier: &str) -> Page {
     let mut page = Page::new("Hand-eye calibration");
     page.verdict(quality);
-    let x = &fit.chain.near_from_camera;
-    let [rz, ry, rx] = crate::robot::zyx_of(&x.rotation);
-    let sigma = |i: usize| fit.covariance[(i, i)].max(0.0).sqrt();
-    let row = |what: &str, value: String, s: String| vec![what.to_string(), value, s];
-    let mut rows: Vec<Vec<String>> = (0..3)
-        .map(|i| {
-            row(
-                &format!("{} of the camera", ["x", "y", "z"][i]),
-                format!("{:.4} mm", x.translation[i]),
-                format!("{:.4} mm", sigma(i)),
-            )
-        })
-        .collect();
-    for (i, (name, value)) in [("RX", rx), ("RY", ry), ("RZ", rz)].into_iter().enumerate() {
-        rows.push(row(
-            &format!("{name} (R = Rz·Ry·Rx)"),
-            format!("{value:.4}°"),
-            format!("{:.4}° about the {carrier}'s {}", sigma(3 + i).to_degrees(), ["x", "y", "z"][i]),
-        ));
-    }
-    page.table(&format!("The camera on the {carrier}"), &["", "value", "sigma"], &rows);
+    page.table(&format!("The camera on the {carrier}"), &["", "value", "sigma"], &chain_rows(fit, carrier));
     let figures: Vec<Vec<String>> = quality.figures.iter().map(|(k, v)| vec![k.clone(), format!("{v:.5}")]).collect();
     page.table("Figures", &["figure (unit in the name)", "value"], &figures);
     let pixels = in_pixels(pairs);
@@ -308,6 +288,40 @@ pub fn page(fit: &HandEyeFit, pairs: &[Pair], quality: &Quality, carrier: &str) 
         "Error of each pose predicted by the others, mm at the board's corners",
         &bars(&bar(&|p| p.holdout_mm), "mm", None),
     );
+    page.figure(
+        &format!("Axes that the {carrier} turned about from each pose to the next ({carrier} frame): a good set fills the disc"),
+        &axis_sphere(&turn_axes(fit, pairs)),
+    );
+    page
+}
+
+/// The camera's place and turn with their sigmas.
+fn chain_rows(fit: &HandEyeFit, carrier: &str) -> Vec<Vec<String>> {
+    let x = &fit.chain.near_from_camera;
+    let [rz, ry, rx] = crate::robot::zyx_of(&x.rotation);
+    let sigma = |i: usize| fit.covariance[(i, i)].max(0.0).sqrt();
+    let row = |what: &str, value: String, s: String| vec![what.to_string(), value, s];
+    let mut rows: Vec<Vec<String>> = (0..3)
+        .map(|i| {
+            row(
+                &format!("{} of the camera", ["x", "y", "z"][i]),
+                format!("{:.4} mm", x.translation[i]),
+                format!("{:.4} mm", sigma(i)),
+            )
+        })
+        .collect();
+    for (i, (name, value)) in [("RX", rx), ("RY", ry), ("RZ", rz)].into_iter().enumerate() {
+        rows.push(row(
+            &format!("{name} (R = Rz·Ry·Rx)"),
+            format!("{value:.4}°"),
+            format!("{:.4}° about the {carrier}'s {}", sigma(3 + i).to_degrees(), ["x", "y", "z"][i]),
+        ));
+    }
+    rows
+}
+
+/// Axes of the turns from each used pose to the next.
+fn turn_axes(fit: &HandEyeFit, pairs: &[Pair]) -> Vec<(Vec3, String)> {
     let mut axes = Vec::new();
     let used: Vec<(usize, &Pair)> = pairs.iter().enumerate().filter(|(i, _)| fit.pairs[*i].used).collect();
     for w in used.windows(2) {
@@ -316,9 +330,5 @@ pub fn page(fit: &HandEyeFit, pairs: &[Pair], quality: &Quality, carrier: &str) 
             axes.push((turn.normalize(), w[1].0.to_string()));
         }
     }
-    page.figure(
-        &format!("Axes that the {carrier} turned about from each pose to the next ({carrier} frame): a good set fills the disc"),
-        &axis_sphere(&axes),
-    );
-    page
+    axes
 }

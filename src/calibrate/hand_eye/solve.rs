@@ -32,6 +32,33 @@ fn distance2(fit: &Fitted, mount: Mount, pair: &Pair, used: bool) -> f64 {
     solve(total).filter(|d| d.is_finite()).or_else(|| solve(own)).unwrap_or(f64::INFINITY)
 }
 
+fn chosen<'a>(pairs: &'a [Pair], used: &[usize]) -> Vec<&'a Pair> {
+    used.iter().map(|&i| &pairs[i]).collect()
+}
+
+/// Fits the agreeing pairs, and again with those within the gate until the same ones stay: their indices and the fit.
+fn settle(
+    pairs: &[Pair],
+    agreement: &Agreement,
+    noise: Noise,
+    mount: Mount,
+    given: &CameraBelief,
+    o: &HandEyeOptions,
+) -> Option<(Vec<usize>, Fitted)> {
+    let mut used = agreement.agreeing.clone();
+    let mut found = fit(&chosen(pairs, &used), &agreement.chain, noise, mount, given, o)?;
+    for _ in 0..10 {
+        let keeps = |i: usize| distance2(&found, mount, &pairs[i], used.contains(&i)) <= o.gate;
+        let next: Vec<usize> = (0..pairs.len()).filter(|&i| keeps(i)).collect();
+        if next == used || next.len() < o.min_pairs {
+            break;
+        }
+        used = next;
+        found = fit(&chosen(pairs, &used), &found.refined.chain, found.noise, mount, given, o)?;
+    }
+    Some((used, found))
+}
+
 /// Solves for both unknowns of the chain. `camera` is the covariance of the camera's parameters
 /// ([`crate::calibrate::measured_pose::intrinsic_covariance`]). The result does not depend on the pairs' order.
 pub fn solve(
@@ -55,24 +82,13 @@ pub fn solve(
         robot_rad: o.robot_sigma_deg.map_or(turn, f64::to_radians),
         feature_factor: pooled_factor(seen()).unwrap_or(turn),
     };
-    let chosen = |used: &[usize]| -> Vec<&Pair> { used.iter().map(|&i| &pairs[i]).collect() };
-    let mut used = agreement.agreeing.clone();
-    let mut found = fit(&chosen(&used), &agreement.chain, noise, mount, &given, o).ok_or_else(mispaired)?;
-    for _ in 0..10 {
-        let keeps = |i: usize| distance2(&found, mount, &pairs[i], used.contains(&i)) <= o.gate;
-        let next: Vec<usize> = (0..pairs.len()).filter(|&i| keeps(i)).collect();
-        if next == used || next.len() < o.min_pairs {
-            break;
-        }
-        used = next;
-        found = fit(&chosen(&used), &found.refined.chain, found.noise, mount, &given, o).ok_or_else(mispaired)?;
-    }
+    let (used, found) = settle(pairs, &agreement, noise, mount, &given, o).ok_or_else(mispaired)?;
     let residuals = pairs
         .iter()
         .enumerate()
         .map(|(i, pair)| {
             let without: Vec<usize> = used.iter().copied().filter(|&k| k != i).collect();
-            let residual = residual(&found, pair, &chosen(&without), mount, &given, model);
+            let residual = residual(&found, pair, &chosen(pairs, &without), mount, &given, model);
             PairResidual {
                 used: used.contains(&i),
                 distance2: distance2(&found, mount, pair, used.contains(&i)),

@@ -9,7 +9,7 @@ use super::volume::expected;
 use crate::calibrate::hand_eye::report::HAND_EYE_NAMES;
 use crate::calibrate::laser_plane::report::PLANE_NAMES;
 use crate::calibrate::laser_plane::terms::basis as plane_basis;
-use crate::calibrate::limits::Limits;
+use crate::calibrate::limits::{Judgement, Limits};
 use crate::calibrate::pointer::beam::{BEAM_NAMES, basis as beam_basis};
 use crate::camera::{ALWAYS_NAMED, CameraCovariance, NAMES, PARAMETERS};
 use crate::geometry::{Camera, Plane};
@@ -155,11 +155,32 @@ pub fn judge(fit: &JointFit, weights: &DMatrix<f64>, beside: &Beside, limits: &L
         .map(|(p, e)| format!("{} {e:.4} mm", p.words()))
         .collect();
     j.reasons.push(format!("what makes it: {}", parts.join(", ")));
-    let (robot_mm, robot_deg) = (fit.noise.robot_mm, fit.noise.robot_rad.to_degrees());
     if robot {
+        let [robot_mm, robot_deg] = robot_scatter(fit);
         j.reasons.push(format!("the robot's poses scatter by {robot_mm:.4} mm and {robot_deg:.4} degrees per axis"));
     }
-    if let Some(s) = beside.systematic.filter(Systematic::found) {
+    by_arm(beside.systematic.as_ref(), &mut j);
+    let names = |shots: usize| format!("{shots} pictures of boards");
+    j.at_best(Verdict::Usable, fit.shots.len() < 8, || format!("{}, 8 are needed to be good", names(fit.shots.len())));
+    if robot {
+        by_stops(fit, &mut j);
+    }
+    for l in &fit.left_out {
+        j.at_best(Verdict::Usable, true, || format!("{}: {} was left out: {}", l.name, l.part.words(), l.why));
+    }
+    j.reasons.extend(beside.missing.iter().map(|(name, why)| format!("{name} was not used: {why}")));
+    let figures = figures(fit, mm, beside);
+    Quality { verdict: j.verdict, reasons: j.reasons, advice: j.advice, figures, per_picture: Vec::new() }
+}
+
+/// What a robot's pose scatters by on each axis, mm and degrees.
+fn robot_scatter(fit: &JointFit) -> [f64; 2] {
+    [fit.noise.robot_mm, fit.noise.robot_rad.to_degrees()]
+}
+
+/// An arm whose misfits follow its pose limits what any solve can give.
+fn by_arm(systematic: Option<&Systematic>, j: &mut Judgement) {
+    if let Some(s) = systematic.filter(|s| s.found()) {
         j.at_best(Verdict::Usable, true, || {
             format!(
                 "the arm itself limits this: {:.0} % of its misfit at a pose left out is predicted by the other poses (chance: {:.0} %): its links \
@@ -172,25 +193,27 @@ pub fn judge(fit: &JointFit, weights: &DMatrix<f64>, beside: &Beside, limits: &L
             "have the arm calibrated by its maker, or calibrate in the volume in which it works: points are good there only".into()
         });
     }
-    let names = |shots: usize| format!("{shots} pictures of boards");
-    j.at_best(Verdict::Usable, fit.shots.len() < 8, || format!("{}, 8 are needed to be good", names(fit.shots.len())));
+}
+
+/// Whether the stops tell the robot's scatter.
+fn by_stops(fit: &JointFit, j: &mut Judgement) {
     // Each stop brings three numbers of the arm's place, hand-eye and boards take six of them.
     let beyond = 3 * fit.shots.iter().filter(|s| s.robot.is_some()).count() as i64 - 6;
-    j.at_best(Verdict::BadlyDetermined, robot && beyond < LEAST_NUMBERS, || {
+    j.at_best(Verdict::BadlyDetermined, beyond < LEAST_NUMBERS, || {
         format!("{} numbers tell the robot's scatter, {LEAST_NUMBERS} are needed", beyond.max(0))
     });
     // An arm that scatters by far less than boards are seen to takes up little of what is left: it hardly matters for points, but whoever
     // wants to know the arm by this number does not.
     let told = fit.freedom[3];
-    j.at_best(Verdict::Usable, robot && beyond >= LEAST_NUMBERS && told < LEAST_NUMBERS as f64, || {
+    j.at_best(Verdict::Usable, beyond >= LEAST_NUMBERS && told < LEAST_NUMBERS as f64, || {
         format!(
             "the robot's scatter is hardly seen beside the boards': of {beyond} numbers {told:.1} are left to tell it"
         )
     });
-    for l in &fit.left_out {
-        j.at_best(Verdict::Usable, true, || format!("{}: {} was left out: {}", l.name, l.part.words(), l.why));
-    }
-    j.reasons.extend(beside.missing.iter().map(|(name, why)| format!("{name} was not used: {why}")));
+}
+
+/// The solve in numbers; `mm` is the expected error of a point.
+fn figures(fit: &JointFit, mm: f64, beside: &Beside) -> BTreeMap<String, f64> {
     let mut figures: BTreeMap<String, f64> = [
         ("expected_error_mm", mm),
         ("separate_expected_error_mm", beside.separate.map_or(f64::NAN, |s| s[0])),
@@ -202,9 +225,10 @@ pub fn judge(fit: &JointFit, weights: &DMatrix<f64>, beside: &Beside, limits: &L
     ]
     .map(|(k, v)| (k.to_owned(), v))
     .into();
-    if robot {
+    if fit.has(Part::RobotPlace) {
+        let [robot_mm, robot_deg] = robot_scatter(fit);
         figures.insert(crate::rig::ROBOT_SIGMA_MM.into(), robot_mm);
         figures.insert(crate::rig::ROBOT_SIGMA_DEG.into(), robot_deg);
     }
-    Quality { verdict: j.verdict, reasons: j.reasons, advice: j.advice, figures, per_picture: Vec::new() }
+    figures
 }

@@ -240,12 +240,60 @@ fn even(freedom: f64) -> f64 {
     1.0 + 3.0 * (2.0 / freedom).sqrt()
 }
 
+fn weak(what: String) -> Fault {
+    Fault::refused(what)
+        .cause("a surface's tilt needs three spots that do not lie on a line")
+        .next("touch three places of the surface that are as far apart as the part allows")
+}
+
+/// A plane through the points' middle.
+struct Leaning {
+    normal: Vec3,
+    /// Of tilt along two directions in the plane, and height.
+    covariance: Mat3,
+    /// Heights of the points over it, mm.
+    residuals: Vec<f64>,
+    misfit: f64,
+}
+
+/// Least squares of the points' heights over the plane square to `normal`.
+fn lean(points: &[BasePoint], centre: &Vec3, normal: &Vec3, shared: &SharedCovariance) -> Result<Leaning> {
+    let n = points.len();
+    let axis = if normal.x.abs() < 0.7 { Vec3::x() } else { Vec3::y() };
+    let a = normal.cross(&axis).normalize();
+    let b = normal.cross(&a);
+    // Height = h + p·a-coordinate + q·b-coordinate.
+    let (mut h, mut g) = (Mat3::zeros(), Vec3::zeros());
+    let rows: Vec<Vec3> =
+        points.iter().map(|p| Vec3::new((p.point - centre).dot(&a), (p.point - centre).dot(&b), 1.0)).collect();
+    let weights: Vec<f64> = points.iter().map(|p| 1.0 / (normal.transpose() * p.own * normal)[0].max(1e-12)).collect();
+    for i in 0..n {
+        let z = (points[i].point - centre).dot(normal);
+        h += rows[i] * rows[i].transpose() * weights[i];
+        g += rows[i] * (z * weights[i]);
+    }
+    let inverse = h.try_inverse().ok_or_else(|| weak("the points lie on a line".into()))?;
+    let s = inverse * g;
+    let residuals: Vec<f64> = (0..n).map(|i| (points[i].point - centre).dot(normal) - rows[i].dot(&s)).collect();
+    // Of the three numbers with respect to the shared parameters.
+    let mut j = SMatrix::<f64, 3, SHARED>::zeros();
+    for i in 0..n {
+        j += rows[i] * weights[i] * (normal.transpose() * points[i].shared);
+    }
+    let j = inverse * j;
+    let freedom = n as f64 - 3.0;
+    let mut misfit = 0.0;
+    if freedom > 0.0 {
+        misfit = residuals.iter().zip(&weights).map(|(r, w)| r * r * w).sum::<f64>() / freedom;
+    }
+    // A surface that is not as flat as the spots are good has a normal that is not as good either.
+    let uneven = if freedom > 0.0 && misfit > even(freedom) { misfit } else { 1.0 };
+    let covariance = inverse * uneven + j * shared * j.transpose();
+    let normal = (normal - a * s.x - b * s.y).normalize();
+    Ok(Leaning { normal, covariance, residuals, misfit })
+}
+
 fn plane_of(points: &[BasePoint], shared: &SharedCovariance, x: &Vec3) -> Result<Surface> {
-    let weak = |what: String| {
-        Fault::refused(what)
-            .cause("a surface's tilt needs three spots that do not lie on a line")
-            .next("touch three places of the surface that are as far apart as the part allows")
-    };
     let n = points.len();
     if n < 3 {
         return Err(weak(format!("{n} points, 3 are needed")));
@@ -258,42 +306,12 @@ fn plane_of(points: &[BasePoint], shared: &SharedCovariance, x: &Vec3) -> Result
     if normal.dot(&outside) < 0.0 {
         normal = -normal;
     }
-    // Two rounds: the weights depend on the normal.
-    let (mut covariance, mut residuals, mut misfit) = (Mat3::zeros(), vec![0.0; n], 0.0);
+    // The weights depend on the normal.
+    let mut leaning = Leaning { normal, covariance: Mat3::zeros(), residuals: vec![0.0; n], misfit: 0.0 };
     for _ in 0..3 {
-        let axis = if normal.x.abs() < 0.7 { Vec3::x() } else { Vec3::y() };
-        let a = normal.cross(&axis).normalize();
-        let b = normal.cross(&a);
-        // Height = h + p·a-coordinate + q·b-coordinate.
-        let (mut h, mut g) = (Mat3::zeros(), Vec3::zeros());
-        let rows: Vec<Vec3> = at.iter().map(|p| Vec3::new((p - centre).dot(&a), (p - centre).dot(&b), 1.0)).collect();
-        let weights: Vec<f64> =
-            points.iter().map(|p| 1.0 / (normal.transpose() * p.own * normal)[0].max(1e-12)).collect();
-        for i in 0..n {
-            let z = (at[i] - centre).dot(&normal);
-            h += rows[i] * rows[i].transpose() * weights[i];
-            g += rows[i] * (z * weights[i]);
-        }
-        let inverse = h.try_inverse().ok_or_else(|| weak("the points lie on a line".into()))?;
-        let s = inverse * g;
-        for i in 0..n {
-            residuals[i] = (at[i] - centre).dot(&normal) - rows[i].dot(&s);
-        }
-        // Of the three numbers with respect to the shared parameters.
-        let mut j = SMatrix::<f64, 3, SHARED>::zeros();
-        for i in 0..n {
-            j += rows[i] * weights[i] * (normal.transpose() * points[i].shared);
-        }
-        let j = inverse * j;
-        let freedom = n as f64 - 3.0;
-        if freedom > 0.0 {
-            misfit = residuals.iter().zip(&weights).map(|(r, w)| r * r * w).sum::<f64>() / freedom;
-        }
-        // A surface that is not as flat as the spots are good has a normal that is not as good either.
-        let uneven = if freedom > 0.0 && misfit > even(freedom) { misfit } else { 1.0 };
-        covariance = inverse * uneven + j * shared * j.transpose();
-        normal = (normal - a * s.x - b * s.y).normalize();
+        leaning = lean(points, &centre, &leaning.normal, shared)?;
     }
+    let Leaning { normal, covariance, residuals, misfit } = leaning;
     let tilt: Matrix2<f64> = covariance.fixed_view::<2, 2>(0, 0).into();
     let e = tilt.symmetric_eigenvalues();
     let along = x - normal * normal.dot(x);

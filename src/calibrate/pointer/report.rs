@@ -4,12 +4,12 @@
 
 use super::beam::BEAM_NAMES;
 use super::range::{RigCovariance, range};
-use super::solve::{PointerFit, PointerOptions};
-use crate::calibrate::limits::{Limits, rms};
+use super::solve::{PointerFit, PointerOptions, SpotResidual};
+use crate::calibrate::limits::{Judgement, Limits, rms};
 use crate::calibrate::report::{Page, bars};
 use crate::calibrate::scatter::overrule;
 use crate::camera::{Intrinsics, NAMES, PARAMETERS, ParameterMatrix, named};
-use crate::rig::{Covariance, Quality, Verdict};
+use crate::rig::{Covariance, Quality, Verdict, Volume};
 use nalgebra::Matrix2;
 use std::collections::BTreeMap;
 
@@ -37,7 +37,7 @@ pub fn judge(fit: &PointerFit, camera: &Intrinsics, spot_px: f64, limits: &Limit
     let at = |z: f64| expected_error(fit, camera, z, spot_px).unwrap_or(f64::INFINITY);
     let expected = at(limits.middle()).max(0.0);
     let farthest = at(far);
-    let used: Vec<_> = fit.spots.iter().filter(|s| s.used).collect();
+    let used: Vec<&SpotResidual> = fit.spots.iter().filter(|s| s.used).collect();
     let mut j = limits.by_error(
         expected,
         format!(
@@ -53,10 +53,33 @@ pub fn judge(fit: &PointerFit, camera: &Intrinsics, spot_px: f64, limits: &Limit
             2.0 * limits.usable_mm()
         )
     });
+    by_spots(fit, &used, work, &mut j);
+    let [low, high] = fit.reach;
+    j.at_best(Verdict::Usable, fit.sigma_ratio > 3.0, || {
+        format!("the spots scatter {:.1} times more than their sigmas say", fit.sigma_ratio)
+    });
+    j.advise(low > near + 0.25 * (far - near), || format!("show the board nearer, at about {} mm", work.depth(near)));
+    j.advise(high < far - 0.25 * (far - near), || {
+        format!("show the board farther away, at about {} mm", work.depth(far))
+    });
+    j.advise(j.verdict != Verdict::Good && used.len() < 12, || {
+        "take more pictures, spread over the whole range".into()
+    });
+    Quality {
+        verdict: j.verdict,
+        reasons: j.reasons,
+        advice: j.advice,
+        figures: figures(fit, &used, work, [expected, farthest], spot_px),
+        per_picture: fit.spots.iter().map(|s| (s.name.clone(), s.px)).collect(),
+    }
+}
+
+/// What the spots allow: how many there are, how far apart, and which of them contradict the others.
+fn by_spots(fit: &PointerFit, used: &[&SpotResidual], work: &Volume, j: &mut Judgement) {
     j.at_best(Verdict::Usable, used.len() < 6, || format!("{} spots, 6 are needed to be good", used.len()));
     j.at_best(Verdict::BadlyDetermined, used.len() < 4, || format!("{} spots leave nothing to check", used.len()));
     let [low, high] = fit.reach;
-    j.at_best(Verdict::Usable, high - low < 0.3 * (far - near), || {
+    j.at_best(Verdict::Usable, high - low < 0.3 * (work.far_mm - work.near_mm), || {
         format!("the spots lie at {} to {} mm, the work is at {work}", work.depth(low), work.depth(high))
     });
     for s in fit.spots.iter().filter(|s| !s.used) {
@@ -64,7 +87,7 @@ pub fn judge(fit: &PointerFit, camera: &Intrinsics, spot_px: f64, limits: &Limit
             format!("{} was left out: its spot is {:.2} px from the beam of the others", s.name, s.px)
         });
     }
-    overrule(used.len(), fit.spots.len() - used.len(), &mut j);
+    overrule(used.len(), fit.spots.len() - used.len(), j);
     let gate = PointerOptions::default().gate;
     for s in used.iter().filter(|s| s.beside > gate) {
         j.at_best(Verdict::BadlyDetermined, true, || {
@@ -77,22 +100,23 @@ pub fn judge(fit: &PointerFit, camera: &Intrinsics, spot_px: f64, limits: &Limit
             )
         });
     }
-    j.at_best(Verdict::Usable, fit.sigma_ratio > 3.0, || {
-        format!("the spots scatter {:.1} times more than their sigmas say", fit.sigma_ratio)
-    });
-    j.advise(low > near + 0.25 * (far - near), || format!("show the board nearer, at about {} mm", work.depth(near)));
-    j.advise(high < far - 0.25 * (far - near), || {
-        format!("show the board farther away, at about {} mm", work.depth(far))
-    });
-    j.advise(j.verdict != Verdict::Good && used.len() < 12, || {
-        "take more pictures, spread over the whole range".into()
-    });
+}
+
+/// The fit in numbers; `expected` are the errors at the working distance and at the far end.
+fn figures(
+    fit: &PointerFit,
+    used: &[&SpotResidual],
+    work: &Volume,
+    expected: [f64; 2],
+    spot_px: f64,
+) -> BTreeMap<String, f64> {
+    let [low, high] = fit.reach;
     let sigma = |i: usize| fit.covariance[(i, i)].max(0.0);
-    let figures = BTreeMap::from([
-        ("expected_error_at_working_distance_mm".to_string(), expected),
-        ("expected_error_at_far_end_mm".into(), farthest),
-        ("working_near_mm".into(), near),
-        ("working_far_mm".into(), far),
+    BTreeMap::from([
+        ("expected_error_at_working_distance_mm".to_string(), expected[0]),
+        ("expected_error_at_far_end_mm".into(), expected[1]),
+        ("working_near_mm".into(), work.near_mm),
+        ("working_far_mm".into(), work.far_mm),
         ("origin_sigma_mm".into(), (sigma(0) + sigma(1) + sigma(2)).sqrt()),
         ("direction_sigma_deg".into(), (sigma(3) + sigma(4) + sigma(5)).sqrt().to_degrees()),
         ("rms_px".into(), rms(used.iter().map(|s| s.px))),
@@ -105,14 +129,7 @@ pub fn judge(fit: &PointerFit, camera: &Intrinsics, spot_px: f64, limits: &Limit
         ("spots_used".into(), used.len() as f64),
         ("spot_sigma_px".into(), spot_px),
         ("residual_over_sigma".into(), fit.sigma_ratio),
-    ]);
-    Quality {
-        verdict: j.verdict,
-        reasons: j.reasons,
-        advice: j.advice,
-        figures,
-        per_picture: fit.spots.iter().map(|s| (s.name.clone(), s.px)).collect(),
-    }
+    ])
 }
 
 /// The report.

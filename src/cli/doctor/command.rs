@@ -63,44 +63,9 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         verdict: String::new(),
     };
     console.part(&format!("{}\n{}", findings.program, findings.adapters.iter().map(adapter).collect::<String>()));
-    trial::watch(&limits, !args.no_rates, &mut |event| match event {
-        Event::Device { name, reads_texels } if findings.used.is_none() => {
-            if reads_texels {
-                console.part(
-                    "stages read arrays as texels of images on the same memory, which is faster on a software adapter",
-                );
-            }
-            (findings.used, findings.reads_texels) = (Some(name), reads_texels);
-        }
-        Event::Device { .. } | Event::Begin { .. } => {}
-        Event::NoDevice { why } => {
-            console.part(&format!("no device: {why}"));
-            findings.no_device_because = Some(why);
-        }
-        Event::Stage(stage) => {
-            console.part(&line(&stage));
-            findings.stages.push(stage);
-        }
-        Event::Rates(r) => {
-            console.part(&format!(
-                "upload {:.1} GB/s, readback {:.1} GB/s in pieces of a 12-megapixel shot",
-                r.upload_gb_s, r.readback_gb_s
-            ));
-            findings.rates = Some(r);
-        }
-        Event::Ways(ways) => {
-            console.part(&ways.iter().map(way).collect::<String>());
-            findings.ways = ways;
-        }
-    })?;
+    trial::watch(&limits, !args.no_rates, &mut |event| findings.take(event, console))?;
     let wrong: Vec<&str> = findings.stages.iter().filter(|s| !s.passed()).map(|s| s.stage.as_str()).collect();
-    findings.verdict = match (&findings.used, wrong.is_empty()) {
-        (None, _) => {
-            "no GPU: everything runs on this machine's processor, with the same results but for rounding".into()
-        }
-        (Some(name), true) => format!("good: every stage on {name} agrees with its CPU twin"),
-        (Some(_), false) => format!("do not use this GPU: {} failed; scan with --on cpu", wrong.join(", ")),
-    };
+    findings.verdict = verdict(findings.used.as_deref(), &wrong);
     console.result(&findings, &findings.verdict);
     if wrong.is_empty() {
         return Ok(());
@@ -108,6 +73,52 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     Err(Fault::device(format!("{} of {} stages fail: {}", wrong.len(), findings.stages.len(), wrong.join(", ")))
         .cause("a driver bug, failing hardware, or a driver that cannot compile them in time")
         .next("update the driver, choose another adapter with SHEETLIGHT_ADAPTER, or scan with --on cpu"))
+}
+
+impl Findings {
+    /// Notes what was tried, and says it.
+    fn take(&mut self, event: Event, console: &Console) {
+        match event {
+            Event::Device { name, reads_texels } if self.used.is_none() => {
+                if reads_texels {
+                    console.part(
+                        "stages read arrays as texels of images on the same memory, which is faster on a software adapter",
+                    );
+                }
+                (self.used, self.reads_texels) = (Some(name), reads_texels);
+            }
+            Event::Device { .. } | Event::Begin { .. } => {}
+            Event::NoDevice { why } => {
+                console.part(&format!("no device: {why}"));
+                self.no_device_because = Some(why);
+            }
+            Event::Stage(stage) => {
+                console.part(&line(&stage));
+                self.stages.push(stage);
+            }
+            Event::Rates(r) => {
+                console.part(&format!(
+                    "upload {:.1} GB/s, readback {:.1} GB/s in pieces of a 12-megapixel shot",
+                    r.upload_gb_s, r.readback_gb_s
+                ));
+                self.rates = Some(r);
+            }
+            Event::Ways(ways) => {
+                console.part(&ways.iter().map(way).collect::<String>());
+                self.ways = ways;
+            }
+        }
+    }
+}
+
+fn verdict(used: Option<&str>, wrong: &[&str]) -> String {
+    match (used, wrong.is_empty()) {
+        (None, _) => {
+            "no GPU: everything runs on this machine's processor, with the same results but for rounding".into()
+        }
+        (Some(name), true) => format!("good: every stage on {name} agrees with its CPU twin"),
+        (Some(_), false) => format!("do not use this GPU: {} failed; scan with --on cpu", wrong.join(", ")),
+    }
 }
 
 fn adapter(a: &AdapterInfo) -> String {

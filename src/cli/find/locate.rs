@@ -89,54 +89,9 @@ pub(super) fn summary(r: &Report) -> String {
     if r.frame != "base" {
         s += &format!("frame        {}\n", r.frame);
     }
-    if let Some(p) = &r.poses {
-        for (name, pose) in [("approach", &p.approach), ("insertion", &p.insertion), ("retract", &p.retract)] {
-            let numbers: Vec<String> = pose.numbers.iter().map(|v| format!("{v:.4}")).collect();
-            s += &format!("{name:12} {} ({}: {})\n", numbers.join(" "), pose.convention, pose.labels.join(", "));
-        }
-        s += &format!(
-            "{:12} {} mm and {} degrees, {} at 3 sigma\n",
-            "tolerance",
-            r.tolerance_mm,
-            r.tolerance_deg,
-            if r.within_tolerance { "kept" } else { "NOT kept" }
-        );
-    }
-    s += &format!("{:12} {} mm, {} degrees (x y z of the part)\n", "sigma", row(&r.sigma_mm, 4), row(&r.sigma_deg, 4));
-    for t in &r.budget.terms {
-        let mm = t.sigma_mm.as_ref().map_or("-".into(), |v| row(v, 4));
-        let deg = t.sigma_deg.as_ref().map_or("-".into(), |v| row(v, 4));
-        s += &format!("  {:12} {mm} mm, {deg} degrees; {}\n", t.name, t.note);
-    }
-    if !r.budget.complete {
-        s += "  the sum is a lower bound: a term is unknown\n";
-    }
-    s += &format!(
-        "match        score {:.3}, next best pose {:.3}; {} edges to {:.3} mm, {} surface points to {:.3} mm\n",
-        r.found.score, r.found.second_score, r.edges, r.edge_rms_mm, r.surface_points, r.surface_rms_mm
-    );
-    for (k, p) in r.all.iter().enumerate() {
-        s += &format!(
-            "  place {:3}    {} mm, {:8.2} degrees, score {:.3}\n",
-            k + 1,
-            row(&p.at_mm, 2),
-            p.angle_deg,
-            p.score
-        );
-    }
-    for c in &r.constructions {
-        s += &format!(
-            "  {:24} {:+.3} {:+.3} mm{} from where the pose puts it ({} shapes)\n",
-            c.name,
-            c.deviation_mm[0],
-            c.deviation_mm[1],
-            c.deviation_deg.map_or(String::new(), |d| format!(", {d:+.3} degrees")),
-            c.shapes
-        );
-    }
-    if let Some(d) = r.disagreement_mm {
-        s += &format!("  the two-pin construction and the lattice fit disagree by {d:.3} mm\n");
-    }
+    s += &poses(r);
+    s += &uncertainty(r);
+    s += &seen(r);
     if let Some(z) = &r.sizes {
         s += &format!(
             "sizes        along the stripe {:+.3} %, from shot to shot {:+.3} %, difference {:+.3} %, shear {:+.4} degrees against the \
@@ -165,6 +120,70 @@ pub(super) fn summary(r: &Report) -> String {
     }
     for n in &r.notes {
         s += &format!("note         {n}\n");
+    }
+    s
+}
+
+/// Where the robot inserts, and whether that keeps the tolerance; empty without a pose.
+fn poses(r: &Report) -> String {
+    let mut s = String::new();
+    let Some(p) = &r.poses else { return s };
+    for (name, pose) in [("approach", &p.approach), ("insertion", &p.insertion), ("retract", &p.retract)] {
+        let numbers: Vec<String> = pose.numbers.iter().map(|v| format!("{v:.4}")).collect();
+        s += &format!("{name:12} {} ({}: {})\n", numbers.join(" "), pose.convention, pose.labels.join(", "));
+    }
+    s += &format!(
+        "{:12} {} mm and {} degrees, {} at 3 sigma\n",
+        "tolerance",
+        r.tolerance_mm,
+        r.tolerance_deg,
+        if r.within_tolerance { "kept" } else { "NOT kept" }
+    );
+    s
+}
+
+/// Sigmas of the pose and the terms that they add up from.
+fn uncertainty(r: &Report) -> String {
+    let mut s =
+        format!("{:12} {} mm, {} degrees (x y z of the part)\n", "sigma", row(&r.sigma_mm, 4), row(&r.sigma_deg, 4));
+    for t in &r.budget.terms {
+        let mm = t.sigma_mm.as_ref().map_or("-".into(), |v| row(v, 4));
+        let deg = t.sigma_deg.as_ref().map_or("-".into(), |v| row(v, 4));
+        s += &format!("  {:12} {mm} mm, {deg} degrees; {}\n", t.name, t.note);
+    }
+    if !r.budget.complete {
+        s += "  the sum is a lower bound: a term is unknown\n";
+    }
+    s
+}
+
+/// How well the scan shows the part: the match, other places of it, its constructions.
+fn seen(r: &Report) -> String {
+    let mut s = format!(
+        "match        score {:.3}, next best pose {:.3}; {} edges to {:.3} mm, {} surface points to {:.3} mm\n",
+        r.found.score, r.found.second_score, r.edges, r.edge_rms_mm, r.surface_points, r.surface_rms_mm
+    );
+    for (k, p) in r.all.iter().enumerate() {
+        s += &format!(
+            "  place {:3}    {} mm, {:8.2} degrees, score {:.3}\n",
+            k + 1,
+            row(&p.at_mm, 2),
+            p.angle_deg,
+            p.score
+        );
+    }
+    for c in &r.constructions {
+        s += &format!(
+            "  {:24} {:+.3} {:+.3} mm{} from where the pose puts it ({} shapes)\n",
+            c.name,
+            c.deviation_mm[0],
+            c.deviation_mm[1],
+            c.deviation_deg.map_or(String::new(), |d| format!(", {d:+.3} degrees")),
+            c.shapes
+        );
+    }
+    if let Some(d) = r.disagreement_mm {
+        s += &format!("  the two-pin construction and the lattice fit disagree by {d:.3} mm\n");
     }
     s
 }

@@ -4,7 +4,7 @@
 use super::curves::{Curve, Form};
 use super::flatten::{FLAT, arc};
 use crate::find::model::outline::area;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 /// A closed edge.
 #[derive(Clone, Debug)]
@@ -57,9 +57,67 @@ impl Nodes {
 /// Joins the curves; an edge that is drawn twice counts once.
 pub fn join(curves: &[Curve]) -> Joined {
     let mut out = Joined::default();
+    let pieces = pieces(curves, &mut out);
+    let mut at: HashMap<usize, Vec<usize>> = HashMap::new();
+    for (i, p) in pieces.iter().enumerate() {
+        p.ends.iter().for_each(|&n| at.entry(n).or_default().push(i));
+    }
+    out.forks = at.values().filter(|list| list.len() > 2).count();
+    let through = |node: usize, from: usize| -> Option<usize> {
+        let list = &at[&node];
+        if list.len() == 2 { list.iter().copied().find(|&i| i != from) } else { None }
+    };
+    let mut used = vec![false; pieces.len()];
+    for start in 0..pieces.len() {
+        if used[start] {
+            continue;
+        }
+        // Back to a free end or a fork, or once around.
+        let (mut piece, mut end) = (start, 0);
+        while let Some(next) = through(pieces[piece].ends[end], piece).filter(|&n| n != start) {
+            end = usize::from(pieces[next].ends[0] == pieces[piece].ends[end]);
+            piece = next;
+        }
+        let first = pieces[piece].ends[end];
+        let mut points: Vec<[f64; 2]> = Vec::new();
+        let (mut here, mut current) = (first, Some(piece));
+        while let Some(i) = current {
+            used[i] = true;
+            let (ends, list) = (pieces[i].ends, pieces[i].points);
+            let forward = ends[0] == here;
+            let skip = usize::from(!points.is_empty());
+            if forward {
+                points.extend(list.iter().skip(skip));
+            } else {
+                points.extend(list.iter().rev().skip(skip));
+            }
+            here = ends[usize::from(forward)];
+            current = through(here, i).filter(|&n| !used[n]);
+        }
+        let c = pieces[piece].curve;
+        if here == first && points.len() > 3 {
+            push(&mut out, c, points);
+        } else {
+            let form = Form::Path { points, closed: false };
+            out.open.push(Curve { layer: c.layer.clone(), z: c.z, form });
+        }
+    }
+    out
+}
+
+/// An edge between two places.
+struct Piece<'a> {
+    /// Nodes.
+    ends: [usize; 2],
+    curve: &'a Curve,
+    points: &'a [[f64; 2]],
+}
+
+/// What is to be joined; edges that are closed by themselves, and those drawn twice, go to `out`.
+fn pieces<'a>(curves: &'a [Curve], out: &mut Joined) -> Vec<Piece<'a>> {
     let mut nodes = Nodes::default();
-    let mut seen = std::collections::HashSet::new();
-    let mut pieces: Vec<([usize; 2], &Curve, &Vec<[f64; 2]>)> = Vec::new();
+    let mut seen = HashSet::new();
+    let mut pieces = Vec::new();
     for c in curves {
         match &c.form {
             Form::Circle { centre, radius } => {
@@ -82,58 +140,14 @@ pub fn join(curves: &[Curve]) -> Joined {
                 if !seen.insert(key) {
                     out.duplicates += 1;
                 } else if *closed || (ends[0] == ends[1] && points.len() > 2) {
-                    push(&mut out, c, points.clone());
+                    push(out, c, points.clone());
                 } else if ends[0] != ends[1] {
-                    pieces.push((ends, c, points));
+                    pieces.push(Piece { ends, curve: c, points });
                 }
             }
         }
     }
-    let mut at: HashMap<usize, Vec<usize>> = HashMap::new();
-    for (i, p) in pieces.iter().enumerate() {
-        p.0.iter().for_each(|&n| at.entry(n).or_default().push(i));
-    }
-    out.forks = at.values().filter(|list| list.len() > 2).count();
-    let through = |node: usize, from: usize| -> Option<usize> {
-        let list = &at[&node];
-        if list.len() == 2 { list.iter().copied().find(|&i| i != from) } else { None }
-    };
-    let mut used = vec![false; pieces.len()];
-    for start in 0..pieces.len() {
-        if used[start] {
-            continue;
-        }
-        // Back to a free end or a fork, or once around.
-        let (mut piece, mut end) = (start, 0);
-        while let Some(next) = through(pieces[piece].0[end], piece).filter(|&n| n != start) {
-            end = usize::from(pieces[next].0[0] == pieces[piece].0[end]);
-            piece = next;
-        }
-        let first = pieces[piece].0[end];
-        let mut points: Vec<[f64; 2]> = Vec::new();
-        let (mut here, mut current) = (first, Some(piece));
-        while let Some(i) = current {
-            used[i] = true;
-            let (ends, _, list) = pieces[i];
-            let forward = ends[0] == here;
-            let skip = usize::from(!points.is_empty());
-            if forward {
-                points.extend(list.iter().skip(skip));
-            } else {
-                points.extend(list.iter().rev().skip(skip));
-            }
-            here = ends[usize::from(forward)];
-            current = through(here, i).filter(|&n| !used[n]);
-        }
-        let c = pieces[piece].1;
-        if here == first && points.len() > 3 {
-            push(&mut out, c, points);
-        } else {
-            let form = Form::Path { points, closed: false };
-            out.open.push(Curve { layer: c.layer.clone(), z: c.z, form });
-        }
-    }
-    out
+    pieces
 }
 
 /// A closed loop without repeated points. One without area (a line there and back, a bow tie) is an edge all the same.

@@ -7,6 +7,7 @@ use super::model::outline::{area, bounds};
 use super::model::shape::{Form, Inside};
 use crate::fault::{Fault, Result};
 mod curves;
+mod entity;
 mod flatten;
 mod loops;
 mod shapes;

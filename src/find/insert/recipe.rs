@@ -243,13 +243,6 @@ impl Recipe {
 
     /// Refuses values out of range, a drawing without a surface, and names that refer to nothing.
     pub fn check(&self) -> Result<()> {
-        let range = |name: &str, v: f64, a: f64, b: f64| {
-            if (a..=b).contains(&v) {
-                Ok(())
-            } else {
-                Err(Fault::input(format!("{name} is {v}, wanted {a} to {b}")).next("correct the recipe"))
-            }
-        };
         range("format", f64::from(self.format), 1.0, 1.0)?;
         crate::files::named("name", &self.name)?;
         range("cell_mm", self.cell_mm, 1e-4, 500.0)?;
@@ -271,42 +264,62 @@ impl Recipe {
                 .next("draw the datum surface first, as a rectangle, circle or polygon"));
         }
         construct::check(&self.construction, &drawing)?;
-        let i = &self.insertion;
-        range("approach_mm", i.approach_mm, 0.0, 1000.0)?;
-        range("retract_mm", i.retract_mm, 0.0, 1000.0)?;
-        range("tolerance_mm", i.tolerance_mm, 1e-4, 100.0)?;
-        range("tolerance_deg", i.tolerance_deg, 1e-3, 10.0)?;
-        range("turn_deg", i.turn_deg, -360.0, 360.0)?;
-        for o in i.offset_mm {
+        self.insertion.check(&self.construction)?;
+        self.gates.check()?;
+        range("robot.sigma_mm", self.robot.sigma_mm, 0.0, 10.0)?;
+        range("robot.sigma_deg", self.robot.sigma_deg, 0.0, 10.0)
+    }
+}
+
+fn range(name: &str, v: f64, a: f64, b: f64) -> Result<()> {
+    if (a..=b).contains(&v) {
+        Ok(())
+    } else {
+        Err(Fault::input(format!("{name} is {v}, wanted {a} to {b}")).next("correct the recipe"))
+    }
+}
+
+impl InsertionSpec {
+    /// Refuses values out of range, and names that are no construction.
+    fn check(&self, constructions: &[Construction]) -> Result<()> {
+        range("approach_mm", self.approach_mm, 0.0, 1000.0)?;
+        range("retract_mm", self.retract_mm, 0.0, 1000.0)?;
+        range("tolerance_mm", self.tolerance_mm, 1e-4, 100.0)?;
+        range("tolerance_deg", self.tolerance_deg, 1e-3, 10.0)?;
+        range("turn_deg", self.turn_deg, -360.0, 360.0)?;
+        for o in self.offset_mm {
             range("offset_mm", o, -1e4, 1e4)?;
         }
-        let named = [Some(&i.construction).filter(|n| *n != "pose"), i.two_pin.as_ref(), i.lattice.as_ref()];
+        let named = [Some(&self.construction).filter(|n| *n != "pose"), self.two_pin.as_ref(), self.lattice.as_ref()];
         for name in named.into_iter().flatten() {
-            if !self.construction.iter().any(|c| c.name == *name) {
+            if !constructions.iter().any(|c| c.name == *name) {
                 return Err(Fault::input(format!("the insertion refers to '{name}', which is no construction"))
                     .cause("a misspelt name")
                     .next("add it under [[construction]]"));
             }
         }
-        let g = &self.gates;
+        Ok(())
+    }
+}
+
+impl Gates {
+    fn check(&self) -> Result<()> {
         for (name, v) in [
-            ("gates.min_score", g.min_score),
-            ("gates.min_margin", g.min_margin),
-            ("gates.min_coverage", g.min_coverage),
-            ("gates.min_agreement", g.min_agreement),
-            ("gates.min_edges", g.min_edges),
-            ("gates.max_crossed", g.max_crossed),
+            ("gates.min_score", self.min_score),
+            ("gates.min_margin", self.min_margin),
+            ("gates.min_coverage", self.min_coverage),
+            ("gates.min_agreement", self.min_agreement),
+            ("gates.min_edges", self.min_edges),
+            ("gates.max_crossed", self.max_crossed),
         ] {
             range(name, v, 0.0, 1.0)?;
         }
-        range("gates.max_sigma_mm", g.max_sigma_mm, 1e-5, 100.0)?;
-        range("gates.max_sigma_deg", g.max_sigma_deg, 1e-4, 10.0)?;
-        range("gates.max_disagreement_mm", g.max_disagreement_mm, 1e-5, 100.0)?;
-        range("gates.max_look_ratio", g.max_look_ratio, 1.0, 10.0)?;
-        range("gates.min_look_turn_deg", g.min_look_turn_deg, 0.0, 180.0)?;
-        range("gates.min_look_tilt_deg", g.min_look_tilt_deg, 0.0, 60.0)?;
-        range("gates.max_unseen_height_mm", g.max_unseen_height_mm, 1e-5, 100.0)?;
-        range("robot.sigma_mm", self.robot.sigma_mm, 0.0, 10.0)?;
-        range("robot.sigma_deg", self.robot.sigma_deg, 0.0, 10.0)
+        range("gates.max_sigma_mm", self.max_sigma_mm, 1e-5, 100.0)?;
+        range("gates.max_sigma_deg", self.max_sigma_deg, 1e-4, 10.0)?;
+        range("gates.max_disagreement_mm", self.max_disagreement_mm, 1e-5, 100.0)?;
+        range("gates.max_look_ratio", self.max_look_ratio, 1.0, 10.0)?;
+        range("gates.min_look_turn_deg", self.min_look_turn_deg, 0.0, 180.0)?;
+        range("gates.min_look_tilt_deg", self.min_look_tilt_deg, 0.0, 60.0)?;
+        range("gates.max_unseen_height_mm", self.max_unseen_height_mm, 1e-5, 100.0)
     }
 }

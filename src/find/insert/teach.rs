@@ -59,6 +59,27 @@ pub fn teach(cloud: &[CloudPoint], shots: &Shots, map: &HeightMap, options: &Tea
     let place = Vec3::new(centre[0], centre[1], 0.0);
     let grid_from_part: Rigid<Grid, Part> =
         Rigid::from_vectors(&Vec3::new(0.0, 0.0, options.angle_deg.to_radians()), place);
+    let mut drawing = drawn(options, &grid_from_part);
+    drawing.check()?;
+    let height = datum_height(map, &grid_from_part, &drawing)?;
+    let lift: Rigid<Part, Part> = Rigid::from_vectors(&Vec3::zeros(), Vec3::new(0.0, 0.0, height));
+    let mut pose: Rigid<Base, Part> = map.base_from_grid * grid_from_part * lift;
+    let gates = MeasureOptions { edge_gate_mm: 1.0, ..MeasureOptions::default() };
+    // Each round measures with the dimensions of the last one; three bring a click's 0.5 mm to the noise.
+    for _ in 0..3 {
+        let measured = measure(&points, &drawing, pose, &gates)?;
+        pose = measured.base_from_part;
+        adjust(&mut drawing, &measured, &gates);
+    }
+    let recipe = recipe_of(options, drawing, map)?;
+    let up = map.base_from_grid.direction(&Vec3::z());
+    let proof = locate(cloud, shots, &recipe, None, &LocateOptions { up: Some(up), ..LocateOptions::default() })?;
+    Ok((recipe, proof))
+}
+
+/// Outline, windows and holes where the numbers put them.
+fn drawn(options: &TeachOptions, grid_from_part: &Rigid<Grid, Part>) -> Drawing {
+    let [x0, y0, x1, y1] = options.outline;
     let local = |x: f64, y: f64| grid_from_part.inverse().point(&Vec3::new(x, y, 0.0));
     let rectangle = |inside, c: [f64; 2], size: [f64; 2]| Shape {
         centre: Some(c),
@@ -81,22 +102,7 @@ pub fn teach(cloud: &[CloudPoint], shots: &Shots, map: &HeightMap, options: &Tea
             ..Shape::new(Form::Circle, Inside::Low)
         });
     }
-    let mut drawing = Drawing { shape: shapes };
-    drawing.check()?;
-    let height = datum_height(map, &grid_from_part, &drawing)?;
-    let lift: Rigid<Part, Part> = Rigid::from_vectors(&Vec3::zeros(), Vec3::new(0.0, 0.0, height));
-    let mut pose: Rigid<Base, Part> = map.base_from_grid * grid_from_part * lift;
-    let gates = MeasureOptions { edge_gate_mm: 1.0, ..MeasureOptions::default() };
-    // Each round measures with the dimensions of the last one; three bring a click's 0.5 mm to the noise.
-    for _ in 0..3 {
-        let measured = measure(&points, &drawing, pose, &gates)?;
-        pose = measured.base_from_part;
-        adjust(&mut drawing, &measured, &gates);
-    }
-    let recipe = recipe_of(options, drawing, map)?;
-    let up = map.base_from_grid.direction(&Vec3::z());
-    let proof = locate(cloud, shots, &recipe, None, &LocateOptions { up: Some(up), ..LocateOptions::default() })?;
-    Ok((recipe, proof))
+    Drawing { shape: shapes }
 }
 
 /// The most frequent height inside the outline and outside the windows, in bins of 0.1 mm.

@@ -4,6 +4,8 @@
 
 use super::options::MeasureOptions;
 use super::surface_ends::Observation;
+pub use super::values::Value;
+use super::values::{line_through, meet, middle, moved};
 use crate::fault::{Fault, Result};
 use crate::find::model::drawing::Drawing;
 use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
@@ -41,20 +43,6 @@ pub struct Construction {
     /// offset: the line or lattice that gives the direction.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub along: Option<String>,
-}
-
-/// What a construction gives: a point, with a direction where it has one.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Value {
-    /// Along the part's x, mm.
-    pub x: f64,
-    /// Along the part's y, mm.
-    pub y: f64,
-    /// Direction from the part's x, rad; `None` for a bare point.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub direction: Option<f64>,
-    /// Standard deviation of the point, mm (per axis).
-    pub sigma_mm: f64,
 }
 
 /// A construction's outcome.
@@ -163,6 +151,7 @@ pub fn build(
     Ok(out)
 }
 
+/// Measured, nominal, and how many shapes went in.
 type Pair = (Value, Value, usize);
 
 fn one(
@@ -172,64 +161,11 @@ fn one(
     earlier: &[Built],
     options: &MeasureOptions,
 ) -> Result<Built> {
-    let needs = |least: usize, most: usize| {
-        if (least..=most).contains(&c.of.len()) {
-            return Ok(());
-        }
-        Err(Fault::input(format!("a {:?} of {} things, wanted {least} to {most}", c.kind, c.of.len()).to_lowercase())
-            .cause("an impossible construction")
-            .next("correct 'of' in the recipe"))
-    };
     if (c.by_mm.is_some() || c.along.is_some()) != (c.kind == Build::Offset) {
         return Err(Fault::input("by_mm and along belong to an offset, and an offset needs both")
             .next("give both, or another kind of construction"));
     }
-    let point = |name: &String| -> Result<Pair> {
-        if let Some(b) = earlier.iter().find(|b| b.name == *name) {
-            return Ok((b.measured, b.nominal, b.shapes));
-        }
-        let (shape, element, [x, y]) = drawing.named(name)?;
-        let f = measured.get(&(shape, element)).ok_or_else(|| {
-            Fault::refused(format!("'{name}' was not seen well enough to be measured"))
-                .cause("it is hidden, filled, or between two shots")
-                .next("scan with finer steps, or construct on other pins")
-        })?;
-        let at = |x, y, sigma_mm| Value { x, y, direction: None, sigma_mm };
-        Ok((at(x + f.offset[0], y + f.offset[1], f.sigma), at(x, y, 0.0), 1))
-    };
-    let (m, n, shapes) = match c.kind {
-        Build::Midpoint => {
-            needs(2, 64)?;
-            let all = c.of.iter().map(point).collect::<Result<Vec<_>>>()?;
-            (middle(all.iter().map(|p| p.0)), middle(all.iter().map(|p| p.1)), all.iter().map(|p| p.2).sum())
-        }
-        Build::Line => {
-            needs(2, 64)?;
-            let all = c.of.iter().map(point).collect::<Result<Vec<_>>>()?;
-            let line = |v: Vec<Value>| line_through(&v);
-            let (a, b) = (line(all.iter().map(|p| p.0).collect())?, line(all.iter().map(|p| p.1).collect())?);
-            (a, b, all.iter().map(|p| p.2).sum())
-        }
-        Build::Intersection => {
-            needs(2, 2)?;
-            let (a, b) = (point(&c.of[0])?, point(&c.of[1])?);
-            (meet(&a.0, &b.0)?, meet(&a.1, &b.1)?, a.2 + b.2)
-        }
-        Build::Offset => {
-            needs(1, 1)?;
-            let (Some(along), Some(by)) = (&c.along, c.by_mm) else {
-                return Err(Fault::input(format!("construction '{}' does not say how far along what", c.name))
-                    .cause("an offset without 'along' or 'by_mm'")
-                    .next("add both: the line to go along, and the millimetres"));
-            };
-            let (p, d) = (point(&c.of[0])?, point(along)?);
-            (moved(&p.0, &d.0, by)?, moved(&p.1, &d.1, by)?, p.2)
-        }
-        Build::Lattice => {
-            needs(1, 1)?;
-            lattice(&c.of[0], drawing, measured, options)?
-        }
-    };
+    let (m, n, shapes) = pair(c, drawing, measured, earlier, options)?;
     let turn = m.direction.zip(n.direction).map(|(a, b)| {
         let d = (a - b).to_degrees().rem_euclid(360.0);
         if d > 180.0 { d - 360.0 } else { d }
@@ -244,65 +180,76 @@ fn one(
     })
 }
 
-fn middle(values: impl Iterator<Item = Value> + Clone) -> Value {
-    let n = values.clone().count() as f64;
-    let sum = |f: fn(&Value) -> f64| values.clone().map(|v| f(&v)).sum::<f64>();
-    Value {
-        x: sum(|v| v.x) / n,
-        y: sum(|v| v.y) / n,
-        direction: None,
-        sigma_mm: sum(|v| v.sigma_mm * v.sigma_mm).sqrt() / n,
-    }
-}
-
-/// Total least squares; points from the first towards the last.
-fn line_through(points: &[Value]) -> Result<Value> {
-    let m = middle(points.iter().copied());
-    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-    for p in points {
-        let (dx, dy) = (p.x - m.x, p.y - m.y);
-        xx += dx * dx;
-        xy += dx * dy;
-        yy += dy * dy;
-    }
-    if xx + yy < 1e-9 {
-        return Err(Fault::input("a line through points that coincide")
-            .cause("an impossible construction")
-            .next("name points that lie apart in 'of'"));
-    }
-    let mut angle = 0.5 * (2.0 * xy).atan2(xx - yy);
-    let (first, last) = (points[0], points[points.len() - 1]);
-    if (last.x - first.x) * angle.cos() + (last.y - first.y) * angle.sin() < 0.0 {
-        angle += std::f64::consts::PI;
-    }
-    Ok(Value { direction: Some(angle), ..m })
-}
-
-fn direction(v: &Value) -> Result<f64> {
-    v.direction.ok_or_else(|| {
-        Fault::input("a point where a line or a lattice is needed")
-            .cause("an impossible construction")
-            .next("name a line or a lattice there")
+fn pair(
+    c: &Construction,
+    drawing: &Drawing,
+    measured: &BTreeMap<(usize, usize), Feature>,
+    earlier: &[Built],
+    options: &MeasureOptions,
+) -> Result<Pair> {
+    let point = |name: &String| named(name, drawing, measured, earlier);
+    Ok(match c.kind {
+        Build::Midpoint => {
+            needs(c, 2, 64)?;
+            let all = c.of.iter().map(point).collect::<Result<Vec<_>>>()?;
+            (middle(all.iter().map(|p| p.0)), middle(all.iter().map(|p| p.1)), all.iter().map(|p| p.2).sum())
+        }
+        Build::Line => {
+            needs(c, 2, 64)?;
+            let all = c.of.iter().map(point).collect::<Result<Vec<_>>>()?;
+            let line = |v: Vec<Value>| line_through(&v);
+            let (a, b) = (line(all.iter().map(|p| p.0).collect())?, line(all.iter().map(|p| p.1).collect())?);
+            (a, b, all.iter().map(|p| p.2).sum())
+        }
+        Build::Intersection => {
+            needs(c, 2, 2)?;
+            let (a, b) = (point(&c.of[0])?, point(&c.of[1])?);
+            (meet(&a.0, &b.0)?, meet(&a.1, &b.1)?, a.2 + b.2)
+        }
+        Build::Offset => {
+            needs(c, 1, 1)?;
+            let (Some(along), Some(by)) = (&c.along, c.by_mm) else {
+                return Err(Fault::input(format!("construction '{}' does not say how far along what", c.name))
+                    .cause("an offset without 'along' or 'by_mm'")
+                    .next("add both: the line to go along, and the millimetres"));
+            };
+            let (p, d) = (point(&c.of[0])?, point(along)?);
+            (moved(&p.0, &d.0, by)?, moved(&p.1, &d.1, by)?, p.2)
+        }
+        Build::Lattice => {
+            needs(c, 1, 1)?;
+            lattice(&c.of[0], drawing, measured, options)?
+        }
     })
 }
 
-fn meet(a: &Value, b: &Value) -> Result<Value> {
-    let ((sa, ca), (sb, cb)) = (direction(a)?.sin_cos(), direction(b)?.sin_cos());
-    let det = sa * cb - ca * sb;
-    if det.abs() < 0.05 {
-        return Err(Fault::input("two lines that are parallel to within 3 degrees do not meet")
-            .cause("an impossible construction")
-            .next("name lines that cross at more than 3 degrees in 'of'"));
+fn needs(c: &Construction, least: usize, most: usize) -> Result<()> {
+    if (least..=most).contains(&c.of.len()) {
+        return Ok(());
     }
-    let (dx, dy) = (b.x - a.x, b.y - a.y);
-    let s = (dy * cb - dx * sb) / det;
-    Ok(Value { x: a.x + s * ca, y: a.y + s * sa, direction: None, sigma_mm: a.sigma_mm.hypot(b.sigma_mm) / det.abs() })
+    Err(Fault::input(format!("a {:?} of {} things, wanted {least} to {most}", c.kind, c.of.len()).to_lowercase())
+        .cause("an impossible construction")
+        .next("correct 'of' in the recipe"))
 }
 
-fn moved(p: &Value, d: &Value, by: [f64; 2]) -> Result<Value> {
-    let angle = direction(d)?;
-    let (s, c) = angle.sin_cos();
-    Ok(Value { x: p.x + c * by[0] - s * by[1], y: p.y + s * by[0] + c * by[1], direction: Some(angle), ..*p })
+/// An earlier construction, or a shape of the drawing.
+fn named(
+    name: &String,
+    drawing: &Drawing,
+    measured: &BTreeMap<(usize, usize), Feature>,
+    earlier: &[Built],
+) -> Result<Pair> {
+    if let Some(b) = earlier.iter().find(|b| b.name == *name) {
+        return Ok((b.measured, b.nominal, b.shapes));
+    }
+    let (shape, element, [x, y]) = drawing.named(name)?;
+    let f = measured.get(&(shape, element)).ok_or_else(|| {
+        Fault::refused(format!("'{name}' was not seen well enough to be measured"))
+            .cause("it is hidden, filled, or between two shots")
+            .next("scan with finer steps, or construct on other pins")
+    })?;
+    let at = |x, y, sigma_mm| Value { x, y, direction: None, sigma_mm };
+    Ok((at(x + f.offset[0], y + f.offset[1], f.sigma), at(x, y, 0.0), 1))
 }
 
 /// Rigid fit of all measured elements of a grid to their nominal places.
@@ -334,7 +281,32 @@ fn lattice(
         .cause("they are hidden, filled, or between two shots")
         .next("scan with finer steps"));
     }
-    // Two rounds: the second without elements that lie 3 robust sigmas off.
+    let Moved { step: t, inverse, sigma: s, used } = moved_by(&seen, options);
+    let centre = drawing.shape[shape].centre.unwrap_or([0.0, 0.0]);
+    let nominal = Value { x: centre[0], y: centre[1], direction: Some(0.0), sigma_mm: 0.0 };
+    let value = Value {
+        x: centre[0] + t.x - t.z * centre[1],
+        y: centre[1] + t.y + t.z * centre[0],
+        direction: Some(t.z),
+        sigma_mm: s * (0.5 * (inverse[(0, 0)] + inverse[(1, 1)])).sqrt(),
+    };
+    Ok((value, nominal, used))
+}
+
+/// How a grid lies as a whole: its place and turn against the drawing.
+struct Moved {
+    /// Along the part's x and y, mm; turn about its origin, rad.
+    step: Vector3<f64>,
+    /// Covariance of it for elements that scatter by 1 mm.
+    inverse: Matrix3<f64>,
+    /// What elements scatter by, mm.
+    sigma: f64,
+    used: usize,
+}
+
+/// Least squares on elements at their nominal places, in two rounds.
+fn moved_by(seen: &[([f64; 2], Feature)], options: &MeasureOptions) -> Moved {
+    // The second without elements that lie 3 robust sigmas off.
     let (mut t, mut inverse, mut limit) = (Vector3::zeros(), Matrix3::zeros(), f64::MAX);
     let mut used = seen.len();
     for _ in 0..2 {
@@ -343,7 +315,7 @@ fn lattice(
             (f.offset[0] - t.x + t.z * p[1], f.offset[1] - t.y - t.z * p[0])
         };
         used = 0;
-        for (p, f) in &seen {
+        for (p, f) in seen {
             let (rx, ry) = off(p, f, &t);
             if rx.hypot(ry) > limit {
                 continue;
@@ -361,14 +333,5 @@ fn lattice(
         size.sort_unstable_by(f64::total_cmp);
         limit = (3.0 * size[size.len() / 2]).max(0.05 * options.unit());
     }
-    let s = limit / 3.0;
-    let centre = drawing.shape[shape].centre.unwrap_or([0.0, 0.0]);
-    let nominal = Value { x: centre[0], y: centre[1], direction: Some(0.0), sigma_mm: 0.0 };
-    let value = Value {
-        x: centre[0] + t.x - t.z * centre[1],
-        y: centre[1] + t.y + t.z * centre[0],
-        direction: Some(t.z),
-        sigma_mm: s * (0.5 * (inverse[(0, 0)] + inverse[(1, 1)])).sqrt(),
-    };
-    Ok((value, nominal, used))
+    Moved { step: t, inverse, sigma: limit / 3.0, used }
 }

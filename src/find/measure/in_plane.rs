@@ -44,18 +44,7 @@ pub(in crate::find) fn fit_edges(
         .cause("the part is hidden, is another one, or the search was misled")
         .next("look at the picture of the match, then scan the part again"));
     }
-    let rows: Vec<(SVector<f64, 5>, f64, u32)> = observations
-        .iter()
-        .filter(|o| o.locates)
-        .map(|o| {
-            let mut j = SVector::<f64, 5>::zeros();
-            j[0] = o.nx;
-            j[1] = o.ny;
-            j[2] = o.x * o.ny - o.y * o.nx;
-            j[3 + o.axis] = 1.0;
-            (j, o.residual, o.row)
-        })
-        .collect();
+    let rows: Vec<_> = observations.iter().filter(|o| o.locates).map(row).collect();
     let growth = GROWTH_PRIOR * options.unit();
     let fit = robust(&rows, &[(3, growth), (4, growth)], 0.03 * options.unit()).ok_or_else(|| {
         Fault::refused("the seen edges do not determine the part's place and turn")
@@ -66,23 +55,8 @@ pub(in crate::find) fn fit_edges(
         o.weight = *w;
     }
     let mut covariance: Matrix3<f64> = fit.covariance.fixed_view::<3, 3>(0, 0).into();
-    // From shot to shot an edge that runs along the stripe is seen by one or two shots only, and all its
-    // samples share the place of those shots against it: one measurement each, however many columns.
-    // In order, so that the same scan gives the same sums to the last bit.
-    let mut shared: BTreeMap<(u32, bool), Vector3<f64>> = BTreeMap::new();
-    let mut normal = Matrix3::zeros();
-    for o in observations.iter().filter(|o| o.locates && o.weight > 0.0) {
-        let j = Vector3::new(o.nx, o.ny, o.x * o.ny - o.y * o.nx) * o.weight;
-        normal += j * j.transpose() / o.weight;
-        if o.axis == 1 {
-            let ascending = if o.nx.abs() > o.ny.abs() { o.nx > 0.0 } else { o.ny > 0.0 };
-            *shared.entry((o.row, ascending)).or_insert_with(Vector3::zeros) += j;
-        }
-    }
-    if let Some(inverse) = normal.try_inverse() {
-        let phase = PHASE * step[1];
-        let middle = shared.values().map(|j| j * j.transpose()).sum::<Matrix3<f64>>() * (phase * phase);
-        covariance += inverse * middle * inverse;
+    if let Some(whole_shots) = of_whole_shots(&observations, PHASE * step[1]) {
+        covariance += whole_shots;
     }
     // What all edges of a kind have in common shifts the part as a whole.
     let bias = options.edge_bias * step[0].max(step[1]);
@@ -99,4 +73,34 @@ pub(in crate::find) fn fit_edges(
         sigma: fit.sigma,
         observations,
     })
+}
+
+/// How a residual follows place, turn and the growth along its axis; with its shot.
+fn row(o: &Observation) -> (SVector<f64, 5>, f64, u32) {
+    let mut j = SVector::<f64, 5>::zeros();
+    j[0] = o.nx;
+    j[1] = o.ny;
+    j[2] = o.x * o.ny - o.y * o.nx;
+    j[3 + o.axis] = 1.0;
+    (j, o.residual, o.row)
+}
+
+/// What the covariance gains because a shot's place against an edge is known to `phase` only, mm.
+fn of_whole_shots(observations: &[Observation], phase: f64) -> Option<Matrix3<f64>> {
+    // From shot to shot an edge that runs along the stripe is seen by one or two shots only, and all its
+    // samples share the place of those shots against it: one measurement each, however many columns.
+    // In order, so that the same scan gives the same sums to the last bit.
+    let mut shared: BTreeMap<(u32, bool), Vector3<f64>> = BTreeMap::new();
+    let mut normal = Matrix3::zeros();
+    for o in observations.iter().filter(|o| o.locates && o.weight > 0.0) {
+        let j = Vector3::new(o.nx, o.ny, o.x * o.ny - o.y * o.nx) * o.weight;
+        normal += j * j.transpose() / o.weight;
+        if o.axis == 1 {
+            let ascending = if o.nx.abs() > o.ny.abs() { o.nx > 0.0 } else { o.ny > 0.0 };
+            *shared.entry((o.row, ascending)).or_insert_with(Vector3::zeros) += j;
+        }
+    }
+    let inverse = normal.try_inverse()?;
+    let middle = shared.values().map(|j| j * j.transpose()).sum::<Matrix3<f64>>() * (phase * phase);
+    Some(inverse * middle * inverse)
 }

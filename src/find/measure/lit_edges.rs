@@ -2,7 +2,7 @@
 //! how much of the sheet's light each sample beside an edge still sends back (docs/math.md, Insertion (3) and (4)).
 //! Frame and unit: a correction in the part frame: x y mm, turn about z rad; light as a share of a fully lit sample's.
 
-use super::edge_pieces::{N, Prior, Row, Unknowns, solve};
+use super::edge_pieces::{N, Prior, Row, Solved, Unknowns, solve};
 use super::options::MeasureOptions;
 use super::points::Ordered;
 use super::robust::median;
@@ -67,6 +67,30 @@ struct Sample {
     z: f64,
 }
 
+/// Fits the unknowns from a start; with the samples used in the last round.
+fn settle(
+    samples: &[Sample],
+    edges: &EdgeIndex,
+    priors: &[Prior],
+    mut x: Unknowns,
+    noise: [f64; 2],
+) -> Option<(Unknowns, Solved, usize)> {
+    let unit = edges.unit();
+    let mut last = None;
+    for _ in 0..ROUNDS {
+        let rows: Vec<Row> = samples.iter().filter_map(|s| row(s, edges, &x)).collect();
+        if rows.len() < MIN_SAMPLES {
+            return None;
+        }
+        let solved = solve(&rows, &x, priors, noise, unit)?;
+        x += solved.step;
+        (5..7).for_each(|k| x[k] = x[k].max(SHARPEST * unit));
+        last = Some((solved, rows.len()));
+    }
+    let (solved, used) = last?;
+    Some((x, solved, used))
+}
+
 /// Fits the light of the samples beside locating edges; `None` where too few are seen. With `shape` the part's sizes are unknown
 /// too, and start there.
 pub(in crate::find) fn fit_light(
@@ -110,18 +134,7 @@ pub(in crate::find) fn fit_light(
     let priors = priors(unit, if shape.is_some() { FREE } else { DRAWN });
     priors.iter().for_each(|p| x[p.0] = p.1);
     x.fixed_rows_mut::<3>(7).copy_from(&shape.unwrap_or_default());
-    let mut last = None;
-    for _ in 0..ROUNDS {
-        let rows: Vec<Row> = samples.iter().filter_map(|s| row(s, edges, &x)).collect();
-        if rows.len() < MIN_SAMPLES {
-            return None;
-        }
-        let solved = solve(&rows, &x, &priors, [bias, scatter], unit)?;
-        x += solved.step;
-        (5..7).for_each(|k| x[k] = x[k].max(SHARPEST * unit));
-        last = Some((solved, rows.len()));
-    }
-    let (solved, samples) = last?;
+    let (x, solved, samples) = settle(&samples, edges, &priors, x, [bias, scatter])?;
     let block = |k: usize| Matrix3::from(solved.covariance.fixed_view::<3, 3>(k, k));
     Some(Lit {
         step: Vector3::new(x[0], x[1], x[2]),

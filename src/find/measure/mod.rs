@@ -14,3 +14,4 @@ pub mod shape;
 mod sizes;
 pub mod slide;
 pub mod surface_ends;
+mod values;

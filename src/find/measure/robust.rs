@@ -49,25 +49,10 @@ pub(in crate::find) fn robust<const N: usize>(
         for &(k, prior) in priors {
             a[(k, k)] += (sigma / prior).powi(2);
         }
-        let scale = SVector::<f64, N>::from_fn(|k, _| a[(k, k)].max(1e-300).sqrt().recip());
-        let unit = SMatrix::<f64, N, N>::from_fn(|i, k| a[(i, k)] * scale[i] * scale[k]);
-        let decomposed = nalgebra::Cholesky::new(unit)?;
-        // The smallest pivot of a unit-diagonal matrix is near 0 where a motion is free.
-        if (0..N).any(|k| decomposed.l()[(k, k)] < 1e-3) {
-            return None;
-        }
-        let inv = decomposed.inverse();
-        inverse = SMatrix::<f64, N, N>::from_fn(|i, k| inv[(i, k)] * scale[i] * scale[k]);
+        inverse = inverted(&a)?;
         step = inverse * b;
     }
-    // In order, so that the same scan gives the same sums to the last bit.
-    let mut by_shot: BTreeMap<u32, SVector<f64, N>> = BTreeMap::new();
-    for ((j, r, shot), w) in rows.iter().zip(&weights) {
-        *by_shot.entry(*shot).or_insert_with(SVector::zeros) += *w * (r - j.dot(&step)) * j;
-    }
-    let clusters = by_shot.len() as f64;
-    let middle = by_shot.values().map(|g| g * g.transpose()).sum::<SMatrix<f64, N, N>>()
-        * (clusters / (clusters - N as f64).max(1.0));
+    let middle = across_shots(rows, &weights, &step);
     let used = weights.iter().filter(|w| **w > 0.0).count();
     // A weighted mean follows a shift of its rows by the mean slope of the influence only, not by the mean weight.
     let (mut weight, mut slope) = (0.0, 0.0);
@@ -87,4 +72,33 @@ pub(in crate::find) fn robust<const N: usize>(
         sandwich * grow
     };
     Some(Fit { step, covariance, used, sigma, weights })
+}
+
+/// Inverse of a normal matrix; `None` where a motion is free.
+fn inverted<const N: usize>(a: &SMatrix<f64, N, N>) -> Option<SMatrix<f64, N, N>> {
+    let scale = SVector::<f64, N>::from_fn(|k, _| a[(k, k)].max(1e-300).sqrt().recip());
+    let unit = SMatrix::<f64, N, N>::from_fn(|i, k| a[(i, k)] * scale[i] * scale[k]);
+    let decomposed = nalgebra::Cholesky::new(unit)?;
+    // The smallest pivot of a unit-diagonal matrix is near 0 where a motion is free.
+    if (0..N).any(|k| decomposed.l()[(k, k)] < 1e-3) {
+        return None;
+    }
+    let inv = decomposed.inverse();
+    Some(SMatrix::from_fn(|i, k| inv[(i, k)] * scale[i] * scale[k]))
+}
+
+/// Scatter of the shots' own pulls: the middle of the sandwich.
+fn across_shots<const N: usize>(
+    rows: &[(SVector<f64, N>, f64, u32)],
+    weights: &[f64],
+    step: &SVector<f64, N>,
+) -> SMatrix<f64, N, N> {
+    // In order, so that the same scan gives the same sums to the last bit.
+    let mut by_shot: BTreeMap<u32, SVector<f64, N>> = BTreeMap::new();
+    for ((j, r, shot), w) in rows.iter().zip(weights) {
+        *by_shot.entry(*shot).or_insert_with(SVector::zeros) += *w * (r - j.dot(step)) * j;
+    }
+    let clusters = by_shot.len() as f64;
+    by_shot.values().map(|g| g * g.transpose()).sum::<SMatrix<f64, N, N>>()
+        * (clusters / (clusters - N as f64).max(1.0))
 }

@@ -55,6 +55,37 @@ struct Runs {
 }
 
 impl Runs {
+    /// Records all of it; where points are wanted, with what measures them and where the poses begin.
+    fn record<T>(
+        device: &Device,
+        frame: &Frame,
+        recorded: &Recorded,
+        ring: &Ring<InFlight<T>>,
+        measuring: Option<(&Measuring, u64)>,
+    ) -> Runs {
+        let mut runs = Runs {
+            prepare: Vec::new(),
+            front: Vec::new(),
+            thinning: recorded.thinning(device, frame),
+            restart: recorded.restart(device, frame),
+            back: Vec::new(),
+        };
+        for slot in &ring.slots {
+            let pixels = measuring.map_or(&slot.outputs[0].buffer, |(m, _)| &m.pixels);
+            let own = [("image", &slot.input), ("header", &slot.header), ("pixels", pixels)];
+            runs.prepare.push(recorded.prepare(device, frame, &own));
+            runs.front.push(recorded.front(device, frame, &own));
+            let mut back = recorded.back(device, frame, &own);
+            if let Some((m, poses)) = measuring {
+                let poses = (&slot.input, poses, POSE_BYTES * u64::from(frame.shots));
+                let [peaks, points] = [0, 1].map(|i| &slot.outputs[i].buffer);
+                back.append(&m.record(device, &slot.input, poses, &slot.header, peaks, points));
+            }
+            runs.back.push(back);
+        }
+        runs
+    }
+
     /// One batch: so many sections of thinning, then further whole rounds.
     fn of(&self, at: usize, upload: bool, sections: usize, rounds: usize) -> Vec<&Recording> {
         let mut work = Vec::new();
@@ -132,26 +163,7 @@ impl<T> Chain<T> {
             },
         )?;
         let (band, parts) = parts(&frame, input);
-        let mut runs = Runs {
-            prepare: Vec::new(),
-            front: Vec::new(),
-            thinning: recorded.thinning(device, &frame),
-            restart: recorded.restart(device, &frame),
-            back: Vec::new(),
-        };
-        for slot in &ring.slots {
-            let pixels = measuring.as_ref().map_or(&slot.outputs[0].buffer, |m| &m.pixels);
-            let own = [("image", &slot.input), ("header", &slot.header), ("pixels", pixels)];
-            runs.prepare.push(recorded.prepare(device, &frame, &own));
-            runs.front.push(recorded.front(device, &frame, &own));
-            let mut back = recorded.back(device, &frame, &own);
-            if let Some(m) = &measuring {
-                let poses = (&slot.input, poses, POSE_BYTES * u64::from(frame.shots));
-                let [peaks, points] = [0, 1].map(|i| &slot.outputs[i].buffer);
-                back.append(&m.record(device, &slot.input, poses, &slot.header, peaks, points));
-            }
-            runs.back.push(back);
-        }
+        let runs = Runs::record(device, &frame, &recorded, &ring, measuring.as_ref().map(|m| (m, poses)));
         Ok(Chain {
             frame,
             device: device.clone(),

@@ -143,67 +143,74 @@ pub fn cases() -> Vec<Case> {
         ("a lattice", 0.35, 0.0927, 0.0),
         ("a lattice on the radius", 0.1875, exact, 0.0),
     ]
-    .into_iter()
-    .map(|(name, step, radius, rough)| {
-        let mut noise = Noise(17);
-        let p = SupportParams { radius_mm: Some(radius), ..Default::default() };
-        let mut f = SupportFrame::new(&p, 1.0);
-        let (mut shots, mut sites, mut places, mut peaks) = (vec![], vec![], vec![], vec![]);
-        for shot in 0..5u32 {
-            let first = places.len();
-            for i in 0..150 {
-                let (x, y) = (0.25 * f64::from(i), step * f64::from(shot));
-                let stray = if noise.next().is_multiple_of(9) { 4.0 * noise.normal() } else { 0.02 * noise.normal() };
-                let z = rough * ((x / 7.0).sin() + stray);
-                let place = [1200.0 + x, y, z, 1200.0 + x].map(whole);
-                let odd = f32::from(u8::from(noise.next().is_multiple_of(3)));
-                places.push(place);
-                peaks.push(Peak {
-                    amplitude: 100.0,
-                    background: if i % 11 == 0 { 40.0 } else { 3.0 },
-                    width_px: 1.0 + 0.4 * odd,
-                    sigma_px: 0.05,
-                    flags: if i % 17 == 0 { Reject::Faint as u32 } else { 0x100 * (i % 2) },
-                    shot,
-                    ..Peak::default()
-                });
-            }
-            let from = sites.len();
-            let kept = (first..places.len()).filter(|&i| peaks[i].kept());
-            sites.extend(kept.map(|i| places[i]));
-            sites[from..].sort_by_key(|s: &Site| s[3]);
-            shots.push((from as u32, sites.len() as u32));
+    .map(|(name, step, radius, rough)| case(name, step, radius, rough))
+    .into()
+}
+
+/// Shots `step` mm apart whose surface rises and strays by `rough` mm.
+fn case(name: &str, step: f64, radius: f32, rough: f64) -> Case {
+    let mut noise = Noise(17);
+    let p = SupportParams { radius_mm: Some(radius), ..Default::default() };
+    let mut f = SupportFrame::new(&p, 1.0);
+    let (mut shots, mut sites, mut places, mut peaks) = (vec![], vec![], vec![], vec![]);
+    for shot in 0..5u32 {
+        let first = places.len();
+        for i in 0..150 {
+            let (x, y) = (0.25 * f64::from(i), step * f64::from(shot));
+            let stray = if noise.next().is_multiple_of(9) { 4.0 * noise.normal() } else { 0.02 * noise.normal() };
+            let z = rough * ((x / 7.0).sin() + stray);
+            let place = [1200.0 + x, y, z, 1200.0 + x].map(whole);
+            let odd = f32::from(u8::from(noise.next().is_multiple_of(3)));
+            places.push(place);
+            peaks.push(Peak {
+                amplitude: 100.0,
+                background: if i % 11 == 0 { 40.0 } else { 3.0 },
+                width_px: 1.0 + 0.4 * odd,
+                sigma_px: 0.05,
+                flags: if i % 17 == 0 { Reject::Faint as u32 } else { 0x100 * (i % 2) },
+                shot,
+                ..Peak::default()
+            });
         }
-        let (reach, drop) = reach((radius.powi(2) as f64 + 1.44 * step * step).sqrt());
-        let at = |i: i64| usize::try_from(i).ok().and_then(|i| shots.get(i)).copied().unwrap_or((0, 0));
-        let table: Vec<Neighbourhood> = (0..5)
-            .map(|i| Neighbourhood {
-                first: [at(i - 1).0, at(i + 1).0],
-                end: [at(i - 1).1, at(i + 1).1],
-                reach: [reach; 2],
-                drop: [drop; 2],
-                clean: 3,
-                doubtful: 4,
-                hazy: 6,
-                usual: 3.0,
-            })
-            .collect();
-        f.peaks = peaks.len() as u32;
-        Case {
-            name: name.into(),
-            overrides: Vec::new(),
-            groups: [f.peaks.div_ceil(64), 1, 1],
-            bindings: vec![
-                bytemuck::cast_slice(&[f]).to_vec(),
-                bytemuck::cast_slice(&table).to_vec(),
-                bytemuck::cast_slice(&sites).to_vec(),
-                bytemuck::cast_slice(&places).to_vec(),
-                bytemuck::cast_slice(&peaks).to_vec(),
-                vec![0; peaks.len()],
-            ],
-        }
-    })
-    .collect()
+        let from = sites.len();
+        let kept = (first..places.len()).filter(|&i| peaks[i].kept());
+        sites.extend(kept.map(|i| places[i]));
+        sites[from..].sort_by_key(|s: &Site| s[3]);
+        shots.push((from as u32, sites.len() as u32));
+    }
+    let table = neighbourhoods(&shots, (radius.powi(2) as f64 + 1.44 * step * step).sqrt());
+    f.peaks = peaks.len() as u32;
+    Case {
+        name: name.into(),
+        overrides: Vec::new(),
+        groups: [f.peaks.div_ceil(64), 1, 1],
+        bindings: vec![
+            bytemuck::cast_slice(&[f]).to_vec(),
+            bytemuck::cast_slice(&table).to_vec(),
+            bytemuck::cast_slice(&sites).to_vec(),
+            bytemuck::cast_slice(&places).to_vec(),
+            bytemuck::cast_slice(&peaks).to_vec(),
+            vec![0; peaks.len()],
+        ],
+    }
+}
+
+/// What each of some shots has beside it: first and last site, and how far it looks, mm.
+fn neighbourhoods(shots: &[(u32, u32)], mm: f64) -> Vec<Neighbourhood> {
+    let (reach, drop) = reach(mm);
+    let at = |i: i64| usize::try_from(i).ok().and_then(|i| shots.get(i)).copied().unwrap_or((0, 0));
+    (0..shots.len() as i64)
+        .map(|i| Neighbourhood {
+            first: [at(i - 1).0, at(i + 1).0],
+            end: [at(i - 1).1, at(i + 1).1],
+            reach: [reach; 2],
+            drop: [drop; 2],
+            clean: 3,
+            doubtful: 4,
+            hazy: 6,
+            usual: 3.0,
+        })
+        .collect()
 }
 
 #[cfg(test)]

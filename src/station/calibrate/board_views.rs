@@ -91,17 +91,22 @@ pub fn boards(recording: &Recording, camera: &Intrinsics, progress: &(dyn Fn(usi
         }
     }
     if out.found.is_empty() {
-        // The picture that says what most pictures say.
-        let votes = |f: &Fault| faults.iter().filter(|o| o.cause == f.cause).count();
-        let (fault, (name, _)) =
-            faults.iter().zip(&out.missing).rev().max_by_key(|(f, _)| votes(f)).expect("one picture or more");
-        let what = format!("no board was found in any of {} pictures; {name}: {}", frames.len(), fault.what);
-        return Err(Fault::input(what)
-            .cause(format!("{}; or another board than meta.json describes", fault.cause))
-            .next(format!("{}; compare meta.json's board with the real one", fault.next)));
+        return Err(none_found(&faults, &out.missing));
     }
     know_diameter(&mut out.found, diameters);
     Ok(out)
+}
+
+/// The fault of a recording none of whose pictures shows its board; one of each picture.
+fn none_found(faults: &[Fault], missing: &[(String, String)]) -> Fault {
+    // The picture that says what most pictures say.
+    let votes = |f: &Fault| faults.iter().filter(|o| o.cause == f.cause).count();
+    let (fault, (name, _)) =
+        faults.iter().zip(missing).rev().max_by_key(|(f, _)| votes(f)).expect("one picture or more");
+    let what = format!("no board was found in any of {} pictures; {name}: {}", faults.len(), fault.what);
+    Fault::input(what)
+        .cause(format!("{}; or another board than meta.json describes", fault.cause))
+        .next(format!("{}; compare meta.json's board with the real one", fault.next))
 }
 
 /// Dots of unstated diameter get the one that the pictures show, in the median.

@@ -40,17 +40,7 @@ pub fn calibrate_latency(
     let motion = recording.meta.motion();
     let rig = &parts_for(rig, &motion);
     let carrier = Carrier::new(rig, &motion)?;
-    let taken: Vec<_> = recording.meta.frames.iter().filter(|f| f.laser.is_some()).map(|f| f.taken.as_ref()).collect();
-    let rates: Vec<Option<Slip>> = taken.iter().map(|t| t.and_then(|t| t.rate)).collect();
-    if rates.iter().all(Option::is_none) {
-        return Err(Fault::refused(format!("{}: no shot was paired by clock", recording.folder.display()))
-            .cause("it was recorded standing still, or by number: then no delay matters")
-            .next("record with --pair clock --pose-stream URI while the part is passed to and fro"));
-    }
-    let former: Vec<f64> = taken.iter().filter_map(|t| t.and_then(|t| t.delay_ns)).collect();
-    if former.iter().any(|d| *d != former[0]) {
-        return Err(Fault::input("its shots were taken with several delays in mind").next("record again in one go"));
-    }
+    let (rates, former_ns) = pairing(recording)?;
     let mut source = RecordingSource::open(recording, None, 0)?;
     let (volume, total) = (believed(settings, rig), source.remaining());
     let mut scanner = Scanner::new(
@@ -87,7 +77,7 @@ pub fn calibrate_latency(
             .next("pass to and fro, several times, over a part with slopes or with edges slanted to the stripe"));
     }
     let latency = Latency {
-        delay_ms: 1e-6 * former.first().copied().unwrap_or(0.0) + 1e3 * beyond.seconds,
+        delay_ms: 1e-6 * former_ns + 1e3 * beyond.seconds,
         sigma_ms,
         created: jiff::Timestamp::now().to_string(),
         recordings: vec![recording.folder.display().to_string()],
@@ -109,4 +99,20 @@ fn passing(
     let later = carrier.place(&rate.times(PART).moves(stand), None, &Vec3::zeros())?.from_camera;
     let moves = later * from_camera.inverse();
     Ok(points.map(|at| Passing { at, velocity: (moves.point(&at) - at) / PART }).collect())
+}
+
+/// What the clock said of each shot, and the delay that all were taken with, ns.
+fn pairing(recording: &Recording) -> Result<(Vec<Option<Slip>>, f64)> {
+    let taken: Vec<_> = recording.meta.frames.iter().filter(|f| f.laser.is_some()).map(|f| f.taken.as_ref()).collect();
+    let rates: Vec<Option<Slip>> = taken.iter().map(|t| t.and_then(|t| t.rate)).collect();
+    if rates.iter().all(Option::is_none) {
+        return Err(Fault::refused(format!("{}: no shot was paired by clock", recording.folder.display()))
+            .cause("it was recorded standing still, or by number: then no delay matters")
+            .next("record with --pair clock --pose-stream URI while the part is passed to and fro"));
+    }
+    let former: Vec<f64> = taken.iter().filter_map(|t| t.and_then(|t| t.delay_ns)).collect();
+    if former.iter().any(|d| *d != former[0]) {
+        return Err(Fault::input("its shots were taken with several delays in mind").next("record again in one go"));
+    }
+    Ok((rates, former.first().copied().unwrap_or(0.0)))
 }

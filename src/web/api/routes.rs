@@ -45,6 +45,22 @@ const BYTES: &str = "application/octet-stream";
 
 /// All of them.
 pub fn routes() -> Vec<Route> {
+    let subjects = [
+        of_door(),
+        of_station(),
+        of_pictures(),
+        of_camera(),
+        of_recipes(),
+        of_jobs(),
+        of_scans(),
+        of_robot(),
+        of_motion(),
+    ];
+    subjects.into_iter().flatten().collect()
+}
+
+/// Who may come in, and which tab operates; what viewers are told.
+fn of_door() -> Vec<Route> {
     vec![
         route(
             ("POST", "/session"),
@@ -66,6 +82,12 @@ pub fn routes() -> Vec<Route> {
             ("", "Event"),
             get(session::events),
         ),
+    ]
+}
+
+/// The station itself: settings, backups, boards, and what somebody who helps asks for.
+fn of_station() -> Vec<Route> {
+    vec![
         route(("GET", "/station"), "Settings and calibrations", ("", "StationInfo"), get(place::station)),
         route(("GET", "/settings"), "Settings and backups", ("", "SettingsState"), get(settings::state)),
         route(
@@ -90,6 +112,19 @@ pub fn routes() -> Vec<Route> {
         )
         .leased(),
         route(("GET", "/bar"), "What the bar shows", ("", "Bar"), get(place::bar)),
+        route(("GET", "/boards"), "Names of the station's calibration boards", ("", ""), get(place::boards)),
+        route(
+            ("GET", "/support"),
+            "Settings, jobs and machine for somebody who helps; pictures=true: the newest ones too",
+            ("?SupportAsk", "application/json"),
+            get(support::support),
+        ),
+    ]
+}
+
+/// Recordings and their pictures.
+fn of_pictures() -> Vec<Route> {
+    vec![
         route(
             ("GET", "/recordings"),
             "Recordings below the recordings' folder",
@@ -109,6 +144,12 @@ pub fn routes() -> Vec<Route> {
             ("?PictureRef", "PictureLook"),
             get(camera::look_back),
         ),
+    ]
+}
+
+/// The camera as it runs.
+fn of_camera() -> Vec<Route> {
+    vec![
         route(("GET", "/camera"), "What the camera can be set to", ("", "CameraState"), get(camera::state)),
         route(
             ("PUT", "/camera/features"),
@@ -129,6 +170,12 @@ pub fn routes() -> Vec<Route> {
             ("", BYTES),
             get(camera::newest),
         ),
+    ]
+}
+
+/// What is looked for, and how the line would go over it.
+fn of_recipes() -> Vec<Route> {
+    vec![
         route(
             ("GET", "/recipes"),
             "Recipes, shipped ones and the station's",
@@ -162,6 +209,18 @@ pub fn routes() -> Vec<Route> {
             post(place::drawing),
         )
         .leased(),
+        route(
+            ("GET", "/sweep"),
+            "How the line would go over a recipe's part, and which speed, step and pictures a second go together",
+            ("?SweepAsk", "SweepPlan"),
+            get(sweep::planned),
+        ),
+    ]
+}
+
+/// Jobs and what they left.
+fn of_jobs() -> Vec<Route> {
+    vec![
         route(("GET", "/jobs"), "Jobs, newest first", ("", "Job[]"), get(jobs::list)),
         route(("POST", "/jobs"), "Order a procedure", ("Order", "Job"), post(jobs::order)).leased(),
         route(("GET", "/jobs/{id}"), "One job", ("", "Job"), get(jobs::get)),
@@ -192,6 +251,18 @@ pub fn routes() -> Vec<Route> {
             get(camera::ghost),
         ),
         route(("GET", "/jobs/{id}/files/{*name}"), "A file that a job left", ("", BYTES), get(jobs::file)),
+        route(
+            ("POST", "/repeats"),
+            "How the places of one part repeat that jobs have found",
+            ("RepeatsAsk", "Repeats"),
+            post(sweep::repeated),
+        ),
+    ]
+}
+
+/// A scan, looked at and measured in.
+fn of_scans() -> Vec<Route> {
+    vec![
         route(
             ("GET", "/scans/{id}/map"),
             "What the numbers of a scan's height map mean",
@@ -230,18 +301,12 @@ pub fn routes() -> Vec<Route> {
             post(surface::measured),
         ),
         route(("GET", "/scans/{id}/points"), "Points to look at (most=)", ("", BYTES), get(surface::points)),
-        route(
-            ("GET", "/sweep"),
-            "How the line would go over a recipe's part, and which speed, step and pictures a second go together",
-            ("?SweepAsk", "SweepPlan"),
-            get(sweep::planned),
-        ),
-        route(
-            ("POST", "/repeats"),
-            "How the places of one part repeat that jobs have found",
-            ("RepeatsAsk", "Repeats"),
-            post(sweep::repeated),
-        ),
+    ]
+}
+
+/// The robot, real or simulated: how it stands and who may move it.
+fn of_robot() -> Vec<Route> {
+    vec![
         route(("GET", "/motion"), "The robot as it may be moved from here", ("", "MotionState"), get(motion::state)),
         route(
             ("POST", "/robot"),
@@ -265,6 +330,19 @@ pub fn routes() -> Vec<Route> {
         )
         .leased(),
         route(
+            ("POST", "/simulated"),
+            "What a person does in the simulated cell: a component into the gripper, the arm jogged",
+            ("InTheCell", "MotionState"),
+            post(motion::simulated),
+        )
+        .leased(),
+    ]
+}
+
+/// One motion, from the button that goes down to the halt.
+fn of_motion() -> Vec<Route> {
+    vec![
+        route(
             ("POST", "/motion/press"),
             "The button over a motion goes down",
             ("Confirmed", "Grant"),
@@ -287,19 +365,5 @@ pub fn routes() -> Vec<Route> {
             post(motion::release),
         ),
         route(("POST", "/stop"), "STOP: what moves is halted, every job ends", ("", ""), post(motion::stop)),
-        route(
-            ("POST", "/simulated"),
-            "What a person does in the simulated cell: a component into the gripper, the arm jogged",
-            ("InTheCell", "MotionState"),
-            post(motion::simulated),
-        )
-        .leased(),
-        route(("GET", "/boards"), "Names of the station's calibration boards", ("", ""), get(place::boards)),
-        route(
-            ("GET", "/support"),
-            "Settings, jobs and machine for somebody who helps; pictures=true: the newest ones too",
-            ("?SupportAsk", "application/json"),
-            get(support::support),
-        ),
     ]
 }

@@ -7,6 +7,27 @@ use ts_rs::TS;
 /// `docs/messages.d.ts`; a test holds the file against this.
 pub fn declarations() -> String {
     let all = [
+        of_bar(),
+        of_orders(),
+        of_outcomes(),
+        of_motion(),
+        of_door(),
+        of_station(),
+        of_recipes(),
+        of_surface(),
+        of_sweep(),
+    ]
+    .concat();
+    let body: Vec<String> = all.iter().map(|d| format!("export {d}")).collect();
+    format!(
+        "// Made from src/web/message by the test `messages`; SHEETLIGHT_WRITE=1 makes it again.\n\n{}\n",
+        body.join("\n\n")
+    )
+}
+
+/// What the bar shows; how a job stands, and what went wrong.
+fn of_bar() -> Vec<String> {
+    vec![
         Mode::decl(),
         RobotState::decl(),
         Frames::decl(),
@@ -15,6 +36,12 @@ pub fn declarations() -> String {
         Bar::decl(),
         JobState::decl(),
         Problem::decl(),
+    ]
+}
+
+/// What can be ordered.
+fn of_orders() -> Vec<String> {
+    vec![
         Target::decl(),
         TeachOrder::decl(),
         Plain::decl(),
@@ -31,6 +58,12 @@ pub fn declarations() -> String {
         InsertOrder::decl(),
         BenchmarkOrder::decl(),
         Order::decl(),
+    ]
+}
+
+/// What came of an order, and the camera that an outcome may show.
+fn of_outcomes() -> Vec<String> {
+    vec![
         CheckLine::decl(),
         ScanFigures::decl(),
         Notation::decl(),
@@ -53,18 +86,22 @@ pub fn declarations() -> String {
         KeptUp::decl(),
         Outcome::decl(),
         Job::decl(),
-        Asked::decl(),
-        SimulatedCell::decl(),
-        MotionState::decl(),
-        Arming::decl(),
-        InTheCell::decl(),
-        Event::decl(),
-        Knock::decl(),
-        Session::decl(),
-        TakeLease::decl(),
-        Confirmed::decl(),
-        Grant::decl(),
-        Redeem::decl(),
+    ]
+}
+
+/// What moves the robot, and what viewers are told.
+fn of_motion() -> Vec<String> {
+    vec![Asked::decl(), SimulatedCell::decl(), MotionState::decl(), Arming::decl(), InTheCell::decl(), Event::decl()]
+}
+
+/// Who may come in and what they confirm.
+fn of_door() -> Vec<String> {
+    vec![Knock::decl(), Session::decl(), TakeLease::decl(), Confirmed::decl(), Grant::decl(), Redeem::decl()]
+}
+
+/// The station: calibrations, settings, recordings.
+fn of_station() -> Vec<String> {
+    vec![
         CalibrationState::decl(),
         FrameInfo::decl(),
         StationInfo::decl(),
@@ -77,11 +114,17 @@ pub fn declarations() -> String {
         ViewRef::decl(),
         SupportAsk::decl(),
         PictureRef::decl(),
-        RecipeText::decl(),
-        PointsOf::decl(),
-        RecipePoint::decl(),
-        DrawingAsk::decl(),
-        DrawingRead::decl(),
+    ]
+}
+
+/// Recipes and their drawings.
+fn of_recipes() -> Vec<String> {
+    vec![RecipeText::decl(), PointsOf::decl(), RecipePoint::decl(), DrawingAsk::decl(), DrawingRead::decl()]
+}
+
+/// A scan looked at, and measured in.
+fn of_surface() -> Vec<String> {
+    vec![
         MapHead::decl(),
         Outlines::decl(),
         Ghost::decl(),
@@ -94,16 +137,10 @@ pub fn declarations() -> String {
         PlaneAsk::decl(),
         Measure::decl(),
         MeasureAnswer::decl(),
-        SweepAsk::decl(),
-        Pace::decl(),
-        SweepPlan::decl(),
-        RepeatsAsk::decl(),
-        Spread::decl(),
-        Repeats::decl(),
-    ];
-    let body: Vec<String> = all.iter().map(|d| format!("export {d}")).collect();
-    format!(
-        "// Made from src/web/message by the test `messages`; SHEETLIGHT_WRITE=1 makes it again.\n\n{}\n",
-        body.join("\n\n")
-    )
+    ]
+}
+
+/// A sweep before it is made, and how places repeat.
+fn of_sweep() -> Vec<String> {
+    vec![SweepAsk::decl(), Pace::decl(), SweepPlan::decl(), RepeatsAsk::decl(), Spread::decl(), Repeats::decl()]
 }
