@@ -57,8 +57,8 @@ fn a_stage_is_two_files_and_a_line() {
         .current_dir(dir.path())
         .args(["test", "--locked", "--offline", "--test", "stages", "--test", "shader_contracts"])
         .args(["--", "--nocapture"])
-        // Its own: the program of that name in the other one is what other tests run.
-        .env("CARGO_TARGET_DIR", dir.path().join("target"))
+        // Its own: the program of that name in the other one is what other tests run. Kept: the crates are built once.
+        .env("CARGO_TARGET_DIR", Path::new(env!("CARGO_TARGET_TMPDIR")).join("added_stage"))
         .output()
         .unwrap();
     let said = String::from_utf8_lossy(&run.stdout);
