@@ -115,21 +115,8 @@ impl Convention {
         .next("write X Y Z RX RY RZ and the figure, or leave the figure out"))
     }
 
-    /// Reads a pose. Wrong counts, numbers that are not finite and quaternions whose length is
-    /// off by more than 1e-2 are refused, and angles of more than ten turns.
-    pub fn read<To: Frame, From: Frame>(self, numbers: &[f64]) -> Result<Rigid<To, From>> {
-        let want = self.labels().len();
-        let numbers = self.without_figure(numbers)?;
-        if numbers.len() != want {
-            return Err(Fault::input(format!(
-                "a {} pose has {want} numbers ({}), {} given",
-                self.name(),
-                self.labels().join(", "),
-                numbers.len()
-            ))
-            .cause("another convention than the one named")
-            .next("name the convention that the robot really writes"));
-        }
+    /// Refuses numbers that no robot's pose has.
+    fn believe(self, numbers: &[f64]) -> Result<()> {
         if numbers.iter().any(|x| !x.is_finite()) {
             return Err(Fault::input("a pose holds a number that is not finite")
                 .cause("NaN in the pose file")
@@ -150,6 +137,25 @@ impl Convention {
                 .cause("a slipped decimal point, another unit, or a damaged file")
                 .next("export the pose again, or name the convention that the robot really writes"));
         }
+        Ok(())
+    }
+
+    /// Reads a pose. Wrong counts, numbers that are not finite and quaternions whose length is
+    /// off by more than 1e-2 are refused, and angles of more than ten turns.
+    pub fn read<To: Frame, From: Frame>(self, numbers: &[f64]) -> Result<Rigid<To, From>> {
+        let want = self.labels().len();
+        let numbers = self.without_figure(numbers)?;
+        if numbers.len() != want {
+            return Err(Fault::input(format!(
+                "a {} pose has {want} numbers ({}), {} given",
+                self.name(),
+                self.labels().join(", "),
+                numbers.len()
+            ))
+            .cause("another convention than the one named")
+            .next("name the convention that the robot really writes"));
+        }
+        self.believe(numbers)?;
         if self == Convention::Matrix {
             let rows: [f64; 16] = numbers.try_into().expect("counted above");
             return Rigid::from_rows(&rows).map(|(pose, _)| pose);

@@ -81,6 +81,43 @@ fn by_clock(meta: &Meta) -> bool {
     meta.frames.iter().flat_map(|f| &f.taken).any(|t| t.pairing == Some(Pairing::Clock))
 }
 
+/// Place and name of a picture, where things stood at it and how far that may be off.
+type Job = (u32, String, Result<Stand>, Option<Slip>);
+
+/// The shots in order, decoded on another thread as far ahead as memory allows.
+fn ahead(
+    recording: Recording,
+    jobs: Vec<Job>,
+    format: &Format,
+) -> Result<Receiver<std::result::Result<Shot, BadShot>>> {
+    let bytes = format.width as usize * format.height as usize * if format.bits > 8 { 2 } else { 1 };
+    let ahead = (AHEAD_BYTES / bytes.max(1)).clamp(8, 64);
+    let (send, shots) = sync_channel(ahead);
+    let started = std::thread::Builder::new().name("pictures".into()).spawn(move || {
+        for chunk in jobs.chunks((ahead / 2).max(rayon::current_num_threads())) {
+            let decoded: Vec<_> = chunk
+                .par_iter()
+                .map(|(index, name, stand, slip)| {
+                    let (index, name, slip) = (*index, name.clone(), *slip);
+                    let shot = stand.clone().and_then(|s| Ok((s, recording.picture(&name)?)));
+                    match shot {
+                        Ok((stand, image)) => Ok(Shot { index, name, image, stand, slip, here_ns: None }),
+                        Err(fault) => Err(BadShot { index, name, fault, last: false }),
+                    }
+                })
+                .collect();
+            for shot in decoded {
+                // The scan ended early and dropped the receiver: nothing is left to do.
+                if send.send(shot).is_err() {
+                    return;
+                }
+            }
+        }
+    });
+    started.map_err(|e| Fault::threads(&e))?;
+    Ok(shots)
+}
+
 impl RecordingSource {
     /// Starts decoding at shot `first`. `poses` names the pose file where meta.json does not.
     /// Refused: no laser pictures, a pose index outside the pose file.
@@ -108,7 +145,7 @@ impl RecordingSource {
                 }
             }
         }
-        let mut jobs = Vec::new();
+        let mut jobs: Vec<Job> = Vec::new();
         for (name, stand, slip) in stands {
             recording.inside(&name)?;
             jobs.push((jobs.len() as u32, name, stand, slip));
@@ -120,32 +157,8 @@ impl RecordingSource {
         }
         let jobs = jobs.split_off(first.min(jobs.len()));
         let format = Format { width: meta.image.width, height: meta.image.height, bits: recording.bits() };
-        let bytes = format.width as usize * format.height as usize * if format.bits > 8 { 2 } else { 1 };
-        let ahead = (AHEAD_BYTES / bytes.max(1)).clamp(8, 64);
-        let (send, shots) = sync_channel(ahead);
-        let (remaining, recording) = (jobs.len(), recording.clone());
-        let started = std::thread::Builder::new().name("pictures".into()).spawn(move || {
-            for chunk in jobs.chunks((ahead / 2).max(rayon::current_num_threads())) {
-                let decoded: Vec<_> = chunk
-                    .par_iter()
-                    .map(|(index, name, stand, slip)| {
-                        let (index, name, slip) = (*index, name.clone(), *slip);
-                        let shot = stand.clone().and_then(|s| Ok((s, recording.picture(&name)?)));
-                        match shot {
-                            Ok((stand, image)) => Ok(Shot { index, name, image, stand, slip, here_ns: None }),
-                            Err(fault) => Err(BadShot { index, name, fault, last: false }),
-                        }
-                    })
-                    .collect();
-                for shot in decoded {
-                    // The scan ended early and dropped the receiver: nothing is left to do.
-                    if send.send(shot).is_err() {
-                        return;
-                    }
-                }
-            }
-        });
-        started.map_err(|e| Fault::threads(&e))?;
+        let remaining = jobs.len();
+        let shots = ahead(recording.clone(), jobs, &format)?;
         let remarks = meta.image.response.remark(meta.image.bits).into_iter().collect();
         Ok(RecordingSource { format, remarks, remaining, shots })
     }

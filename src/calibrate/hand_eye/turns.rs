@@ -64,20 +64,9 @@ impl Reading {
     }
 }
 
-/// Which of `turns` each picture has to be read with, so that all boards are one board in one place. The turn
-/// that is common to all pictures is free; as few as possible are read anew. Up to half of the pairs may be
-/// wrong; the result does not depend on the pairs' order.
-///
-/// # Errors
-/// Where no reading agrees with the robot's poses, or where two different ones do.
-pub fn resolve(pairs: &[Pair], turns: &[Turn], seed: u64) -> Result<Vec<usize>> {
-    let (n, count) = (pairs.len(), turns.len());
-    if n < 3 || count < 2 {
-        return Ok(vec![0; n]);
-    }
-    let order = canonical_order(pairs);
-    let readings: Vec<Vec<Pair>> =
-        order.iter().map(|&i| turns.iter().map(|t| read_with(&pairs[i], t)).collect()).collect();
+/// Readings by the chains of all triples of pictures that robot and boards turn alike in, or of many drawn ones.
+fn candidates(readings: &[Vec<Pair>], count: usize, seed: u64) -> Vec<Reading> {
+    let n = readings.len();
     let mut found: Vec<Reading> = Vec::new();
     let mut consider = |[a, b, c]: [usize; 3]| {
         for kb in 0..count {
@@ -89,7 +78,7 @@ pub fn resolve(pairs: &[Pair], turns: &[Turn], seed: u64) -> Result<Vec<usize>> 
                 if !same_angle(three[0], three[2]) || !same_angle(three[1], three[2]) {
                     continue;
                 }
-                found.extend(park_martin(&three).map(|chain| Reading::by(&chain, &readings)));
+                found.extend(park_martin(&three).map(|chain| Reading::by(&chain, readings)));
             }
         }
     };
@@ -104,6 +93,24 @@ pub fn resolve(pairs: &[Pair], turns: &[Turn], seed: u64) -> Result<Vec<usize>> 
             consider([drawn.index(0), drawn.index(1), drawn.index(2)]);
         }
     }
+    found
+}
+
+/// Which of `turns` each picture has to be read with, so that all boards are one board in one place. The turn
+/// that is common to all pictures is free; as few as possible are read anew. Up to half of the pairs may be
+/// wrong; the result does not depend on the pairs' order.
+///
+/// # Errors
+/// Where no reading agrees with the robot's poses, or where two different ones do.
+pub fn resolve(pairs: &[Pair], turns: &[Turn], seed: u64) -> Result<Vec<usize>> {
+    let (n, count) = (pairs.len(), turns.len());
+    if n < 3 || count < 2 {
+        return Ok(vec![0; n]);
+    }
+    let order = canonical_order(pairs);
+    let readings: Vec<Vec<Pair>> =
+        order.iter().map(|&i| turns.iter().map(|t| read_with(&pairs[i], t)).collect()).collect();
+    let found = candidates(&readings, count, seed);
     let least = found.iter().map(|r| r.rad).fold(f64::INFINITY, f64::min);
     let fitting: Vec<&Reading> = found.iter().filter(|r| r.rad <= MARGIN * least + FINE).collect();
     let best = fitting.iter().min_by(|a, b| a.mm.total_cmp(&b.mm));

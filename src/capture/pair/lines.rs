@@ -153,6 +153,12 @@ impl Lines {
         paced: bool,
     ) -> Result<()> {
         self.seen += 1;
+        self.clocks(t_ns, here_ns, paced)?;
+        self.units(kind, numbers, stand)
+    }
+
+    /// Times go on as fast as time does, and by the clock that the head names.
+    fn clocks(&mut self, t_ns: u64, here_ns: u64, paced: bool) -> Result<()> {
         let (t0, here0) = *self.first.get_or_insert((t_ns, here_ns));
         let (there, here) = (t_ns.saturating_sub(t0) as f64, here_ns.saturating_sub(here0));
         let long = paced && here >= LONG_ENOUGH && t_ns > t0;
@@ -175,6 +181,11 @@ impl Lines {
             .cause("the sender's clock is another one, or its times are not in nanoseconds")
             .next("write '# clock: own', or synchronise the clocks"));
         }
+        Ok(())
+    }
+
+    /// Places and angles are as large as in the convention's units.
+    fn units(&mut self, kind: Kind, numbers: &[f64], stand: &Stand) -> Result<()> {
         let (Kind::Pose(convention), Stand::Robot(pose), false) = (kind, stand, self.meant) else { return Ok(()) };
         self.reach = self.reach.max(pose.translation.norm());
         let angles = convention.angles();

@@ -107,19 +107,7 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
         Command::Restore(a) => return keep::restore(a, console),
         Command::Serve(a) => return serve::run(a, console),
         Command::Password(a) => return serve::password(a, console),
-        Command::New(a) => {
-            if a.station.join("station.toml").exists() {
-                let what = format!("{}: is a station already", a.station.display());
-                return Err(Fault::usage(what).next("choose another folder"));
-            }
-            let settings = Settings {
-                name: a.name.clone().unwrap_or_else(|| named(&a.station)),
-                robot: a.robot,
-                ..Settings::default()
-            };
-            settings.store(&a.station)?;
-            console.result(&settings, &format!("{}: made; calibrate it or import values next", a.station.display()));
-        }
+        Command::New(a) => return make(a, console),
         Command::Show(a) => {
             let (settings, rig) = (Settings::load(&a.station)?, Rig::load(&a.station)?);
             console.result(&Values::of(&rig), &summary(&settings, &rig));
@@ -140,23 +128,39 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
             crate::files::write(&a.out, text.as_bytes())?;
             console.say(format!("{}: written", a.out.display()));
         }
-        Command::Seal(a) => {
-            let vouch = match a.kind {
-                Kind::Camera => Rig::vouch::<Intrinsics>,
-                Kind::LaserPlane => Rig::vouch::<Plane<Camera>>,
-                Kind::Pointer => Rig::vouch::<Ray<Camera>>,
-                Kind::BaseCamera => Rig::vouch::<Rigid<Base, Camera>>,
-                Kind::LinearAxis | Kind::Turntable => Rig::vouch::<Axis>,
-                _ => Rig::vouch::<HandEye>,
-            };
-            if a.because.trim().is_empty() {
-                return Err(Fault::usage("--because says nothing").next("say why the file is to be believed"));
-            }
-            let path = vouch(&a.station, a.kind, a.because.trim(), a.as_stated)?;
-            console.result(&path, &format!("{}: sealed; reports made with it say so", path.display()));
-            stale(&a.station, console);
-        }
+        Command::Seal(a) => return seal(a, console),
     }
+    Ok(())
+}
+
+fn make(a: &New, console: &Console) -> Result<()> {
+    if a.station.join("station.toml").exists() {
+        let what = format!("{}: is a station already", a.station.display());
+        return Err(Fault::usage(what).next("choose another folder"));
+    }
+    let settings =
+        Settings { name: a.name.clone().unwrap_or_else(|| named(&a.station)), robot: a.robot, ..Settings::default() };
+    settings.store(&a.station)?;
+    console.result(&settings, &format!("{}: made; calibrate it or import values next", a.station.display()));
+    Ok(())
+}
+
+/// Vouches for a calibration that was edited.
+fn seal(a: &Seal, console: &Console) -> Result<()> {
+    let vouch = match a.kind {
+        Kind::Camera => Rig::vouch::<Intrinsics>,
+        Kind::LaserPlane => Rig::vouch::<Plane<Camera>>,
+        Kind::Pointer => Rig::vouch::<Ray<Camera>>,
+        Kind::BaseCamera => Rig::vouch::<Rigid<Base, Camera>>,
+        Kind::LinearAxis | Kind::Turntable => Rig::vouch::<Axis>,
+        _ => Rig::vouch::<HandEye>,
+    };
+    if a.because.trim().is_empty() {
+        return Err(Fault::usage("--because says nothing").next("say why the file is to be believed"));
+    }
+    let path = vouch(&a.station, a.kind, a.because.trim(), a.as_stated)?;
+    console.result(&path, &format!("{}: sealed; reports made with it say so", path.display()));
+    stale(&a.station, console);
     Ok(())
 }
 

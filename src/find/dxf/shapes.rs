@@ -11,13 +11,10 @@ fn micrometre(v: f64) -> f64 {
     (v * 1000.0).round() / 1000.0 + 0.0
 }
 
-/// The shapes, the largest outline first: it lies on the datum surface.
-pub fn shapes(mut loops: Vec<Loop>, open: &[Curve]) -> Vec<Shape> {
-    loops.sort_by(|a, b| area(&b.points).abs().total_cmp(&area(&a.points).abs()));
-    let datum = loops.first().map_or(0.0, |l| l.z);
+/// The smallest larger loop around each, on the same surface; loops come by size, the largest first.
+fn parents(loops: &[Loop]) -> Vec<Option<usize>> {
     let boxes: Vec<[f64; 4]> = loops.iter().map(|l| bounds(&l.points)).collect();
-    // The smallest larger loop around each, on the same surface.
-    let parents: Vec<Option<usize>> = (0..loops.len())
+    (0..loops.len())
         .map(|i| {
             let inner = inside_of(&loops[i].points);
             (0..i).rev().find(|&k| {
@@ -26,12 +23,11 @@ pub fn shapes(mut loops: Vec<Loop>, open: &[Curve]) -> Vec<Shape> {
                 near && (loops[k].z - loops[i].z).abs() < 1e-6 && contains(&loops[k].points, inner[0], inner[1])
             })
         })
-        .collect();
-    let mut depth = vec![0usize; loops.len()];
-    for i in 0..loops.len() {
-        depth[i] = parents[i].map_or(0, |p| depth[p] + 1);
-    }
-    // Material that stands in a hole belongs to the hole's outline: a slit without width leads to it.
+        .collect()
+}
+
+/// Material that stands in a hole belongs to the hole's outline: a slit without width leads to it.
+fn bridge_islands(loops: &mut [Loop], parents: &[Option<usize>], depth: &[usize]) {
     let mut islands: Vec<usize> = (0..loops.len()).filter(|&i| depth[i] >= 2 && depth[i].is_multiple_of(2)).collect();
     islands.sort_by_key(|&i| depth[i]);
     for i in islands {
@@ -43,6 +39,18 @@ pub fn shapes(mut loops: Vec<Loop>, open: &[Curve]) -> Vec<Shape> {
         hole.points.extend(&island);
         hole.points.push(island[0]);
     }
+}
+
+/// The shapes, the largest outline first: it lies on the datum surface.
+pub fn shapes(mut loops: Vec<Loop>, open: &[Curve]) -> Vec<Shape> {
+    loops.sort_by(|a, b| area(&b.points).abs().total_cmp(&area(&a.points).abs()));
+    let datum = loops.first().map_or(0.0, |l| l.z);
+    let parents = parents(&loops);
+    let mut depth = vec![0usize; loops.len()];
+    for i in 0..loops.len() {
+        depth[i] = parents[i].map_or(0, |p| depth[p] + 1);
+    }
+    bridge_islands(&mut loops, &parents, &depth);
     let mut out = Vec::new();
     let mut circles: Vec<(&Loop, Inside, [f64; 2], f64)> = Vec::new();
     for (l, depth) in loops.iter().zip(&depth) {

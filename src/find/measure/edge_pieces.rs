@@ -56,27 +56,7 @@ pub(in crate::find) fn solve(
         .iter()
         .map(|r| (1.0 - (r.residual / (TUKEY * sigma)).powi(2)).max(0.0).powi(2) / (sigma * sigma))
         .collect();
-    let (mut a, mut b) = (Square::zeros(), Unknowns::zeros());
-    for &(k, mean, sd) in priors {
-        a[(k, k)] += 1.0 / (sd * sd);
-        b[k] += (mean - x[k]) / (sd * sd);
-    }
-    let mut pieces = BTreeMap::<_, Piece>::new();
-    for (i, (r, w)) in rows.iter().zip(&weights).enumerate() {
-        a += *w * r.j * r.j.transpose();
-        b += *w * r.residual * r.j;
-        let p = pieces.entry(r.piece).or_insert_with(|| Piece {
-            cross: Unknowns::zeros(),
-            own: 0.0,
-            right: 0.0,
-            rows: vec![],
-        });
-        p.cross += *w * r.slope * r.j;
-        p.own += w * r.slope * r.slope;
-        p.right += w * r.slope * r.residual;
-        p.rows.push(i);
-    }
-    let pieces: Vec<Piece> = pieces.into_values().collect();
+    let (a, b, pieces) = gathered(rows, &weights, x, priors);
     let least = 1e-4 * unit;
     let mut size = bias.max(least);
     let (mut inverse, mut step) = (Square::zeros(), Unknowns::zeros());
@@ -101,6 +81,31 @@ pub(in crate::find) fn solve(
     }
     let covariance = spread(rows, &weights, &pieces, &reduced, &inverse, &step, size, scatter);
     Some(Solved { step, covariance, sigma })
+}
+
+/// Normal matrix and right side of the priors and all rows, and what each piece takes from them.
+fn gathered(rows: &[Row], weights: &[f64], x: &Unknowns, priors: &[Prior]) -> (Square, Unknowns, Vec<Piece>) {
+    let (mut a, mut b) = (Square::zeros(), Unknowns::zeros());
+    for &(k, mean, sd) in priors {
+        a[(k, k)] += 1.0 / (sd * sd);
+        b[k] += (mean - x[k]) / (sd * sd);
+    }
+    let mut pieces = BTreeMap::<_, Piece>::new();
+    for (i, (r, w)) in rows.iter().zip(weights).enumerate() {
+        a += *w * r.j * r.j.transpose();
+        b += *w * r.residual * r.j;
+        let p = pieces.entry(r.piece).or_insert_with(|| Piece {
+            cross: Unknowns::zeros(),
+            own: 0.0,
+            right: 0.0,
+            rows: vec![],
+        });
+        p.cross += *w * r.slope * r.j;
+        p.own += w * r.slope * r.slope;
+        p.right += w * r.slope * r.residual;
+        p.rows.push(i);
+    }
+    (a, b, pieces.into_values().collect())
 }
 
 /// The inverse, scaled to unit diagonal first; `None` where a motion is free.

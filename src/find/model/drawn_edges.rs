@@ -23,6 +23,25 @@ struct Contour {
     element: usize,
 }
 
+/// -1 where the material lies right of the contour at a place, 1 where left, or where nothing tells; `None` where it lies on
+/// both sides or on neither. `r` points right.
+fn side(c: &Contour, face: Option<&Face>, [x, y]: [f64; 2], [rx, ry]: [f64; 2]) -> Option<f64> {
+    let sign = match (c.closed && c.inside != Inside::Either, face) {
+        (true, Some(f)) => {
+            const STEP: f64 = 1e-6;
+            let right = f.material(x + STEP * rx, y + STEP * ry);
+            let left = f.material(x - STEP * rx, y - STEP * ry);
+            if right == left {
+                return None;
+            }
+            if right { -1.0 } else { 1.0 }
+        }
+        _ if c.inside == Inside::Low => -1.0,
+        _ => 1.0,
+    };
+    Some(sign)
+}
+
 /// A place on an edge of the drawing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeSample {
@@ -90,19 +109,7 @@ impl Drawing {
                 while carry < length {
                     let (x, y) = (a[0] + dx * carry / length, a[1] + dy * carry / length);
                     carry += spacing;
-                    let sign = match (c.closed && c.inside != Inside::Either, face) {
-                        (true, Some(f)) => {
-                            const STEP: f64 = 1e-6;
-                            let right = f.material(x + STEP * rx, y + STEP * ry);
-                            let left = f.material(x - STEP * rx, y - STEP * ry);
-                            if right == left {
-                                continue;
-                            }
-                            if right { -1.0 } else { 1.0 }
-                        }
-                        _ if c.inside == Inside::Low => -1.0,
-                        _ => 1.0,
-                    };
+                    let Some(sign) = side(&c, face, [x, y], [rx, ry]) else { continue };
                     let either = c.inside == Inside::Either;
                     let (extent, search, measure) = (c.extent, c.search, c.measure && c.closed && !either);
                     let curvature =
