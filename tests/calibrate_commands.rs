@@ -99,7 +99,9 @@ fn with_spots_cut(from: &Path, to: &Path, spots: &[[f64; 2]]) {
     let mut meta = json(&from.join("meta.json"));
     let (a, b) = (spots[0], spots[spots.len() - 1]);
     let beam = nalgebra::Vector2::new(b[0] - a[0], b[1] - a[1]).normalize();
-    for (i, (frame, spot)) in meta["frames"].as_array_mut().unwrap().iter_mut().zip(spots).enumerate() {
+    let frames = meta["frames"].as_array_mut().unwrap();
+    frames.truncate(spots.len());
+    for (i, (frame, spot)) in frames.iter_mut().zip(spots).enumerate() {
         let picture = load(&from.join(frame["laser"].as_str().unwrap()), Channel::Luma, 8).unwrap();
         let mut bytes = picture.to_u8();
         let dark = *bytes.clone().select_nth_unstable(picture.width as usize * picture.height as usize / 2).1;
@@ -188,10 +190,10 @@ fn a_station_is_calibrated_ranged_and_verified_by_its_commands() {
         let sigma = figure(d, &["along_axis_sigma_mm"]);
         assert!(e.abs() < 4.0 * sigma.max(0.005), "at {z} mm: {e:+.4} mm, sigma {sigma:.4}");
     }
-    // Half a spot is not where the beam is, and is refused; asked roughly it tells how far the surface is.
+    // Half a spot is not where the beam is, and is refused; asked roughly it tells how far the surface is. Near by, where spots are wide.
     let spots: Vec<[f64; 2]> =
         distances.iter().map(|d| serde_json::from_value(d["spot_px"].clone()).unwrap()).collect();
-    with_spots_cut(&s.at.join("pointer"), &s.at.join("cut"), &spots);
+    with_spots_cut(&s.at.join("pointer"), &s.at.join("cut"), &spots[..4]);
     let (recording, rig) = (Recording::open(&s.at.join("cut")).unwrap(), Rig::load(Path::new(&s.station)).unwrap());
     let refused = measure_range(&recording, &rig, &RangeRun::default()).unwrap_err().to_string();
     assert!(refused.contains("beside the beam's image"), "{refused}");

@@ -204,9 +204,12 @@ fn measured(found: &Brightest, speckle: f64, o: &SpotOptions) -> Result<Spot> {
         .cause("a glint or a second reflection of the beam")
         .next("cover the shiny place and take this picture again"));
     }
-    let covariance = covariance.ok_or_else(|| {
+    // A centre that is known to less than the spot's own width is no measurement: the fit went away from the light.
+    let known = |c: &Matrix2<f64>| c.symmetric_eigenvalues().max().sqrt() <= width;
+    let covariance = covariance.filter(known).ok_or_else(|| {
         Fault::refused("the spot's centre is not determined")
-            .next("take the picture again with a smaller or darker spot")
+            .cause("an edge or a print cuts the spot, or it is drowned by other light")
+            .next("take the picture again with a smaller or darker spot, or from another place")
     })?;
     let mut saturated = 0;
     patch.each(|i, _, _| saturated += usize::from(patch.grey[i] >= patch.full));
