@@ -130,8 +130,8 @@ impl std::str::FromStr for CameraUri {
 }
 
 fn sim(seed: &str, query: &str) -> Said<SimSpec> {
-    let keys = ["rate", "speed", "size", "axis", "scene", "delay_ms", "exposure_us", "shows"];
-    let [rate, speed, size, axis, scene, delay, exposure, shows] = options(query, keys)?;
+    let keys = ["rate", "speed", "still", "size", "axis", "scene", "delay_ms", "exposure_us", "shows"];
+    let [rate, speed, still, size, axis, scene, delay, exposure, shows] = options(query, keys)?;
     let usual = SimSpec::default();
     let seed = seed.parse().map_err(|_| format!("sim:{seed} names no seed, a whole number"))?;
     let size = size.map_or(Ok(usual.size), |s| {
@@ -155,6 +155,7 @@ fn sim(seed: &str, query: &str) -> Said<SimSpec> {
         board,
         rate_hz: number("rate", rate, usual.rate_hz)?,
         speed: number("speed", speed, usual.speed)?,
+        still: still.map(|s| number("still", Some(s), 0.0)).transpose()?,
         size,
         axis,
         scene: scene.map(PathBuf::from),
@@ -233,6 +234,8 @@ mod tests {
         let sim =
             SimSpec { seed: 3, rate_hz: 5.0, size: [320, 240], axis: Some(AxisKind::Linear), ..SimSpec::default() };
         assert_eq!("sim:3?rate=5&size=320x240&axis=linear".parse(), Ok(CameraUri::Sim(sim)));
+        let still = SimSpec { seed: 3, still: Some(0.25), ..SimSpec::default() };
+        assert_eq!("sim:3?still=0.25".parse(), Ok(CameraUri::Sim(still)));
         for (wrong, says) in [
             ("cell://cell3", "no port"),
             ("cell://c:1?fps=3", "unknown option 'fps': rate"),
@@ -243,6 +246,7 @@ mod tests {
             ("ffmpeg:-f v4l2", "what ffmpeg is to open"),
             ("folder:a?bits=7", "8 to 16"),
             ("sim:one", "no seed"),
+            ("sim:1?still=here", "no number"),
         ] {
             let said = wrong.parse::<CameraUri>().unwrap_err();
             assert!(said.contains(says), "{wrong}: {said}");

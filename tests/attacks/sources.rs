@@ -21,6 +21,7 @@ const CASES: &[(&str, &str)] = &[
     ("record --camera cell://127.0.0.1:99999 --out {}/o", "next step"),
     ("record --camera sim:1?rate=1e308 --out {}/o", "rate is 1e308, wanted 0 to 1000"),
     ("record --camera sim:1?speed=-1 --out {}/o", "speed is -1e0, wanted 0.001 to 10000"),
+    ("record --camera sim:1?still=1.5 --out {}/o", "still is 1.5e0, wanted 0 to 1"),
     ("record --camera sim:1?size=99999x9 --out {}/o", "size is"),
     ("record --camera - --out {}/o", "state it: --raw"),
     ("record --camera http://x --out {}/o", "known are"),

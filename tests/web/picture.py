@@ -78,7 +78,7 @@ def lit(b):
         text = ""
         while text.count("{") != text.count("}") or not text:
             text += cell.stdout.readline().decode()
-        s = Server(program, cell_folder, "--camera", "sim:3?rate=6&speed=0.2", "--robot", json.loads(text)["robot"], "--allow-motion")
+        s = Server(program, cell_folder, "--camera", "sim:3?rate=6&still=0.25", "--robot", json.loads(text)["robot"], "--allow-motion")
         b.open(s.url)
         b.ready("station")
         b.page("settings")
@@ -168,7 +168,7 @@ def recorded(s, b):
     quiet(b, "recorded")
 
 
-s = Server(program, folder, "--recordings", folder, "--camera", "sim:3?rate=6&speed=0.2")
+s = Server(program, folder, "--recordings", folder, "--camera", "sim:3?rate=6&still=0.25")
 by_hand(s)
 if not Browser.there():
     print("no chromium and chromedriver here")

@@ -27,6 +27,8 @@ pub struct SimSpec {
     pub rate_hz: f64,
     /// Of what moves, mm/s; degrees/s of a turntable.
     pub speed: f64,
+    /// Nothing moves: it stands at this share of its way; a way that is gone stands elsewhere at another time of day.
+    pub still: Option<f64>,
     /// Columns and rows.
     pub size: [u32; 2],
     /// An axis; none: a robot moves the sensor.
@@ -47,6 +49,7 @@ impl Default for SimSpec {
             seed: 1,
             rate_hz: 10.0,
             speed: 20.0,
+            still: None,
             size: [640, 480],
             axis: None,
             scene: None,
@@ -74,6 +77,8 @@ pub struct SimMotion {
     scene: Arc<Scene>,
     way: Way,
     speed: f64,
+    /// Share of the way at which it stands, where it does not move.
+    still: Option<f64>,
     /// The board is shown.
     board: bool,
 }
@@ -96,6 +101,7 @@ impl SimMotion {
             ("size", f64::from(h), 64.0..=8192.0),
             ("rate", spec.rate_hz, 0.0..=1e3),
             ("speed", spec.speed, 1e-3..=1e4),
+            ("still", spec.still.unwrap_or(0.0), 0.0..=1.0),
             ("delay_ms", spec.delay_ms, -1e3..=1e3),
             ("exposure_us", spec.exposure_us, 1.0..=1e6),
         ];
@@ -131,7 +137,8 @@ impl SimMotion {
                 Way::Axis(Arc::new(ride), range)
             }
         };
-        Ok(SimMotion { station: station.into(), scene: scene.into(), way, speed: spec.speed, board: spec.board })
+        let (speed, still, board) = (spec.speed, spec.still, spec.board);
+        Ok(SimMotion { station: station.into(), scene: scene.into(), way, speed, still, board })
     }
 
     /// What moves, as meta.json says it.
@@ -144,6 +151,9 @@ impl SimMotion {
 
     /// Share of the way at a host's time: to and fro, each end left and reached within [`RAMP`].
     fn share(&self, ns: u64, length: f64) -> f64 {
+        if let Some(share) = self.still {
+            return share;
+        }
         let ramp = RAMP.min(0.5 * length / self.speed);
         let once = length / self.speed + ramp;
         // Whole periods are taken off in whole ns: f64 does not hold a time of day.
