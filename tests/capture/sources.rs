@@ -261,7 +261,9 @@ fn what_ends_a_run_is_said_with_the_next_step_and_what_was_recorded_stays() {
 fn an_exposure_is_found_at_which_the_stripe_stands_right() {
     // Places all along the way: where a glint shines none is right, and it is the brightest that saturates nothing.
     let mut remarked = 0;
-    for (at, exposure) in (0..=8).flat_map(|k| [60, 20000].map(|e| (f64::from(k) / 8.0, e))) {
+    for (at, exposure) in
+        [0, 7, 11, 15, 16, 19, 23, 28, 32].into_iter().flat_map(|k| [60, 20000].map(|e| (f64::from(k) / 32.0, e)))
+    {
         let camera = format!("sim:2?rate=20&still={at}&size=160x120&exposure_us={exposure}");
         let tuned: serde_json::Value =
             serde_json::from_str(&sheetlight(&["camera", "tune", "--camera", &camera, "--json", "--quiet"])).unwrap();
@@ -273,7 +275,7 @@ fn an_exposure_is_found_at_which_the_stripe_stands_right() {
         assert!(stripe["saturated"].as_f64().unwrap() <= 0.005, "{tuned}");
         remarked += u32::from(remark.is_some());
     }
-    assert!(remarked <= 4, "{remarked} of 18 are not right");
+    assert!((1..=4).contains(&remarked), "{remarked} of 18 are not right");
     // Nor does a folder: said before it waits for a picture.
     let said = sheetlight_fails(&["camera", "tune", "--camera", &format!("folder:{}", text(&scan_folder()))]).1;
     assert!(said.contains("has no ExposureTime"), "{said}");
