@@ -1,6 +1,6 @@
 // In: the pictures of a batch and their skeleton pixels. Out: one peak a pixel, with the reason where it fails by itself; the
-// strongest of the others on each line across the stripe. Twin: src/stages/peak/fit.rs, direction.rs, profile.rs, scoring.rs, methods.rs, stripe/choose.rs,
-// where the reasons stand; docs/math.md, Stripe peak (1) to (5). Frame and unit: pixels, grey levels.
+// strongest of the others on each line across the stripe. Twin: src/stages/peak/fit.rs, centre.rs, direction.rs, profile.rs, scoring.rs,
+// methods.rs, stripe/choose.rs, where the reasons stand; docs/math.md, Stripe peak (0) to (5). Frame and unit: pixels, grey levels.
 @group(0) @binding(0) var<uniform> frame: PeakFrame;
 @group(0) @binding(1) var<storage, read> image: array<u32>;
 @group(0) @binding(2) var<storage, read> header: array<u32>;
@@ -15,6 +15,8 @@ override peak_method: u32 = 0u;
 
 // Nearer than so many pixels lies a narrow stripe's own light.
 const BESIDE = 4;
+// Of narrower stripes the skeleton is near enough to the middle, px.
+const BROAD = 4.5;
 // Variances of a pixel by as many pixels a side that two sides of one level differ by, squared.
 const BY_NOISE = 8.0;
 // Share of the amplitude that sides of different levels are doubted by at most.
@@ -28,6 +30,42 @@ const SOFT = 0.05;
 
 // First word of the picture; set once.
 var<private> first: u32;
+
+// Light on three lines, k pixels across.
+fn lit_across(at: vec2<i32>, k: i32, beside: i32) -> i32 {
+    let along = select(vec2(0, beside), vec2(beside, 0), frame.columns > 0u);
+    let p = at + k * select(vec2(1, 0), vec2(0, 1), frame.columns > 0u);
+    return (whole(p.x - along.x, p.y - along.y) + whole(p.x, p.y)) + whole(p.x + along.x, p.y + along.y);
+}
+
+fn crest(at: vec2<i32>, k: i32, step: i32, beside: i32) -> i32 {
+    return (lit_across(at, k - step, beside) + lit_across(at, k, beside)) + lit_across(at, k + step, beside);
+}
+
+// The pixel of a wide stripe's middle: its skeleton runs beside that.
+fn centred(at: vec2<i32>) -> vec2<i32> {
+    if frame.s0 < BROAD {
+        return at;
+    }
+    let step = max(i32(0.34 * frame.s0), 1);
+    let reach = i32(3.0 * frame.s0) / step;
+    let beside = i32(1.2 * frame.s0);
+    let dark = min(lit_across(at, -reach * step, beside), lit_across(at, reach * step, beside));
+    var all = 0;
+    var moment = 0;
+    for (var k = -reach; k <= reach; k++) {
+        let lit = max(lit_across(at, k * step, beside) - dark, 0);
+        all += lit;
+        moment += k * lit;
+    }
+    let most = i32(2.0 * frame.s0);
+    let off = clamp(floor_div(2 * step * moment + all, max(2 * all, 1)), -most, most);
+    if f32(2 * abs(off)) <= frame.s0 || crest(at, off, step, beside) <= crest(at, 0, step, beside) {
+        return at;
+    }
+    let p = at + off * select(vec2(1, 0), vec2(0, 1), frame.columns > 0u);
+    return clamp(p, vec2(0), vec2(frame.width - 1, frame.height - 1));
+}
 
 // Square of what the two sides' levels differ by beyond their noise.
 var<private> uneven2: f32;
@@ -383,11 +421,11 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         var peak: Peak;
         // The method is a constant of the pipeline: the others are not in its code.
         if peak_method == 0u {
-            peak = gaussian(at);
+            peak = gaussian(centred(at));
         } else if peak_method == 1u {
-            peak = centroid(at);
+            peak = centroid(centred(at));
         } else if peak_method == 2u {
-            peak = derivative(at);
+            peak = derivative(centred(at));
         } else {
             peak = itself(at);
         }

@@ -4,7 +4,7 @@
 use super::frame::{ALL_TILES, GAUSSIAN, HAS_ROI};
 use super::listing::{self, HEADER_WORDS};
 use super::peak::found::{REASON, Reject, SATURATED};
-use super::peak::{direction, fit, methods, scoring, turn};
+use super::peak::{centre, direction, fit, methods, scoring, turn};
 use super::stripe::{point, skeleton, spacing};
 use super::{grid, support};
 
@@ -36,6 +36,7 @@ pub const NUMBERS: &[(&str, &str, f64)] = &[
     ("", "RECORD", grid::RECORD as f64),
     ("", "BEYOND", grid::BEYOND as f64),
     ("", "Z_MOST", grid::Z_MOST as f64),
+    ("peak", "BROAD", centre::BROAD as f64),
     ("peak", "BESIDE", fit::BESIDE as f64),
     ("peak", "BORDER_STEPS", direction::BORDER_STEPS as f64),
     ("peak", "LEAVES", direction::LEAVES as f64),

@@ -2,6 +2,7 @@
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels. docs/math.md, Stripe peak (2) to (5).
 
 use super::PeakFrame;
+use super::centre::centred;
 use super::direction::direction;
 use super::found::{Peak, SATURATED};
 use super::grey::{Grey, Inner, Place};
@@ -49,7 +50,7 @@ pub(super) fn look<G: Grey>(places: &[Place<G>], profiles: &mut Profiles, s: &Pe
     let reach = (3 * s.lattice_u.max(s.lattice_v)).max((8.0 * s.s0 + 4.0) as i32);
     let inner = |x: i32, y: i32| x.min(y) >= reach && x < s.width - reach && y < s.height - reach;
     for (lane, (place, seen)) in places.iter().zip(&mut seen).enumerate() {
-        let (x, y) = place.at();
+        let (x, y) = centred(place.image, place.at(), s);
         *seen = if inner(x, y) { beside(Inner(place.image), x, y, s) } else { beside(place.image, x, y, s) };
         profiles.put(lane, place, seen, s);
     }
@@ -60,7 +61,7 @@ pub(super) fn look<G: Grey>(places: &[Place<G>], profiles: &mut Profiles, s: &Pe
 fn beside<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> Seen {
     let n = direction(image, x, y, s);
     let (base, uneven2) = background(image, x, y, n.0, n.1, s);
-    Seen { n, base, uneven2 }
+    Seen { at: (x, y), n, base, uneven2 }
 }
 
 /// Peaks of up to [`LANES`] skeleton pixels: their profiles, then the Gaussians of all of them at once.
@@ -73,8 +74,7 @@ pub(super) fn gaussians<G: Grey>(
 ) {
     let seen = look(places, profiles, s);
     let found = scoring::gaussians(profiles, places.len(), s);
-    for (lane, (place, Seen { n, base, .. })) in places.iter().zip(seen).enumerate() {
-        let (x, y) = place.at();
+    for (lane, (place, Seen { at: (x, y), n, base, .. })) in places.iter().zip(seen).enumerate() {
         let [m, a, width, sigma, clipped] =
             [found.m, found.a, found.width, found.sigma, found.clipped].map(|v| v.0[lane]);
         let peak = finish(x, y, n, m, a, base, width, sigma, clipped > 0.0, s);

@@ -50,8 +50,7 @@ pub(super) fn centroids<G: Grey>(
     let width = ((profiles.step * profiles.step) * spread - profiles.blur2).max(Lanes::ZERO).sqrt();
     let share = profiles.square / (profiles.weight * profiles.weight);
     let sigma = profiles.step.map(f32::abs) * ((noise[0] + noise[1]) * share).sqrt() / least;
-    for (lane, (place, Seen { n, base, .. })) in places.iter().zip(seen).enumerate() {
-        let (x, y) = place.at();
+    for (lane, (place, Seen { at: (x, y), n, base, .. })) in places.iter().zip(seen).enumerate() {
         let [m, top, width, sigma, clipped] = [m, top, width, sigma, clipped].map(|v| v.0[lane]);
         let peak = finish(x, y, n, m, top.max(1.0), base, width, sigma, clipped > 0.0, s);
         take(Peak { pixel: place.pixel, shot: place.shot, ..peak });
@@ -69,7 +68,7 @@ pub(super) fn derivatives<G: Grey>(
     let seen = look(places, profiles, s);
     let (m0, _) = profiles.guess(s);
     for (lane, (place, seen)) in places.iter().zip(seen).enumerate() {
-        let peak = derivative(place.image, place.at(), m0.0[lane], seen, s);
+        let peak = derivative(place.image, m0.0[lane], seen, s);
         take(Peak { pixel: place.pixel, shot: place.shot, ..peak });
     }
 }
@@ -77,7 +76,7 @@ pub(super) fn derivatives<G: Grey>(
 /// Steger's line point: second-order Taylor expansion of the picture smoothed with a Gaussian of sigma
 /// width / √3 or more, which is where the response to a bar has one maximum (\[steger98\] sec. 2.2).
 #[inline(always)]
-fn derivative<G: Grey>(image: G, (x, y): (i32, i32), m0: f32, Seen { n, base, .. }: Seen, s: &PeakFrame) -> Peak {
+fn derivative<G: Grey>(image: G, m0: f32, Seen { at: (x, y), n, base, .. }: Seen, s: &PeakFrame) -> Peak {
     // The expansion holds within half a pixel: it starts at the pixel nearest to the centre of gravity.
     let (dx, dy) = ((m0 * n.0 + 0.5).floor() as i32, (m0 * n.1 + 0.5).floor() as i32);
     let (cx, cy) = (x + dx, y + dy);

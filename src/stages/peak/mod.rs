@@ -2,6 +2,7 @@
 //! amplitude, background, signal-to-noise and its own standard deviation across the stripe.
 //! Frame and unit: image pixels (an integer is a pixel's centre), grey levels of the picture's depth.
 
+pub(in crate::stages) mod centre;
 pub(in crate::stages) mod direction;
 pub(in crate::stages) mod fit;
 pub mod found;

@@ -38,6 +38,8 @@ pub(super) struct Profiles {
 /// What is known of a place before its profile is fitted.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Seen {
+    /// The pixel that offsets are counted from.
+    pub at: (i32, i32),
     /// Unit vector across the stripe.
     pub n: (f32, f32),
     /// Level beside the stripe.
@@ -199,8 +201,7 @@ impl Profiles {
     /// Puts the profile at a place into a lane.
     #[inline(always)]
     pub fn put<G: Grey>(&mut self, lane: usize, place: &Place<G>, seen: &Seen, s: &PeakFrame) {
-        let (x, y) = place.at();
-        let Seen { n: (nx, ny), base, uneven2 } = *seen;
+        let Seen { at: (x, y), n: (nx, ny), base, uneven2 } = *seen;
         let columns = by_columns((nx, ny));
         let (na, nb) = if columns { (nx, ny) } else { (ny, nx) };
         let (a0, b0, width, height) = if columns { (x, y, s.width, s.height) } else { (y, x, s.height, s.width) };
