@@ -1,6 +1,7 @@
 // In: the pictures of a batch and their skeleton pixels. Out: one peak a pixel, with the reason where it fails by itself; the
-// strongest of the others on each line across the stripe. Twin: src/stages/peak/fit.rs, centre.rs, direction.rs, profile.rs, scoring.rs,
-// methods.rs, stripe/choose.rs, where the reasons stand; docs/math.md, Stripe peak (0) to (5). Frame and unit: pixels, grey levels.
+// strongest of the others on each line across the stripe. Twin: src/stages/peak/fit.rs, across/centre.rs, across/direction.rs,
+// profile.rs, scoring.rs, methods.rs, stripe/choose.rs, where the reasons stand; docs/math.md, Stripe peak (0) to (5). Frame and unit:
+// pixels, grey levels.
 @group(0) @binding(0) var<uniform> frame: PeakFrame;
 @group(0) @binding(1) var<storage, read> image: array<u32>;
 @group(0) @binding(2) var<storage, read> header: array<u32>;

@@ -1,4 +1,4 @@
-// In: a picture, a skeleton pixel. Out: the unit vector across the stripe there. Twin and reasons: src/stages/peak/direction.rs;
+// In: a picture, a skeleton pixel. Out: the unit vector across the stripe there. Twin and reasons: src/stages/peak/across/direction.rs;
 // docs/math.md, Stripe peak (1). Frame and unit: pixels.
 
 // Directions that are taken in turn beside a border.

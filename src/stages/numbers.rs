@@ -3,8 +3,9 @@
 
 use super::frame::{ALL_TILES, GAUSSIAN, HAS_ROI};
 use super::listing::{self, HEADER_WORDS};
+use super::peak::across::{centre, direction, turn};
 use super::peak::found::{REASON, Reject, SATURATED};
-use super::peak::{centre, direction, fit, methods, scoring, turn};
+use super::peak::{fit, methods, scoring};
 use super::stripe::{point, skeleton, spacing};
 use super::{grid, support};
 

@@ -2,8 +2,8 @@
 //! Frame and unit: offsets from the skeleton pixel, px; grey levels. docs/math.md, Stripe peak (2) to (5).
 
 use super::PeakFrame;
-use super::centre::centred;
-use super::direction::direction;
+use super::across::centre::centred;
+use super::across::direction::direction;
 use super::found::{Peak, SATURATED};
 use super::grey::{Grey, Inner, Place};
 use super::lanes::LANES;

@@ -1,8 +1,8 @@
 //! In: the pictures' layout, the settings of peaks and their choice. Out: the uniform block of the stages lines and peak,
 //! every size worked out once. Frame and unit: pixels, grey levels of the picture's depth.
 
+use super::across::turn::{FLAT, turn};
 use super::params::{PeakParams, SAMPLES};
-use super::turn::{FLAT, turn};
 use crate::gpu::Field;
 use crate::stages::frame::px_log2;
 use crate::stages::stripe::choose_params::ChooseParams;

@@ -2,8 +2,7 @@
 //! amplitude, background, signal-to-noise and its own standard deviation across the stripe.
 //! Frame and unit: image pixels (an integer is a pixel's centre), grey levels of the picture's depth.
 
-pub(in crate::stages) mod centre;
-pub(in crate::stages) mod direction;
+pub(in crate::stages) mod across;
 pub(in crate::stages) mod fit;
 pub mod found;
 pub mod frame;
@@ -16,7 +15,6 @@ pub mod params;
 mod profile;
 pub(in crate::stages) mod scoring;
 mod stage;
-pub(in crate::stages) mod turn;
 mod twin;
 
 pub use found::{Peak, Reject, SATURATED};

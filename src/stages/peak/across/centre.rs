@@ -1,8 +1,8 @@
 //! In: a picture, a skeleton pixel, the expected stripe. Out: the pixel of its middle, where the skeleton runs beside that.
 //! Frame and unit: pixels. docs/math.md, Stripe peak (0).
 
-use super::PeakFrame;
-use super::grey::Grey;
+use crate::stages::peak::PeakFrame;
+use crate::stages::peak::grey::Grey;
 
 /// Of narrower stripes the skeleton is near enough to the middle, px: at 4 px (rendered LED at 4096x3072) half of the errors are 2 % smaller
 /// where it is moved, and beside edges the large ones 3 % larger.
@@ -13,7 +13,7 @@ pub(in crate::stages) const BROAD: f32 = 4.5;
 /// the stripe is that of its own light. Centre of gravity of three widths on three lines, in whole numbers; what is nearer than half a
 /// width stays where it is, and what lies between two stripes is no middle.
 #[inline(always)]
-pub(super) fn centred<G: Grey>(image: G, (x, y): (i32, i32), s: &PeakFrame) -> (i32, i32) {
+pub(in crate::stages::peak) fn centred<G: Grey>(image: G, (x, y): (i32, i32), s: &PeakFrame) -> (i32, i32) {
     if s.s0 < BROAD {
         return (x, y);
     }

@@ -1,9 +1,9 @@
 //! In: a picture, a skeleton pixel. Out: the unit vector across the stripe there.
 //! Frame and unit: pixels. docs/math.md, Stripe peak (1).
 
-use super::PeakFrame;
-use super::grey::Grey;
 use super::turn::{DIAGONAL, EVEN_ROW, MIDDLE_ROW};
+use crate::stages::peak::PeakFrame;
+use crate::stages::peak::grey::Grey;
 
 /// Directions that are taken in turn beside a border, each at a place that the one before led to.
 pub(in crate::stages) const BORDER_STEPS: u32 = 2;
@@ -13,7 +13,7 @@ pub(in crate::stages) const LEAVES: f32 = 0.3;
 /// Direction across the stripe. Beside the picture's border differences reach beyond it, where all levels go on as on the border, and a slanted
 /// stripe would seem less so: there the direction is that of the stripe's next piece whose differences lie in the picture.
 #[inline(always)]
-pub(super) fn direction<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> (f32, f32) {
+pub(in crate::stages::peak) fn direction<G: Grey>(image: G, x: i32, y: i32, s: &PeakFrame) -> (f32, f32) {
     let mut n = direction_at(image, x, y, s);
     for _ in 0..BORDER_STEPS {
         let (inner_x, inner_y) = inward(x, y, n, s);

@@ -4,7 +4,7 @@
 /// Angles that the correction is fitted to.
 const ANGLES: usize = 12;
 /// A stripe that is seen flatter than this, rad, keeps the lattice that is longer along it; the others take a square one.
-pub(super) const FLAT: f64 = 33.0 * std::f64::consts::PI / 180.0;
+pub(in crate::stages::peak) const FLAT: f64 = 33.0 * std::f64::consts::PI / 180.0;
 
 /// Angle of the tensor's strongest direction on a straight Gaussian stripe whose normal is (sin a, cos a).
 fn seen(a: f64, s0: f64, (u, v): (i32, i32)) -> f64 {
@@ -30,7 +30,13 @@ fn seen(a: f64, s0: f64, (u, v): (i32, i32)) -> f64 {
 /// Differences over nearly three widths are no derivatives, and a lattice that is not square weighs them differently: the tensor's
 /// direction is off by up to 13 degrees, the same way on every stripe. Coefficients c of the turn sum c_k sin(k a), a the angle that
 /// was seen, for the multiples `k`; least squares over the angles from 0 to `up_to`, from the u axis where `rows`.
-pub(super) fn turn<const N: usize>(s0: f32, lattice: (i32, i32), k: [f64; N], up_to: f64, rows: bool) -> [f32; N] {
+pub(in crate::stages::peak) fn turn<const N: usize>(
+    s0: f32,
+    lattice: (i32, i32),
+    k: [f64; N],
+    up_to: f64,
+    rows: bool,
+) -> [f32; N] {
     let mut normal = nalgebra::SMatrix::<f64, N, N>::zeros();
     let mut right = nalgebra::SVector::<f64, N>::zeros();
     for i in 1..=ANGLES {
