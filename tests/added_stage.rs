@@ -56,7 +56,8 @@ fn a_stage_is_two_files_and_a_line() {
     let run = Command::new(env!("CARGO"))
         .current_dir(dir.path())
         .args(["test", "--locked", "--offline", "--test", "stages", "--test", "shader_contracts"])
-        .args(["--", "--nocapture"])
+        // A mask without its border is another one than the plain definition's, which knows nothing of the stage.
+        .args(["--", "--nocapture", "--skip", "the_chain_of_twins_is_the_plain_definition"])
         // Its own: the program of that name in the other one is what other tests run. Kept: the crates are built once.
         .env("CARGO_TARGET_DIR", Path::new(env!("CARGO_TARGET_TMPDIR")).join("added_stage"))
         .output()
