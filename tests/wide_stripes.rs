@@ -254,8 +254,8 @@ fn row(sigma: f64, angle_deg: f64, light: &Light) -> Row {
     Row { text, faults }
 }
 
-/// Speckle makes the edges of a wide stripe ragged, and its skeleton runs up to 1.2 widths beside the middle: a rendered stripe of 9 px had 1.27
-/// of the bound, 1.09 where the fit begins in the middle.
+/// Speckle makes the edges of a wide stripe ragged, and its skeleton runs up to 1.2 widths beside the middle: the rig 'wide' (9 px) had 1.27
+/// of its prediction, and has 1.11 since the fit begins in the middle.
 #[test]
 fn a_skeleton_beside_the_middle_costs_no_accuracy() {
     let mut faults = Vec::new();
