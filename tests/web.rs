@@ -122,7 +122,7 @@ fn measured(script: &str, width: &str, shots: &str) {
 
 #[test]
 fn a_live_picture_to_two_browsers_leaves_a_scan_its_time() {
-    measured("tests/web/rates.py", "1280", "300");
+    measured("tests/web/rates.py", "1280", "1200");
 }
 
 #[test]

@@ -31,19 +31,28 @@ class Feed:
 
     def __init__(self, pipe, frames, rate):
         self.pipe, self.frames, self.rate, self.sent, self.over = pipe, frames, rate, [], False
+        self.goes = threading.Event()
+        self.goes.set()
         self.thread = threading.Thread(target=self.run, daemon=True)
         self.thread.start()
 
     def run(self):
-        begun = time.time()
+        due = time.time()
         while not self.over:
+            self.goes.wait()
             n = len(self.sent)
             self.pipe.write(struct.pack("<I", n) + self.frames[n % len(self.frames)][4:])
             self.pipe.flush()
             self.sent.append(time.time())
-            time.sleep(max(0.0, begun + (n + 1) / self.rate - time.time()))
+            due = max(due + 1 / self.rate, time.time() - 1)
+            time.sleep(max(0.0, due - time.time()))
         self.pipe.close()
+
+    def rest(self, rests):
+        """Sends nothing for a while, or again."""
+        self.goes.clear() if rests else self.goes.set()
 
     def end(self):
         self.over = True
+        self.goes.set()
         self.thread.join(20)
