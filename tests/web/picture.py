@@ -155,6 +155,21 @@ def region(s, b):
     quiet(b, "region")
 
 
+def pointed(s, b):
+    """What the page reads at its middle is the picture's middle, on a screen of any fineness."""
+    _, grey, width = newest(s)
+    height = len(grey) // width
+    left, top, wide, high = b.place(".map canvas")
+    b.mouse({"type": "pointerMove", "duration": 0, "x": round(left + wide / 2), "y": round(top + high / 2)})
+    read = b.until("what stands there", "return document.querySelector('.map .read').textContent.match(/u (\\d+) +v (\\d+) +(\\d+)/)")
+    # The window's own rounding: a CSS pixel, and the picture is 0.97 of the box.
+    off = [abs(int(read[1]) + 0.5 - width / 2), abs(int(read[2]) + 0.5 - height / 2)]
+    assert max(off) <= 1 + 1.1 * max(width / wide, height / high), (read, width, height, wide, high)
+    sharp = b.run("const c = document.querySelector('.map canvas'), r = c.getBoundingClientRect(); return [c.width / r.width, c.height / r.height, devicePixelRatio]")
+    assert abs(sharp[0] / sharp[2] - 1) < 0.01 and abs(sharp[1] / sharp[2] - 1) < 0.01, sharp
+    return sharp[2]
+
+
 def recorded(s, b):
     """A recording's picture is described too: its levels are those of the picture."""
     b.run("const e = document.querySelector('.head select'); e.value = 'scan'; e.dispatchEvent(new Event('change'))")
@@ -179,10 +194,26 @@ with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         b.open(s.url)
         b.ready("station")
         tuned(s, b)
+        assert pointed(s, b) == 1
         region(s, b)
         recorded(s, b)
         # A page that is left asks nobody who is gone.
         b.open("about:blank")
+        with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as other:
+            fine = Browser(other, flags=("--force-device-scale-factor=2",))
+            try:
+                fine.open(s.url)
+                fine.ready("station")
+                fine.page("picture")
+                fine.until("a picture", "return document.querySelector('.map')?.dataset.number")
+                assert pointed(s, fine) == 2
+                # The other one operates still.
+                fine.click("#lease")
+                fine.until("the lease", "return document.querySelector('#lease').getAttribute('aria-pressed') === 'true'")
+                region(s, fine)
+                fine.open("about:blank")
+            finally:
+                fine.close()
         assert s.end() == 0
         b.console()
         lit(b)
