@@ -4,8 +4,9 @@
 mod common;
 
 use common::rays::ray_error;
-use rand::SeedableRng;
 use rand::seq::SliceRandom;
+use rand::{Rng, SeedableRng};
+use rand_distr::StandardNormal;
 use rayon::prelude::*;
 use sheetlight::calibrate::boards::{BoardPoint, BoardView, FindOptions, find};
 use sheetlight::calibrate::camera::intrinsics::{Observation, SolveOptions, Solved, solve};
@@ -187,6 +188,30 @@ fn all_photographs_hold_their_board_and_fit_better_than_opencvs_best_corners() {
     }
 }
 
+/// Halves of each set of pictures, dealt again and again: how far apart their cameras lie over what both state and over what corners that
+/// err by themselves would make of it (rms), and of how many pairs.
+fn apart(sets: &[Vec<Observation>], times: usize, lens: Lens, rng: &mut rand_pcg::Pcg64) -> [(f64, f64, usize); FIVE] {
+    // Squares over the stated sigma's and over that of corners that err by themselves; pairs.
+    let mut sums = [(0.0, 0.0, 0usize); FIVE];
+    for mut pictures in sets.iter().cloned() {
+        for _ in 0..times {
+            pictures.shuffle(rng);
+            let (a, b) = pictures.split_at(pictures.len() / 2);
+            let options = SolveOptions { lens, ..SolveOptions::default() };
+            let halves = [a, b].map(|half| solve(half, 640, 480, &options).unwrap());
+            let apart = halves[0].intrinsics.parameters() - halves[1].intrinsics.parameters();
+            for i in (0..FIVE).filter(|i| halves.iter().all(|h| !h.held.contains(i))) {
+                let variance = |h: &Solved| h.covariance.unwrap()[(i, i)];
+                let plain = |h: &Solved| variance(h) / h.repeat[i].powi(2);
+                sums[i].0 += apart[i].powi(2) / halves.iter().map(variance).sum::<f64>();
+                sums[i].1 += apart[i].powi(2) / halves.iter().map(plain).sum::<f64>();
+                sums[i].2 += 1;
+            }
+        }
+    }
+    sums.map(|(sum, plain, n)| ((sum / n as f64).sqrt(), (plain / n as f64).sqrt(), n))
+}
+
 /// What is stated of a camera is what repeats: photographs of one camera, dealt into two halves again and again, give two cameras
 /// that differ by what both state.
 #[test]
@@ -195,36 +220,79 @@ fn halves_of_real_photographs_differ_by_what_is_stated() {
     let seen = ["left", "right"].map(|side| photographs(&reference, side));
     for lens in [Lens::Five, Lens::Evidence] {
         let mut rng = rand_pcg::Pcg64::seed_from_u64(1);
-        // Squares over the stated sigma's and over that of corners that err by themselves; pairs.
-        let mut sums = [(0.0, 0.0, 0usize); FIVE];
-        for mut pictures in seen.clone() {
-            for _ in 0..50 {
-                pictures.shuffle(&mut rng);
-                let (a, b) = pictures.split_at(pictures.len() / 2);
-                let options = SolveOptions { lens, ..SolveOptions::default() };
-                let halves = [a, b].map(|half| solve(half, 640, 480, &options).unwrap());
-                let apart = halves[0].intrinsics.parameters() - halves[1].intrinsics.parameters();
-                for i in (0..FIVE).filter(|i| halves.iter().all(|h| !h.held.contains(i))) {
-                    let variance = |h: &Solved| h.covariance.unwrap()[(i, i)];
-                    let plain = |h: &Solved| variance(h) / h.repeat[i].powi(2);
-                    sums[i].0 += apart[i].powi(2) / halves.iter().map(variance).sum::<f64>();
-                    sums[i].1 += apart[i].powi(2) / halves.iter().map(plain).sum::<f64>();
-                    sums[i].2 += 1;
-                }
-            }
-        }
-        for (i, (sum, plain, count)) in sums.into_iter().enumerate() {
-            let [stated, plain] = [sum, plain].map(|s| (s / count as f64).sqrt());
+        for (i, (stated, plain, count)) in apart(&seen, 50, lens, &mut rng).into_iter().enumerate() {
             println!(
                 "{lens:?} {}: {stated:.2} of the stated sigma, {plain:.2} of the corners', {count} pairs",
                 NAMES[i]
             );
-            // Which terms of the lens are there hangs on the half, and moves those that are there: no sigma holds that. p1 of the
-            // second camera misses what is asked of all, 0.8 to 1.25: a few of its pictures pull at it, and six tell little of few.
+            // Which terms of the lens are there hangs on the half, and moves those that are there: no sigma holds that. p1 of the second
+            // camera has 1.38 where 0.8 to 1.25 is asked of all: a few of its pictures pull at it, and six tell little of few. Of two
+            // cameras all parameters hold that in a tenth of the cases where what is stated is right (the test below).
             let most = if lens == Lens::Evidence && i >= 4 || NAMES[i] == "p1" { 1.5 } else { 1.25 };
             assert!((0.8..=most).contains(&stated), "{lens:?} {}: {stated:.2}", NAMES[i]);
         }
     }
+}
+
+/// The same for cameras and boards like those two, drawn again and again: boards that bend a little otherwise in each picture. Over many
+/// what is stated is right; of two cameras alone it may by chance be more or less, by as much as is printed. In the long form.
+#[test]
+fn halves_of_simulated_photographs_differ_by_what_is_stated() {
+    if std::env::var_os("SHEETLIGHT_LONG").is_none() {
+        return;
+    }
+    const DRAWS: u64 = 40;
+    let cameras = ["left", "right"].map(|side| {
+        let pictures = golden(side).0;
+        let solved = solve(&pictures, 640, 480, &as_opencv()).unwrap();
+        (pictures, solved)
+    });
+    let deal = |seed| {
+        let mut rng = rand_pcg::Pcg64::seed_from_u64(seed);
+        let sets = cameras.each_ref().map(|(pictures, solved)| bent(pictures, solved, &mut rng));
+        apart(&sets, 25, Lens::Five, &mut rng)
+    };
+    let draws: Vec<_> = (0..DRAWS).into_par_iter().map(deal).collect();
+    let within = |ratio: f64| (0.8..=1.25).contains(&ratio);
+    let whole = draws.iter().filter(|d| d.iter().all(|p| within(p.0))).count();
+    println!("two cameras alone: all parameters 0.8 to 1.25 in {whole} of {DRAWS} draws");
+    for i in 0..FIVE {
+        let mut each: Vec<f64> = draws.iter().map(|d| d[i].0).collect();
+        each.sort_by(f64::total_cmp);
+        let all = (each.iter().map(|r| r * r).sum::<f64>() / DRAWS as f64).sqrt();
+        let plain = (draws.iter().map(|d| d[i].1.powi(2)).sum::<f64>() / DRAWS as f64).sqrt();
+        let at = |q: f64| each[((each.len() - 1) as f64 * q).round() as usize];
+        let beyond = each.iter().filter(|r| !within(**r)).count();
+        println!(
+            "{}: {all:.2} of the stated sigma, {plain:.2} of the corners'; two cameras alone {:.2} to {:.2} (5 to 95 %), {beyond} of {DRAWS} not 0.8 to 1.25",
+            NAMES[i],
+            at(0.05),
+            at(0.95)
+        );
+        // Of six pictures the scatter from picture to picture tells the lens' terms a fifth too wide.
+        assert!((0.75..=1.25).contains(&all), "{}: {all:.2}", NAMES[i]);
+    }
+}
+
+/// The same views of a board that bends by some hundredths of a square, in each picture otherwise, its corners found to a tenth of a pixel.
+fn bent(pictures: &[Observation], solved: &Solved, rng: &mut rand_pcg::Pcg64) -> Vec<Observation> {
+    const BEND: f64 = 0.02;
+    const CORNER_PX: f64 = 0.1;
+    let mut normal = |sigma: f64| sigma * rng.sample::<f64, _>(StandardNormal);
+    let mut bend = |picture: &Observation, pose: &Rigid<Camera, Board>| {
+        let mut picture = picture.clone();
+        let [xx, xy, yy] = [0; 3].map(|_| normal(BEND));
+        for p in &mut picture.view.points {
+            let mut place = picture.features[p.feature_id];
+            // From the board's middle, in half of its length.
+            let [x, y] = [(place.x - 4.0) / 4.0, (place.y - 2.5) / 4.0];
+            place.z += xx * x * x + xy * x * y + yy * y * y;
+            let pixel = solved.intrinsics.pixel_from_point(&pose.point(&place)).unwrap();
+            p.pixel = pixel + Vec2::new(normal(CORNER_PX), normal(CORNER_PX));
+        }
+        picture
+    };
+    pictures.iter().zip(&solved.camera_from_board).map(|(p, pose)| bend(p, pose)).collect()
 }
 
 #[test]
