@@ -41,7 +41,9 @@ impl Nodes {
         let q = [p[0], p[1], z];
         let cell = q.map(|v| (v / JOIN).floor() as i64);
         for k in 0..27 {
-            let near = [cell[0] + k % 3 - 1, cell[1] + k / 3 % 3 - 1, cell[2] + k / 9 - 1];
+            // A damaged drawing's place can lie beyond all cells: in the last one then.
+            let step = [k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1];
+            let near = [0, 1, 2].map(|i| cell[i].saturating_add(step[i]));
             let known = self.cells.get(&near).into_iter().flatten().copied();
             let found = known.into_iter().find(|&n| (0..3).all(|i| (self.places[n][i] - q[i]).abs() <= JOIN));
             if let Some(n) = found {
