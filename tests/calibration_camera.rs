@@ -226,16 +226,17 @@ fn halves_of_real_photographs_differ_by_what_is_stated() {
                 NAMES[i]
             );
             // Which terms of the lens are there hangs on the half, and moves those that are there: no sigma holds that. p1 of the second
-            // camera has 1.38 where 0.8 to 1.25 is asked of all: a few of its pictures pull at it, and six tell little of few. Of two
-            // cameras all parameters hold that in a tenth of the cases where what is stated is right (the test below).
+            // camera has 1.38 where 0.8 to 1.25 is asked of all: a few of its pictures pull at it. Chance does not explain it: of cameras
+            // whose boards bend (the test below) 95 % have less than 1.18 there.
             let most = if lens == Lens::Evidence && i >= 4 || NAMES[i] == "p1" { 1.5 } else { 1.25 };
             assert!((0.8..=most).contains(&stated), "{lens:?} {}: {stated:.2}", NAMES[i]);
         }
     }
 }
 
-/// The same for cameras and boards like those two, drawn again and again: boards that bend a little otherwise in each picture. Over many
-/// what is stated is right; of two cameras alone it may by chance be more or less, by as much as is printed. In the long form.
+/// The same for cameras and boards like those two, drawn again and again: boards that bend a little otherwise in each picture. Over many,
+/// what is stated is right but for the lens' terms, which six pictures tell a fifth too wide; two cameras alone scatter about that as is
+/// printed. In the long form.
 #[test]
 fn halves_of_simulated_photographs_differ_by_what_is_stated() {
     if std::env::var_os("SHEETLIGHT_LONG").is_none() {
@@ -255,7 +256,10 @@ fn halves_of_simulated_photographs_differ_by_what_is_stated() {
     let draws: Vec<_> = (0..DRAWS).into_par_iter().map(deal).collect();
     let within = |ratio: f64| (0.8..=1.25).contains(&ratio);
     let whole = draws.iter().filter(|d| d.iter().all(|p| within(p.0))).count();
-    println!("two cameras alone: all parameters 0.8 to 1.25 in {whole} of {DRAWS} draws");
+    let none_above = draws.iter().filter(|d| d.iter().all(|p| p.0 <= 1.25)).count();
+    println!(
+        "two cameras alone: all parameters 0.8 to 1.25 in {whole} of {DRAWS} draws, none above 1.25 in {none_above}"
+    );
     for i in 0..FIVE {
         let mut each: Vec<f64> = draws.iter().map(|d| d[i].0).collect();
         each.sort_by(f64::total_cmp);

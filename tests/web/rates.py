@@ -62,7 +62,7 @@ def look_on(s, browsers):
 
 
 def turn_away(browsers, seen):
-    """Keeps what each showed, its page open or not."""
+    """Keeps what each browser has shown, and shows it an empty page."""
     for k, b in enumerate(browsers):
         seen[k].append(b.run("return window.seen"))
         quiet(b, f"browser {k}")
