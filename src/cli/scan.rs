@@ -262,6 +262,9 @@ fn summary(r: &ScanReport, out: &Path) -> String {
     if r.hot_pixels > 0 {
         s += &format!("{} pixels of the sensor shine by themselves: their neighbours stand for them\n", r.hot_pixels);
     }
+    if let Some(p) = &r.places {
+        s += &format!("{p}\n");
+    }
     if let Some(v) = &r.working_volume {
         s += &format!("points were believed at depths of {v}\n");
     }

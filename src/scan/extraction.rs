@@ -46,6 +46,9 @@ pub struct Extraction {
     /// threshold and the sizes of the fit from them, and raise the limits of light above the noise. Off: the numbers below are
     /// used as they stand.
     pub measure_stripe: bool,
+    /// Take out of the cloud what the reported places scatter by about a smooth path, as far as the surface shows that the camera did not move
+    /// so: lines of a scan that stand higher or lower than their neighbours. Off: every shot lies where it was reported.
+    pub straighten: bool,
     /// Where in the picture the stripe is looked for: left, top, right and bottom as shares of its width and height, 0..=1. A tool that
     /// stands in the picture, or a place that always shines, is left out so; places in the picture stay what they are.
     pub region: [f64; 4],
@@ -73,6 +76,7 @@ impl Default for Extraction {
     fn default() -> Extraction {
         Extraction {
             measure_stripe: true,
+            straighten: true,
             region: WHOLE,
             // A peak fainter than 8 levels is not believed, so a pixel darker than that need not be looked at.
             threshold: ThresholdParams { minimum: 8, ..ThresholdParams::default() },

@@ -64,6 +64,28 @@ impl Shots {
         self.places.get(&shot)
     }
 
+    /// All shots and where the camera stood, in their order.
+    pub fn places(&self) -> impl Iterator<Item = (u32, Rigid<Base, Camera>)> + '_ {
+        self.places.iter().map(|(shot, place)| (*shot, *place))
+    }
+
+    /// The text of a scan folder's file with every place moved, `motion` of shot and place; all else stays what it is.
+    pub fn rewritten(scan: &Path, motion: impl Fn(u32, Rigid<Base, Camera>) -> Rigid<Base, Camera>) -> Result<String> {
+        let path = scan.join(SHOTS_FILE);
+        let text = crate::files::read_text(&path)?;
+        let mut lines = text.lines();
+        let head = lines.next().unwrap_or_default().to_owned() + "\n";
+        let one = |text: &str| {
+            let Line { shot, from_camera } = serde_json::from_str(text).map_err(|e| {
+                Fault::input(format!("{}: {e}", path.display()))
+                    .cause("damaged while it was written")
+                    .next("scan again")
+            })?;
+            Ok(line(&Line { shot, from_camera: motion(shot, from_camera) }))
+        };
+        lines.map(one).try_fold(head, |text, line: Result<String>| Ok(text + &line?))
+    }
+
     /// Reads a scan folder's file, of a cloud in `frame` that was made with `rig` (its fingerprint).
     ///
     /// # Errors
@@ -159,7 +181,12 @@ impl ShotsWriter {
     /// # Errors
     /// As [`Shots::load`].
     pub fn resume(folder: &Path, done: usize, frame: &str, rig: &str) -> Result<ShotsWriter> {
-        let text = match crate::files::read_text_if_there(&folder.join(SHOTS_FILE))? {
+        // Stopped when what was measured had made room for what was made of it.
+        let (path, measured) = (folder.join(SHOTS_FILE), folder.join(format!("{SHOTS_FILE}.part")));
+        if measured.exists() {
+            moment().and_then(|()| std::fs::rename(&measured, &path)).map_err(|e| Fault::write(&path, e))?;
+        }
+        let text = match crate::files::read_text_if_there(&path)? {
             Some(text) => text,
             None => return Err(missing(folder)),
         };

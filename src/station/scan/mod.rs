@@ -2,6 +2,7 @@
 //! Frame and unit: cloud in the base frame, mm (docs/file-formats.md).
 
 mod overlays;
+mod path;
 pub(super) mod products;
 pub mod progress;
 pub(super) mod recorded;

@@ -7,7 +7,7 @@ use crate::capture::{Account, Delay};
 use crate::fault::{Fault, Result};
 use crate::recording::Motion;
 use crate::rig::{Volume, hash_file};
-use crate::scan::{Along, CloudFile, CloudPoint, Extraction, Filter, Format, SHOTS_FILE, Shots, read_cloud};
+use crate::scan::{Along, CloudFile, CloudPoint, Extraction, Filter, Format, PathFound, SHOTS_FILE, Shots, read_cloud};
 use crate::stages::peak::Stripe;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -60,6 +60,9 @@ pub struct ScanReport {
     pub median_sigma_mm: Option<f64>,
     /// Width (px) and speckle of the stripe, measured in the first shots or as set.
     pub stripe: Option<Stripe>,
+    /// How the places scatter that the robot or the axis reported, where a surface shows it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub places: Option<PathFound>,
     /// Pixels of the sensor that shine by themselves; their neighbours stood for them.
     #[serde(default)]
     pub hot_pixels: usize,

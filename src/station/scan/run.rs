@@ -5,7 +5,7 @@
 use super::overlays::Overlays;
 use super::progress::{Checkpoint, fingerprint_of};
 use super::report::{FORMAT, ScanReport, Spent};
-use super::scan_folder::{self, FORMER_PROGRESS};
+use super::scan_folder::{self, CLOUD_FILE, FORMER_PROGRESS};
 use super::seen::Seen;
 use super::watch::Watch;
 use crate::capture::{Delays, Latency};
@@ -57,8 +57,6 @@ pub struct ScanOptions {
 
 /// Shots between two checkpoints: what a crash can cost beside those under way.
 const CHECKPOINT_SHOTS: usize = 64;
-
-const CLOUD_FILE: &str = "cloud.ply";
 
 /// [`scan_on`] where the options say; the device is opened while the first pictures are decoded.
 pub fn scan(
@@ -320,6 +318,11 @@ impl<'a> Work<'a> {
     fn finish(self, label: &str, rig: &Rig, options: &ScanOptions, source: &dyn Source) -> Result<ScanReport> {
         let Work { part, cloud, mut state, scanner, mut spent, .. } = self;
         let points = cloud.finish()?;
+        let (format, print) = (source.format(), rig.fingerprint());
+        let places = match options.extraction.straighten {
+            true => super::path::follow(part, &options.motion, &print, format)?,
+            false => None,
+        };
         let seconds = self.started.elapsed().as_secs_f64();
         let products = Instant::now();
         let (cloud_path, up) = (part.join(CLOUD_FILE), scanner.up_in_base());
@@ -338,14 +341,15 @@ impl<'a> Work<'a> {
             frame: options.motion.frame().into(),
             motion: options.motion.clone(),
             recording: label.into(),
-            rig_fingerprint: rig.fingerprint(),
+            rig_fingerprint: print,
             working_volume: options.volume.clone(),
             ran_on: scanner.ran_on(),
-            image: source.format(),
+            image: format,
             shots: state.shots,
             points,
             median_sigma_mm: state.median_sigma(),
             stripe: scanner.stripe(),
+            places,
             hot_pixels: scanner.hot().count(),
             seen: self.seen,
             peaks: state.peaks,

@@ -34,6 +34,9 @@ const FILES: [&str; 21] = [
     FORMER_PROGRESS,
     "found.json",
 ];
+pub(super) const CLOUD_FILE: &str = "cloud.ply";
+/// Cloud and shots as measured, in the working folder, under the names of those that are not done: an interrupted scan goes on with these.
+pub(super) const MEASURED: [&str; 2] = ["cloud.ply.part", "shots.jsonl.part"];
 /// How far a scan of a former version got.
 pub(super) const FORMER_PROGRESS: &str = "scan.progress.json";
 
@@ -64,6 +67,7 @@ fn clear(out: &Path, whole: &Path) -> Io<()> {
         remove(&out.join(format!("find_{name}.png")))?;
     }
     FILES.iter().try_for_each(|name| remove(&out.join(name)))?;
+    MEASURED.iter().try_for_each(|name| remove(&whole.join(name)))?;
     remove(&whole.join(PROGRESS))
 }
 

@@ -1,0 +1,59 @@
+//! In: places of one shot's line, each with its distance from its neighbours' surface. Out: one such place for each half of the line, the
+//! usual one, whatever steps and edges lie under the rest.
+//! Frame and unit: the cloud's frame, mm.
+
+use crate::geometry::Vec3;
+
+/// Fewer places tell too little of a half.
+const FEWEST: usize = 10;
+/// Places whose distance is within so many median deviations of the median are of the surface.
+const USUAL: f64 = 3.0;
+
+/// Median of the absolute values of a normal distribution, in standard deviations.
+pub(super) const MEDIAN: f64 = 0.6745;
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Side {
+    pub at: Vec3,
+    pub normal: Vec3,
+    pub along: Vec3,
+    pub off: f64,
+    pub after: f64,
+}
+
+/// Places in order along the stripe, cut in the middle of those there are.
+pub(super) fn halves(mut places: Vec<Side>) -> [Option<Side>; 2] {
+    // Normals of one sign, so that they can be added up.
+    if let Some(first) = places.first().map(|p| p.normal) {
+        for p in &mut places {
+            let sign = p.normal.dot(&first).signum();
+            (p.normal, p.off) = (sign * p.normal, sign * p.off);
+        }
+    }
+    let (left, right) = places.split_at(places.len() / 2);
+    [usual(left), usual(right)]
+}
+
+fn usual(places: &[Side]) -> Option<Side> {
+    if places.len() < FEWEST {
+        return None;
+    }
+    let middle = median(places.iter().map(|p| p.off));
+    let width = median(places.iter().map(|p| (p.off - middle).abs()));
+    let of_it: Vec<&Side> = places.iter().filter(|p| (p.off - middle).abs() <= USUAL * width).collect();
+    let n = of_it.len() as f64;
+    let sum = |f: fn(&Side) -> Vec3| of_it.iter().map(|p| f(p)).sum::<Vec3>();
+    Some(Side {
+        at: sum(|p| p.at) / n,
+        normal: sum(|p| p.normal).try_normalize(1e-9)?,
+        along: sum(|p| p.along).try_normalize(1e-9)?,
+        off: middle,
+        after: of_it.iter().map(|p| p.after).sum::<f64>() / n,
+    })
+}
+
+pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut all: Vec<f64> = values.collect();
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied().unwrap_or(0.0)
+}

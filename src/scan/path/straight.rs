@@ -1,0 +1,357 @@
+//! In: a cloud, where the camera was reported at its shots. Out: how much the reported places scatter about a smooth path, how much of that
+//! the surface does not show, and the places and points without it.
+//! Frame and unit: the cloud's frame, mm, rad; docs/math.md, Places that scatter.
+
+use super::super::{CloudPoint, PointSource, Shots};
+use super::sides::{MEDIAN, median};
+use super::smooth::{Around, Departures, departures, scatter};
+use super::witness::{Step, steps};
+use crate::fault::Result;
+use crate::geometry::{Base, Camera, Rigid, Twist, Vec3, exp};
+use std::collections::BTreeMap;
+
+/// Halves of shots that must have been compared.
+const FEWEST: usize = 16;
+/// The share is believed from so many of its standard deviations on.
+const SURE: f64 = 4.0;
+/// Neighbouring comparisons share two of three shots, and the halves of a line their shot: its standard deviation is so many times that of
+/// as many comparisons that know nothing of each other.
+const SHARED: f64 = 2.0;
+/// Where the weight of a comparison has gone to nothing, in deviations: Tukey's biweight.
+const FAR: f64 = 4.7;
+const ROUNDS: usize = 20;
+/// Places that scatter by less, mm and rad, are exact.
+const EXACT: f64 = 1e-8;
+
+/// How the reported places scatter; in scan.json.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PathFound {
+    /// By how much a reported place scatters about a smooth path along the surface's normal, mm (1 sigma).
+    pub height_mm: f64,
+    /// The same of its turn that lifts one end of the stripe, degrees.
+    pub roll_deg: f64,
+    /// Share of that scatter which the surface does not follow, so that it is the report's: 0 where the camera moved as it was reported, 1 where
+    /// it went smoothly.
+    pub share: f64,
+    /// Its standard deviation.
+    pub share_sigma: f64,
+    /// Whether the share was taken out of the cloud.
+    pub taken_out: bool,
+}
+
+impl std::fmt::Display for PathFound {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let PathFound { height_mm, roll_deg, share, share_sigma, taken_out } = self;
+        write!(f, "reported places scatter by {height_mm:.4} mm and {roll_deg:.4} degrees about a smooth path; ")?;
+        write!(f, "the surface does not follow {:.1} +- {:.1} % of it", 100.0 * share, 100.0 * share_sigma)?;
+        f.write_str(if *taken_out { ", which is taken out" } else { ": left as reported" })
+    }
+}
+
+/// What a scan's places come to.
+pub struct Straight {
+    /// The figures.
+    pub found: PathFound,
+    /// Of each shot where the camera was, and the motion of its points from where it was reported; empty where nothing is taken out.
+    moved: BTreeMap<u32, (Rigid<Base, Camera>, Rigid<Base, Base>)>,
+}
+
+/// The directions in which a surface shows how its shots stood, camera frame.
+struct Seen {
+    /// Middle of the points, mm.
+    anchor: Vec3,
+    /// Along the surface's normal.
+    height: Vec3,
+    /// Axis of the turn that lifts one end of the stripe.
+    roll: Vec3,
+}
+
+/// Looks at a cloud in the order of its shots, of pictures with so many pixels along the stripe; `None` where the places are exact or few, or
+/// no surface shows how they stood.
+pub fn straight(cloud: &dyn PointSource, shots: &Shots, pixels_along: u32) -> Result<Option<Straight>> {
+    let places: Vec<(u32, Rigid<Base, Camera>)> = shots.places().collect();
+    let around = |k: usize, reach: usize| around(&places, k, reach, |t| t.vector().into());
+    if scatter(places.len(), around).iter().all(|s| *s < EXACT) {
+        return Ok(None);
+    }
+    let mut steps = steps(cloud, shots.along, pixels_along)?;
+    steps.retain(|s| s.shots.iter().all(|k| shots.place(*k).is_some()));
+    let Some(seen) = Seen::by(&steps, shots).filter(|_| steps.len() >= FEWEST) else { return Ok(None) };
+    let Departures { sigma: [height_mm, roll], off } =
+        departures(places.len(), |k, reach| seen.around(&places, k, reach));
+    let off: BTreeMap<u32, [f64; 2]> = places.iter().map(|(shot, _)| *shot).zip(off).collect();
+    let pairs: Vec<[f64; 2]> = steps.iter().map(|s| [seen.lift(s, shots, &off), -s.off]).collect();
+    let Some((share, share_sigma)) = share(&pairs) else { return Ok(None) };
+    let taken_out = share > SURE * share_sigma;
+    let found = PathFound { height_mm, roll_deg: roll.to_degrees(), share, share_sigma, taken_out };
+    let by = share.clamp(0.0, 1.0);
+    let moved = |(shot, place): (u32, Rigid<Base, Camera>)| {
+        let is = place * seen.motion(off[&shot].map(|o| by * o));
+        (shot, (is, is * place.inverse()))
+    };
+    let moved = if taken_out { places.into_iter().map(moved).collect() } else { BTreeMap::new() };
+    Ok(Some(Straight { found, moved }))
+}
+
+impl Straight {
+    /// The points where they are with the camera on its path.
+    pub fn apply(&self, points: &mut [CloudPoint]) {
+        for p in points {
+            if let Some((_, motion)) = self.moved.get(&p.shot) {
+                let at = motion.point(&Vec3::from(p.position.as_dvec3().to_array()));
+                p.position = glam::DVec3::from_array(at.into()).as_vec3();
+            }
+        }
+    }
+
+    /// Where the camera was at a shot that was reported at `place`.
+    pub fn place(&self, shot: u32, place: Rigid<Base, Camera>) -> Rigid<Base, Camera> {
+        self.moved.get(&shot).map_or(place, |(is, _)| *is)
+    }
+}
+
+/// Places up to `reach` before and after the k-th, as steady motions from it, camera frame.
+fn around<const N: usize>(
+    places: &[(u32, Rigid<Base, Camera>)],
+    k: usize,
+    reach: usize,
+    number: impl Fn(Twist) -> [f64; N],
+) -> Around<N> {
+    let (shot, place) = &places[k];
+    let from = place.inverse();
+    let near = k.saturating_sub(reach)..(k + reach + 1).min(places.len());
+    let one =
+        |(s, p): &(u32, Rigid<Base, Camera>)| (f64::from(*s) - f64::from(*shot), number(Twist::steady(&(from * *p))));
+    places[near].iter().map(one).collect()
+}
+
+impl Seen {
+    /// From all that was compared; `None` where that shows no direction.
+    fn by(steps: &[Step], shots: &Shots) -> Option<Seen> {
+        let (mut anchor, mut height, mut along) = (Vec3::zeros(), Vec3::zeros(), Vec3::zeros());
+        for step in steps {
+            let camera = shots.place(step.shots[0])?.inverse();
+            anchor += camera.point(&step.at) / steps.len() as f64;
+            let (n, t) = (camera.direction(&step.normal), camera.direction(&step.along));
+            height += n * n.z.signum();
+            along += t * t.dot(&along).signum();
+        }
+        let height = height.try_normalize(1e-9)?;
+        Some(Seen { anchor, height, roll: along.cross(&height).try_normalize(1e-9)? })
+    }
+
+    /// Height and roll of the places around the k-th.
+    fn around(&self, places: &[(u32, Rigid<Base, Camera>)], k: usize, reach: usize) -> Around<2> {
+        around(places, k, reach, |t| [self.height.dot(&t.at(&self.anchor)), self.roll.dot(&t.w)])
+    }
+
+    /// The motion by a height and a roll, camera frame.
+    fn motion(&self, [height, roll]: [f64; 2]) -> Rigid<Camera, Camera> {
+        let turn = exp(&(self.roll * roll));
+        Rigid::new(turn, self.anchor - turn * self.anchor + self.height * height)
+    }
+
+    /// By how much a shot would rise over the surface between its neighbours, were all three where the smooth path has them, mm.
+    fn lift(&self, step: &Step, shots: &Shots, off: &BTreeMap<u32, [f64; 2]>) -> f64 {
+        let parts = [1.0, step.after - 1.0, -step.after];
+        let of = |(shot, part): (u32, f64)| {
+            let (Some(place), [height, roll]) = (shots.place(shot), off[&shot]) else { return 0.0 };
+            let beside = place.inverse().point(&step.at) - self.anchor;
+            let rise = self.height * height + self.roll.cross(&beside) * roll;
+            part * step.normal.dot(&place.direction(&rise))
+        };
+        step.shots.into_iter().zip(parts).map(of).sum()
+    }
+}
+
+/// The share of what was `expected` that was seen, of all pairs (expected, seen), and its standard deviation; steps and edges of the
+/// part lie in some of them. `None` where nothing was expected.
+fn share(pairs: &[[f64; 2]]) -> Option<(f64, f64)> {
+    let rest = |share: f64| move |[expected, seen]: &[f64; 2]| seen - share * expected;
+    let mut share = middle(pairs)?;
+    let width = FAR * median(pairs.iter().map(rest(share)).map(f64::abs)) / MEDIAN;
+    let weight = |rest: f64| if rest.abs() < width { (1.0 - (rest / width).powi(2)).powi(2) } else { 0.0 };
+    let (mut square, mut left) = (0.0, 0.0);
+    for _ in 0..ROUNDS {
+        let mut across = 0.0;
+        (square, left) = (0.0, 0.0);
+        for pair in pairs {
+            let r = rest(share)(pair);
+            let w = weight(r);
+            square += w * pair[0] * pair[0];
+            across += w * pair[0] * pair[1];
+            left += (w * pair[0] * r).powi(2);
+        }
+        if square <= 0.0 {
+            return None;
+        }
+        share = across / square;
+    }
+    Some((share, SHARED * left.sqrt() / square))
+}
+
+/// The share with the least sum of absolute rests: a median of the single ones, each as heavy as it was expected to be.
+fn middle(pairs: &[[f64; 2]]) -> Option<f64> {
+    let mut all: Vec<(f64, f64)> =
+        pairs.iter().filter(|p| p[0] != 0.0).map(|[expected, seen]| (seen / expected, expected.abs())).collect();
+    all.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * all.iter().map(|a| a.1).sum::<f64>();
+    let mut sum = 0.0;
+    all.into_iter()
+        .find(|(_, weight)| {
+            sum += weight;
+            sum >= half
+        })
+        .map(|a| a.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::Along;
+    use super::*;
+    use crate::stages::noise::Noise;
+
+    const STEP: f64 = 0.3;
+    const NOISE: f64 = 0.01;
+
+    /// A scan of a surface by a camera that looks down on it and a sheet that it sees from the side.
+    struct Scene {
+        shots: u32,
+        along: Along,
+        /// How far the report scatters from where the camera is, and the camera from its path, mm; as many hundredths of a degree.
+        report: f64,
+        motion: f64,
+        surface: fn(f64, f64) -> f64,
+        /// Turn of the camera from shot to shot, rad.
+        turn: f64,
+    }
+
+    const SCENE: Scene =
+        Scene { shots: 120, along: Along::U, report: 0.0, motion: 0.0, surface: |x, y| 0.1 * x - 0.05 * y, turn: 0.0 };
+
+    /// A small motion about the middle of the light, camera frame.
+    fn scattered(noise: &mut Noise, mm: f64) -> Rigid<Camera, Camera> {
+        let mut three = |s: f64| Vec3::new(s * noise.normal(), s * noise.normal(), s * noise.normal());
+        let (v, w) = (three(mm), three((0.2 * mm).to_radians()));
+        let (turn, middle) = (exp(&w), Vec3::new(0.0, 0.0, 150.0));
+        Rigid::new(turn, middle - turn * middle + v)
+    }
+
+    impl Scene {
+        /// The cloud as it was reported, where the camera was reported, and the distance of each point from the surface after `straight`.
+        fn scan(&self, seed: u64) -> (Vec<CloudPoint>, Shots) {
+            let mut noise = Noise(seed);
+            let (mut cloud, mut places) = (Vec::new(), Vec::new());
+            for shot in 0..self.shots {
+                let turned = exp(&(Vec3::z() * (self.turn * f64::from(shot))));
+                let looks_down = exp(&(Vec3::x() * std::f64::consts::PI));
+                let path: Rigid<Base, Camera> =
+                    Rigid::new(turned * looks_down, Vec3::new(0.0, STEP * f64::from(shot), 150.0));
+                let is = path * scattered(&mut noise, self.motion);
+                let reported = is * scattered(&mut noise, self.report);
+                for k in 0..400 {
+                    let x = 0.1 * f64::from(k) - 20.0;
+                    // The sheet is the camera's x-z plane; along it lies what it lights.
+                    let (mut z, direction) = (150.0, is.direction(&Vec3::z()));
+                    for _ in 0..20 {
+                        let p = is.point(&Vec3::new(x, 0.0, z));
+                        z += (p.z - (self.surface)(p.x, p.y)) / -direction.z;
+                    }
+                    let at = reported.point(&Vec3::new(x, 0.0, z + NOISE * noise.normal()));
+                    let (u, v) = if self.along == Along::U { (k as f32, 50.0) } else { (50.0, k as f32) };
+                    let position = glam::DVec3::from_array(at.into()).as_vec3();
+                    cloud.push(CloudPoint { position, shot, u, v, ..Default::default() });
+                }
+                places.push((shot, reported));
+            }
+            (cloud, Shots::new(self.along, places))
+        }
+
+        /// What `straight` says, and the points' rms from the surface before and after.
+        fn straight(&self, seed: u64) -> (Option<PathFound>, f64, f64) {
+            let (mut cloud, shots) = self.scan(seed);
+            // What lies an edge's height off was moved over the edge.
+            let rms = |cloud: &[CloudPoint]| {
+                let off =
+                    |p: &CloudPoint| f64::from(p.position.z) - (self.surface)(p.position.x.into(), p.position.y.into());
+                let near: Vec<f64> = cloud.iter().map(off).filter(|off| off.abs() < 0.2).collect();
+                (near.iter().map(|off| off.powi(2)).sum::<f64>() / near.len() as f64).sqrt()
+            };
+            let before = rms(&cloud);
+            let found = straight(&cloud, &shots, 400).unwrap();
+            found.iter().for_each(|s| s.apply(&mut cloud));
+            (found.map(|s| s.found), before, rms(&cloud))
+        }
+    }
+
+    /// Steps, a comb, a slope and a plate: what noise of 0.01 mm leaves, and a fifth of the scatter.
+    #[test]
+    fn a_report_that_scatters_is_taken_out() {
+        let surfaces: [(&str, fn(f64, f64) -> f64); 4] = [
+            ("a plate", |_, _| 0.0),
+            ("a slope", |x, y| 0.3 * x + 0.4 * y),
+            ("treads", |x, _| (x / 6.0).floor()),
+            ("blocks", |x, y| if (x / 7.0).floor() as i32 % 2 == 0 && (y / 9.0).sin() > 0.0 { 5.0 } else { 0.0 }),
+        ];
+        for (name, surface) in surfaces {
+            for (along, turn) in [(Along::U, 0.0), (Along::V, 0.0), (Along::U, 0.004)] {
+                let scene = Scene { report: 0.02, surface, along, turn, ..SCENE };
+                let (found, before, after) = scene.straight(3);
+                let found = found.unwrap_or_else(|| panic!("{name}: nothing is told"));
+                println!("{name}, {along:?}, {turn}: {found}; {before:.4} -> {after:.4} mm");
+                assert!(found.taken_out && (0.9..1.1).contains(&found.share), "{name}: {found:?}");
+                assert!((0.7..1.4).contains(&(found.height_mm / 0.02)), "{name}: {found:?}");
+                // Where a slope turns under the camera, what lies across its mean normal stays.
+                let most = if name == "a slope" && turn > 0.0 { 0.9 } else { 0.6 };
+                assert!(after < most * before, "{name}: {before} -> {after}");
+            }
+        }
+    }
+
+    /// The arm trembles and says so: every shot stays where it was reported, to the bit.
+    #[test]
+    fn a_motion_that_scatters_and_is_reported_stays() {
+        for seed in 0..10 {
+            let (found, before, after) = Scene { motion: 0.02, ..SCENE }.straight(seed);
+            let found = found.unwrap();
+            assert!(!found.taken_out && found.share.abs() < 0.1, "{found:?}");
+            assert_eq!(before, after);
+        }
+    }
+
+    /// Half of the variance each: the half is taken out.
+    #[test]
+    fn of_both_the_reports_share_is_taken_out() {
+        let (found, before, after) = Scene { report: 0.02, motion: 0.02, ..SCENE }.straight(5);
+        let found = found.unwrap();
+        assert!(found.taken_out && (0.35..0.65).contains(&found.share), "{found:?}");
+        assert!(after < 0.9 * before, "{before} -> {after}");
+    }
+
+    /// Grooves along the stripe, as far apart as three shots, are the part's: with a report that is exact, and with one that scatters.
+    #[test]
+    fn grooves_along_the_stripe_stay() {
+        let surface = |_: f64, y: f64| 0.02 * (y / (3.0 * STEP) * std::f64::consts::TAU).sin();
+        let (found, before, after) = Scene { surface, ..SCENE }.straight(1);
+        assert!(found.is_none() && before == after);
+        let (found, before, after) = Scene { surface, report: 0.02, ..SCENE }.straight(1);
+        println!("{found:?}: {before:.4} -> {after:.4} mm");
+        assert!(found.unwrap().taken_out && after < 0.7 * before);
+    }
+
+    /// What shows nothing changes nothing: few shots, a report that is exact, a camera that stands, a surface that is noise.
+    #[test]
+    fn where_nothing_is_shown_nothing_is_done() {
+        let told = |scene: Scene| scene.straight(2).0.is_some_and(|f| f.taken_out);
+        assert!(!told(Scene { shots: 8, report: 0.02, ..SCENE }));
+        assert!(!told(SCENE));
+        assert!(!told(Scene {
+            report: 0.02,
+            surface: |x, y| ((x * 911.0).sin() * 43.0 + (y * 77.0).sin() * 97.0).fract() * 3.0,
+            ..SCENE
+        }));
+        let shots = Shots::new(Along::U, []);
+        assert!(straight(&Vec::new(), &shots, 400).unwrap().is_none());
+    }
+}
