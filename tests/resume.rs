@@ -35,7 +35,10 @@ impl Bench {
         assert!(paper.contains("[sensor]"));
         std::fs::write(&rig, paper.replace("[sensor]", "[sensor]\nhot_per_million = 5000")).unwrap();
         let rig = rig.to_str().unwrap();
-        sheetlight(&["simulate", "--rig", rig, "--out", &out, "--width", "320", "--shots", &shots, "--quiet"]);
+        // Poses that scatter, which the end of a scan takes out of all of its shots.
+        let poses = ["--pose-noise-mm", "0.05", "--pose-noise-deg", "0.005"];
+        let size = ["--width", "320", "--shots", &shots, "--quiet"];
+        sheetlight(&[&["simulate", "--rig", rig, "--out", &out], &size[..], &poses[..]].concat());
         Bench { dir }
     }
     fn at(&self, name: &str) -> PathBuf {
@@ -55,6 +58,7 @@ impl Bench {
         let report = std::fs::read_to_string(self.at("whole/scan.json")).unwrap();
         let hot = serde_json::from_str::<serde_json::Value>(&report).unwrap()["hot_pixels"].as_u64().unwrap();
         assert!(hot > 50, "{hot} hot pixels found of 384");
+        assert!(report.contains("\"taken_out\": true"), "{report}");
         read_cloud(&self.at("whole/cloud.ply")).unwrap()
     }
     fn resumed(&self, out: &str) -> Vec<CloudPoint> {

@@ -6,7 +6,7 @@ use super::bench::{Bench, VALUES, refused, run, snapshot};
 use sheetlight::recording::Recording;
 use sheetlight::rig::{Rig, Volume};
 use sheetlight::scan::{Extraction, GridOptions, RecordingSource, Where};
-use sheetlight::station::{ScanOptions, cloud_of, scan};
+use sheetlight::station::{ScanOptions, cloud_of, load_report, scan};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::Arc;
@@ -29,7 +29,7 @@ pub fn cut_off(args: &[String], variable: &str, at: u64) -> bool {
 
 /// What a scan gives, whatever the clock said meanwhile.
 fn results(out: &Path) -> Vec<(String, Vec<u8>)> {
-    ["cloud.ply", "height.tif", "sigma.tif", "height.json", "cloud.pcd"]
+    ["cloud.ply", "shots.jsonl", "height.tif", "sigma.tif", "height.json", "cloud.pcd"]
         .map(|name| (name.to_owned(), std::fs::read(out.join(name)).unwrap_or_default()))
         .to_vec()
 }
@@ -68,10 +68,13 @@ fn an_import_that_is_stopped_anywhere_is_old_or_new() {
 #[test]
 #[cfg_attr(not(debug_assertions), ignore = "only debug builds can be stopped at a file operation")]
 fn a_scan_that_is_stopped_anywhere_is_resumed_to_the_same_bytes() {
-    let b = Bench::new(3);
+    let b = Bench::new(24);
     b.record("former", 90);
     run(&b.scan("recording", "whole", &[]));
     run(&b.scan("former", "old", &[]));
+    // With cloud and shots that are written twice.
+    let places = load_report(&b.at("whole")).unwrap().places;
+    assert!(places.is_some_and(|p| p.taken_out), "{places:?}");
     let (whole, old) = (results(&b.at("whole")), results(&b.at("old")));
     assert!(whole != old && whole.iter().all(|(_, bytes)| !bytes.is_empty()));
     let mut tried = 0;

@@ -239,6 +239,9 @@ fn machine(r: &ScanReport) -> Markup {
         ("pictures", format!("{}×{}, {} bits", r.image.width, r.image.height, r.image.bits)),
         ("calibration", format!("rig {print}")),
     ];
+    if let Some(p) = &r.places {
+        rows.push(("reported places", p.to_string()));
+    }
     if let Some(s) = &r.stripe {
         rows.push(("stripe", format!("{:.2} px wide (1 sigma), speckle contrast {:.2}", s.width_px, s.speckle)));
     }
