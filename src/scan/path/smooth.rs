@@ -10,6 +10,9 @@ const AGREE: f64 = 2.0;
 /// A place that lies farther off, in standard deviations, is where the path jumps: that is no scatter.
 const JUMP: f64 = 4.0;
 
+/// Half window over which departures have no mean and no slope.
+const BEND: usize = 16;
+
 /// Farthest place, in the list, that a place is compared with.
 pub(super) const REACH: usize = WINDOWS[WINDOWS.len() - 1];
 
@@ -34,8 +37,18 @@ pub(super) fn scatter<const N: usize>(places: usize, around: impl Fn(usize, usiz
 /// they disagree with narrower ones: intersection of confidence intervals [goldenshluger97], so that bends stay what they are.
 pub(super) fn departures<const N: usize>(places: usize, around: impl Fn(usize, usize) -> Around<N>) -> Departures<N> {
     let sigma = scatter(places, &around);
-    let off = (0..places).map(|k| smoothed(&around(k, REACH), sigma)).collect();
+    let off: Vec<[f64; N]> = (0..places).map(|k| smoothed(&around(k, REACH), sigma)).collect();
+    let off = (0..places).map(|k| scattered(&off, k)).collect();
     Departures { sigma, off }
+}
+
+/// What of a departure is scatter: a bend that a window cut short lies in all departures there alike, and no surface tells it from its own
+/// height. Smoothed once more and taken away (Tukey's twicing).
+fn scattered<const N: usize>(off: &[[f64; N]], k: usize) -> [f64; N] {
+    let near = k.saturating_sub(BEND)..(k + BEND + 1).min(off.len());
+    let window: Vec<(f64, [f64; N])> = near.map(|j| (j as f64 - k as f64, off[j])).collect();
+    let smooth = line_at_zero(&window).map_or([0.0; N], |(smooth, _)| smooth);
+    std::array::from_fn(|i| off[k][i] - smooth[i])
 }
 
 /// By how much the middle one of three places lies off the line through the others, as one place's own scatter.

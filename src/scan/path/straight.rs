@@ -285,7 +285,7 @@ mod tests {
         }
     }
 
-    /// Steps, a comb, a slope and a plate: what noise of 0.01 mm leaves, and a fifth of the scatter.
+    /// Plate, slope, treads and blocks: what noise of 0.01 mm leaves, and a fifth of the scatter.
     #[test]
     fn a_report_that_scatters_is_taken_out() {
         let surfaces: [(&str, fn(f64, f64) -> f64); 4] = [
@@ -302,9 +302,8 @@ mod tests {
                 println!("{name}, {along:?}, {turn}: {found}; {before:.4} -> {after:.4} mm");
                 assert!(found.taken_out && (0.9..1.1).contains(&found.share), "{name}: {found:?}");
                 assert!((0.7..1.4).contains(&(found.height_mm / 0.02)), "{name}: {found:?}");
-                // Where a slope turns under the camera, what lies across its mean normal stays.
-                let most = if name == "a slope" && turn > 0.0 { 0.9 } else { 0.6 };
-                assert!(after < most * before, "{name}: {before} -> {after}");
+                // Noise alone leaves 0.42; under a camera that turns a bend that is cut short left 0.8.
+                assert!(after < 0.6 * before, "{name}: {before} -> {after}");
             }
         }
     }
