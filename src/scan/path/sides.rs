@@ -3,14 +3,12 @@
 //! Frame and unit: the cloud's frame, mm.
 
 use crate::geometry::Vec3;
+use crate::solve::robust_scale;
 
 /// Fewer places tell too little of a half.
 const FEWEST: usize = 10;
-/// Places whose distance is within so many median deviations of the median are of the surface.
-const USUAL: f64 = 3.0;
-
-/// Median of the absolute values of a normal distribution, in standard deviations.
-pub(super) const MEDIAN: f64 = 0.6745;
+/// Places whose distance is within so many robust deviations of the median are of the surface.
+const USUAL: f64 = 2.0;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Side {
@@ -38,8 +36,11 @@ fn usual(places: &[Side]) -> Option<Side> {
     if places.len() < FEWEST {
         return None;
     }
-    let middle = median(places.iter().map(|p| p.off));
-    let width = median(places.iter().map(|p| (p.off - middle).abs()));
+    let mut off: Vec<f64> = places.iter().map(|p| p.off).collect();
+    let half = off.len() / 2;
+    let middle = *off.select_nth_unstable_by(half, f64::total_cmp).1;
+    off.iter_mut().for_each(|off| *off = (*off - middle).abs());
+    let width = robust_scale(&mut off, 1);
     let of_it: Vec<&Side> = places.iter().filter(|p| (p.off - middle).abs() <= USUAL * width).collect();
     let n = of_it.len() as f64;
     let sum = |f: fn(&Side) -> Vec3| of_it.iter().map(|p| f(p)).sum::<Vec3>();
@@ -50,10 +51,4 @@ fn usual(places: &[Side]) -> Option<Side> {
         off: middle,
         after: of_it.iter().map(|p| p.after).sum::<f64>() / n,
     })
-}
-
-pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut all: Vec<f64> = values.collect();
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2).copied().unwrap_or(0.0)
 }

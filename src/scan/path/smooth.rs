@@ -1,7 +1,7 @@
 //! In: numbers along a path, seen from each of its places. Out: by how much each place lies off the smooth path through its neighbours.
 //! Frame and unit: the caller's; docs/math.md, Places that scatter (1) and (2).
 
-use super::sides::{MEDIAN, median};
+use crate::solve::robust_scale;
 
 /// Half windows, in shots to each side.
 const WINDOWS: [usize; 6] = [2, 4, 8, 16, 32, 64];
@@ -30,7 +30,7 @@ pub(super) struct Departures<const N: usize> {
 /// By how much each number of a place scatters about the straight line through its two neighbours' own: standard deviation of one place.
 pub(super) fn scatter<const N: usize>(places: usize, around: impl Fn(usize, usize) -> Around<N>) -> [f64; N] {
     let near: Vec<[f64; N]> = (1..places.saturating_sub(1)).filter_map(|k| off_the_chord(&around(k, 1))).collect();
-    std::array::from_fn(|i| median(near.iter().map(|off| off[i].abs())) / MEDIAN)
+    std::array::from_fn(|i| robust_scale(&mut near.iter().map(|off| off[i].abs()).collect::<Vec<f64>>(), 1))
 }
 
 /// `around(k, reach)` lists the places up to `reach` before and after place k, itself among them with 0. Lines through windows that grow until

@@ -3,11 +3,11 @@
 //! Frame and unit: the cloud's frame, mm, rad; docs/math.md, Places that scatter.
 
 use super::super::{CloudPoint, PointSource, Shots};
-use super::sides::{MEDIAN, median};
 use super::smooth::{Around, Departures, departures, scatter};
 use super::witness::{Step, steps};
 use crate::fault::Result;
 use crate::geometry::{Base, Camera, Rigid, Twist, Vec3, exp};
+use crate::solve::robust_scale;
 use std::collections::BTreeMap;
 
 /// Halves of shots that must have been compared.
@@ -170,7 +170,8 @@ impl Seen {
 fn share(pairs: &[[f64; 2]]) -> Option<(f64, f64)> {
     let rest = |share: f64| move |[expected, seen]: &[f64; 2]| seen - share * expected;
     let mut share = middle(pairs)?;
-    let width = FAR * median(pairs.iter().map(rest(share)).map(f64::abs)) / MEDIAN;
+    let mut rests: Vec<f64> = pairs.iter().map(rest(share)).map(f64::abs).collect();
+    let width = FAR * robust_scale(&mut rests, 1);
     let weight = |rest: f64| if rest.abs() < width { (1.0 - (rest / width).powi(2)).powi(2) } else { 0.0 };
     let (mut square, mut left) = (0.0, 0.0);
     for _ in 0..ROUNDS {

@@ -52,9 +52,9 @@ impl Line {
     }
 }
 
-/// Of a cloud whose points come in the order of their shots; `across_px`: pixels of a picture along the stripe.
-pub(super) fn steps(cloud: &dyn PointSource, along: Along, across_px: u32) -> Result<Vec<Step>> {
-    let px = (across_px as f32 / PLACES).ceil().max(1.0);
+/// Of a cloud whose points come in the order of their shots; `along_px`: pixels of a picture along the stripe.
+pub(super) fn steps(cloud: &dyn PointSource, along: Along, along_px: u32) -> Result<Vec<Step>> {
+    let px = (along_px as f32 / PLACES).ceil().max(1.0);
     let mut lines: [Option<Line>; 3] = [None, None, None];
     let mut steps = Vec::new();
     cloud.for_each_chunk(&mut |points| {

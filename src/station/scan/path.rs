@@ -11,7 +11,7 @@ use crate::scan::{
 };
 use std::path::Path;
 
-/// Where cloud and shots are made that take the measured ones' names.
+/// Where the cloud is made that takes the measured one's name.
 const NEXT: &str = "straight.ply";
 
 /// `part`: the working folder; `rig`: the fingerprint of the scan's. `None` where nothing is told of the places.
@@ -24,9 +24,9 @@ pub(super) fn follow(part: &Path, motion: &Motion, rig: &str, format: Format) ->
         let next = part.join(NEXT);
         moved(&cloud, &path, CloudWriter::create_in(&next, motion.frame())?)?;
         let places = Shots::rewritten(part, |shot, place| path.place(shot, place))?;
-        set_aside(part, CLOUD_FILE, MEASURED[0])?;
+        rename(&part.join(CLOUD_FILE), &part.join(MEASURED[0]))?;
         rename(&next, &part.join(CLOUD_FILE))?;
-        set_aside(part, SHOTS_FILE, MEASURED[1])?;
+        rename(&part.join(SHOTS_FILE), &part.join(MEASURED[1]))?;
         crate::files::write(&part.join(SHOTS_FILE), places.as_bytes())?;
     }
     Ok(Some(path.found))
@@ -45,10 +45,6 @@ fn moved(cloud: &CloudFile, path: &Straight, mut out: CloudWriter) -> Result<()>
     })?;
     written?;
     out.finish().map(|_| ())
-}
-
-fn set_aside(part: &Path, name: &str, measured: &str) -> Result<()> {
-    rename(&part.join(name), &part.join(measured))
 }
 
 fn rename(from: &Path, to: &Path) -> Result<()> {
