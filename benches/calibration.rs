@@ -6,7 +6,7 @@
 use criterion::measurement::{Measurement, ValueFormatter, WallTime};
 use criterion::{Criterion, criterion_group, criterion_main};
 use sheetlight::calibrate::boards::{BoardPoint, BoardView, FindOptions, find};
-use sheetlight::calibrate::camera::intrinsics::{Observation, SolveOptions, solve};
+use sheetlight::calibrate::camera::intrinsics::{Boards, Observation, SolveOptions, solve};
 use sheetlight::calibrate::camera::lens::Lens;
 use sheetlight::geometry::Vec2;
 use sheetlight::raster::{Channel, Image, load};
@@ -101,7 +101,8 @@ fn benches(c: &mut Criterion<CpuTime>) {
     let (left, right) = (corners("left"), corners("right"));
     let both: Vec<Observation> = left.iter().chain(&right).cloned().collect();
     // As cv2.calibrateCamera does it: five lens parameters, plain least squares.
-    let plain = SolveOptions { lens: Lens::Five, skew: false, loss: Loss::Squares, weigh: false };
+    let plain =
+        SolveOptions { lens: Lens::Five, skew: false, loss: Loss::Squares, weigh: false, boards: Boards::Drawn };
     let mut group = c.benchmark_group("camera solve");
     group.bench_function("13 + 13 pictures, two cameras", |b| {
         b.iter(|| {

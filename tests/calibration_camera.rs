@@ -9,7 +9,7 @@ use rand::{Rng, SeedableRng};
 use rand_distr::StandardNormal;
 use rayon::prelude::*;
 use sheetlight::calibrate::boards::{BoardPoint, BoardView, FindOptions, find};
-use sheetlight::calibrate::camera::intrinsics::{Observation, SolveOptions, Solved, solve};
+use sheetlight::calibrate::camera::intrinsics::{Boards, Observation, SolveOptions, Solved, solve};
 use sheetlight::calibrate::camera::lens::Lens;
 use sheetlight::calibrate::camera::procedure::{CameraOptions, calibrate};
 use sheetlight::camera::{Intrinsics, NAMES};
@@ -124,7 +124,7 @@ fn golden(side: &str) -> (Vec<Observation>, serde_json::Value) {
 }
 
 fn as_opencv() -> SolveOptions {
-    SolveOptions { lens: Lens::Five, skew: false, loss: Loss::Squares, weigh: false }
+    SolveOptions { lens: Lens::Five, skew: false, loss: Loss::Squares, weigh: false, boards: Boards::Drawn }
 }
 
 #[test]
@@ -186,6 +186,30 @@ fn all_photographs_hold_their_board_and_fit_better_than_opencvs_best_corners() {
             assert!(solved.intrinsics.distortion.is_brown(), "{side} {name}: {:?}", solved.intrinsics.distortion);
         }
     }
+}
+
+/// The board of the photographs is neither flat nor printed as drawn: two cameras, each by itself, tell the same of it, and corners fit
+/// twice as well.
+#[test]
+fn two_cameras_find_one_shape_of_the_board() {
+    let Some(reference) = reference() else { return };
+    let solved = ["left", "right"].map(|side| {
+        let pictures = photographs(&reference, side);
+        let of = |boards| solve(&pictures, 640, 480, &SolveOptions { boards, ..SolveOptions::default() }).unwrap();
+        let (drawn, shaped) = (of(Boards::Drawn), of(Boards::Evidence));
+        eprintln!(
+            "{side}: rms {:.4} px, as drawn {:.4}; cy {:.2}, {:.2}",
+            shaped.rms_px, drawn.rms_px, shaped.intrinsics.cy, drawn.intrinsics.cy
+        );
+        assert!(drawn.shape.is_none() && shaped.rms_px < 0.6 * drawn.rms_px, "{side}");
+        (shaped, pictures[0].features.clone())
+    });
+    let [left, right] = [0, 1].map(|i| solved[i].0.places(&solved[i].1));
+    let apart: Vec<f64> = left.iter().zip(&right).map(|(a, b)| (a - b).norm_squared()).collect();
+    let rms = (apart.iter().sum::<f64>() / apart.len() as f64).sqrt();
+    let [flat, lifted] = solved[0].0.shape.as_ref().unwrap().departs(&solved[0].1);
+    eprintln!("shapes {flat:.4} and {lifted:.4} squares off the drawing, {rms:.4} from each other");
+    assert!(rms < 0.3 * flat.hypot(lifted), "{rms} of {flat} {lifted}");
 }
 
 /// Halves of each set of pictures, dealt again and again: how far apart their cameras lie over what both state and over what corners that

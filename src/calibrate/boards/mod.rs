@@ -11,6 +11,7 @@ mod quads;
 pub mod refine;
 mod sandwich;
 mod search;
+pub mod shape;
 mod view;
 
 pub use chess::turns::{Turn, turns};

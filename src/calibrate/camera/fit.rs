@@ -1,23 +1,28 @@
-//! In: boards' features in pictures, the parameters that are held. Out: camera and boards' poses that explain them best, and how far
-//! the camera is known.
+//! In: boards' features in pictures, the parameters that are held. Out: camera, board's shape and boards' poses that explain them best,
+//! and how far the camera is known.
 //! Frame and unit: camera_from_board, mm, rad; px (docs/math.md, Camera calibration (7), (9)).
 
-use super::bundle::{Bundle, Corner, State};
+use super::bundle::{Bent, Bundle, Corner, State};
 use super::repeat::{repeat, widened};
+use crate::calibrate::boards::shape::{Basis, Shape};
 use crate::camera::{Intrinsics, PARAMETERS, ParameterMatrix, Parameters};
 use crate::solve::{LmOptions, Loss, Solution, lm};
 
 /// The corners with what stays the same from one choice of lens terms to the next.
+#[derive(Clone, Copy)]
 pub(in crate::calibrate) struct Fit<'a> {
     pub corners: &'a [Vec<Corner>],
     pub like: &'a Intrinsics,
     pub loss: Loss,
+    /// `None` for a board as drawn.
+    pub bent: Option<Bent>,
 }
 
 impl Fit<'_> {
     fn bundle(&self, held: &[usize]) -> Bundle<'_> {
-        let free = (0..PARAMETERS).filter(|i| !held.contains(i)).collect();
-        Bundle { pictures: self.corners, like: self.like, free }
+        let shared = PARAMETERS + self.bent.map_or(0, |_| Basis::LEN);
+        let free = (0..shared).filter(|i| !held.contains(i)).collect();
+        Bundle { pictures: self.corners, like: self.like, bent: self.bent, free }
     }
     pub fn with(&self, held: &[usize], from: State, options: LmOptions) -> Solution<State> {
         lm(&self.bundle(held), from, &LmOptions { hold: held.to_vec(), ..options })
@@ -27,8 +32,21 @@ impl Fit<'_> {
         let estimate_scale = self.loss != Loss::Squares;
         self.with(held, from, LmOptions { loss: self.loss, estimate_scale, ..LmOptions::default() })
     }
+    /// The same as near as choices need it.
+    pub fn rough(&self, held: &[usize], from: State) -> Solution<State> {
+        let estimate_scale = self.loss != Loss::Squares;
+        self.with(held, from, LmOptions { loss: self.loss, estimate_scale, tolerance: 1e-5, ..LmOptions::default() })
+    }
+    /// The same with all held but the poses.
+    pub fn placed(&self, from: State) -> Solution<State> {
+        let all: Vec<usize> = (0..self.bundle(&[]).shared()).collect();
+        self.rough(&all, from)
+    }
     pub fn camera(&self, solution: &Solution<State>) -> Intrinsics {
-        self.like.with_parameters(&solution.state.0)
+        self.like.with_parameters(&solution.state.camera)
+    }
+    pub fn shape(&self, solution: &Solution<State>) -> Option<Shape> {
+        self.bundle(&[]).shape(&solution.state)
     }
     /// Of the intrinsic parameters, as the pictures repeat.
     pub fn covariance(&self, solution: &Solution<State>) -> Option<ParameterMatrix> {
@@ -38,9 +56,8 @@ impl Fit<'_> {
     pub fn belief(&self, solution: &Solution<State>) -> Option<(ParameterMatrix, Parameters)> {
         let whole = solution.scaled_covariance()?;
         let mut covariance: ParameterMatrix = whole.fixed_view::<PARAMETERS, PARAMETERS>(0, 0).into();
-        let free = (0..PARAMETERS).filter(|&i| covariance[(i, i)] > 0.0).collect();
-        let bundle = Bundle { pictures: self.corners, like: self.like, free };
-        let factors = repeat(&bundle, solution).unwrap_or(Parameters::repeat(1.0));
+        let held: Vec<usize> = (0..PARAMETERS).filter(|&i| covariance[(i, i)] <= 0.0).collect();
+        let factors = repeat(&self.bundle(&held), solution).unwrap_or(Parameters::repeat(1.0));
         widened(&mut covariance, &factors);
         Some((covariance, factors))
     }

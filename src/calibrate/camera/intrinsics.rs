@@ -3,12 +3,12 @@
 //! Frame and unit: pixels; board and camera frames in mm.
 
 use super::bundle::{Corner, State};
-use super::evidence::by_evidence;
-use super::families::by_families;
+use super::choice::{by_evidence, by_families, by_shape, resized, shaped};
 use super::fit::Fit;
 use super::lens::Lens;
 use super::zhang::{Seen, first_camera};
 use crate::calibrate::boards::BoardView;
+use crate::calibrate::boards::shape::{Basis, Shape};
 use crate::calibrate::homography::homography;
 use crate::calibrate::pose::pose_from_homography;
 use crate::camera::{Intrinsics, LENS, PARAMETERS, ParameterMatrix, Parameters, SKEW};
@@ -38,11 +38,37 @@ pub struct SolveOptions {
     pub loss: Loss,
     /// Weigh corners by their own sigmas; false: all alike.
     pub weigh: bool,
+    /// What is believed of the boards.
+    pub boards: Boards,
+}
+
+/// Whether boards are as drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr, strum::VariantArray)]
+#[strum(serialize_all = "lowercase", parse_err_ty = String, parse_err_fn = unknown)]
+pub enum Boards {
+    /// As drawn, unless all pictures show one board and those that were held out fit better with a shape that is estimated beside the
+    /// camera ([`Shape`]). It is said.
+    #[default]
+    Evidence,
+    /// As drawn.
+    Drawn,
+    /// One board, its shape estimated whatever comes.
+    Shaped,
+}
+
+fn unknown(word: &str) -> String {
+    crate::fault::unknown::<Boards>("boards", word)
 }
 
 impl Default for SolveOptions {
     fn default() -> Self {
-        SolveOptions { lens: Lens::Evidence, skew: false, loss: Loss::Huber(2.5), weigh: true }
+        SolveOptions {
+            lens: Lens::Evidence,
+            skew: false,
+            loss: Loss::Huber(2.5),
+            weigh: true,
+            boards: Boards::Evidence,
+        }
     }
 }
 
@@ -51,6 +77,8 @@ impl Default for SolveOptions {
 pub struct Solved {
     /// The camera that explains all pictures together.
     pub intrinsics: Intrinsics,
+    /// The board's, where the pictures tell that it is not as drawn.
+    pub shape: Option<Shape>,
     /// One a picture.
     pub camera_from_board: Vec<Rigid<Camera, Board>>,
     /// Of the intrinsic parameters (order: [`crate::camera::NAMES`]), zero rows for held ones; the residuals'
@@ -73,7 +101,14 @@ pub struct Solved {
     pub iterations: usize,
 }
 
-/// Solves for camera and poses together.
+impl Solved {
+    /// Where features are on the board, mm.
+    pub fn places(&self, features: &[Vec3]) -> Vec<Vec3> {
+        features.iter().map(|x| self.shape.as_ref().map_or(*x, |s| s.place(x))).collect()
+    }
+}
+
+/// Solves for camera, boards' poses and, where the pictures tell it, the board's shape together.
 ///
 /// # Errors
 /// Fewer than two pictures with at least 6 corners each; corners on a line; no camera explains them.
@@ -93,7 +128,7 @@ pub fn solve(pictures: &[Observation], width: u32, height: u32, options: &SolveO
     let to_normalised =
         Mat3::new(1.0 / start.fx, 0.0, -start.cx / start.fx, 0.0, 1.0 / start.fy, -start.cy / start.fy, 0.0, 0.0, 1.0);
     let poses = seen.iter().map(|s| pose_from_homography(&(to_normalised * s.homography))).collect();
-    let fit = Fit { corners: &points, like: &start, loss: options.loss };
+    let mut fit = Fit { corners: &points, like: &start, loss: options.loss, bent: None };
     let mut held: Vec<usize> = options.lens.held();
     if !options.skew {
         held.push(SKEW);
@@ -101,18 +136,36 @@ pub fn solve(pictures: &[Observation], width: u32, height: u32, options: &SolveO
     // First without the higher lens terms and with all corners counting: the closed form is far off.
     let rough: Vec<usize> = (LENS + 1..PARAMETERS).chain(held.iter().copied()).collect();
     let coarse = LmOptions { max_iterations: 15, tolerance: 1e-4, ..LmOptions::default() };
-    let first = fit.with(&rough, (start.parameters(), poses), coarse);
+    let first = fit.with(&rough, State { camera: start.parameters(), shape: Vec::new(), poses }, coarse);
     let mut solution = fit.fine(&held, first.state);
+    let basis = (options.boards != Boards::Drawn).then(|| one_board(pictures)).flatten();
+    match basis {
+        Some(basis) if options.boards == Boards::Evidence => by_shape(&mut fit, basis, &mut solution, &held),
+        Some(basis) => shaped(&mut fit, basis, &mut solution, &held),
+        None => {}
+    }
+    if options.boards == Boards::Shaped && fit.bent.is_none() {
+        return Err(Fault::refused("the board's shape is not determined")
+            .cause("the pictures show several boards, or too few of one")
+            .next("use pictures of one board, 8 or more, or take it as drawn (--board drawn)"));
+    }
     if options.lens == Lens::Evidence {
         by_families(&fit, &mut solution, &mut held);
+        resized(&mut fit, &mut solution, &held);
         by_evidence(&fit, &mut solution, &mut held);
     }
-    if solution.stop == Stop::BadStart || solution.state.0.iter().any(|x| !x.is_finite()) {
+    if solution.stop == Stop::BadStart || solution.state.camera.iter().any(|x| !x.is_finite()) {
         return Err(Fault::refused("the camera could not be solved")
             .cause("the corners contradict each other, or do not determine so many lens terms")
             .next("look at the pictures and leave out those where the board was misread; ask for fewer lens terms (--lens five)"));
     }
     Ok(finish(&fit, solution, held))
+}
+
+/// The ways in which the board may differ from its drawing, where all pictures show the same one.
+fn one_board(pictures: &[Observation]) -> Option<Basis> {
+    let first = pictures.first()?;
+    pictures.iter().all(|o| o.features == first.features).then(|| Basis::of(&first.features)).flatten()
 }
 
 /// Corners with sigmas for the solver. A floor keeps a few very sharp corners from ruling: printing
@@ -134,19 +187,21 @@ fn see(name: &str, points: &[Corner]) -> Result<Seen> {
 }
 
 fn finish(fit: &Fit<'_>, solution: Solution<State>, held: Vec<usize>) -> Solved {
-    let camera = fit.camera(&solution);
+    let (camera, shape) = (fit.camera(&solution), fit.shape(&solution));
+    let place = |x: &Vec3| shape.as_ref().map_or(*x, |s| s.place(x));
     let mut weights = solution.weights.iter();
     let mut sum = 0.0;
     let mut count = 0usize;
     let residuals: Vec<Vec<(Vec2, f64)>> = fit
         .corners
         .iter()
-        .zip(&solution.state.1)
+        .zip(&solution.state.poses)
         .map(|(points, pose)| {
             points
                 .iter()
                 .map(|(x, pixel, _)| {
-                    let r = camera.pixel_from_point(&pose.point(x)).map_or(Vec2::repeat(f64::NAN), |p| pixel - p);
+                    let r =
+                        camera.pixel_from_point(&pose.point(&place(x))).map_or(Vec2::repeat(f64::NAN), |p| pixel - p);
                     sum += r.norm_squared();
                     count += 1;
                     (r, weights.next().copied().unwrap_or(0.0))
@@ -157,7 +212,8 @@ fn finish(fit: &Fit<'_>, solution: Solution<State>, held: Vec<usize>) -> Solved 
     let belief = fit.belief(&solution);
     Solved {
         intrinsics: camera,
-        camera_from_board: solution.state.1.clone(),
+        shape,
+        camera_from_board: solution.state.poses.clone(),
         covariance: belief.map(|b| b.0),
         repeat: belief.map_or(Parameters::repeat(1.0), |b| b.1),
         held,

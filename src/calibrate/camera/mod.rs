@@ -2,8 +2,7 @@
 //! Frame and unit: camera frame; px, mm (docs/math.md, Camera calibration).
 
 mod bundle;
-mod evidence;
-mod families;
+mod choice;
 mod fit;
 pub mod intrinsics;
 pub mod lens;

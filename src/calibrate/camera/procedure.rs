@@ -2,7 +2,7 @@
 //! report shows (\[zhang00\]; docs/math.md, Camera calibration).
 //! Frame and unit: camera frame; pixels, mm, degrees where the name says so.
 
-use super::intrinsics::{Observation, SolveOptions, Solved, solve};
+use super::intrinsics::{Boards, Observation, SolveOptions, Solved, solve};
 use super::lens::{Lens, further_names, held_names};
 use super::pictures::{Pictures, one_size, pictures};
 use super::quality;
@@ -105,7 +105,9 @@ pub fn from_observations(
     let agreed = agree(pictures, left_out, [width, height], &options.solve)?;
     let Agreed { pictures, solved, .. } = &agreed;
     let hold_out_px = if pictures.len() > 2 {
-        quality::hold_out(pictures, width, height, &options.solve)
+        // Whether the board is as drawn is a matter of the board, not of the picture that is held out.
+        let boards = if solved.shape.is_some() { Boards::Shaped } else { Boards::Drawn };
+        quality::hold_out(pictures, width, height, &SolveOptions { boards, ..options.solve.clone() })
     } else {
         vec![None; pictures.len()]
     };
@@ -232,12 +234,23 @@ fn judge(
     evidence.fits(&mut j);
     j.reasons.extend(held_parameters(solved, options.solve.lens));
     j.reasons.extend(further_parameters(solved, options.solve.lens));
+    let shape = board_shape(pictures, solved);
+    j.reasons.extend(shape.map(|[flat, lifted]| {
+        format!(
+            "the board is not as drawn: its features are {flat:.3} mm off in its plane and {lifted:.3} mm out of it (rms); its shape \
+             was estimated with the camera, pictures that were not solved from fit better with it"
+        )
+    }));
     j.reasons.extend(agreed.left_out.iter().map(|(name, why)| format!("{name} was left out: {why}")));
     if let Some((name, id, r)) = worst.first() {
         j.reasons.push(format!("worst corner: {name}, feature {id}, {r:.2} px ({} stand out)", worst.len()));
     }
     let noise = rms(solved.residuals.iter().flatten().map(|r| r.0.norm())) / std::f64::consts::SQRT_2;
     j.advice = advise(pictures, solved, distance, noise, expected, j.verdict);
+    j.advice.extend(shape.map(|_| {
+        "calibrate hand-eye, laser plane and pointer with a flatter board (print on glass or aluminium): they take it as drawn"
+            .to_string()
+    }));
     let per_picture = pictures
         .iter()
         .zip(&solved.residuals)
@@ -316,6 +329,10 @@ impl Evidence<'_> {
             ("coverage_share".into(), self.covered),
             ("tilt_spread_deg".into(), self.tilt),
         ]);
+        if let Some([flat, lifted]) = board_shape(&self.agreed.pictures, solved) {
+            figures.insert("board_off_in_its_plane_rms_mm".into(), flat);
+            figures.insert("board_off_out_of_its_plane_rms_mm".into(), lifted);
+        }
         if let Some(held) = self.held_out {
             figures.insert("holdout_rms_px".into(), held);
             figures.insert("holdout_rms_mm".into(), held * self.distance / (0.5 * (k.fx + k.fy)));
@@ -324,6 +341,11 @@ impl Evidence<'_> {
         figures.retain(|_, v| v.is_finite());
         figures
     }
+}
+
+/// By how much the board departs from its drawing, mm rms, in its plane and out of it; `None` where it was taken as drawn.
+fn board_shape(pictures: &[Observation], solved: &Solved) -> Option<[f64; 2]> {
+    Some(solved.shape.as_ref()?.departs(&pictures.first()?.features))
 }
 
 /// The lens parameters that the evidence holds at 0, in words; `None` where the lens was stated.

@@ -46,7 +46,7 @@ pub fn hold_out(pictures: &[Observation], width: u32, height: u32, options: &Sol
             let solved = solve(&others, width, height, options).ok();
             (g..pictures.len())
                 .step_by(groups)
-                .map(|i| (i, solved.as_ref().and_then(|s| alone(&s.intrinsics, &pictures[i]))))
+                .map(|i| (i, solved.as_ref().and_then(|s| alone(s, &pictures[i]))))
                 .collect()
         })
         .collect();
@@ -56,8 +56,8 @@ pub fn hold_out(pictures: &[Observation], width: u32, height: u32, options: &Sol
 }
 
 /// sqrt(sum |r|² / n) of one picture with its own pose, px.
-fn alone(k: &Intrinsics, o: &Observation) -> Option<f64> {
-    let pose = crate::calibrate::pose::pose_of_points(k, &o.features, &o.view).ok()?;
+fn alone(others: &Solved, o: &Observation) -> Option<f64> {
+    let pose = crate::calibrate::pose::pose_of_points(&others.intrinsics, &others.places(&o.features), &o.view).ok()?;
     Some(pose.rms_px * std::f64::consts::SQRT_2)
 }
 

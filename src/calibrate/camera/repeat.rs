@@ -25,11 +25,18 @@ pub(super) fn repeat(bundle: &Bundle<'_>, solution: &Solution<State>) -> Option<
         return None;
     }
     let information: DMatrix<f64> = told.iter().map(|t| &t.0).sum();
-    let covariance = information.cholesky()?.inverse();
-    let root = covariance.clone().cholesky()?.l();
     let variance = solution.sigma0 * solution.sigma0;
+    let mut all = information.clone();
+    for (i, usual) in bundle.usual() {
+        let row = bundle.free.iter().position(|&f| f == i)?;
+        all[(row, row)] += variance / (usual * usual);
+    }
+    let root = all.cholesky()?.inverse().cholesky()?.l();
     let pulls: Vec<DVector<f64>> = told.iter().map(|t| pulled(t, &root) / variance.sqrt()).collect();
-    let alike = pulls.iter().map(|u| u.norm_squared()).sum::<f64>() / p as f64;
+    // What the pictures determine of each direction: all, but of those that are expected near zero.
+    let share = root.transpose() * information * &root;
+    let alike = pulls.iter().map(|u| u.norm_squared()).sum::<f64>() / share.trace();
+    let covariance = &root * share * root.transpose();
     if !alike.is_finite() {
         return None;
     }
@@ -37,7 +44,7 @@ pub(super) fn repeat(bundle: &Bundle<'_>, solution: &Solution<State>) -> Option<
     let freedom = n - 1.0 + ALIKE;
     let tails = freedom / (freedom - 2.0);
     let mut out = Parameters::repeat(1.0);
-    for (row, &i) in bundle.free.iter().enumerate() {
+    for (row, &i) in bundle.free.iter().enumerate().filter(|(_, i)| **i < PARAMETERS) {
         let moved = pulls.iter().map(|u| root.row(row).transpose().dot(u).powi(2)).sum::<f64>();
         let seen = ((n - 1.0) * moved / covariance[(row, row)] + ALIKE * alike) / freedom;
         out[i] = (1.0 + tails * (seen - 1.0).max(0.0)).sqrt();
@@ -53,8 +60,8 @@ fn pulled((own, pull): &Told, root: &DMatrix<f64>) -> DVector<f64> {
 }
 
 fn each(bundle: &Bundle<'_>, solution: &Solution<State>) -> Option<Vec<Told>> {
-    let (k, poses) = &solution.state;
-    let camera = bundle.like.with_parameters(k);
+    let State { camera, shape, poses } = &solution.state;
+    let camera = bundle.like.with_parameters(camera);
     let mut weights = solution.weights.iter();
     let p = bundle.free.len();
     let picture = |(corners, pose): (&Vec<_>, _)| -> Option<Told> {
@@ -63,7 +70,7 @@ fn each(bundle: &Bundle<'_>, solution: &Solution<State>) -> Option<Vec<Told>> {
         let (mut pull, mut pose_pull) = (DVector::zeros(p), Vector6::zeros());
         for corner in corners {
             let weight = *weights.next()?;
-            let (residual, rows) = bundle.row(&camera, pose, corner)?;
+            let (residual, rows) = bundle.row(&camera, shape, pose, corner)?;
             for (r, row) in [residual.x, residual.y].into_iter().zip(&rows) {
                 let (own, pose) = (DVector::from_row_slice(&row[..p]), Vector6::from_row_slice(&row[p..]));
                 kk.ger(weight, &own, &own, 1.0);

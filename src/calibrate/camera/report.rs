@@ -4,6 +4,7 @@
 use super::intrinsics::Observation;
 use super::procedure::CameraResult;
 use super::quality::{feature_bias, tilt_deg};
+use crate::calibrate::boards::shape::Shape;
 use crate::calibrate::report::{Page, axis_sphere, bars, coverage_map, residual_arrows, scatter};
 use crate::camera::NAMES;
 use crate::geometry::{Board, Camera, Rigid, Vec3};
@@ -22,6 +23,9 @@ pub fn page(result: &CameraResult, title: &str) -> Page {
     );
     page.table("Figures", &["figure and unit", "value"], &figures);
     draw_residuals(&mut page, result);
+    if let Some(shape) = &result.solved.shape {
+        draw_shape(&mut page, result, shape);
+    }
     page.table(
         "Features that are off the same way in every picture (board printed or mounted unevenly), the worst first",
         &["feature", "x mm", "y mm", "standard error mm", "pictures"],
@@ -92,6 +96,29 @@ fn draw_residuals(page: &mut Page, result: &CameraResult) {
     let by_radius: Vec<(f64, f64)> =
         arrows.iter().map(|(p, r, _)| ((p.x - k.cx).hypot(p.y - k.cy), r.norm())).collect();
     page.figure("Residual against distance from the principal point", &scatter(&by_radius, "px from the centre", "px"));
+}
+
+/// The board as its pictures show it.
+fn draw_shape(page: &mut Page, result: &CameraResult, shape: &Shape) {
+    let Some(features) = result.used.first().map(|o| &o.features) else { return };
+    let off: Vec<Vec3> = features.iter().map(|x| shape.place(x) - x).collect();
+    let far = off.iter().fold([0.0, 0.0], |[flat, high]: [f64; 2], d| [flat.max(d.xy().norm()), high.max(d.z.abs())]);
+    page.paragraph(&format!(
+        "The board is not as drawn. Smooth departures of its features were estimated beside the camera: up to {:.3} mm in its plane, \
+         up to {:.3} mm out of it (along its z axis). A scale of the whole board cannot be seen.",
+        far[0], far[1]
+    ));
+    let mut farthest: Vec<usize> = (0..features.len()).collect();
+    farthest.sort_by(|&a, &b| off[b].norm().total_cmp(&off[a].norm()));
+    let row = |&id: &usize| {
+        let d = off[id];
+        [vec![id.to_string()], [d.x, d.y, d.z].map(|v| format!("{v:.4}")).to_vec()].concat()
+    };
+    page.table(
+        "Features that are farthest from where the drawing has them",
+        &["feature", "x mm", "y mm", "z mm"],
+        &farthest.iter().take(10).map(row).collect::<Vec<_>>(),
+    );
 }
 
 /// The ten features whose mean residual on the board is largest beside its standard error.

@@ -2,7 +2,7 @@
 //! Frame and unit: camera frame; pixels, mm.
 
 use super::store::{Keep, finish};
-use crate::calibrate::camera::intrinsics::SolveOptions;
+use crate::calibrate::camera::intrinsics::{Boards, SolveOptions};
 use crate::calibrate::camera::lens::Lens;
 use crate::calibrate::camera::procedure::{CameraOptions, CameraResult, calibrate};
 use crate::calibrate::camera::report::page;
@@ -38,6 +38,10 @@ pub struct Args {
     /// Estimate the skew too (sensors with square rows have none)
     #[arg(long)]
     skew: bool,
+    /// The board: evidence (as drawn, unless 8 or more pictures of one board tell its bending and its print's errors: these are estimated
+    /// too then, and said), drawn, shaped (estimated whatever comes)
+    #[arg(long, default_value = "evidence", value_parser = crate::cli::terminal::arguments::parse::<Boards>)]
+    board: Boards,
     /// Distance at which the expected error is stated, mm [default: the middle of station.toml's working volume, else where
     /// the boards stood]
     #[arg(long)]
@@ -54,7 +58,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let mut recordings = args.recordings.iter().map(|r| Recording::open(r)).collect::<Result<Vec<_>>>()?;
     recordings.iter_mut().for_each(|r| r.channel = args.channel);
     let options = CameraOptions {
-        solve: SolveOptions { lens: args.lens, skew: args.skew, ..SolveOptions::default() },
+        solve: SolveOptions { lens: args.lens, skew: args.skew, boards: args.board, ..SolveOptions::default() },
         working_distance_mm: args.working_mm.or(settings.volume().map(|v| v.middle())),
         ..CameraOptions::default()
     };

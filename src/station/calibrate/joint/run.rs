@@ -6,7 +6,7 @@ use super::super::pointer::PointerRun;
 use super::gather::{Gathered, gather};
 use super::measure::{Finders, Measured, Separate, measure};
 use super::page::page;
-use crate::calibrate::camera::intrinsics::{Observation, SolveOptions, solve as solve_camera};
+use crate::calibrate::camera::intrinsics::{Boards, Observation, SolveOptions, solve as solve_camera};
 use crate::calibrate::hand_eye::closed::Near;
 use crate::calibrate::hand_eye::options::Mount;
 use crate::calibrate::joint::limits::systematic;
@@ -148,7 +148,9 @@ pub(in crate::station) fn first_camera(
         view: s.view.clone(),
     };
     let seen: Vec<Observation> = gathered.stops.iter().map(observe).collect();
-    let found = solve_camera(&seen, size[0], size[1], &run.camera)?;
+    // What is solved for together takes boards as drawn.
+    let drawn = SolveOptions { boards: Boards::Drawn, ..run.camera.clone() };
+    let found = solve_camera(&seen, size[0], size[1], &drawn)?;
     let covariance = found.covariance.ok_or_else(|| {
         Fault::refused("the camera is not determined by these pictures")
             .cause("too few boards, or all of them alike in distance and tilt")

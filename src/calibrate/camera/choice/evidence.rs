@@ -1,16 +1,16 @@
 //! In: a camera solved with every term. Out: the terms that the pictures give reason for; the others held at zero.
 //! Frame and unit: the lens's own.
 
-use super::bundle::State;
-use super::fit::Fit;
-use super::ray_error::expected_ray_error;
+use crate::calibrate::camera::bundle::State;
+use crate::calibrate::camera::fit::Fit;
+use crate::calibrate::camera::ray_error::expected_ray_error;
 use crate::solve::Solution;
 use nalgebra::DMatrix;
 use nalgebra::DVector;
 
 /// Holds lens terms at zero, from the highest down, where the pictures cannot tell them from zero and
 /// where estimating them would cost accuracy (expected ray error over the image).
-pub(in crate::calibrate) fn by_evidence(fit: &Fit<'_>, solution: &mut Solution<State>, held: &mut Vec<usize>) {
+pub(in crate::calibrate::camera) fn by_evidence(fit: &Fit<'_>, solution: &mut Solution<State>, held: &mut Vec<usize>) {
     for block in [&[8][..], &[6, 7], &[5], &[4]] {
         if block.iter().all(|i| held.contains(i)) {
             continue;
@@ -20,7 +20,7 @@ pub(in crate::calibrate) fn by_evidence(fit: &Fit<'_>, solution: &mut Solution<S
         }
         let fewer = [held, block].concat();
         let mut start = solution.state.clone();
-        block.iter().for_each(|&i| start.0[i] = 0.0);
+        block.iter().for_each(|&i| start.camera[i] = 0.0);
         let reduced = fit.fine(&fewer, start);
         let cost =
             |s: &Solution<State>| fit.covariance(s).map_or(f64::INFINITY, |c| expected_ray_error(&fit.camera(s), &c));
@@ -35,7 +35,7 @@ pub(in crate::calibrate) fn by_evidence(fit: &Fit<'_>, solution: &mut Solution<S
 /// Squared Mahalanobis distance of some parameters from zero; 0 where they are not determined.
 fn tells(fit: &Fit<'_>, solution: &Solution<State>, block: &[usize]) -> f64 {
     let Some(c) = fit.covariance(solution) else { return 0.0 };
-    let theta = DVector::from_iterator(block.len(), block.iter().map(|&i| solution.state.0[i]));
+    let theta = DVector::from_iterator(block.len(), block.iter().map(|&i| solution.state.camera[i]));
     let sub = DMatrix::from_fn(block.len(), block.len(), |a, b| c[(block[a], block[b])]);
     sub.try_inverse().map_or(0.0, |inverse| (theta.transpose() * inverse * &theta)[0])
 }

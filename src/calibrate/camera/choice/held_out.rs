@@ -1,0 +1,62 @@
+//! In: two models of a camera and its boards. Out: whether pictures that neither was solved from fit better with the second.
+//! Frame and unit: squares of the corners' sigmas. docs/math.md, Camera calibration (10).
+
+use crate::calibrate::camera::bundle::{Corner, State};
+use crate::calibrate::camera::fit::Fit;
+use crate::solve::Solution;
+
+/// Parts in which pictures are held out.
+const PARTS: usize = 4;
+/// Standard errors by which the held-out pictures must fit better.
+const SURE: f64 = 3.0;
+/// The same of what does no harm where it is taken in without need.
+const LIKELY: f64 = 2.0;
+/// Least share of the squared residuals that goes: what is less is the corners', whatever its odds. Of photographs by a plain lens
+/// rational terms explain between 0.5 and 2 %, three standard errors sure.
+pub(super) const WORTH: f64 = 0.02;
+/// Residuals beyond this many sigmas say no more.
+const FAR: f64 = 3.0;
+
+/// Mean squared residual of each picture, in squares of the corners' sigmas, with the camera and the shape of others and its own pose.
+/// `sigma0` is the plainest model's: all are cut off alike.
+pub(super) fn held_out(fit: &Fit<'_>, solution: &Solution<State>, held: &[usize], sigma0: f64) -> Vec<f64> {
+    let far = (FAR * sigma0).powi(2);
+    let mut scores = vec![0.0; fit.corners.len()];
+    for part in 0..PARTS {
+        let of = |out: bool| -> (Vec<usize>, Vec<Vec<Corner>>, Vec<_>) {
+            let those: Vec<usize> = (0..fit.corners.len()).filter(|i| (i % PARTS == part) == out).collect();
+            let corners = those.iter().map(|&i| fit.corners[i].clone()).collect();
+            let poses = those.iter().map(|&i| solution.state.poses[i]).collect();
+            (those, corners, poses)
+        };
+        let (_, corners, poses) = of(false);
+        let others = Fit { corners: &corners, ..*fit }.rough(held, State { poses, ..solution.state.clone() }).state;
+        let (those, corners, poses) = of(true);
+        let placed = Fit { corners: &corners, ..*fit }.placed(State { poses, ..others });
+        let mut lengths = placed.lengths.iter();
+        for (i, corners) in those.into_iter().zip(&corners) {
+            let sum: f64 = lengths.by_ref().take(corners.len()).map(|r| (r * r).min(far)).sum();
+            scores[i] = sum / corners.len() as f64;
+        }
+    }
+    scores
+}
+
+/// Share by which the second scores are lower; `None` where picture against picture that is not sure or not worth it.
+pub(super) fn gain(plain: &[f64], more: &[f64]) -> Option<f64> {
+    let n = plain.len() as f64;
+    let lower: Vec<f64> = plain.iter().zip(more).map(|(a, b)| a - b).collect();
+    let mean = lower.iter().sum::<f64>() / n;
+    let error = (lower.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / (n * (n - 1.0))).sqrt();
+    let all = plain.iter().sum::<f64>() / n;
+    (mean > SURE * error && mean > WORTH * all).then(|| mean / all)
+}
+
+/// True where the second scores are lower picture against picture, by factors.
+pub(super) fn surely_lower(plain: &[f64], more: &[f64]) -> bool {
+    let n = plain.len() as f64;
+    let factors: Vec<f64> = plain.iter().zip(more).map(|(a, b)| (a / b).ln()).collect();
+    let mean = factors.iter().sum::<f64>() / n;
+    let error = (factors.iter().map(|f| (f - mean).powi(2)).sum::<f64>() / (n * (n - 1.0))).sqrt();
+    mean > LIKELY * error && mean > WORTH
+}
