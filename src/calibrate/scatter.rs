@@ -9,6 +9,8 @@ use crate::rig::Verdict;
 const CONTRADICTING: f64 = 1.0 / 3.0;
 /// Pictures that must agree where others contradict them, and to be good.
 pub const ENOUGH: usize = 5;
+/// Three sigmas, squared.
+const FAR2: f64 = 9.0;
 /// Median of a chi-square with 2 degrees of freedom.
 const MEDIAN_OF_TWO: f64 = 2.0 * std::f64::consts::LN_2;
 
@@ -21,6 +23,13 @@ pub fn inflation(scatter2: f64, freedom: f64) -> f64 {
     let more = (scatter2 - 1.0).clamp(0.0, 1.0);
     let few = ((9.0 - n) / 4.0).clamp(0.0, 1.0);
     scatter2.max(1.0) * (1.0 + (student - 1.0) * more.max(few)).powi(2)
+}
+
+/// The scatter with what was left out as far off as is not doubted, three sigmas (Winsor's variance \[tukey62\]): where some stand
+/// out, others may by less, unseen. `left_out` pictures of 2 degrees of freedom each.
+pub fn winsorised(scatter2: f64, freedom: f64, left_out: usize) -> f64 {
+    let (n, k) = (freedom.max(1.0), left_out as f64);
+    if left_out == 0 { scatter2 } else { scatter2.max(1.0) * (n + FAR2 * k) / (n + 2.0 * k) }
 }
 
 /// Squared distances (2 degrees of freedom each) over what is usual among those that count, where that is more than chance:
@@ -56,6 +65,14 @@ mod tests {
             let found = 3.0 * (inflation(2.0, n) / 2.0).sqrt();
             assert!((found / t - 1.0).abs() < within, "{n}: {found} for {t}");
         }
+    }
+
+    #[test]
+    fn what_is_left_out_still_scatters() {
+        assert_eq!(winsorised(0.7, 17.0, 0), 0.7);
+        // Ten pictures, one of them out: 15 degrees of freedom and two more.
+        assert!((winsorised(2.0, 15.0, 1) - 2.0 * 24.0 / 17.0).abs() < 1e-12);
+        assert!(winsorised(0.5, 7.0, 2) > 2.0);
     }
 
     #[test]

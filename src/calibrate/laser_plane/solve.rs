@@ -10,7 +10,7 @@ use super::terms::{Data, Seen, State, basis, by_camera, look, mm_per_px, on_boar
 use super::views::StripeView;
 use crate::calibrate::boards::extent::{inside, to_print_edge};
 use crate::calibrate::measured_pose::MeasuredPose;
-use crate::calibrate::scatter::inflation;
+use crate::calibrate::scatter::{inflation, winsorised};
 use crate::camera::{CameraCovariance, Intrinsics};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Board, Camera, Plane, Rigid};
@@ -137,7 +137,9 @@ pub fn solve(
         let explained = from_camera(&data, &state, factor, &by_camera, camera_covariance);
         checks.scatter2 *= checks.freedom / (checks.freedom + explained);
     }
-    let inflation = inflation(checks.scatter2, checks.freedom);
+    let residuals = residuals(&data, &state, views, &used, &checks, &all, o);
+    let against = residuals.iter().filter(|v| v.contradicts).count();
+    let inflation = inflation(winsorised(checks.scatter2, checks.freedom, against), checks.freedom);
     let basis = basis(&state.plane);
     let exact = &basis * &local * basis.transpose() * inflation;
     let follows = by_camera.plane * camera_covariance.matrix() * by_camera.plane.transpose();
@@ -150,7 +152,7 @@ pub fn solve(
         plane: state.plane,
         covariance,
         covariance_camera_exact: exact,
-        views: residuals(&data, &state, views, &used, &checks, &all, o),
+        views: residuals,
         uses,
         sigma_ratio,
         neighbour_factor: neighbours,
