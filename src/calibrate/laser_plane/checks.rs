@@ -1,6 +1,6 @@
 //! In: a laser plane's fit. Out: whether each picture's stripe lies where the others predict it, how much the pictures
 //! scatter beyond their own sigmas, and the plane's error in the view.
-//! Frame and unit: camera frame, mm (docs/math.md, Laser plane (7) to (9)).
+//! Frame and unit: camera frame, mm (docs/math.md, Laser plane (7) to (10)).
 
 use super::terms::{ByCamera, Data, Says, State, on_board, says, stepped, tangents};
 use crate::calibrate::scatter;
