@@ -278,7 +278,8 @@ fn a_noisy_robot_gets_its_transform_with_an_honest_sigma() {
 #[test]
 fn a_noisy_robot_is_not_taken_for_shuffled_pairs() {
     let (mut noisy, mut shuffled) = (Vec::new(), Vec::new());
-    for k in 0..120 {
+    let sets = if std::env::var_os("SHEETLIGHT_LONG").is_some() { 1200 } else { 120 };
+    for k in 0..sets {
         let rng = &mut Pcg64::seed_from_u64(12_000 + k);
         let s = station(rng, Mount::EyeInHand, 6 + (k as usize % 20));
         let mut p = pairs(rng, &s, NOISY, &s.camera);
@@ -294,8 +295,14 @@ fn a_noisy_robot_is_not_taken_for_shuffled_pairs() {
     }
     noisy.sort_by(f64::total_cmp);
     shuffled.sort_by(f64::total_cmp);
-    println!("misfit over that of random deals: noisy up to {:.3}, shuffled from {:.3}", noisy[119], shuffled[0]);
-    assert!(noisy[119] < 0.3 && shuffled[0] > 0.7, "{:.3} {:.3}", noisy[119], shuffled[0]);
+    println!(
+        "misfit over that of random deals: noisy up to {:.3}, shuffled from {:.3}",
+        noisy[sets as usize - 1],
+        shuffled[0]
+    );
+    // The limit is 0.5.
+    let (least, most) = if sets > 120 { (0.4, 0.55) } else { (0.3, 0.7) };
+    assert!(noisy[sets as usize - 1] < least && shuffled[0] > most);
 }
 
 /// Each picture of a board that looks the same after a turn is read with a turn drawn by lot.

@@ -63,9 +63,9 @@ pub fn before(pairs: &[Pair], o: &HandEyeOptions) -> Result<()> {
 }
 
 /// Poses dealt out at random fit a chain too, badly. Pairs whose misfit is above this share of the best of
-/// [`DEALS`] random deals fit by chance: shuffled sets of 6 to 25 pairs come out at 0.94 and more, a robot that
-/// scatters by 2 mm and 1 degree at 0.18 and less (tests/hand_eye_judge.rs).
-const BY_CHANCE: f64 = 0.45;
+/// [`DEALS`] random deals fit by chance: 1200 shuffled sets of 6 to 25 pairs come out at 0.56 and more, robots
+/// that scatter by 2 mm and 1 degree at 0.33 and less, and once of 1200 more at 0.47 (tests/hand_eye_judge.rs, its long form).
+const BY_CHANCE: f64 = 0.5;
 const DEALS: u64 = 20;
 /// Below this share no other order of the poses is looked for.
 const SURELY: f64 = 0.02;

@@ -13,6 +13,9 @@ use crate::rig::{Covariance, Quality, Verdict, Volume};
 use nalgebra::Matrix2;
 use std::collections::BTreeMap;
 
+/// Scatter over the stated sigmas from which on spots are not good, and overrule no other.
+const LOUD: f64 = 3.0;
+
 /// Of the beam and the camera it was found with, under the names that the pointer's file has.
 pub fn covariance(fit: &PointerFit) -> Covariance {
     let camera: ParameterMatrix = fit.covariance.fixed_view::<PARAMETERS, PARAMETERS>(6, 6).into();
@@ -55,8 +58,11 @@ pub fn judge(fit: &PointerFit, camera: &Intrinsics, spot_px: f64, limits: &Limit
     });
     by_spots(fit, &used, work, &mut j);
     let [low, high] = fit.reach;
-    j.at_best(Verdict::Usable, fit.sigma_ratio > 3.0, || {
-        format!("the spots scatter {:.1} times more than their sigmas say", fit.sigma_ratio)
+    let loud = format!("the spots scatter {:.1} times more than their sigmas say", fit.sigma_ratio);
+    let overruled = used.len() < fit.spots.len();
+    j.at_best(Verdict::Usable, fit.sigma_ratio > LOUD && !overruled, || loud.clone());
+    j.at_best(Verdict::BadlyDetermined, fit.sigma_ratio > LOUD && overruled, || {
+        format!("{loud}, {LOUD:.0} times are allowed where others are left out: they do not agree well enough to overrule any")
     });
     j.advise(low > near + 0.25 * (far - near), || format!("show the board nearer, at about {} mm", work.depth(near)));
     j.advise(high < far - 0.25 * (far - near), || {
@@ -88,6 +94,11 @@ fn by_spots(fit: &PointerFit, used: &[&SpotResidual], work: &Volume, j: &mut Jud
         });
     }
     overrule(used.len(), fit.spots.len() - used.len(), j);
+    if let Some([out, within]) = &fit.rivals {
+        j.at_best(Verdict::BadlyDetermined, true, || {
+            format!("{out} was left out, but with it the others fit as well without {within}: it is not known which is wrong")
+        });
+    }
     let gate = PointerOptions::default().gate;
     for s in used.iter().filter(|s| s.beside > gate) {
         j.at_best(Verdict::BadlyDetermined, true, || {

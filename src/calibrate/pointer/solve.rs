@@ -5,7 +5,7 @@
 use super::beam::{basis, near_line, robust_line};
 pub use super::fit::SpotView;
 use super::fit::{Solved, by_camera, distance2, fit, spot};
-use crate::calibrate::scatter::{beside, inflation};
+use crate::calibrate::scatter::{beside, inflation, winsorised};
 use crate::camera::{CameraCovariance, Intrinsics, PARAMETERS, Parameters};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Camera, Plane, Ray, Vec3};
@@ -89,6 +89,8 @@ pub struct PointerFit {
     pub sigma_ratio: f64,
     /// Nearest and farthest spot along the optical axis, mm.
     pub reach: [f64; 2],
+    /// A spot that was left out and one that was not, where the beam through the others goes as well through the one as through the other.
+    pub rivals: Option<[String; 2]>,
 }
 
 fn refused(what: String) -> Fault {
@@ -167,6 +169,18 @@ impl Spots<'_> {
             used = next;
         }
         Ok(used)
+    }
+
+    /// A spot outside and one inside these that could change places: then it is not known which of them is wrong.
+    fn rivals(&self, used: &[usize], cost: f64, o: &PointerOptions) -> Option<[String; 2]> {
+        let usual = (cost / ((2 * used.len()) as f64 - 4.0).max(1.0)).max(1.0);
+        let outside = (0..self.views.len()).filter(|i| !used.contains(i));
+        let name = |i: usize| self.views[i].pose.name.clone();
+        outside.flat_map(|out| used.iter().map(move |&within| (out, within))).find_map(|(out, within)| {
+            let others: Vec<usize> = used.iter().copied().filter(|&i| i != within).chain([out]).collect();
+            let other = fit(&self.chosen(&others), self.camera, &Parameters::zeros(), &self.start, self.factor)?;
+            (other.2 - cost <= o.gate * usual).then(|| [name(out), name(within)])
+        })
     }
 
     /// Nearest and farthest of these, mm.
@@ -254,9 +268,10 @@ pub fn solve(
     let (state, local, cost) = &judged.solved;
     let freedom = (2 * used.len()) as f64 - 4.0;
     let sigma_ratio = (cost / freedom.max(1.0)).sqrt();
+    let scatter2 = winsorised(sigma_ratio * sigma_ratio, freedom, views.len() - used.len());
     let exact = {
         let j = basis(&state.beam);
-        &j * local.view((0, 0), (4, 4)) * j.transpose() * inflation(sigma_ratio * sigma_ratio, freedom)
+        &j * local.view((0, 0), (4, 4)) * j.transpose() * inflation(scatter2, freedom)
     };
     let by_camera = by_camera(&spots.chosen(&used), camera, state, &camera_covariance.named(), feature_factor)
         .ok_or_else(undetermined)?;
@@ -267,5 +282,6 @@ pub fn solve(
         spots: spots.residuals(&used, &judged),
         sigma_ratio,
         reach,
+        rivals: spots.rivals(&used, *cost, o),
     })
 }
