@@ -274,6 +274,19 @@ fn a_noisy_robot_gets_its_transform_with_an_honest_sigma() {
     }
 }
 
+/// Scoring of the noise that overshoots had left the robot's turns and the boards without any here, and a sigma 4800 times too small:
+/// one set of 600.
+#[test]
+fn noise_that_is_shared_among_three_sources_does_not_vanish() {
+    let rng = &mut Pcg64::seed_from_u64(9476);
+    let s = station(rng, Mount::EyeToHand, 20);
+    let p = poses_alone(&pairs(rng, &s, NOISY, &s.camera), None);
+    let found = run(&s, &p, &CameraCovariance::exact()).unwrap();
+    let e = error(&found.chain, &s.truth);
+    let off = (0..6).map(|i| e[i] * e[i] / found.covariance[(i, i)]).sum::<f64>() / 6.0;
+    assert!(off < 4.0 && (0.5..2.0).contains(&found.chi2), "{:.2} sigmas, chi2 {}", off.sqrt(), found.chi2);
+}
+
 /// What parts a robot that scatters from pairs that do not belong together: measured far on both sides of the limit.
 #[test]
 fn a_noisy_robot_is_not_taken_for_shuffled_pairs() {

@@ -47,8 +47,64 @@ impl Components {
                 }
             }
         }
-        next.iter().all(|t| t.is_finite()).then_some(next)
+        if !next.iter().all(|t| t.is_finite()) {
+            return None;
+        }
+        // Which of them are nothing is not told by their signs one after the other: of all ways the likeliest.
+        let mut likeliest = (self.likelihood(&next).unwrap_or(f64::NEG_INFINITY), next);
+        if likeliest.1.iter().zip(floor).any(|(t, f)| t <= f) {
+            for other in (1..1u32 << k).filter_map(|free| at_floor(&s, &q, floor, free)) {
+                let l = self.likelihood(&other).unwrap_or(f64::NEG_INFINITY);
+                if l > likeliest.0 + SAME {
+                    likeliest = (l, other);
+                }
+            }
+        }
+        // Scoring can overshoot: half of the way, until it is no step back.
+        let (mut l, mut next) = likeliest;
+        let before = self.likelihood(theta).unwrap_or(f64::NEG_INFINITY);
+        for _ in 0..HALVINGS {
+            if l >= before - SAME {
+                return Some(next);
+            }
+            next.iter_mut().zip(theta).for_each(|(n, t)| *n = 0.5 * (*n + t));
+            l = self.likelihood(&next).unwrap_or(f64::NEG_INFINITY);
+        }
+        Some(theta.to_vec())
     }
+
+    /// Logarithm of the restricted likelihood, but for a constant; `None` where a matrix is singular.
+    fn likelihood(&self, theta: &[f64]) -> Option<f64> {
+        let mut v = self.known.clone();
+        for (t, u) in theta.iter().zip(&self.parts) {
+            v += u * *t;
+        }
+        let v = v.cholesky()?;
+        let (vj, ve) = (v.solve(&self.jacobian), v.solve(&self.residual));
+        let normal = (self.jacobian.transpose() * vj).cholesky()?;
+        let right = self.jacobian.transpose() * &ve;
+        let misfit = self.residual.dot(&ve) - right.dot(&normal.solve(&right));
+        let ln_root = |m: &DMatrix<f64>| m.diagonal().iter().map(|d| d.ln()).sum::<f64>();
+        Some(-ln_root(v.l_dirty()) - ln_root(normal.l_dirty()) - 0.5 * misfit)
+    }
+}
+
+/// Differences of the likelihood's logarithm that are no difference.
+const SAME: f64 = 1e-6;
+/// Shortest step: a thousandth of the scoring's.
+const HALVINGS: usize = 10;
+
+/// The components that `free` names (a bit each) with the others at their floor; `None` where one of them would lie below its own.
+fn at_floor(s: &DMatrix<f64>, q: &DVector<f64>, floor: &[f64], free: u32) -> Option<Vec<f64>> {
+    let (some, held): (Vec<usize>, Vec<usize>) = (0..floor.len()).partition(|a| free >> a & 1 == 1);
+    let right =
+        DVector::from_fn(some.len(), |i, _| q[some[i]] - held.iter().map(|&c| s[(some[i], c)] * floor[c]).sum::<f64>());
+    let found = DMatrix::from_fn(some.len(), some.len(), |i, j| s[(some[i], some[j])]).lu().solve(&right)?;
+    let mut out = floor.to_vec();
+    for (&a, &t) in some.iter().zip(&found) {
+        out[a] = t;
+    }
+    some.iter().all(|&a| out[a] > floor[a] && out[a].is_finite()).then_some(out)
 }
 
 #[cfg(test)]
