@@ -172,14 +172,13 @@ impl Spots<'_> {
     }
 
     /// A spot outside and one inside these that could change places: then it is not known which of them is wrong.
-    fn rivals(&self, used: &[usize], cost: f64, o: &PointerOptions) -> Option<[String; 2]> {
-        let usual = (cost / ((2 * used.len()) as f64 - 4.0).max(1.0)).max(1.0);
+    fn rivals(&self, used: &[usize], cost: f64, scatter2: f64, o: &PointerOptions) -> Option<[String; 2]> {
         let outside = (0..self.views.len()).filter(|i| !used.contains(i));
         let name = |i: usize| self.views[i].pose.name.clone();
         outside.flat_map(|out| used.iter().map(move |&within| (out, within))).find_map(|(out, within)| {
             let others: Vec<usize> = used.iter().copied().filter(|&i| i != within).chain([out]).collect();
             let other = fit(&self.chosen(&others), self.camera, &Parameters::zeros(), &self.start, self.factor)?;
-            (other.2 - cost <= o.gate * usual).then(|| [name(out), name(within)])
+            (other.2 - cost <= o.gate * scatter2.max(1.0)).then(|| [name(out), name(within)])
         })
     }
 
@@ -282,6 +281,6 @@ pub fn solve(
         spots: spots.residuals(&used, &judged),
         sigma_ratio,
         reach,
-        rivals: spots.rivals(&used, *cost, o),
+        rivals: spots.rivals(&used, *cost, sigma_ratio * sigma_ratio, o),
     })
 }
