@@ -36,32 +36,11 @@ impl Components {
         let trace = |a: &DMatrix<f64>, b: &DMatrix<f64>| a.component_mul(&b.transpose()).sum();
         let s = DMatrix::from_fn(k, k, |a, b| trace(&pu[a], &pu[b]));
         let q = DVector::from_fn(k, |a, _| pe.dot(&(&self.parts[a] * &pe)) - trace(&pu[a], &pv));
-        let mut next: Vec<f64> = s.clone().lu().solve(&q)?.iter().copied().collect();
-        // A component that would be negative is nothing, and the others take its share.
-        for a in 0..k {
-            if next[a] <= floor[a] {
-                next[a] = floor[a];
-                for b in (0..k).filter(|&b| b != a) {
-                    let rest: f64 = (0..k).filter(|&c| c != b).map(|c| s[(b, c)] * next[c].max(floor[c])).sum();
-                    next[b] = ((q[b] - rest) / s[(b, b)]).max(floor[b]);
-                }
-            }
-        }
-        if !next.iter().all(|t| t.is_finite()) {
+        if !q.iter().chain(s.iter()).all(|x| x.is_finite()) {
             return None;
         }
-        // Which of them are nothing is not told by their signs one after the other: of all ways the likeliest.
-        let mut likeliest = (self.likelihood(&next).unwrap_or(f64::NEG_INFINITY), next);
-        if likeliest.1.iter().zip(floor).any(|(t, f)| t <= f) {
-            for other in (1..1u32 << k).filter_map(|free| at_floor(&s, &q, floor, free)) {
-                let l = self.likelihood(&other).unwrap_or(f64::NEG_INFINITY);
-                if l > likeliest.0 + SAME {
-                    likeliest = (l, other);
-                }
-            }
-        }
+        let (mut l, mut next) = self.likeliest(&s, &q, floor);
         // Scoring can overshoot: half of the way, until it is no step back.
-        let (mut l, mut next) = likeliest;
         let before = self.likelihood(theta).unwrap_or(f64::NEG_INFINITY);
         for _ in 0..HALVINGS {
             if l >= before - SAME {
@@ -71,6 +50,20 @@ impl Components {
             l = self.likelihood(&next).unwrap_or(f64::NEG_INFINITY);
         }
         Some(theta.to_vec())
+    }
+
+    /// Solution of s θ = q with no component below its floor, and its likelihood's logarithm: where a component would be,
+    /// the signs do not tell which of them are nothing, and the likeliest of all ways is taken.
+    fn likeliest(&self, s: &DMatrix<f64>, q: &DVector<f64>, floor: &[f64]) -> (f64, Vec<f64>) {
+        let weighed = |theta: Vec<f64>| (self.likelihood(&theta).unwrap_or(f64::NEG_INFINITY), theta);
+        let all = (1u32 << floor.len()) - 1;
+        match at_floor(s, q, floor, all) {
+            Some(inside) => weighed(inside),
+            None => (1..all)
+                .filter_map(|free| at_floor(s, q, floor, free))
+                .map(weighed)
+                .fold(weighed(floor.to_vec()), |best, other| if other.0 > best.0 { other } else { best }),
+        }
     }
 
     /// Logarithm of the restricted likelihood, but for a constant; `None` where a matrix is singular.
