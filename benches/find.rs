@@ -16,6 +16,10 @@ use sheetlight::raster::{Image, save_png};
 use std::hint::black_box;
 use std::path::Path;
 
+/// The program's own.
+#[global_allocator]
+static MEMORY: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 fn boxed(x: f64, y: f64, cx: f64, cy: f64, hw: f64, hh: f64) -> f64 {
     let (dx, dy) = ((x - cx).abs() - hw, (y - cy).abs() - hh);
     dx.max(0.0).hypot(dy.max(0.0)) + dx.max(dy).min(0.0)

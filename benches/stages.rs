@@ -12,6 +12,10 @@ use sheetlight::stages::chain::config::ChainConfig;
 use sheetlight::stages::stripe::{hough, skeleton, thin, threshold};
 use sheetlight::stages::{Thinning, ThresholdParams};
 
+/// The program's own.
+#[global_allocator]
+static MEMORY: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 const THRESHOLD: ThresholdParams =
     ThresholdParams { window: sheetlight::stages::Window::Mean, size: 31, offset: 8, minimum: 0 };
 

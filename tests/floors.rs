@@ -115,6 +115,7 @@ const HOMES: &[(&str, &str)] = &[
     ("image", "raster"),
     ("indicatif", "cli"),
     ("libm", "calibrate"),
+    ("mimalloc", "main"),
     ("multiversion", "stages"),
     ("notify", "capture"),
     ("pollster", "gpu"),

@@ -20,7 +20,7 @@ struct Memory {
     /// Its place in the adapter's list of memory types.
     kind: u32,
     /// Vulkan's device, and the driver that holds its code, must outlive the memory: scans with an ambient picture crashed
-    /// at their end without it (tests/inputs.rs).
+    /// at their end without it (tests/scan/inputs.rs).
     _owner: wgpu::Device,
 }
 

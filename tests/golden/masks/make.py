@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # In: nothing (seeded noise). Out: small pictures, their masks by cv2.adaptiveThreshold and the skeletons of some by
 # cv2.ximgproc.thinning, stacked in PNG files beside this script; list.json says what each is and which OpenCV made it.
-# Frame and unit: pixels. Needs opencv-contrib-python and numpy; tests/masks.rs compares the stages with the files.
+# Frame and unit: pixels. Needs opencv-contrib-python and numpy; tests/scan/masks.rs compares the stages with the files.
 import json
 import pathlib
 

@@ -1,0 +1,20 @@
+//! In: simulated stations, rendered recordings and photographs with known truth. Out: whether each calibration is as good as it
+//! can be, says how good it is, and refuses what cannot be calibrated.
+//! Frame and unit: mm, degrees, px, as each file says.
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod axis_judge;
+mod bad_input;
+mod ball_judge;
+mod camera_judge;
+mod commands;
+mod guide;
+mod hand_eye_judge;
+mod joint;
+mod laser_plane_judge;
+mod photographs;
+mod pointer_judge;
+mod second_look;
+mod second_look_commands;

@@ -1,0 +1,129 @@
+//! In: simulated recordings, small and odd ones and deep ones, and scans that begin beside the part. Out: the scan on the GPU and
+//! the scan on the CPU twins give the same points, and the stripe is measured where it is seen. Frame and unit: base frame, mm; pixels.
+
+use crate::common::sheetlight;
+use sheetlight::geometry::{Rigid, Vec3};
+use sheetlight::raster::Image;
+use sheetlight::recording::{Motion, Stand};
+use sheetlight::rig::Rig;
+use sheetlight::scan::{Carrier, CloudPoint, Extraction, Format, Processor, Profile, Scanner, Shot, read_cloud};
+use std::collections::BTreeMap;
+
+/// Points by shot and pixel of the peak, which is unique within half a pixel.
+fn by_place(points: &[CloudPoint]) -> BTreeMap<(u32, i32, i32), &CloudPoint> {
+    points.iter().map(|p| ((p.shot, (p.u * 8.0).round() as i32, (p.v * 8.0).round() as i32), p)).collect()
+}
+
+fn agree(name: &str, simulate: &[&str]) {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    let out = at("sim");
+    sheetlight(&[&["simulate", "--out", &out, "--quiet"], simulate].concat());
+    let scan = |place: &str| {
+        let args = [
+            "scan",
+            &at("sim/scan"),
+            "--station",
+            &at("sim/station"),
+            "--out",
+            &at(place),
+            "--on",
+            place,
+            "--overlays",
+            "0",
+        ];
+        sheetlight(&args);
+        read_cloud(&dir.path().join(place).join("cloud.ply")).unwrap()
+    };
+    let (gpu, cpu) = (scan("gpu"), scan("cpu"));
+    assert!(cpu.len() > 1000, "{name}: {} points", cpu.len());
+    // A peak on the edge of a test may fall on either side of it; one in a thousand is plenty for that.
+    let lost = gpu.len().abs_diff(cpu.len());
+    assert!(lost * 1000 <= cpu.len(), "{name}: {} points on the GPU, {} on the twins", gpu.len(), cpu.len());
+    let (a, b) = (by_place(&gpu), by_place(&cpu));
+    let both: Vec<_> = a.iter().filter_map(|(k, p)| b.get(k).map(|q| (p, q))).collect();
+    // Places are rounded to eighths; peaks beside a rounding edge find no partner, whatever agrees.
+    assert!(both.len() * 100 >= cpu.len() * 98, "{name}: {} of {} points have a partner", both.len(), cpu.len());
+    let apart =
+        |p: &CloudPoint, q: &CloudPoint| (0..3).map(|i| (p.position[i] - q.position[i]).powi(2)).sum::<f32>().sqrt();
+    let worst = both.iter().map(|(p, q)| apart(p, q)).fold(0f32, f32::max);
+    println!("{name}: {} points, largest difference {worst:.5} mm", cpu.len());
+    assert!(worst < 0.005, "{name}: points differ by {worst} mm");
+}
+
+#[test]
+fn gpu_and_twins_give_the_same_points() {
+    if sheetlight::gpu::Device::open().is_err() {
+        assert!(std::env::var_os("SHEETLIGHT_REQUIRE_GPU").is_none(), "no GPU adapter");
+        eprintln!("*** SKIPPED: no GPU adapter ***");
+        return;
+    }
+    agree("640x480", &["--shots", "40"]);
+    agree("641x479", &["--shots", "21", "--width", "641", "--height", "479", "--seed", "3"]);
+    agree("12 bits", &["--shots", "20", "--bits", "12", "--seed", "5"]);
+}
+
+/// Kept points in the shots from `lead.len()` on: a few pictures that a scan begins with, then wide stripes.
+fn kept_after(station: &std::path::Path, row: f32, lead: &[Image]) -> usize {
+    let rig = Rig::load(station).unwrap();
+    let format = Format { width: WIDTH, height: HEIGHT, bits: 8 };
+    let carrier = Carrier::new(&rig, &Motion::default()).unwrap();
+    let mut scanner =
+        Scanner::new(&rig, carrier, format, &Extraction::default(), None, None, Processor::host()).unwrap();
+    let wide = (0..30).map(|k| stripe(row + 0.1 * k as f32, 2.2, 40..600));
+    let mut kept = 0;
+    let mut count = |profiles: Vec<Profile>| {
+        kept += profiles.iter().filter(|p| p.shot as usize >= lead.len()).map(|p| p.points.len()).sum::<usize>();
+    };
+    for (index, image) in lead.iter().cloned().chain(wide).enumerate() {
+        let at = Rigid::from_vectors(&Vec3::zeros(), Vec3::new(0.0, 0.25 * index as f64, 300.0));
+        let shot = Shot {
+            index: index as u32,
+            name: String::new(),
+            image,
+            stand: Stand::Robot(at),
+            slip: None,
+            here_ns: None,
+        };
+        scanner.push(shot).unwrap();
+        count(scanner.ready().unwrap());
+    }
+    count(scanner.finish().unwrap());
+    kept
+}
+
+const WIDTH: u32 = 640;
+const HEIGHT: u32 = 480;
+
+/// A lying stripe with its middle at a row, of a Gaussian's sigma in px, over some columns.
+fn stripe(row: f32, sigma: f32, columns: std::ops::Range<u32>) -> Image {
+    let light = |x: u32, y: u32| {
+        let d = (y as f32 - row) / sigma;
+        if columns.contains(&x) { 150.0 * (-0.5 * d * d).exp() } else { 0.0 }
+    };
+    let level = |i: u32| (5.0 + light(i % WIDTH, i / WIDTH) + 2.0 * ((i * 7919 % 13) as f32 / 13.0)) as u8;
+    Image::from_u8(WIDTH, HEIGHT, (0..WIDTH * HEIGHT).map(level).collect())
+}
+
+/// A scan that begins in the dark or sees splinters of light at a part's edge first: the stripe is measured where it is seen.
+#[test]
+fn a_scan_that_begins_beside_the_part_measures_the_stripe_all_the_same() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
+    sheetlight(&["simulate", "--out", &at("sim"), "--quiet", "--shots", "12", "--set", "scan"]);
+    sheetlight(&["scan", &at("sim/scan"), "--station", &at("sim/station"), "--out", &at("out"), "--overlays", "0"]);
+    let mut rows: Vec<f32> = read_cloud(&dir.path().join("out/cloud.ply")).unwrap().iter().map(|p| p.v).collect();
+    rows.sort_by(f32::total_cmp);
+    let row = rows[rows.len() / 2];
+    let station = dir.path().join("sim/station");
+    let plain = kept_after(&station, row, &[]);
+    assert!(plain > 30 * 100, "{plain} points without a lead");
+    let dark = vec![stripe(row, 2.2, 0..0); 10];
+    let long_dark = vec![stripe(row, 2.2, 0..0); 75];
+    let splinters = vec![stripe(row, 0.7, 300..340); 10];
+    for (name, lead) in [("in the dark", dark), ("long in the dark", long_dark), ("with splinters", splinters)] {
+        let kept = kept_after(&station, row, &lead);
+        println!("begins {name}: {kept} of {plain}");
+        assert!(kept * 100 >= plain * 97, "begins {name}: {kept} of {plain} points");
+    }
+}
