@@ -137,7 +137,33 @@ fn a_station_is_calibrated_ranged_and_verified_by_its_commands() {
     );
     // The board of the hand-eye recording is seen by the same camera: both together know it better than one.
     let both = s.calibrate("camera", "intrinsics", &[text(&s.at.join("handeye"))]);
+    // A board that is as drawn, its shape asked for: the camera is known less well, and as well as it says.
+    let mut meta = json(&s.at.join("intrinsics/meta.json"));
+    meta["frames"].as_array_mut().unwrap().truncate(9);
+    std::fs::create_dir(s.at.join("some")).unwrap();
+    for frame in meta["frames"].as_array().unwrap() {
+        let name = frame["ambient"].as_str().unwrap();
+        std::fs::copy(s.at.join("intrinsics").join(name), s.at.join("some").join(name)).unwrap();
+    }
+    std::fs::write(s.at.join("some/meta.json"), meta.to_string()).unwrap();
+    let shaped = s.calibrate("camera", "some", &["--board", "shaped"]);
+    let said = &shaped["quality"];
+    let words = said["reasons"].to_string();
+    assert!(words.contains("estimated with the camera, as was asked") && !words.contains("not as drawn"), "{words}");
+    let said = &said["figures"];
+    assert!(said["board_off_out_of_its_plane_rms_mm"].as_f64().unwrap() < 0.05, "{said}");
+    let (code, talk) = sheetlight_fails(&[
+        "calibrate",
+        "camera",
+        text(&s.at.join("intrinsics")),
+        "--station",
+        &s.station,
+        "--board",
+        "bent",
+    ]);
+    assert!(code == 2 && ["bent", "evidence", "drawn", "shaped"].iter().all(|w| talk.contains(w)), "{code} {talk}");
     let camera = s.calibrate("camera", "intrinsics", &[]);
+    assert!(camera["quality"]["figures"].get("board_off_out_of_its_plane_rms_mm").is_none());
     let k = &s.truth("camera")["value"];
     let sigma = |camera: &Value, name: &str| {
         let all: Vec<String> = serde_json::from_value(camera["covariance"]["parameters"].clone()).unwrap();
@@ -145,7 +171,7 @@ fn a_station_is_calibrated_ranged_and_verified_by_its_commands() {
         camera["covariance"]["matrix"][i][i].as_f64().unwrap().sqrt()
     };
     for name in ["fx", "fy", "cx", "cy"] {
-        for found in [&camera, &both] {
+        for found in [&camera, &both, &shaped] {
             let (off, sigma) = (figure(found, &["value", name]) - figure(k, &[name]), sigma(found, name));
             assert!(off.abs() < 4.0 * sigma, "{name} is {off:+.4} px off, sigma {sigma:.4}");
         }

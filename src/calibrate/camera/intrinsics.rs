@@ -77,7 +77,7 @@ impl Default for SolveOptions {
 pub struct Solved {
     /// The camera that explains all pictures together.
     pub intrinsics: Intrinsics,
-    /// The board's, where the pictures tell that it is not as drawn.
+    /// The board's, where it was estimated ([`Boards`]).
     pub shape: Option<Shape>,
     /// One a picture.
     pub camera_from_board: Vec<Rigid<Camera, Board>>,

@@ -235,11 +235,17 @@ fn judge(
     j.reasons.extend(held_parameters(solved, options.solve.lens));
     j.reasons.extend(further_parameters(solved, options.solve.lens));
     let shape = board_shape(pictures, solved);
+    let told = options.solve.boards == Boards::Evidence;
     j.reasons.extend(shape.map(|[flat, lifted]| {
-        format!(
-            "the board is not as drawn: its features are {flat:.3} mm off in its plane and {lifted:.3} mm out of it (rms); its shape \
-             was estimated with the camera, pictures that were not solved from fit better with it"
-        )
+        let off = format!("its features are {flat:.3} mm off in its plane and {lifted:.3} mm out of it (rms)");
+        if told {
+            format!(
+                "the board is not as drawn: {off}; its shape was estimated with the camera, pictures that were not solved from fit \
+                 better with it"
+            )
+        } else {
+            format!("the board's shape was estimated with the camera, as was asked: {off}")
+        }
     }));
     j.reasons.extend(agreed.left_out.iter().map(|(name, why)| format!("{name} was left out: {why}")));
     if let Some((name, id, r)) = worst.first() {
@@ -247,7 +253,7 @@ fn judge(
     }
     let noise = rms(solved.residuals.iter().flatten().map(|r| r.0.norm())) / std::f64::consts::SQRT_2;
     j.advice = advise(pictures, solved, distance, noise, expected, j.verdict);
-    j.advice.extend(shape.map(|_| {
+    j.advice.extend(shape.filter(|_| told).map(|_| {
         "calibrate hand-eye, laser plane and pointer with a flatter board (print on glass or aluminium): they take it as drawn"
             .to_string()
     }));
