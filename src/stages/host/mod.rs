@@ -121,7 +121,7 @@ impl Host {
                 choose::beside(k, &strongest, lines);
                 point::one(k, &m.optics, pose)
             };
-            let points = peaks.par_iter_mut().with_min_len(4096).map(point).collect();
+            let points = peaks.par_iter_mut().with_min_len(peak::TOGETHER).map(point).collect();
             Found { pixels, peaks, points }
         })
     }

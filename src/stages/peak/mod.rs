@@ -24,4 +24,4 @@ pub use measure::measure;
 pub use noise::noise;
 pub use params::{Method, PeakParams, Stripe};
 pub use stage::{METHOD, QUADS, STAGE, apart, stage_twin};
-pub use twin::{fitted, peaks};
+pub use twin::{TOGETHER, fitted, peaks};

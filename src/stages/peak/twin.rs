@@ -32,8 +32,8 @@ pub fn fitted(image: &Image, skeleton: &[u32], shot: u32, frame: &PeakFrame, met
     skeleton.par_chunks(TOGETHER).flat_map_iter(some).collect()
 }
 
-/// Skeleton pixels that a thread takes at least.
-pub const TOGETHER: usize = 256;
+/// Skeleton pixels that a thread takes at least: few enough that threads end together on a small picture's stripe.
+pub const TOGETHER: usize = 64;
 
 /// Compiled for what processors can do; none of it rounds otherwise.
 #[multiversion(targets = "simd")]
