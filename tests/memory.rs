@@ -8,6 +8,10 @@ use sheetlight::rig::Rig;
 use sheetlight::scan::{BadShot, Extraction, Format, GridOptions, Processor, Shot, Source, Where};
 use sheetlight::station::{ScanOptions, scan_on};
 
+/// The program's own: it is judged too.
+#[global_allocator]
+static MEMORY: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// The same few pictures again and again, the robot going to and fro over 10 mm.
 struct Repeating {
     pictures: Vec<Image>,

@@ -12,6 +12,10 @@ use sheetlight::simulate::{RigSpec, Set, SimulateOptions, simulate};
 use sheetlight::station::{ScanOptions, find_part, scan};
 use std::path::{Path, PathBuf};
 
+/// The program's own: it is judged too.
+#[global_allocator]
+static MEMORY: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// A part every half minute for 12 hours.
 const SCANS: usize = 12 * 3600 / 30;
 /// Pictures of this width, and so few of them, stand for the camera's: what is kept too long shows by the scan.
