@@ -54,11 +54,13 @@ fn taken_in(source: &str, text: &str) -> Vec<String> {
         .collect()
 }
 
-/// Files and folders of the tree that a page names.
+/// Files and folders of the tree that a page names; what the program makes there (`make demo`) is none of it.
 fn named(page: &str) -> BTreeSet<String> {
+    let ignored = read(".gitignore");
+    let made = |w: &str| ignored.lines().filter_map(|l| l.strip_prefix('/')).any(|l| Path::new(w).starts_with(l));
     page.split(|c: char| !(c.is_ascii_alphanumeric() || "_-./".contains(c)))
         .map(|w| w.trim_end_matches(['.', '/']))
-        .filter(|w| w.contains(['/', '.']) && !w.starts_with('/') && root().join(w).exists())
+        .filter(|w| w.contains(['/', '.']) && !w.starts_with('/') && !made(w) && root().join(w).exists())
         .map(|w| plain(Path::new(w)))
         .filter(|w| !w.is_empty())
         .collect()
