@@ -18,7 +18,7 @@ pub use machine::{Ceilings, cpu_seconds, peak_memory_bytes};
 pub use peer::serve;
 pub use recorded::recorded;
 pub use rows::{Latency, Row, Soak, Stage};
-pub use run::{BenchOptions, Report, run};
+pub use run::{BenchOptions, Report, run, scan_chain};
 pub use scaling::Scaling;
 pub use scenes::{Scene, pictures};
 pub use table::table;

@@ -220,7 +220,7 @@ fn resident(chain: &mut Chain, seconds: f64) -> Result<f64> {
 }
 
 /// What `scan` would run on pictures of a scene whose dark pixels scatter by `noise` grey levels.
-pub(super) fn scan_chain(width: u32, height: u32, scene: Scene, noise: f32) -> ChainConfig {
+pub fn scan_chain(width: u32, height: u32, scene: Scene, noise: f32) -> ChainConfig {
     let width_px = scene.width_px();
     let stripe = Stripe { width_px, speckle: PeakParams::default().speckle, noise, ..Stripe::default() };
     let optics = scene.optics(width, height);

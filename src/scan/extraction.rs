@@ -104,8 +104,6 @@ const WINDOW_WIDTHS: f32 = 24.0;
 const ABOVE_NOISE: f32 = 3.0;
 /// Of light that stands so many above it, one dark pixel in 30,000 is taken for it: no company is asked for.
 const FREE_OF_SPECKS: f32 = 4.0;
-/// Grey levels by which the measured noise must exceed the assumed one to replace it: the measurement comes in steps of 0.6.
-const COARSE: f32 = 1.0;
 
 impl Extraction {
     /// The same for pictures whose dark pixels scatter by `noise` grey levels of an 8-bit picture: no limit of light lies within it.
@@ -115,7 +113,7 @@ impl Extraction {
         self.threshold.minimum = self.threshold.minimum.max(least as u16);
         self.choose.faintest = self.choose.faintest.max(least);
         self.company = (self.threshold.offset as f32) < FREE_OF_SPECKS * noise;
-        if noise > self.peak.read_noise + COARSE {
+        if noise > self.peak.read_noise {
             self.peak.read_noise = noise.min(20.0);
         }
         self

@@ -321,4 +321,40 @@ mod tests {
             assert_eq!(found.grain_px, 0.0, "faces of {face} px, print of {print}: {found:?}");
         }
     }
+    /// The lower edge of a cylinder across the picture, up to 45 degrees steep, and its middle.
+    fn bent(radius: f64, wide: f64, speckle: f64) -> (Image, Vec<u32>) {
+        let mut noise = Noise(9);
+        let half = (0.7 * radius) as u32;
+        let (width, height) = (2 * half + 1, (0.3 * radius) as u32 + 80);
+        let across = |x: u32| f64::from(x) - f64::from(half);
+        let above = radius - f64::from(height) + 40.0;
+        let pixels = (0..width * height)
+            .map(|i| {
+                let from = across(i % width).hypot(f64::from(i / width) + above) - radius;
+                let light = 150.0 * (-0.5 * (from / wide).powi(2)).exp();
+                let scatter = (0.5f64.powi(2) + 0.02 * (light + 4.0) + (speckle * light).powi(2)).sqrt();
+                (4.0 + light + noise.normal() * scatter).round().clamp(0.0, 255.0) as u8
+            })
+            .collect();
+        let middle = |x: u32| (radius * radius - across(x).powi(2)).sqrt() - above;
+        let skeleton = (40..width - 40).map(|x| x | (middle(x).round() as u32) << 16).collect();
+        (Image::from_u8(width, height, pixels), skeleton)
+    }
+
+    /// A bend moves columns that are far apart alike, as large grains do.
+    #[test]
+    fn a_bent_line_has_no_grains() {
+        for (radius, wide, speckle) in [400.0, 700.0, 1500.0]
+            .into_iter()
+            .flat_map(|r| [(r, 1.5, 0.0), (r, 6.0, 0.0), (r, 3.0, SPECKLE), (r, 6.0, SPECKLE)])
+        {
+            let (image, skeleton) = bent(radius, wide, speckle);
+            let p = PeakParams { width_px: wide as f32, ..PeakParams::default() };
+            let found = measure(&image, &skeleton, &p, Vec2::Y).unwrap();
+            let off = |is: f32, of: f64, least: f64| (f64::from(is) - of).abs() / of.max(least);
+            let line = format!("{wide} px along {radius} px, speckle {speckle}: {found:?}");
+            assert_eq!(found.grain_px, 0.0, "{line}");
+            assert!(off(found.width_px, wide, 0.0) < 0.02 && off(found.speckle, speckle, 0.1) < 0.15, "{line}");
+        }
+    }
 }

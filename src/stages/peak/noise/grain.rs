@@ -53,7 +53,8 @@ impl Grains {
         (0..LAGS).filter(|&k| self.n[k] > 0.0).map(|k| self.squares[k] / self.n[k]).sum()
     }
     /// Sigma of all their grains, px; 0 where pixels scatter by themselves or nothing is told. A square is v (1 - (4 r(k) - r(2k)) / 3) on
-    /// average, r the correlation k columns apart: least squares over v and the grains' size. Peaks whose columns scatter more than noise
+    /// average, r the correlation k columns apart: least squares over v and the grains' size. A line's bend has squares that grow as k⁴.
+    /// Peaks whose columns scatter more than noise
     /// does, with grains as they were known `before`, lie over an edge.
     pub fn sigma(mut all: Vec<Grains>, before: f32) -> f32 {
         all.retain(|g| g.n[0] > 0.0);
@@ -68,23 +69,35 @@ impl Grains {
                 sum.n[k] += g.n[k];
             }
         }
-        // What a shape of the squares over the distance leaves less of, of all squares with white noise's.
         let lags: Vec<usize> = (0..LAGS).filter(|&k| sum.n[k] > 0.0).collect();
         let whole: f64 = lags.iter().map(|&k| sum.squares[k].powi(2) / sum.n[k]).sum();
-        let explained = |shape: &dyn Fn(f32) -> f64| {
-            let [mut across, mut square] = [0.0; 2];
-            for &k in &lags {
-                let shape = shape((k + 1) as f32);
-                across += shape * (sum.squares[k] - sum.white[k]);
-                square += sum.n[k] * shape * shape;
-            }
-            if across > 0.0 { across * across / (square * whole) } else { 0.0 }
+        let product = |a: &dyn Fn(f64) -> f64, b: &dyn Fn(f64) -> f64| -> f64 {
+            lags.iter().map(|&k| sum.n[k] * a((k + 1) as f64) * b((k + 1) as f64)).sum()
         };
-        let grained =
-            |s: f32| move |k: f32| 1.0 - f64::from(4.0 * correlation(k * k, s) - correlation(4.0 * k * k, s)) / 3.0;
+        // Of the squares without white noise's.
+        let along = |shape: &dyn Fn(f64) -> f64| -> f64 {
+            lags.iter().map(|&k| shape((k + 1) as f64) * (sum.squares[k] - sum.white[k])).sum()
+        };
+        // What one shape of the squares over the distance explains, a share of them all; and what two do.
+        let explained = |shape: &dyn Fn(f64) -> f64| along(shape).max(0.0).powi(2) / (product(shape, shape) * whole);
+        let together = |a: &dyn Fn(f64) -> f64, b: &dyn Fn(f64) -> f64| {
+            let (of_a, of_b, aa, ab, bb) = (along(a), along(b), product(a, a), product(a, b), product(b, b));
+            let (by_a, by_b) = (of_a * bb - of_b * ab, of_b * aa - of_a * ab);
+            let one = explained(a).max(explained(b));
+            // None of the two takes away.
+            if by_a > 0.0 && by_b > 0.0 { (by_a * of_a + by_b * of_b) / ((aa * bb - ab * ab) * whole) } else { one }
+        };
+        let grained = |s: f32| {
+            move |k: f64| {
+                1.0 - f64::from(4.0 * correlation((k * k) as f32, s) - correlation((4.0 * k * k) as f32, s)) / 3.0
+            }
+        };
+        let (white, bend) = (|_: f64| 1.0, |k: f64| k.powi(4));
         let sizes = (1..=(LARGEST / FINE) as u32).map(|i| i as f32 * FINE);
         let best = sizes.map(|s| (s, explained(&grained(s)))).max_by(|a, b| a.1.total_cmp(&b.1));
-        best.filter(|b| b.1 - explained(&|_| 1.0) > TELLING).map_or(0.0, |b| b.0)
+        // A bend of the line moves columns that are far apart alike, as large grains do.
+        let told = |&(_, by): &(f32, f64)| by - explained(&white) > TELLING && by > together(&white, &bend);
+        best.filter(told).map_or(0.0, |b| b.0)
     }
 }
 

@@ -10,11 +10,13 @@ use crate::raster::Image;
 const SAMPLES: u32 = 40_000;
 /// Median of |I - (left + right) / 2| over sigma: 0.6745 sqrt(1.5).
 const MEDIAN: f32 = 0.826;
+/// What rounding adds to the square of the scatter, levels^2.
+const ROUNDING: f32 = 1.0 / 12.0;
 
 /// From second differences over two pixels, because neighbours may share a sensor's or a codec's smoothing. Their median: the
 /// stripe, edges and specks are few. Where black is cut off at 0, that many pixels scatter on one side only: the share of zeros,
-/// up to a half, puts it right to a fifth; of a picture that is mostly zeros this says too little. Whole grey levels make it coarse: of
-/// 8-bit pictures steps of 0.6.
+/// up to a half, puts it right to a fifth; of a picture that is mostly zeros this says too little. Whole levels stand for half a
+/// level to both sides: the median lies between them as [sheppard98] has it, and what rounding adds is taken off.
 pub fn noise(image: &Image) -> f32 {
     let (w, h) = (image.width, image.height);
     let step = ((w * h / SAMPLES) as f32).sqrt().max(1.0) as u32;
@@ -32,10 +34,20 @@ pub fn noise(image: &Image) -> f32 {
     if twice.is_empty() {
         return 0.0;
     }
-    let middle = twice.len() / 2;
     let cut = 1.0 + zeros as f32 / twice.len() as f32;
-    let median = *twice.select_nth_unstable(middle).1 as f32 / 2.0;
-    median / MEDIAN * cut * 255.0 / f32::from(image.full_scale())
+    let scatter = median(&mut twice) / 2.0 / MEDIAN;
+    (scatter * scatter - ROUNDING).max(0.0).sqrt() * cut * 255.0 / f32::from(image.full_scale())
+}
+
+/// The median of what was rounded to these numbers.
+fn median(numbers: &mut [u32]) -> f32 {
+    let middle = numbers.len() / 2;
+    let level = *numbers.select_nth_unstable(middle).1;
+    let count = |of: std::cmp::Ordering| numbers.iter().filter(|n| n.cmp(&&level) == of).count() as f32;
+    let (below, same) = (count(std::cmp::Ordering::Less), count(std::cmp::Ordering::Equal));
+    let share = (0.5 * numbers.len() as f32 - below) / same;
+    // Numbers without sign: 0 stands for those up to a half.
+    if level == 0 { 0.5 * share } else { level as f32 - 0.5 + share }
 }
 
 #[cfg(test)]
@@ -63,6 +75,16 @@ mod tests {
         {
             let found = f64::from(noisy(bits, black, sigma));
             assert!((found / sigma - 1.0).abs() < 0.25, "{bits} bits, black {black}, {sigma}: {found}");
+        }
+    }
+
+    /// The threshold stands three of them above the dark: a tenth less, and five times as many specks are lit.
+    #[test]
+    fn whole_grey_levels_leave_the_scatter_as_it_is() {
+        for sigma in [0.7, 0.85, 1.0, 1.2, 1.5, 1.8, 2.0, 2.2, 3.1] {
+            let found = f64::from(noisy(8, 30.0, sigma));
+            // The stripe's pixels are few, but there.
+            assert!((0.99..1.07).contains(&(found / sigma)), "{sigma}: {found}");
         }
     }
 
