@@ -17,6 +17,7 @@ mod inputs;
 mod live;
 mod masks;
 mod resume;
+mod round_parts;
 mod shift_scan;
 mod speckle_grain;
 mod wide_stripes;
