@@ -2,7 +2,7 @@
 //! says they are, near the bound, and whether wrong pictures and reflections are found.
 //! Frame and unit: camera frame, mm, px.
 
-use crate::common::judge::{Trial, between, gauss, judge};
+use crate::common::judge::{Trial, between, gauss, information, judge};
 use crate::common::sheets::{FLAWS, Flaw, Sheet, set};
 use nalgebra::{DMatrix, DVector};
 use rand::{Rng, SeedableRng};
@@ -128,7 +128,7 @@ fn error(found: &Plane<Camera>, truth: &Plane<Camera>) -> DVector<f64> {
 /// derivatives of the predicted pixels.
 fn bound(s: &Station, fit: &LaserPlaneFit, corner_px: f64, peak_px: f64) -> DMatrix<f64> {
     let t = three(&s.plane);
-    let mut information = DMatrix::<f64>::zeros(3, 3);
+    let mut said = DMatrix::<f64>::zeros(3, 3);
     let points = s.spec.features();
     for (v, pose) in s.boards.iter().enumerate() {
         let moved = |d: &[f64; 9]| {
@@ -177,20 +177,9 @@ fn bound(s: &Station, fit: &LaserPlaneFit, corner_px: f64, peak_px: f64) -> DMat
             r.extend(across(d));
             DVector::from_vec(r)
         };
-        let rows = all(&[0.0; 9]).len();
-        let mut j = DMatrix::<f64>::zeros(rows, 9);
-        for c in 0..9 {
-            let h = if c == 2 || (3..6).contains(&c) { 1e-3 } else { 1e-5 };
-            let (mut a, mut b) = ([0.0; 9], [0.0; 9]);
-            (a[c], b[c]) = (h, -h);
-            j.set_column(c, &((all(&a) - all(&b)) / (2.0 * h)));
-        }
-        let h = j.transpose() * j;
-        let local = h.view((3, 3), (6, 6)).into_owned().try_inverse().unwrap();
-        let mixed = h.view((0, 3), (3, 6)).into_owned();
-        information += h.view((0, 0), (3, 3)).into_owned() - &mixed * local * mixed.transpose();
+        said += information(all, |c| if c == 2 || (3..6).contains(&c) { 1e-3 } else { 1e-5 }, 3);
     }
-    information.try_inverse().unwrap()
+    said.try_inverse().unwrap()
 }
 
 #[test]

@@ -2,7 +2,7 @@
 //! what the report says, near the bound, and whether wrong spots are found.
 //! Frame and unit: camera frame, mm, px.
 
-use crate::common::judge::{Trial, between, gauss, gauss2, gauss3, judge};
+use crate::common::judge::{Trial, between, gauss, gauss2, gauss3, information, judge};
 use crate::common::sheets::{Sheet, log_between};
 use nalgebra::{DMatrix, DVector, Matrix2, SMatrix};
 use rand::{Rng, SeedableRng};
@@ -109,7 +109,7 @@ fn four_by_beam(beam: &Ray<Camera>) -> DMatrix<f64> {
 /// Cramer-Rao bound of the four numbers with all board poses free, by numerical derivatives.
 fn bound(s: &Station, corner_px: f64, spot_px: f64) -> DMatrix<f64> {
     let truth = four(&s.beam);
-    let mut information = DMatrix::<f64>::zeros(4, 4);
+    let mut said = DMatrix::<f64>::zeros(4, 4);
     for pose in &s.boards {
         let all = |d: &[f64; 10]| {
             let a = Vec3::new(truth[0] + d[0], truth[1] + d[1], 120.0);
@@ -127,20 +127,9 @@ fn bound(s: &Station, corner_px: f64, spot_px: f64) -> DMatrix<f64> {
             r.extend([q.x, q.y]);
             DVector::from_vec(r)
         };
-        let rows = all(&[0.0; 10]).len();
-        let mut j = DMatrix::<f64>::zeros(rows, 10);
-        for c in 0..10 {
-            let h = if c < 7 { 1e-4 } else { 1e-6 };
-            let (mut a, mut b) = ([0.0; 10], [0.0; 10]);
-            (a[c], b[c]) = (h, -h);
-            j.set_column(c, &((all(&a) - all(&b)) / (2.0 * h)));
-        }
-        let h = j.transpose() * j;
-        let local = h.view((4, 4), (6, 6)).into_owned().try_inverse().unwrap();
-        let mixed = h.view((0, 4), (4, 6)).into_owned();
-        information += h.view((0, 0), (4, 4)).into_owned() - &mixed * local * mixed.transpose();
+        said += information(all, |c| if c < 7 { 1e-4 } else { 1e-6 }, 4);
     }
-    information.try_inverse().unwrap()
+    said.try_inverse().unwrap()
 }
 
 #[test]

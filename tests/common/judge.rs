@@ -26,6 +26,28 @@ pub fn between(rng: &mut Pcg64, low: f64, high: f64) -> f64 {
     low + (high - low) * rng.random::<f64>()
 }
 
+/// What residuals, each in units of its sigma, say of the first `shared` of their N numbers with the others free: the inverse of their
+/// covariance. Derivatives by differences over `step` of each number, the others eliminated.
+pub fn information<const N: usize>(
+    residuals: impl Fn(&[f64; N]) -> DVector<f64>,
+    step: impl Fn(usize) -> f64,
+    shared: usize,
+) -> DMatrix<f64> {
+    let columns: Vec<DVector<f64>> = (0..N)
+        .map(|c| {
+            let (mut a, mut b) = ([0.0; N], [0.0; N]);
+            (a[c], b[c]) = (step(c), -step(c));
+            (residuals(&a) - residuals(&b)) / (2.0 * step(c))
+        })
+        .collect();
+    let j = DMatrix::from_columns(&columns);
+    let h = j.transpose() * j;
+    let own = N - shared;
+    let local = h.view((shared, shared), (own, own)).into_owned().try_inverse().unwrap();
+    let mixed = h.view((0, shared), (shared, own)).into_owned();
+    h.view((0, 0), (shared, shared)).into_owned() - &mixed * local * mixed.transpose()
+}
+
 /// One calibration: error, reported variance and Cramer-Rao bound (a variance) of each parameter.
 pub struct Trial {
     pub error: DVector<f64>,

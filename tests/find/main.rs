@@ -14,4 +14,5 @@ mod pairs;
 mod photos;
 mod plate;
 mod recipes;
+mod scanned;
 mod sigma;

@@ -2,6 +2,7 @@
 //! with shots missing, half hidden, not there, or another part. Out: judgement: a pose that passes is right, whole parts pass.
 //! Frame and unit: the part's own axes; mm, degrees.
 
+use super::scanned::{Scan, Way, noisy, scanned};
 use crate::common::pose::Off;
 use rand::seq::IndexedRandom;
 use rand::{Rng, SeedableRng};
@@ -9,12 +10,9 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use sheetlight::find::{LocateOptions, Recipe, locate};
 use sheetlight::geometry::{Base, Part, Rigid, Vec3};
-use sheetlight::rig::{Rig, Volume};
-use sheetlight::scan::{CloudPoint, Extraction, Format, Processor, Profile, Scanner, Shot, Shots};
-use sheetlight::simulate::{
-    Canvas, InScene, Scene, SceneSpec, Sensor, Station, View, above, base_from_scene, expose, flange, part_pose,
-    reported,
-};
+use sheetlight::rig::Rig;
+use sheetlight::scan::{CloudPoint, Shots};
+use sheetlight::simulate::{Scene, SceneSpec, Station};
 use std::collections::BTreeMap;
 
 const PARTS: [&str; 4] = ["dimm", "led", "osc", "flash"];
@@ -142,61 +140,15 @@ fn scan(part: &'static str, seed: u64) -> Scanned {
     let scene = Scene::new(spec).unwrap();
     let mut station = Station::random(11 + seed % 9);
     let noise: f64 = rng.random_range(0.5..1.5);
-    let s = Sensor::default();
-    station.sensor = Sensor {
-        read_noise_e: s.read_noise_e * noise,
-        speckle: s.speckle * noise,
-        full_well_e: s.full_well_e / noise.powi(2),
-        hot_per_million: 0.0,
-        ..s
-    };
+    station.sensor = noisy(noise);
     let width = 640;
     let mut station = station.with_size(width, if long { 240 } else { 160 });
     station.laser.half_fan_deg = 12.0;
     let shaky = rng.random_bool(0.5);
     let (pose_mm, pose_deg) = if shaky { (0.02, 0.004) } else { (0.0, 0.0) };
     let pitch: f64 = if long { 0.45 } else { rng.random_range(0.2..0.35) };
-    let folder = tempfile::tempdir().unwrap();
-    station.store(folder.path()).unwrap();
-    let rig = Rig::load(folder.path()).unwrap();
-    let base_from_scene = base_from_scene(&station);
-    let format = Format { width: station.camera.width, height: station.camera.height, bits: 8 };
-    let volume = Volume::new(100.0, 230.0, "test");
-    let carrier = sheetlight::scan::Carrier::new(&rig, &sheetlight::recording::Motion::default()).unwrap();
-    let mut scanner =
-        Scanner::new(&rig, carrier, format, &Extraction::default(), Some(&volume), None, Processor::host()).unwrap();
-    let above_scene = scene.spec.focus_height_mm + station.working_distance;
-    let (mut cloud, mut places): (Vec<CloudPoint>, Vec<_>) = Default::default();
-    let mut take = |profiles: Vec<Profile>| {
-        for p in profiles {
-            places.push((p.shot, p.from_camera));
-            cloud.extend(p.points);
-        }
-    };
-    for i in 0..(2.0 * half[1] / pitch) as usize {
-        let scene_from_camera = above(0.0, pitch * i as f64 - half[1], above_scene);
-        let view = View { station: &station, scene: &scene, scene_from_camera };
-        let mut light = Canvas::new(format.width, format.height);
-        view.sheet(&mut light);
-        let dark = Canvas::new(format.width, format.height);
-        let image = expose(&station.sensor, &light, &dark, 0.0, &[], &mut rng);
-        let pose = flange(&station, &(base_from_scene * scene_from_camera));
-        let base_from_flange = reported(&pose, pose_mm, pose_deg, &mut rng);
-        scanner
-            .push(Shot {
-                index: i as u32,
-                name: String::new(),
-                image,
-                stand: sheetlight::recording::Stand::Robot(base_from_flange),
-                slip: None,
-                here_ns: None,
-            })
-            .unwrap();
-        take(scanner.ready().unwrap());
-    }
-    take(scanner.finish().unwrap());
-    let shots = Shots::new(scanner.stripe_along(), places);
-    let truth = base_from_scene * part_pose::<InScene>(&scene.spec.part[0]);
+    let way = Way { from: -half[1], to: half[1], pitch, depths: [100.0, 230.0], pose_mm, pose_deg };
+    let Scan { cloud, shots, rig, base_from_part: truth } = scanned(&station, &scene, &way, &mut rng);
     let about = format!(
         "{part} {seed}: size {k:.2}, turn {turn:.0}, albedo {albedo:.2}, noise {noise:.2}, pitch {pitch:.2}, shaky {shaky}, {} points",
         cloud.len()

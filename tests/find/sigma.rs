@@ -2,18 +2,13 @@
 //! Out: judgement on the reported uncertainty: true insertion error over reported sigma, rms per axis, near 1.
 //! Frame and unit: the part's own axes; mm, degrees.
 
+use super::scanned::{Way, noisy, scanned};
 use crate::common::pose::Off;
 use rand::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 use sheetlight::find::{LocateOptions, Recipe, locate};
-use sheetlight::geometry::{Base, Part, Rigid};
-use sheetlight::rig::{Rig, Volume};
-use sheetlight::scan::{CloudPoint, Extraction, Format, Processor, Profile, Scanner, Shot, Shots};
-use sheetlight::simulate::{
-    Canvas, InScene, Scene, SceneSpec, Sensor, Station, View, above, base_from_scene, expose, flange, part_pose,
-    reported,
-};
+use sheetlight::simulate::{Scene, SceneSpec, Station};
 
 /// A relay socket on a board: a body with a window and a notch. {x} {y} {turn} {tx} {ty} are drawn.
 fn scene(rng: &mut Pcg64) -> Scene {
@@ -93,70 +88,24 @@ fn trial(seed: u64) -> Option<Trial> {
     let said = conditions(&mut rng);
     let scene = scene(&mut rng);
     let mut station = Station::random(1 + seed % 7);
-    let s = Sensor::default();
-    station.sensor = Sensor {
-        read_noise_e: s.read_noise_e * said.noise,
-        speckle: s.speckle * said.noise,
-        full_well_e: s.full_well_e / said.noise.powi(2),
-        hot_per_million: 0.0,
-        ..s
-    };
+    station.sensor = noisy(said.noise);
     // The stripe moves by some 20 px for the part's height: a band of the sensor holds it all.
     let mut station = station.with_size(said.width, said.width / 5);
     // A narrow fan: what falls beside the part would only cost time.
     station.laser.half_fan_deg = 6.5;
-    let folder = tempfile::tempdir().unwrap();
-    station.store(folder.path()).unwrap();
-    let rig = Rig::load(folder.path()).unwrap();
-    let base_from_scene = base_from_scene(&station);
-    let format = Format { width: station.camera.width, height: station.camera.height, bits: 8 };
-    let volume = Volume::new(100.0, 210.0, "test");
-    let carrier = sheetlight::scan::Carrier::new(&rig, &sheetlight::recording::Motion::default()).unwrap();
-    let mut scanner =
-        Scanner::new(&rig, carrier, format, &Extraction::default(), Some(&volume), None, Processor::host()).unwrap();
-    let [_, y0, _, y1] = scene.spec.region_mm;
-    let height = scene.spec.focus_height_mm + station.working_distance;
-    let (mut cloud, mut places): (Vec<CloudPoint>, Vec<_>) = Default::default();
-    let mut take = |profiles: Vec<Profile>| {
-        for p in profiles {
-            places.push((p.shot, p.from_camera));
-            cloud.extend(p.points);
-        }
-    };
-    let shots = ((y1 - y0) / said.pitch) as usize;
-    for i in 0..shots {
-        let scene_from_camera = above(0.0, y0 + said.pitch * i as f64, height);
-        let view = View { station: &station, scene: &scene, scene_from_camera };
-        let mut light = Canvas::new(format.width, format.height);
-        view.sheet(&mut light);
-        let dark = Canvas::new(format.width, format.height);
-        let image = expose(&station.sensor, &light, &dark, 0.0, &[], &mut rng);
-        let pose = flange(&station, &(base_from_scene * scene_from_camera));
-        let base_from_flange = reported(&pose, said.pose_mm, said.pose_deg, &mut rng);
-        scanner
-            .push(Shot {
-                index: i as u32,
-                name: String::new(),
-                image,
-                stand: sheetlight::recording::Stand::Robot(base_from_flange),
-                slip: None,
-                here_ns: None,
-            })
-            .unwrap();
-        take(scanner.ready().unwrap());
-    }
-    take(scanner.finish().unwrap());
-    let shots = Shots::new(scanner.stripe_along(), places);
-    let truth: Rigid<Base, Part> = base_from_scene * part_pose::<InScene>(&scene.spec.part[0]);
+    let [_, from, _, to] = scene.spec.region_mm;
+    let Conditions { pitch, pose_mm, pose_deg, .. } = said;
+    let way = Way { from, to, pitch, depths: [100.0, 210.0], pose_mm, pose_deg };
+    let scan = scanned(&station, &scene, &way, &mut rng);
     let recipe = Recipe::parse(RELAY).unwrap();
-    let report = match locate(&cloud, &shots, &recipe, Some(&rig), &LocateOptions::default()) {
+    let report = match locate(&scan.cloud, &scan.shots, &recipe, Some(&scan.rig), &LocateOptions::default()) {
         Ok(r) => r,
         Err(e) => {
             println!("{seed}: refused: {} {:?}", e.what, said);
             return None;
         }
     };
-    let off = Off::of(&report.base_from_part, &truth);
+    let off = Off::of(&report.base_from_part, &scan.base_from_part);
     let error = [off.by.x, off.by.y, off.by.z, off.turn_deg];
     let sigma = [report.sigma_mm[0], report.sigma_mm[1], report.sigma_mm[2], report.sigma_deg[2]];
     println!("{seed:3}: error {error:8.4?}, sigma {sigma:7.4?}, {said:.2?} {:?}", report.reasons);
