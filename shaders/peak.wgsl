@@ -298,7 +298,7 @@ fn gaussian(at: vec2<i32>) -> Peak {
         a = max(a + da, 1.0);
         m = clamp(m + dm, m0 - 2.0 * s0, m0 + 2.0 * s0);
         width = clamp(width + dw, 0.3 * s0, 3.0 * s0);
-        let still = abs(dm) < 1e-2 * s0 && abs(dw) < 3e-2 * s0 && abs(da) < 3e-2 * a;
+        let still = abs(dm) < 5e-3 * s0 && abs(dw) < 1e-2 * s0 && abs(da) < 1e-2 * a;
         left = select(left - 1u, 0u, still);
     }
     let share = profile.square / profile.weight;

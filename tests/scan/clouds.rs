@@ -10,7 +10,7 @@ use std::path::Path;
 /// Lying, upright, askew, bent by a barrel lens, behind a tilted sensor, narrower than a pixel.
 const SHORT: [&str; 6] = ["barrel", "behind", "fine", "scheimpflug", "slant45", "upright"];
 /// Of a footprint: 0.001 mm at the reference rigs' pixel of 0.25 mm. What the fit's rule of ending leaves beyond it: a fit whose last
-/// step is as long as the rule's limit, a hundredth of the stripe's width, ends a step earlier on one side. Stripes are up to a pixel wide
+/// step is as long as the rule's limit, half a hundredth of the stripe's width, ends a step earlier on one side. Stripes are up to a pixel wide
 /// here, and a pixel moves a point on a sheet at 30 degrees by two footprints.
 const APART: f64 = 0.004;
 const ONE_STEP: f64 = 0.02;
