@@ -145,9 +145,9 @@ impl Engine {
         self
     }
 
-    /// Width of the pictures, px.
-    pub fn width(&self) -> u32 {
-        self.format.width
+    /// The pictures' longer side, px: the same of a camera that is turned.
+    pub fn longer_side(&self) -> u32 {
+        self.format.width.max(self.format.height)
     }
 
     /// Skeleton pixels that found no room in the GPU's list: more than a twentieth of the pictures.

@@ -238,7 +238,7 @@ impl Scanner {
         // Seen from the camera a turntable's part turns: its map lies over the table.
         self.up = if self.carrier.turns() { Vec3::z() * towards.z.signum() } else { towards };
         let axis = base_from_camera.direction(&self.along());
-        let field = self.pitch() * self.engine.width() as f32;
+        let field = self.pitch() * self.engine.longer_side() as f32;
         self.support = Some(Support::new(self.extraction.support, stripe.width_px, field, &axis, self.device())?);
         Ok(())
     }
@@ -254,7 +254,7 @@ impl Scanner {
         if !self.carrier.turns() {
             return [self.anchor; 3];
         }
-        let half = self.along() * (0.5 * f64::from(self.pitch()) * f64::from(self.engine.width()));
+        let half = self.along() * (0.5 * f64::from(self.pitch()) * f64::from(self.engine.longer_side()));
         [self.anchor - half, self.anchor, self.anchor + half]
     }
 

@@ -59,8 +59,8 @@ pub struct Support<T = ()> {
 }
 
 impl<T> Support<T> {
-    /// `axis`: unit vector along the laser line, base frame; `width_px`: the stripe's Gaussian sigma; `field_mm`: width of the
-    /// picture where the sheet meets the optical axis. Without a device the twin judges, with the same result.
+    /// `axis`: unit vector along the laser line, base frame; `width_px`: the stripe's Gaussian sigma; `field_mm`: what the
+    /// picture's longer side sees where the sheet meets the optical axis. Without a device the twin judges, with the same result.
     pub fn new(
         params: SupportParams,
         width_px: f32,

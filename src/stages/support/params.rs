@@ -11,8 +11,8 @@ pub struct SupportParams {
     /// Whether points are judged by their neighbours at all.
     pub on: bool,
     /// Half of the chord on a neighbouring shot's line, 0.0001..=1000 mm: what a point may be wrong by and still be
-    /// useful; smaller removes more at corners. Unless given a 540th of the picture's width where the sheet meets the
-    /// optical axis.
+    /// useful; smaller removes more at corners. Unless given a 540th of what the picture's longer side sees where the
+    /// sheet meets the optical axis: a camera that is turned sees the same.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radius_mm: Option<f32>,
     /// How much farther than the distance of the shots a neighbour may lie, 1..=3; 1.2 is a slope of 33 degrees.
