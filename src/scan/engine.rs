@@ -204,7 +204,7 @@ impl Engine {
     }
 
     /// Length of a stripe that crosses the region which is looked at, px.
-    fn along_px(&self) -> f32 {
+    pub fn along_px(&self) -> f32 {
         let [x, y] = self.optics.across().to_array();
         let [left, top, right, bottom] = self.asked.region_px(self.format);
         (right - left) as f32 * y.abs() + (bottom - top) as f32 * x.abs()

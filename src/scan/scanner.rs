@@ -254,7 +254,7 @@ impl Scanner {
         if !self.carrier.turns() {
             return [self.anchor; 3];
         }
-        let half = self.along() * (0.5 * f64::from(self.pitch()) * f64::from(self.engine.longer_side()));
+        let half = self.along() * (0.5 * f64::from(self.pitch()) * f64::from(self.engine.along_px()));
         [self.anchor - half, self.anchor, self.anchor + half]
     }
 

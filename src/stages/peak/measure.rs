@@ -321,6 +321,7 @@ mod tests {
             assert_eq!(found.grain_px, 0.0, "faces of {face} px, print of {print}: {found:?}");
         }
     }
+
     /// The lower edge of a cylinder across the picture, up to 45 degrees steep, and its middle.
     fn bent(radius: f64, wide: f64, speckle: f64) -> (Image, Vec<u32>) {
         let mut noise = Noise(9);

@@ -54,8 +54,7 @@ impl Grains {
     }
     /// Sigma of all their grains, px; 0 where pixels scatter by themselves or nothing is told. A square is v (1 - (4 r(k) - r(2k)) / 3) on
     /// average, r the correlation k columns apart: least squares over v and the grains' size. A line's bend has squares that grow as k⁴.
-    /// Peaks whose columns scatter more than noise
-    /// does, with grains as they were known `before`, lie over an edge.
+    /// Peaks whose columns scatter more than noise does, with grains as they were known `before`, lie over an edge.
     pub fn sigma(mut all: Vec<Grains>, before: f32) -> f32 {
         all.retain(|g| g.n[0] > 0.0);
         all.sort_by(|a, b| a.whole().total_cmp(&b.whole()));
