@@ -2,11 +2,14 @@
 //! the scan on the CPU twins give the same points, and the stripe is measured where it is seen. Frame and unit: base frame, mm; pixels.
 
 use crate::common::sheetlight;
-use sheetlight::geometry::{Rigid, Vec3};
+use sheetlight::camera::Intrinsics;
+use sheetlight::geometry::{Plane, Rigid, Vec3};
 use sheetlight::raster::Image;
 use sheetlight::recording::{Motion, Stand};
 use sheetlight::rig::Rig;
-use sheetlight::scan::{Carrier, CloudPoint, Extraction, Format, Processor, Profile, Scanner, Shot, read_cloud};
+use sheetlight::scan::{
+    Carrier, CloudPoint, Engine, Extraction, Format, Optical, Processor, Profile, Scanner, Shot, read_cloud,
+};
 use std::collections::BTreeMap;
 
 /// Points by shot and pixel of the peak, which is unique within half a pixel.
@@ -61,6 +64,27 @@ fn gpu_and_twins_give_the_same_points() {
     agree("640x480", &["--shots", "40"]);
     agree("641x479", &["--shots", "21", "--width", "641", "--height", "479", "--seed", "3"]);
     agree("12 bits", &["--shots", "20", "--bits", "12", "--seed", "5"]);
+}
+
+/// A quarter turn changes neither how long the stripe is nor what the picture's longer side sees: the reach of support and the ends of a
+/// turntable's stripe follow from these.
+#[test]
+fn a_turned_camera_has_the_same_stripe() {
+    let (lying, upright) = ([0.0, 0.883, 0.469], [0.883, 0.0, 0.469]);
+    for ((width, height), normal, along) in [
+        ((640, 480), lying, 640.0),
+        ((480, 640), upright, 640.0),
+        ((640, 480), upright, 480.0),
+        ((480, 640), lying, 480.0),
+    ] {
+        let (cx, cy, distortion) = (0.5 * f64::from(width), 0.5 * f64::from(height), [0.0; 5].into());
+        let camera = Intrinsics { fx: 600.0, fy: 600.0, cx, cy, skew: 0.0, distortion, width, height };
+        let laser = Plane::new(Vec3::from(normal), 72.0).unwrap();
+        let optical = Optical { camera, laser, depth_mm: [60.0, 320.0] };
+        let format = Format { width, height, bits: 8 };
+        let engine = Engine::new(format, &optical, &Extraction::default(), None, Processor::host());
+        assert_eq!((engine.along_px(), engine.longer_side()), (along, 640), "{width}x{height}, normal {normal:?}");
+    }
 }
 
 /// Kept points in the shots from `lead.len()` on: a few pictures that a scan begins with, then wide stripes.
