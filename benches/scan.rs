@@ -2,6 +2,9 @@
 //! chain alone and of a whole `sheetlight scan`, in turns, and the scan over what it cannot be faster than.
 //! Frame and unit: seconds. `cargo bench --bench scan -- [RECORDING STATION] [ROUNDS]`
 
+mod common;
+
+use common::median;
 use sheetlight::fault::{Fault, Result};
 use sheetlight::raster::Image;
 use sheetlight::recording::Recording;
@@ -10,7 +13,6 @@ use sheetlight::scan::{Engine, Optical, Place, RecordingSource, Source, Where, c
 use sheetlight::station::{Settings, load_report};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::Instant;
 
 /// The program's own.
 #[global_allocator]
@@ -19,9 +21,6 @@ static MEMORY: mimalloc::MiMalloc = mimalloc::MiMalloc;
 const PROGRAM: &str = env!("CARGO_BIN_EXE_sheetlight");
 /// Pictures that the stripe is measured in, as in a scan.
 const MEASURED: usize = 8;
-
-/// Wall and CPU time, s.
-type Cost = [f64; 2];
 
 fn main() {
     let (rounds, folders): (Vec<_>, Vec<_>) =
@@ -126,17 +125,9 @@ fn measure(folder: &Path, station: &Path, rounds: usize) -> Result<()> {
     Ok(())
 }
 
-fn median<T>(values: &[T], of: impl Fn(&T) -> f64) -> f64 {
-    let mut values: Vec<f64> = values.iter().map(of).collect();
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
-}
-
-/// Wall time, and CPU time of this process and of those that it waited for.
-fn cost(work: impl FnOnce() -> Result<()>) -> Result<Cost> {
-    let (cpu, start) = (cpu_seconds(), Instant::now());
-    work()?;
-    Ok([start.elapsed().as_secs_f64(), cpu_seconds() - cpu])
+/// CPU time of this process and of those that it waited for.
+fn cost(work: impl FnOnce() -> Result<()>) -> Result<[f64; 2]> {
+    common::cost(cpu_seconds, work)
 }
 
 /// Hundredths of a second, as /proc/self/stat counts; NaN where there is none.

@@ -2,6 +2,10 @@
 //! that `sheetlight bench` and the peers time, which is told it: points, wall and CPU time of both, in turns, on the processor and
 //! on the GPU. Frame and unit: ms a shot, shares. `cargo bench --bench scan_chain -- [WIDTHxHEIGHT]... [ROUNDS]`
 
+mod common;
+
+use common::median;
+use rayon::prelude::*;
 use sheetlight::bench::{Scene, cpu_seconds, pictures, scan_chain};
 use sheetlight::camera::Intrinsics;
 use sheetlight::fault::{Fault, Result};
@@ -14,9 +18,6 @@ use sheetlight::stages::chain::config::ChainConfig;
 use sheetlight::stages::host::Host;
 use sheetlight::stages::peak::{Stripe, noise};
 use sheetlight::stages::stripe::point::{Optics, pose_words};
-
-use rayon::prelude::*;
-use std::time::Instant;
 
 /// The program's own.
 #[global_allocator]
@@ -158,16 +159,7 @@ impl Bench {
     }
 }
 
-/// Wall time, and CPU time of this process, s; NaN where the system does not tell.
+/// CPU time of this process; NaN where the system does not tell.
 fn cost(work: impl FnOnce() -> Result<usize>) -> Result<[f64; 2]> {
-    let (cpu, start) = (cpu_seconds(), Instant::now());
-    work()?;
-    let wall = start.elapsed().as_secs_f64();
-    Ok([wall, cpu.and_then(|c| Some(cpu_seconds()? - c)).unwrap_or(f64::NAN)])
-}
-
-fn median<T>(values: &[T], of: impl Fn(&T) -> f64) -> f64 {
-    let mut values: Vec<f64> = values.iter().map(of).collect();
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
+    common::cost(|| cpu_seconds().unwrap_or(f64::NAN), || work().map(drop))
 }
