@@ -146,7 +146,7 @@ fn scans() {
     survives("checkpoints", vec![seed], move |b| {
         std::fs::write(dir.path().join("progress.json"), sealed_anew(b)).expect("a file");
         let Some(found) = Checkpoint::load(dir.path())? else { return Ok(()) };
-        assert!(found.median_sigma().is_none_or(f64::is_finite));
+        assert!(found.sigma.median_mm().is_none_or(f64::is_finite));
         std::hint::black_box(found.first_place());
         CloudWriter::resume(&dir.path().join("cloud.ply"), found.points).map(drop)
     });

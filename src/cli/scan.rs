@@ -265,6 +265,9 @@ fn summary(r: &ScanReport, out: &Path) -> String {
     if let Some(p) = &r.places {
         s += &format!("{p}\n");
     }
+    if let Some(sheet) = &r.sheet {
+        s += &format!("{sheet}\n");
+    }
     if let Some(v) = &r.working_volume {
         s += &format!("points were believed at depths of {v}\n");
     }

@@ -49,6 +49,9 @@ pub struct Extraction {
     /// Take out of the cloud what the reported places scatter by about a smooth path, as far as the surface shows that the camera did not move
     /// so: lines of a scan that stand higher or lower than their neighbours. Off: every shot lies where it was reported.
     pub straighten: bool,
+    /// Take out of the cloud by how much the light's middle lies off the sheet's where the surface's brightness changes from shot to shot, as
+    /// far as the cloud shows that it does. Off: every point lies where the light's middle was.
+    pub thick_sheet: bool,
     /// Where in the picture the stripe is looked for: left, top, right and bottom as shares of its width and height, 0..=1. A tool that
     /// stands in the picture, or a place that always shines, is left out so; places in the picture stay what they are.
     pub region: [f64; 4],
@@ -77,6 +80,7 @@ impl Default for Extraction {
         Extraction {
             measure_stripe: true,
             straighten: true,
+            thick_sheet: true,
             region: WHOLE,
             // A peak fainter than 8 levels is not believed, so a pixel darker than that need not be looked at.
             threshold: ThresholdParams { minimum: 8, ..ThresholdParams::default() },

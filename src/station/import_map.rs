@@ -89,6 +89,7 @@ fn report(made: Lines, points: u64, imported: Imported) -> ScanReport {
         median_sigma_mm: Some(made.sigma_mm),
         stripe: None,
         places: None,
+        sheet: None,
         hot_pixels: 0,
         seen: Seen::default(),
         peaks: BTreeMap::new(),

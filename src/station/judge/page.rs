@@ -242,6 +242,9 @@ fn machine(r: &ScanReport) -> Markup {
     if let Some(p) = &r.places {
         rows.push(("reported places", p.to_string()));
     }
+    if let Some(s) = &r.sheet {
+        rows.push(("sheet", s.to_string()));
+    }
     if let Some(s) = &r.stripe {
         rows.push(("stripe", format!("{:.2} px wide (1 sigma), speckle contrast {:.2}", s.width_px, s.speckle)));
     }

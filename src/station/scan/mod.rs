@@ -2,12 +2,13 @@
 //! Frame and unit: cloud in the base frame, mm (docs/file-formats.md).
 
 mod overlays;
-mod path;
 pub(super) mod products;
 pub mod progress;
 pub(super) mod recorded;
+mod refined;
 pub(super) mod report;
 pub(super) mod run;
 pub(super) mod scan_folder;
 pub(super) mod seen;
+mod spread;
 pub(super) mod watch;

@@ -3,6 +3,7 @@
 //! Frame and unit: counts; sigma in mm; places of the camera in the cloud's frame.
 
 use super::scan_folder::PROGRESS;
+use super::spread::Spread;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Camera, Rigid, Vec3};
 use crate::raster::{Image, Pixels};
@@ -39,11 +40,9 @@ pub struct Checkpoint {
     first_place: Option<[f64; 16]>,
     /// Fingerprint of the last shot done, which a resumed scan reads again.
     pub last_picture: Option<u32>,
-    /// Histogram of log10(sigma / mm) from -5 to 1 in 240 steps of 0.025 (6 % a step).
-    sigma: Vec<u64>,
+    /// Standard deviations of the points.
+    pub sigma: Spread,
 }
-
-const SIGMA_BINS: usize = 240;
 
 /// CRC-32 of a picture's levels: tells one recording's picture from another's, whose noise differs.
 pub fn fingerprint_of(image: &Image) -> u32 {
@@ -68,7 +67,7 @@ impl Checkpoint {
             hot: HotPixels::default(),
             first_place: None,
             last_picture: None,
-            sigma: vec![0; SIGMA_BINS],
+            sigma: Spread::default(),
         }
     }
 
@@ -79,13 +78,8 @@ impl Checkpoint {
         let Some(text) = crate::files::read_text_if_there(&path).map_err(|e| e.next(again))? else { return Ok(None) };
         let what = format!("{}: the checkpoint", path.display());
         let found: Checkpoint = unsealed(&text, &what).map_err(|e| e.next(again))?;
-        if found.sigma.len() != SIGMA_BINS {
-            return Err(Fault::input(format!(
-                "{what} has {} steps of sigma, {SIGMA_BINS} are needed",
-                found.sigma.len()
-            ))
-            .cause("of another version")
-            .next(again));
+        if let Some(strange) = found.sigma.strange() {
+            return Err(Fault::input(format!("{what} {strange}")).cause("of another version").next(again));
         }
         Ok(Some(found))
     }
@@ -126,22 +120,7 @@ impl Checkpoint {
         if profile.points.is_empty() {
             self.dark.push(profile.shot);
         }
-        for p in &profile.points {
-            let bin = ((f64::from(p.sigma_mm).max(1e-30).log10() + 5.0) * 40.0).clamp(0.0, SIGMA_BINS as f64 - 1.0);
-            self.sigma[bin as usize] += 1;
-        }
-    }
-
-    /// Median standard deviation of the points, mm, to 3 %; none without points.
-    pub fn median_sigma(&self) -> Option<f64> {
-        // A damaged checkpoint may hold any numbers.
-        let half = self.sigma.iter().map(|n| u128::from(*n)).sum::<u128>().div_ceil(2);
-        let mut sum = 0;
-        let bin = self.sigma.iter().position(|n| {
-            sum += u128::from(*n);
-            half > 0 && sum >= half
-        });
-        bin.map(|b| 10f64.powf((b as f64 + 0.5) / 40.0 - 5.0))
+        self.sigma.add(&profile.points);
     }
 }
 
@@ -167,6 +146,5 @@ mod tests {
             let said = Checkpoint::load(dir.path()).unwrap_err();
             assert!(said.what.contains("was changed") && said.next.contains("without --resume"), "{said}");
         }
-        assert_eq!(Checkpoint::new(String::new()).median_sigma(), None);
     }
 }

@@ -7,7 +7,9 @@ use crate::capture::{Account, Delay};
 use crate::fault::{Fault, Result};
 use crate::recording::Motion;
 use crate::rig::{Volume, hash_file};
-use crate::scan::{Along, CloudFile, CloudPoint, Extraction, Filter, Format, PathFound, SHOTS_FILE, Shots, read_cloud};
+use crate::scan::{
+    Along, CloudFile, CloudPoint, Extraction, Filter, Format, PathFound, SHOTS_FILE, SheetFound, Shots, read_cloud,
+};
 use crate::stages::peak::Stripe;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -63,6 +65,9 @@ pub struct ScanReport {
     /// How the places scatter that the robot or the axis reported, where a surface shows it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub places: Option<PathFound>,
+    /// How thick the sheet is where brightness changes, where the cloud shows it; what that does is taken out of the points.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sheet: Option<SheetFound>,
     /// Pixels of the sensor that shine by themselves; their neighbours stood for them.
     #[serde(default)]
     pub hot_pixels: usize,

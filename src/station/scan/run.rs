@@ -4,6 +4,7 @@
 
 use super::overlays::Overlays;
 use super::progress::{Checkpoint, fingerprint_of};
+use super::refined::{Refined, refine};
 use super::report::{FORMAT, ScanReport, Spent};
 use super::scan_folder::{self, CLOUD_FILE, FORMER_PROGRESS};
 use super::seen::Seen;
@@ -319,10 +320,9 @@ impl<'a> Work<'a> {
         let Work { part, cloud, mut state, scanner, mut spent, .. } = self;
         let points = cloud.finish()?;
         let (format, print) = (source.format(), rig.fingerprint());
-        let places = match options.extraction.straighten {
-            true => super::path::follow(part, &options.motion, &print, format)?,
-            false => None,
-        };
+        let sheet = &rig.need_laser_plane()?.value;
+        let refined = refine(part, &options.motion, (&print, sheet), format, &options.extraction)?;
+        let Refined { places, sheet, median_sigma_mm } = refined;
         let seconds = self.started.elapsed().as_secs_f64();
         let products = Instant::now();
         let (cloud_path, up) = (part.join(CLOUD_FILE), scanner.up_in_base());
@@ -347,9 +347,10 @@ impl<'a> Work<'a> {
             image: format,
             shots: state.shots,
             points,
-            median_sigma_mm: state.median_sigma(),
+            median_sigma_mm: median_sigma_mm.or(state.sigma.median_mm()),
             stripe: scanner.stripe(),
             places,
+            sheet,
             hot_pixels: scanner.hot().count(),
             seen: self.seen,
             peaks: state.peaks,

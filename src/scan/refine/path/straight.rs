@@ -2,24 +2,16 @@
 //! the surface does not show, and the places and points without it.
 //! Frame and unit: the cloud's frame, mm, rad; docs/math.md, Places that scatter.
 
-use super::super::{CloudPoint, PointSource, Shots};
+use super::super::slope::slope;
 use super::smooth::{Around, Departures, departures, scatter};
 use super::witness::{Step, steps};
 use crate::fault::Result;
 use crate::geometry::{Base, Camera, Rigid, Twist, Vec3, exp};
-use crate::solve::robust_scale;
+use crate::scan::{CloudPoint, PointSource, Shots};
 use std::collections::BTreeMap;
 
 /// Halves of shots that must have been compared.
 const FEWEST: usize = 16;
-/// The share is believed from so many of its standard deviations on.
-const SURE: f64 = 4.0;
-/// Neighbouring comparisons share two of three shots, and the halves of a line their shot: its standard deviation is so many times that of
-/// as many comparisons that know nothing of each other.
-const SHARED: f64 = 2.0;
-/// Where the weight of a comparison has gone to nothing, in deviations: Tukey's biweight.
-const FAR: f64 = 4.7;
-const ROUNDS: usize = 20;
 /// Places that scatter by less, mm and rad, are exact.
 const EXACT: f64 = 1e-8;
 
@@ -82,8 +74,8 @@ pub fn straight(cloud: &dyn PointSource, shots: &Shots, pixels_along: u32) -> Re
         departures(places.len(), |k, reach| seen.around(&places, k, reach));
     let off: BTreeMap<u32, [f64; 2]> = places.iter().map(|(shot, _)| *shot).zip(off).collect();
     let pairs: Vec<[f64; 2]> = steps.iter().map(|s| [seen.lift(s, shots, &off), -s.off]).collect();
-    let Some((share, share_sigma)) = share(&pairs) else { return Ok(None) };
-    let taken_out = share > SURE * share_sigma;
+    let Some(slope) = slope(&pairs) else { return Ok(None) };
+    let (share, share_sigma, taken_out) = (slope.is, slope.sigma, slope.sure());
     let found = PathFound { height_mm, roll_deg: roll.to_degrees(), share, share_sigma, taken_out };
     let by = share.clamp(0.0, 1.0);
     let moved = |(shot, place): (u32, Rigid<Base, Camera>)| {
@@ -103,6 +95,12 @@ impl Straight {
                 p.position = glam::DVec3::from_array(at.into()).as_vec3();
             }
         }
+    }
+
+    /// The shots with the camera on its path.
+    pub fn shots(&self, shots: &Shots) -> Shots {
+        let on = |(shot, place)| (shot, self.place(shot, place));
+        Shots::new(shots.along, shots.places().map(on)).with_stripe(shots.stripe_px)
     }
 
     /// Where the camera was at a shot that was reported at `place`.
@@ -165,52 +163,10 @@ impl Seen {
     }
 }
 
-/// The share of what was `expected` that was seen, of all pairs (expected, seen), and its standard deviation; steps and edges of the
-/// part lie in some of them. `None` where nothing was expected.
-fn share(pairs: &[[f64; 2]]) -> Option<(f64, f64)> {
-    let rest = |share: f64| move |[expected, seen]: &[f64; 2]| seen - share * expected;
-    let mut share = middle(pairs)?;
-    let mut rests: Vec<f64> = pairs.iter().map(rest(share)).map(f64::abs).collect();
-    let width = FAR * robust_scale(&mut rests, 1);
-    let weight = |rest: f64| if rest.abs() < width { (1.0 - (rest / width).powi(2)).powi(2) } else { 0.0 };
-    let (mut square, mut left) = (0.0, 0.0);
-    for _ in 0..ROUNDS {
-        let mut across = 0.0;
-        (square, left) = (0.0, 0.0);
-        for pair in pairs {
-            let r = rest(share)(pair);
-            let w = weight(r);
-            square += w * pair[0] * pair[0];
-            across += w * pair[0] * pair[1];
-            left += (w * pair[0] * r).powi(2);
-        }
-        if square <= 0.0 {
-            return None;
-        }
-        share = across / square;
-    }
-    Some((share, SHARED * left.sqrt() / square))
-}
-
-/// The share with the least sum of absolute rests: a median of the single ones, each as heavy as it was expected to be.
-fn middle(pairs: &[[f64; 2]]) -> Option<f64> {
-    let mut all: Vec<(f64, f64)> =
-        pairs.iter().filter(|p| p[0] != 0.0).map(|[expected, seen]| (seen / expected, expected.abs())).collect();
-    all.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let half = 0.5 * all.iter().map(|a| a.1).sum::<f64>();
-    let mut sum = 0.0;
-    all.into_iter()
-        .find(|(_, weight)| {
-            sum += weight;
-            sum >= half
-        })
-        .map(|a| a.0)
-}
-
 #[cfg(test)]
 mod tests {
-    use super::super::super::Along;
     use super::*;
+    use crate::scan::Along;
     use crate::stages::noise::Noise;
 
     const STEP: f64 = 0.3;

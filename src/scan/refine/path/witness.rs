@@ -2,10 +2,10 @@
 //! after, left and right of its middle.
 //! Frame and unit: the cloud's frame, mm; docs/math.md, Places that scatter (3).
 
-use super::super::{Along, CloudPoint, PointSource};
 use super::sides::{Side, halves};
 use crate::fault::Result;
 use crate::geometry::Vec3;
+use crate::scan::{Along, CloudPoint, PointSource};
 
 /// Places along the stripe at which a shot is compared: enough that noise is no matter, few enough for large pictures.
 const PLACES: f32 = 512.0;

@@ -1,0 +1,167 @@
+//! In: a cloud, shot by shot. Out: each shot's line with, for each of its points, how fast the light grows from shot to shot there and how far
+//! the point moves along its ray when the sheet does.
+//! Frame and unit: the cloud's frame, mm; docs/math.md, Sheets that are thick (2) and (3).
+
+use crate::fault::Result;
+use crate::geometry::{Base, Camera, Plane, Vec3};
+use crate::scan::{Along, CloudPoint, PointSource, Shots};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Points of another line are beside a point up to so many pixels along the stripe, the nearer the heavier.
+const BESIDE_PX: f32 = 1.5;
+/// Light that changes by more than this from one shot to the next, as a logarithm, counts as this: it ends there, and where between the two
+/// nobody knows.
+const MOST: f64 = 1.5;
+
+/// What a point's neighbours in the shots before and after say of it.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Pull {
+    /// Change of the light's logarithm from shot to shot.
+    pub change: f64,
+    /// How the point moves for a change of 1 and a sheet of variance 1 mm².
+    pub per: Vec3,
+}
+
+/// A shot's points.
+pub(super) struct Line {
+    pub shot: u32,
+    pub points: Vec<CloudPoint>,
+    /// Logarithms of the points' light.
+    lights: Vec<f64>,
+    /// Where the camera was.
+    place: Option<Place>,
+    /// Indices of the points in their order along the stripe, with their places there, px.
+    order: Vec<(f32, u32)>,
+    along: Along,
+}
+
+/// Pinhole and sheet of a shot.
+struct Place {
+    eye: Vec3,
+    sheet: Plane<Base>,
+}
+
+/// A line and what those beside it say of its points, one each.
+#[derive(Clone)]
+pub(super) struct Pulled {
+    pub line: Arc<Line>,
+    pub pulls: Vec<Pull>,
+}
+
+/// Where a point lies along its stripe and across it, px.
+fn in_picture(along: Along, p: &CloudPoint) -> (f32, f32) {
+    if along == Along::U { (p.u, p.v) } else { (p.v, p.u) }
+}
+
+pub(super) fn at(p: &CloudPoint) -> Vec3 {
+    Vec3::from(p.position.as_dvec3().to_array())
+}
+
+fn light(p: &CloudPoint) -> f64 {
+    f64::from(p.intensity.max(f32::MIN_POSITIVE)).ln()
+}
+
+impl Line {
+    fn new(shot: u32, points: Vec<CloudPoint>, shots: &Shots, sheet: &Plane<Camera>) -> Line {
+        let place = shots.place(shot).and_then(|place| {
+            let normal = place.direction(&sheet.normal);
+            let on = place.point(&(sheet.normal * sheet.offset));
+            Some(Place { eye: place.point(&Vec3::zeros()), sheet: Plane::new(normal, normal.dot(&on))? })
+        });
+        let mut order: Vec<(f32, u32)> =
+            points.iter().zip(0..).map(|(p, i)| (in_picture(shots.along, p).0, i)).collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let lights = points.iter().map(light).collect();
+        Line { shot, points, lights, place, order, along: shots.along }
+    }
+
+    /// The points of it that are beside a point of another line: index, distances along and across the stripe, px.
+    fn beside(&self, p: &CloudPoint) -> impl Iterator<Item = (usize, f32, f32)> + '_ {
+        let (along, across) = in_picture(self.along, p);
+        let first = self.order.partition_point(|(a, _)| *a <= along - BESIDE_PX);
+        let near = self.order[first..].iter().take_while(move |(a, _)| *a < along + BESIDE_PX);
+        near.map(move |(a, i)| {
+            let i = *i as usize;
+            (i, (a - along).abs(), (in_picture(self.along, &self.points[i]).1 - across).abs())
+        })
+    }
+
+    /// The point of it that is nearest to a point of another line.
+    pub fn nearest(&self, p: &CloudPoint) -> Option<usize> {
+        let square = |(_, along, across): &(usize, f32, f32)| along * along + across * across;
+        self.beside(p).min_by(|a, b| square(a).total_cmp(&square(b))).map(|(i, _, _)| i)
+    }
+
+    /// Logarithm of the light beside a point of another line: a mean whose weights have no steps, so that it has none where this line's points
+    /// lie a little otherwise.
+    fn light(&self, p: &CloudPoint) -> Option<f64> {
+        let (mut sum, mut all) = (0.0, 0.0);
+        for (i, along, across) in self.beside(p) {
+            let weight = f64::from((1.0 - along / BESIDE_PX) / (1.0 + across * across));
+            sum += weight * self.lights[i];
+            all += weight;
+        }
+        (all > 0.0).then(|| sum / all)
+    }
+
+    /// What two lines say of a point of this one.
+    fn pull(&self, i: usize, before: Option<&Line>, after: Option<&Line>) -> Pull {
+        let (p, here) = (&self.points[i], self.lights[i]);
+        let at = at(p);
+        // How much brighter a line is beside the point, and how far its sheet stands from the point along the normal.
+        let beside = |line: Option<&Line>| {
+            let line = line?;
+            let way = -line.place.as_ref()?.sheet.distance(&at);
+            Some(((line.light(p)? - here).clamp(-MOST, MOST), way))
+        };
+        let (change, way) = match (beside(before), beside(after)) {
+            (Some((a, from)), Some((b, to))) if from * to < 0.0 => (0.5 * (b - a), 0.5 * (to - from)),
+            (None, Some((b, to))) => (b, to),
+            (Some((a, from)), None) => (-a, -from),
+            _ => return Pull::default(),
+        };
+        let Some(Place { eye, sheet }) = &self.place else { return Pull::default() };
+        let ray = at - eye;
+        let per = ray / (ray.dot(&sheet.normal) * way);
+        if per.iter().all(|x| x.is_finite()) { Pull { change, per } } else { Pull::default() }
+    }
+
+    fn pulled(self: Arc<Line>, before: Option<&Line>, after: Option<&Line>) -> Pulled {
+        // What lies beside lies a shot away: over dark and missing ones nobody knows what happened between.
+        let next = |line: &&Line| line.shot.abs_diff(self.shot) == 1;
+        let (before, after) = (before.filter(next), after.filter(next));
+        let pulls =
+            (0..self.points.len()).into_par_iter().with_min_len(64).map(|i| self.pull(i, before, after)).collect();
+        Pulled { line: self, pulls }
+    }
+}
+
+/// The lines of a cloud whose points come in the order of their shots, to `take` in that order; `sheet`: the laser plane.
+pub(super) fn lines(
+    cloud: &dyn PointSource,
+    shots: &Shots,
+    sheet: &Plane<Camera>,
+    take: &mut dyn FnMut(Pulled) -> Result<()>,
+) -> Result<()> {
+    let (mut before, mut last): (Option<Arc<Line>>, Option<Arc<Line>>) = (None, None);
+    let mut next: Vec<CloudPoint> = Vec::new();
+    let mut close = |points: Vec<CloudPoint>| -> Result<()> {
+        let line = points.first().map(|p| p.shot).map(|shot| Arc::new(Line::new(shot, points, shots, sheet)));
+        let done = last.clone().map_or(Ok(()), |last| take(last.pulled(before.as_deref(), line.as_deref())));
+        before = std::mem::replace(&mut last, line);
+        done
+    };
+    let mut closed = Ok(());
+    cloud.for_each_chunk(&mut |points| {
+        for line in points.chunk_by(|a, b| a.shot == b.shot) {
+            if next.first().is_some_and(|p| p.shot != line[0].shot) && closed.is_ok() {
+                closed = close(std::mem::take(&mut next));
+            }
+            next.extend_from_slice(line);
+        }
+    })?;
+    closed?;
+    close(next)?;
+    close(Vec::new())
+}

@@ -1,0 +1,387 @@
+//! In: a scan's lines with what those beside them say. Out: the sheet's thickness as the cloud shows it, and the points without what it does
+//! where brightness changes.
+//! Frame and unit: the cloud's frame, mm; docs/math.md, Sheets that are thick.
+
+use super::super::slope::{Slope, slope};
+use super::lines::{Pulled, at, lines};
+use crate::fault::Result;
+use crate::geometry::{Camera, Plane};
+use crate::scan::{CloudPoint, PointSource, Shots};
+use crate::solve::robust_scale;
+use std::collections::VecDeque;
+
+/// A point is compared with those beside it where it lies between them, no nearer to one of them than this share of their distance.
+const BETWEEN: f64 = 0.2;
+/// And where their depths differ by less than this share of it: an edge says nothing.
+const LEVEL: f64 = 0.6;
+/// What lies farther off than so many robust deviations is an edge.
+const EDGE: f64 = 10.0;
+/// Changes of light from shot to shot within their robust deviation are speckle and noise, but none beyond this: where most of a surface is
+/// printed, they are the print.
+const UNCHANGED: f64 = 0.15;
+/// Fewer comparisons say nothing.
+const FEWEST: usize = 256;
+/// More are thinned out.
+const MOST: usize = 1 << 16;
+
+/// How thick the sheet is where brightness changes; in scan.json.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SheetFound {
+    /// The standard deviation across of the sheet that it acts as, mm: within 0.8 and 1.5 of the real one, less where shots lie farther apart than
+    /// three of those.
+    pub thickness_mm: f64,
+    /// Standard deviation of that.
+    pub thickness_sigma_mm: f64,
+    /// What is left scatters as a sheet of this standard deviation pulls, mm; it is in the points' sigma.
+    pub scatter_mm: f64,
+    /// Changes of light from shot to shot below this, as logarithms, count as speckle and noise.
+    pub unchanged: f64,
+    /// Share of the points that were moved by more than their standard deviation.
+    pub moved: f64,
+}
+
+impl std::fmt::Display for SheetFound {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let SheetFound { thickness_mm, thickness_sigma_mm, moved, .. } = self;
+        write!(
+            f,
+            "where brightness changes the sheet acts as one of {thickness_mm:.3} +- {thickness_sigma_mm:.3} mm (1 sigma): "
+        )?;
+        write!(f, "taken out, of {:.1} % of the points more than their standard deviation", 100.0 * moved)
+    }
+}
+
+/// What a cloud shows of its sheet.
+#[derive(Clone, Copy, Debug)]
+pub struct Thick {
+    /// Variance of the sheet, mm².
+    square: Slope,
+    /// By how much points that are pulled scatter about that, as a variance of the sheet, mm².
+    left: f64,
+    unchanged: f64,
+}
+
+/// A point between those beside it.
+#[derive(Clone, Copy)]
+struct Between {
+    /// How far it lies beyond them along its ray, mm.
+    beyond: f64,
+    /// Of itself and of the two, the latter with the opposite sign: change of the light, and how far along the ray it moves the comparison.
+    parts: [[f64; 2]; 3],
+}
+
+impl Thick {
+    /// Looks at a cloud in the order of its shots, `sheet` the laser plane; `None` where it does not show that brightness pulls its points.
+    pub fn of(cloud: &dyn PointSource, shots: &Shots, sheet: &Plane<Camera>) -> Result<Option<Thick>> {
+        let (mut all, mut every, mut seen) = (Vec::new(), 1, 0_usize);
+        let mut three: VecDeque<Pulled> = VecDeque::new();
+        lines(cloud, shots, sheet, &mut |line| {
+            three.push_back(line);
+            if let [before, line, after] = three.make_contiguous() {
+                for i in 0..line.pulls.len() {
+                    let Some(between) = between(before, line, i, after) else { continue };
+                    if seen.is_multiple_of(every) {
+                        all.push(between);
+                    }
+                    seen += 1;
+                    if all.len() == MOST {
+                        let mut k = 0;
+                        all.retain(|_| (k += 1, k % 2 == 1).1);
+                        every *= 2;
+                    }
+                }
+                three.pop_front();
+            }
+            Ok(())
+        })?;
+        if all.len() < FEWEST {
+            return Ok(None);
+        }
+        let mut changes: Vec<f64> = all.iter().map(|b| b.parts[0][0].abs()).collect();
+        let unchanged = robust_scale(&mut changes, 1).min(UNCHANGED);
+        let pulls = |b: &Between| b.parts.map(|[change, by]| beyond(change, unchanged) * by);
+        let pairs: Vec<[f64; 2]> = all.iter().map(|b| [-pulls(b).iter().sum::<f64>(), b.beyond]).collect();
+        let Some(square) = slope(&pairs).filter(Slope::sure) else { return Ok(None) };
+        let rests = pairs.iter().map(|[expected, seen]| seen - square.is * expected);
+        let squares = all.iter().map(|b| pulls(b).iter().map(|p| p * p).sum());
+        let left = left(&squares.zip(rests).collect::<Vec<_>>(), square.is);
+        Ok(Some(Thick { square, left, unchanged }))
+    }
+
+    /// The points without it, line by line in their order.
+    pub fn apply(
+        &self,
+        cloud: &dyn PointSource,
+        shots: &Shots,
+        sheet: &Plane<Camera>,
+        take: &mut dyn FnMut(&[CloudPoint]) -> Result<()>,
+    ) -> Result<SheetFound> {
+        let (mut moved, mut points, mut all) = (0_u64, Vec::new(), 0_u64);
+        lines(cloud, shots, sheet, &mut |Pulled { line, pulls }| {
+            points.clear();
+            for (p, pull) in line.points.iter().zip(&pulls) {
+                let pull = pull.per * beyond(pull.change, self.unchanged);
+                let by = pull * self.square.is;
+                moved += u64::from(by.norm() as f32 > p.sigma_mm);
+                let position = glam::DVec3::from_array((at(p) + by).into()).as_vec3();
+                let sigma_mm = p.sigma_mm.hypot((pull.norm() * self.left) as f32);
+                points.push(CloudPoint { position, sigma_mm, ..*p });
+            }
+            all += points.len() as u64;
+            take(&points)
+        })?;
+        let thickness_mm = self.square.is.sqrt();
+        Ok(SheetFound {
+            thickness_mm,
+            thickness_sigma_mm: 0.5 * self.square.sigma / thickness_mm,
+            scatter_mm: self.left.sqrt(),
+            unchanged: self.unchanged,
+            moved: moved as f64 / all.max(1) as f64,
+        })
+    }
+}
+
+/// By how much points that are pulled scatter, as a variance of the sheet: of pairs (sum of the squared pulls, rest), what the squared rests
+/// grow by, each as heavy as chance lets it be with a sheet of variance `square`.
+fn left(pairs: &[(f64, f64)], square: f64) -> f64 {
+    let mut rests: Vec<f64> = pairs.iter().map(|(_, rest)| rest.abs()).collect();
+    let noise = robust_scale(&mut rests, 1).powi(2);
+    let (mut across, mut all) = (0.0, 0.0);
+    for (pulls, rest) in pairs.iter().map(|(pulls, rest)| (pulls, rest * rest)) {
+        if rest < EDGE * EDGE * noise {
+            let weight = (noise + square * square * pulls).powi(-2);
+            across += weight * pulls * (rest - noise);
+            all += weight * pulls * pulls;
+        }
+    }
+    // No less than what they are moved by: of a surface that is printed all over the robust deviation holds pulls already.
+    if all > 0.0 { (across / all).max(square * square).sqrt() } else { square }
+}
+
+/// By how much a change exceeds what is no change, either way: without a step, so that nothing hangs on which side of one it lies.
+fn beyond(change: f64, unchanged: f64) -> f64 {
+    change - change.clamp(-unchanged, unchanged)
+}
+
+/// The `i`-th point of a line between its neighbours; `None` where it has none, or lies at an edge.
+fn between(before: &Pulled, line: &Pulled, i: usize, after: &Pulled) -> Option<Between> {
+    let (p, pull) = (&line.line.points[i], &line.pulls[i]);
+    let (j, k) = (before.line.nearest(p)?, after.line.nearest(p)?);
+    let (a, b) = (at(&before.line.points[j]), at(&after.line.points[k]));
+    let ray = pull.per.try_normalize(1e-12)?;
+    let (chord, to) = (b - a, at(p) - a);
+    let deeper = chord.dot(&ray);
+    let way = chord - ray * deeper;
+    let far = way.norm();
+    if far <= 0.0 || deeper.abs() > LEVEL * far {
+        return None;
+    }
+    let share = to.dot(&way) / (far * far);
+    if !(BETWEEN..=1.0 - BETWEEN).contains(&share) {
+        return None;
+    }
+    let part = |pull: &super::lines::Pull, part: f64| [pull.change, part * pull.per.dot(&ray)];
+    Some(Between {
+        beyond: to.dot(&ray) - share * deeper,
+        parts: [part(pull, 1.0), part(&before.pulls[j], share - 1.0), part(&after.pulls[k], -share)],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Base, Rigid, Vec3, exp};
+    use crate::scan::Along;
+    use crate::stages::noise::Noise;
+
+    /// A scan by a camera 150 mm over a surface, with a sheet 60 mm beside it.
+    #[derive(Clone, Copy)]
+    struct Scene {
+        shots: u32,
+        along: Along,
+        /// From shot to shot, mm, and turn of camera and sheet about the vertical, rad.
+        step: f64,
+        turn: f64,
+        /// Standard deviation of the sheet, mm.
+        thick: f64,
+        height: fn(f64, f64) -> f64,
+        albedo: fn(f64, f64) -> f64,
+        /// Of the light from point to point, and of the laser from shot to shot, as logarithms.
+        speckle: f64,
+        flicker: f64,
+    }
+
+    /// Print 1.6 mm wide and as far apart, its edges 0.15 mm wide, four times as bright as the ground.
+    fn print(x: f64, y: f64) -> f64 {
+        let wave = (y / 1.6 * std::f64::consts::PI + 0.3 * x).sin();
+        0.25 + 0.75 / (1.0 + (-wave * 1.6 / std::f64::consts::PI / 0.05).exp())
+    }
+
+    const PRINTED: Scene = Scene {
+        shots: 60,
+        along: Along::U,
+        step: 0.25,
+        turn: 0.0,
+        thick: 0.1,
+        height: |x, y| 0.05 * x + 0.1 * y,
+        albedo: print,
+        speckle: 0.03,
+        flicker: 0.0,
+    };
+    const NOISE_MM: f64 = 0.01;
+
+    fn sheet() -> Plane<Camera> {
+        Plane::new(Vec3::new(0.0, 150.0, 60.0), 9000.0).unwrap()
+    }
+
+    impl Scene {
+        /// Light falls on the surface as a Gaussian about the sheet's middle and comes back as the surface is bright; a point lies where the
+        /// sheet's middle meets the ray of that light's centre.
+        fn scan(&self, seed: u64) -> (Vec<CloudPoint>, Shots) {
+            let mut noise = Noise(seed);
+            let (mut cloud, mut places) = (Vec::new(), Vec::new());
+            for shot in 0..self.shots {
+                let k = f64::from(shot);
+                let turned = exp(&(Vec3::z() * (self.turn * k))) * exp(&(Vec3::x() * std::f64::consts::PI));
+                let place: Rigid<Base, Camera> = Rigid::new(turned, Vec3::new(0.0, self.step * k, 150.0));
+                let laser = (self.flicker * noise.normal()).exp();
+                for column in 0..200 {
+                    let x = 0.1 * f64::from(column) - 10.0;
+                    let seen = |y: f64| {
+                        let on = place.point(&Vec3::new(x, y, 150.0));
+                        let on = Vec3::new(on.x, on.y, (self.height)(on.x, on.y));
+                        (on, place.inverse().point(&on))
+                    };
+                    let middle = (0..20).fold(0.0, |y, _| y - sheet().distance(&seen(y).1));
+                    let (mut light, mut ray) = (0.0, Vec3::zeros());
+                    for part in -60..=60 {
+                        let (on, seen) = seen(middle + f64::from(part) * 0.1 * self.thick);
+                        let off = sheet().distance(&seen) / self.thick;
+                        let here = (-0.5 * off * off).exp() * (self.albedo)(on.x, on.y);
+                        light += here;
+                        ray += here * seen / seen.z;
+                    }
+                    let ray = ray / light;
+                    let depth = sheet().offset / sheet().normal.dot(&ray);
+                    let at = place.point(&(ray * depth)) + Vec3::z() * (NOISE_MM * noise.normal());
+                    let (u, v) = (column as f32, 200.0 + (600.0 * ray.y) as f32);
+                    let (u, v) = if self.along == Along::U { (u, v) } else { (v, u) };
+                    let intensity = (8.0 * laser * light * (self.speckle * noise.normal()).exp()) as f32;
+                    let position = glam::DVec3::from_array(at.into()).as_vec3();
+                    cloud.push(CloudPoint {
+                        position,
+                        intensity,
+                        sigma_mm: NOISE_MM as f32,
+                        shot,
+                        u,
+                        v,
+                        ..Default::default()
+                    });
+                }
+                places.push((shot, place));
+            }
+            (cloud, Shots::new(self.along, places))
+        }
+
+        fn rms(&self, cloud: &[CloudPoint]) -> f64 {
+            let off = |p: &CloudPoint| {
+                let [x, y, z] = p.position.as_dvec3().to_array();
+                (z - (self.height)(x, y)).powi(2)
+            };
+            (cloud.iter().map(off).sum::<f64>() / cloud.len() as f64).sqrt()
+        }
+
+        /// What is found, and the points' rms from the surface before and after.
+        fn refined(&self, seed: u64) -> (Option<SheetFound>, f64, f64) {
+            let (cloud, shots) = self.scan(seed);
+            let before = self.rms(&cloud);
+            let Some(thick) = Thick::of(&cloud, &shots, &sheet()).unwrap() else { return (None, before, before) };
+            let mut after = Vec::new();
+            let found = thick.apply(&cloud, &shots, &sheet(), &mut |points| {
+                after.extend_from_slice(points);
+                Ok(())
+            });
+            assert_eq!(after.len(), cloud.len());
+            (Some(found.unwrap()), before, self.rms(&after))
+        }
+    }
+
+    /// Lying and upright, forwards and back, straight and turning, a shot each 1 to 4 standard deviations of the sheet.
+    #[test]
+    fn print_no_longer_pulls_the_points_about() {
+        for (name, scene) in [
+            ("as it is", PRINTED),
+            ("upright", Scene { along: Along::V, ..PRINTED }),
+            ("back", Scene { step: -0.25, ..PRINTED }),
+            ("turning", Scene { turn: 0.004, ..PRINTED }),
+            ("fine", Scene { step: 0.1, shots: 150, ..PRINTED }),
+            ("coarse", Scene { step: 0.35, ..PRINTED }),
+            ("thick", Scene { thick: 0.2, ..PRINTED }),
+            ("thin", Scene { thick: 0.06, ..PRINTED }),
+            ("flickering", Scene { flicker: 0.03, ..PRINTED }),
+            ("speckled", Scene { speckle: 0.2, ..PRINTED }),
+            ("steep", Scene { height: |x, y| 0.3 * x - 0.5 * y, ..PRINTED }),
+            ("round", Scene { height: |x, y| 0.02 * x * x - 0.01 * (y - 7.0).powi(2), ..PRINTED }),
+        ] {
+            let (found, before, after) = scene.refined(7);
+            let found = found.unwrap_or_else(|| panic!("{name}: nothing is found"));
+            println!("{name}: {found}; {before:.4} -> {after:.4} mm");
+            // Noise alone is 0.01 mm.
+            assert!(after < 0.7 * before, "{name}: {before} -> {after}");
+            let ratio = found.thickness_mm / scene.thick;
+            assert!((0.8..1.6).contains(&ratio), "{name}: {found:?}");
+        }
+    }
+
+    /// What is left of a pulled point is in its standard deviation.
+    #[test]
+    fn points_that_were_moved_state_it() {
+        let (cloud, shots) = PRINTED.scan(3);
+        let thick = Thick::of(&cloud, &shots, &sheet()).unwrap().unwrap();
+        let mut after = Vec::new();
+        let found = thick.apply(&cloud, &shots, &sheet(), &mut |points| {
+            after.extend_from_slice(points);
+            Ok(())
+        });
+        let beyond = |cloud: &[CloudPoint]| {
+            let off = |p: &&CloudPoint| {
+                let [x, y, z] = p.position.as_dvec3().to_array();
+                (z - (PRINTED.height)(x, y)).abs() > 3.0 * f64::from(p.sigma_mm)
+            };
+            cloud.iter().filter(off).count() as f64 / cloud.len() as f64
+        };
+        let (before, after) = (beyond(&cloud), beyond(&after));
+        println!("beyond three standard deviations: {before:.4} -> {after:.4}");
+        assert!(before > 0.2 && after < 0.02, "{before} -> {after}");
+        assert!((0.2..0.7).contains(&found.unwrap().moved));
+    }
+
+    /// Where nothing pulls, nothing is moved: even light, speckle, a laser that flickers, a sheet that is thin, ridges that are bright, few shots,
+    /// shots that nobody knows the places of.
+    #[test]
+    fn what_is_not_pulled_is_not_moved() {
+        let even = Scene { albedo: |_, _| 1.0, ..PRINTED };
+        // Its light stands for the surface's where no point is off.
+        let thin = Scene { thick: 0.005, ..PRINTED };
+        // 0.3 mm high: the print itself.
+        let ridges = Scene { height: |x, y| 0.4 * print(x, y), ..thin };
+        for (name, scene) in [
+            ("even", even),
+            ("speckled", Scene { speckle: 0.3, ..even }),
+            ("flickering", Scene { flicker: 0.2, ..even }),
+            ("thin", thin),
+            ("ridges", ridges),
+            ("few", Scene { shots: 3, ..PRINTED }),
+        ] {
+            for seed in 0..5 {
+                let (found, before, after) = scene.refined(seed);
+                println!("{name}: {found:?}: {before:.4} -> {after:.4}");
+                assert!(found.is_none(), "{name}: {found:?}: {before} -> {after}");
+            }
+        }
+        let (cloud, shots) = PRINTED.scan(1);
+        assert!(Thick::of(&cloud, &Shots::unplaced(shots.along), &sheet()).unwrap().is_none());
+        assert!(Thick::of(&Vec::new(), &shots, &sheet()).unwrap().is_none());
+    }
+}

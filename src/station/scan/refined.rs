@@ -1,0 +1,101 @@
+//! In: the working folder of a scan whose last shot is done. Out: cloud and shots without what the reported places scatter by, and without
+//! what the sheet's thickness does where brightness changes, as far as the surface shows both; what was measured waits beside them until the
+//! scan has its names.
+//! Frame and unit: the cloud's frame, mm.
+
+use super::scan_folder::{CLOUD_FILE, MEASURED};
+use super::spread::Spread;
+use crate::fault::{Fault, Result};
+use crate::files::moment;
+use crate::geometry::{Camera, Plane};
+use crate::recording::Motion;
+use crate::scan::{
+    Along, CloudFile, CloudPoint, CloudWriter, Extraction, Format, PathFound, PointSource, SHOTS_FILE, SheetFound,
+    Shots, Straight, Thick, straight,
+};
+use std::path::Path;
+
+/// Where the cloud is made that takes the measured one's name.
+const NEXT: &str = "refined.ply";
+
+/// What was told of a scan, and taken out; `None` where nothing is.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Refined {
+    pub places: Option<PathFound>,
+    pub sheet: Option<SheetFound>,
+    /// Median of the points' standard deviations where they have others than they were measured with, mm.
+    pub median_sigma_mm: Option<f64>,
+}
+
+/// A cloud with its shots on the path that the camera went.
+struct OnPath<'a> {
+    cloud: &'a CloudFile,
+    path: Option<&'a Straight>,
+}
+
+impl PointSource for OnPath<'_> {
+    fn for_each_chunk(&self, take: &mut dyn FnMut(&[CloudPoint])) -> Result<()> {
+        let Some(path) = self.path else { return self.cloud.for_each_chunk(take) };
+        let mut points: Vec<CloudPoint> = Vec::new();
+        self.cloud.for_each_chunk(&mut |chunk| {
+            points.clear();
+            points.extend_from_slice(chunk);
+            path.apply(&mut points);
+            take(&points);
+        })
+    }
+}
+
+/// `part`: the working folder; `rig`: the fingerprint of the scan's, and `sheet` its laser plane.
+pub(super) fn refine(
+    part: &Path,
+    motion: &Motion,
+    (rig, sheet): (&str, &Plane<Camera>),
+    format: Format,
+    settings: &Extraction,
+) -> Result<Refined> {
+    let shots = Shots::load(part, motion.frame(), rig)?;
+    let cloud = CloudFile::open(&part.join(CLOUD_FILE))?;
+    let pixels = if shots.along == Along::U { format.width } else { format.height };
+    let path = if settings.straighten { straight(&cloud, &shots, pixels)? } else { None };
+    let places = path.as_ref().map(|p| p.found);
+    let path = path.filter(|p| p.found.taken_out);
+    let shots = path.as_ref().map_or_else(|| shots.clone(), |p| p.shots(&shots));
+    let on_path = OnPath { cloud: &cloud, path: path.as_ref() };
+    let thick = if settings.thick_sheet { Thick::of(&on_path, &shots, sheet)? } else { None };
+    if path.is_none() && thick.is_none() {
+        return Ok(Refined { places, ..Refined::default() });
+    }
+    let next = part.join(NEXT);
+    let mut out = CloudWriter::create_in(&next, motion.frame())?;
+    let mut spread = Spread::default();
+    let sheet = match thick {
+        Some(thick) => Some(thick.apply(&on_path, &shots, sheet, &mut |points| {
+            spread.add(points);
+            out.append(points)
+        })?),
+        None => {
+            let mut written = Ok(());
+            on_path.for_each_chunk(&mut |points| {
+                if written.is_ok() {
+                    written = out.append(points);
+                }
+            })?;
+            written?;
+            None
+        }
+    };
+    out.finish()?;
+    rename(&part.join(CLOUD_FILE), &part.join(MEASURED[0]))?;
+    rename(&next, &part.join(CLOUD_FILE))?;
+    if let Some(path) = &path {
+        let places = Shots::rewritten(part, |shot, place| path.place(shot, place))?;
+        rename(&part.join(SHOTS_FILE), &part.join(MEASURED[1]))?;
+        crate::files::write(&part.join(SHOTS_FILE), places.as_bytes())?;
+    }
+    Ok(Refined { places, sheet, median_sigma_mm: spread.median_mm() })
+}
+
+fn rename(from: &Path, to: &Path) -> Result<()> {
+    moment().and_then(|()| std::fs::rename(from, to)).map_err(|e| Fault::write(to, e))
+}
