@@ -19,6 +19,8 @@ const MOST: f64 = 1.5;
 pub(super) struct Pull {
     /// Change of the light's logarithm from shot to shot.
     pub change: f64,
+    /// By how much that of the point lies below the mean of its neighbours': light that falls on an edge, or on a line thinner than the shots show.
+    pub dip: f64,
     /// How the point moves for a change of 1 and a sheet of variance 1 mm².
     pub per: Vec3,
 }
@@ -115,16 +117,16 @@ impl Line {
             let way = -line.place.as_ref()?.sheet.distance(&at);
             Some(((line.light(p)? - here).clamp(-MOST, MOST), way))
         };
-        let (change, way) = match (beside(before), beside(after)) {
-            (Some((a, from)), Some((b, to))) if from * to < 0.0 => (0.5 * (b - a), 0.5 * (to - from)),
-            (None, Some((b, to))) => (b, to),
-            (Some((a, from)), None) => (-a, -from),
+        let (change, dip, way) = match (beside(before), beside(after)) {
+            (Some((a, from)), Some((b, to))) if from * to < 0.0 => (0.5 * (b - a), 0.5 * (a + b), 0.5 * (to - from)),
+            (None, Some((b, to))) => (b, 0.0, to),
+            (Some((a, from)), None) => (-a, 0.0, -from),
             _ => return Pull::default(),
         };
         let Some(Place { eye, sheet }) = &self.place else { return Pull::default() };
         let ray = at - eye;
         let per = ray / (ray.dot(&sheet.normal) * way);
-        if per.iter().all(|x| x.is_finite()) { Pull { change, per } } else { Pull::default() }
+        if per.iter().all(|x| x.is_finite()) { Pull { change, dip, per } } else { Pull::default() }
     }
 
     fn pulled(self: Arc<Line>, before: Option<&Line>, after: Option<&Line>) -> Pulled {
