@@ -221,9 +221,11 @@ fn between(before: &Pulled, line: &Pulled, i: usize, after: &Pulled) -> Option<B
     }
     let part = |&Pull { change, dip, per }: &Pull, part: f64| Part { change, dip, by: part * per.dot(&ray) };
     let stated = |p: &CloudPoint, part: f64| (f64::from(p.sigma_mm) * part).powi(2);
-    Some(Between {
+    let stated = stated(p, 1.0) + stated(&before.line.points[j], 1.0 - share) + stated(&after.line.points[k], share);
+    // A fit that its light does not determine states any size, up to none that is a number.
+    stated.is_normal().then_some(Between {
         beyond: to.dot(&ray) - share * deeper,
-        stated: stated(p, 1.0) + stated(&before.line.points[j], 1.0 - share) + stated(&after.line.points[k], share),
+        stated,
         parts: [part(pull, 1.0), part(&before.pulls[j], share - 1.0), part(&after.pulls[k], -share)],
     })
 }
@@ -377,7 +379,11 @@ mod tests {
     /// What is left of a pulled point is in its standard deviation.
     #[test]
     fn points_that_were_moved_state_it() {
-        let (cloud, shots) = PRINTED.scan(3);
+        let (mut cloud, shots) = PRINTED.scan(3);
+        // Not determined, and exact.
+        for (p, sigma_mm) in cloud[5000..].iter_mut().zip([f32::INFINITY, 0.0]) {
+            p.sigma_mm = sigma_mm;
+        }
         let thick = Thick::of(&cloud, &shots, &sheet()).unwrap().unwrap();
         let mut after = Vec::new();
         let found = thick.apply(&cloud, &shots, &sheet(), &mut |points| {
@@ -394,7 +400,8 @@ mod tests {
         let (before, after) = (beyond(&cloud), beyond(&after));
         println!("beyond three standard deviations: {before:.4} -> {after:.4}");
         assert!(before > 0.2 && after < 0.02, "{before} -> {after}");
-        assert!((0.2..0.7).contains(&found.unwrap().moved));
+        let SheetFound { moved, scatter_mm, .. } = found.unwrap();
+        assert!((0.2..0.7).contains(&moved) && (0.1..0.2).contains(&scatter_mm), "{moved}, {scatter_mm}");
     }
 
     /// Where nothing pulls, nothing is moved: even light, speckle, a laser that flickers, a sheet that is thin, ridges that are bright, few shots,
