@@ -10,7 +10,7 @@ use damage::{scratch, sealed_anew, survives, text, through_file};
 use proptest::prelude::*;
 use sheetlight::find::dxf::{self, DxfOptions};
 use sheetlight::find::{Drawing, ModelOptions, Recipe, Scene as FindScene, SearchOptions, Template, find};
-use sheetlight::geometry::{Base, Flange, Rigid};
+use sheetlight::geometry::{Base, Flange, Plane, Rigid, Vec3};
 use sheetlight::raster::{Channel, Image, decode, float_tiff, png, read_float_tiff};
 use sheetlight::recording::{BoardSpec, Markers, Meta, load_board_poses, load_poses};
 use sheetlight::rig::Rig;
@@ -129,7 +129,8 @@ fn scans() {
         }
     });
     let folder = scratch();
-    let mut list = ShotsWriter::create(folder.path(), "base", Along::U, "rig").unwrap();
+    let sheet = Plane::new(Vec3::new(0.0, 0.6, 0.8), 72.5).unwrap();
+    let mut list = ShotsWriter::create(folder.path(), "base", Along::U, "rig", &sheet).unwrap();
     (0..3).for_each(|shot| list.add(shot, Rigid::identity()));
     list.checkpoint().unwrap();
     let path = folder.path().join(SHOTS_FILE);

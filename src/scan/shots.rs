@@ -2,9 +2,10 @@
 //! the camera at a shot, the image axis that the stripe runs along.
 //! Frame and unit: the cloud's frame, mm (docs/file-formats.md).
 
+use super::CloudPoint;
 use crate::fault::{Fault, Result};
 use crate::files::moment;
-use crate::geometry::{Base, Camera, Rigid};
+use crate::geometry::{Base, Camera, Plane, Ray, Rigid, Vec3};
 use glam::Vec2;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -40,23 +41,45 @@ pub struct Shots {
     pub along: Along,
     /// Width of the stripe across it, px (1 sigma); `None` where nobody measured it.
     pub stripe_px: Option<f32>,
+    /// The laser's sheet, camera frame; `None` where nobody wrote it down.
+    pub sheet: Option<Plane<Camera>>,
     places: BTreeMap<u32, Rigid<Base, Camera>>,
 }
 
 impl Shots {
     /// Shots and where the camera stood, cloud's frame.
     pub fn new(along: Along, places: impl IntoIterator<Item = (u32, Rigid<Base, Camera>)>) -> Shots {
-        Shots { along, stripe_px: None, places: places.into_iter().collect() }
+        Shots { places: places.into_iter().collect(), ..Shots::unplaced(along) }
     }
 
     /// Of a sensor that nobody knows the places of: an imported map.
     pub fn unplaced(along: Along) -> Shots {
-        Shots { along, stripe_px: None, places: BTreeMap::new() }
+        Shots { along, stripe_px: None, sheet: None, places: BTreeMap::new() }
     }
 
     /// The same shots, of a stripe so wide, px (1 sigma).
     pub fn with_stripe(self, stripe_px: Option<f32>) -> Shots {
         Shots { stripe_px, ..self }
+    }
+
+    /// The same shots with their cameras elsewhere.
+    pub fn moved(&self, motion: impl Fn(u32, Rigid<Base, Camera>) -> Rigid<Base, Camera>) -> Shots {
+        let places = self.places().map(|(shot, place)| (shot, motion(shot, place))).collect();
+        Shots { places, ..self.clone() }
+    }
+
+    /// Puts points where the rays of their light's middle meet the sheet, from where [`super::Thick`] has them: edges of parts are where the
+    /// sheet's middle crosses them. Without a sheet they stay.
+    pub fn onto_sheet(&self, points: &mut [CloudPoint]) {
+        let Some(sheet) = &self.sheet else { return };
+        for p in points {
+            let Some(place) = self.place(p.shot) else { continue };
+            let seen = place.inverse().point(&Vec3::from(p.position.as_dvec3().to_array()));
+            let met = Ray::new(Vec3::zeros(), seen).and_then(|ray| ray.meet(sheet));
+            if let Some(on) = met {
+                p.position = glam::DVec3::from_array(place.point(&on).into()).as_vec3();
+            }
+        }
     }
 
     /// Where the camera stood, cloud's frame; `None` for a shot that is not listed.
@@ -115,7 +138,7 @@ impl Shots {
         if head.rig != rig {
             return Err(strange(0, format!("is of calibration {:.12}, the scan of {rig:.12}", head.rig)));
         }
-        let mut shots = Shots::unplaced(head.stripe_along);
+        let mut shots = Shots { sheet: head.sheet, ..Shots::unplaced(head.stripe_along) };
         for (n, line) in lines.enumerate().map(|(i, line)| (i + 1, line)) {
             let Line { shot, from_camera } = serde_json::from_str(line).map_err(|e| strange(n, e.to_string()))?;
             if shots.places.insert(shot, from_camera).is_some() {
@@ -142,6 +165,9 @@ struct Head {
     stripe_along: Along,
     /// Fingerprint of the rig that the points were made with.
     rig: String,
+    /// Its laser plane, camera frame; former versions left it out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    sheet: Option<Plane<Camera>>,
 }
 
 #[derive(serde::Serialize, serde::Deserialize)]
@@ -165,13 +191,14 @@ pub struct ShotsWriter {
 
 impl ShotsWriter {
     /// Starts a list; a former one of that name is discarded. `frame`: the cloud's; `rig`: the rig's fingerprint.
-    pub fn create(folder: &Path, frame: &str, along: Along, rig: &str) -> Result<ShotsWriter> {
+    pub fn create(folder: &Path, frame: &str, along: Along, rig: &str, sheet: &Plane<Camera>) -> Result<ShotsWriter> {
         let head = Head {
             format: FORMAT.into(),
             frame: frame.into(),
             units: UNITS.into(),
             stripe_along: along,
             rig: rig.into(),
+            sheet: Some(*sheet),
         };
         ShotsWriter::with(folder, &line(&head))
     }
@@ -224,7 +251,7 @@ impl ShotsWriter {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Vec3, exp};
+    use crate::geometry::exp;
 
     fn place(shot: u32) -> Rigid<Base, Camera> {
         let k = f64::from(shot);
@@ -234,13 +261,14 @@ mod tests {
     #[test]
     fn what_is_written_is_read_and_a_cut_off_list_goes_on() {
         let dir = tempfile::tempdir().unwrap();
-        let mut w = ShotsWriter::create(dir.path(), "base", Along::V, "rig").unwrap();
+        let sheet = Plane::new(Vec3::new(0.0, 0.6, 0.8), 72.5).unwrap();
+        let mut w = ShotsWriter::create(dir.path(), "base", Along::V, "rig", &sheet).unwrap();
         (0..5).for_each(|s| w.add(s, place(s)));
         w.checkpoint().unwrap();
         w.add(5, place(5));
         w.checkpoint().unwrap();
         let whole = Shots::load(dir.path(), "base", "rig").unwrap();
-        assert_eq!((whole.along, whole.places.len()), (Along::V, 6));
+        assert_eq!((whole.along, whole.sheet, whole.places.len()), (Along::V, Some(sheet), 6));
         for s in 0..6 {
             let (turn, shift) = whole.place(s).unwrap().difference(&place(s));
             assert!(turn < 1e-12 && shift < 1e-9, "{s}");
@@ -260,7 +288,8 @@ mod tests {
     fn other_lists_are_refused() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join(SHOTS_FILE);
-        let mut w = ShotsWriter::create(dir.path(), "base", Along::U, "rig").unwrap();
+        let sheet = Plane::new(Vec3::z(), 100.0).unwrap();
+        let mut w = ShotsWriter::create(dir.path(), "base", Along::U, "rig", &sheet).unwrap();
         w.add(0, place(0));
         w.checkpoint().unwrap();
         let text = std::fs::read_to_string(&path).unwrap();

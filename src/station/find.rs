@@ -3,7 +3,7 @@
 //! Frame and unit: the scan's frame, mm; plans of a second look: base.
 
 use super::height_witness::height_witness;
-use super::scan::report::{ScanReport, cloud_of, load_report, shots_of};
+use super::scan::report::{ScanReport, lit_cloud_of, load_report, shots_of};
 use crate::fault::{Fault, Result};
 use crate::find::insert::picture;
 use crate::find::insert::teach::{TeachOptions, teach};
@@ -129,7 +129,7 @@ pub fn find_part(
         rig.belong_together().map_err(|e| e.at(station.display()))?;
         fits(rig, scan, &scanned)?;
     }
-    let (cloud, shots) = (cloud_of(scan)?, shots_of(scan)?);
+    let (cloud, shots) = (lit_cloud_of(scan)?, shots_of(scan)?);
     // A turntable's part turns before the camera: heights are those over the table, z of the axis frame.
     let over_table = (scanned.motion.axis() == Some(AxisKind::Turntable)).then(Vec3::z);
     let options = &LocateOptions { up: options.up.or(over_table), ..options.clone() };
@@ -163,7 +163,7 @@ pub(super) fn fits(rig: &Rig, scan: &Path, scanned: &ScanReport) -> Result<()> {
 
 /// Teaches a part from a finished scan: the recipe, its proof on that scan, and a picture of it.
 pub fn teach_part(scan: &Path, options: &TeachOptions) -> Result<(Recipe, Report, RgbImage)> {
-    let (cloud, shots) = (cloud_of(scan)?, shots_of(scan)?);
+    let (cloud, shots) = (lit_cloud_of(scan)?, shots_of(scan)?);
     let map = grid(&cloud, &GridOptions::default())?;
     let (recipe, proof) = teach(&cloud, &shots, &map, options).map_err(|e| e.at(scan.display()))?;
     let image = picture::draw(&proof, &recipe.drawing());

@@ -199,7 +199,7 @@ impl Run<'_> {
     /// The part in the scan, drawn for the operator, and the angle between its top and the board, degrees.
     fn find(&self, normal: &Vec3) -> Result<(Report, f64)> {
         let (options, folder) = (self.options, self.options.scan_folder());
-        let (cloud, shots) = (super::cloud_of(&folder)?, super::shots_of(&folder)?);
+        let (cloud, shots) = (super::lit_cloud_of(&folder)?, super::shots_of(&folder)?);
         let accelerator = (options.place != Where::Cpu).then(Accelerator::open).flatten();
         let locate_options =
             LocateOptions { up: Some(*normal), robot: options.robot, accelerator, ..LocateOptions::default() };

@@ -54,7 +54,9 @@ pub use output::{Output, try_output};
 pub use range::{Distance, RangeReport, RangeRun, Square, SurfaceFound, measure_range};
 pub use scan::progress::Checkpoint;
 pub use scan::recorded::scan_recording;
-pub use scan::report::{Filtered, HeightMapFigures, Imported, ScanReport, Spent, cloud_of, load_report, shots_of};
+pub use scan::report::{
+    Filtered, HeightMapFigures, Imported, ScanReport, Spent, cloud_of, lit_cloud_of, load_report, shots_of,
+};
 pub use scan::run::{ScanOptions, scan, scan_on};
 pub use scan::scan_folder::of_a_scan;
 pub use scan::seen::Seen;

@@ -129,8 +129,8 @@ fn object(rig: &Rig, folders: &[PathBuf]) -> Result<ObjectCheck> {
     let mut scans = Vec::new();
     for folder in folders {
         fits(rig, folder, &super::load_report(folder)?)?;
-        let points =
-            Ordered::new(&super::cloud_of(folder)?, &super::shots_of(folder)?).map_err(|e| e.at(folder.display()))?;
+        let points = Ordered::new(&super::lit_cloud_of(folder)?, &super::shots_of(folder)?)
+            .map_err(|e| e.at(folder.display()))?;
         scans.push((folder.display().to_string(), points));
     }
     let registered = register(&scans, rig)?;

@@ -21,7 +21,7 @@ use crate::rig::{Rig, hash_file, hash_text};
 use crate::robot::Convention;
 use crate::scan::Where;
 use crate::station::scan::recorded::scan_recording;
-use crate::station::scan::report::{cloud_of, load_report, shots_of};
+use crate::station::scan::report::{lit_cloud_of, load_report, shots_of};
 use crate::station::scan::run::ScanOptions;
 use crate::station::settings::Settings;
 use std::path::PathBuf;
@@ -290,7 +290,7 @@ impl<'a> Job<'a> {
     fn find(&mut self) -> Result<Phase> {
         let Some([_, normal]) = self.state.surface else { return Ok(Phase::Touch) };
         let folder = self.options.out.join("scan");
-        let (cloud, shots) = (cloud_of(&folder)?, shots_of(&folder)?);
+        let (cloud, shots) = (lit_cloud_of(&folder)?, shots_of(&folder)?);
         let options = LocateOptions { up: Some(normal), robot: self.options.robot, ..LocateOptions::default() };
         let report = locate(&cloud, &shots, &self.recipe, Some(&self.rig), &options)?;
         self.keep(&report)?;

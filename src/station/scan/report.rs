@@ -247,6 +247,16 @@ pub fn shots_of(scan: &Path) -> Result<Shots> {
     Ok(shots.with_stripe(report.stripe.map(|s| s.width_px)))
 }
 
+/// The points of a finished scan where the sheet's middle meets the rays of their light, checked as those of [`cloud_of`]: what finds a part's edges
+/// in them takes the sheet to be thick ([`crate::scan::Thick`] has moved them off it).
+pub fn lit_cloud_of(scan: &Path) -> Result<Vec<CloudPoint>> {
+    let mut cloud = cloud_of(scan)?;
+    if load_report(scan)?.sheet.is_some() {
+        shots_of(scan)?.onto_sheet(&mut cloud);
+    }
+    Ok(cloud)
+}
+
 /// The points of a finished scan, checked to be those that the scan wrote.
 pub fn cloud_of(scan: &Path) -> Result<Vec<CloudPoint>> {
     settle(scan)?;

@@ -199,7 +199,8 @@ impl<'a> Work<'a> {
         let shots = if resumed {
             ShotsWriter::resume(part, first, options.motion.frame(), &print)?
         } else {
-            ShotsWriter::create(part, options.motion.frame(), scanner.stripe_along(), &print)?
+            let sheet = &rig.need_laser_plane()?.value;
+            ShotsWriter::create(part, options.motion.frame(), scanner.stripe_along(), &print, sheet)?
         };
         Ok(Work {
             part,

@@ -99,8 +99,7 @@ impl Straight {
 
     /// The shots with the camera on its path.
     pub fn shots(&self, shots: &Shots) -> Shots {
-        let on = |(shot, place)| (shot, self.place(shot, place));
-        Shots::new(shots.along, shots.places().map(on)).with_stripe(shots.stripe_px)
+        shots.moved(|shot, place| self.place(shot, place))
     }
 
     /// Where the camera was at a shot that was reported at `place`.

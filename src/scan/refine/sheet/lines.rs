@@ -95,36 +95,43 @@ impl Line {
         self.beside(p).min_by(|a, b| square(a).total_cmp(&square(b))).map(|(i, _, _)| i)
     }
 
-    /// Logarithm of the light beside a point of another line: a mean whose weights have no steps, so that it has none where this line's points
-    /// lie a little otherwise.
-    fn light(&self, p: &CloudPoint) -> Option<f64> {
-        let (mut sum, mut all) = (0.0, 0.0);
+    /// Logarithm of the light beside a point of another line, and how much of it is there, 0..=1: a mean whose weights have no steps, so that it
+    /// has none where this line's points lie a little otherwise. What lies pixels away across the stripe is of another surface, and counts for little.
+    fn light(&self, p: &CloudPoint) -> (f64, f64) {
+        let (mut sum, mut sure, mut all) = (0.0, 0.0, 0.0);
         for (i, along, across) in self.beside(p) {
             let weight = f64::from((1.0 - along / BESIDE_PX) / (1.0 + across * across));
-            sum += weight * self.lights[i];
+            // A fit that determines its place badly does so with its light.
+            let known = weight / f64::from(self.points[i].sigma_mm.max(1e-6)).powi(2);
+            sum += known * self.lights[i];
+            sure += known;
             all += weight;
         }
-        (all > 0.0).then(|| sum / all)
+        if sure > 0.0 { (sum / sure, all.min(1.0)) } else { (0.0, 0.0) }
     }
 
     /// What two lines say of a point of this one.
     fn pull(&self, i: usize, before: Option<&Line>, after: Option<&Line>) -> Pull {
-        let (p, here) = (&self.points[i], self.lights[i]);
-        let at = at(p);
-        // How much brighter a line is beside the point, and how far its sheet stands from the point along the normal.
+        let p = &self.points[i];
+        let (at, here) = (at(p), self.light(p).0);
+        let Some(Place { eye, sheet }) = &self.place else { return Pull::default() };
+        let ray = at - eye;
+        // How much brighter a line is beside the point, how far its sheet stands from the point along the normal, and how much that counts.
         let beside = |line: Option<&Line>| {
             let line = line?;
             let way = -line.place.as_ref()?.sheet.distance(&at);
-            Some(((line.light(p)? - here).clamp(-MOST, MOST), way))
+            let (light, weight) = line.light(p);
+            Some([(light - here).clamp(-MOST, MOST), way, weight])
         };
-        let (change, dip, way) = match (beside(before), beside(after)) {
-            (Some((a, from)), Some((b, to))) if from * to < 0.0 => (0.5 * (b - a), 0.5 * (a + b), 0.5 * (to - from)),
-            (None, Some((b, to))) => (b, 0.0, to),
-            (Some((a, from)), None) => (-a, 0.0, -from),
-            _ => return Pull::default(),
-        };
-        let Some(Place { eye, sheet }) = &self.place else { return Pull::default() };
-        let ray = at - eye;
+        let [a, from, before] = beside(before).unwrap_or_default();
+        let [b, to, after] = beside(after).unwrap_or_default();
+        // Behind both, or before both, is nothing between them.
+        if before + after <= 0.0 || before * after > 0.0 && from * to > 0.0 {
+            return Pull::default();
+        }
+        let change = (after * b - before * a) / (before + after).max(1.0);
+        let way = (after * to - before * from) / (before + after);
+        let dip = 0.5 * (a + b) * before.min(after);
         let per = ray / (ray.dot(&sheet.normal) * way);
         if per.iter().all(|x| x.is_finite()) { Pull { change, dip, per } } else { Pull::default() }
     }
