@@ -379,6 +379,30 @@ mod tests {
         }
     }
 
+    /// Where the sheet's middle met the light is not lost.
+    #[test]
+    fn points_go_back_onto_the_sheet() {
+        let (cloud, shots) = PRINTED.scan(5);
+        let shots = Shots { sheet: Some(sheet()), ..shots };
+        let thick = Thick::of(&cloud, &shots, &sheet()).unwrap().unwrap();
+        let mut after = Vec::new();
+        let taken = thick.apply(&cloud, &shots, &sheet(), &mut |points| {
+            after.extend_from_slice(points);
+            Ok(())
+        });
+        taken.unwrap();
+        // Noise along the vertical has put the points off the sheet.
+        let mut before = cloud.clone();
+        shots.onto_sheet(&mut before);
+        let apart = |a: &[CloudPoint], b: &[CloudPoint]| {
+            a.iter().zip(b).map(|(a, b)| a.position.distance(b.position)).fold(0.0, f32::max)
+        };
+        let moved = apart(&before, &after);
+        shots.onto_sheet(&mut after);
+        println!("{moved} mm apart, {} back on the sheet", apart(&before, &after));
+        assert!(moved > 0.05 && apart(&before, &after) < 1e-4);
+    }
+
     /// What is left of a pulled point is in its standard deviation.
     #[test]
     fn points_that_were_moved_state_it() {
