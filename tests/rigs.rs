@@ -129,6 +129,8 @@ impl Known {
 struct Row {
     name: String,
     footprint: f64,
+    /// From one number of the cloud's farthest coordinate to the next, mm.
+    step: f64,
     /// Of camera, laser plane and hand-eye, and of all at once.
     verdicts: [String; 4],
     points: usize,
@@ -262,6 +264,7 @@ fn run(name: &str, file: &Path, at: &Path, width: Option<u32>, shots: Option<usi
     let lines = 3.0;
     let completeness = (cloud.len() as f64 / (lit as f64 / lines)).min(1.0);
 
+    let farthest = cloud.iter().map(|p| p.position.abs().max_element()).fold(0.0, f32::max);
     if calibrated {
         scan("cpu", &of("cell"), &of("result"));
     }
@@ -269,6 +272,7 @@ fn run(name: &str, file: &Path, at: &Path, width: Option<u32>, shots: Option<usi
     Row {
         name: name.into(),
         footprint,
+        step: f64::from(farthest.next_up() - farthest),
         verdicts,
         points: cloud.len(),
         completeness,
@@ -320,8 +324,8 @@ fn judged(row: &Row, over: f64, coarse: bool) -> Vec<String> {
         Err(why) => want(coarse && why.contains("no pose:"), format!("part not found: {why}")),
     }
     if let Some(Apart { alone, worst_mm, .. }) = row.gpu {
-        // 0.001 mm at the reference rigs' pixel of 0.25 mm.
-        want(worst_mm <= 0.004 * p, format!("GPU and twins differ by {worst_mm:.6} mm, footprint {p:.4}"));
+        // 0.001 mm at the reference rigs' pixel of 0.25 mm, and a step of the numbers that clouds are written in: 30 nm from 256 mm on.
+        want(worst_mm <= 0.004 * p + row.step, format!("GPU and twins differ by {worst_mm:.6} mm, footprint {p:.4}"));
         want(alone * 20_000 <= row.points, format!("{alone} points on GPU or twins alone"));
     }
     faults

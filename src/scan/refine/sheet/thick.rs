@@ -382,8 +382,8 @@ mod tests {
     /// Where the sheet's middle met the light is not lost.
     #[test]
     fn points_go_back_onto_the_sheet() {
-        let (cloud, shots) = PRINTED.scan(5);
-        let shots = Shots { sheet: Some(sheet()), ..shots };
+        let (cloud, mut shots) = PRINTED.scan(5);
+        shots.sheet = Some(sheet());
         let thick = Thick::of(&cloud, &shots, &sheet()).unwrap().unwrap();
         let mut after = Vec::new();
         let taken = thick.apply(&cloud, &shots, &sheet(), &mut |points| {
