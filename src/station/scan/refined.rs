@@ -7,8 +7,6 @@ use super::scan_folder::{CLOUD_FILE, MEASURED};
 use super::spread::Spread;
 use crate::fault::{Fault, Result};
 use crate::files::moment;
-use crate::geometry::{Camera, Plane};
-use crate::recording::Motion;
 use crate::scan::{
     Along, CloudFile, CloudPoint, CloudWriter, Extraction, Format, PathFound, PointSource, SHOTS_FILE, SheetFound,
     Shots, Straight, Thick, straight,
@@ -46,31 +44,30 @@ impl PointSource for OnPath<'_> {
     }
 }
 
-/// `part`: the working folder; `rig`: the fingerprint of the scan's, and `sheet` its laser plane.
+/// `part`: the working folder; `frame`: the cloud's; `shots`: where they were reported.
 pub(super) fn refine(
     part: &Path,
-    motion: &Motion,
-    (rig, sheet): (&str, &Plane<Camera>),
+    frame: &'static str,
+    shots: Shots,
     format: Format,
     settings: &Extraction,
 ) -> Result<Refined> {
-    let shots = Shots::load(part, motion.frame(), rig)?;
     let cloud = CloudFile::open(&part.join(CLOUD_FILE))?;
     let pixels = if shots.along == Along::U { format.width } else { format.height };
     let path = if settings.straighten { straight(&cloud, &shots, pixels)? } else { None };
     let places = path.as_ref().map(|p| p.found);
     let path = path.filter(|p| p.found.taken_out);
-    let shots = path.as_ref().map_or_else(|| shots.clone(), |p| p.shots(&shots));
+    let shots = if let Some(p) = &path { p.shots(&shots) } else { shots };
     let on_path = OnPath { cloud: &cloud, path: path.as_ref() };
-    let thick = if settings.thick_sheet { Thick::of(&on_path, &shots, sheet)? } else { None };
+    let thick = if settings.thick_sheet { Thick::of(&on_path, &shots)? } else { None };
     if path.is_none() && thick.is_none() {
         return Ok(Refined { places, ..Refined::default() });
     }
     let next = part.join(NEXT);
-    let mut out = CloudWriter::create_in(&next, motion.frame())?;
+    let mut out = CloudWriter::create_in(&next, frame)?;
     let mut spread = Spread::default();
     let sheet = match thick {
-        Some(thick) => Some(thick.apply(&on_path, &shots, sheet, &mut |points| {
+        Some(thick) => Some(thick.apply(&on_path, &shots, &mut |points| {
             spread.add(points);
             out.append(points)
         })?),

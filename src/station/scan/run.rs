@@ -16,8 +16,8 @@ use crate::raster::Image;
 use crate::recording::Motion;
 use crate::rig::{Rig, Volume};
 use crate::scan::{
-    BadShot, Carrier, CloudWriter, Extraction, GridOptions, Processor, Profile, SHOTS_FILE, Scanner, ShotsWriter,
-    Source, Where, camera_for, parts_for,
+    BadShot, Carrier, CloudWriter, Extraction, GridOptions, Processor, Profile, SHOTS_FILE, Scanner, Shots,
+    ShotsWriter, Source, Where, camera_for, parts_for,
 };
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -321,9 +321,9 @@ impl<'a> Work<'a> {
         let Work { part, cloud, mut state, scanner, mut spent, .. } = self;
         let points = cloud.finish()?;
         let (format, print) = (source.format(), rig.fingerprint());
-        let sheet = &rig.need_laser_plane()?.value;
-        let refined = refine(part, &options.motion, (&print, sheet), format, &options.extraction)?;
-        let Refined { places, sheet, median_sigma_mm } = refined;
+        let frame = options.motion.frame();
+        let shots = Shots::load(part, frame, &print)?.with_stripe(scanner.stripe().map(|s| s.width_px));
+        let Refined { places, sheet, median_sigma_mm } = refine(part, frame, shots, format, &options.extraction)?;
         let seconds = self.started.elapsed().as_secs_f64();
         let products = Instant::now();
         let (cloud_path, up) = (part.join(CLOUD_FILE), scanner.up_in_base());

@@ -3,13 +3,15 @@
 //! Frame and unit: the cloud's frame, mm; docs/math.md, Sheets that are thick (2) and (3).
 
 use crate::fault::Result;
-use crate::geometry::{Base, Camera, Plane, Vec3};
+use crate::geometry::{Base, Plane, Vec3};
 use crate::scan::{Along, CloudPoint, PointSource, Shots};
 use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Points of another line are beside a point up to so many pixels along the stripe, the nearer the heavier.
 const BESIDE_PX: f32 = 1.5;
+/// Stripes that are narrower, or that nobody measured, px: centres of one surface lie closer than a pixel.
+const LEAST_PX: f32 = 1.0;
 /// Light that changes by more than this from one shot to the next, as a logarithm, counts as this: it ends there, and where between the two
 /// nobody knows.
 const MOST: f64 = 1.5;
@@ -36,6 +38,8 @@ pub(super) struct Line {
     /// Indices of the points in their order along the stripe, with their places there, px.
     order: Vec<(f32, u32)>,
     along: Along,
+    /// What lies so far across the stripe counts half, px.
+    width_px: f32,
 }
 
 /// Pinhole and sheet of a shot.
@@ -65,8 +69,8 @@ fn light(p: &CloudPoint) -> f64 {
 }
 
 impl Line {
-    fn new(shot: u32, points: Vec<CloudPoint>, shots: &Shots, sheet: &Plane<Camera>) -> Line {
-        let place = shots.place(shot).and_then(|place| {
+    fn new(shot: u32, points: Vec<CloudPoint>, shots: &Shots) -> Line {
+        let place = shots.place(shot).zip(shots.sheet).and_then(|(place, sheet)| {
             let normal = place.direction(&sheet.normal);
             let on = place.point(&(sheet.normal * sheet.offset));
             Some(Place { eye: place.point(&Vec3::zeros()), sheet: Plane::new(normal, normal.dot(&on))? })
@@ -75,7 +79,8 @@ impl Line {
             points.iter().zip(0..).map(|(p, i)| (in_picture(shots.along, p).0, i)).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         let lights = points.iter().map(light).collect();
-        Line { shot, points, lights, place, order, along: shots.along }
+        let width_px = shots.stripe_px.unwrap_or(0.0).max(LEAST_PX);
+        Line { shot, points, lights, place, order, along: shots.along, width_px }
     }
 
     /// The points of it that are beside a point of another line: index, distances along and across the stripe, px.
@@ -96,11 +101,12 @@ impl Line {
     }
 
     /// Logarithm of the light beside a point of another line, and how much of it is there, 0..=1: a mean whose weights have no steps, so that it
-    /// has none where this line's points lie a little otherwise. What lies pixels away across the stripe is of another surface, and counts for little.
+    /// has none where this line's points lie a little otherwise. What lies widths of the stripe away across it is of another surface, and counts for
+    /// little.
     fn light(&self, p: &CloudPoint) -> (f64, f64) {
         let (mut sum, mut sure, mut all) = (0.0, 0.0, 0.0);
         for (i, along, across) in self.beside(p) {
-            let weight = f64::from((1.0 - along / BESIDE_PX) / (1.0 + across * across));
+            let weight = f64::from((1.0 - along / BESIDE_PX) / (1.0 + (across / self.width_px).powi(2)));
             // A fit that determines its place badly does so with its light.
             let known = weight / f64::from(self.points[i].sigma_mm.max(1e-6)).powi(2);
             sum += known * self.lights[i];
@@ -146,17 +152,12 @@ impl Line {
     }
 }
 
-/// The lines of a cloud whose points come in the order of their shots, to `take` in that order; `sheet`: the laser plane.
-pub(super) fn lines(
-    cloud: &dyn PointSource,
-    shots: &Shots,
-    sheet: &Plane<Camera>,
-    take: &mut dyn FnMut(Pulled) -> Result<()>,
-) -> Result<()> {
+/// The lines of a cloud whose points come in the order of their shots, to `take` in that order.
+pub(super) fn lines(cloud: &dyn PointSource, shots: &Shots, take: &mut dyn FnMut(Pulled) -> Result<()>) -> Result<()> {
     let (mut before, mut last): (Option<Arc<Line>>, Option<Arc<Line>>) = (None, None);
     let mut next: Vec<CloudPoint> = Vec::new();
     let mut close = |points: Vec<CloudPoint>| -> Result<()> {
-        let line = points.first().map(|p| p.shot).map(|shot| Arc::new(Line::new(shot, points, shots, sheet)));
+        let line = points.first().map(|p| p.shot).map(|shot| Arc::new(Line::new(shot, points, shots)));
         let done = last.clone().map_or(Ok(()), |last| take(last.pulled(before.as_deref(), line.as_deref())));
         before = std::mem::replace(&mut last, line);
         done

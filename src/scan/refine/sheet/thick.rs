@@ -5,7 +5,6 @@
 use super::super::slope::{Slope, slope};
 use super::lines::{Pull, Pulled, at, lines};
 use crate::fault::Result;
-use crate::geometry::{Camera, Plane};
 use crate::scan::{CloudPoint, PointSource, Shots};
 use crate::solve::robust_scale;
 use std::collections::VecDeque;
@@ -90,11 +89,11 @@ struct Between {
 }
 
 impl Thick {
-    /// Looks at a cloud in the order of its shots, `sheet` the laser plane; `None` where it does not show that brightness pulls its points.
-    pub fn of(cloud: &dyn PointSource, shots: &Shots, sheet: &Plane<Camera>) -> Result<Option<Thick>> {
+    /// Looks at a cloud in the order of its shots; `None` where nobody wrote the sheet down, or where it does not show that brightness pulls its points.
+    pub fn of(cloud: &dyn PointSource, shots: &Shots) -> Result<Option<Thick>> {
         let (mut all, mut every, mut seen) = (Vec::new(), 1, 0_usize);
         let mut three: VecDeque<Pulled> = VecDeque::new();
-        lines(cloud, shots, sheet, &mut |line| {
+        lines(cloud, shots, &mut |line| {
             three.push_back(line);
             if let [before, line, after] = three.make_contiguous() {
                 for i in 0..line.pulls.len() {
@@ -136,11 +135,10 @@ impl Thick {
         &self,
         cloud: &dyn PointSource,
         shots: &Shots,
-        sheet: &Plane<Camera>,
         take: &mut dyn FnMut(&[CloudPoint]) -> Result<()>,
     ) -> Result<SheetFound> {
         let (mut moved, mut points, mut all) = (0_u64, Vec::new(), 0_u64);
-        lines(cloud, shots, sheet, &mut |Pulled { line, pulls }| {
+        lines(cloud, shots, &mut |Pulled { line, pulls }| {
             points.clear();
             for (p, Pull { change, dip, per }) in line.points.iter().zip(&pulls) {
                 let by = per * (self.quiet.change_of(*change) * self.square.is);
@@ -236,7 +234,7 @@ fn between(before: &Pulled, line: &Pulled, i: usize, after: &Pulled) -> Option<B
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::{Base, Rigid, Vec3, exp};
+    use crate::geometry::{Base, Camera, Plane, Rigid, Vec3, exp};
     use crate::scan::Along;
     use crate::stages::noise::Noise;
 
@@ -255,6 +253,7 @@ mod tests {
         /// Of the light from point to point, and of the laser from shot to shot, as logarithms.
         speckle: f64,
         flicker: f64,
+        focal_px: f64,
     }
 
     /// Print 1.6 mm wide and as far apart, its edges 0.15 mm wide, four times as bright as the ground.
@@ -273,6 +272,7 @@ mod tests {
         albedo: print,
         speckle: 0.03,
         flicker: 0.0,
+        focal_px: 600.0,
     };
     const NOISE_MM: f64 = 0.01;
 
@@ -310,7 +310,7 @@ mod tests {
                     let ray = ray / light;
                     let depth = sheet().offset / sheet().normal.dot(&ray);
                     let at = place.point(&(ray * depth)) + Vec3::z() * (NOISE_MM * noise.normal());
-                    let (u, v) = (column as f32, 200.0 + (600.0 * ray.y) as f32);
+                    let (u, v) = (column as f32, 200.0 + (self.focal_px * ray.y) as f32);
                     let (u, v) = if self.along == Along::U { (u, v) } else { (v, u) };
                     let intensity = (8.0 * laser * light * (self.speckle * noise.normal()).exp()) as f32;
                     let position = glam::DVec3::from_array(at.into()).as_vec3();
@@ -326,7 +326,10 @@ mod tests {
                 }
                 places.push((shot, place));
             }
-            (cloud, Shots::new(self.along, places))
+            let stripe_px = self.focal_px * self.thick / 150.0;
+            let mut shots = Shots::new(self.along, places).with_stripe(Some(stripe_px as f32));
+            shots.sheet = Some(sheet());
+            (cloud, shots)
         }
 
         fn rms(&self, cloud: &[CloudPoint]) -> f64 {
@@ -341,9 +344,9 @@ mod tests {
         fn refined(&self, seed: u64) -> (Option<SheetFound>, f64, f64) {
             let (cloud, shots) = self.scan(seed);
             let before = self.rms(&cloud);
-            let Some(thick) = Thick::of(&cloud, &shots, &sheet()).unwrap() else { return (None, before, before) };
+            let Some(thick) = Thick::of(&cloud, &shots).unwrap() else { return (None, before, before) };
             let mut after = Vec::new();
-            let found = thick.apply(&cloud, &shots, &sheet(), &mut |points| {
+            let found = thick.apply(&cloud, &shots, &mut |points| {
                 after.extend_from_slice(points);
                 Ok(())
             });
@@ -366,6 +369,8 @@ mod tests {
             ("thin", Scene { thick: 0.06, ..PRINTED }),
             ("flickering", Scene { flicker: 0.03, ..PRINTED }),
             ("speckled", Scene { speckle: 0.2, ..PRINTED }),
+            ("fine pixels, steep", Scene { height: |x, y| 0.3 * x - 0.5 * y, focal_px: 12_000.0, ..PRINTED }),
+            ("fine pixels", Scene { focal_px: 12_000.0, ..PRINTED }),
             ("steep", Scene { height: |x, y| 0.3 * x - 0.5 * y, ..PRINTED }),
             ("round", Scene { height: |x, y| 0.02 * x * x - 0.01 * (y - 7.0).powi(2), ..PRINTED }),
         ] {
@@ -382,11 +387,10 @@ mod tests {
     /// Where the sheet's middle met the light is not lost.
     #[test]
     fn points_go_back_onto_the_sheet() {
-        let (cloud, mut shots) = PRINTED.scan(5);
-        shots.sheet = Some(sheet());
-        let thick = Thick::of(&cloud, &shots, &sheet()).unwrap().unwrap();
+        let (cloud, shots) = PRINTED.scan(5);
+        let thick = Thick::of(&cloud, &shots).unwrap().unwrap();
         let mut after = Vec::new();
-        let taken = thick.apply(&cloud, &shots, &sheet(), &mut |points| {
+        let taken = thick.apply(&cloud, &shots, &mut |points| {
             after.extend_from_slice(points);
             Ok(())
         });
@@ -411,9 +415,9 @@ mod tests {
         for (p, sigma_mm) in cloud[5000..].iter_mut().zip([f32::INFINITY, 0.0]) {
             p.sigma_mm = sigma_mm;
         }
-        let thick = Thick::of(&cloud, &shots, &sheet()).unwrap().unwrap();
+        let thick = Thick::of(&cloud, &shots).unwrap().unwrap();
         let mut after = Vec::new();
-        let found = thick.apply(&cloud, &shots, &sheet(), &mut |points| {
+        let found = thick.apply(&cloud, &shots, &mut |points| {
             after.extend_from_slice(points);
             Ok(())
         });
@@ -455,7 +459,7 @@ mod tests {
             }
         }
         let (cloud, shots) = PRINTED.scan(1);
-        assert!(Thick::of(&cloud, &Shots::unplaced(shots.along), &sheet()).unwrap().is_none());
-        assert!(Thick::of(&Vec::new(), &shots, &sheet()).unwrap().is_none());
+        assert!(Thick::of(&cloud, &Shots::unplaced(shots.along)).unwrap().is_none());
+        assert!(Thick::of(&Vec::new(), &shots).unwrap().is_none());
     }
 }
