@@ -213,7 +213,7 @@ fn run(name: &str, file: &Path, at: &Path, width: Option<u32>, shots: Option<usi
     let part_from_base = steps_part.inverse();
     let bounds: Vec<f64> = (0..=known.full as i32).map(|grey| known.bound_px(sigma, f64::from(grey.max(1)))).collect();
     let bound_px = |p: &CloudPoint| bounds[(p.intensity.max(1.0) as usize).min(bounds.len() - 1)];
-    let base = |p: &CloudPoint| Vec3::from(p.position.as_dvec3().to_array());
+    let base = |p: &CloudPoint| p.at();
     let footprint = median(
         cloud
             .iter()

@@ -115,8 +115,7 @@ fn steps_are_right_to_four_micrometres() {
     let truth = sheetlight::simulate::Truth::load(&dir.path().join("scan/truth.json")).unwrap();
     let part_from_base = truth.file.parts[0].base_from_part.inverse();
     let cloud = read_cloud(&dir.path().join("result/cloud.ply")).unwrap();
-    let points: Vec<Vec3> =
-        cloud.iter().map(|p| part_from_base.point(&Vec3::from(p.position.as_dvec3().to_array()))).collect();
+    let points: Vec<Vec3> = cloud.iter().map(|p| part_from_base.point(&p.at())).collect();
     // The middle of each tread, 2 mm from its edges.
     let mean = |i: usize| {
         let x = -24.0 + 12.0 * i as f64;

@@ -160,7 +160,7 @@ fn what_the_sheets_thickness_does_is_taken_out() {
 fn turned_back(mut cloud: Vec<CloudPoint>, steps: &[Step]) -> Vec<CloudPoint> {
     let m = turned::base_axes(steps).transpose();
     for p in &mut cloud {
-        let turned: [f64; 3] = (m * Vec3::from(p.position.as_dvec3().to_array())).into();
+        let turned: [f64; 3] = (m * p.at()).into();
         p.position = turned.map(|x| x as f32).into();
     }
     cloud
@@ -188,7 +188,7 @@ fn a_turned_camera_sees_the_same_plate_on_both_processors() {
     let known = Plane::<Base>::new(normal, known["offset_mm"].as_f64().unwrap()).unwrap();
     // The plate without the table beside it.
     let own_plane = |cloud: &[CloudPoint]| {
-        let points = cloud.iter().map(|p| Vec3::from(p.position.as_dvec3().to_array()));
+        let points = cloud.iter().map(|p| p.at());
         fit_plane::<Base>(&points.filter(|p| known.distance(p).abs() < 1.0).collect::<Vec<_>>()).expect("a plate")
     };
     let straight = cloud(&[], "cpu");
@@ -197,7 +197,7 @@ fn a_turned_camera_sees_the_same_plate_on_both_processors() {
     for steps in [&quarter[..1], &quarter[..2], &quarter, &[Step::Mirror], &[Step::Mirror, Step::Quarter]] {
         let twins = cloud(steps, "cpu");
         let (own, own_rms) = own_plane(&twins);
-        let middle = Vec3::from(straight[straight.len() / 2].position.as_dvec3().to_array());
+        let middle = straight[straight.len() / 2].at();
         let height = own.distance(&middle) * own.normal.dot(&plane.normal).signum() - plane.distance(&middle);
         let angle = plane.normal.cross(&own.normal).norm();
         println!(

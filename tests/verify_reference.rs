@@ -26,7 +26,7 @@ impl sheetlight::geometry::Frame for Scene {
 
 fn points(scan: &Path) -> Vec<(u32, Vec3)> {
     let cloud = read_cloud(&scan.join("cloud.ply")).unwrap();
-    cloud.iter().map(|p| (p.shot, Vec3::from(p.position.as_dvec3().to_array()))).collect()
+    cloud.iter().map(|p| (p.shot, p.at())).collect()
 }
 
 /// Where the scan puts the middle of each tread, and where a tip that follows the same line down would touch it.

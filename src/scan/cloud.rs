@@ -4,6 +4,7 @@
 
 use crate::fault::{Fault, Result};
 use crate::files::{moment, remove};
+use crate::geometry::Vec3;
 use std::fs::File;
 use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -26,6 +27,18 @@ pub struct CloudPoint {
     pub u: f32,
     /// Its place down the rows of that shot, px.
     pub v: f32,
+}
+
+impl CloudPoint {
+    /// Where it lies, the cloud's frame, mm.
+    pub fn at(&self) -> Vec3 {
+        Vec3::from(self.position.as_dvec3().to_array())
+    }
+
+    /// The same point elsewhere.
+    pub fn moved_to(self, at: Vec3) -> CloudPoint {
+        CloudPoint { position: glam::DVec3::from_array(at.into()).as_vec3(), ..self }
+    }
 }
 
 const RECORD: u64 = size_of::<CloudPoint>() as u64;

@@ -74,10 +74,10 @@ impl Shots {
         let Some(sheet) = &self.sheet else { return };
         for p in points {
             let Some(place) = self.place(p.shot) else { continue };
-            let seen = place.inverse().point(&Vec3::from(p.position.as_dvec3().to_array()));
+            let seen = place.inverse().point(&p.at());
             let met = Ray::new(Vec3::zeros(), seen).and_then(|ray| ray.meet(sheet));
             if let Some(on) = met {
-                p.position = glam::DVec3::from_array(place.point(&on).into()).as_vec3();
+                *p = p.moved_to(place.point(&on));
             }
         }
     }

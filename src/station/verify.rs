@@ -96,7 +96,7 @@ pub fn verify(rig: &Rig, run: &VerifyRun) -> Result<VerifyReport> {
         let mut parts: BTreeMap<u32, Vec<Vec3>> = BTreeMap::new();
         for p in super::cloud_of(folder)? {
             let view = p.shot.checked_div(run.shots_per_view).unwrap_or(0);
-            parts.entry(view).or_default().push(Vec3::from(p.position.as_dvec3().to_array()));
+            parts.entry(view).or_default().push(p.at());
         }
         let label =
             folder.file_name().map_or_else(|| folder.display().to_string(), |n| n.to_string_lossy().into_owned());

@@ -107,8 +107,7 @@ impl Live<'_> {
         let scene_from_base = truth.file.base_from_scene.unwrap().inverse();
         let cloud = sheetlight::scan::read_cloud(&Path::new(&to).join("cloud.ply")).unwrap();
         let true_from_own = true_from_own.unwrap_or_else(Rigid::identity);
-        let points: Vec<Vec3> =
-            cloud.iter().map(|p| true_from_own.point(&Vec3::from(p.position.as_dvec3().to_array()))).collect();
+        let points: Vec<Vec3> = cloud.iter().map(|p| true_from_own.point(&p.at())).collect();
         let on_faces = points.iter().filter(|p| on_a_face(&scene_from_base.point(p)));
         let distances: Vec<f64> = on_faces.map(|p| truth.distance(p)).collect();
         let all = json(&Path::new(&to).join("errors.json"))["cloud"]["rms_without_outliers_mm"].as_f64().unwrap();

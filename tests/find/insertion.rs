@@ -7,8 +7,8 @@ use crate::common::pose::{Off, truth};
 use sheetlight::find::insert::recipe::InsertionSpec;
 use sheetlight::find::{LocateOptions, Recipe, Report, locate};
 use sheetlight::geometry::{Base, Part, Rigid, Vec3};
-use sheetlight::scan::{Along, CloudPoint, Shots, read_cloud};
-use sheetlight::station::shots_of;
+use sheetlight::scan::{Along, CloudPoint, Shots};
+use sheetlight::station::{lit_cloud_of, shots_of};
 use std::path::PathBuf;
 
 const PARTS: [&str; 4] = ["dimm", "led", "osc", "flash"];
@@ -62,7 +62,7 @@ fn scans(test: &str) -> Vec<Scanned> {
             ]);
             out.push(Scanned {
                 part,
-                cloud: read_cloud(&to.join("cloud.ply")).unwrap(),
+                cloud: lit_cloud_of(&to).unwrap(),
                 shots: shots_of(&to).unwrap(),
                 truth: truth(&truths.join(format!("scan_{part}"))),
                 recipe: recipe(part),
@@ -127,7 +127,7 @@ fn the_four_parts_are_found_and_the_damaged_scans_are_never_wrong() {
             right_or_refused("30 % of the shots gone", &s, &cloud, &s.truth);
         }
         let part_from_base = s.truth.inverse();
-        let local = |p: &CloudPoint| part_from_base.point(&Vec3::from(p.position.as_dvec3().to_array()));
+        let local = |p: &CloudPoint| part_from_base.point(&p.at());
         let lifted = |p: &CloudPoint, mm: f64| {
             let up = s.truth.direction(&Vec3::z()) * mm;
             let position: [f32; 3] = std::array::from_fn(|k| p.position[k] + up[k] as f32);
@@ -168,7 +168,7 @@ fn the_four_parts_are_found_and_the_damaged_scans_are_never_wrong() {
         // The whole board turned by half: the notch, the cut corner or the key tells.
         let turn: Rigid<Base, Base> = Rigid::from_vectors(&Vec3::new(0.0, 0.0, std::f64::consts::PI), Vec3::zeros());
         let turned = |p: &CloudPoint| {
-            let q = turn.point(&Vec3::from(p.position.as_dvec3().to_array()));
+            let q = turn.point(&p.at());
             CloudPoint { position: [q.x as f32, q.y as f32, q.z as f32].into(), ..*p }
         };
         let cloud: Vec<CloudPoint> = s.cloud.iter().map(turned).collect();

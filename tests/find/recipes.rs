@@ -186,7 +186,7 @@ fn judged(s: &Scanned, recipe: &Recipe, cloud: &[CloudPoint], truth: Option<&Rig
 
 fn cases(s: &Scanned, seed: u64) -> Vec<(&'static str, Outcome)> {
     let part_from_base = s.truth.inverse();
-    let local = |p: &CloudPoint| part_from_base.point(&Vec3::from(p.position.as_dvec3().to_array()));
+    let local = |p: &CloudPoint| part_from_base.point(&p.at());
     let lifted = |p: &CloudPoint, mm: f64| {
         let up = s.truth.direction(&Vec3::z()) * mm;
         CloudPoint { position: p.position + glam::DVec3::from_array(up.into()).as_vec3(), ..*p }

@@ -64,7 +64,7 @@ fn judged(cloud: &[CloudPoint], truth: &Path) -> Found {
         let x = TREAD_MM[0] * (i as f64 - 2.0) * u;
         let on: Vec<(Vec3, f32)> = cloud
             .iter()
-            .map(|p| (back.point(&Vec3::from(p.position.as_dvec3().to_array())), p.sigma_mm))
+            .map(|p| (back.point(&p.at()), p.sigma_mm))
             .filter(|(q, _)| {
                 (q.x - x).abs() < 0.3 * TREAD_MM[0] * u
                     && q.y.abs() < 0.35 * TREAD_MM[1] * u

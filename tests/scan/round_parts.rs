@@ -34,7 +34,7 @@ fn flanks(cloud: &[CloudPoint], truth: &Truth) -> (usize, f64, f64) {
     let up = part.point(&Vec3::zeros()) - middle;
     let (mut n, mut square, mut pulls) = (0, 0.0, 0.0);
     for p in cloud {
-        let from = Vec3::from(p.position.as_dvec3().to_array()) - middle;
+        let from = p.at() - middle;
         let off = from.norm() - RADIUS;
         let slope = (from.dot(&up) / (from.norm() * RADIUS)).acos().to_degrees();
         if off.abs() < 0.3 && (55.0..78.0).contains(&slope) {

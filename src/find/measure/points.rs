@@ -81,7 +81,7 @@ impl Ordered {
             if *i != NONE {
                 let p = &cloud[*i as usize];
                 *i = out.points.len() as u32;
-                out.points.push(Vec3::from(p.position.as_dvec3().to_array()));
+                out.points.push(p.at());
                 out.intensity.push(p.intensity);
                 out.sigma.push(p.sigma_mm);
                 out.row.push((slot / columns) as u32);

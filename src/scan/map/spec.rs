@@ -157,7 +157,7 @@ pub fn sample(source: &(impl PointSource + ?Sized), min_quality: f32) -> Result<
     let mut stride = 1u64;
     source.for_each_chunk(&mut |chunk| {
         for p in chunk.iter().filter(|p| p.quality >= min_quality && p.position.is_finite()) {
-            let point = Vec3::from(p.position.as_dvec3().to_array());
+            let point = p.at();
             out.most_intensity = out.most_intensity.max(p.intensity);
             for (axis, [low, high]) in extremes.iter_mut().enumerate() {
                 let value = p.position[axis];

@@ -56,7 +56,7 @@ pub fn calibrate_latency(
     let mut shots = Vec::new();
     let mut add = |profiles: Vec<crate::scan::Profile>, stands: &BTreeMap<u32, Stand>| -> Result<()> {
         for profile in profiles {
-            let points = profile.points.iter().map(|p| Vec3::from(p.position.as_dvec3().to_array()));
+            let points = profile.points.iter().map(|p| p.at());
             shots.push(passing(&carrier, &stands[&profile.shot], rates[profile.shot as usize].as_ref(), points)?);
         }
         Ok(())

@@ -5,7 +5,6 @@
 use super::figures::{HISTOGRAM_STEP, Judged};
 use super::parts::FoundPart;
 use crate::fault::Result;
-use crate::geometry::Vec3;
 use crate::scan::{CloudFile, HeightMap, PointSource};
 use crate::simulate::{CloudErrors, Truth};
 use std::collections::BTreeMap;
@@ -23,7 +22,7 @@ pub fn judge(scan: &Path, truth: &Path, found: &[FoundPart]) -> Result<Judged> {
     let mut within = [0u64; 3];
     cloud.for_each_chunk(&mut |chunk| {
         for p in chunk {
-            let place = Vec3::from(p.position.as_dvec3().to_array());
+            let place = p.at();
             let d = truth.distance(&place);
             let part = truth.part_near(&place).unwrap_or("board");
             match parts.get_mut(part) {

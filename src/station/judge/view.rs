@@ -29,7 +29,7 @@ pub(super) fn of(scan: &Path, map: &HeightMap) -> Result<Markup> {
             if (i - 1) % every != 0 {
                 continue;
             }
-            let q = grid_from_base.point(&Vec3::from(p.position.as_dvec3().to_array())) - middle;
+            let q = grid_from_base.point(&p.at()) - middle;
             q.iter().for_each(|x| bytes.extend(((x / STEP).round().clamp(-32_767.0, 32_767.0) as i16).to_le_bytes()));
         }
     })?;

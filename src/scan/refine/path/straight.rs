@@ -91,8 +91,7 @@ impl Straight {
     pub fn apply(&self, points: &mut [CloudPoint]) {
         for p in points {
             if let Some((_, motion)) = self.moved.get(&p.shot) {
-                let at = motion.point(&Vec3::from(p.position.as_dvec3().to_array()));
-                p.position = glam::DVec3::from_array(at.into()).as_vec3();
+                *p = p.moved_to(motion.point(&p.at()));
             }
         }
     }

@@ -47,7 +47,7 @@ impl Line {
             self.places.resize(place + 1, (Vec3::zeros(), 0.0));
         }
         let (sum, n) = &mut self.places[place];
-        *sum += Vec3::from(p.position.as_dvec3().to_array());
+        *sum += p.at();
         *n += 1.0;
     }
 }

@@ -60,10 +60,6 @@ fn in_picture(along: Along, p: &CloudPoint) -> (f32, f32) {
     if along == Along::U { (p.u, p.v) } else { (p.v, p.u) }
 }
 
-pub(super) fn at(p: &CloudPoint) -> Vec3 {
-    Vec3::from(p.position.as_dvec3().to_array())
-}
-
 fn light(p: &CloudPoint) -> f64 {
     f64::from(p.intensity.max(f32::MIN_POSITIVE)).ln()
 }
@@ -119,7 +115,7 @@ impl Line {
     /// What two lines say of a point of this one.
     fn pull(&self, i: usize, before: Option<&Line>, after: Option<&Line>) -> Pull {
         let p = &self.points[i];
-        let (at, here) = (at(p), self.light(p).0);
+        let (at, here) = (p.at(), self.light(p).0);
         let Some(Place { eye, sheet }) = &self.place else { return Pull::default() };
         let ray = at - eye;
         // How much brighter a line is beside the point, how far its sheet stands from the point along the normal, and how much that counts.

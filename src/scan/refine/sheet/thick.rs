@@ -3,7 +3,7 @@
 //! Frame and unit: the cloud's frame, mm; docs/math.md, Sheets that are thick.
 
 use super::super::slope::{Slope, slope};
-use super::lines::{Pull, Pulled, at, lines};
+use super::lines::{Pull, Pulled, lines};
 use crate::fault::Result;
 use crate::scan::{CloudPoint, PointSource, Shots};
 use crate::solve::robust_scale;
@@ -143,9 +143,9 @@ impl Thick {
             for (p, Pull { change, dip, per }) in line.points.iter().zip(&pulls) {
                 let by = per * (self.quiet.change_of(*change) * self.square.is);
                 moved += u64::from(by.norm() as f32 > p.sigma_mm);
-                let position = glam::DVec3::from_array((at(p) + by).into()).as_vec3();
+                let moved_to = p.moved_to(p.at() + by);
                 let scatter = per.norm() * self.quiet.unsure(*change, *dip) * self.left;
-                points.push(CloudPoint { position, sigma_mm: p.sigma_mm.hypot(scatter as f32), ..*p });
+                points.push(CloudPoint { sigma_mm: p.sigma_mm.hypot(scatter as f32), ..moved_to });
             }
             all += points.len() as u64;
             take(&points)
@@ -207,9 +207,9 @@ fn left(rests: &[[f64; 3]], square: f64) -> f64 {
 fn between(before: &Pulled, line: &Pulled, i: usize, after: &Pulled) -> Option<Between> {
     let (p, pull) = (&line.line.points[i], &line.pulls[i]);
     let (j, k) = (before.line.nearest(p)?, after.line.nearest(p)?);
-    let (a, b) = (at(&before.line.points[j]), at(&after.line.points[k]));
+    let (a, b) = (before.line.points[j].at(), after.line.points[k].at());
     let ray = pull.per.try_normalize(1e-12)?;
-    let (chord, to) = (b - a, at(p) - a);
+    let (chord, to) = (b - a, p.at() - a);
     let deeper = chord.dot(&ray);
     let way = chord - ray * deeper;
     let far = way.norm();
