@@ -18,6 +18,12 @@ pub trait Halt: Send + Sync {
     fn halt(&self) -> Result<()>;
 }
 
+/// Switches outputs of a controller over a connection of its own: neither a motion nor a link that was cut is in its way.
+pub trait Switch: Send {
+    /// Returns when the controller has taken the order. Errors: it could not be told, or it refused; nobody knows then what is on.
+    fn put(&mut self, number: u16, on: bool) -> Result<()>;
+}
+
 /// A robot on a wire. Reading is always possible; what changes the world is refused by links that only read.
 pub trait Arm: PoseSource {
     /// The URI that it was opened with.
@@ -55,8 +61,8 @@ pub trait Arm: PoseSource {
         Err(reads_only(self.name()))
     }
 
-    /// Switches an output of the controller (a laser, a lamp, a gripper).
-    fn put_output(&mut self, _number: u16, _on: bool) -> Result<()> {
+    /// What switches outputs of the controller (lasers, lamp, gripper). Errors: a link that switches nothing.
+    fn switch(&self) -> Result<Box<dyn Switch>> {
         Err(reads_only(self.name()))
     }
 

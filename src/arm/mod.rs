@@ -9,11 +9,13 @@ mod motion;
 mod outputs;
 pub mod rules;
 mod state;
+mod switchboard;
 pub mod ur;
 mod uri;
 
-pub use link::{Arm, Halt, PoseSource};
+pub use link::{Arm, Halt, PoseSource, Switch};
 pub use motion::{Allowed, Motion, Way};
 pub use outputs::Outputs;
 pub use state::{ControllerError, Mode, Reach, State, TimedPose};
+pub use switchboard::Switchboard;
 pub use uri::{RobotUri, open};

@@ -2,12 +2,16 @@
 //! gripper goes where it is told. Nothing moves.
 //! Frame and unit: numbers of the controller's outputs; s.
 
-use crate::arm::{Arm, Outputs};
+use crate::arm::{Arm, Outputs, Switchboard};
 use crate::fault::Result;
-use std::time::Duration;
+use crate::recording::Beam;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 /// A lamp or laser that is tried is lit so long: long enough to look, short enough to look away.
 const LIT: Duration = Duration::from_millis(1500);
+/// How often is looked meanwhile whether the program is to end.
+const GLANCE: Duration = Duration::from_millis(20);
 
 /// What hangs on an output.
 #[derive(
@@ -41,24 +45,30 @@ fn unknown(word: &str) -> String {
     crate::fault::unknown::<Output>("output", word)
 }
 
-/// Tries it; the number of the output that was switched.
+/// Tries it; the number of the output that was switched. `stop` ends the wait while something is lit.
 ///
 /// # Errors
 /// The controller refuses or does not answer. Lasers are told to go off in any case.
-pub fn try_output(arm: &mut dyn Arm, outputs: &Outputs, what: Output) -> Result<u16> {
-    let flash = |arm: &mut dyn Arm, number: u16, on: bool| {
-        let lit = arm.put_output(number, on);
-        std::thread::sleep(LIT);
-        arm.put_output(number, !on).and(lit).map(|()| number)
-    };
+pub fn try_output(arm: &mut dyn Arm, outputs: &Outputs, what: Output, stop: &AtomicBool) -> Result<u16> {
+    let mut all = Switchboard::of(arm, *outputs)?;
     match what {
-        Output::Line => flash(arm, outputs.line, true),
-        Output::Pointer => flash(arm, outputs.pointer, true),
+        Output::Line => all.lit(Beam::Line, || look(stop)).map(|()| outputs.line),
+        Output::Pointer => all.lit(Beam::Pointer, || look(stop)).map(|()| outputs.pointer),
         Output::Room => {
             let before = arm.signal(outputs.room)?;
-            flash(arm, outputs.room, !before)
+            let lit = all.lamp(!before).and_then(|()| look(stop));
+            all.lamp(before).and(lit).map(|()| outputs.room)
         }
-        Output::Open => arm.put_output(outputs.gripper, false).map(|()| outputs.gripper),
-        Output::Close => arm.put_output(outputs.gripper, true).map(|()| outputs.gripper),
+        Output::Open => all.grip(false).map(|()| outputs.gripper),
+        Output::Close => all.grip(true).map(|()| outputs.gripper),
     }
+}
+
+/// Waits while somebody looks.
+fn look(stop: &AtomicBool) -> Result<()> {
+    let begun = Instant::now();
+    while begun.elapsed() < LIT && !stop.load(Ordering::Relaxed) {
+        std::thread::sleep(GLANCE);
+    }
+    Ok(())
 }

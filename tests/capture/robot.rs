@@ -26,8 +26,8 @@ fn cell(change: impl FnOnce(&mut CellOptions)) -> Served {
     change(&mut options);
     let served = Served::here(Cell::new(options).unwrap()).unwrap();
     served.controller.set_motor(true);
-    let mut arm = sheetlight::arm::open(&served.robot_uri()).unwrap();
-    arm.put_output(served.cell.options().outputs.line, true).unwrap();
+    let arm = sheetlight::arm::open(&served.robot_uri()).unwrap();
+    arm.switch().unwrap().put(served.cell.options().outputs.line, true).unwrap();
     served
 }
 

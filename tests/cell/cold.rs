@@ -77,7 +77,7 @@ impl Cold {
         };
         let (mut guard, mut who) = (self.guard(), Yes::always());
         let camera = Box::new(CellCamera::open(&self.served.camera.to_string(), -1.0)?);
-        let mut cell = ArmCell::new(&mut guard, camera, Outputs::default(), &mut who, None);
+        let mut cell = ArmCell::new(&mut guard, camera, Outputs::default(), &mut who, None)?;
         let result = calibrate_auto(&mut cell, &Rig::default(), &run, &|_, _| {})?;
         drop(cell);
         store_joint(&self.station, &result.joint)?;

@@ -61,7 +61,7 @@ fn the_link_reads_asks_and_gets_through_what_a_wire_does() {
     assert!(matches!(arm.reach(&at(1400.0)).unwrap(), Reach::Refused(why) if why.contains("reach")));
     served.controller.set_fence(Some([Vec3::new(340.0, -50.0, 400.0), Vec3::new(360.0, 50.0, 600.0)]));
     assert!(matches!(arm.reach(&at(350.0)).unwrap(), Reach::Refused(why) if why.contains("fence")));
-    arm.put_output(24, true).unwrap();
+    arm.switch().unwrap().put(24, true).unwrap();
     assert!(arm.signal(24).unwrap() && !arm.signal(25).unwrap());
     // Interim replies, foreign serials, pieces of one byte, two answers at once, delay.
     let faults = &served.faults;
@@ -175,14 +175,14 @@ fn a_universal_robot_is_read_from_its_stream() {
 #[test]
 fn the_camera_sees_what_is_lit_from_where_the_arm_stands() {
     let served = cell(2, 20.0);
-    let (mut arm, mut camera) = (
-        sheetlight::arm::open(&served.robot_uri()).unwrap(),
+    let (mut switch, mut camera) = (
+        sheetlight::arm::open(&served.robot_uri()).unwrap().switch().unwrap(),
         sheetlight::capture::source::cell::CellCamera::open(&served.camera.to_string(), -1.0).unwrap(),
     );
     assert!(matches!(served.camera_uri().parse(), Ok(CameraUri::Cell { rate_hz, .. }) if rate_hz < 0.0));
     let mut mean = |line: bool, pointer: bool, room: bool| {
         for (number, on) in [(24, line), (25, pointer), (26, room)] {
-            arm.put_output(number, on).unwrap();
+            switch.put(number, on).unwrap();
         }
         camera.snap().unwrap();
         use sheetlight::capture::PictureSource;

@@ -3,8 +3,9 @@
 
 use super::halt::DensoHalt;
 use super::session::Session;
+use super::spare::Spare;
 use super::words;
-use crate::arm::{Allowed, Arm, Halt, Mode, PoseSource, Reach, State, TimedPose, Way};
+use crate::arm::{Allowed, Arm, Halt, Mode, PoseSource, Reach, State, Switch, TimedPose, Way};
 use crate::bcap::{Call, Network, Variant};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid};
@@ -19,7 +20,7 @@ const LEAST_PERCENT: f64 = 0.1;
 /// Gentlest acceleration that is asked for, per cent.
 const LEAST_RAMP: f32 = 5.0;
 
-/// A Denso arm: one connection for reading and moving, one that only halts.
+/// A Denso arm: one connection for reading and moving, one that only halts; those that switch outputs are made as they are asked for.
 pub struct Denso {
     name: String,
     address: String,
@@ -143,9 +144,8 @@ impl Arm for Denso {
             .map_err(|e| self.session.in_its_words(e))
     }
 
-    fn put_output(&mut self, number: u16, on: bool) -> Result<()> {
-        let (controller, name) = (self.session.controller, format!("IO{number}"));
-        self.session.client.write(Call::ControllerGetVariable, controller, &name, Variant::Bool(on))
+    fn switch(&self) -> Result<Box<dyn Switch>> {
+        Ok(Box::new(Spare::open(&self.address)?))
     }
 
     fn signal(&mut self, number: u16) -> Result<bool> {

@@ -4,6 +4,7 @@
 mod arm;
 mod halt;
 mod session;
+mod spare;
 mod words;
 
 pub(super) use arm::Denso;

@@ -71,13 +71,13 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         let mut person = moving.person(console);
         let report = Job::open(&options, &mut guard, moving.camera.open(None)?, &mut person)?.run()?;
         let stopped = report.outcome == Outcome::Stopped;
-        let why = report.why.clone();
+        let (why, next) = (report.why.clone(), report.next());
         reports.push(report);
         if stopped {
             console.result(&reports, &text(&reports));
             return Err(Fault::refused(format!("the job was stopped: {why}"))
                 .cause("what is named is not as it has to be")
-                .next(format!("look at the cell and at {}; then begin again in another folder", shown(&out))));
+                .next(format!("{next} (a new job in another folder, resumed by the same command); see {}", shown(&out))));
         }
     }
     console.result(&reports, &text(&reports));

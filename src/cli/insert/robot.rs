@@ -43,8 +43,10 @@ fn output(args: &TryOutput, console: &Console) -> Result<()> {
     let settings = Settings::load(&args.station)?;
     let log = MotionLog::file(&args.station.join("motions.jsonl"));
     let mut guard = Guard::new(crate::arm::open(&args.robot)?, settings.motion.clone(), log);
+    // From here on a signal ends the wait, not the program with the laser on.
+    let stop = interrupt::asked_for();
     guard.arm(args.allow_motion)?;
-    let number = try_output(guard.link(), &settings.outputs.unwrap_or_default(), args.output)?;
+    let number = try_output(guard.link(), &settings.outputs.unwrap_or_default(), args.output, &stop)?;
     console.result(&number, &format!("output {number} was switched"));
     Ok(())
 }

@@ -76,9 +76,9 @@ pub struct InsertionSpec {
     /// The tool's turn about the part's z, degrees.
     #[serde(default)]
     pub turn_deg: f64,
-    /// Distances above the insertion pose along the part's z, mm, 0 to 1000.
+    /// Distances above the insertion pose along the part's z, mm, [`InsertionSpec::least_above_mm`] to 1000.
     pub approach_mm: f64,
-    /// The same for the way back, mm, 0 to 1000.
+    /// The same for the way back.
     pub retract_mm: f64,
     /// What the insertion bears: 3 sigma in the plane must stay within it, mm and degrees.
     pub tolerance_mm: f64,
@@ -264,7 +264,7 @@ impl Recipe {
                 .next("draw the datum surface first, as a rectangle, circle or polygon"));
         }
         construct::check(&self.construction, &drawing)?;
-        self.insertion.check(&self.construction)?;
+        self.insertion.check(&self.construction, &drawing)?;
         self.gates.check()?;
         range("robot.sigma_mm", self.robot.sigma_mm, 0.0, 10.0)?;
         range("robot.sigma_deg", self.robot.sigma_deg, 0.0, 10.0)
@@ -279,11 +279,40 @@ fn range(name: &str, v: f64, a: f64, b: f64) -> Result<()> {
     }
 }
 
+/// An arm counts as arrived within 0.2 mm of where it was sent (docs/robots.md): at the part and above it that may add up, and a
+/// tenth of a millimetre is left.
+const CLEAR_MM: f64 = 0.5;
+/// Farther off the tool has left the part's surroundings.
+const MOST_ABOVE_MM: f64 = 1000.0;
+
+fn above(name: &str, mm: f64, least: f64) -> Result<()> {
+    if (least..=MOST_ABOVE_MM).contains(&mm) {
+        return Ok(());
+    }
+    Err(Fault::input(format!("insertion.{name} is {mm}, wanted {least:.3} to {MOST_ABOVE_MM}"))
+        .cause(format!(
+            "below {least:.3} mm, the drawn depth of the part and {CLEAR_MM} mm, the tool there is not clear of the part"
+        ))
+        .next(format!("set {name} in the recipe to more than the component reaches into the part, 30 for example")))
+}
+
 impl InsertionSpec {
+    /// The tool is above the part from here on, mm above the insertion pose: as much as lies between the lowest and the highest of
+    /// what is drawn and the insertion pose, and a clearance. How long the component is nobody says: it may need more.
+    pub fn least_above_mm(&self, drawing: &Drawing) -> f64 {
+        let heights = drawing.shape.iter().map(|s| s.z_mm);
+        let low = heights.clone().fold(self.offset_mm[2], f64::min);
+        let high = heights.fold(f64::NEG_INFINITY, f64::max);
+        (high - low).max(0.0) + CLEAR_MM
+    }
+
     /// Refuses values out of range, and names that are no construction.
-    fn check(&self, constructions: &[Construction]) -> Result<()> {
-        range("approach_mm", self.approach_mm, 0.0, 1000.0)?;
-        range("retract_mm", self.retract_mm, 0.0, 1000.0)?;
+    fn check(&self, constructions: &[Construction], drawing: &Drawing) -> Result<()> {
+        range("offset_mm", self.offset_mm[2], -1e4, 1e4)?;
+        let least = self.least_above_mm(drawing);
+        for (name, mm) in [("approach_mm", self.approach_mm), ("retract_mm", self.retract_mm)] {
+            above(name, mm, least)?;
+        }
         range("tolerance_mm", self.tolerance_mm, 1e-4, 100.0)?;
         range("tolerance_deg", self.tolerance_deg, 1e-3, 10.0)?;
         range("turn_deg", self.turn_deg, -360.0, 360.0)?;
@@ -321,5 +350,44 @@ impl Gates {
         range("gates.min_look_turn_deg", self.min_look_turn_deg, 0.0, 180.0)?;
         range("gates.min_look_tilt_deg", self.min_look_tilt_deg, 0.0, 60.0)?;
         range("gates.max_unseen_height_mm", self.max_unseen_height_mm, 1e-5, 100.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn with(text: &str, approach: &str, retract: &str) -> Result<Recipe> {
+        let text = text.replace("approach_mm = 40", &format!("approach_mm = {approach}"));
+        Recipe::parse(&text.replace("retract_mm = 80", &format!("retract_mm = {retract}")))
+    }
+
+    /// A retract pose that is the insertion pose leaves the tool in the part; an approach pose that is it goes in unasked.
+    #[test]
+    fn the_tool_is_above_the_part_before_and_after() {
+        let dimm = include_str!("../../../data/recipes/dimm.toml");
+        // Drawn from 0.35 mm below the datum to 8 mm above it.
+        let least = 8.35 + CLEAR_MM;
+        let ok = with(dimm, &format!("{least}"), "80").unwrap();
+        assert!((ok.insertion.least_above_mm(&ok.drawing()) - least).abs() < 1e-12);
+        for (approach, retract, names) in [
+            ("0", "80", "approach_mm is 0,"),
+            ("40", "0", "retract_mm is 0,"),
+            ("40", "8.84", "retract_mm is 8.84"),
+            ("nan", "80", "approach_mm is NaN"),
+            ("40", "nan", "retract_mm is NaN"),
+            ("40", "inf", "retract_mm is inf"),
+            ("-40", "80", "approach_mm is -40"),
+        ] {
+            let fault = with(dimm, approach, retract).unwrap_err();
+            let says = fault.what.contains(names) && fault.what.contains("8.850 to 1000");
+            assert!(says && fault.next.contains("in the recipe to more than"), "{fault}");
+        }
+        // The tool's origin high above the part, as with a long component in it: the way up is as long all the same.
+        let high = dimm.replace("[insertion]", "[insertion]\noffset_mm = [0, 0, 20]");
+        assert!(with(&high, "40", "8.84").is_err() && with(&high, "40", "8.86").is_ok());
+        // Its origin far below what is drawn: it has to come out of there.
+        let deep = dimm.replace("[insertion]", "[insertion]\noffset_mm = [0, 0, -10]");
+        assert!(with(&deep, "40", "18.4").is_err() && with(&deep, "40", "18.6").is_ok());
     }
 }

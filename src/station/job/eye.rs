@@ -1,81 +1,34 @@
-//! In: a camera, the outputs that lasers and lamp hang on. Out: pictures whose exposure began after the light was switched and
-//! while the arm stood still.
-//! Frame and unit: grey levels; ms.
+//! A camera with the lights that its pictures are taken in.
 
-use crate::arm::{Arm, Outputs};
-use crate::capture::{Event, PictureSource};
-use crate::fault::{Fault, Result};
+use super::snapshots::Snapshots;
+use crate::arm::Switchboard;
+use crate::capture::{Format, PictureSource};
+use crate::fault::Result;
 use crate::raster::Image;
 use crate::recording::Beam;
-use std::time::{Duration, Instant};
-
-/// A picture that has not come by then does not come.
-const PATIENCE: Duration = Duration::from_secs(20);
-/// Of a camera whose clock cannot be asked so many pictures are passed over: they may have been on their way.
-const ON_THEIR_WAY: u32 = 3;
 
 /// A camera with its lights.
 pub struct Eye {
-    camera: Box<dyn PictureSource>,
-    outputs: Outputs,
-    lit: Option<Option<Beam>>,
+    snapshots: Snapshots,
+    /// What its pictures are lit by.
+    pub lights: Switchboard,
 }
 
 impl Eye {
-    /// A camera whose lights hang on these outputs.
-    pub fn new(camera: Box<dyn PictureSource>, outputs: Outputs) -> Eye {
-        Eye { camera, outputs, lit: None }
+    /// A camera with what lights its pictures.
+    pub fn new(camera: Box<dyn PictureSource>, lights: Switchboard) -> Eye {
+        Eye { snapshots: Snapshots::new(camera), lights }
     }
 
     /// Width, height and depth of its pictures.
-    pub fn format(&self) -> crate::capture::Format {
-        self.camera.format()
+    pub fn format(&self) -> Format {
+        self.snapshots.format()
     }
 
-    /// Switches one beam on, or the room's lamp (`None`), and everything else off.
-    pub fn light(&mut self, arm: &mut dyn Arm, beam: Option<Beam>) -> Result<()> {
-        if self.lit != Some(beam) {
-            let o = self.outputs;
-            arm.put_output(o.line, beam == Some(Beam::Line))?;
-            arm.put_output(o.pointer, beam == Some(Beam::Pointer))?;
-            arm.put_output(o.room, beam.is_none())?;
-            self.lit = Some(beam);
-        }
-        Ok(())
-    }
-
-    /// A picture that was begun after now.
-    pub fn picture(&mut self, arm: &mut dyn Arm, beam: Option<Beam>) -> Result<Image> {
-        self.light(arm, beam)?;
-        self.fresh()
-    }
-
-    /// A picture that was begun after now, in whatever light there is.
-    pub fn fresh(&mut self) -> Result<Image> {
-        let triggered = self.camera.trigger()?;
-        let since = if triggered { None } else { self.camera.clock()?.map(|c| c.there_ns) };
-        let mut pass_over = if triggered || since.is_some() { 0 } else { ON_THEIR_WAY };
-        let give_up = Instant::now() + PATIENCE;
-        while Instant::now() < give_up {
-            match self.camera.next(Duration::from_millis(200)) {
-                Event::Picture(p) => {
-                    let late = since.is_some_and(|t| p.device_ns.is_none_or(|d| d < t));
-                    if late || pass_over > 0 {
-                        pass_over = pass_over.saturating_sub(1);
-                        continue;
-                    }
-                    return Ok(p.image);
-                }
-                Event::Lost(fault) => return Err(fault),
-                Event::Ended => {
-                    return Err(Fault::input(format!("{}: no picture comes any more", self.camera.name()))
-                        .next("use a camera that runs, not a file"));
-                }
-                Event::Incomplete { .. } | Event::Quiet => {}
-            }
-        }
-        Err(Fault::device(format!("{}: no picture within {} s", self.camera.name(), PATIENCE.as_secs()))
-            .cause("the cable is out, or the camera waits for a trigger")
-            .next("look at the camera's picture with another program, then begin again"))
+    /// A picture that was begun after now, lit by one laser or by the room's lamp alone (`None`). A laser stays on after it: the
+    /// caller takes the next picture, or ends with [`Switchboard::after`].
+    pub fn picture(&mut self, beam: Option<Beam>) -> Result<Image> {
+        self.lights.light(beam)?;
+        self.snapshots.fresh()
     }
 }

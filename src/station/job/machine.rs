@@ -8,10 +8,10 @@ use super::operator::{Ask, Operator};
 use super::record::Record;
 use super::report::JobReport;
 use super::shoot::{settle, shoot};
-use super::state::{JobState, Phase};
+use super::state::{BACKED_OUT, JobState, Phase, Resumes};
 use super::sweep::{Board, checked, sweep};
 use crate::arm::rules::{Confirmation, Evidence, Guard, Plan, Proposal};
-use crate::arm::{Arm, Motion, Way};
+use crate::arm::{Arm, Motion, Switchboard, Way};
 use crate::fault::{Fault, Gate, Result};
 use crate::find::insert::picture;
 use crate::find::{LocateOptions, Recipe, Report, locate};
@@ -63,6 +63,10 @@ pub struct Job<'a> {
     since: Instant,
 }
 
+/// Back out of a job that knows the board but no part yet: so far off the board, mm.
+const AWAY_MM: f64 = 30.0;
+/// Shorter ways are none: an arm reads its own pose to some hundredths of a millimetre.
+const LEAST_WAY_MM: f64 = 0.05;
 /// A part whose pose is not known well enough is swept again so often, in steps half as long each time.
 const HALVINGS: u32 = 1;
 
@@ -110,40 +114,19 @@ impl<'a> Job<'a> {
             }
             None => JobState { made_from, ..JobState::new(guard.link().pose()?.base_from_flange) },
         };
-        let eye = Eye::new(camera, settings.outputs.unwrap_or_default());
+        // The first thing that is done: what a program that was killed left lit goes off.
+        let lights = Switchboard::of(guard.link(), settings.outputs.unwrap_or_default())?;
+        let eye = Eye::new(camera, lights);
         Ok(Job { options, settings, rig, recipe, guard, eye, operator, state, found: None, since: Instant::now() })
     }
 
-    /// Does what is left. Whatever stops it, the report says why; the arm stands still then.
+    /// Does what is left. Whatever stops it, the report says why; the arm stands still then, and the lasers are off.
     ///
     /// # Errors
     /// The job's own files cannot be written.
     pub fn run(mut self) -> Result<JobReport> {
-        self.pick_up()?;
-        while !matches!(self.state.phase, Phase::Done | Phase::Stopped) {
-            let (phase, step) = (self.state.phase, self.step());
-            self.tick();
-            match step {
-                Ok(next) => self.state.phase = next,
-                Err(fault) => {
-                    self.operator.tell(&format!("stopped: {}", fault.what));
-                    self.state.why = fault.what;
-                    // After the component was let go the tool only has to come back: that may be asked for again.
-                    let comes_back = phase == Phase::Retract && self.state.released;
-                    self.state.phase = if comes_back { Phase::Retract } else { Phase::Stopped };
-                    self.state.moving = self.guard.unknown().is_some();
-                    self.store()?;
-                    break;
-                }
-            }
-            self.store()?;
-        }
-        let report = JobReport::of(&self.state, self.found.take());
-        let text = serde_json::to_string_pretty(&report).expect("plain data");
-        crate::files::write(&self.options.out.join("report.json"), text.as_bytes())?;
-        // Lasers off, whatever happened; a controller that does not answer has said so already.
-        let _ = self.eye.light(self.guard.link(), None);
-        Ok(report)
+        let done = self.work();
+        self.eye.lights.after(done)
     }
 
     /// Goes back up instead of on, and ends there.
@@ -151,25 +134,49 @@ impl<'a> Job<'a> {
     /// # Errors
     /// As [`Job::run`].
     pub fn back_out(mut self) -> Result<JobReport> {
-        if self.state.phase != Phase::Done {
+        if self.state.resumes() != Resumes::Over {
             self.state.phase = Phase::Retract;
         }
         self.run()
     }
 
-    /// After a crash: a scan that was not finished is made anew; after a motion that was cut off the tool backs out.
-    fn pick_up(&mut self) -> Result<()> {
-        if !self.state.moving {
-            return Ok(());
+    fn work(&mut self) -> Result<JobReport> {
+        self.pick_up()?;
+        while !self.state.stopped && self.state.resumes() != Resumes::Over {
+            let step = self.step();
+            // Before anything is written: a disk that is full does not keep a laser on.
+            let step = self.eye.lights.after(step);
+            self.tick();
+            match step {
+                Ok(next) => self.state.phase = next,
+                Err(fault) => {
+                    self.operator.tell(&format!("stopped: {}", fault.what));
+                    self.state.why = fault.what;
+                    self.state.stopped = true;
+                    self.state.moving = self.guard.unknown().is_some();
+                }
+            }
+            self.store()?;
         }
-        self.operator.tell("the last motion was cut off: where the arm is was not known, look at the robot");
-        self.guard.looked()?;
-        self.state.moving = false;
-        self.state.phase = match self.state.phase {
-            Phase::Touch | Phase::Scan | Phase::Find => Phase::Touch,
-            // Down at the part there is only one way that is known to be free: back up.
-            _ => Phase::Retract,
-        };
+        let report = JobReport::of(&self.state, self.found.take());
+        let text = serde_json::to_string_pretty(&report).expect("plain data");
+        crate::files::write(&self.options.out.join("report.json"), text.as_bytes())?;
+        Ok(report)
+    }
+
+    /// Takes up what was stopped or cut off: before the part it measures anew, at the part it goes back up.
+    fn pick_up(&mut self) -> Result<()> {
+        if self.state.moving {
+            self.operator.tell("the last motion was cut off: where the arm is was not known, look at the robot");
+            self.guard.looked()?;
+        }
+        match self.state.resumes() {
+            Resumes::On | Resumes::Over => return Ok(()),
+            Resumes::Anew => self.state.measure_anew(),
+            Resumes::Up => self.state.phase = Phase::Retract,
+        }
+        (self.state.moving, self.state.stopped) = (false, false);
+        self.state.why = String::new();
         self.store()
     }
 
@@ -193,7 +200,7 @@ impl<'a> Job<'a> {
             Phase::Approach => self.approach(),
             Phase::Insert => self.insert(),
             Phase::Retract => self.retract(),
-            done => Ok(done),
+            over => Ok(over),
         }
     }
 
@@ -215,12 +222,15 @@ impl<'a> Job<'a> {
         plan: Plan,
         each: &mut dyn FnMut(&mut Eye, &mut dyn Arm, usize) -> Result<()>,
     ) -> Result<()> {
+        finite(&plan)?;
         let (proposal, yes) = self.agreed(step, &says, question, plan)?;
         self.state.confirmations += 1;
         self.state.moving = true;
         self.store()?;
         let eye = &mut self.eye;
         let made = self.guard.make(&proposal, yes, &mut |arm, k| each(eye, arm, k));
+        // What follows may take long: somebody is asked, or pictures are measured.
+        let made = self.eye.lights.after(made);
         self.operator.over();
         made?;
         self.state.moving = false;
@@ -273,7 +283,7 @@ impl<'a> Job<'a> {
             0 => {
                 settle();
                 let at = arm.pose()?;
-                record.ambient(&eye.picture(arm, None)?, &at)
+                record.ambient(&eye.picture(None)?, &at)
             }
             _ => shoot(eye, arm, &mut record, Some(Beam::Line)),
         })?;
@@ -311,7 +321,7 @@ impl<'a> Job<'a> {
             }
             return Err(Fault::refused(format!("no pose: {reasons}")).next("look at found.png"));
         };
-        if tilt > self.options.max_tilt_deg {
+        if !(tilt <= self.options.max_tilt_deg) {
             return Err(Fault::refused(format!(
                 "the part's top is {tilt:.2} degrees off the touched board, limit {}",
                 self.options.max_tilt_deg
@@ -330,7 +340,7 @@ impl<'a> Job<'a> {
         let png = picture::draw(report, &self.recipe.drawing()).to_png();
         let out = &self.options.out;
         crate::files::write_beside((&out.join("found.json"), text.as_bytes()), &[(&out.join("found.png"), &png)])?;
-        if let Err(fault) = self.eye.picture(self.guard.link(), None) {
+        if let Err(fault) = self.eye.picture(None) {
             self.operator.tell(&format!("no picture of the part: {}", fault.what));
         }
         Ok(())
@@ -389,8 +399,7 @@ impl<'a> Job<'a> {
         let says = vec![format!("insertion: {}", written(&self.options.robot.write(&down)))];
         let plan = self.plan("insert", "insert the component".into(), vec![self.leg(down)], self.evidence()?);
         self.go("insert", says, "insert?", plan, &mut |_, _, _| Ok(()))?;
-        let gripper = self.settings.outputs.unwrap_or_default().gripper;
-        self.guard.link().put_output(gripper, false)?;
+        self.eye.lights.grip(false)?;
         self.state.released = true;
         Ok(Phase::Retract)
     }
@@ -399,25 +408,59 @@ impl<'a> Job<'a> {
     fn retract(&mut self) -> Result<Phase> {
         let at = self.guard.link().pose()?.base_from_flange;
         let up = match (self.state.poses, self.state.surface) {
-            (Some([_, down, up]), _) => {
-                (up.translation - down.translation).normalize()
-                    * ((up.translation - at.translation).dot(&(up.translation - down.translation).normalize())).max(0.0)
-            }
-            (None, Some([_, normal])) => normal * 30.0,
+            (Some([_, down, up]), _) => way_up(&at.translation, &down.translation, &up.translation)?,
+            (None, Some([_, normal])) => normal * AWAY_MM,
+            // Nothing was touched yet: the arm stands where the job began, or above it.
             (None, None) => Vec3::zeros(),
         };
-        if up.norm() > 0.05 {
+        let mm = up.norm();
+        if !(mm <= LEAST_WAY_MM) {
             let to = Rigid::new(at.rotation, at.translation + up);
             let plan = self.plan("retract", "back up the way it came".into(), vec![self.leg(to)], Evidence::default());
             let question = if self.state.released { "is the component in? retract?" } else { "back out?" };
-            self.go("retract", vec![format!("{:.0} mm up", up.norm())], question, plan, &mut |_, _, _| Ok(()))?;
+            self.go("retract", vec![format!("{mm:.0} mm up")], question, plan, &mut |_, _, _| Ok(()))?;
         }
-        if !self.state.released {
-            return Err(
-                Fault::refused("backed out: nothing was inserted").next("look at the cell, then begin a new job")
-            );
+        if self.state.released {
+            return Ok(Phase::Done);
         }
-        Ok(Phase::Done)
+        self.state.why = BACKED_OUT.into();
+        self.operator.tell(BACKED_OUT);
+        Ok(Phase::BackedOut)
+    }
+}
+
+/// From where the arm stands up to the height of the retract pose, along the way from the insertion to it; nothing where it is that
+/// high already.
+fn way_up(at: &Vec3, down: &Vec3, up: &Vec3) -> Result<Vec3> {
+    let way = up - down;
+    if !(way.norm() > LEAST_WAY_MM && way.norm().is_finite()) {
+        return Err(Fault::input(format!(
+            "the job's retract pose is {:.3} mm from its insertion pose, more than {LEAST_WAY_MM} is needed to know the way up",
+            way.norm()
+        ))
+        .cause("its recipe had retract_mm = 0, or the pose is none")
+        .next("take the tool up with the pendant, set retract_mm in the recipe, then begin a new job in another folder"));
+    }
+    let axis = way.normalize();
+    let mm = (up - at).dot(&axis);
+    // A height that is no number is no height that is reached.
+    Ok(if mm <= 0.0 { Vec3::zeros() } else { axis * mm })
+}
+
+/// Refuses a plan with a leg that is no pose: it is neither made nor left out.
+fn finite(plan: &Plan) -> Result<()> {
+    let numbers = |leg: &Motion| leg.to.to_rows().iter().all(|x| x.is_finite()) && leg.speed_mm_s.is_finite();
+    match plan.legs.iter().position(|leg| !numbers(leg)) {
+        None => Ok(()),
+        Some(k) => Err(Fault::refused(format!(
+            "{}: motion {} of {} leads to {:?} mm, which is no place",
+            plan.name,
+            k + 1,
+            plan.legs.len(),
+            plan.legs[k].to.translation.as_slice()
+        ))
+        .cause("a number of the recipe, the calibration or the scan is none")
+        .next("look at the robot, take it away from the part with the pendant, then begin a new job in another folder")),
     }
 }
 

@@ -1,7 +1,7 @@
 //! In: a job that has ended. Out: what came of it, how long it took and what a person had to do.
 //! Frame and unit: s; mm, degrees.
 
-use super::state::{JobState, Phase};
+use super::state::{JobState, Phase, Resumes};
 use crate::find::Report;
 use std::collections::BTreeMap;
 
@@ -24,6 +24,8 @@ pub struct JobReport {
     pub why: String,
     /// Where it came to.
     pub phase: Phase,
+    /// How it goes on when it is taken up again.
+    pub resumes: Resumes,
     /// Work and waits, s.
     pub seconds: f64,
     /// The same by step.
@@ -45,12 +47,22 @@ impl JobReport {
             outcome,
             why: state.why.clone(),
             phase: state.phase,
+            resumes: state.resumes(),
             seconds: state.seconds,
             seconds_by_phase: state.seconds_by_phase.clone(),
             time_to_position_s: state.seconds_to_position,
             confirmations_to_position: state.confirmations_to_position,
             confirmations: state.confirmations,
             found,
+        }
+    }
+
+    /// What a person may do with a job that was stopped.
+    pub fn next(&self) -> &'static str {
+        match self.resumes {
+            Resumes::Over => "look at the cell, then begin a new job",
+            Resumes::Up => "look at the cell; resumed it goes back up, nothing else",
+            Resumes::On | Resumes::Anew => "look at the cell; resumed it measures anew, backed out of it goes back up",
         }
     }
 }

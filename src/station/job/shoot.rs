@@ -21,7 +21,7 @@ pub fn shoot(eye: &mut Eye, arm: &mut dyn Arm, record: &mut Record, beam: Option
     const STILL: [f64; 2] = [0.01, 1e-4];
     settle();
     let before = arm.pose()?;
-    let picture = eye.picture(arm, beam)?;
+    let picture = eye.picture(beam)?;
     let after = arm.pose()?;
     let (angle, mm) = before.base_from_flange.difference(&after.base_from_flange);
     if mm > STILL[0] || angle > STILL[1] {

@@ -4,6 +4,7 @@
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid, Vec3};
 use crate::rig::{sealed, unsealed};
+use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -25,21 +26,38 @@ pub enum Phase {
     Retract,
     /// Everything is done.
     Done,
-    /// It ended without insertion; nothing more is done.
-    Stopped,
+    /// The tool came back up without an insertion; nothing more is done.
+    #[serde(rename = "backed_out")]
+    BackedOut,
+}
+
+/// How a job goes on when it is taken up again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Resumes {
+    /// With the phase that is next.
+    On,
+    /// It measures anew, from where the arm stands.
+    Anew,
+    /// Down at the part there is only one way that is known to be free: back up.
+    Up,
+    /// Not at all.
+    Over,
 }
 
 /// A job on disk.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct JobState {
-    /// Version of this file: 1.
+    /// Version of this file: 2. In 1 there was no `stopped`: a job that was stopped had forgotten its phase.
     pub format: u32,
     /// Of the recipe's text and the station's calibrations: its poses are good with these only.
     #[serde(default)]
     pub made_from: String,
-    /// What is done next.
+    /// What is done next, or what it was stopped in.
     pub phase: Phase,
+    /// It was stopped: by a person, a gate or a fault; `why` says it.
+    pub stopped: bool,
     /// A motion was begun and its end was not written down: nobody knows where the arm is.
     pub moving: bool,
     /// Where the arm stood when the job was begun.
@@ -71,15 +89,19 @@ pub struct JobState {
 }
 
 const NAME: &str = "job.json";
+const FORMAT: u32 = 2;
+/// Why a job ended that came back up with its component.
+pub(super) const BACKED_OUT: &str = "backed out: nothing was inserted";
 const ANEW: &str = "look at the robot, then begin a new job in another folder";
 
 impl JobState {
     /// A job that begins where the arm stands.
     pub fn new(start: Rigid<Base, Flange>) -> JobState {
         JobState {
-            format: 1,
+            format: FORMAT,
             made_from: String::new(),
             phase: Phase::Touch,
+            stopped: false,
             moving: false,
             start,
             surface: None,
@@ -103,13 +125,44 @@ impl JobState {
     pub fn load(folder: &Path) -> Result<Option<JobState>> {
         let path = folder.join(NAME);
         let Some(text) = crate::files::read_text_if_there(&path)? else { return Ok(None) };
-        let state: JobState = unsealed(&text, &path.display().to_string()).map_err(|e| e.next(ANEW))?;
-        if state.format != 1 {
-            return Err(Fault::input(format!("{}: format {}, 1 is read", path.display(), state.format))
-                .cause("another version wrote it")
-                .next(ANEW));
+        let at = path.display().to_string();
+        let mut value: Value = unsealed(&text, &at).map_err(|e| e.next(ANEW))?;
+        let format = value["format"].as_u64();
+        match format {
+            Some(1) => former(&mut value),
+            Some(n) if n == u64::from(FORMAT) => {}
+            _ => {
+                let is = format.map_or_else(|| "none".into(), |n| n.to_string());
+                return Err(Fault::input(format!("{at}: format {is}, 1 and {FORMAT} are read"))
+                    .cause("another version wrote it")
+                    .next(ANEW));
+            }
         }
+        let state = serde_json::from_value(value).map_err(|e| {
+            Fault::input(format!("{at}: cannot be understood: {e}"))
+                .cause("edited by hand, or another version wrote it")
+                .next(ANEW)
+        })?;
         Ok(Some(state))
+    }
+
+    /// How it goes on when it is taken up again.
+    pub fn resumes(&self) -> Resumes {
+        let interrupted = self.stopped || self.moving;
+        match self.phase {
+            Phase::Done | Phase::BackedOut => Resumes::Over,
+            Phase::Retract => Resumes::Up,
+            Phase::Insert if interrupted => Resumes::Up,
+            // Stopped before it went there, it stands where the scan ended.
+            Phase::Approach if self.moving => Resumes::Up,
+            _ if interrupted => Resumes::Anew,
+            _ => Resumes::On,
+        }
+    }
+
+    /// Forgets what was measured.
+    pub(super) fn measure_anew(&mut self) {
+        (self.phase, self.surface, self.poses, self.scanned_at, self.halvings) = (Phase::Touch, None, None, None, 0);
     }
 
     /// Goes on only with the recipe and the calibrations that its poses were made from; back up it may go with any.
@@ -117,8 +170,7 @@ impl JobState {
     /// # Errors
     /// Another recipe or other calibrations.
     pub fn goes_on_with(&self, made_from: &str) -> Result<()> {
-        let way_up = matches!(self.phase, Phase::Retract | Phase::Done | Phase::Stopped)
-            || (self.moving && matches!(self.phase, Phase::Approach | Phase::Insert));
+        let way_up = matches!(self.resumes(), Resumes::Up | Resumes::Over);
         if way_up || self.made_from == made_from {
             return Ok(());
         }
@@ -136,4 +188,21 @@ impl JobState {
     pub fn store(&self, folder: &Path) -> Result<()> {
         crate::files::write(&folder.join(NAME), sealed(self).as_bytes())
     }
+}
+
+/// Makes a file of format 1 one of today. A job that was stopped there had forgotten its phase: poses at the part are known from the
+/// approach on.
+fn former(value: &mut Value) {
+    let was_stopped = value["phase"] == "stopped";
+    if was_stopped {
+        let at_the_part = !value["poses"].is_null();
+        value["phase"] = match (value["why"] == BACKED_OUT, at_the_part) {
+            (true, _) => "backed_out",
+            (false, true) => "retract",
+            (false, false) => "touch",
+        }
+        .into();
+    }
+    value["stopped"] = was_stopped.into();
+    value["format"] = FORMAT.into();
 }

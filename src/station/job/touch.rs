@@ -135,7 +135,8 @@ impl Job<'_> {
         let mut record =
             Record::begin(&self.options.out.join("first"), "first touch", Beam::Pointer, self.eye.format())?;
         let link = self.guard.link();
-        shoot(&mut self.eye, link, &mut record, Some(Beam::Pointer))?;
+        let shot = shoot(&mut self.eye, link, &mut record, Some(Beam::Pointer));
+        self.eye.lights.after(shot)?;
         let at = link.pose()?.base_from_flange;
         // The place is the operator's, an edge may be there: those around it are on the board, and count in full.
         let seen = measure_range(&record.end()?, &self.rig, &RangeRun { coarse: true, ..RangeRun::default() });

@@ -2,7 +2,7 @@
 //! Frame and unit: base_from_flange as the notation has it, mm here; tool 0 and work frame 0 on the controller.
 
 use super::words::{self, Code, Of, Request, Which, Wrong};
-use crate::arm::{Outputs, TimedPose};
+use crate::arm::TimedPose;
 use crate::capture::PictureSource;
 use crate::fault::{Fault, Kind, Result};
 use crate::find::{LocateOptions, Recipe, Report};
@@ -12,7 +12,8 @@ use crate::rig::Rig;
 use crate::robot::Convention;
 use crate::scan::Where;
 use crate::station::find::find_part;
-use crate::station::job::{Eye, Record};
+use crate::station::job::Record;
+use crate::station::job::snapshots::Snapshots;
 use crate::station::scan::recorded::scan_recording;
 use crate::station::scan::run::ScanOptions;
 use crate::station::settings::Settings;
@@ -53,7 +54,7 @@ pub struct Session {
     options: SocketOptions,
     settings: Settings,
     rig: Rig,
-    eye: Eye,
+    camera: Snapshots,
     scan: Option<Scan>,
     found: Option<Report>,
     scans: usize,
@@ -85,8 +86,8 @@ impl Session {
                 .next("give the folder in which NAME.toml lies for each FIND NAME"));
         }
         crate::files::make_folder(&options.out)?;
-        let eye = Eye::new(camera, Outputs::default());
-        Ok(Session { options, settings, rig, eye, scan: None, found: None, scans: 0 })
+        let camera = Snapshots::new(camera);
+        Ok(Session { options, settings, rig, camera, scan: None, found: None, scans: 0 })
     }
 
     /// Another program has come: it knows nothing of what the one before did.
@@ -126,7 +127,7 @@ impl Session {
         let free = (self.scans..).find(|k| !self.options.out.join(format!("scan_{k:04}")).exists());
         self.scans = free.expect("numbers do not end");
         let folder = self.options.out.join(format!("scan_{:04}", self.scans));
-        let record = Record::begin(&folder.join("line"), "scan", Beam::Line, self.eye.format()).map_err(ours)?;
+        let record = Record::begin(&folder.join("line"), "scan", Beam::Line, self.camera.format()).map_err(ours)?;
         let last = Rigid::from_vectors(&Vec3::zeros(), Vec3::zeros());
         self.scan = Some(Scan { record, shots: 0, last });
         Ok("0".into())
@@ -157,7 +158,7 @@ impl Session {
             ));
         }
         let asked = Instant::now();
-        let picture = self.eye.fresh().map_err(ours)?;
+        let picture = self.camera.fresh().map_err(ours)?;
         let timed = TimedPose { base_from_flange: at, figure: None, asked, here: asked, device: None };
         scan.record.shot(&picture, &timed).map_err(ours)?;
         (scan.shots, scan.last) = (scan.shots + 1, at);

@@ -4,6 +4,7 @@
 
 use super::grants::Grants;
 use super::simulated::SimulatedRobot;
+use crate::arm::Switchboard;
 use crate::arm::rules::{Guard, MotionLog, StopButton};
 use crate::fault::{Fault, Result};
 use crate::station::{Output, Settings, try_output};
@@ -152,6 +153,8 @@ impl Desk {
             let mut guard = Guard::new(crate::arm::open(uri)?, settings.motion, log);
             guard.stop_button().listen(self.links.stop.clone());
             guard.arm(self.links.may_move)?;
+            // What a program that was killed left lit goes off before anybody goes near.
+            settings.outputs.map(|o| Switchboard::of(guard.link(), o)).transpose()?;
             Some(guard)
         };
         let mut at = self.at();
@@ -196,7 +199,7 @@ impl Desk {
         };
         drop(at);
         let outputs = Settings::load(&self.links.station).map(|s| s.outputs.unwrap_or_default());
-        let tried = outputs.and_then(|o| try_output(guard.link(), &o, what));
+        let tried = outputs.and_then(|o| try_output(guard.link(), &o, what, &self.links.stop));
         let mut at = self.at();
         // Given back meanwhile: it stays given back.
         if at.button.is_some() {

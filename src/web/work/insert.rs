@@ -51,9 +51,8 @@ pub(super) fn insert(this: &Run, order: &InsertOrder) -> Result<Outcome> {
     let job = Job::open(&options, session.guard(), camera.lend()?, &mut person)?;
     let report = if order.back_out { job.back_out() } else { job.run() }?;
     if report.outcome == Ended::Stopped {
-        return Err(Fault::refused(report.why)
-            .cause("the job was stopped; the arm stands still")
-            .next("look at the cell; resume the job or back out where that is offered, else begin a new one"));
+        let next = report.next();
+        return Err(Fault::refused(report.why).cause("the job was stopped; the arm stands still").next(next));
     }
     this.progress(STEPS.len(), Some(STEPS.len()));
     Ok(Outcome::Insert(Box::new(Inserted {

@@ -3,7 +3,7 @@
 
 use super::cell::{Cell, Light, Went};
 use crate::arm::rules::{Confirmation, Guard, Limits, Plan, Proposal};
-use crate::arm::{Motion, Outputs, Reach, Way};
+use crate::arm::{Motion, Outputs, Reach, Switchboard, Way};
 use crate::capture::PictureSource;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid, exp, log};
@@ -31,14 +31,18 @@ pub struct ArmCell<'a> {
 
 impl<'a> ArmCell<'a> {
     /// `guard` is armed; `speed_mm_s` as asked for, the rules' own limit holds besides.
+    ///
+    /// # Errors
+    /// The outputs cannot be switched.
     pub fn new(
         guard: &'a mut Guard,
         camera: Box<dyn PictureSource>,
         outputs: Outputs,
         operator: &'a mut dyn Operator,
         speed_mm_s: Option<f64>,
-    ) -> ArmCell<'a> {
-        ArmCell { guard, eye: Eye::new(camera, outputs), operator, speed_mm_s, stops: 0 }
+    ) -> Result<ArmCell<'a>> {
+        let lights = Switchboard::of(guard.link(), outputs)?;
+        Ok(ArmCell { guard, eye: Eye::new(camera, lights), operator, speed_mm_s, stops: 0 })
     }
 
     fn limits(&self) -> Result<Limits> {
@@ -134,13 +138,8 @@ impl Cell for ArmCell<'_> {
             Light::Line => Some(Beam::Line),
             Light::Pointer => Some(Beam::Pointer),
         };
-        self.eye.picture(self.guard.link(), beam)
-    }
-}
-
-impl Drop for ArmCell<'_> {
-    /// No laser stays on, whatever ended it.
-    fn drop(&mut self) {
-        let _ = self.eye.light(self.guard.link(), None);
+        // A laser is on for its picture alone: between two stops somebody is asked, and may think about it.
+        let picture = self.eye.picture(beam);
+        self.eye.lights.after(picture)
     }
 }

@@ -63,7 +63,7 @@ pub(in crate::web::work) fn auto(this: &Run, order: &AutoOrder) -> Result<Outcom
     let robot = settings.robot.unwrap_or(Convention::Denso);
     let mut person = Person { desk, job: &this.id, robot, within_s, step: &|_| {}, late: false };
     let mut cell =
-        ArmCell::new(session.guard(), camera.lend()?, settings.outputs.unwrap_or_default(), &mut person, None);
+        ArmCell::new(session.guard(), camera.lend()?, settings.outputs.unwrap_or_default(), &mut person, None)?;
     let most = asked.most;
     let told = |stops: usize, mm: f64| {
         this.progress(stops, Some(most));

@@ -1,0 +1,47 @@
+//! A connection to a Denso controller beside the one that moves: what fails over it is asked once more over a new one.
+
+use super::session::Session;
+use crate::arm::Switch;
+use crate::bcap::{Call, ClientOptions, Variant};
+use crate::fault::Result;
+use std::time::Duration;
+
+/// A controller that has not answered by then is asked again over a new connection.
+const PATIENCE: Duration = Duration::from_millis(500);
+
+/// Such a connection. TCP: over UDP Denso's service answers one call after the other, these after a motion.
+pub struct Spare {
+    address: String,
+    session: Option<Session>,
+}
+
+impl Spare {
+    pub fn open(address: &str) -> Result<Spare> {
+        Ok(Spare { address: address.to_owned(), session: Some(connect(address)?) })
+    }
+
+    /// Asks; what is asked must bear to be done twice.
+    pub fn ask(&mut self, question: impl Fn(&mut Session) -> Result<()>) -> Result<()> {
+        if let Some(session) = self.session.as_mut()
+            && question(session).is_ok()
+        {
+            return Ok(());
+        }
+        self.session = None;
+        let mut fresh = connect(&self.address)?;
+        question(&mut fresh)?;
+        self.session = Some(fresh);
+        Ok(())
+    }
+}
+
+fn connect(address: &str) -> Result<Session> {
+    Session::with(address, ClientOptions { patience: PATIENCE, watchdog_ms: None, ..ClientOptions::default() })
+}
+
+impl Switch for Spare {
+    fn put(&mut self, number: u16, on: bool) -> Result<()> {
+        let name = format!("IO{number}");
+        self.ask(|s| s.client.write(Call::ControllerGetVariable, s.controller, &name, Variant::Bool(on)))
+    }
+}

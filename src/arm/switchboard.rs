@@ -1,0 +1,126 @@
+//! The outputs of a cell in one hand: whoever holds them lights the lasers, and the lasers go off when they are let go.
+
+use super::{Arm, Outputs, Switch};
+use crate::fault::{Fault, Kind, Result};
+use crate::recording::Beam;
+
+/// Lasers, lamp and gripper. Dropped, on whatever way, it switches the lasers off. The gripper stays as it is: what it holds would
+/// fall; so does the lamp.
+pub struct Switchboard {
+    switch: Box<dyn Switch>,
+    outputs: Outputs,
+    /// What pictures are lit by; none where the lamp may be anyhow.
+    light: Option<Option<Beam>>,
+    /// A laser may be on.
+    burns: bool,
+    /// Whoever holds it was told that a laser may still be on.
+    told: bool,
+}
+
+impl Switchboard {
+    /// Takes the outputs of an arm's controller. What a program that was killed left lit goes off first.
+    ///
+    /// # Errors
+    /// A link that switches nothing; the controller is not reached, or refuses.
+    pub fn of(arm: &dyn Arm, outputs: Outputs) -> Result<Switchboard> {
+        let mut taken = Switchboard { switch: arm.switch()?, outputs, light: None, burns: true, told: false };
+        taken.dark()?;
+        Ok(taken)
+    }
+
+    /// Switches one laser on, or the room's lamp (`None`), and everything else off.
+    pub fn light(&mut self, light: Option<Beam>) -> Result<()> {
+        if self.light != Some(light) {
+            match light {
+                Some(beam) => self.burn(beam)?,
+                None => self.dark()?,
+            }
+            self.lamp(light.is_none())?;
+            self.light = Some(light);
+        }
+        Ok(())
+    }
+
+    /// Does something with one laser on, the lamp as it is; the laser is off when this returns, whatever came of it.
+    ///
+    /// # Errors
+    /// Those of the work, and of [`Switchboard::after`].
+    pub fn lit<T>(&mut self, beam: Beam, work: impl FnOnce() -> Result<T>) -> Result<T> {
+        let done = self.burn(beam).and_then(|()| work());
+        self.after(done)
+    }
+
+    /// Both lasers off, the lamp as it is.
+    ///
+    /// # Errors
+    /// A laser may still be on: the controller was not reached, or refused.
+    pub fn dark(&mut self) -> Result<()> {
+        if !self.burns {
+            return Ok(());
+        }
+        self.off().map_err(|e| {
+            self.told = true;
+            let why = if e.kind == Kind::Refused { "refused" } else { "was not reached" };
+            Fault::device(format!("the laser may still be on: the controller {why} ({})", e.what))
+                .cause(e.cause)
+                .next("switch the laser off at the cell before anybody goes near, then look at the link")
+        })
+    }
+
+    /// Both lasers off after some work; where that fails too, the work's fault says both.
+    ///
+    /// # Errors
+    /// The work's, and those of [`Switchboard::dark`].
+    pub fn after<T>(&mut self, done: Result<T>) -> Result<T> {
+        match (done, self.dark()) {
+            (done, Ok(())) => done,
+            (Ok(_), Err(lit)) => Err(lit),
+            (Err(mut fault), Err(lit)) => {
+                fault.what = format!("{}; {}", fault.what, lit.what);
+                fault.next = format!("{}; {}", lit.next, fault.next);
+                Err(fault)
+            }
+        }
+    }
+
+    /// The room's lamp.
+    pub fn lamp(&mut self, on: bool) -> Result<()> {
+        self.light = None;
+        self.switch.put(self.outputs.room, on)
+    }
+
+    /// Closes the gripper, or opens it: what it holds falls.
+    pub fn grip(&mut self, closed: bool) -> Result<()> {
+        self.switch.put(self.outputs.gripper, closed)
+    }
+
+    /// One laser on and the other off, the lamp as it is.
+    fn burn(&mut self, beam: Beam) -> Result<()> {
+        (self.light, self.burns) = (None, true);
+        self.switch.put(self.outputs.line, beam == Beam::Line)?;
+        self.switch.put(self.outputs.pointer, beam == Beam::Pointer)
+    }
+
+    /// Tells both lasers, also where the controller refuses the first; where it is not reached the second would wait in vain.
+    fn off(&mut self) -> Result<()> {
+        self.light = None;
+        let line = self.switch.put(self.outputs.line, false);
+        if line.as_ref().is_err_and(|e| e.kind != Kind::Refused) {
+            return line;
+        }
+        line.and(self.switch.put(self.outputs.pointer, false))?;
+        self.burns = false;
+        Ok(())
+    }
+}
+
+impl Drop for Switchboard {
+    fn drop(&mut self) {
+        let told = self.told;
+        if let Err(fault) = self.dark()
+            && !told
+        {
+            eprintln!("{fault}");
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! Pictures of a running camera that were begun after they were asked for.
+
+use crate::capture::{Event, Format, PictureSource};
+use crate::fault::{Fault, Result};
+use crate::raster::Image;
+use std::time::{Duration, Instant};
+
+/// A picture that has not come by then does not come.
+const PATIENCE: Duration = Duration::from_secs(20);
+/// Of a camera whose clock cannot be asked so many pictures are passed over: they may have been on their way.
+const ON_THEIR_WAY: u32 = 3;
+
+/// A camera of which single pictures are wanted.
+pub struct Snapshots {
+    camera: Box<dyn PictureSource>,
+}
+
+impl Snapshots {
+    /// Of this camera.
+    pub fn new(camera: Box<dyn PictureSource>) -> Snapshots {
+        Snapshots { camera }
+    }
+
+    /// Width, height and depth of its pictures.
+    pub fn format(&self) -> Format {
+        self.camera.format()
+    }
+
+    /// A picture that was begun after now, in whatever light there is.
+    pub fn fresh(&mut self) -> Result<Image> {
+        let triggered = self.camera.trigger()?;
+        let since = if triggered { None } else { self.camera.clock()?.map(|c| c.there_ns) };
+        let mut pass_over = if triggered || since.is_some() { 0 } else { ON_THEIR_WAY };
+        let give_up = Instant::now() + PATIENCE;
+        while Instant::now() < give_up {
+            match self.camera.next(Duration::from_millis(200)) {
+                Event::Picture(p) => {
+                    let late = since.is_some_and(|t| p.device_ns.is_none_or(|d| d < t));
+                    if late || pass_over > 0 {
+                        pass_over = pass_over.saturating_sub(1);
+                        continue;
+                    }
+                    return Ok(p.image);
+                }
+                Event::Lost(fault) => return Err(fault),
+                Event::Ended => {
+                    return Err(Fault::input(format!("{}: no picture comes any more", self.camera.name()))
+                        .next("use a camera that runs, not a file"));
+                }
+                Event::Incomplete { .. } | Event::Quiet => {}
+            }
+        }
+        Err(Fault::device(format!("{}: no picture within {} s", self.camera.name(), PATIENCE.as_secs()))
+            .cause("the cable is out, or the camera waits for a trigger")
+            .next("look at the camera's picture with another program, then begin again"))
+    }
+}
