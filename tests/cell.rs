@@ -14,14 +14,20 @@ mod golden;
 mod guard;
 #[path = "cell/job.rs"]
 mod job;
+#[path = "cell/lasers.rs"]
+mod lasers;
 #[path = "cell/programs.rs"]
 mod programs;
 #[path = "cell/refusals.rs"]
 mod refusals;
+#[path = "cell/resumed.rs"]
+mod resumed;
 #[path = "cell/rules.rs"]
 mod rules;
 #[path = "cell/socket.rs"]
 mod socket;
+#[path = "cell/trap.rs"]
+mod trap;
 #[path = "cell/wire.rs"]
 mod wire;
 #[path = "cell/workplace.rs"]

@@ -10,6 +10,7 @@ use sheetlight::calibrate::hand_eye::options::Mount;
 use sheetlight::calibrate::joint::unknowns::State;
 use sheetlight::calibrate::joint::volume::{apart, places, scanned};
 use sheetlight::calibrate::limits::Asked;
+use sheetlight::capture::PictureSource;
 use sheetlight::capture::source::cell::CellCamera;
 use sheetlight::cell::{Cell, CellOptions, Event, Served, Vs060};
 use sheetlight::fault::Result;
@@ -19,7 +20,7 @@ use sheetlight::rig::{Rig, Volume};
 use sheetlight::robot::Convention;
 use sheetlight::scan::{Extraction, Where};
 use sheetlight::simulate::RigSpec;
-use sheetlight::station::job::{Job, JobOptions, Outcome};
+use sheetlight::station::job::{Job, JobOptions, Operator, Outcome};
 use sheetlight::station::{
     ArmCell, AutoResult, AutoRun, JointRun, Settings, ToolSpec, WorkingVolume, calibrate_auto, store_joint,
 };
@@ -29,15 +30,15 @@ use std::time::Instant;
 const SPACE: Space = Space { from_mm: [150.0, -350.0, 200.0], to_mm: [650.0, 350.0, 750.0] };
 
 /// A cell, its station folder without any calibration.
-struct Cold {
-    served: Served,
+pub struct Cold {
+    pub served: Served,
     station: PathBuf,
-    dir: tempfile::TempDir,
+    pub dir: tempfile::TempDir,
     working: [f64; 2],
 }
 
 impl Cold {
-    fn new(options: CellOptions) -> Cold {
+    pub fn new(options: CellOptions) -> Cold {
         let working = [options.rig.working.near_mm, options.rig.working.far_mm];
         let served = Served::here(Cell::new(options).unwrap()).unwrap();
         served.controller.set_motor(true);
@@ -52,7 +53,7 @@ impl Cold {
         Cold { served, station, dir, working }
     }
 
-    fn guard(&self) -> Guard {
+    pub fn guard(&self) -> Guard {
         let limits = Settings::load(&self.station).unwrap().motion;
         let log = MotionLog::file(&self.dir.path().join("motions.jsonl"));
         let mut guard = Guard::new(sheetlight::arm::open(&self.served.robot_uri()).unwrap(), limits, log);
@@ -62,6 +63,21 @@ impl Cold {
 
     /// As `sheetlight calibrate auto` does it; the calibrations are in the station then.
     fn calibrate(&self, target_mm: f64, candidates: usize) -> Result<AutoResult> {
+        let camera = Box::new(CellCamera::open(&self.served.camera.to_string(), -1.0)?);
+        let result = self.calibrate_with(&mut self.guard(), camera, &mut Yes::always(), target_mm, candidates)?;
+        store_joint(&self.station, &result.joint)?;
+        Ok(result)
+    }
+
+    /// The same with another camera and another person; nothing is kept.
+    pub fn calibrate_with(
+        &self,
+        guard: &mut Guard,
+        camera: Box<dyn PictureSource>,
+        who: &mut dyn Operator,
+        target_mm: f64,
+        candidates: usize,
+    ) -> Result<AutoResult> {
         let asked =
             Asked { working: Some(Volume::new(self.working[0], self.working[1], "stated")), tolerance_mm: None };
         let mount = if self.served.cell.options().eye_to_hand { Mount::EyeToHand } else { Mount::EyeInHand };
@@ -75,13 +91,8 @@ impl Cold {
             candidates,
             seed: 1,
         };
-        let (mut guard, mut who) = (self.guard(), Yes::always());
-        let camera = Box::new(CellCamera::open(&self.served.camera.to_string(), -1.0)?);
-        let mut cell = ArmCell::new(&mut guard, camera, Outputs::default(), &mut who, None)?;
-        let result = calibrate_auto(&mut cell, &Rig::default(), &run, &|_, _| {})?;
-        drop(cell);
-        store_joint(&self.station, &result.joint)?;
-        Ok(result)
+        let mut cell = ArmCell::new(guard, camera, Outputs::default(), who, None)?;
+        calibrate_auto(&mut cell, &Rig::default(), &run, &|_, _| {})
     }
 
     /// How far points of the working volume are off, mm rms.
@@ -385,16 +396,7 @@ fn a_cold_cell_whose_sensor_stands_still_calibrates_itself() {
 
 /// What is in the station afterwards, and stops of the check whose stripe lay on the board.
 fn coarse(of: impl Fn(CellOptions) -> CellOptions) -> (Rig, usize) {
-    let mut rig = RigSpec::paper();
-    (rig.camera.width_px, rig.camera.height_px) = (320, 240);
-    rig.camera.pixel_um *= 2.0;
-    let board = Some(BoardSpec::Chessboard {
-        inner_corners: [9, 6],
-        square_mm: 19.0,
-        border_mm: 8.0,
-        first_square: "black".into(),
-    });
-    let cold = Cold::new(of(CellOptions { board, speed: 200.0, ..options(rig, 4, 5.0) }));
+    let cold = Cold::new(of(coarse_options()));
     let result = cold.calibrate(0.2, 40).unwrap_or_else(|e| panic!("{e}"));
     let (off, expected) = (cold.off(&result), result.joint.expected_mm());
     println!(
@@ -407,4 +409,18 @@ fn coarse(of: impl Fn(CellOptions) -> CellOptions) -> (Rig, usize) {
     assert!(off < 3.0 * expected && expected < 0.25, "{off} {expected}");
     assert!(cold.outside() == 0 && cold.stood() <= 40, "{} poses", cold.stood());
     (Rig::load(&cold.station).unwrap(), result.check.unwrap().stops)
+}
+
+/// A quarter of the pixels, a cell that runs 200 times as fast as ours.
+pub fn coarse_options() -> CellOptions {
+    let mut rig = RigSpec::paper();
+    (rig.camera.width_px, rig.camera.height_px) = (320, 240);
+    rig.camera.pixel_um *= 2.0;
+    let board = Some(BoardSpec::Chessboard {
+        inner_corners: [9, 6],
+        square_mm: 19.0,
+        border_mm: 8.0,
+        first_square: "black".into(),
+    });
+    CellOptions { board, speed: 200.0, ..options(rig, 4, 5.0) }
 }

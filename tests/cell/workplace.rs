@@ -4,7 +4,7 @@
 
 use sheetlight::arm::rules::{Confirmation, Guard, Limits, MotionLog, Space};
 use sheetlight::capture::source::cell::CellCamera;
-use sheetlight::cell::{Cell, CellOptions, Served};
+use sheetlight::cell::{Cell, CellOptions, Event, Served};
 use sheetlight::fault::Result;
 use sheetlight::robot::Convention;
 use sheetlight::scan::Where;
@@ -12,6 +12,7 @@ use sheetlight::simulate::SceneSpec;
 use sheetlight::station::job::{Ask, Job, JobOptions, JobReport, Operator};
 use sheetlight::station::{Settings, ToolSpec};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 /// A person who says yes to every motion that is shown, up to a step.
 pub struct Yes {
@@ -88,6 +89,36 @@ pub fn set_but(mut spec: SceneSpec, seed: u64, tilt_deg: f64, but: impl FnOnce(&
     let motion = Limits { max_silence_ms: 5000.0, ..Limits::within(workspace) };
     Settings { motion: Some(motion), tool, ..Settings::default() }.store(&station).unwrap();
     Set { served, station, dir }
+}
+
+/// Lasers are off so soon after whatever went wrong.
+pub const DARK: Duration = Duration::from_secs(1);
+
+/// How long it takes from now until no laser of a cell is on, by the controller's own log; none where that is longer than asked for.
+pub fn dark_within(cell: &Cell, most: Duration) -> Option<Duration> {
+    let begun = Instant::now();
+    loop {
+        if lit(cell).is_empty() {
+            return Some(begun.elapsed());
+        }
+        if begun.elapsed() > most {
+            return None;
+        }
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// The numbers of the lasers' outputs that are on.
+pub fn lit(cell: &Cell) -> Vec<u16> {
+    let (log, outputs) = (cell.log(), cell.options().outputs);
+    let on = |number: &u16| {
+        let last = log.iter().rev().find_map(|e| match e.event {
+            Event::Output { number: n, on } if n == *number => Some(on),
+            _ => None,
+        });
+        last.unwrap_or(false)
+    };
+    [outputs.line, outputs.pointer].into_iter().filter(on).collect()
 }
 
 impl Set {

@@ -201,7 +201,8 @@ def nothing_moves(s, former):
     a.post("/robot", {"armed": True})
     assert a.post("/motion/refuse", what)[0] == 200
     ended = s.ended(job)
-    assert ended["state"] == "failed" and not ended["resumable"], ended
+    # It stands where it stood: resumed it would measure anew.
+    assert ended["state"] == "failed" and ended["resumable"], ended
     refused("press of a motion of a job that has ended", a.post("/motion/press", what))
     assert count("move") == 0, "something moved"
 
@@ -287,6 +288,7 @@ def halts(s):
     s.json("POST", f"/jobs/{ended['id']}/back_out")
     ended = s.ended(ended["id"])
     assert ended["state"] == "failed" and ended["outcome"] is None and "backed out" in ended["problem"]["what"], ended
+    assert not ended["resumable"], ended
     assert motions("begun") == begun, "something moved that nobody held the button for"
 
 

@@ -7,7 +7,7 @@ use crate::fault::{Fault, Result};
 use crate::robot::Convention;
 use crate::scan::Where;
 use crate::station::Settings;
-use crate::station::job::{Job, JobOptions, JobReport, Outcome, Phase};
+use crate::station::job::{Job, JobOptions, JobReport, Outcome, Phase, Resumes};
 use std::path::{Path, PathBuf};
 
 /// Insert a part with a robot: touch, square, scan, find, approach, insert, retract
@@ -72,12 +72,14 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         let report = Job::open(&options, &mut guard, moving.camera.open(None)?, &mut person)?.run()?;
         let stopped = report.outcome == Outcome::Stopped;
         let (why, next) = (report.why.clone(), report.next());
+        let over = report.resumes == Resumes::Over;
+        let how = if over { "it wants another --out" } else { "the same command resumes it" };
         reports.push(report);
         if stopped {
             console.result(&reports, &text(&reports));
             return Err(Fault::refused(format!("the job was stopped: {why}"))
                 .cause("what is named is not as it has to be")
-                .next(format!("{next} (a new job in another folder, resumed by the same command); see {}", shown(&out))));
+                .next(format!("{next}; {how}; {} has the reason", shown(&out))));
         }
     }
     console.result(&reports, &text(&reports));

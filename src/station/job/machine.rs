@@ -460,7 +460,9 @@ fn finite(plan: &Plan) -> Result<()> {
             plan.legs[k].to.translation.as_slice()
         ))
         .cause("a number of the recipe, the calibration or the scan is none")
-        .next("look at the robot, take it away from the part with the pendant, then begin a new job in another folder")),
+        .next(
+            "look at the robot, take it away from the part with the pendant, then begin a new job in another folder",
+        )),
     }
 }
 
@@ -470,4 +472,36 @@ fn written(numbers: &[f64]) -> String {
 
 fn now_s() -> f64 {
     jiff::Timestamp::now().as_millisecond() as f64 * 1e-3
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_way_up_is_known_or_a_fault() {
+        let (down, up) = (Vec3::new(400.0, -100.0, 60.0), Vec3::new(400.0, -100.0, 120.0));
+        let from = |z: f64| way_up(&Vec3::new(401.0, -100.0, z), &down, &up).unwrap().z;
+        assert_eq!((from(60.0), from(90.0), from(120.0), from(150.0)), (60.0, 30.0, 0.0, 0.0));
+        for wrong in [down, down + Vec3::z() * 0.04, Vec3::new(f64::NAN, 0.0, 0.0), Vec3::new(0.0, f64::INFINITY, 0.0)]
+        {
+            let fault = way_up(&down, &down, &wrong).unwrap_err();
+            assert!(fault.what.contains("from its insertion pose") && fault.next.contains("pendant"), "{fault}");
+        }
+        assert!(way_up(&Vec3::new(0.0, f64::NAN, 0.0), &down, &up).unwrap().norm().is_nan());
+    }
+
+    #[test]
+    fn a_leg_that_is_no_pose_is_a_fault() {
+        let leg = |z: f64, speed_mm_s: f64| Motion {
+            to: Rigid::from_vectors(&Vec3::zeros(), Vec3::new(1.0, 2.0, z)),
+            way: Way::Straight,
+            speed_mm_s,
+        };
+        assert!(finite(&Plan::single("up", "", leg(3.0, 50.0))).is_ok());
+        for wrong in [leg(f64::NAN, 50.0), leg(f64::INFINITY, 50.0), leg(3.0, f64::NAN)] {
+            let plan = Plan { legs: vec![leg(3.0, 50.0), wrong], ..Plan::single("up", "", wrong) };
+            assert!(finite(&plan).unwrap_err().what.contains("motion 2 of 2"));
+        }
+    }
 }

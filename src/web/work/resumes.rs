@@ -13,8 +13,9 @@ pub(super) fn resumes(folder: &Path, order: &Order, stopped: bool) -> bool {
     match order {
         Order::Scan(_) => true,
         // Before the part it measures anew, at the part it goes back up; what has backed out is over.
-        Order::Insert(_) => JobState::load(&folder.join(INSERTION))
-            .is_ok_and(|s| s.is_none_or(|s| s.resumes() != Resumes::Over)),
+        Order::Insert(_) => {
+            JobState::load(&folder.join(INSERTION)).is_ok_and(|s| s.is_none_or(|s| s.resumes() != Resumes::Over))
+        }
         // Its pictures are kept; it begins anew in another folder.
         Order::Auto(_) => true,
         _ => stopped,

@@ -239,6 +239,7 @@ export const TABLE = {
   "Restored; the former state is a backup too.": ["Wiederhergestellt; der vorige Stand ist auch gesichert.", "已恢复；之前的状态也已备份。", "復元しました。前の状態もバックアップ済みです。"],
   "Result": ["Ergebnis", "结果", "結果"],
   "Resume": ["Fortsetzen", "继续", "再開"],
+  "Resumed before the part it measures anew, at the part it goes back up.": ["Fortgesetzt misst er vor dem Teil neu, am Teil fährt er zurück nach oben.", "继续后：到达零件之前重新测量，在零件处则退回上方。", "再開すると、部品の手前では測り直し、部品の位置では上へ戻ります。"],
   "Resume or take away": ["Fortsetzen oder entfernen", "继续或删除", "再開または削除"],
   "Retract": ["Zurückziehen", "撤回", "退避"],
   "Robot": ["Roboter", "机器人", "ロボット"],

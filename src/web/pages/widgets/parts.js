@@ -81,7 +81,8 @@ export function follow(place, id, ended) {
     fill(place, j.problem && fault(j.problem), j.state !== "done" && h("div", { class: "row note", "data-job": j.state },
       h("span", {}, `${j.id}: ${t({ cut_off: "cut off when the program ended", stopped: "stopped; what was done is kept", failed: "failed" }[j.state])}`),
       resumable && h("button", { class: "resume", onclick: async () => { await operate(false).catch(() => {}); act("resume"); } }, t("Resume")),
-      resumable && j.order.procedure === "insert" && h("button", { class: "back-out", onclick: async () => { await operate(false).catch(() => {}); act("back_out"); } }, t("Back out"))));
+      resumable && j.order.procedure === "insert" && h("button", { class: "back-out", onclick: async () => { await operate(false).catch(() => {}); act("back_out"); } }, t("Back out")),
+      resumable && j.order.procedure === "insert" && h("span", { class: "quiet small" }, t("Resumed before the part it measures anew, at the part it goes back up."))));
     if (j.state === "done") ended?.(j);
   };
   const off = on("jobs", (j) => (!j || j.id === id) && draw());
