@@ -272,18 +272,17 @@ impl Guard {
         let link = &mut *self.link;
         let poses = &mut *armed.poses;
         let made = std::thread::scope(|threads| {
+            let _ended = Ended(&watch);
             let named = |name: &str| std::thread::Builder::new().name(name.into());
             let guarding = named("halt").spawn_scoped(threads, || watch.guard());
             let following = named("poses").spawn_scoped(threads, || watch.follow(poses));
             if let Err(e) = guarding.and(following) {
-                watch.end();
                 return Err(unwatched(e));
             }
             let made = all(link, plan, &watch, each);
             if let Err(e) = &made {
                 watch.halt(e.what.clone());
             }
-            watch.end();
             made
         });
         match watch.halted() {
@@ -294,6 +293,18 @@ impl Guard {
                 Err(made.err().filter(|e| e.what == why).unwrap_or_else(|| stopped(why)))
             }
         }
+    }
+}
+
+/// Ends the watch with the motion, also where a bug ends it: its threads would be waited for without end, a laser on.
+struct Ended<'w, 'a>(&'w Watch<'a>);
+
+impl Drop for Ended<'_, '_> {
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            self.0.halt("a bug ended the motion".into());
+        }
+        self.0.end();
     }
 }
 
