@@ -18,9 +18,11 @@ pub trait Halt: Send + Sync {
     fn halt(&self) -> Result<()>;
 }
 
-/// Switches outputs of a controller over a connection of its own: neither a motion nor a link that was cut is in its way.
+/// Switches outputs of a controller over a connection of its own: neither a motion nor a link that was cut is in its
+/// way.
 pub trait Switch: Send {
-    /// Returns when the controller has taken the order. Errors: it could not be told, or it refused; nobody knows then what is on.
+    /// Returns when the controller has taken the order. Errors: it could not be told, or it refused; nobody knows then
+    /// what is on.
     fn put(&mut self, number: u16, on: bool) -> Result<()>;
 }
 

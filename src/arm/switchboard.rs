@@ -4,7 +4,8 @@ use super::{Arm, Outputs, Switch};
 use crate::fault::{Fault, Kind, Result};
 use crate::recording::Beam;
 
-/// Lasers, lamp and gripper. Dropped, on whatever way, it switches the lasers off. The gripper stays as it is: what it holds would
+/// Lasers, lamp and gripper. Dropped, on whatever way, it switches the lasers off. The gripper stays as it is: what it
+/// holds would
 /// fall; so does the lamp.
 pub struct Switchboard {
     switch: Box<dyn Switch>,
@@ -101,7 +102,8 @@ impl Switchboard {
         self.switch.put(self.outputs.pointer, beam == Beam::Pointer)
     }
 
-    /// Tells both lasers, also where the controller refuses the first; where it is not reached the second would wait in vain.
+    /// Tells both lasers, also where the controller refuses the first; where it is not reached the second would wait
+    /// in vain.
     fn off(&mut self) -> Result<()> {
         self.light = None;
         let line = self.switch.put(self.outputs.line, false);

@@ -1,4 +1,5 @@
-//! Whatever goes wrong in whichever phase of what switches a laser: the lasers are off within a second, or it is said that the
+//! Whatever goes wrong in whichever phase of what switches a laser: the lasers are off within a second, or it is said
+//! that the
 //! controller was not reached; what was left lit goes off first when the program is started again.
 
 use super::cold::{Cold, coarse_options};

@@ -94,7 +94,8 @@ pub fn set_but(mut spec: SceneSpec, seed: u64, tilt_deg: f64, but: impl FnOnce(&
 /// Lasers are off so soon after whatever went wrong.
 pub const DARK: Duration = Duration::from_secs(1);
 
-/// How long it takes from now until no laser of a cell is on, by the controller's own log; none where that is longer than asked for.
+/// How long it takes from now until no laser of a cell is on, by the controller's own log; none where that is longer
+/// than asked for.
 pub fn dark_within(cell: &Cell, most: Duration) -> Option<Duration> {
     let begun = Instant::now();
     loop {

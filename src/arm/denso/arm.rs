@@ -20,7 +20,8 @@ const LEAST_PERCENT: f64 = 0.1;
 /// Gentlest acceleration that is asked for, per cent.
 const LEAST_RAMP: f32 = 5.0;
 
-/// A Denso arm: one connection for reading and moving, one that only halts; those that switch outputs are made as they are asked for.
+/// A Denso arm: one connection for reading and moving, one that only halts; those that switch outputs are made as they
+/// are asked for.
 pub struct Denso {
     name: String,
     address: String,

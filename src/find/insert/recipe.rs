@@ -279,7 +279,8 @@ fn range(name: &str, v: f64, a: f64, b: f64) -> Result<()> {
     }
 }
 
-/// An arm counts as arrived within 0.2 mm of where it was sent (docs/robots.md): at the part and above it that may add up, and a
+/// An arm counts as arrived within 0.2 mm of where it was sent (docs/robots.md): at the part and above it that may add
+/// up, and a
 /// tenth of a millimetre is left.
 const CLEAR_MM: f64 = 0.5;
 /// Farther off the tool has left the part's surroundings.
@@ -297,7 +298,8 @@ fn above(name: &str, mm: f64, least: f64) -> Result<()> {
 }
 
 impl InsertionSpec {
-    /// The tool is above the part from here on, mm above the insertion pose: as much as lies between the lowest and the highest of
+    /// The tool is above the part from here on, mm above the insertion pose: as much as lies between the lowest and
+    /// the highest of
     /// what is drawn and the insertion pose, and a clearance. How long the component is nobody says: it may need more.
     pub fn least_above_mm(&self, drawing: &Drawing) -> f64 {
         let heights = drawing.shape.iter().map(|s| s.z_mm);
@@ -362,7 +364,8 @@ mod tests {
         Recipe::parse(&text.replace("retract_mm = 80", &format!("retract_mm = {retract}")))
     }
 
-    /// A retract pose that is the insertion pose leaves the tool in the part; an approach pose that is it goes in unasked.
+    /// A retract pose that is the insertion pose leaves the tool in the part; an approach pose that is it goes in
+    /// unasked.
     #[test]
     fn the_tool_is_above_the_part_before_and_after() {
         let dimm = include_str!("../../../data/recipes/dimm.toml");

@@ -25,7 +25,8 @@ impl Eye {
         self.snapshots.format()
     }
 
-    /// A picture that was begun after now, lit by one laser or by the room's lamp alone (`None`). A laser stays on after it: the
+    /// A picture that was begun after now, lit by one laser or by the room's lamp alone (`None`). A laser stays on
+    /// after it: the
     /// caller takes the next picture, or ends with [`Switchboard::after`].
     pub fn picture(&mut self, beam: Option<Beam>) -> Result<Image> {
         self.lights.light(beam)?;

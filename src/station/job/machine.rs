@@ -429,7 +429,8 @@ impl<'a> Job<'a> {
     }
 }
 
-/// From where the arm stands up to the height of the retract pose, along the way from the insertion to it; nothing where it is that
+/// From where the arm stands up to the height of the retract pose, along the way from the insertion to it; nothing
+/// where it is that
 /// high already.
 fn way_up(at: &Vec3, down: &Vec3, up: &Vec3) -> Result<Vec3> {
     let way = up - down;

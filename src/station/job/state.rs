@@ -190,7 +190,8 @@ impl JobState {
     }
 }
 
-/// Makes a file of format 1 one of today. A job that was stopped there had forgotten its phase: poses at the part are known from the
+/// Makes a file of format 1 one of today. A job that was stopped there had forgotten its phase: poses at the part are
+/// known from the
 /// approach on.
 fn former(value: &mut Value) {
     let was_stopped = value["phase"] == "stopped";
