@@ -19,6 +19,7 @@ pub struct Slot {
     header_staging: Buffer,
     /// Large results, of each of which only the first part is brought back.
     pub outputs: Vec<Output>,
+    /// Asked for last: of the upload where the place is free, of the header's staging while a batch is in it.
     mapping: Option<Mapping>,
     /// The submission that works on this place.
     at: Option<wgpu::SubmissionIndex>,

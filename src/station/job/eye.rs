@@ -27,9 +27,9 @@ impl Eye {
         Eye { camera, outputs, lit: None }
     }
 
-    /// Width, height and depth of its pictures.
-    pub fn format(&self) -> crate::capture::Format {
-        self.camera.format()
+    /// What its pictures are, and how they are read from the sensor.
+    pub fn pictures(&self) -> crate::capture::Pictures {
+        crate::capture::Pictures { format: self.camera.format(), readout: self.camera.readout() }
     }
 
     /// Switches one beam on, or the room's lamp (`None`), and everything else off.
