@@ -2,12 +2,13 @@
 
 use super::Intrinsics;
 
-/// How a camera reads its sensor: it adds pixels together (binning), passes pixels over (decimation), and cuts a region out of what
-/// is left. Columns come before rows.
+/// How a camera reads its sensor: it adds pixels together (binning), passes pixels over (decimation), and cuts a region
+/// out of what is left. Columns come before rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Readout {
-    /// Left and top of the region, px of the pictures: counted after binning and decimation, as GenICam's OffsetX and OffsetY are.
+    /// Left and top of the region, px of the pictures: counted after binning and decimation, as GenICam's OffsetX and
+    /// OffsetY are.
     #[serde(default)]
     pub offset_px: [u32; 2],
     /// Pixels of the sensor that are one of the picture: it lies in their middle.
@@ -80,8 +81,8 @@ impl Readout {
         }
     }
 
-    /// The camera whose every pixel is read, of one whose pictures are read out like this. Its size is the sensor's, or what is known
-    /// of that.
+    /// The camera whose every pixel is read, of one whose pictures are read out like this. Its size is the sensor's, or
+    /// what is known of that.
     pub fn to_whole(&self, camera: &Intrinsics) -> Intrinsics {
         let [x, y] = self.axes();
         let reach = self.reach([camera.width, camera.height]).map(|n| u32::try_from(n).unwrap_or(u32::MAX));

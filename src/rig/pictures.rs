@@ -1,15 +1,16 @@
-//! Which camera model belongs to pictures of another size or part of the sensor than the calibrated one. Nothing is guessed.
+//! Which camera model belongs to pictures of another size, or another part of the sensor, than the calibrated one.
 
 use super::Calibration;
 use crate::camera::{Intrinsics, Readout};
 use crate::fault::{Fault, Result};
 
 impl Calibration<Intrinsics> {
-    /// The camera of pictures of this size (columns, rows), and of the part of the sensor that is stated: the calibrated one where
-    /// they are as it was calibrated.
+    /// The camera of pictures of this size (columns, rows), and of the part of the sensor that is stated: the calibrated
+    /// one where they are as it was calibrated.
     ///
     /// # Errors
-    /// Another size than the calibrated one, and nobody says what the pictures show; pictures that this camera cannot send.
+    /// Another size than the calibrated one, and nobody says what the pictures show; pictures that this camera cannot
+    /// send.
     pub fn for_pictures(&self, size: [u32; 2], readout: Option<&Readout>) -> Result<Intrinsics> {
         let (camera, same_size) = (&self.value, size == self.size());
         let known = match (self.readout.as_ref(), readout) {
@@ -64,8 +65,8 @@ impl Calibration<Intrinsics> {
     }
 }
 
-const UNSTATED: &str = "say what the pictures show, --region X,Y or --binned N, or 'readout' in meta.json (docs/file-formats.md); \
-     or record with the settings that the camera was calibrated with";
+const UNSTATED: &str = "say what the pictures show: --region X,Y or --binned N, or 'readout' in meta.json \
+     (docs/file-formats.md); or record with the settings that the camera was calibrated with";
 
 /// Two statements of one and the same setting.
 fn same(a: &Readout, b: &Readout) -> bool {

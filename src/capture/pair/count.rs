@@ -77,8 +77,8 @@ impl Counting {
         let by_number = matches!(self.table, Table::Rows(_) | Table::Pulses(_));
         if by_number && numbering.first > 1 {
             self.said.push(format!(
-                "the first picture has the number {}: it is taken for the first trigger's, and is not where pictures before \
-                 it were lost",
+                "the first picture has the number {}: it is taken for the first trigger's, and is not where pictures \
+                 before it were lost",
                 numbering.first
             ));
         }
