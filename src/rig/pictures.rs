@@ -5,8 +5,8 @@ use crate::camera::{Intrinsics, Readout};
 use crate::fault::{Fault, Result};
 
 impl Calibration<Intrinsics> {
-    /// The camera of pictures of this size (columns, rows), and of the part of the sensor that is stated: the calibrated
-    /// one where they are as it was calibrated.
+    /// The camera of pictures of this size (columns, rows), and of the part of the sensor that is stated: the
+    /// calibrated one where they are as it was calibrated.
     ///
     /// # Errors
     /// Another size than the calibrated one, and nobody says what the pictures show; pictures that this camera cannot

@@ -263,7 +263,8 @@ fn a_device_with_memory_of_its_own_gives_the_same() {
     assert_eq!(chain.collect(true).unwrap().unwrap(), first, "the same pictures once more");
 }
 
-/// What is read back shrinks by halves after a full list, and wgpu copies whole words only. Half of an eighth of this list is none.
+/// What is read back shrinks by halves after a full list, and wgpu copies whole words only: an eighth of this list is
+/// none.
 #[test]
 fn a_device_with_memory_of_its_own_calms_down_after_a_full_list_of_an_odd_size() {
     let Some(device) = common::device() else { return };

@@ -1,4 +1,4 @@
-//! Pictures of a region of the sensor, and binned ones, give the points of the whole pictures; unexplained ones are refused.
+//! Pictures of a region of the sensor, and binned ones, give the points of the whole ones; unexplained ones are refused.
 
 use crate::common::{sheetlight, sheetlight_fails};
 use sheetlight::camera::Readout;
@@ -97,7 +97,7 @@ fn binned_pictures_give_the_surface_of_the_whole_ones() {
     let full = whole.points(&whole.images, None);
     let images: Vec<Image> = whole.images.iter().map(binned).collect();
     let half = whole.points(&images, Some(Readout { binning: [2, 2], ..Readout::default() }));
-    // Between the two points of the whole picture that are next to it, how far across the stripe; px of the whole picture.
+    // How far it lies across the stripe, between the two points of the whole picture next to it; px of that picture.
     let camera = whole.rig.need_camera().unwrap().value;
     let mut off: Vec<f64> = Vec::new();
     for p in &half {

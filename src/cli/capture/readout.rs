@@ -5,12 +5,12 @@ use crate::camera::Readout;
 /// What pictures show of the sensor.
 #[derive(Clone, clap::Args)]
 pub struct ReadoutArgs {
-    /// Pictures that are smaller than the calibrated ones are a region of the sensor, and this is its left upper corner
+    /// Pictures that are smaller than the calibrated ones are a region of the sensor; this is its left upper corner
     /// (OffsetX and OffsetY of the camera); only where neither camera nor meta.json says so
     #[arg(long, value_name = "X,Y", value_parser = crate::cli::terminal::arguments::parse::<Corner>)]
     region: Option<Corner>,
-    /// Pictures that are smaller than the calibrated ones are binned: so many pixels each way are one; only where neither
-    /// camera nor meta.json says so
+    /// Pictures that are smaller than the calibrated ones are binned: so many pixels each way are one; only where
+    /// neither camera nor meta.json says so
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
     binned: Option<u32>,
 }
