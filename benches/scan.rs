@@ -9,7 +9,7 @@ use sheetlight::fault::{Fault, Result};
 use sheetlight::raster::Image;
 use sheetlight::recording::Recording;
 use sheetlight::rig::{Rig, Volume};
-use sheetlight::scan::{Engine, Optical, Place, RecordingSource, Source, Where, camera_for};
+use sheetlight::scan::{Engine, Optical, Place, RecordingSource, Source, Where};
 use sheetlight::station::{Settings, load_report};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -60,10 +60,11 @@ fn measure(folder: &Path, station: &Path, rounds: usize) -> Result<()> {
         let mut source = RecordingSource::open(&recording, None, 0)?;
         std::iter::from_fn(|| source.next()).map(|s| s.map(|s| s.image).map_err(|bad| bad.fault)).collect()
     };
-    let format = RecordingSource::open(&recording, None, 0)?.format();
+    let pictures = RecordingSource::open(&recording, None, 0)?.pictures();
+    let format = pictures.format;
     let images = decode()?;
     let optical = Optical {
-        camera: camera_for(&rig.need_camera()?.value, format)?,
+        camera: rig.need_camera()?.for_pictures(pictures.size(), pictures.readout.as_ref())?,
         laser: rig.need_laser_plane()?.value,
         depth_mm: Volume::depths(sheetlight::station::volume::believed(&settings, &rig).as_ref()),
     };

@@ -1,6 +1,6 @@
 // In: peaks, the strongest of each line across the stripe, the rig, a pose a shot. Out: the reason of peaks that are weak
 // beside another: echoes, and spots cut by an edge; of the others points in the poses' frame with their standard deviation, bits
-// `none` where there is none. Twin and reasons: src/stages/choose.rs, point.rs; docs/math.md, Stripe peak (7), (8). Frame and unit: mm.
+// `none` where there is none. Twin and reasons: src/stages/stripe/choose.rs, point.rs; docs/math.md, Stripe peak (7), (8). Frame and unit: mm.
 struct PointFrame {
     fx: f32,
     fy: f32,

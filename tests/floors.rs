@@ -16,7 +16,7 @@ const MAY: &[(&str, &[&str])] = &[
     ("gpu", &[]),
     ("camera", &["geometry"]),
     ("robot", &["geometry"]),
-    ("recording", &["geometry", "raster", "robot"]),
+    ("recording", &["geometry", "raster", "camera", "robot"]),
     ("arm", &["bcap", "geometry", "robot", "recording"]),
     ("rig", &["geometry", "camera"]),
     ("simulate", &["geometry", "raster", "solve", "camera", "robot", "recording", "rig"]),

@@ -73,7 +73,7 @@ fn at((width, height): (u32, u32), rate_hz: f64, seconds: f64, place: Where) -> 
     let (mut waits, mut measured) = (Vec::new(), 0);
     loop {
         let picture = match feed.next(WITHIN) {
-            Fed::Picture(picture) => picture,
+            Fed::Picture(picture, _) => picture,
             Fed::Quiet => continue,
             Fed::Ended(None) => break,
             Fed::Ended(Some(fault)) => return Err(fault),

@@ -5,11 +5,13 @@ mod covariance;
 mod distortion;
 mod intrinsics;
 mod parameters;
+mod readout;
 
 pub use covariance::{CameraCovariance, named};
 pub use distortion::{Distortion, TERMS};
 pub use intrinsics::Intrinsics;
 pub use parameters::{ALWAYS_NAMED, LENS, NAMES, PARAMETERS, ParameterMatrix, Parameters, SKEW, difference_step};
+pub use readout::Readout;
 
 #[cfg(test)]
 #[path = "tests.rs"]

@@ -148,11 +148,12 @@ impl Ledger {
             }
             return Order::Late;
         }
-        let new = id - expected + 1;
-        self.account.missed += new - 1;
-        self.account.sent += new;
-        self.since_open += new;
-        self.expected = Some(id + 1);
+        let new = (id - expected).saturating_add(1);
+        for count in [&mut self.account.sent, &mut self.since_open] {
+            *count = count.saturating_add(new);
+        }
+        self.account.missed = self.account.missed.saturating_add(new - 1);
+        self.expected = Some(id.saturating_add(1));
         Order::Next
     }
 

@@ -96,21 +96,14 @@ impl ClockMap {
     }
 
     fn add(&mut self, there_ns: u64, here_ns: u64, half: f64) {
-        let (there0, here0) = *self.origin.get_or_insert((there_ns, here_ns));
-        let (there, here) = (there_ns as f64 - there0 as f64, here_ns as f64 - here0 as f64);
-        let reading = Reading { there, offset: here - there, half };
+        let reading = self.reading(there_ns, here_ns, half);
         // A clock that was set, or that began anew: what was known of it is of no use.
-        let jumped = self.best.back().is_some_and(|b| {
-            let behind = there + 1.0 < b.there - STRETCH as f64;
-            let ways = if self.one_way { 0.5e9 } else { half + b.half + ODD };
-            behind || (reading.offset - b.offset).abs() > ways + DRIFT * (there - b.there).abs()
-        });
-        if jumped {
-            self.jumps += 1;
-            (self.best, self.origin) = (VecDeque::new(), None);
-            self.unsure_until = here_ns + if half.is_finite() { half as u64 } else { 0 };
+        if self.best.back().is_some_and(|b| !self.agree(b, &reading)) {
+            self.begin_anew(here_ns + if half.is_finite() { half as u64 } else { 0 });
             return self.add(there_ns, here_ns, half);
         }
+        self.origin.get_or_insert((there_ns, here_ns));
+        let there = reading.there;
         self.newest = here_ns;
         let same = |b: &Reading| (b.there / STRETCH as f64).floor() == (there / STRETCH as f64).floor();
         match self.best.back_mut().filter(|b| same(b)) {
@@ -125,6 +118,32 @@ impl ClockMap {
         if self.best.len() > STRETCHES {
             self.best.pop_front();
         }
+    }
+
+    fn reading(&self, there_ns: u64, here_ns: u64, half: f64) -> Reading {
+        let (there0, here0) = self.origin.unwrap_or((there_ns, here_ns));
+        let there = there_ns as f64 - there0 as f64;
+        Reading { there, offset: (here_ns as f64 - here0 as f64) - there, half }
+    }
+
+    /// Two readings, the older one first, are of one clock that ran on.
+    fn agree(&self, b: &Reading, reading: &Reading) -> bool {
+        let behind = reading.there + 1.0 < b.there - STRETCH as f64;
+        let ways = if self.one_way { 0.5e9 } else { reading.half + b.half + ODD };
+        !behind && (reading.offset - b.offset).abs() <= ways + DRIFT * (reading.there - b.there).abs()
+    }
+
+    /// Whether a round trip shows that the other clock ran on since it was read last: it was not reset, and had power.
+    pub fn ran_on(&self, trip: RoundTrip) -> bool {
+        let here = trip.before_ns + (trip.after_ns - trip.before_ns) / 2;
+        let reading = self.reading(trip.there_ns, here, 0.5 * (trip.after_ns - trip.before_ns) as f64);
+        !self.one_way && self.best.back().is_some_and(|b| self.agree(b, &reading))
+    }
+
+    /// Forgets what is known of the other clock. What was here up to `until_ns` of the host's time can be told no more.
+    pub fn begin_anew(&mut self, until_ns: u64) {
+        let jumps = self.jumps + 1;
+        *self = ClockMap { jumps, unsure_until: until_ns, one_way: self.one_way, ..ClockMap::default() };
     }
 
     /// How often the other clock jumped or began anew.
@@ -229,6 +248,13 @@ mod tests {
         assert!(map.told(last + 50_000_000, last + 50_000_000).unwrap().is_err());
         read(&mut map, last + 400_000_000, 30_000_000);
         let told = map.told(last + 330_000_000, last + 310_000_000).unwrap().unwrap();
+        let trip = |before_ns: u64, ahead: u64| RoundTrip {
+            before_ns,
+            there_ns: before_ns + 250_000 + ahead,
+            after_ns: before_ns + 500_000,
+        };
+        assert!(map.ran_on(trip(last + 9_000_000_000, 30_000_000)), "as it was, ten seconds later");
+        assert!(!map.ran_on(trip(last + 9_000_000_000, 0)) && !ClockMap::default().ran_on(trip(last, 0)));
         assert!((told.ns - (last + 300_000_000) as f64).abs() < 1e6, "{told:?}");
     }
 

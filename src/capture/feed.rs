@@ -4,9 +4,11 @@
 
 use super::account::{Account, Ledger, Order};
 use super::clock::{ClockMap, now_ns};
-use super::format::Format;
-use super::picture::{Event, Picture, PictureSource};
+use super::format::{Format, Pictures};
+use super::picture::{Event, Numbering, Picture, PictureSource};
+use crate::camera::Readout;
 use crate::fault::{Fault, Result};
+use crate::recording::stated_once;
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -36,12 +38,22 @@ pub struct FeedOptions {
     pub seconds: Option<f64>,
     /// Set by somebody who wants it to end.
     pub stop: Arc<AtomicBool>,
+    /// How pictures are read from the sensor, by a person's word, where the source does not know.
+    pub readout: Option<Readout>,
 }
 
 impl Default for FeedOptions {
     fn default() -> Self {
         let (mode, patience) = (Mode::All, Duration::from_secs(60));
-        FeedOptions { mode, memory: 256 << 20, patience, shots: None, seconds: None, stop: Arc::default() }
+        FeedOptions {
+            mode,
+            memory: 256 << 20,
+            patience,
+            shots: None,
+            seconds: None,
+            stop: Arc::default(),
+            readout: None,
+        }
     }
 }
 
@@ -61,8 +73,8 @@ pub enum Fate {
 /// What comes of waiting for a feed.
 #[derive(Debug)]
 pub enum Fed {
-    /// The next picture, or the newest.
-    Picture(Box<Picture>),
+    /// The next picture, or the newest, and what its number can be compared with.
+    Picture(Box<Picture>, Numbering),
     /// The time is over, nothing came.
     Quiet,
     /// Nothing will come any more, and why where it is nobody's wish.
@@ -81,7 +93,7 @@ const CLOCK_FIRST: usize = 8;
 
 #[derive(Default)]
 struct State {
-    pictures: VecDeque<Box<Picture>>,
+    pictures: VecDeque<(Box<Picture>, Numbering)>,
     bytes: usize,
     ledger: Ledger,
     clock: ClockMap,
@@ -107,7 +119,7 @@ impl Shared {
 /// A source that is being read.
 pub struct Feed {
     shared: Arc<Shared>,
-    format: Format,
+    pictures: Pictures,
     name: String,
     device: String,
     stop: Arc<AtomicBool>,
@@ -118,21 +130,38 @@ impl Feed {
     /// Starts asking.
     ///
     /// # Errors
-    /// No thread can be started.
+    /// No thread can be started; the readout is stated, and the source knows it.
     pub fn start(source: Box<dyn PictureSource>, options: FeedOptions) -> Result<Feed> {
-        let (format, name, device) = (source.format(), source.name(), source.device());
+        let (name, device) = (source.name(), source.device());
+        let readout = stated_once(source.readout(), options.readout)?;
+        let pictures = Pictures { format: source.format(), readout };
         let shared = Arc::new(Shared::default());
         let (theirs, stop) = (shared.clone(), Arc::new(AtomicBool::new(false)));
-        let reader =
-            Reader { source, shared: theirs, options, ours: stop.clone(), begun: Instant::now(), asked: None, came: 0 };
+        let reader = Reader {
+            source,
+            shared: theirs,
+            options,
+            ours: stop.clone(),
+            begun: Instant::now(),
+            asked: None,
+            jump_said: false,
+            came: 0,
+            first: None,
+            numbering: Numbering::default(),
+        };
         let thread = std::thread::Builder::new().name("camera".into()).spawn(move || reader.run());
         let thread = Some(thread.map_err(|e| Fault::threads(&e))?);
-        Ok(Feed { shared, format, name, device, stop, thread })
+        Ok(Feed { shared, pictures, name, device, stop, thread })
     }
 
     /// Size and depth of all its pictures.
     pub fn format(&self) -> Format {
-        self.format
+        self.pictures.format
+    }
+
+    /// What all its pictures are, and how they are read from the sensor.
+    pub fn pictures(&self) -> Pictures {
+        self.pictures
     }
 
     /// What it is and where.
@@ -150,10 +179,10 @@ impl Feed {
         let until = Instant::now() + within;
         let mut state = self.shared.lock();
         loop {
-            if let Some(picture) = state.pictures.pop_front() {
+            if let Some((picture, numbering)) = state.pictures.pop_front() {
                 state.bytes -= weight(&picture);
                 self.shared.changed.notify_all();
-                return Fed::Picture(picture);
+                return Fed::Picture(picture, numbering);
             }
             if state.ended {
                 return Fed::Ended(state.fault.take());
@@ -196,8 +225,8 @@ impl Feed {
         self.shared.lock().clock.clone()
     }
 
-    /// Share of the memory for waiting pictures that is taken.
-    pub fn fill(&self) -> usize {
+    /// Pictures that wait in memory.
+    pub fn waiting(&self) -> usize {
         self.shared.lock().pictures.len()
     }
 
@@ -240,7 +269,12 @@ struct Reader {
     begun: Instant,
     /// When the clock was read last.
     asked: Option<Instant>,
+    /// A person was told that the clock jumps.
+    jump_said: bool,
     came: u64,
+    /// The first number since the source was opened.
+    first: Option<u64>,
+    numbering: Numbering,
 }
 
 impl Reader {
@@ -257,7 +291,10 @@ impl Reader {
             }
             match self.source.next(GLANCE) {
                 Event::Picture(picture) => self.take(picture),
-                Event::Incomplete { id, .. } => self.shared.lock().ledger.came_in_part(id),
+                Event::Incomplete { id, .. } => {
+                    self.first.get_or_insert(id);
+                    self.shared.lock().ledger.came_in_part(id);
+                }
                 Event::Quiet => {}
                 Event::Lost(fault) => {
                     if let Err(fault) = self.bring_back(fault) {
@@ -301,7 +338,7 @@ impl Reader {
             let jumps = state.clock.jumps();
             state.clock.round_trip(trip);
             // Once: one that jumps all the time would say nothing else.
-            if jumps == 0 && state.clock.jumps() > 0 {
+            if state.clock.jumps() > jumps && !std::mem::replace(&mut self.jump_said, true) {
                 let name = self.source.name();
                 state
                     .said
@@ -311,6 +348,7 @@ impl Reader {
     }
 
     fn take(&mut self, picture: Box<Picture>) {
+        self.numbering.first = *self.first.get_or_insert(picture.id);
         let mut state = self.shared.lock();
         state.resent = self.source.resent();
         if let (Some(there), None) = (picture.device_ns, self.asked) {
@@ -341,8 +379,24 @@ impl Reader {
             }
         }
         state.bytes += weight;
-        state.pictures.push_back(picture);
+        state.pictures.push_back((picture, self.numbering));
         self.shared.changed.notify_all();
+    }
+
+    /// The source is back: what can still be compared with what was before, and a new reading of its clock.
+    fn opened_again(&mut self) {
+        let trip = self.source.clock().ok().flatten();
+        let mut state = self.shared.lock();
+        let ran_on = trip.is_some_and(|trip| state.clock.ran_on(trip));
+        if !ran_on {
+            // Pictures that still wait to be paired carry times of the clock as it was.
+            state.clock.begin_anew(now_ns());
+        }
+        drop(state);
+        self.numbering.outages += 1;
+        self.numbering.resets += u64::from(!ran_on);
+        (self.first, self.asked) = (None, None);
+        (0..CLOCK_FIRST).for_each(|_| self.read_clock());
     }
 
     /// Waits for a camera that went away. `Err` where it does not come back, with why unless somebody wanted the end.
@@ -357,7 +411,6 @@ impl Reader {
                 state.ledger.says(sent);
             }
             state.ledger.gone();
-            state.clock = ClockMap::default();
             state.said.push(format!("{}: gone: {}; waiting for it", self.source.name(), fault.what));
         }
         let mut why = fault.what.clone();
@@ -369,8 +422,7 @@ impl Reader {
                 Ok(()) => {
                     let seconds = (now_ns() - gone) as f64 * 1e-9;
                     self.shared.lock().said.push(format!("{}: back after {seconds:.1} s", self.source.name()));
-                    self.asked = None;
-                    (0..CLOCK_FIRST).for_each(|_| self.read_clock());
+                    self.opened_again();
                     return Ok(());
                 }
                 Err(again) if again.what != why => {

@@ -1,6 +1,7 @@
 //! In: how raw frames are laid out in words, a reader of their bytes. Out: their size and depth; one picture after another.
 //! Frame and unit: pixels; grey levels of the sensor's depth, those of more than 8 bits as two bytes, little endian.
 
+use crate::camera::Readout;
 use crate::fault::{Fault, Result};
 use crate::raster::{Image, Pixels};
 use std::io::Read;
@@ -14,6 +15,28 @@ pub struct Format {
     pub height: u32,
     /// Bits of a grey level, 8 to 16.
     pub bits: u8,
+}
+
+/// What pictures are, and how they were read from the sensor where that is known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Pictures {
+    /// Size and depth.
+    pub format: Format,
+    /// Region, binning and decimation; none where nobody says.
+    pub readout: Option<Readout>,
+}
+
+impl Pictures {
+    /// Columns and rows, px.
+    pub fn size(&self) -> [u32; 2] {
+        [self.format.width, self.format.height]
+    }
+}
+
+impl From<Format> for Pictures {
+    fn from(format: Format) -> Pictures {
+        Pictures { format, readout: None }
+    }
 }
 
 impl Format {

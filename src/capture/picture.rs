@@ -4,6 +4,7 @@
 use super::clock::RoundTrip;
 use super::feature::Feature;
 use super::format::Format;
+use crate::camera::Readout;
 use crate::fault::{Fault, Result};
 use crate::raster::Image;
 use crate::recording::Stand;
@@ -27,6 +28,18 @@ pub struct Picture {
     pub count: Option<i64>,
     /// Where what moves stood in the middle of the exposure, of a source that knows: a recording that is played, a simulated station.
     pub stand: Option<Stand>,
+}
+
+/// How far the numbers of pictures can be compared: what happened to the source before a picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Numbering {
+    /// The first number that was seen since the source was opened, also of a picture that came only in part.
+    pub first: u64,
+    /// How often the source was gone and came back. Numbers of before and after do not belong together.
+    pub outages: u64,
+    /// Outages after which the device's clock does not show that it had power all the time: its counters may have begun
+    /// anew.
+    pub resets: u64,
 }
 
 /// What comes of waiting for the next picture.
@@ -54,6 +67,11 @@ pub enum Event {
 pub trait PictureSource: Send {
     /// Size and depth of all its pictures.
     fn format(&self) -> Format;
+
+    /// How its pictures are read from the sensor; none where it does not know.
+    fn readout(&self) -> Option<Readout> {
+        None
+    }
 
     /// The next picture, waited for at most this long.
     fn next(&mut self, within: Duration) -> Event;

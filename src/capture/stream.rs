@@ -3,7 +3,7 @@
 
 use super::account::Account;
 use super::feed::{Fate, Fed, Feed};
-use super::format::Format;
+use super::format::{Format, Pictures};
 use super::pair::{LeftOut, Paired, Pairer, PoseFeed, Way};
 use crate::fault::Fault;
 use std::time::{Duration, Instant};
@@ -43,6 +43,11 @@ impl Stream {
         self.feed.format()
     }
 
+    /// What all pictures are, and how they are read from the sensor.
+    pub fn pictures(&self) -> Pictures {
+        self.feed.pictures()
+    }
+
     /// The source and what is known of it.
     pub fn feed(&self) -> &Feed {
         &self.feed
@@ -64,9 +69,9 @@ impl Stream {
     }
 
     /// What happened since it was asked last.
-    pub fn news(&self) -> Vec<String> {
+    pub fn news(&mut self) -> Vec<String> {
         let poses = self.pairer.poses().map(PoseFeed::news).unwrap_or_default();
-        self.feed.news().into_iter().chain(poses).collect()
+        self.feed.news().into_iter().chain(poses).chain(self.pairer.news()).collect()
     }
 
     /// The next shot, waited for at most this long.
@@ -99,7 +104,7 @@ impl Stream {
             // While a pose is waited for it may come before the next picture does.
             let wait = if self.pairer.waiting() > 0 { left.min(GLANCE) } else { left };
             match self.feed.next(wait) {
-                Fed::Picture(picture) => self.pairer.push(picture),
+                Fed::Picture(picture, numbering) => self.pairer.push(picture, numbering),
                 Fed::Quiet => {}
                 Fed::Ended(fault) => self.ending(fault),
             }

@@ -3,7 +3,7 @@
 
 use super::capture::options::Running;
 use super::terminal::console::Console;
-use crate::capture::{CameraUri, Delays, Fate, Fed, Format, Mode, RawFormat, now_ns};
+use crate::capture::{CameraUri, Delays, Fate, Fed, Mode, Pictures, RawFormat, now_ns};
 use crate::fault::{Fault, Result};
 use crate::raster::Light;
 use crate::rig::Rig;
@@ -63,18 +63,19 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     if args.raw.is_some() {
         running.camera.get_or_insert(CameraUri::Input);
     }
-    let begin = |format: Format| Live::new(&rig, format, &settings.extraction, volume.as_ref(), args.on);
+    let begin = |pictures: Pictures| Live::new(&rig, pictures, &settings.extraction, volume.as_ref(), args.on);
     // A stated format is judged, and the GPU opened, before pictures come.
-    let early = args.raw.map(|raw| begin(raw.format)).transpose()?;
+    let early =
+        args.raw.map(|raw| begin(Pictures { format: raw.format, readout: running.readout.stated() })).transpose()?;
     let feed = running.open(args.raw, Mode::Newest)?;
-    let mut live = early.map_or_else(|| begin(feed.format()), Ok)?;
+    let mut live = early.map_or_else(|| begin(feed.pictures()), Ok)?;
     let (mut teller, bar) = (running.teller(), console.bar("live", 0));
     let (mut waits, mut measured_count) = (Delays::default(), 0usize);
     let (mut without_stripe, mut unlit) = (0, None);
     let ended = loop {
         feed.news().into_iter().for_each(|n| console.warn(n));
         let picture = match feed.next(GLANCE) {
-            Fed::Picture(picture) => picture,
+            Fed::Picture(picture, _) => picture,
             Fed::Quiet => continue,
             Fed::Ended(fault) => break fault,
         };

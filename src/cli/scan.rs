@@ -164,6 +164,7 @@ fn from_recording(
     let mut recording = Recording::open(folder)?;
     recording.channel = args.channel;
     recording.outside = args.pictures_outside;
+    recording.read_out_as(args.capture.running.readout.stated())?;
     if recording.meta.motion().axis().is_none() {
         recording.pose_file(args.poses.as_deref())?.warnings.iter().for_each(|w| console.warn(w));
     } else if args.poses.is_some() {
@@ -198,7 +199,11 @@ fn from_pipe(
     }
     options.ambient = ambient_beside(args, raw.format)?;
     let missing = args.missing.iter().copied().collect();
-    let open = |_| Ok(Box::new(RawSource::new(raw, std::io::stdin().lock(), file.poses, missing)?) as Box<_>);
+    let readout = args.capture.running.readout.stated();
+    let open = |_| {
+        let frames = RawSource::new(raw, std::io::stdin().lock(), file.poses, missing)?;
+        Ok(Box::new(frames.read_out_as(readout)) as Box<_>)
+    };
     crate::station::scan("pipe", "standard input", open, rig, options, shown_by(bar))
 }
 

@@ -147,14 +147,16 @@ fn heard(raw: &wgpu::Device) -> Arc<Mutex<Option<String>>> {
     let lost = Arc::new(Mutex::new(None::<String>));
     let note = lost.clone();
     raw.set_device_lost_callback(move |reason, message| {
-        note.lock().unwrap().get_or_insert(format!("{reason:?}: {message}"));
+        note.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(format!("{reason:?}: {message}"));
     });
     // Out of memory and driver errors surface here; a validation error is our bug and panics.
     let note = lost.clone();
     raw.on_uncaptured_error(Arc::new(move |e: wgpu::Error| match e {
-        wgpu::Error::Validation { .. } if note.lock().unwrap().is_none() => panic!("{e}"),
+        wgpu::Error::Validation { .. } if note.lock().unwrap_or_else(PoisonError::into_inner).is_none() => {
+            panic!("{e}")
+        }
         e => {
-            note.lock().unwrap().get_or_insert(e.to_string());
+            note.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(e.to_string());
         }
     }));
     lost
@@ -345,7 +347,7 @@ impl Device {
 
     /// `Err` once the device was lost or ran out of memory.
     pub fn alive(&self) -> Result<()> {
-        match &*self.lost.lock().unwrap() {
+        match &*self.lost.lock().unwrap_or_else(PoisonError::into_inner) {
             None => Ok(()),
             Some(why) => Err(Fault::device(format!("{}: the device was lost: {}", self.info.name, why.trim()))
                 .cause("the driver crashed, the GPU was unplugged or reset, or its memory ran out")
@@ -357,7 +359,7 @@ impl Device {
     pub fn lose(&self) {
         self.raw.destroy();
         let _ = self.raw.poll(wgpu::PollType::Poll);
-        self.lost.lock().unwrap().get_or_insert("destroyed".into());
+        self.lost.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert("destroyed".into());
     }
 }
 
@@ -382,10 +384,10 @@ pub(super) struct Mapping(Arc<Mutex<Option<std::result::Result<(), wgpu::BufferA
 
 impl Mapping {
     pub(super) fn ready(&self) -> bool {
-        self.0.lock().unwrap().is_some()
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).is_some()
     }
     pub(super) fn done(&self) -> Result<()> {
-        match &*self.0.lock().unwrap() {
+        match &*self.0.lock().unwrap_or_else(PoisonError::into_inner) {
             Some(Ok(())) => Ok(()),
             other => Err(Fault::device(format!("a buffer could not be mapped: {other:?}"))
                 .cause("the device was lost or its memory ran out")
@@ -433,7 +435,7 @@ impl Buffer {
     pub(super) fn map(&self, mode: wgpu::MapMode, range: std::ops::Range<u64>) -> Mapping {
         let slot = Arc::new(Mutex::new(None));
         let note = slot.clone();
-        self.raw.map_async(mode, range, move |r| *note.lock().unwrap() = Some(r));
+        self.raw.map_async(mode, range, move |r| *note.lock().unwrap_or_else(PoisonError::into_inner) = Some(r));
         Mapping(slot)
     }
     pub(super) fn view(&self, range: std::ops::Range<u64>) -> Result<wgpu::BufferView> {

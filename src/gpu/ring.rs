@@ -19,6 +19,7 @@ pub struct Slot {
     header_staging: Buffer,
     /// Large results, of each of which only the first part is brought back.
     pub outputs: Vec<Output>,
+    /// Asked for last: of the upload where the place is free, of the header's staging while a batch is in it.
     mapping: Option<Mapping>,
     /// The submission that works on this place.
     at: Option<wgpu::SubmissionIndex>,
@@ -241,7 +242,9 @@ impl<T> Ring<T> {
                     device.submit(encoder.finish());
                 }
                 // The next one brings as much with it; less and less where that was noise in one batch.
-                output.sent = room.max(output.sent / 2).max(FIRST).min(staging.raw.size());
+                // wgpu copies whole words only, and a half of a half is none by itself.
+                let half = (output.sent / 2).next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT);
+                output.sent = room.max(half).max(FIRST).min(staging.raw.size());
             }
             if bytes == 0 {
                 read(i, &[]);

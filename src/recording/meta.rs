@@ -3,6 +3,7 @@
 
 use super::frame::FrameRef;
 use super::{BoardSpec, Motion};
+use crate::camera::Readout;
 use crate::fault::{Fault, Result};
 use crate::raster::{MOST_PIXELS, MOST_SIDE, Response};
 use std::collections::BTreeMap;
@@ -80,9 +81,17 @@ pub struct ImageSpec {
     pub response: Response,
     /// Where pixel centres are; only "integer coordinates" is read.
     pub pixel_centre: String,
+    /// How they were read from the sensor; none where nobody said.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub readout: Option<Readout>,
 }
 
 impl ImageSpec {
+    /// Columns and rows, px.
+    pub fn size(&self) -> [u32; 2] {
+        [self.width, self.height]
+    }
+
     /// Refuses pixel conventions, depths and sizes that are not read.
     fn check(&self) -> Result<()> {
         if self.pixel_centre != "integer coordinates" {
@@ -96,6 +105,9 @@ impl ImageSpec {
                 format!("image {}x{} with {} bits is out of range", self.width, self.height, self.bits),
                 "bits must be 8 to 16 and the size at least 1x1",
             );
+        }
+        if let Some(readout) = self.readout.filter(|r| r.step().contains(&0)) {
+            return refuse(format!("readout is {readout}"), "binning and decimation are 1 or more");
         }
         let [w, h] = [self.width, self.height];
         if w.max(h) > MOST_SIDE || u64::from(w) * u64::from(h) > MOST_PIXELS {

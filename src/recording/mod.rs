@@ -12,6 +12,7 @@ mod motion;
 mod pose_csv;
 mod poses;
 mod raw;
+mod readout;
 mod stand;
 mod taken;
 
@@ -24,6 +25,7 @@ pub use meta::{AmbientRef, Beam, ImageSpec, Meta, Sources};
 pub use motion::{Carries, Motion, MotionKind};
 pub use poses::{PoseFile, load_poses, save_poses};
 pub use raw::raw_name;
+pub use readout::{one_readout, stated_once};
 pub use stand::Stand;
 pub use taken::{Pairing, Slip, Taken};
 

@@ -4,7 +4,7 @@
 use super::hash::{hash_text, hex};
 use super::kind::{Place, Units};
 use super::{Covariance, Kind, Measured};
-use crate::camera::Intrinsics;
+use crate::camera::{Intrinsics, Readout};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Camera, Flange, Rigid};
 use serde::Serialize;
@@ -87,6 +87,9 @@ pub struct Calibration<T> {
     pub inputs: BTreeMap<String, String>,
     /// The calibrations that it was made with and is of no use without: kind to [`Calibration::content`].
     pub rests_on: BTreeMap<Kind, String>,
+    /// Of a camera: how its pictures were read from the sensor, where they said so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub readout: Option<Readout>,
     /// What was found.
     pub value: T,
     /// Of the value's parameters.
@@ -121,6 +124,7 @@ impl<T: Serialize> Calibration<T> {
             frame: kind.place(),
             inputs: BTreeMap::new(),
             rests_on: with.map(|c| (Kind::Camera, c.content())).into_iter().collect(),
+            readout: None,
             value,
             covariance,
             quality,

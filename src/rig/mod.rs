@@ -11,6 +11,7 @@ mod joint;
 mod kind;
 mod measured;
 mod once;
+mod pictures;
 mod seal;
 mod volume;
 

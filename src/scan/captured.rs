@@ -3,7 +3,7 @@
 
 use super::source::{BadShot, Shot, Source};
 use crate::capture::record::{Backlog, RecordReport, Recorded, Waits};
-use crate::capture::{Account, Fate, Format, Stream, Streamed};
+use crate::capture::{Account, Fate, Format, Pictures, Stream, Streamed};
 use crate::fault::{Fault, Result};
 use crate::recording::{FollowedFrames, FrameRef, Recording, Stand};
 use std::path::PathBuf;
@@ -40,6 +40,10 @@ fn without_stand(index: u32, name: &str) -> BadShot {
 impl Source for StreamSource {
     fn format(&self) -> Format {
         self.stream.format()
+    }
+
+    fn pictures(&self) -> Pictures {
+        self.stream.pictures()
     }
 
     fn remaining(&self) -> Option<usize> {
@@ -132,6 +136,10 @@ impl RecordedSource {
 impl Source for RecordedSource {
     fn format(&self) -> Format {
         self.format
+    }
+
+    fn pictures(&self) -> Pictures {
+        Pictures { format: self.format, readout: self.recording.meta.image.readout }
     }
 
     fn remaining(&self) -> Option<usize> {

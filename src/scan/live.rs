@@ -2,7 +2,7 @@
 //! Frame and unit: camera frame, mm.
 
 use super::engine::{Engine, Measured, Optical};
-use super::{Extraction, Format, Place, Processor, Where, camera_for};
+use super::{Extraction, Pictures, Place, Processor, Where};
 use crate::fault::Result;
 use crate::raster::Image;
 use crate::rig::{Rig, Volume};
@@ -15,20 +15,22 @@ pub struct Live {
 }
 
 impl Live {
-    /// Refused: a rig without camera or laser plane; another picture shape than the camera's; no GPU where one is asked for.
+    /// Refused: a rig without camera or laser plane; pictures that the camera's calibration does not cover; no GPU where
+    /// one is asked for.
     pub fn new(
         rig: &Rig,
-        format: Format,
+        pictures: impl Into<Pictures>,
         extraction: &Extraction,
         volume: Option<&Volume>,
         place: Where,
     ) -> Result<Live> {
         extraction.check()?;
-        let camera = camera_for(&rig.need_camera()?.value, format)?;
+        let pictures: Pictures = pictures.into();
+        let camera = rig.need_camera()?.for_pictures(pictures.size(), pictures.readout.as_ref())?;
         let laser = rig.need_laser_plane()?.value;
         let optical = Optical { camera, laser, depth_mm: Volume::depths(volume) };
         let processor: Processor = place.open()?;
-        let engine = Engine::new(format, &optical, extraction, None, processor).one_at_a_time();
+        let engine = Engine::new(pictures.format, &optical, extraction, None, processor).one_at_a_time();
         Ok(Live { engine, ready: false })
     }
 

@@ -20,7 +20,7 @@ mod shift;
 mod shots;
 mod source;
 
-pub use crate::capture::{Format, RawFormat, RawFrames};
+pub use crate::capture::{Format, Pictures, RawFormat, RawFrames};
 pub use ambient::Ambient;
 pub use captured::{RecordedSource, Say, StreamSource};
 pub use carrier::{Carrier, Place, parts_for};
@@ -39,7 +39,7 @@ pub use map::spec::{GridOptions, GridSpec};
 pub use pcd::write_pcd;
 pub use processor::{Processor, Where, Why};
 pub use refine::{PathFound, SheetFound, Straight, Thick, straight};
-pub use scanner::{Profile, Scanner, camera_for};
+pub use scanner::{Profile, Scanner};
 pub use shift::plateau::Plateau;
 pub use shift::scan::{ShiftReport, ShiftRig, Side, shift_scan};
 pub use shots::{Along, SHOTS_FILE, Shots, ShotsWriter};

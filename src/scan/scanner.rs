@@ -3,9 +3,9 @@
 //! Frame and unit: points in the carrier's frame (mostly the robot's base), mm (docs/math.md, Stripe peak; the paper's eq. 5 and 6).
 
 use super::engine::{Engine, Measured, Optical, StripeSeen};
-use super::{Along, Ambient, Carrier, CloudPoint, Extraction, Format, HotPixels, Place, Processor, Shot};
+use super::{Along, Ambient, Carrier, CloudPoint, Extraction, HotPixels, Pictures, Place, Processor, Shot};
 use crate::camera::Intrinsics;
-use crate::fault::{Fault, Result};
+use crate::fault::Result;
 use crate::geometry::{Base, Camera, Plane, Rigid, Vec2, Vec3};
 use crate::gpu::Device;
 use crate::raster::Image;
@@ -63,18 +63,20 @@ pub struct Scanner {
 
 impl Scanner {
     /// `carrier` says where the camera is at a shot; `ambient` is subtracted from every shot.
-    /// Refused: a rig without camera or laser plane; another picture shape than the camera's.
+    /// Refused: a rig without camera or laser plane; pictures that the camera's calibration does not cover.
     pub fn new(
         rig: &Rig,
         carrier: Carrier,
-        format: Format,
+        pictures: impl Into<Pictures>,
         extraction: &Extraction,
         volume: Option<&Volume>,
         ambient: Option<Image>,
         processor: Processor,
     ) -> Result<Scanner> {
         extraction.check()?;
-        let camera = camera_for(&rig.need_camera()?.value, format)?;
+        let pictures: Pictures = pictures.into();
+        let camera = rig.need_camera()?.for_pictures(pictures.size(), pictures.readout.as_ref())?;
+        let format = pictures.format;
         let laser = rig.need_laser_plane()?.value;
         let optics = Optics::new(&camera, &laser);
         let depth_mm = Volume::depths(volume);
@@ -317,21 +319,6 @@ fn quality(k: &Peak, limit_px: f32) -> f32 {
     if k.flags & SATURATED != 0 { 0.5 * spare } else { spare }
 }
 
-/// The calibrated camera at the recording's resolution: the same one, or the same lens and field of view.
-pub fn camera_for(camera: &Intrinsics, format: Format) -> Result<Intrinsics> {
-    let (w, h) = (format.width, format.height);
-    let stretch = (f64::from(w) / f64::from(camera.width)) / (f64::from(h) / f64::from(camera.height));
-    if (stretch - 1.0).abs() > 1e-3 {
-        return Err(Fault::input(format!(
-            "pictures are {w}x{h}, the camera was calibrated at {}x{}",
-            camera.width, camera.height
-        ))
-        .cause("another camera, or a region of interest set in the camera")
-        .next("calibrate with pictures of the same kind, or record with the full sensor"));
-    }
-    Ok(camera.scaled_to(w, h))
-}
-
 /// Where the sheet meets the optical axis if it is believed there, else the middle one of the places where it is seen.
 fn anchor(camera: &Intrinsics, laser: &Plane<Camera>, depth_mm: [f64; 2]) -> Vec3 {
     let [near, far] = depth_mm;
@@ -351,25 +338,4 @@ fn anchor(camera: &Intrinsics, laser: &Plane<Camera>, depth_mm: [f64; 2]) -> Vec
         .collect();
     seen.sort_by(|a, b| a.z.total_cmp(&b.z));
     seen.get(seen.len() / 2).copied().unwrap_or_else(|| laser.normal * laser.offset)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn another_picture_shape_is_refused() {
-        let camera = Intrinsics {
-            fx: 600.0,
-            fy: 600.0,
-            cx: 320.0,
-            cy: 240.0,
-            skew: 0.0,
-            distortion: Default::default(),
-            width: 640,
-            height: 480,
-        };
-        assert!(camera_for(&camera, Format { width: 4096, height: 3072, bits: 8 }).is_ok());
-        assert!(camera_for(&camera, Format { width: 640, height: 512, bits: 8 }).is_err());
-    }
 }

@@ -2,7 +2,8 @@
 //! ahead on other threads, a bounded number of them in memory.
 //! Frame and unit: robot poses are base_from_flange, mm, an axis stands at counts; pictures in grey levels of the sensor's depth.
 
-use crate::capture::{Account, Format, Latency, RawFormat, RawFrames};
+use crate::camera::Readout;
+use crate::capture::{Account, Format, Latency, Pictures, RawFormat, RawFrames};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid};
 use crate::raster::Image;
@@ -46,6 +47,10 @@ pub struct BadShot {
 pub trait Source {
     /// Size and depth of all its shots.
     fn format(&self) -> Format;
+    /// What all its shots are, and how they were read from the sensor.
+    fn pictures(&self) -> Pictures {
+        self.format().into()
+    }
     /// Number of shots still to come, where that is known.
     fn remaining(&self) -> Option<usize>;
     /// The next shot, in order; `None` at the end.
@@ -70,7 +75,7 @@ const AHEAD_BYTES: usize = 100 << 20;
 
 /// A recording folder as a source.
 pub struct RecordingSource {
-    format: Format,
+    pictures: Pictures,
     remarks: Vec<String>,
     remaining: usize,
     shots: Receiver<std::result::Result<Shot, BadShot>>,
@@ -160,7 +165,8 @@ impl RecordingSource {
         let remaining = jobs.len();
         let shots = ahead(recording.clone(), jobs, &format)?;
         let remarks = meta.image.response.remark(meta.image.bits).into_iter().collect();
-        Ok(RecordingSource { format, remarks, remaining, shots })
+        let pictures = Pictures { format, readout: meta.image.readout };
+        Ok(RecordingSource { pictures, remarks, remaining, shots })
     }
 }
 
@@ -211,7 +217,10 @@ fn counted(recording: &Recording) -> Result<Vec<Stood>> {
 
 impl Source for RecordingSource {
     fn format(&self) -> Format {
-        self.format
+        self.pictures.format
+    }
+    fn pictures(&self) -> Pictures {
+        self.pictures
     }
     fn remaining(&self) -> Option<usize> {
         Some(self.remaining)
@@ -229,6 +238,7 @@ impl Source for RecordingSource {
 /// Raw frames from a reader, each with its pose: as many frames as poses, those that are `missing` counted.
 pub struct RawSource<R: Read> {
     frames: RawFrames<R>,
+    readout: Option<Readout>,
     poses: Vec<Rigid<Base, Flange>>,
     /// Numbers of the poses whose frame never came.
     missing: BTreeSet<usize>,
@@ -250,7 +260,13 @@ impl<R: Read> RawSource<R> {
                 .cause("frames are numbered from 0")
                 .next("name the missing frames by the numbers of their poses"));
         }
-        Ok(RawSource { frames: RawFrames::new(raw, reader), poses, missing, next: 0, ended: false })
+        let frames = RawFrames::new(raw, reader);
+        Ok(RawSource { frames, readout: None, poses, missing, next: 0, ended: false })
+    }
+
+    /// Takes a person's word for how its frames are read from the sensor.
+    pub fn read_out_as(self, readout: Option<Readout>) -> RawSource<R> {
+        RawSource { readout, ..self }
     }
 
     /// Frames and poses do not go together: nobody knows which pose belongs to which frame.
@@ -268,6 +284,9 @@ impl<R: Read> RawSource<R> {
 impl<R: Read> Source for RawSource<R> {
     fn format(&self) -> Format {
         self.frames.format()
+    }
+    fn pictures(&self) -> Pictures {
+        Pictures { format: self.format(), readout: self.readout }
     }
     fn remaining(&self) -> Option<usize> {
         Some((self.next..self.poses.len()).filter(|i| !self.missing.contains(i)).count())

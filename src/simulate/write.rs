@@ -120,6 +120,7 @@ impl Plan {
                 channels: 1,
                 response: crate::raster::Response::Linear,
                 pixel_centre: "integer coordinates".into(),
+                readout: Some(station.camera.whole_sensor()),
             },
             beam,
             board: single.then(|| self.boards[0].clone()),

@@ -102,6 +102,13 @@ impl Frame {
         }
         let (tiles_x, tiles_y) = (width.div_ceil(32), height.div_ceil(8));
         let pitch = (tiles_x * 32) >> px_log2(bits);
+        // One skeleton pixel in twenty, over the whole batch, is more than a scene with a stripe ever gives: 24 lines
+        // across a picture of 480 rows. A small picture keeps all.
+        let a_shot = (u64::from(width) * u64::from(height) / 20).max((u64::from(width) * u64::from(height)).min(32768));
+        let capacity = u32::try_from(a_shot * u64::from(shots)).map_err(|_| {
+            Fault::usage(format!("{shots} shots of {width} x {height} pixels in one batch: their list has no room"))
+                .next("send fewer shots a batch")
+        })?;
         Ok(Frame {
             width,
             height,
@@ -115,9 +122,7 @@ impl Frame {
             minimum: u32::from(p.minimum),
             flags: if p.window == Window::Gaussian { GAUSSIAN } else { 0 },
             step: 0,
-            // One skeleton pixel in twenty, over the whole batch, is more than a scene with a stripe ever gives: 24 lines
-            // across a picture of 480 rows. A small picture keeps all.
-            capacity: (width * height / 20).max((width * height).min(32768)) * shots,
+            capacity,
             full_scale: (1 << bits) - 1,
             lengthen: 0,
             spacing: 0,

@@ -168,6 +168,9 @@ pub(super) fn touched(recording: &Recording, rig: &Rig, run: &RangeRun) -> Resul
     }
     let (camera, pointer) = (rig.need_camera()?, rig.need_pointer()?);
     recording.shows(Beam::Pointer)?;
+    let image = &recording.meta.image;
+    let same = camera.same_pictures(image.size(), image.readout.as_ref());
+    same.map_err(|e| e.at(recording.folder.display()))?;
     let joint = joint_covariance(&pointer.covariance);
     let carried = Carried::of(recording, rig, run)?;
     let mut remarks = rig.remarks();

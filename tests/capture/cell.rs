@@ -75,7 +75,7 @@ fn a_cells_camera_is_read_cut_off_and_read_again() {
     loop {
         said.extend(feed.news());
         match feed.next(Duration::from_secs(60)) {
-            Fed::Picture(p) => {
+            Fed::Picture(p, _) => {
                 assert_eq!((&p.image, p.count, p.device_ns), (&picture(p.id), Some(-7), Some(p.id * 10_000_000)));
                 feed.fate(Fate::Used);
             }

@@ -7,7 +7,7 @@ use super::{cloud_of, scan_folder, text};
 use crate::common::sheetlight_fails;
 use crate::common::tries::{judged, tries};
 use crate::common::wait::until;
-use sheetlight::capture::pair::{PoseFeed, Sample, Way};
+use sheetlight::capture::pair::{Counting, PoseFeed, Sample, Table, Way};
 use sheetlight::capture::{Account, CameraUri, Fate, Fed, Feed, FeedOptions, PictureSource, Stream, Streamed, now_ns};
 use sheetlight::geometry::{Base, Flange, Rigid, Vec3};
 use sheetlight::raster::Image;
@@ -59,7 +59,7 @@ fn receive(
             stop.store(true, Relaxed);
         }
         match feed.next(Duration::from_millis(50)) {
-            Fed::Picture(p) => {
+            Fed::Picture(p, _) => {
                 feed.fate(Fate::Used);
                 look(p.id, p.image);
                 heard = Instant::now();
@@ -265,6 +265,51 @@ fn a_camera_that_is_unplugged_and_comes_back_goes_on() {
         let missed = a.missed as f64 / not_taken;
         let back = said.iter().any(|s| s.contains("gone")) && said.iter().any(|s| s.contains("back after"));
         judged((), a.outages == 1 && back && (0.9..1.1).contains(&missed), format!("{missed} of it: {a} {said:?}"))
+    });
+}
+
+/// Its block ids begin at 1 again when it is back: poses of the scan's start are paired with none of these pictures.
+#[test]
+fn after_an_outage_no_picture_is_paired_by_number_with_a_pose_of_before() {
+    const BEFORE: u64 = 20;
+    tries(TRIES, || {
+        let start = || Device::start(address(9), pictures(), 40.0, 1_000_000, Faults::default());
+        let (mut device, stop) = (Some(start()), Arc::new(AtomicBool::new(false)));
+        let options = FeedOptions { stop: stop.clone(), ..FeedOptions::default() };
+        let feed = Feed::start(open(&format!("gige://{}", address(9)))?, options).unwrap();
+        let at = |row: u64| Stand::Count(row as f64);
+        let table = Table::Rows((0..100_000).map(|row| Some(at(row))).collect());
+        let mut stream = Stream::new(feed, Way::Count(Counting::new(table)));
+        let (mut used, mut said, mut left): (Vec<(u64, Option<Stand>)>, Vec<String>, u64) = Default::default();
+        loop {
+            said.extend(stream.news());
+            if used.len() as u64 >= BEFORE
+                && let Some(running) = device.take_if(|_| stream.account().outages == 0 && left == 0)
+            {
+                left = running.unplug();
+                device = Some(start());
+            }
+            if stream.account().unpaired >= BEFORE {
+                stop.store(true, Relaxed);
+            }
+            match stream.next(Duration::from_millis(50)) {
+                Streamed::Shot(shot) => {
+                    stream.fate(Fate::Used);
+                    used.push((shot.picture.id, shot.stand));
+                }
+                Streamed::Quiet => {}
+                Streamed::Ended(fault) => break assert!(fault.is_none(), "{fault:?}"),
+            }
+        }
+        let a = stream.account();
+        println!("out after {left} pictures: {a}; {said:?}");
+        assert_eq!(a.unexplained(), 0, "{a}");
+        let first = used[0].0;
+        assert!(used.iter().all(|(id, stand)| *stand == Some(at(id - first))), "{used:?}");
+        let rising = used.windows(2).all(|w| w[0].0 < w[1].0);
+        assert!(rising && used.iter().all(|(id, _)| *id <= left), "{used:?}");
+        let told = said.iter().any(|s| s.contains("are left out")) && stream.left_out()[0].why.contains("was gone");
+        judged((), told && a.outages == 1 && a.unpaired >= BEFORE, format!("{a} {said:?}"))
     });
 }
 

@@ -5,10 +5,12 @@
 use super::{json, scan_folder, text};
 use crate::common::sheetlight;
 use crate::common::tries::{judged, tries};
-use sheetlight::capture::pair::{PoseFeed, Sample, Still, Table, Way};
+use sheetlight::capture::pair::{Counting, PoseFeed, Sample, Still, Table, Way};
 use sheetlight::capture::record::{Recorder, RecorderOptions, record};
-use sheetlight::capture::{Event, Feed, FeedOptions, Format, Picture, PictureSource, RoundTrip, Stream, Streamed};
-use sheetlight::fault::Result;
+use sheetlight::capture::{
+    Event, Feed, FeedOptions, Format, Picture, PictureSource, RoundTrip, Stream, Streamed, now_ns,
+};
+use sheetlight::fault::{Fault, Result};
 use sheetlight::geometry::{Base, Flange, Rigid, Vec3};
 use sheetlight::raster::Image;
 use sheetlight::recording::{Motion, Recording, Stand, load_poses, save_poses};
@@ -219,9 +221,104 @@ fn still_is_still_and_numbers_are_not_made_up() {
     );
     assert_eq!(outcomes(arriving(plain(90, 20 * MS), 80 * MS, moves_on)).0, (3..=49).collect::<Vec<_>>());
     let table = Table::Rows((0..30).map(|k| (k != 7).then(|| pose(f64::from(k)))).collect());
-    let (paired, left) = outcomes(stream(plain(32, 20 * MS), Way::Count(table)));
+    let (paired, left) = outcomes(stream(plain(32, 20 * MS), Way::Count(Counting::new(table))));
     assert_eq!((paired.len(), left.iter().map(|l| l.0).collect::<Vec<_>>()), (29, vec![8, 31, 32]));
     assert!(left[0].1.contains("nothing is known of number 7") && left[1].1.contains("end at 30"), "{left:?}");
+}
+
+/// Five pictures, an outage, five more: its numbers begin anew, and where it had no power its clock and its counter do.
+struct Cut {
+    power: bool,
+    taken: u64,
+    gone: bool,
+}
+
+impl Cut {
+    fn clock_ns(&self) -> u64 {
+        let begun_ns = if self.gone && !self.power { 3_600_000 * MS } else { 0 };
+        now_ns() - BEGUN - begun_ns
+    }
+}
+
+impl PictureSource for Cut {
+    fn format(&self) -> Format {
+        Format { width: 1, height: 1, bits: 8 }
+    }
+    fn next(&mut self, _: Duration) -> Event {
+        if self.taken == 5 && !self.gone {
+            return Event::Lost(Fault::input("the cable is out").next("plug it in"));
+        }
+        if self.taken == 10 {
+            return Event::Ended;
+        }
+        let k = self.taken;
+        self.taken += 1;
+        let id = 1 + k % 5;
+        let count = Some(if self.power { 100 + 20 * k } else { 20 * (k % 5) } as i64);
+        let (device_ns, host_ns) = (Some(self.clock_ns()), now_ns());
+        let image = Image::from_u8(1, 1, vec![k as u8]);
+        Event::Picture(Box::new(Picture { image, id, device_ns, host_ns, exposure_ns: None, count, stand: None }))
+    }
+    fn clock(&mut self) -> Result<Option<RoundTrip>> {
+        let before_ns = now_ns();
+        Ok(Some(RoundTrip { before_ns, there_ns: self.clock_ns(), after_ns: now_ns() }))
+    }
+    fn waits(&self) -> bool {
+        true
+    }
+    fn reopens(&self) -> bool {
+        true
+    }
+    fn reopen(&mut self) -> Result<()> {
+        self.gone = true;
+        Ok(())
+    }
+    fn name(&self) -> String {
+        "cut".into()
+    }
+}
+
+#[test]
+fn after_an_outage_numbers_pair_nothing_and_a_counter_only_where_it_had_power() {
+    let rows = || Table::Rows((0..30).map(|k| Some(pose(f64::from(k)))).collect());
+    for (table, power, used) in [
+        (rows(), true, 5),
+        (Table::Pulses(20.0), true, 5),
+        (Table::Chunk, true, 10),
+        (rows(), false, 5),
+        (Table::Pulses(20.0), false, 5),
+        (Table::Chunk, false, 5),
+    ] {
+        let feed = Feed::start(Box::new(Cut { power, taken: 0, gone: false }), FeedOptions::default()).unwrap();
+        let mut stream = Stream::new(feed, Way::Count(Counting::new(table.clone())));
+        let (mut said, mut shots) = (Vec::new(), Vec::new());
+        loop {
+            match stream.next(Duration::from_millis(500)) {
+                Streamed::Shot(shot) => {
+                    stream.fate(sheetlight::capture::Fate::Used);
+                    shots.push((shot.picture.image.get(0, 0), shot.stand.unwrap()));
+                }
+                Streamed::Quiet => {}
+                Streamed::Ended(fault) => break assert!(fault.is_none()),
+            }
+            said.extend(stream.news());
+        }
+        said.extend(stream.news());
+        let a = stream.account();
+        assert_eq!((a.used, a.unpaired, a.outages, a.unexplained()), (used, 10 - used, 1, 0), "{table:?}: {a}");
+        for (k, stand) in shots {
+            let k = f64::from(k);
+            let want = match table {
+                Table::Rows(_) => pose(k),
+                Table::Pulses(_) => Stand::Count(20.0 * k),
+                Table::Chunk if power => Stand::Count(100.0 + 20.0 * k),
+                Table::Chunk => Stand::Count(20.0 * k),
+            };
+            assert_eq!(stand, want, "{table:?}, picture {k}");
+        }
+        let left = said.iter().filter(|s| s.contains("are left out")).count();
+        assert_eq!(left, usize::from(used < 10), "{table:?}: {said:?}");
+    }
 }
 
 /// A block with a wedge, rising along the motion and falling across it.

@@ -138,7 +138,7 @@ fn the_newest_picture_is_never_old_and_the_others_are_counted() {
         let mut oldest: f64 = 0.0;
         loop {
             match feed.next(Duration::from_secs(60)) {
-                Fed::Picture(p) => {
+                Fed::Picture(p, _) => {
                     // After the last one no newer comes.
                     if p.id < 47 {
                         oldest = oldest.max((sheetlight::capture::now_ns() - p.host_ns) as f64 * 1e-6);

@@ -263,6 +263,39 @@ fn a_device_with_memory_of_its_own_gives_the_same() {
     assert_eq!(chain.collect(true).unwrap().unwrap(), first, "the same pictures once more");
 }
 
+/// What is read back shrinks by halves after a full list, and wgpu copies whole words only: an eighth of this list is
+/// none.
+#[test]
+fn a_device_with_memory_of_its_own_calms_down_after_a_full_list_of_an_odd_size() {
+    let Some(device) = common::device() else { return };
+    let device = device.as_discrete();
+    let (width, height) = (2050, 1711);
+    let measure = Measure {
+        peak: PeakParams { width_px: 2.5, ..PeakParams::default() },
+        choose: ChooseParams::lenient(),
+        optics: cases::optics(width, height),
+    };
+    let config = ChainConfig { shots: 1, slots: 1, measure: Some(measure), ..ChainConfig::new(width, height, 8) };
+    let lines = drawn(width, height, 8, |_, y| if y % 16 < 3 { 200 } else { 10 });
+    let quiet = drawn(width, height, 8, |_, y| if (800..803).contains(&y) { 200 } else { 10 });
+    let pose = pose_words(&Rigid::<Base, Camera>::identity());
+    let mut chain = Chain::new(&device, &config).unwrap();
+    let mut run = |image: &Image| {
+        chain.submit_posed(0, &[image], &[pose]).unwrap();
+        chain.collect(true).unwrap().unwrap()
+    };
+    let before = run(&quiet);
+    let full = run(&lines);
+    let room = full.peaks.len();
+    assert!(full.found as usize > room && room % 2 == 1, "{} found, room for {room}", full.found);
+    for _ in 0..8 {
+        let again = run(&quiet);
+        // By their bytes: a refused peak's point is no number, which equals nothing.
+        let bytes = |batch: &Batch| bytemuck::pod_collect_to_vec::<_, u8>(&batch.points);
+        assert!(again.peaks == before.peaks && bytes(&again) == bytes(&before), "a quiet picture after a full list");
+    }
+}
+
 #[test]
 fn a_lost_device_ends_in_an_error() {
     let Some(device) = common::device() else { return };

@@ -16,6 +16,7 @@ mod golden;
 mod inputs;
 mod live;
 mod masks;
+mod readout;
 mod resume;
 mod round_parts;
 mod shift_scan;

@@ -12,7 +12,7 @@ use crate::calibrate::limits::Judgement;
 use crate::camera::{ALWAYS_NAMED, Intrinsics, NAMES};
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec2;
-use crate::recording::Recording;
+use crate::recording::{Recording, one_readout};
 use crate::rig::{Calibration, Covariance, Kind, Quality, Verdict};
 use std::collections::BTreeMap;
 
@@ -73,10 +73,12 @@ pub fn calibrate(
 ) -> Result<CameraResult> {
     options.check()?;
     let (width, height) = one_size(recordings)?;
+    let readout = one_readout(recordings)?;
     let Pictures { found, left_out, mut inputs } = pictures(recordings, &options.find, progress)?;
     let mut result = from_observations(found, left_out, width, height, options)?;
     inputs.retain(|name, _| name.ends_with("meta.json") || result.used.iter().any(|o| o.name == *name));
     result.calibration.inputs = inputs;
+    result.calibration.readout = readout;
     Ok(result)
 }
 

@@ -2,6 +2,7 @@
 //! out with the reason. Nothing is extrapolated.
 //! Frame and unit: base_from_flange, mm; counts; times in ns.
 
+mod count;
 mod feed;
 mod lines;
 mod pairer;
@@ -10,6 +11,7 @@ mod table;
 mod track;
 mod uri;
 
+pub use count::Counting;
 pub use feed::PoseFeed;
 pub use lines::{Lines, Told};
 pub use pairer::{LeftOut, Outcome, Paired, Pairer, Way};

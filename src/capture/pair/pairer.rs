@@ -1,11 +1,11 @@
 //! In: pictures as they come, a way to pair. Out: each with where things stood, in order, or left out with the reason.
 //! Frame and unit: base_from_flange, mm, or counts; times in ns.
 
+use super::count::Counting;
 use super::feed::PoseFeed;
 use super::step::Still;
-use super::table::Table;
 use crate::capture::clock::{ClockMap, Moment, now_ns};
-use crate::capture::picture::Picture;
+use crate::capture::picture::{Numbering, Picture};
 use crate::recording::{Pairing, Slip, Stand, Taken};
 use std::collections::VecDeque;
 
@@ -18,7 +18,7 @@ pub enum Way {
     /// Everything stands still at a picture.
     Step(PoseFeed, Still),
     /// By number.
-    Count(Table),
+    Count(Counting),
     /// By time. The pictures' times are late by `delay_ns`, known to `delay_sigma_ns`.
     Clock {
         /// Where poses come from.
@@ -63,20 +63,23 @@ const ARRIVAL: f64 = 1e6;
 /// Holds pictures until it is known where things stood.
 pub struct Pairer {
     way: Way,
-    first: Option<u64>,
-    waiting: VecDeque<Box<Picture>>,
+    waiting: VecDeque<(Box<Picture>, Numbering)>,
 }
 
 impl Pairer {
     /// Pairs in one way.
     pub fn new(way: Way) -> Pairer {
-        Pairer { way, first: None, waiting: VecDeque::new() }
+        Pairer { way, waiting: VecDeque::new() }
     }
 
     /// Takes in the next picture.
-    pub fn push(&mut self, picture: Box<Picture>) {
-        self.first.get_or_insert(picture.id);
-        self.waiting.push_back(picture);
+    pub fn push(&mut self, picture: Box<Picture>, numbering: Numbering) {
+        self.waiting.push_back((picture, numbering));
+    }
+
+    /// What happened since it was asked last.
+    pub fn news(&mut self) -> Vec<String> {
+        if let Way::Count(counting) = &mut self.way { counting.news() } else { Vec::new() }
     }
 
     /// Pictures that wait for a pose.
@@ -94,10 +97,10 @@ impl Pairer {
 
     /// The next outcome, in the order of the pictures; `None` where it is too early to say. With `all` nothing is waited for.
     pub fn next(&mut self, clock: &ClockMap, all: bool) -> Option<Outcome> {
-        let picture = self.waiting.front()?;
+        let (picture, numbering) = self.waiting.front()?;
         let late = all || now_ns().saturating_sub(picture.host_ns) > PATIENCE;
-        let told = self.told(picture, clock, late)?;
-        let picture = self.waiting.pop_front()?;
+        let told = self.way.told(picture, *numbering, clock, late)?;
+        let (picture, _) = self.waiting.pop_front()?;
         let Picture { id, device_ns, host_ns, exposure_ns, .. } = *picture;
         let Standing { pairing, stand, time_sigma_ns, rate, delay_ns } = match told {
             Ok(told) => told,
@@ -109,22 +112,30 @@ impl Pairer {
         let taken = taken.standing(stand.as_ref());
         Some(Ok(Paired { picture, stand, taken }))
     }
+}
 
-    fn told(&self, picture: &Picture, clock: &ClockMap, late: bool) -> Option<Result<Standing, String>> {
+impl Way {
+    fn told(
+        &mut self,
+        picture: &Picture,
+        numbering: Numbering,
+        clock: &ClockMap,
+        late: bool,
+    ) -> Option<Result<Standing, String>> {
         let plain = |pairing, stand| Standing { pairing, stand, time_sigma_ns: None, rate: None, delay_ns: None };
-        match &self.way {
+        match self {
             Way::Nothing => Some(Ok(plain(None, None))),
             Way::Given => Some(match picture.stand {
                 Some(stand) => Ok(plain(Some(Pairing::Given), Some(stand))),
                 None => Err("the source does not say where things stood".into()),
             }),
-            Way::Count(table) => {
-                let number = picture.id - self.first.unwrap_or(picture.id);
-                Some(table.at(number, picture.count).map(|s| plain(Some(Pairing::Count), Some(s))))
-            }
+            Way::Count(counting) => Some(counting.at(picture, numbering).map(|s| plain(Some(Pairing::Count), Some(s)))),
             Way::Step(poses, still) => {
                 // A picture may be long under way: where the device has a clock, its exposure was when that says.
                 let exposed = picture.exposure_ns.unwrap_or(0);
+                if let Some(Some(Err(why))) = picture.device_ns.map(|ns| clock.told(ns, picture.host_ns)) {
+                    return Some(Err(why));
+                }
                 let told = picture.device_ns.and_then(|ns| clock.host(ns));
                 let begun = told.map_or(u64::MAX, |m| (m.ns - m.sigma_ns).max(0.0) as u64);
                 let ended = told.map_or(u64::MAX, |m| (m.ns + m.sigma_ns) as u64 + exposed + AROUND);
@@ -144,7 +155,7 @@ impl Pairer {
                     Some(None) if !late => return None,
                     _ => middle(picture, clock),
                 };
-                let at = middle.ns - delay_ns;
+                let at = middle.ns - *delay_ns;
                 let Some(told) = poses.at(at.max(0.0) as u64) else {
                     return late.then(|| Err("no pose came after the picture; nothing is extrapolated".into()));
                 };

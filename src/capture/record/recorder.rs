@@ -4,6 +4,7 @@
 
 use super::super::format::{Format, raw_bytes};
 use super::super::pair::LeftOut;
+use crate::camera::Readout;
 use crate::fault::{Fault, Result};
 use crate::files::{Append, Lock};
 use crate::raster::{Image, Response};
@@ -60,6 +61,8 @@ pub struct RecorderOptions {
     pub sources: Option<Sources>,
     /// The board that pictures show, where they show one.
     pub board: Option<BoardSpec>,
+    /// How pictures are read from the sensor, where that is known.
+    pub readout: Option<Readout>,
 }
 
 /// From one wait for the disk to the next: what a power cut may cost.
@@ -232,7 +235,7 @@ fn meta(format: Format, options: &RecorderOptions) -> Meta {
         format: 1,
         set: options.set.clone(),
         units: "mm".into(),
-        image: ImageSpec { width, height, bits, channels: 1, response, pixel_centre },
+        image: ImageSpec { width, height, bits, channels: 1, response, pixel_centre, readout: options.readout },
         beam,
         board: options.board.clone(),
         boards: vec![],

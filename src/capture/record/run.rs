@@ -54,7 +54,7 @@ pub fn record(
             continue;
         }
         let slip = shot.taken.slip();
-        match recorder.add(&shot.picture.image, shot.stand.as_ref(), shot.taken, stream.feed().fill()) {
+        match recorder.add(&shot.picture.image, shot.stand.as_ref(), shot.taken, stream.feed().waiting()) {
             Ok(kept) => {
                 stream.fate(Fate::Used);
                 if let Some(handing) = on {

@@ -2,6 +2,7 @@
 //! full loses pictures, this one too.
 //! Frame and unit: the recording's; the device's clock counts ns from its start.
 
+use crate::camera::Readout;
 use crate::capture::clock::{RoundTrip, now_ns};
 use crate::capture::format::Format;
 use crate::capture::picture::{Event, Picture, PictureSource};
@@ -72,6 +73,10 @@ fn stands(recording: &Recording) -> Vec<Option<Stand>> {
 impl PictureSource for Player {
     fn format(&self) -> Format {
         self.format
+    }
+
+    fn readout(&self) -> Option<Readout> {
+        self.recording.meta.image.readout
     }
 
     fn next(&mut self, within: Duration) -> Event {

@@ -2,6 +2,7 @@
 //! any time, for the pairing by clock.
 //! Frame and unit: base_from_flange, mm, or counts; the device's clock is the host's plus the stated delay, ns.
 
+use crate::camera::Readout;
 use crate::capture::clock::{RoundTrip, now_ns};
 use crate::capture::feature::{Feature, Range, Value};
 use crate::capture::format::Format;
@@ -254,6 +255,10 @@ impl PictureSource for SimCamera {
     fn format(&self) -> Format {
         let camera = &self.motion.station.camera;
         Format { width: camera.width, height: camera.height, bits: self.motion.station.sensor.bits }
+    }
+
+    fn readout(&self) -> Option<Readout> {
+        Some(self.motion.station.camera.whole_sensor())
     }
 
     fn next(&mut self, within: Duration) -> Event {

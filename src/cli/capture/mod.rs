@@ -3,5 +3,6 @@
 
 pub mod camera;
 pub mod options;
+mod readout;
 pub mod record;
 pub mod scanning;

@@ -1,7 +1,8 @@
 //! In: --camera, --pair and what belongs to them. Out: a stream of shots; what a person should hear of it meanwhile.
 //! Frame and unit: mm, degrees, counts; s.
 
-use crate::capture::pair::{PoseFeed, PoseUri, Still, Table, Way};
+use super::readout::ReadoutArgs;
+use crate::capture::pair::{Counting, PoseFeed, PoseUri, Still, Table, Way};
 use crate::capture::{CameraUri, Feed, FeedOptions, Latency, Mode, RawFormat, Stream};
 use crate::cli::terminal::arguments::parse;
 use crate::cli::terminal::console::Console;
@@ -87,6 +88,8 @@ pub struct Running {
     /// Write the counters into this file every second, as Prometheus' node exporter reads it
     #[arg(long, value_name = "FILE", requires = "camera")]
     metrics: Option<PathBuf>,
+    #[command(flatten)]
+    pub readout: ReadoutArgs,
 }
 
 /// A running camera and what moves.
@@ -120,6 +123,7 @@ impl Running {
             shots: self.shots,
             seconds: self.seconds.map(|s| seconds("--seconds", s)).transpose()?.map(|d| d.as_secs_f64()),
             stop: crate::cli::terminal::interrupt::asked_for(),
+            readout: self.readout.stated(),
         };
         Feed::start(self.named()?.open(raw)?, options)
     }
@@ -212,7 +216,7 @@ impl Capture {
                 let [delay_ns, delay_sigma_ns] = latency.map_or([0.0; 2], |l| [1e6 * l.delay_ms, 1e6 * l.sigma_ms]);
                 Way::Clock { poses: stream()?, delay_ns, delay_sigma_ns }
             }
-            Pair::Count => Way::Count(match (poses, self.counts_per_shot) {
+            Pair::Count => Way::Count(Counting::new(match (poses, self.counts_per_shot) {
                 (Some(path), None) => {
                     Table::Rows(load_poses(path)?.poses.into_iter().map(|p| Some(Stand::Robot(p))).collect())
                 }
@@ -223,7 +227,7 @@ impl Capture {
                         .cause("a robot's poses by number, or an axis that triggers the camera or counts into its pictures")
                         .next("give --poses FILE, or --motion linear:count with --counts-per-shot N or a camera that sends its count"));
                 }
-            }),
+            })),
         })
     }
 }

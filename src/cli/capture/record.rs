@@ -62,6 +62,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         store: args.store,
         sources: Some(args.capture.sources(stream.feed())),
         board,
+        readout: stream.pictures().readout,
     };
     let recorder = Recorder::create(&args.out, stream.format(), options)?;
     let mut teller = args.capture.running.teller();

@@ -3,7 +3,7 @@
 
 use super::options::{Capture, Teller};
 use crate::capture::record::{Backlog, RecordReport, Recorder, RecorderOptions, record};
-use crate::capture::{Format, Mode, RawFormat};
+use crate::capture::{Format, Mode, RawFormat, Stream};
 use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
 use crate::raster::Image;
@@ -65,7 +65,8 @@ pub fn scan_camera(
         };
         return crate::station::scan("camera", &name, open, rig, options, progress);
     };
-    let recorder = Recorder::create(keep, stream.format(), options_of(motion, capture.sources(stream.feed())))?;
+    let recorder =
+        Recorder::create(keep, stream.format(), options_of(motion, capture.sources(stream.feed()), &stream))?;
     let meta = recorder.meta();
     let (handing, backlog) = Backlog::new();
     let report: Arc<Mutex<Option<Result<RecordReport>>>> = Arc::default();
@@ -90,7 +91,13 @@ pub fn scan_camera(
     Ok(scanned)
 }
 
-fn options_of(motion: Motion, sources: Sources) -> RecorderOptions {
+fn options_of(motion: Motion, sources: Sources, stream: &Stream) -> RecorderOptions {
     let (motion, sources) = (Some(motion), Some(sources));
-    RecorderOptions { set: "scan".into(), motion, sources, ..RecorderOptions::default() }
+    RecorderOptions {
+        set: "scan".into(),
+        motion,
+        sources,
+        readout: stream.pictures().readout,
+        ..RecorderOptions::default()
+    }
 }

@@ -38,7 +38,7 @@ pub fn calibrate_axis(
     let (Some(moved), Some(unit)) = (motion.axis(), motion.unit) else {
         unreachable!("a recording with counts is an axis', and its unit was checked")
     };
-    let seen = boards(recording, &camera.value, progress)?;
+    let seen = boards(recording, camera, progress)?;
     let mut missing = seen.missing;
     let mut found: Vec<(f64, FrameBoard)> = Vec::new();
     for b in seen.found {

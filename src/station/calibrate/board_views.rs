@@ -7,6 +7,7 @@ use crate::calibrate::measured_pose::{MeasuredPose, measure_view};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::recording::{BoardSpec, FrameRef, Recording};
+use crate::rig::Calibration;
 use rayon::prelude::*;
 
 /// The board in one frame of a recording.
@@ -33,20 +34,15 @@ pub struct Boards {
 
 /// Finds and measures the board in every frame's ambient picture. Refused: a recording without
 /// boards or ambient pictures, another picture size than the camera's.
-pub fn boards(recording: &Recording, camera: &Intrinsics, progress: &(dyn Fn(usize, usize) + Sync)) -> Result<Boards> {
+pub fn boards(
+    recording: &Recording,
+    camera: &Calibration<Intrinsics>,
+    progress: &(dyn Fn(usize, usize) + Sync),
+) -> Result<Boards> {
     let meta = &recording.meta;
-    if (meta.image.width, meta.image.height) != (camera.width, camera.height) {
-        return Err(Fault::input(format!(
-            "{}: pictures of {}x{}, the camera was calibrated at {}x{}",
-            recording.folder.display(),
-            meta.image.width,
-            meta.image.height,
-            camera.width,
-            camera.height
-        ))
-        .cause("another camera, another resolution, or a cropped picture")
-        .next("calibrate the camera at this resolution"));
-    }
+    let same = camera.same_pictures(meta.image.size(), meta.image.readout.as_ref());
+    same.map_err(|e| e.at(recording.folder.display()))?;
+    let camera = &camera.value;
     let frames: Vec<(usize, &FrameRef, &str)> =
         meta.frames.iter().enumerate().filter_map(|(i, f)| Some((i, f, f.ambient.as_deref()?))).collect();
     if frames.is_empty() {

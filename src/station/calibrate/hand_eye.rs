@@ -88,7 +88,7 @@ pub fn calibrate_hand_eye(
 ) -> Result<HandEyeResult> {
     let camera = rig.need_camera()?;
     let poses = recording.poses(run.poses.as_deref())?;
-    let seen = boards(recording, &camera.value, progress)?;
+    let seen = boards(recording, camera, progress)?;
     let mut pairs = Vec::new();
     for b in &seen.found {
         let pose = recording.pose_of(b.frame, &poses).map_err(|e| e.at(&b.pose.name))?;

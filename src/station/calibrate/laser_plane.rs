@@ -45,7 +45,7 @@ pub fn calibrate_laser_plane(
     run.solver.check()?;
     let camera = rig.need_camera()?;
     recording.shows(Beam::Line)?;
-    let Boards { found, mut missing } = boards(recording, &camera.value, progress)?;
+    let Boards { found, mut missing } = boards(recording, camera, progress)?;
     let mut seen: Vec<FrameBoard> = Vec::new();
     let mut images = Vec::new();
     let mut names = Vec::new();

@@ -46,7 +46,7 @@ pub fn calibrate_latency(
     let mut scanner = Scanner::new(
         rig,
         carrier.clone(),
-        source.format(),
+        source.pictures(),
         &settings.extraction,
         volume.as_ref(),
         None,

@@ -38,7 +38,7 @@ pub fn calibrate_pointer(
     run.solver.check()?;
     let camera = rig.need_camera()?;
     recording.shows(Beam::Pointer)?;
-    let Boards { found, mut missing } = boards(recording, &camera.value, progress)?;
+    let Boards { found, mut missing } = boards(recording, camera, progress)?;
     let mut pictures = Vec::new();
     for b in found {
         match &recording.meta.frames[b.frame].laser {

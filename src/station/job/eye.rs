@@ -2,7 +2,7 @@
 
 use super::snapshots::Snapshots;
 use crate::arm::Switchboard;
-use crate::capture::{Format, PictureSource};
+use crate::capture::{PictureSource, Pictures};
 use crate::fault::Result;
 use crate::raster::Image;
 use crate::recording::Beam;
@@ -20,9 +20,9 @@ impl Eye {
         Eye { snapshots: Snapshots::new(camera), lights }
     }
 
-    /// Width, height and depth of its pictures.
-    pub fn format(&self) -> Format {
-        self.snapshots.format()
+    /// What its pictures are, and how they are read from the sensor.
+    pub fn pictures(&self) -> Pictures {
+        self.snapshots.pictures()
     }
 
     /// A picture that was begun after now, lit by one laser or by the room's lamp alone (`None`). A laser stays on

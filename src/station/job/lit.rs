@@ -20,11 +20,11 @@ const LEAST_SHARE: f64 = 0.1;
 
 /// Refuses where a picture with the line on has no stripe at a depth that can be.
 pub fn line_is_seen(eye: &mut Eye, arm: &mut dyn Arm, rig: &Rig, settings: &Settings, folder: &Path) -> Result<()> {
-    let mut record = Record::begin(folder, "is the line seen", Beam::Line, eye.format())?;
+    let mut record = Record::begin(folder, "is the line seen", Beam::Line, eye.pictures())?;
     let shot = shoot(eye, arm, &mut record, Some(Beam::Line));
     eye.lights.after(shot)?;
     let run = ScanOptions { place: Where::Cpu, ..ScanOptions::for_station(settings, rig, &folder.join("scan")) };
-    let format = eye.format();
+    let format = eye.pictures().format;
     let least = (LEAST_SHARE * f64::from(format.width.min(format.height))).ceil() as u64;
     let seen = scan_recording(&record.end()?, None, rig, &run, |_, _| {});
     let (points, why) = match seen {

@@ -91,15 +91,8 @@ impl<'a> Job<'a> {
         rig.belong_together()?;
         rig.need_hand_eye()?;
         rig.need_pointer()?;
-        let (format, camera_of) = (camera.format(), rig.need_camera()?.value);
-        if [format.width, format.height] != [camera_of.width, camera_of.height] {
-            return Err(Fault::input(format!(
-                "the camera sends {}x{}, the station was calibrated with {}x{}",
-                format.width, format.height, camera_of.width, camera_of.height
-            ))
-            .cause("another camera, or another region of it")
-            .next("set the camera as it was calibrated, or calibrate it anew"));
-        }
+        let format = camera.format();
+        rig.need_camera()?.same_pictures([format.width, format.height], camera.readout().as_ref())?;
         if settings.tool.is_none() {
             return Err(Fault::usage("where the gripper's tool is on the flange is not known")
                 .cause("station.toml has no [tool]")
@@ -278,7 +271,7 @@ impl<'a> Job<'a> {
         let legs = [planned.square].into_iter().chain(planned.flanges).map(|p| self.leg(p)).collect();
         let evidence = Evidence { normal: Some(normal), ..Evidence::default() };
         let plan = self.plan("scan", format!("look squarely, then {shots} shots over {length:.0} mm"), legs, evidence);
-        let mut record = Record::begin(&self.options.out.join("line"), "scan", Beam::Line, self.eye.format())?;
+        let mut record = Record::begin(&self.options.out.join("line"), "scan", Beam::Line, self.eye.pictures())?;
         self.go("scan", says, "is the path free?", plan, &mut |eye, arm, k| match k {
             0 => {
                 settle();

@@ -2,7 +2,7 @@
 //! Frame and unit: base_from_flange, mm.
 
 use crate::arm::TimedPose;
-use crate::capture::Format;
+use crate::capture::Pictures;
 use crate::fault::Result;
 use crate::geometry::{Base, Flange, Rigid};
 use crate::raster::{Image, Response, save_png};
@@ -18,10 +18,11 @@ pub struct Record {
 
 impl Record {
     /// Begins one; what stood there goes.
-    pub fn begin(folder: &Path, name: &str, beam: Beam, format: Format) -> Result<Record> {
+    pub fn begin(folder: &Path, name: &str, beam: Beam, pictures: Pictures) -> Result<Record> {
         crate::files::make_folder(folder)?;
         let meta = folder.join("meta.json");
         crate::files::remove(&meta).map_err(|e| crate::fault::Fault::write(&meta, e))?;
+        let Pictures { format, readout } = pictures;
         let image = ImageSpec {
             width: format.width,
             height: format.height,
@@ -29,6 +30,7 @@ impl Record {
             channels: 1,
             response: Response::Linear,
             pixel_centre: "integer coordinates".into(),
+            readout,
         };
         let meta = Meta {
             format: 1,

@@ -1,6 +1,6 @@
 //! Pictures of a running camera that were begun after they were asked for.
 
-use crate::capture::{Event, Format, PictureSource};
+use crate::capture::{Event, PictureSource, Pictures};
 use crate::fault::{Fault, Result};
 use crate::raster::Image;
 use std::time::{Duration, Instant};
@@ -21,9 +21,9 @@ impl Snapshots {
         Snapshots { camera }
     }
 
-    /// Width, height and depth of its pictures.
-    pub fn format(&self) -> Format {
-        self.camera.format()
+    /// What its pictures are, and how they are read from the sensor.
+    pub fn pictures(&self) -> Pictures {
+        Pictures { format: self.camera.format(), readout: self.camera.readout() }
     }
 
     /// A picture that was begun after now, in whatever light there is.

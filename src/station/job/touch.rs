@@ -95,7 +95,7 @@ impl Job<'_> {
         )];
         let plan = self.plan(around.name, format!("touch the board at {count} places"), legs, Evidence::default());
         let folder = self.options.out.join(around.name);
-        let mut record = Record::begin(&folder, around.name, Beam::Pointer, self.eye.format())?;
+        let mut record = Record::begin(&folder, around.name, Beam::Pointer, self.eye.pictures())?;
         self.go(around.name, says, "is the way free?", plan, &mut |eye, arm, _| {
             shoot(eye, arm, &mut record, Some(Beam::Pointer))
         })?;
@@ -133,7 +133,7 @@ impl Job<'_> {
     /// How far the board is, and where the flange stood; nothing moves.
     fn first_touch(&mut self) -> Result<(f64, Rigid<Base, Flange>)> {
         let mut record =
-            Record::begin(&self.options.out.join("first"), "first touch", Beam::Pointer, self.eye.format())?;
+            Record::begin(&self.options.out.join("first"), "first touch", Beam::Pointer, self.eye.pictures())?;
         let link = self.guard.link();
         let shot = shoot(&mut self.eye, link, &mut record, Some(Beam::Pointer));
         self.eye.lights.after(shot)?;

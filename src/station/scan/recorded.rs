@@ -61,6 +61,8 @@ fn identity(recording: &Recording, poses: Option<&str>, ambient: Option<&Image>)
     if let Some(name) = &recording.meta.frames_file {
         meta += &hash_file(&recording.inside(name)?)?;
     }
+    // Also by a person's word.
+    meta += &recording.meta.image.readout.map_or(String::new(), |r| r.to_string());
     let ambient = ambient.map(|image| match &image.pixels {
         Pixels::U8(px) => hash_text(px),
         Pixels::U16(px) => hash_text(bytemuck::cast_slice(px)),

@@ -17,7 +17,7 @@ use crate::recording::Motion;
 use crate::rig::{Rig, Volume};
 use crate::scan::{
     BadShot, Carrier, CloudWriter, Extraction, GridOptions, Processor, Profile, SHOTS_FILE, Scanner, Shots,
-    ShotsWriter, Source, Where, camera_for, parts_for,
+    ShotsWriter, Source, Where, parts_for,
 };
 use std::collections::VecDeque;
 use std::path::{Path, PathBuf};
@@ -185,15 +185,15 @@ impl<'a> Work<'a> {
             CloudWriter::create_in(&cloud_path, options.motion.frame())?
         };
         let total = source.remaining().map(|n| n + first - repeated);
-        let (format, volume) = (source.format(), options.volume.as_ref());
+        let (pictures, volume) = (source.pictures(), options.volume.as_ref());
         let carrier = Carrier::new(rig, &options.motion)?;
         let ambient = options.ambient.clone();
-        let scanner = Scanner::new(rig, carrier, format, &options.extraction, volume, ambient, processor)?.resumed(
+        let scanner = Scanner::new(rig, carrier, pictures, &options.extraction, volume, ambient, processor)?.resumed(
             state.stripe,
             state.hot.clone(),
             state.first_place(),
         );
-        let camera = camera_for(&rig.need_camera()?.value, format)?;
+        let camera = rig.need_camera()?.for_pictures(pictures.size(), pictures.readout.as_ref())?;
         let seen = Seen::new(&camera, &rig.need_laser_plane()?.value, Volume::depths(volume));
         let print = rig.fingerprint();
         let shots = if resumed {

@@ -72,15 +72,8 @@ impl Session {
         rig.belong_together()?;
         rig.need_hand_eye()?;
         rig.need_laser_plane()?;
-        let (format, of_rig) = (camera.format(), rig.need_camera()?.value);
-        if [format.width, format.height] != [of_rig.width, of_rig.height] {
-            return Err(Fault::input(format!(
-                "the camera sends {}x{}, the station was calibrated with {}x{}",
-                format.width, format.height, of_rig.width, of_rig.height
-            ))
-            .cause("another camera, or another region of it")
-            .next("set the camera as it was calibrated, or calibrate it anew"));
-        }
+        let format = camera.format();
+        rig.need_camera()?.same_pictures([format.width, format.height], camera.readout().as_ref())?;
         if !options.recipes.is_dir() {
             return Err(Fault::usage(format!("{}: is no folder of recipes", options.recipes.display()))
                 .next("give the folder in which NAME.toml lies for each FIND NAME"));
@@ -127,7 +120,7 @@ impl Session {
         let free = (self.scans..).find(|k| !self.options.out.join(format!("scan_{k:04}")).exists());
         self.scans = free.expect("numbers do not end");
         let folder = self.options.out.join(format!("scan_{:04}", self.scans));
-        let record = Record::begin(&folder.join("line"), "scan", Beam::Line, self.camera.format()).map_err(ours)?;
+        let record = Record::begin(&folder.join("line"), "scan", Beam::Line, self.camera.pictures()).map_err(ours)?;
         let last = Rigid::from_vectors(&Vec3::zeros(), Vec3::zeros());
         self.scan = Some(Scan { record, shots: 0, last });
         Ok("0".into())

@@ -4,7 +4,7 @@
 
 use super::lent::Lent;
 use super::state::{Looked, State, Use, lock};
-use crate::capture::{CameraUri, Fate, Fed, Feed, FeedOptions, Format, Mode, PictureSource, RawFormat, now_ns};
+use crate::capture::{CameraUri, Fate, Fed, Feed, FeedOptions, Mode, PictureSource, Pictures, RawFormat, now_ns};
 use crate::fault::{Fault, Result};
 use crate::rig::Rig;
 use crate::scan::{Live, Where};
@@ -220,11 +220,11 @@ fn look(
     let mut number = lock(tell).newest.as_ref().map_or(0, |l| l.number);
     while !ends() {
         if uses.renewed.swap(false, Ordering::SeqCst) {
-            live = begin(station, feed.format());
+            live = begin(station, feed.pictures());
             lock(tell).wrong = live.as_ref().err().map(|fault| fault.what.clone());
         }
         let picture = match feed.next(WITHIN) {
-            Fed::Picture(picture) => picture,
+            Fed::Picture(picture, _) => picture,
             Fed::Quiet => continue,
             Fed::Ended(fault) => {
                 lock(tell).account = feed.account();
@@ -272,7 +272,7 @@ fn look(
 }
 
 /// The chain for pictures like these.
-fn begin(station: &Path, format: Format) -> Result<Live> {
+fn begin(station: &Path, pictures: Pictures) -> Result<Live> {
     let (settings, rig) = (Settings::load(station)?, Rig::load(station)?);
-    Live::new(&rig, format, &settings.extraction, volume::believed(&settings, &rig).as_ref(), Where::default())
+    Live::new(&rig, pictures, &settings.extraction, volume::believed(&settings, &rig).as_ref(), Where::default())
 }

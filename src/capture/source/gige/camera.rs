@@ -4,6 +4,7 @@
 use super::find::find;
 use super::numbers::Numbers;
 use super::pixels::{depth, unpack};
+use crate::camera::Readout;
 use crate::capture::clock::{RoundTrip, now_ns};
 use crate::capture::feature::{Feature, Range, Value};
 use crate::capture::format::Format;
@@ -30,8 +31,14 @@ const FORMER: [(&str, &str); 5] = [
     ("AcquisitionFrameRateEnable", "AcquisitionFrameRateEnabled"),
 ];
 /// Set again, in this order, where a camera comes back without.
-const SETTINGS: [&str; 15] = [
+const SETTINGS: [&str; 21] = [
     "PixelFormat",
+    "BinningHorizontal",
+    "BinningVertical",
+    "DecimationHorizontal",
+    "DecimationVertical",
+    "ReverseX",
+    "ReverseY",
     "Width",
     "Height",
     "OffsetX",
@@ -58,6 +65,7 @@ pub struct GigeCamera {
     camera: Camera<GigeRegisterIo>,
     stream: Option<FrameStream>,
     format: Format,
+    readout: Option<Readout>,
     pixel_format: String,
     exposure_ns: Option<u64>,
     /// ns a tick of its clock.
@@ -107,6 +115,7 @@ impl GigeCamera {
             camera,
             stream: None,
             format: Format { width: 1, height: 1, bits: 8 },
+            readout: None,
             pixel_format: String::new(),
             exposure_ns: None,
             tick_ns: 1.0,
@@ -132,6 +141,7 @@ impl GigeCamera {
         };
         self.pixel_format = self.camera.get_enum("PixelFormat").map_err(|e| said(&format!("{at}: PixelFormat"), &e))?;
         self.format = Format { width, height, bits: depth(&self.pixel_format).map_err(|e| e.at(&at))? };
+        self.readout = super::readout::of(&self.camera);
         let exposure = EXPOSURE.iter().find_map(|name| self.camera.get_float(name).ok());
         self.exposure_ns = exposure.filter(|us| (0.0..1e9).contains(us)).map(|us| (1e3 * us) as u64);
         let ticks = TICKS.iter().find_map(|name| self.camera.get_integer(name).ok()).filter(|hz| *hz > 0);
@@ -216,6 +226,10 @@ impl PictureSource for GigeCamera {
         self.format
     }
 
+    fn readout(&self) -> Option<Readout> {
+        self.readout
+    }
+
     fn next(&mut self, within: Duration) -> Event {
         self.receive(within)
     }
@@ -243,7 +257,7 @@ impl PictureSource for GigeCamera {
         self.stream = None;
         let (at, device) = (format!("gige://{}", self.word), find(&self.word)?);
         self.camera = blocking::connect(&device).map_err(|e| said(&at, &e))?;
-        let former = self.format;
+        let former = (self.format, self.readout);
         for (name, value) in self.kept.clone() {
             let is = self.feature(name).and_then(|f| f.value);
             if is.is_some_and(|v| v.to_string() != value) {
@@ -251,8 +265,15 @@ impl PictureSource for GigeCamera {
             }
         }
         self.look()?;
-        if self.format != former {
-            return Err(Fault::input(format!("the camera is {} now, was {former}", self.format)).next("start again"));
+        if self.format != former.0 {
+            return Err(
+                Fault::input(format!("the camera is {} now, was {}", self.format, former.0)).next("start again")
+            );
+        }
+        if self.readout != former.1 {
+            let words = |r: Option<Readout>| r.map_or("not known".into(), |r| r.to_string());
+            let (now, was) = (words(self.readout), words(former.1));
+            return Err(Fault::input(format!("the camera's readout is {now}; it was {was}")).next("start again"));
         }
         self.start()
     }

@@ -5,6 +5,7 @@ mod camera;
 mod find;
 mod numbers;
 mod pixels;
+mod readout;
 
 pub use camera::GigeCamera;
 pub use find::{Found, find, found, interfaces};

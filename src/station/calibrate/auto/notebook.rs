@@ -94,6 +94,7 @@ impl Notebook {
             channels: 1,
             response: Response::Linear,
             pixel_centre: "integer coordinates".into(),
+            readout: None,
         };
         match self.image.get_or_insert_with(|| spec.clone()) {
             known if *known == spec => Ok(()),

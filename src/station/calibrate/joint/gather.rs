@@ -4,9 +4,10 @@
 
 use crate::calibrate::boards::{BoardView, FindOptions, find};
 use crate::calibrate::joint::shots::Reported;
+use crate::camera::Readout;
 use crate::fault::{Fault, Kind, Result};
 use crate::geometry::{Base, Flange, Rigid};
-use crate::recording::{Beam, BoardSpec, Recording};
+use crate::recording::{Beam, BoardSpec, Recording, one_readout};
 use crate::rig::hash_file;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -49,6 +50,8 @@ pub struct Gathered {
     pub missing: Vec<(String, String)>,
     /// Name to SHA-256 of everything that went in.
     pub inputs: BTreeMap<String, String>,
+    /// How all pictures were read from the sensor, where all recordings say so.
+    pub readout: Option<Readout>,
     /// How many places boards stood at.
     pub places: usize,
 }
@@ -106,7 +109,8 @@ pub fn gather(
             .cause("boards are found in pictures taken in room light, the lasers off")
             .next("record an ambient picture with each frame"));
     }
-    let out = Gathered { inputs, ..Gathered::default() };
+    let readout = one_readout(recordings)?;
+    let out = Gathered { inputs, readout, ..Gathered::default() };
     let mut gathering = Gathering { recordings, robots, places: Vec::new(), known: BTreeMap::new(), out };
     for (f, (hash, view)) in frames.iter().zip(boards(recordings, &frames, progress)?) {
         match view {

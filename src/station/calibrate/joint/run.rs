@@ -276,6 +276,7 @@ fn records(fit: &JointFit, hand_eye: Kind, quality: &Quality, gathered: &Gathere
     let mut take = |kind| covariances.remove(&kind).unwrap_or_default();
     let mut camera = Calibration::new(Kind::Camera, fit.state.camera, None, take(Kind::Camera), quality.clone());
     camera.inputs = gathered.inputs.clone();
+    camera.readout = gathered.readout;
     let x = fit.state.near_from_camera;
     let mut rig = Rig::default();
     if fit.has(Part::Stripe) {

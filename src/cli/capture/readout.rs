@@ -1,0 +1,41 @@
+//! A person's word for how pictures were read from the sensor, where neither camera nor recording says so.
+
+use crate::camera::Readout;
+
+/// What pictures show of the sensor.
+#[derive(Clone, clap::Args)]
+pub struct ReadoutArgs {
+    /// Pictures that are smaller than the calibrated ones are a region of the sensor; this is its left upper corner
+    /// (OffsetX and OffsetY of the camera); only where neither camera nor meta.json says so
+    #[arg(long, value_name = "X,Y", value_parser = crate::cli::terminal::arguments::parse::<Corner>)]
+    region: Option<Corner>,
+    /// Pictures that are smaller than the calibrated ones are binned: so many pixels each way are one; only where
+    /// neither camera nor meta.json says so
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
+    binned: Option<u32>,
+}
+
+/// X,Y in pixels.
+#[derive(Clone, Copy)]
+struct Corner([u32; 2]);
+
+impl std::str::FromStr for Corner {
+    type Err = String;
+    fn from_str(s: &str) -> Result<Corner, String> {
+        let numbers: Vec<u32> = s.split(',').map_while(|w| w.trim().parse().ok()).collect();
+        <[u32; 2]>::try_from(numbers)
+            .map(Corner)
+            .map_err(|_| format!("'{s}' is no corner: two whole numbers, 1024,768"))
+    }
+}
+
+impl ReadoutArgs {
+    /// What was said; none where nothing was.
+    pub fn stated(&self) -> Option<Readout> {
+        if self.region.is_none() && self.binned.is_none() {
+            return None;
+        }
+        let offset_px = self.region.map_or([0; 2], |c| c.0);
+        Some(Readout { offset_px, binning: [self.binned.unwrap_or(1); 2], ..Readout::default() })
+    }
+}

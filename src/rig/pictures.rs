@@ -1,0 +1,158 @@
+//! Which camera model belongs to pictures of another size, or another part of the sensor, than the calibrated one.
+
+use super::Calibration;
+use crate::camera::{Intrinsics, Readout};
+use crate::fault::{Fault, Result};
+
+impl Calibration<Intrinsics> {
+    /// The camera of pictures of this size (columns, rows), and of the part of the sensor that is stated: the
+    /// calibrated one where they are as it was calibrated.
+    ///
+    /// # Errors
+    /// Another size than the calibrated one, and nobody says what the pictures show; pictures that this camera cannot
+    /// send.
+    pub fn for_pictures(&self, size: [u32; 2], readout: Option<&Readout>) -> Result<Intrinsics> {
+        let (camera, same_size) = (&self.value, size == self.size());
+        let known = match (self.readout.as_ref(), readout) {
+            (Some(known), Some(stated)) if !same_size || !same(known, stated) => *known,
+            // Made before calibrations said what they were made with: of the whole sensor, or of pictures like these.
+            (None, Some(_)) if !same_size => Readout { sensor_px: Some(self.size()), ..Readout::default() },
+            (_, None) if !same_size => return Err(self.another(size).next(UNSTATED)),
+            _ => return Ok(*camera),
+        };
+        let stated = readout.expect("all others are answered above");
+        if stated.reversed != known.reversed {
+            return Err(self.another(size).cause("the pictures are mirrored, or those of the calibration were").next(
+                "set ReverseX and ReverseY of the camera as they were when it was calibrated, or calibrate it anew",
+            ));
+        }
+        let whole = known.to_whole(camera);
+        let (sensor, reach) = (known.sensor_px.or(stated.sensor_px), stated.reach(size));
+        let [step, own] = [stated.step(), known.step()].map(|[x, y]| x.max(y));
+        // What is no whole binned pixel is not read.
+        let another =
+            stated.sensor_px.zip(sensor).is_some_and(|(a, b)| (0..2).any(|i| a[i].abs_diff(b[i]) >= step.max(own)));
+        if another || sensor.is_some_and(|[w, h]| reach[0] > u64::from(w) || reach[1] > u64::from(h)) {
+            return Err(self
+                .another(size)
+                .cause(format!("the pictures are of another sensor, or their part of it is wrong: {stated}"))
+                .next("use the station of this camera, or calibrate it with pictures of the same kind"));
+        }
+        Ok(stated.of_whole(&whole, size))
+    }
+
+    /// Refuses pictures that are not as the camera was calibrated: of work that goes with the calibrated camera only.
+    ///
+    /// # Errors
+    /// Another size, another part of the sensor.
+    pub fn same_pictures(&self, size: [u32; 2], readout: Option<&Readout>) -> Result<()> {
+        if size == self.size() && self.for_pictures(size, readout)? == self.value {
+            return Ok(());
+        }
+        Err(self
+            .another(size)
+            .next("set the camera as it was when it was calibrated, or calibrate it with pictures of the same kind"))
+    }
+
+    fn size(&self) -> [u32; 2] {
+        [self.value.width, self.value.height]
+    }
+
+    fn another(&self, [w, h]: [u32; 2]) -> Fault {
+        let ([width, height], readout) = (self.size(), self.readout.map_or(String::new(), |r| format!(" ({r})")));
+        Fault::input(format!("pictures are {w}x{h}, the camera was calibrated at {width}x{height}{readout}"))
+            .cause("another camera, or another region, binning or decimation set in it")
+    }
+}
+
+const UNSTATED: &str = "say what the pictures show: --region X,Y or --binned N, or 'readout' in meta.json \
+     (docs/file-formats.md); or record with the settings that the camera was calibrated with";
+
+/// Two statements of one and the same setting.
+fn same(a: &Readout, b: &Readout) -> bool {
+    Readout { sensor_px: None, ..*a } == Readout { sensor_px: None, ..*b }
+        && a.sensor_px.zip(b.sensor_px).is_none_or(|(a, b)| a == b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rig::{Covariance, Kind, Quality, Verdict};
+
+    fn calibrated(readout: Option<Readout>) -> Calibration<Intrinsics> {
+        let camera = Intrinsics {
+            fx: 600.0,
+            fy: 600.0,
+            cx: 320.0,
+            cy: 240.0,
+            skew: 0.0,
+            distortion: Default::default(),
+            width: 640,
+            height: 480,
+        };
+        let quality = Quality {
+            verdict: Verdict::Good,
+            reasons: vec![],
+            advice: vec![],
+            figures: Default::default(),
+            per_picture: vec![],
+        };
+        Calibration { readout, ..Calibration::new(Kind::Camera, camera, None, Covariance::default(), quality) }
+    }
+
+    fn region(x: u32, y: u32) -> Readout {
+        Readout { offset_px: [x, y], ..Readout::default() }
+    }
+
+    #[test]
+    fn a_size_that_nobody_explains_is_refused() {
+        for camera in [calibrated(None), calibrated(Some(Readout::default()))] {
+            assert_eq!(camera.for_pictures([640, 480], None).unwrap(), camera.value);
+            // The aspect of the calibrated size, half of it, and another one.
+            for size in [[320, 240], [640, 240], [1280, 960]] {
+                let said = camera.for_pictures(size, None).unwrap_err();
+                assert!(said.what.contains("640x480") && said.next.contains("--region"), "{said}");
+                assert!(camera.same_pictures(size, None).is_err());
+            }
+            let cut = camera.for_pictures([320, 240], Some(&region(100, 50))).unwrap();
+            assert_eq!((cut.fx, cut.cx, cut.cy, cut.width), (600.0, 220.0, 190.0, 320));
+            let wide = camera.for_pictures([640, 100], Some(&region(0, 200))).unwrap();
+            assert_eq!((wide.cx, wide.cy, wide.height), (320.0, 40.0, 100));
+            let binned = Readout { binning: [2, 2], ..Readout::default() };
+            let half = camera.for_pictures([320, 240], Some(&binned)).unwrap();
+            assert_eq!((half.fx, half.cx), (300.0, 159.75));
+            assert!(camera.same_pictures([320, 240], Some(&binned)).is_err());
+        }
+    }
+
+    #[test]
+    fn pictures_that_this_camera_cannot_send_are_refused() {
+        let camera = calibrated(None);
+        let refused = |size, readout: Readout| camera.for_pictures(size, Some(&readout)).unwrap_err();
+        assert!(refused([320, 240], region(400, 0)).cause.contains("another sensor"));
+        assert!(refused([1280, 960], Readout::default()).cause.contains("another sensor"));
+        assert!(
+            refused([320, 240], Readout { sensor_px: Some([4096, 3072]), ..region(9, 9) }).cause.contains("4096x3072")
+        );
+        assert!(refused([320, 240], Readout { reversed: [true, false], ..region(9, 9) }).cause.contains("mirrored"));
+        // 641 columns are 320 binned ones.
+        let odd = Readout { binning: [2, 2], sensor_px: Some([641, 480]), ..Readout::default() };
+        assert!(camera.for_pictures([320, 240], Some(&odd)).is_ok());
+    }
+
+    #[test]
+    fn a_calibration_that_says_what_it_was_made_with_is_followed() {
+        // Made with the middle of a sensor of 1280x960.
+        let camera = calibrated(Some(Readout { sensor_px: Some([1280, 960]), ..region(320, 240) }));
+        let moved = Readout { sensor_px: Some([1280, 960]), ..region(330, 200) };
+        let same_size = camera.for_pictures([640, 480], Some(&moved)).unwrap();
+        assert_eq!((same_size.cx, same_size.cy), (310.0, 280.0));
+        assert!(camera.same_pictures([640, 480], Some(&moved)).is_err());
+        assert_eq!(camera.for_pictures([640, 480], camera.readout.as_ref()).unwrap(), camera.value);
+        assert_eq!(camera.for_pictures([640, 480], Some(&region(320, 240))).unwrap(), camera.value);
+        let whole = Readout { sensor_px: Some([1280, 960]), ..Readout::default() };
+        assert_eq!(camera.for_pictures([1280, 960], Some(&whole)).unwrap().cx, 640.0);
+        // One that does not say so is taken for one of pictures like these.
+        assert_eq!(calibrated(None).for_pictures([640, 480], Some(&moved)).unwrap().cx, 320.0);
+    }
+}

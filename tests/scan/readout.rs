@@ -1,0 +1,169 @@
+//! Pictures of a region of the sensor, and binned ones, give the points of the whole ones; unexplained ones are refused.
+
+use crate::common::{sheetlight, sheetlight_fails};
+use sheetlight::camera::Readout;
+use sheetlight::geometry::Vec3;
+use sheetlight::raster::{Image, save_png};
+use sheetlight::recording::{Motion, Recording};
+use sheetlight::rig::Rig;
+use sheetlight::scan::{
+    Carrier, CloudPoint, Extraction, Format, Pictures, Processor, RecordingSource, Scanner, Source,
+};
+use std::path::{Path, PathBuf};
+
+/// A simulated recording of 640x480 pictures.
+struct Whole {
+    dir: tempfile::TempDir,
+    rig: Rig,
+    images: Vec<Image>,
+}
+
+impl Whole {
+    fn new() -> Whole {
+        let dir = tempfile::tempdir().unwrap();
+        let out = dir.path().join("sim");
+        sheetlight(&["simulate", "--out", out.to_str().unwrap(), "--width", "640", "--shots", "10", "--quiet"]);
+        let recording = Recording::open(&out.join("scan")).unwrap();
+        let names = recording.meta.frames.iter().filter_map(|f| f.laser.clone());
+        let images = names.map(|n| recording.picture(&n).unwrap()).collect();
+        Whole { rig: Rig::load(&out.join("station")).unwrap(), dir, images }
+    }
+
+    fn folder(&self, name: &str) -> PathBuf {
+        self.dir.path().join("sim").join(name)
+    }
+
+    /// The points of these pictures, one a shot of the recording.
+    fn points(&self, images: &[Image], readout: Option<Readout>) -> Vec<CloudPoint> {
+        let carrier = Carrier::new(&self.rig, &Motion::default()).unwrap();
+        let extraction = Extraction { measure_stripe: false, ..Extraction::default() };
+        let pictures = Pictures { format: Format::of(&images[0]), readout };
+        let mut scanner =
+            Scanner::new(&self.rig, carrier, pictures, &extraction, None, None, Processor::host()).unwrap();
+        let mut source = RecordingSource::open(&Recording::open(&self.folder("scan")).unwrap(), None, 0).unwrap();
+        for image in images {
+            let shot = source.next().unwrap().unwrap();
+            scanner.push(sheetlight::scan::Shot { image: image.clone(), ..shot }).unwrap();
+        }
+        scanner.finish().unwrap().into_iter().flat_map(|p| p.points).collect()
+    }
+}
+
+fn image(width: u32, height: u32, of: impl Fn(u32, u32) -> u32) -> Image {
+    Image::from_u8(width, height, (0..width * height).map(|i| of(i % width, i / width) as u8).collect())
+}
+
+fn region(whole: &Image, [left, top]: [u32; 2], [width, height]: [u32; 2]) -> Image {
+    image(width, height, |x, y| whole.get(left + x, top + y).into())
+}
+
+/// Two by two pixels are one.
+fn binned(whole: &Image) -> Image {
+    let sum = |x: u32, y: u32| -> u32 {
+        [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(i, j)| u32::from(whole.get(x + i, y + j))).iter().sum()
+    };
+    image(whole.width / 2, whole.height / 2, |x, y| (sum(2 * x, 2 * y) + 2) / 4)
+}
+
+#[test]
+fn a_region_gives_the_points_of_the_whole_picture() {
+    let whole = Whole::new();
+    let full = whole.points(&whole.images, None);
+    // The first has the aspect of the whole picture, the second has not.
+    for ([left, top], size) in [([150, 110], [320, 240]), ([37, 101], [560, 290])] {
+        let images: Vec<Image> = whole.images.iter().map(|i| region(i, [left, top], size)).collect();
+        let readout = Readout { offset_px: [left, top], ..Readout::default() };
+        let part = whole.points(&images, Some(readout));
+        let (mut compared, mut worst) = (0, 0f64);
+        for p in &part {
+            let (u, v) = (p.u + left as f32, p.v + top as f32);
+            let inside = |at: f32, size: u32| at > 40.0 && at < size as f32 - 40.0;
+            if !inside(p.u, size[0]) || !inside(p.v, size[1]) {
+                continue;
+            }
+            let there = |f: &&CloudPoint| f.shot == p.shot && (f.u - u).abs() < 0.01 && (f.v - v).abs() < 0.01;
+            let Some(f) = full.iter().find(there) else { continue };
+            compared += 1;
+            worst = worst.max((f.at() - p.at()).norm());
+        }
+        println!("{size:?} at {left}, {top}: {compared} of {} points compared, {worst:.6} mm", part.len());
+        assert!(compared > 500 && worst < 2e-3, "{compared} of {} compared, {worst} mm", part.len());
+    }
+}
+
+#[test]
+fn binned_pictures_give_the_surface_of_the_whole_ones() {
+    let whole = Whole::new();
+    let full = whole.points(&whole.images, None);
+    let images: Vec<Image> = whole.images.iter().map(binned).collect();
+    let half = whole.points(&images, Some(Readout { binning: [2, 2], ..Readout::default() }));
+    // How far it lies across the stripe, between the two points of the whole picture next to it; px of that picture.
+    let camera = whole.rig.need_camera().unwrap().value;
+    let mut off: Vec<f64> = Vec::new();
+    for p in &half {
+        let mut near: Vec<(f64, Vec3)> =
+            full.iter().filter(|f| f.shot == p.shot).map(|f| ((f.at() - p.at()).norm(), f.at())).collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let [(distance, a), (_, b), ..] = near[..] else { continue };
+        let along = (b - a).normalize();
+        let side = (p.at() - a) - along * along.dot(&(p.at() - a));
+        if distance < 1.0 {
+            off.push(side.norm() / (200.0 / camera.fx));
+        }
+    }
+    off.sort_by(f64::total_cmp);
+    let median = off[off.len() / 2];
+    println!("binned: {} points, {median:.4} px of the whole picture off in the median", off.len());
+    assert!(off.len() > 500 && median < 0.1, "{} points, {median} px", off.len());
+}
+
+/// A region as a recording of its own.
+fn record(from: &Path, to: &Path, images: &[Image], readout: Option<Readout>) {
+    std::fs::create_dir(to).unwrap();
+    std::fs::copy(from.join("poses.json"), to.join("poses.json")).unwrap();
+    let mut meta = Recording::open(from).unwrap().meta;
+    (meta.image.width, meta.image.height, meta.image.readout) = (images[0].width, images[0].height, readout);
+    meta.ambient = None;
+    for (frame, image) in meta.frames.iter().zip(images) {
+        save_png(image, &to.join(frame.laser.as_ref().unwrap())).unwrap();
+    }
+    std::fs::write(to.join("meta.json"), serde_json::to_string(&meta).unwrap()).unwrap();
+}
+
+#[test]
+fn a_size_that_nobody_explains_is_refused_and_a_persons_word_counts() {
+    let whole = Whole::new();
+    let meta = Recording::open(&whole.folder("scan")).unwrap().meta;
+    assert_eq!(meta.image.readout.unwrap().sensor_px, Some([640, 480]), "what the simulator says");
+    // The aspect of the calibrated size: what was taken for binning.
+    let images: Vec<Image> = whole.images.iter().map(|i| region(i, [150, 110], [320, 240])).collect();
+    let (silent, telling) = (whole.folder("silent"), whole.folder("telling"));
+    record(&whole.folder("scan"), &silent, &images, None);
+    record(&whole.folder("scan"), &telling, &images, Some(Readout { offset_px: [150, 110], ..Readout::default() }));
+    let station = whole.folder("station");
+    let out = |name: &str| whole.folder(name).to_str().unwrap().to_owned();
+    let args = |from: &Path, to: &str| -> Vec<String> {
+        let from = from.to_str().unwrap();
+        ["scan", from, "--station", station.to_str().unwrap(), "--out", to, "--on", "cpu", "--quiet"]
+            .map(String::from)
+            .into()
+    };
+    let scan = |from: &Path, to: &str, word: &[&str]| {
+        let args = args(from, &out(to));
+        sheetlight(&args.iter().map(String::as_str).chain(word.iter().copied()).collect::<Vec<_>>());
+        std::fs::read(whole.folder(to).join("cloud.ply")).unwrap()
+    };
+    let refused = |from: &Path, word: &[&str]| {
+        let args = args(from, &out("none"));
+        sheetlight_fails(&args.iter().map(String::as_str).chain(word.iter().copied()).collect::<Vec<_>>()).1
+    };
+    let said = refused(&silent, &[]);
+    assert!(said.contains("pictures are 320x240") && said.contains("640x480") && said.contains("--region"), "{said}");
+    let told = scan(&telling, "told", &[]);
+    assert!(told == scan(&silent, "word", &["--region", "150,110"]), "another cloud by a person's word");
+    assert!(told != scan(&silent, "wrong", &["--binned", "2"]), "the word is used");
+    let said = refused(&telling, &["--region", "0,0"]);
+    assert!(said.contains("leave --region and --binned out"), "{said}");
+    let said = refused(&silent, &["--region", "400,0"]);
+    assert!(said.contains("another sensor"), "{said}");
+}
