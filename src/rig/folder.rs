@@ -208,7 +208,8 @@ impl Rig {
     /// The axis of a rig that has one.
     ///
     /// # Errors
-    /// It has a linear axis and a turntable: the motion of a recording says which of them moved ([`crate::scan::parts_for`]).
+    /// It has a linear axis and a turntable. The motion of a recording says which of them moved:
+    /// [`crate::scan::parts_for`].
     pub fn axis(&self) -> Result<Option<&Calibration<Axis>>> {
         match (&self.linear_axis, &self.turntable) {
             (Some(_), Some(_)) => {
@@ -454,6 +455,23 @@ mod tests {
         let rig = Rig::load(dir.path()).unwrap();
         rig.need_laser_plane().unwrap();
         assert!(rig.remarks()[0].contains("only the focus was touched"), "{:?}", rig.remarks());
+    }
+
+    #[test]
+    fn a_rig_with_two_axes_says_that_one_is_needed() {
+        use crate::geometry::CountUnit;
+        let camera = camera(611.6);
+        let axis = |kind: Kind, of| {
+            let value = Axis { kind: of, unit: CountUnit::Count, pitch: 0.01, camera_from_axis: Rigid::identity() };
+            Some(Calibration::new(kind, value, Some(&camera), Covariance::default(), quality()))
+        };
+        let mut rig = Rig { linear_axis: axis(Kind::LinearAxis, AxisKind::Linear), ..Rig::default() };
+        assert_eq!(rig.axis().unwrap().unwrap().kind, Kind::LinearAxis);
+        rig.turntable = axis(Kind::Turntable, AxisKind::Turntable);
+        assert!(rig.axis().unwrap_err().what.contains("a linear axis and a turntable"));
+        rig.linear_axis = None;
+        assert_eq!(rig.axis().unwrap().unwrap().kind, Kind::Turntable);
+        assert!(Rig::default().axis().unwrap().is_none());
     }
 
     #[test]

@@ -38,8 +38,8 @@ pub fn calibrations(rig: &Rig) -> Vec<CalibrationState> {
     rig.records().iter().map(state).collect()
 }
 
-/// What the bar says of them; none without camera, laser plane and what carries them. The worst record decides. A joint.json
-/// that is not of the station's records makes them usable at best: their common errors are no longer known.
+/// What the bar says of them; none without camera, laser plane and what carries them. The worst record decides. A
+/// joint.json that is not of the station's records makes them usable at best: their common errors are no longer known.
 pub fn age(rig: &Rig) -> Option<CalibrationAge> {
     let carried =
         rig.hand_eye.is_some() || rig.base_camera.is_some() || rig.linear_axis.is_some() || rig.turntable.is_some();

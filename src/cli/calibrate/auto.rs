@@ -16,8 +16,8 @@ use std::path::PathBuf;
 
 /// Calibrate camera, hand-eye, laser plane and pointer by moves that the program chooses
 ///
-/// One board lies below the robot, or is on its flange before a camera that stands still (--mount eye-to-hand); jog until the whole of it is in
-/// the picture. The program makes small moves first, then goes to the
+/// One board lies below the robot, or is on its flange before a camera that stands still (--mount eye-to-hand); jog
+/// until the whole of it is in the picture. The program makes small moves first, then goes to the
 /// pose that lowers the expected error of a scanned point the most, among those that station.toml's [motion] allows, that can be
 /// reached, and that keep board and stripe in view; it ends at --target-mm, or where more stops do not help, and checks itself on five
 /// poses that no solve saw. Every move is shown and asked for. The pictures are kept in --out: `calibrate joint` on them comes to the

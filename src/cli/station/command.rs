@@ -54,8 +54,8 @@ pub struct New {
     /// [default: none; poses are then read and written as matrices]
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Convention>)]
     robot: Option<Convention>,
-    /// Where the camera is: eye-in-hand (on the flange) or eye-to-hand (it stands still, and the flange carries the part)
-    /// [default: not stated]
+    /// Where the camera is: eye-in-hand (on the flange) or eye-to-hand (it stands still, and the flange carries the
+    /// part) [default: not stated]
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Mount>)]
     mount: Option<Mount>,
 }

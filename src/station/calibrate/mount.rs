@@ -15,11 +15,12 @@ pub struct Mounted {
     pub assumed: Option<String>,
 }
 
-/// The mount that station.toml states; else the one that the station's stored record is of; else the one that a person states with
-/// the command; else the camera is taken to be on the flange, and that is said.
+/// The mount that station.toml states; else the one that the station's stored record is of; else the one that a person
+/// states with the command; else the camera is taken to be on the flange, and that is said.
 ///
 /// # Errors
-/// A person states another mount than the station has. The station has records of both mounts, and nothing says which one holds.
+/// A person states another mount than the station has. The station has records of both mounts, and nothing says which
+/// one holds.
 pub fn mount_of(station: &Path, settings: &Settings, stated: Option<Mount>) -> Result<Mounted> {
     let set = settings.mount;
     let stored = |kind| Rig::stored(station, kind);

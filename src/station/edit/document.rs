@@ -1,8 +1,8 @@
 //! Sets a value in a text of TOML, or takes one out, and leaves every comment in the text.
 //!
-//! `toml_edit` keeps comments with the entry that they stand beside, so a comment would go where its entry goes. Therefore an
-//! entry that is taken out is only marked, and what lies between the marks is cut out of the text. A comment within a value that
-//! is replaced moves to the line above.
+//! `toml_edit` keeps comments with the entry that they stand beside, so a comment would go where its entry goes.
+//! Therefore an entry that is taken out is only marked, and what lies between the marks is cut out of the text. A
+//! comment within a value that is replaced moves to the line above.
 
 use crate::fault::{Fault, Result};
 use serde_json::Value as Json;

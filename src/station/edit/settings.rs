@@ -57,7 +57,8 @@ fn pruned(table: toml::Table) -> toml::Table {
     table.into_iter().filter_map(|(name, value)| Some((name, below(value)?))).collect()
 }
 
-/// The settings themselves, changed and checked; names are those within a table, with dots (`below`: "" or "extraction").
+/// The settings themselves, changed and checked; names are those within a table, with dots (`below`: "" or
+/// "extraction").
 ///
 /// # Errors
 /// Names that are no setting, values that a station cannot have.
@@ -100,7 +101,8 @@ mod tests {
     use crate::robot::Convention;
     use serde_json::json;
 
-    const TEXT: &str = "# cell 3, by the window\nname = \"cell # 3\" # as on its door\nrobot = \"denso\"\n\n[working_volume] # measured in May\nnear_mm = 60\nfar_mm = 320\n";
+    const TEXT: &str = "# cell 3, by the window\nname = \"cell # 3\" # as on its door\nrobot = \"denso\"\n\n\
+        [working_volume] # measured in May\nnear_mm = 60\nfar_mm = 320\n";
 
     fn changed(text: &str, key: &str, value: Value) -> Result<String> {
         edited(text, &BTreeMap::from([(key.to_owned(), value)]))
@@ -124,15 +126,21 @@ mod tests {
 
     /// One layout in tables, one in dotted names, one within braces; lists and braces over several lines.
     const LAYOUTS: [&str; 3] = [
-        "name = \"cell # 3\"\nrobot = \"denso\"\nmount = 'eye-in-hand'\ntolerance_mm = 0.1\n\n[working_volume]\nnear_mm = 60\n\
-         far_mm = 320\n\n[motion]\nspeed_mm_s = 40\nmax_step_mm = 300\n[motion.workspace]\nfrom_mm = [\n150,\n-350,\n200,\n]\n\
-         to_mm = [650, 350, 750]\n[[motion.keep_out]]\nfrom_mm = [1, 2, 3]\nto_mm = [4, 5, 6]\n\n[outputs]\nline = 24\ngripper = 27\n\
-         [extraction]\nregion = [\n0.1,\n0.2,\n0.9,\n1\n]\n[extraction.threshold]\nminimum = 14\n",
-        "working_volume.near_mm = 60\nname = 'a'\nworking_volume.far_mm = 320\nextraction.threshold.minimum = 14\n\
-         extraction.region = [0.1,\n0.2, 0.9,\n1]\noutputs.line = 24\nmotion.workspace.from_mm = [150, -350, 200]\n\
-         motion.workspace.to_mm = [650, 350, 750]\nmotion.speed_mm_s = 40\n",
-        "working_volume = {\nnear_mm = 60,\nfar_mm = 320\n}\nrobot = 'ur'\nextraction = { region = [0.1, 0.2, 0.9, 1] }\n\
-         outputs = { line = 24,\ngripper = 27 }\nmotion = { speed_mm_s = 40, workspace = { from_mm = [150, -350, 200], to_mm = [650, 350, 750] } }\n",
+        "name = \"cell # 3\"\nrobot = \"denso\"\nmount = 'eye-in-hand'\ntolerance_mm = 0.1\n\n\
+         [working_volume]\nnear_mm = 60\nfar_mm = 320\n\n\
+         [motion]\nspeed_mm_s = 40\nmax_step_mm = 300\n\
+         [motion.workspace]\nfrom_mm = [\n150,\n-350,\n200,\n]\nto_mm = [650, 350, 750]\n\
+         [[motion.keep_out]]\nfrom_mm = [1, 2, 3]\nto_mm = [4, 5, 6]\n\n\
+         [outputs]\nline = 24\ngripper = 27\n\
+         [extraction]\nregion = [\n0.1,\n0.2,\n0.9,\n1\n]\n\
+         [extraction.threshold]\nminimum = 14\n",
+        "working_volume.near_mm = 60\nname = 'a'\nworking_volume.far_mm = 320\n\
+         extraction.threshold.minimum = 14\nextraction.region = [0.1,\n0.2, 0.9,\n1]\noutputs.line = 24\n\
+         motion.workspace.from_mm = [150, -350, 200]\nmotion.workspace.to_mm = [650, 350, 750]\n\
+         motion.speed_mm_s = 40\n",
+        "working_volume = {\nnear_mm = 60,\nfar_mm = 320\n}\nrobot = 'ur'\n\
+         extraction = { region = [0.1, 0.2, 0.9, 1] }\noutputs = { line = 24,\ngripper = 27 }\n\
+         motion = { speed_mm_s = 40, workspace = { from_mm = [150, -350, 200], to_mm = [650, 350, 750] } }\n",
     ];
 
     /// What the pages change, with two values each.

@@ -1,5 +1,5 @@
-//! Lists, reads, stores and removes recipes: those that ship with the program and the station's own. Lengths are in mm, angles in
-//! degrees, in the part frame.
+//! Lists, reads, stores and removes recipes: those that ship with the program and the station's own. Lengths are in mm,
+//! angles in degrees, in the part frame.
 
 use super::place::Place;
 use crate::fault::{Fault, Result};
@@ -22,8 +22,8 @@ const SHIPPED: [(&str, &str); 4] = [
     ("osc", include_str!("../../../data/recipes/osc.toml")),
 ];
 
-/// All of them: the station's own first, in the order of their names; a station's own replaces a shipped one of that name. One that
-/// cannot be read stands in the list with what is wrong with it.
+/// All of them: the station's own first, in the order of their names; a station's own replaces a shipped one of that name.
+/// One that cannot be read stands in the list with what is wrong with it.
 pub fn recipes(place: &Place) -> Vec<RecipeText> {
     let entries = std::fs::read_dir(place.recipes()).into_iter().flatten().flatten();
     let mut own: Vec<RecipeText> = entries.filter_map(|entry| of_file(&entry.path())).collect();
@@ -62,8 +62,8 @@ fn recipe_path(place: &Place, name: &str) -> Result<PathBuf> {
     Ok(place.recipes().join(format!("{name}.toml")))
 }
 
-/// Refuses a name under which the station has a recipe of its own, unless that one is to be replaced. A shipped recipe stays where
-/// one of its name is stored: it is there again when that one is taken away.
+/// Refuses a name under which the station has a recipe of its own, unless that one is to be replaced. A shipped recipe
+/// stays where one of its name is stored: it is there again when that one is taken away.
 pub fn vacant(place: &Place, name: &str, replace: bool) -> Result<()> {
     if !replace && recipe_path(place, name)?.exists() {
         return Err(Fault::refused(format!("{name}: is a recipe of this station already"))
@@ -259,7 +259,8 @@ mod tests {
         let box_ = [(-15.0, -9.0), (15.0, -9.0), (15.0, 9.0), (-15.0, 9.0)];
         let corners: String = box_.iter().map(|(x, y)| format!("10\n{x}\n20\n{y}\n")).collect();
         let text = format!(
-            "0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n4\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n0\nLWPOLYLINE\n8\n0\n90\n4\n70\n1\n\
+            "0\nSECTION\n2\nHEADER\n9\n$INSUNITS\n70\n4\n0\nENDSEC\n0\nSECTION\n2\nENTITIES\n\
+             0\nLWPOLYLINE\n8\n0\n90\n4\n70\n1\n\
              {corners}0\nCIRCLE\n8\n0\n10\n3\n20\n2\n40\n1\n0\nENDSEC\n0\nEOF\n"
         );
         let ask = |replace| DrawingAsk {
