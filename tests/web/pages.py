@@ -199,6 +199,15 @@ def teach(s, b):
     assert len(kept) == 1 and kept[0]["name"].endswith("before-recipe.json"), kept
     _, _, data = s.ask("GET", f"/api/v1/backups/{kept[0]['name']}")
     assert json.loads(data)["files"]["recipes/part.toml"] == before
+    # Taught once more under its name: refused before anything is measured, unless it is to take the place of the former one.
+    order = next(j for j in s.json("GET", "/jobs") if j["order"]["procedure"] == "teach")["order"]
+    s.json("POST", "/lease", {"firmly": True})
+    refused = s.job({**order, "replace": False})
+    assert refused["state"] == "failed" and "already" in refused["problem"]["what"] and stored() == "# mine\n" + before, refused
+    again = s.job({**order, "replace": True})
+    assert again["state"] == "done" and stored() == before, again
+    assert len(s.json("GET", "/settings")["backups"]) == 2
+    s.json("POST", "/lease/release")
     quiet(b, "teach", refused=1)
 
 

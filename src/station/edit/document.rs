@@ -93,11 +93,11 @@ fn lost<'t>(before: &'t str, after: &str) -> Vec<&'t str> {
     comments(before).into_iter().filter(gone).collect()
 }
 
-/// Whether the entry is gone: it was taken out, or was never there.
+/// Whether an entry was taken out.
 fn put(table: &mut Table, path: &[&str], value: Option<&Json>, mark: char) -> Result<bool> {
     let [name, rest @ ..] = path else { return Ok(false) };
     if !table.contains_key(name) {
-        let Some(value) = value else { return Ok(true) };
+        let Some(value) = value else { return Ok(false) };
         if rest.is_empty() {
             table.insert(name, Item::Value(plain(value)?));
             return Ok(false);
@@ -147,7 +147,8 @@ fn put_all(table: &mut Table, values: &serde_json::Map<String, Json>, mark: char
     values.iter().try_for_each(|(name, value)| put(table, &[name], Some(value), mark).map(|_| ()))
 }
 
-/// Changes a value or what is within its `{ }`; one that is taken out, or is empty then, is marked. Whether it is gone.
+/// Changes a value or what is within its `{ }`; one that is taken out, or is empty then, is marked. Whether it
+/// was taken out.
 fn put_value(whole: &mut Value, path: &[&str], value: Option<&Json>, mark: char) -> Result<bool> {
     match value {
         Some(value) if path.len() == 1 => replace(whole, plain(value)?),

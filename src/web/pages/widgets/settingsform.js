@@ -12,7 +12,7 @@ const NUMBERS = [
 ];
 
 /** Where the camera is; calibrations of its place go by it. */
-const MOUNTS = [["", "not stated"], ["eye-in-hand", "on the flange"], ["eye-to-hand", "beside the robot, it stands still"]];
+export const MOUNTS = { "eye-in-hand": "on the flange", "eye-to-hand": "beside the robot, it stands still" };
 
 /** Fills `place`; `save(changes)` hears names and values, null where a field was emptied. */
 export function settingsForm(place, now, save) {
@@ -26,7 +26,7 @@ export function settingsForm(place, now, save) {
   const name = field(t("Name"), { type: "text", value: values.name ?? "", maxlength: "80", "data-setting": "name", oninput: (e) => changed("name", e.target.value) });
   const notation = choice(t("Notation"), [["", t("none: matrices")], ...now.notations.map((n) => [n, n])], values.robot ?? "", (v) => changed("robot", v || null));
   notation.querySelector("select").dataset.setting = "robot";
-  const mount = choice(t("Camera is mounted"), MOUNTS.map(([v, words]) => [v, t(words)]), values.mount ?? "", (v) => changed("mount", v || null));
+  const mount = choice(t("Camera is mounted"), [["", t("not stated")], ...Object.entries(MOUNTS).map(([v, words]) => [v, t(words)])], values.mount ?? "", (v) => changed("mount", v || null));
   mount.querySelector("select").dataset.setting = "mount";
   const offered = NUMBERS.filter(([key]) => !/^motion\./.test(key) || (has("motion") && key in values)).filter(([key]) => !/^outputs\./.test(key) || has("outputs"));
   const number = ([key, words, unit]) => field(t(words), { type: "number", step: "any", value: String(values[key] ?? ""), "data-setting": key, placeholder: t("not set"), oninput: (e) => changed(key, e.target.value === "" ? null : Number(e.target.value)) }, unit);
