@@ -32,7 +32,7 @@ def fixed():
         elif name.endswith(".json") and name not in ("meta.json", "truth.json"):
             with open(path) as f:
                 poses = json.load(f)
-            for pose in poses["poses"]:
+            for pose in poses.get("poses", []):
                 pose["matrix"] = inverse(pose["matrix"])
             with open(path, "w") as f:
                 json.dump(poses, f)
