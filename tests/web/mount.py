@@ -24,6 +24,12 @@ def inverse(m):
 def fixed():
     """The same pictures as a camera beside the robot sees them: the flange carries the board where it carried the camera."""
     to = os.path.join(folder, "fixed")
+    # The page asks for no pose file: meta.json names the one.
+    meta = os.path.join(folder, "handeye", "meta.json")
+    with open(meta) as f:
+        told = json.load(f)
+    with open(meta, "w") as f:
+        json.dump({**told, "pose_file": "poses_noisy"}, f)
     shutil.copytree(os.path.join(folder, "handeye"), to)
     for name in os.listdir(to):
         path = os.path.join(to, name)
