@@ -20,13 +20,17 @@ dropped: Record<string, number>, };
 
 export type CalibrationAge = { 
 /**
- * Days since the oldest of camera, laser plane and hand-eye was measured.
+ * Days since the oldest record was measured.
  */
 days: number, 
 /**
- * The worst verdict of them.
+ * The worst verdict of all records.
  */
 verdict: string, 
+/**
+ * Which record has it.
+ */
+worst: string, 
 /**
  * Root of the sum of squares of what each expects at the working distance, mm; null where one does not say.
  */
@@ -166,7 +170,11 @@ tolerance_deg: number,
 /**
  * The tool's way above the insertion pose before and after, mm.
  */
-approach_mm: number, };
+approach_mm: number, 
+/**
+ * It takes the place of the station's own recipe of that name.
+ */
+replace: boolean, };
 
 export type Plain = Record<string, never>;
 
@@ -1202,6 +1210,10 @@ program: string,
  */
 robot: string | null, 
 /**
+ * eye-in-hand or eye-to-hand; null: not stated.
+ */
+mount: string | null, 
+/**
  * What the work tolerates, mm.
  */
 tolerance_mm: number | null, 
@@ -1419,9 +1431,23 @@ title: string,
  */
 shipped: boolean, 
 /**
+ * TOML; empty where it cannot be read at all.
+ */
+text: string, 
+/**
+ * What is wrong with it; null: nothing.
+ */
+problem: Problem | null, };
+
+export type RecipeAsk = { 
+/**
  * TOML.
  */
-text: string, };
+text: string, 
+/**
+ * It takes the place of the station's own recipe of that name.
+ */
+replace: boolean, };
 
 export type PointsOf = { 
 /**
@@ -1446,6 +1472,58 @@ kind: string,
  * The tool goes there.
  */
 chosen: boolean, };
+
+export type NewPoint = { 
+/**
+ * By which later ones and the insertion name it.
+ */
+name: string, 
+/**
+ * midpoint, line, intersection, offset or lattice.
+ */
+kind: string, 
+/**
+ * Names of shapes, or of points before it.
+ */
+of: Array<string>, 
+/**
+ * Of an offset: the line or lattice that gives the direction.
+ */
+along?: string | null, 
+/**
+ * Of an offset: along and across, mm.
+ */
+by_mm?: [number, number] | null, };
+
+export type PointChange = { "add": NewPoint } | { "take_out": { 
+/**
+ * Which one.
+ */
+name: string, } } | { "choose": { 
+/**
+ * Which one; null: the part's own place.
+ */
+name: string | null, } };
+
+export type PointsChange = { 
+/**
+ * TOML; it need not be stored.
+ */
+text: string, 
+/**
+ * What changes.
+ */
+change: PointChange, };
+
+export type PointsChanged = { 
+/**
+ * TOML, with all comments that it had.
+ */
+text: string, 
+/**
+ * Its points now.
+ */
+points: Array<RecipePoint>, };
 
 export type DrawingAsk = { 
 /**
@@ -1487,7 +1565,11 @@ tolerance_deg: number,
 /**
  * The tool's way above the insertion pose before and after, mm.
  */
-approach_mm: number, };
+approach_mm: number, 
+/**
+ * It takes the place of the station's own recipe of that name.
+ */
+replace: boolean, };
 
 export type DrawingRead = { 
 /**

@@ -125,6 +125,8 @@ const HOMES: &[(&str, &str)] = &[
     ("tiff", "raster"),
     ("tokio", "web"),
     ("tokio_rustls", "web"),
+    ("toml_edit", "station"),
+    ("toml_parser", "station"),
     ("ts_rs", "web"),
     ("viva_genicam", "capture"),
     ("wgpu", "gpu"),

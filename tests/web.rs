@@ -175,6 +175,14 @@ fn old_browsers_and_full_disks_are_told_what_to_do() {
 }
 
 #[test]
+fn a_camera_that_stands_still_is_calibrated_as_on_the_command_line() {
+    let dir = tempfile::tempdir().unwrap();
+    let folder = dir.path().to_str().unwrap();
+    sheetlight(&["--quiet", "simulate", "--out", folder, "--set", "handeye,intrinsics", "--seed", "3"]);
+    python("tests/web/mount.py", &[program(), folder]);
+}
+
+#[test]
 fn an_axis_is_calibrated_through_its_page() {
     let dir = tempfile::tempdir().unwrap();
     let folder = dir.path().to_str().unwrap();

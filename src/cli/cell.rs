@@ -42,7 +42,7 @@ pub struct Args {
     /// The arm begins over the board, as an operator jogs it there for `calibrate auto`; else over the scene
     #[arg(long, requires = "board")]
     over_board: bool,
-    /// The sensor stands still and the flange carries the board before it, for `calibrate auto --eye-to-hand`
+    /// The sensor stands still and the flange carries the board before it, for `calibrate auto --mount eye-to-hand`
     #[arg(long, requires = "board", conflicts_with = "over_board")]
     eye_to_hand: bool,
     /// Another specimen of sensor, gripper and places, other noise, for every seed; 0 is the design itself

@@ -4,7 +4,7 @@
 
 use super::calibration::FORMAT;
 use super::seal::{apart, sealed, shaped, unsealed};
-use super::{Calibration, HandEye, Joint, JointCovariance, Kind, Measured, Verdict};
+use super::{Calibration, HandEye, Joint, JointCovariance, Kind, Measured, Quality, Verdict};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::files::Together;
@@ -31,6 +31,25 @@ pub struct Rig {
     pub turntable: Option<Calibration<Axis>>,
     /// Covariance of the records together, where they were calibrated together.
     pub joint: Joint,
+}
+
+/// What a record says of itself, whatever its value is.
+#[derive(Clone, Copy, Debug)]
+pub struct Record<'a> {
+    /// Which one.
+    pub kind: Kind,
+    /// When it was measured, RFC 3339.
+    pub created: &'a str,
+    /// How well.
+    pub quality: &'a Quality,
+    /// What people have vouched for.
+    pub remarks: &'a [String],
+}
+
+impl<'a> Record<'a> {
+    fn of<T>(c: &'a Calibration<T>) -> Record<'a> {
+        Record { kind: c.kind, created: &c.created, quality: &c.quality, remarks: &c.remarks }
+    }
 }
 
 impl Rig {
@@ -186,9 +205,41 @@ impl Rig {
         };
         self.belonging(axis)?.ok_or_else(|| missing(kind))
     }
-    /// The axis of a rig that has one, where it has not both.
-    pub fn axis(&self) -> Option<&Calibration<Axis>> {
-        self.linear_axis.as_ref().xor(self.turntable.as_ref())
+    /// The axis of a rig that has one.
+    ///
+    /// # Errors
+    /// It has a linear axis and a turntable. The motion of a recording says which of them moved:
+    /// [`crate::scan::parts_for`].
+    pub fn axis(&self) -> Result<Option<&Calibration<Axis>>> {
+        match (&self.linear_axis, &self.turntable) {
+            (Some(_), Some(_)) => {
+                Err(Fault::refused("the rig has a linear axis and a turntable, one of them is needed")
+                    .cause("nothing says which of the two moved the part")
+                    .next("take the parts of the rig that the recording's motion rests on"))
+            }
+            (linear, turntable) => Ok(linear.as_ref().or(turntable.as_ref())),
+        }
+    }
+
+    /// What every record that there is says of itself.
+    pub fn records(&self) -> Vec<Record<'_>> {
+        [
+            self.camera.as_ref().map(Record::of),
+            self.laser_plane.as_ref().map(Record::of),
+            self.hand_eye.as_ref().map(Record::of),
+            self.pointer.as_ref().map(Record::of),
+            self.base_camera.as_ref().map(Record::of),
+            self.linear_axis.as_ref().map(Record::of),
+            self.turntable.as_ref().map(Record::of),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+
+    /// Whether a station has such a record, readable or not.
+    pub fn stored(station: &Path, kind: Kind) -> bool {
+        file(station, kind).is_file()
     }
 
     /// Refuses parts of which one was measured with another camera than the station's.
@@ -216,7 +267,7 @@ impl Rig {
         .next(again(kind)))
     }
 
-    /// The covariance of camera, laser plane and hand-eye together. `None` where none was ever stated.
+    /// The covariance of camera, laser plane and the camera's place together. `None` where none was ever stated.
     ///
     /// # Errors
     /// Why what is stated is not of these records: one was exchanged since, or the file is spoilt. In words.
@@ -229,7 +280,10 @@ impl Rig {
         let now = [
             (Kind::Camera, self.camera.as_ref().map(|c| c.content())),
             (Kind::LaserPlane, self.laser_plane.as_ref().map(|c| c.content())),
-            (Kind::HandEye, self.hand_eye.as_ref().map(|c| c.content())),
+            match (&self.hand_eye, &self.base_camera) {
+                (None, Some(c)) => (Kind::BaseCamera, Some(c.content())),
+                (c, _) => (Kind::HandEye, c.as_ref().map(|c| c.content())),
+            },
         ];
         let other = |kind: Kind| format!("joint.json is of another {} than the station's", kind.words());
         Some(stated.other(&now).map_or(Ok(stated), |kind| Err(other(kind))))
@@ -237,24 +291,14 @@ impl Rig {
 
     /// What a report must say of the calibrations it rests on: what people have vouched for, and what is badly determined.
     pub fn remarks(&self) -> Vec<String> {
-        fn of<T>(part: &Option<Calibration<T>>) -> Vec<String> {
-            let Some(c) = part else { return Vec::new() };
-            let mut said: Vec<String> = c.remarks.iter().map(|r| format!("{}: {r}", c.kind.words())).collect();
-            if c.quality.verdict > Verdict::Usable {
-                said.push(format!("{}: {}", c.kind.words(), c.quality.verdict.words()));
+        let of = |r: Record| {
+            let mut said: Vec<String> = r.remarks.iter().map(|said| format!("{}: {said}", r.kind.words())).collect();
+            if r.quality.verdict > Verdict::Usable {
+                said.push(format!("{}: {}", r.kind.words(), r.quality.verdict.words()));
             }
             said
-        }
-        [
-            of(&self.camera),
-            of(&self.laser_plane),
-            of(&self.pointer),
-            of(&self.hand_eye),
-            of(&self.base_camera),
-            of(&self.linear_axis),
-            of(&self.turntable),
-        ]
-        .concat()
+        };
+        self.records().into_iter().flat_map(of).collect()
     }
 
     /// One hash over the values that turn pixels into points; a scan keeps it, so that a later
@@ -354,7 +398,7 @@ fn read<T: DeserializeOwned + Measured>(folder: &Path, kind: Kind) -> Result<Opt
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Covariance, Quality};
+    use super::super::Covariance;
     use super::*;
     use crate::geometry::Vec3;
 
@@ -411,6 +455,23 @@ mod tests {
         let rig = Rig::load(dir.path()).unwrap();
         rig.need_laser_plane().unwrap();
         assert!(rig.remarks()[0].contains("only the focus was touched"), "{:?}", rig.remarks());
+    }
+
+    #[test]
+    fn a_rig_with_two_axes_says_that_one_is_needed() {
+        use crate::geometry::CountUnit;
+        let camera = camera(611.6);
+        let axis = |kind: Kind, of| {
+            let value = Axis { kind: of, unit: CountUnit::Count, pitch: 0.01, camera_from_axis: Rigid::identity() };
+            Some(Calibration::new(kind, value, Some(&camera), Covariance::default(), quality()))
+        };
+        let mut rig = Rig { linear_axis: axis(Kind::LinearAxis, AxisKind::Linear), ..Rig::default() };
+        assert_eq!(rig.axis().unwrap().unwrap().kind, Kind::LinearAxis);
+        rig.turntable = axis(Kind::Turntable, AxisKind::Turntable);
+        assert!(rig.axis().unwrap_err().what.contains("a linear axis and a turntable"));
+        rig.linear_axis = None;
+        assert_eq!(rig.axis().unwrap().unwrap().kind, Kind::Turntable);
+        assert!(Rig::default().axis().unwrap().is_none());
     }
 
     #[test]

@@ -89,7 +89,7 @@ impl Kind {
     /// The `sheetlight calibrate` command that makes it.
     pub fn command(self) -> String {
         match self {
-            Kind::BaseCamera => "hand-eye --eye-to-hand".into(),
+            Kind::BaseCamera => "hand-eye --mount eye-to-hand".into(),
             Kind::LinearAxis | Kind::Turntable => "axis".into(),
             _ => self.words().replace(' ', "-"),
         }

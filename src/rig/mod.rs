@@ -20,7 +20,7 @@ pub use calibration::{
     hash_file,
 };
 pub use covariance::Covariance;
-pub use folder::{Rig, asked};
+pub use folder::{Record, Rig, asked};
 pub use hash::hash_text;
 pub use joint::{Joint, JointCovariance};
 pub use kind::{Kind, Place, Units};

@@ -5,6 +5,7 @@ use super::settings::Settings;
 use crate::fault::{Fault, Result};
 use crate::files::{Lock, Together, remove};
 use crate::rig::{Rig, hash_text};
+use base64::prelude::{BASE64_STANDARD, Engine};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -13,6 +14,8 @@ const FORMAT: u32 = 1;
 /// What a station is made of: its settings, and folders of texts.
 const SETTINGS: &str = "station.toml";
 const FOLDERS: [&str; 3] = ["calibration", "recipes", "boards"];
+/// Bytes of a file in it at most.
+const MOST_BYTES: u64 = 64 << 20;
 /// Files of a backup at most.
 const MOST_FILES: usize = 2000;
 
@@ -28,28 +31,39 @@ pub struct Backup {
     pub created: String,
     /// The station's name.
     pub station: String,
-    /// SHA-256 over all names and texts.
+    /// SHA-256 over all names and what is in the files.
     pub seal: String,
     /// Texts by their path in the station.
     pub files: BTreeMap<String, String>,
+    /// Files that are no texts, in base64: a recipe that was spoilt is backed up as it is.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub spoilt: BTreeMap<String, String>,
 }
 
-fn seal(files: &BTreeMap<String, String>) -> String {
-    hash_text(&serde_json::to_vec(files).expect("plain data"))
+/// Of the texts alone where there is nothing else, as former versions have it.
+fn seal(files: &BTreeMap<String, String>, spoilt: &BTreeMap<String, String>) -> String {
+    let all = if spoilt.is_empty() { serde_json::to_vec(files) } else { serde_json::to_vec(&(files, spoilt)) };
+    hash_text(&all.expect("plain data"))
 }
 
 impl Backup {
     /// Reads the station as it stands.
     ///
     /// # Errors
-    /// No station, a file in it that is no text.
+    /// No station, a file in it that cannot be read.
     pub fn of(station: &Path) -> Result<Backup> {
-        let mut files = BTreeMap::new();
+        let (mut files, mut spoilt) = (BTreeMap::new(), BTreeMap::new());
         let mut add = |name: String, path: &Path| -> Result<()> {
-            files.insert(name, crate::files::read_text(path)?);
+            match String::from_utf8(crate::files::read(path, MOST_BYTES)?) {
+                Ok(text) => drop(files.insert(name, text)),
+                Err(bytes) => drop(spoilt.insert(name, BASE64_STANDARD.encode(bytes.as_bytes()))),
+            }
             Ok(())
         };
-        add(SETTINGS.into(), &station.join(SETTINGS))?;
+        // A station without settings has the usual ones.
+        if FOLDERS.iter().all(|f| !station.join(f).is_dir()) || station.join(SETTINGS).exists() {
+            add(SETTINGS.into(), &station.join(SETTINGS))?;
+        }
         for folder in FOLDERS {
             for entry in std::fs::read_dir(station.join(folder)).into_iter().flatten().flatten() {
                 let name = entry.file_name().to_string_lossy().into_owned();
@@ -64,8 +78,9 @@ impl Backup {
             program: format!("sheetlight {}", env!("CARGO_PKG_VERSION")),
             created: jiff::Timestamp::now().to_string(),
             station: Settings::load(station).map(|s| s.name).unwrap_or_default(),
-            seal: seal(&files),
+            seal: seal(&files, &spoilt),
             files,
+            spoilt,
         })
     }
 
@@ -87,17 +102,18 @@ impl Backup {
         if b.format != FORMAT {
             return Err(strange(format!("is of format {}, this version reads {FORMAT}", b.format)));
         }
-        if b.seal != seal(&b.files) {
+        if b.seal != seal(&b.files, &b.spoilt) {
             return Err(strange("its texts are not those that were backed up".into()));
         }
         let place = |name: &str| {
             name == SETTINGS || name.split_once('/').is_some_and(|(f, n)| FOLDERS.contains(&f) && known(n))
         };
-        if let Some(name) = b.files.keys().find(|n| !place(n)).filter(|_| b.files.len() <= MOST_FILES) {
+        let count = b.files.len() + b.spoilt.len();
+        if let Some(name) = b.files.keys().chain(b.spoilt.keys()).find(|n| !place(n)).filter(|_| count <= MOST_FILES) {
             return Err(strange(format!("{name:?} is no part of a station")));
         }
-        if b.files.len() > MOST_FILES || !b.files.contains_key(SETTINGS) {
-            return Err(strange(format!("holds {} files, and {SETTINGS} must be one of them", b.files.len())));
+        if count > MOST_FILES || count == 0 {
+            return Err(strange(format!("holds {count} files, 1 to {MOST_FILES} are a station")));
         }
         Ok(b)
     }
@@ -122,6 +138,12 @@ impl Backup {
         }
         for (name, text) in &self.files {
             crate::files::write(&part.join(name), text.as_bytes())?;
+        }
+        for (name, bytes) in &self.spoilt {
+            let bytes = BASE64_STANDARD.decode(bytes);
+            let bytes =
+                bytes.map_err(|e| Fault::input(format!("{name} in the backup: {e}")).next("give another one"))?;
+            crate::files::write(&part.join(name), &bytes)?;
         }
         let checked = Settings::load(&part).and_then(|_| Rig::load(&part));
         if let Err(fault) = checked {
@@ -216,7 +238,7 @@ mod tests {
         let refused = |change: &dyn Fn(&mut Backup)| {
             let mut b = good.clone();
             change(&mut b);
-            b.seal = seal(&b.files);
+            b.seal = seal(&b.files, &b.spoilt);
             let text = serde_json::to_string(&b).unwrap();
             Backup::parse(&text).and_then(|b| b.restore(dir.path())).unwrap_err().what
         };
@@ -232,7 +254,7 @@ mod tests {
         ] {
             assert!(refused(&add(name)).contains("no part of a station"), "{name}");
         }
-        assert!(refused(&|b| drop(b.files.remove("station.toml"))).contains("station.toml must"));
+        assert!(refused(&|b| b.files.clear()).contains("holds 0 files"));
         assert!(refused(&|b| drop(b.files.insert("station.toml".into(), "nam = 1".into()))).contains("nam"));
         assert!(refused(&add("calibration/camera.json")).contains("camera.json"));
         let edited = serde_json::to_string(&good).unwrap().replace("first", "other");

@@ -111,7 +111,7 @@ pub fn second_look(
             .next("scan the part again as it lies otherwise on the axis"));
     }
     let (report, _) = find_part(scan, recipe, Some(station), &LocateOptions::default())?;
-    let plan = plan_look(&report, &Rig::load(station)?, turn_deg, tilt_deg)?;
+    let plan = plan_look(&report, &parts_for(&Rig::load(station)?, &motion), turn_deg, tilt_deg)?;
     let flanges = poses.iter().map(|p| plan.base_from_base * *p).collect();
     Ok(SecondLook { report, plan, flanges })
 }

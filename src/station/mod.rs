@@ -36,11 +36,12 @@ pub use calibrate::board_views::{Boards, FrameBoard, boards};
 pub use calibrate::hand_eye::{
     Calibrated, HandEyeResult, HandEyeRun, PosePairs, calibrate_hand_eye, calibrate_hand_eye_from_poses,
 };
-pub use calibrate::joint::run::{JointResult, JointRun, calibrate_joint, store_joint};
+pub use calibrate::joint::run::{JointResult, JointRun, accept_joint, calibrate_joint, store_joint};
 pub use calibrate::laser_plane::{LaserPlaneRun, calibrate_laser_plane};
 pub use calibrate::latency::{LatencyFound, calibrate_latency};
+pub use calibrate::mount::{Mounted, mount_of};
 pub use calibrate::pointer::{PointerRun, calibrate_pointer};
-pub use edit::{changed, edited};
+pub use edit::{changed, edited, point_added, point_chosen, point_taken_out};
 pub use filter::{filter_map, filter_scan, left};
 pub use find::{Looked, SecondLook, find_part, find_part_in_all, second_look, teach_part};
 pub use ghost::{Lies, ghost};

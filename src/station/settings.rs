@@ -2,6 +2,7 @@
 //! Frame and unit: camera frame for the working volume, mm; docs/file-formats.md lists every key.
 
 use crate::arm::{Outputs, rules::Limits};
+use crate::calibrate::hand_eye::options::Mount;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Flange, Rigid, Tool};
 use crate::rig::Volume;
@@ -17,6 +18,9 @@ pub struct Settings {
     /// How this station's robot writes poses; needed only where poses are printed for it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub robot: Option<Convention>,
+    /// Whether the camera is on the flange or stands still; calibrations of the camera's place go by it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mount: Option<Mount>,
     /// What the work tolerates, mm: calibrations are judged by it. Without it a share of the camera's view.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance_mm: Option<f64>,

@@ -10,6 +10,7 @@ use crate::find::look::register::{Registered, register};
 use crate::find::measure::points::Ordered;
 use crate::geometry::Vec3;
 use crate::rig::{Calibration, Rig};
+use crate::scan::parts_for;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -127,13 +128,17 @@ const RATIO: f64 = 3.0;
 fn object(rig: &Rig, folders: &[PathBuf]) -> Result<ObjectCheck> {
     different(folders)?;
     let mut scans = Vec::new();
+    // The scans of one object rest on the same parts of the rig: they have one fingerprint.
+    let mut rig = rig.clone();
     for folder in folders {
-        fits(rig, folder, &super::load_report(folder)?)?;
+        let report = super::load_report(folder)?;
+        rig = parts_for(&rig, &report.motion);
+        fits(&rig, folder, &report)?;
         let points = Ordered::new(&super::lit_cloud_of(folder)?, &super::shots_of(folder)?)
             .map_err(|e| e.at(folder.display()))?;
         scans.push((folder.display().to_string(), points));
     }
-    let registered = register(&scans, rig)?;
+    let registered = register(&scans, &rig)?;
     let looks: Vec<Look> =
         registered.iter().map(|r| Look { base_from_part: r.base_from_object, budget: &r.budget }).collect();
     let looks = agree(&looks, None, 0.0, RATIO)?.disagreement;

@@ -2,6 +2,7 @@
 //! Frame and unit: base frame, mm.
 
 use crate::arm::rules::{Limits, Space};
+use crate::calibrate::hand_eye::options::Mount;
 use crate::cell::Cell;
 use crate::fault::Result;
 use crate::robot::Convention;
@@ -21,6 +22,7 @@ pub fn station_for(cell: &Cell, folder: &Path, name: &str, silence_ms: Option<f6
     let usual = Limits::within(WORKSPACE);
     let motion = Limits { max_silence_ms: silence_ms.unwrap_or(usual.max_silence_ms), ..usual };
     let tool = Some(ToolSpec { flange_from_tool: cell.flange_from_tool() });
-    Settings { name: name.into(), robot: Some(Convention::Denso), motion: Some(motion), tool, ..Settings::default() }
-        .store(folder)
+    let mount = Some(if cell.options().eye_to_hand { Mount::EyeToHand } else { Mount::EyeInHand });
+    let (name, robot, motion) = (name.into(), Some(Convention::Denso), Some(motion));
+    Settings { name, robot, mount, motion, tool, ..Settings::default() }.store(folder)
 }

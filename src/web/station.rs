@@ -3,7 +3,7 @@
 
 use super::message::{CalibrationAge, CalibrationState, FrameInfo, Problem, StationInfo};
 use super::work::Place;
-use crate::rig::{Calibration, Quality, Rig, Verdict};
+use crate::rig::{Kind, Quality, Record, Rig, Verdict};
 use crate::robot::Convention;
 use crate::station::Settings;
 use jiff::{Timestamp, Unit};
@@ -13,54 +13,46 @@ use std::collections::BTreeMap;
 /// Figures in which calibrations state what they make expect at the working distance, mm.
 const EXPECTED: [&str; 2] = ["expected_error_at_working_distance_mm", "expected_point_error_mm"];
 
+/// What the bar calls the covariance of all records together.
+const JOINT: &str = "joint covariance";
+
 fn days_since(created: &str) -> f64 {
     let since = created.parse::<Timestamp>().ok().and_then(|t| Timestamp::now().since(t).ok());
     since.and_then(|s| s.total(Unit::Hour).ok()).map_or(f64::NAN, |hours| (hours / 24.0).max(0.0))
 }
 
-fn state<T>(c: &Calibration<T>) -> CalibrationState {
-    let q: &Quality = &c.quality;
+fn state(record: &Record) -> CalibrationState {
+    let q: &Quality = record.quality;
     CalibrationState {
-        kind: c.kind.name().into(),
-        words: c.kind.words(),
+        kind: record.kind.name().into(),
+        words: record.kind.words(),
         verdict: q.verdict.words().into(),
-        created: c.created.clone(),
-        days: days_since(&c.created),
+        created: record.created.to_owned(),
+        days: days_since(record.created),
         expected_mm: EXPECTED.iter().find_map(|k| q.figures.get(*k).copied()),
     }
 }
 
 /// Every calibration that there is.
 pub fn calibrations(rig: &Rig) -> Vec<CalibrationState> {
-    let all = [
-        rig.camera.as_ref().map(state),
-        rig.laser_plane.as_ref().map(state),
-        rig.hand_eye.as_ref().map(state),
-        rig.pointer.as_ref().map(state),
-        rig.base_camera.as_ref().map(state),
-        rig.linear_axis.as_ref().map(state),
-        rig.turntable.as_ref().map(state),
-    ];
-    all.into_iter().flatten().collect()
+    rig.records().iter().map(state).collect()
 }
 
-/// What the bar says of them; none without camera, laser plane and what carries them.
+/// What the bar says of them; none without camera, laser plane and what carries them. The worst record decides. A
+/// joint.json that is not of the station's records makes them usable at best: their common errors are no longer known.
 pub fn age(rig: &Rig) -> Option<CalibrationAge> {
     let carried =
         rig.hand_eye.is_some() || rig.base_camera.is_some() || rig.linear_axis.is_some() || rig.turntable.is_some();
     rig.camera.as_ref().zip(rig.laser_plane.as_ref()).filter(|_| carried)?;
+    let verdicts = rig.records().into_iter().map(|r| (r.quality.verdict, r.kind.words()));
+    let joint = rig.joint().and_then(std::result::Result::err).map(|_| (Verdict::Usable, JOINT.to_owned()));
+    let (verdict, worst) = verdicts.chain(joint).reduce(|a, b| if b.0 > a.0 { b } else { a })?;
     let all = calibrations(rig);
-    let verdicts = [
-        rig.camera.as_ref().map(|c| c.quality.verdict),
-        rig.laser_plane.as_ref().map(|c| c.quality.verdict),
-        rig.hand_eye.as_ref().map(|c| c.quality.verdict),
-    ];
-    let worst = verdicts.into_iter().flatten().max().unwrap_or(Verdict::Refused);
-    let known: Vec<f64> = all.iter().filter_map(|c| c.expected_mm).collect();
-    let scanning = all.iter().filter(|c| c.kind != "pointer").count();
-    let expected = (known.len() >= scanning).then(|| known.iter().map(|v| v * v).sum::<f64>().sqrt());
+    let scanning: Vec<_> = all.iter().filter(|c| c.kind != Kind::Pointer.name()).map(|c| c.expected_mm).collect();
+    let known: Option<Vec<f64>> = scanning.into_iter().collect();
+    let expected = known.map(|mm| mm.iter().map(|v| v * v).sum::<f64>().sqrt());
     let days = all.iter().map(|c| c.days).fold(0.0, f64::max);
-    Some(CalibrationAge { days, verdict: worst.words().into(), expected_mm: expected })
+    Some(CalibrationAge { days, verdict: verdict.words().into(), worst, expected_mm: expected })
 }
 
 /// The station as it stands on the disk now.
@@ -79,6 +71,7 @@ pub fn info(place: &Place) -> StationInfo {
         mode: place.mode,
         program: format!("sheetlight {}", env!("CARGO_PKG_VERSION")),
         robot: settings.robot.map(|r| r.name().to_owned()),
+        mount: settings.mount.map(|m| m.name().to_owned()),
         tolerance_mm: settings.tolerance_mm,
         volume_mm: settings.working_volume.map(|v| [v.near_mm, v.far_mm]),
         work_frame: rig.as_ref().map_or("base", work_frame).into(),
@@ -127,5 +120,80 @@ pub(super) fn flatten(before: &str, value: &Value, out: &mut BTreeMap<String, Va
         value => {
             out.insert(before.to_owned(), value.clone());
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Axis, AxisKind, Base, Camera, CountUnit, Rigid};
+    use crate::rig::{Calibration, Covariance, Joint, JointCovariance};
+    use crate::simulate::Station;
+    use std::collections::BTreeMap;
+
+    fn quality(verdict: Verdict) -> Quality {
+        Quality { verdict, ..Station::random(1).calibrations(None).camera.unwrap().quality }
+    }
+
+    /// A rig of good records, and one of each other kind with this verdict.
+    fn rig(verdict: Verdict) -> Vec<(Kind, Rig)> {
+        let whole = || Station::random(1).calibrations(None);
+        let camera = whole().camera;
+        let mut all: Vec<(Kind, Rig)> = Vec::new();
+        let mut add = |kind, change: &dyn Fn(&mut Rig)| {
+            let mut rig = whole();
+            change(&mut rig);
+            all.push((kind, rig));
+        };
+        add(Kind::Camera, &|r| r.camera.as_mut().unwrap().quality = quality(verdict));
+        add(Kind::LaserPlane, &|r| r.laser_plane.as_mut().unwrap().quality = quality(verdict));
+        add(Kind::HandEye, &|r| r.hand_eye.as_mut().unwrap().quality = quality(verdict));
+        add(Kind::Pointer, &|r| r.pointer.as_mut().unwrap().quality = quality(verdict));
+        let standing = Rigid::<Base, Camera>::identity();
+        let place =
+            Calibration::new(Kind::BaseCamera, standing, camera.as_ref(), Covariance::default(), quality(verdict));
+        add(Kind::BaseCamera, &|r| r.base_camera = Some(place.clone()));
+        for (kind, of) in [(Kind::LinearAxis, AxisKind::Linear), (Kind::Turntable, AxisKind::Turntable)] {
+            let value = Axis { kind: of, unit: CountUnit::Count, pitch: 0.01, camera_from_axis: Rigid::identity() };
+            let record = Calibration::new(kind, value, camera.as_ref(), Covariance::default(), quality(verdict));
+            add(kind, &|r| match of {
+                AxisKind::Linear => r.linear_axis = Some(record.clone()),
+                AxisKind::Turntable => r.turntable = Some(record.clone()),
+            });
+        }
+        all
+    }
+
+    #[test]
+    fn the_worst_of_all_records_decides_what_the_bar_says() {
+        for verdict in [Verdict::Good, Verdict::Usable, Verdict::BadlyDetermined] {
+            let all = rig(verdict);
+            assert_eq!(all.len(), Kind::OF_A_RIG.len());
+            for (kind, rig) in all {
+                let said = age(&rig).unwrap();
+                assert_eq!(said.verdict, verdict.words(), "{kind:?}");
+                assert!(verdict == Verdict::Good || said.worst == kind.words(), "{kind:?}: {}", said.worst);
+            }
+        }
+    }
+
+    #[test]
+    fn a_covariance_of_other_records_is_not_good() {
+        let mut rig = Station::random(1).calibrations(None);
+        let of = |rig: &Rig| {
+            BTreeMap::from([
+                (Kind::Camera, rig.camera.as_ref().unwrap().content()),
+                (Kind::LaserPlane, rig.laser_plane.as_ref().unwrap().content()),
+                (Kind::HandEye, rig.hand_eye.as_ref().unwrap().content()),
+            ])
+        };
+        let stated = |of| Joint::Stated(JointCovariance { format: 1, of, parameters: vec![], matrix: vec![] });
+        rig.joint = stated(of(&rig));
+        assert_eq!(age(&rig).unwrap().verdict, "good");
+        rig.joint = stated(of(&Station::random(2).calibrations(None)));
+        let said = age(&rig).unwrap();
+        assert_eq!((&*said.verdict, &*said.worst), ("usable", JOINT));
+        rig.joint = Joint::Spoilt("cut off".into());
+        assert_eq!(age(&rig).unwrap().verdict, "usable");
     }
 }

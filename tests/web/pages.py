@@ -182,8 +182,32 @@ def teach(s, b):
     b.page("part")
     b.until("the recipe", "return document.querySelector('textarea')")
     b.run("document.querySelector('textarea').value = 'format = 1\\nname = \"x\"\\ncell_mm = \"wide\"\\n'")
-    b.run("[...document.querySelectorAll('button')].find((e) => e.innerText === 'Check and save').click()")
+    stored = lambda: next(r["text"] for r in s.json("GET", "/recipes") if r["name"] == "part")
+    before = stored()
+    b.click("#save-recipe")
+    b.until("the question", "return document.querySelector('#save-recipe').innerText === 'Really replace it?'")
+    assert stored() == before, "it was replaced without being asked for twice"
+    b.click("#save-recipe")
     b.until("the line of a broken recipe", "return /line 3|cell_mm/.test(document.querySelector('.problem')?.innerText ?? '')")
+    # A right text takes its place at the second press, and the former one lies in a backup.
+    b.run("document.querySelector('textarea').value = arguments[0]", "# mine\n" + before)
+    b.click("#save-recipe")
+    b.click("#save-recipe")
+    b.until("saved", "return /Saved/.test(document.getElementById('main').innerText)")
+    assert stored() == "# mine\n" + before
+    kept = s.json("GET", "/settings")["backups"]
+    assert len(kept) == 1 and kept[0]["name"].endswith("before-recipe.json"), kept
+    _, _, data = s.ask("GET", f"/api/v1/backups/{kept[0]['name']}")
+    assert json.loads(data)["files"]["recipes/part.toml"] == before
+    # Taught once more under its name: refused before anything is measured, unless it is to take the place of the former one.
+    order = next(j for j in s.json("GET", "/jobs") if j["order"]["procedure"] == "teach")["order"]
+    s.json("POST", "/lease", {"firmly": True})
+    refused = s.job({**order, "replace": False})
+    assert refused["state"] == "failed" and "already" in refused["problem"]["what"] and stored() == "# mine\n" + before, refused
+    again = s.job({**order, "replace": True})
+    assert again["state"] == "done" and stored() == before, again
+    assert len(s.json("GET", "/settings")["backups"]) == 2
+    s.json("POST", "/lease/release")
     quiet(b, "teach", refused=1)
 
 

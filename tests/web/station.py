@@ -161,7 +161,7 @@ def part(s, b):
     points = {p["name"]: p for p in s.json("POST", "/points", {"text": b.run("return document.querySelector('textarea').value")})}
     moved = [points["aside"]["at"][k] - points["middle"]["at"][k] for k in (0, 1)]
     assert abs(math.hypot(*moved) - math.hypot(2.54, 1)) < 1e-6, moved
-    b.run("document.querySelector('[aria-label=\"Take away middle\"]').click()")
+    b.run("document.querySelector('[aria-label=\"Delete middle\"]').click()")
     b.until("that it is needed", "return /middle/.test(document.querySelector('.problem')?.innerText ?? '')")
     quiet(b, "part", refused=2)
 

@@ -145,7 +145,7 @@ pub fn explain(pairs: &[Pair], what: String, o: &HandEyeOptions) -> Fault {
     if let Some(order) = other_order(pairs, o) {
         let inverted = order.contains("inverted");
         return Fault::input(what).cause(format!("the poses fit the pictures {order}")).next(if inverted {
-            "state the mount as it is (with or without --eye-to-hand), or export the poses as base_from_flange"
+            "state the mount as it is (mount in station.toml), or export the poses as base_from_flange"
         } else {
             "put the poses into the order in which the pictures were taken"
         });

@@ -77,7 +77,20 @@ pub struct Noise {
 }
 
 /// Where the flange is, as the noise of its pose moves the board in the picture.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    serde::Serialize,
+    serde::Deserialize,
+    strum::EnumString,
+    strum::IntoStaticStr,
+    strum::VariantArray,
+)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case", parse_err_ty = String, parse_err_fn = unknown)]
 pub enum Mount {
     /// On the camera's side: it carries the camera, and the board stands still.
     EyeInHand,
@@ -85,7 +98,15 @@ pub enum Mount {
     EyeToHand,
 }
 
+fn unknown(word: &str) -> String {
+    crate::fault::unknown::<Mount>("mount", word)
+}
+
 impl Mount {
+    /// As station.toml and the command line call it.
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
     /// The flange's origin in the camera frame.
     pub(in crate::calibrate) fn flange(self, chain: &Chain, near_from_far: &Rigid<Near, Far>) -> Vec3 {
         match self {

@@ -2,8 +2,8 @@
 //! Frame and unit: mm, mm/s.
 
 use super::joint::finish;
+use super::mount;
 use super::store::{Keep, stale};
-use crate::calibrate::hand_eye::options::Mount;
 use crate::cli::insert::moving::Moving;
 use crate::cli::terminal::console::Console;
 use crate::fault::Result;
@@ -16,8 +16,8 @@ use std::path::PathBuf;
 
 /// Calibrate camera, hand-eye, laser plane and pointer by moves that the program chooses
 ///
-/// One board lies below the robot, or is on its flange before a camera that stands still (--eye-to-hand); jog until the whole of it is in
-/// the picture. The program makes small moves first, then goes to the
+/// One board lies below the robot, or is on its flange before a camera that stands still (--mount eye-to-hand); jog
+/// until the whole of it is in the picture. The program makes small moves first, then goes to the
 /// pose that lowers the expected error of a scanned point the most, among those that station.toml's [motion] allows, that can be
 /// reached, and that keep board and stripe in view; it ends at --target-mm, or where more stops do not help, and checks itself on five
 /// poses that no solve saw. Every move is shown and asked for. The pictures are kept in --out: `calibrate joint` on them comes to the
@@ -40,9 +40,8 @@ pub struct Args {
     /// Expected error of a scanned point at which it is enough, mm rms
     #[arg(long)]
     target_mm: f64,
-    /// The camera stands still and the flange carries the board before it; else the camera is on the flange
-    #[arg(long)]
-    eye_to_hand: bool,
+    #[command(flatten)]
+    mount: mount::Where,
     /// Stops at most
     #[arg(long, default_value_t = 40)]
     most: usize,
@@ -57,7 +56,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let moving = &args.moving;
     moving.check()?;
     let (settings, rig) = (Settings::load(&moving.station)?, Rig::load_camera(&moving.station)?);
-    let mount = if args.eye_to_hand { Mount::EyeToHand } else { Mount::EyeInHand };
+    let mount = args.mount.of(&moving.station, &settings, console)?;
     let run = AutoRun {
         joint: JointRun::new(mount, asked(&settings, None), &settings.extraction, args.on),
         board: BoardSpec::load(&args.board)?,

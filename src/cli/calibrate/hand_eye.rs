@@ -1,8 +1,9 @@
 //! In: a recording of a board with robot poses. Out: the camera on the flange (or in the base).
 //! Frame and unit: flange_T_camera or base_T_camera; mm, degrees.
 
+use super::mount;
 use super::store::{Keep, finish};
-use crate::calibrate::hand_eye::options::{HandEyeOptions, Mount};
+use crate::calibrate::hand_eye::options::HandEyeOptions;
 use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Frame, Rigid};
@@ -45,9 +46,8 @@ pub struct Args {
     /// Sigma of the board poses' orientation per axis, degrees
     #[arg(long, requires = "board_poses", requires = "board_sigma_mm")]
     board_sigma_deg: Option<f64>,
-    /// The camera stands still and the flange carries the board
-    #[arg(long)]
-    eye_to_hand: bool,
+    #[command(flatten)]
+    mount: mount::Where,
     /// Sigma of the robot's position per axis, mm [default: estimated]
     #[arg(long)]
     robot_sigma_mm: Option<f64>,
@@ -66,7 +66,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let (settings, rig) = (Settings::load(&args.station)?, Rig::load_to_calibrate(&args.station)?);
     let run = HandEyeRun {
         poses: args.poses.clone(),
-        mount: if args.eye_to_hand { Mount::EyeToHand } else { Mount::EyeInHand },
+        mount: args.mount.of(&args.station, &settings, console)?,
         solver: HandEyeOptions {
             robot_sigma_mm: args.robot_sigma_mm,
             robot_sigma_deg: args.robot_sigma_deg,

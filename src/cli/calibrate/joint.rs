@@ -1,8 +1,8 @@
 //! In: recordings of boards and a station. Out: the station's whole rig from one solve, stored together.
 //! Frame and unit: mm, degrees.
 
+use super::mount;
 use super::store::{Keep, figures, stale};
-use crate::calibrate::hand_eye::options::Mount;
 use crate::cli::terminal::console::Console;
 use crate::fault::{Fault, Result};
 use crate::raster::Channel;
@@ -36,9 +36,8 @@ pub struct Args {
     /// Pose file of the recordings with robot poses, without extension [default: the one meta.json names]
     #[arg(long)]
     poses: Option<String>,
-    /// The camera stands still and the flange carries the board
-    #[arg(long)]
-    eye_to_hand: bool,
+    #[command(flatten)]
+    mount: mount::Where,
     /// Depths at which the expected error is stated: nearest and farthest, mm [default: station.toml's working volume, else
     /// where boards were lit]
     #[arg(long, num_args = 2, value_names = ["NEAR", "FAR"])]
@@ -58,7 +57,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let mut recordings = args.recordings.iter().map(|r| Recording::open(r)).collect::<Result<Vec<_>>>()?;
     recordings.iter_mut().for_each(|r| r.channel = args.channel);
     let asked = asked(&settings, args.working_mm.as_ref().map(|w| [w[0], w[1]]));
-    let mount = if args.eye_to_hand { Mount::EyeToHand } else { Mount::EyeInHand };
+    let mount = args.mount.of(&args.station, &settings, console)?;
     let run = JointRun { poses: args.poses.clone(), ..JointRun::new(mount, asked, &settings.extraction, args.on) };
     let bar = console.bar("boards", 0);
     let progress = |done: usize, all: usize| {

@@ -8,6 +8,7 @@ mod hand_eye;
 mod joint;
 mod laser_plane;
 mod latency;
+mod mount;
 mod pointer;
 mod profile_hand_eye;
 pub(in crate::cli) mod store;

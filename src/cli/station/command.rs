@@ -2,6 +2,7 @@
 //! Frame and unit: camera and flange frames, mm.
 
 use super::{keep, serve};
+use crate::calibrate::hand_eye::options::Mount;
 use crate::camera::{Intrinsics, LENS, NAMES};
 use crate::cli::calibrate::store::stale;
 use crate::cli::terminal::console::Console;
@@ -41,7 +42,7 @@ pub enum Command {
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:
-  sheetlight station new --station cell3 --robot denso")]
+  sheetlight station new --station cell3 --robot denso --mount eye-in-hand")]
 pub struct New {
     /// Folder to make
     #[arg(long)]
@@ -53,6 +54,10 @@ pub struct New {
     /// [default: none; poses are then read and written as matrices]
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Convention>)]
     robot: Option<Convention>,
+    /// Where the camera is: eye-in-hand (on the flange) or eye-to-hand (it stands still, and the flange carries the
+    /// part) [default: not stated]
+    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Mount>)]
+    mount: Option<Mount>,
 }
 
 #[derive(clap::Args)]
@@ -138,8 +143,8 @@ fn make(a: &New, console: &Console) -> Result<()> {
         let what = format!("{}: is a station already", a.station.display());
         return Err(Fault::usage(what).next("choose another folder"));
     }
-    let settings =
-        Settings { name: a.name.clone().unwrap_or_else(|| named(&a.station)), robot: a.robot, ..Settings::default() };
+    let name = a.name.clone().unwrap_or_else(|| named(&a.station));
+    let settings = Settings { name, robot: a.robot, mount: a.mount, ..Settings::default() };
     settings.store(&a.station)?;
     console.result(&settings, &format!("{}: made; calibrate it or import values next", a.station.display()));
     Ok(())

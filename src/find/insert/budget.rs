@@ -3,6 +3,7 @@
 //! (docs/math.md, Insertion (5)). Frame and unit: the part's own axes; mm, degrees; one standard deviation.
 
 use super::recipe::Recipe;
+use crate::fault::Result;
 use crate::find::look::levers::{AXIS, HAND_EYE, Lever, TOGETHER};
 use crate::find::look::part_seen::PartSeen;
 use crate::find::measure::construct::Built;
@@ -88,7 +89,10 @@ impl Budget {
 }
 
 /// Adds up the budget. `rig` may be missing or have imported values of unknown uncertainty.
-pub fn budget(points: &Ordered, measured: &Measured, rig: Option<&Rig>, recipe: &Recipe) -> Budget {
+///
+/// # Errors
+/// A rig with two axes.
+pub fn budget(points: &Ordered, measured: &Measured, rig: Option<&Rig>, recipe: &Recipe) -> Result<Budget> {
     let robot = &recipe.robot;
     let (p, r) = (robot.sigma_mm.powi(2), robot.sigma_deg.to_radians().powi(2));
     let repeatability = Matrix6::from_diagonal(&nalgebra::Vector6::new(p, p, p, r, r, r));
@@ -100,10 +104,12 @@ pub fn budget(points: &Ordered, measured: &Measured, rig: Option<&Rig>, recipe: 
     ];
     let mut complete = true;
     let seen = rig.and_then(|_| PartSeen::new(points, &recipe.drawing(), measured, &recipe.measure));
-    let levers = seen.as_ref().zip(rig).map_or(Vec::new(), |(seen, rig)| seen.levers(rig));
+    let levers = seen.as_ref().zip(rig).map_or(Ok(Vec::new()), |(seen, rig)| seen.levers(rig))?;
+    let on_axis = rig.map_or(Ok(None), Rig::axis)?.is_some();
     let into_part = both(&measured.base_from_part.rotation.transpose());
-    let (together, aside) = seen.as_ref().zip(rig).map_or((None, None), |(seen, rig)| at_once(seen, rig));
-    let carrying = if rig.is_some_and(|r| r.axis().is_some()) { AXIS } else { HAND_EYE };
+    let (together, aside) =
+        seen.as_ref().zip(rig).filter(|_| !on_axis).map_or((None, None), |(seen, rig)| at_once(seen, rig));
+    let carrying = if on_axis { AXIS } else { HAND_EYE };
     for name in ["laser plane", carrying] {
         let known = levers.iter().find(|l| l.name == name);
         match (known.filter(|l| l.covariance.is_some()), &seen) {
@@ -136,14 +142,11 @@ pub fn budget(points: &Ordered, measured: &Measured, rig: Option<&Rig>, recipe: 
     let [sigma_mm, sigma_deg] = sigmas(&covariance);
     let base_from_camera = seen.as_ref().map(PartSeen::base_from_camera);
     let shape = measured.shape;
-    Budget { terms, sigma_mm, sigma_deg, complete, covariance, own, levers, shape, seen, base_from_camera }
+    Ok(Budget { terms, sigma_mm, sigma_deg, complete, covariance, own, levers, shape, seen, base_from_camera })
 }
 
 /// The lever of calibrations that were made at once; else why what is stated of that is not used, where anything is.
 fn at_once(seen: &PartSeen, rig: &Rig) -> (Option<Lever>, Option<String>) {
-    if rig.axis().is_some() {
-        return (None, None);
-    }
     match rig.joint() {
         None => (None, None),
         Some(Err(why)) => (None, Some(why)),

@@ -74,7 +74,7 @@ pub fn locate(
     let matches = search(&map, recipe, options)?;
     let all = if options.all { places(&matches, &map) } else { vec![] };
     let part = examine(&points, &map, recipe, options.expected.as_ref(), &matches)?;
-    let report = conclude(recipe, rig, options, &points, map, part);
+    let report = conclude(recipe, rig, options, &points, map, part)?;
     Ok(Report { all, ..report })
 }
 
@@ -224,10 +224,10 @@ fn conclude(
     points: &Ordered,
     map: HeightMap,
     part: Examined,
-) -> Report {
+) -> Result<Report> {
     let spec = &recipe.insertion;
     let used = part.constructions.iter().find(|b| b.name == spec.construction);
-    let mut budget = budget(points, &part.measured, rig, recipe);
+    let mut budget = budget(points, &part.measured, rig, recipe)?;
     part.constructions.iter().filter(|b| b.name == spec.construction).for_each(|b| budget.built(b));
     let sizes = size_check(&budget, recipe);
     let disagreement_mm = disagreement(recipe, &part.constructions);
@@ -246,7 +246,7 @@ fn conclude(
         notes.push(SAME_IN_A_MIRROR.into());
     }
     let passed = reasons.is_empty();
-    Report {
+    Ok(Report {
         recipe: recipe.name.clone(),
         frame: "base".into(),
         passed,
@@ -276,7 +276,7 @@ fn conclude(
         looks: None,
         base_from_constructed,
         map,
-    }
+    })
 }
 
 /// Distance between the two-pin construction and the lattice, mm; `None` where one of them is missing.

@@ -3,6 +3,7 @@
 //! Frame and unit: base frame, mm, rad; sizes as shares, the part's axes. docs/math.md, Second look.
 
 use crate::camera::{Intrinsics, NAMES, Parameters, difference_step};
+use crate::fault::Result;
 use crate::geometry::{Axis, AxisKind, Base, Camera, Plane, Ride, Rigid, Vec3};
 use crate::rig::{Covariance, HandEye, JointCovariance, Kind, Rig};
 use nalgebra::{DMatrix, Matrix6, SVector};
@@ -64,7 +65,10 @@ impl Lever {
 }
 
 /// The levers of all that a rig has, and of what it supposes. `answer` takes the displacement of each place, base axes.
-pub fn levers(seen: &[Seen], rig: &Rig, answer: impl Fn(&[Vec3]) -> Answer) -> Vec<Lever> {
+///
+/// # Errors
+/// A rig with two axes.
+pub fn levers(seen: &[Seen], rig: &Rig, answer: impl Fn(&[Vec3]) -> Answer) -> Result<Vec<Lever>> {
     let lever = |name, parameters: &'static [&'static str], by: &dyn Fn(&Seen, usize) -> Vec3| {
         let columns: Vec<Answer> =
             (0..parameters.len()).map(|k| answer(&seen.iter().map(|s| by(s, k)).collect::<Vec<_>>())).collect();
@@ -85,7 +89,7 @@ pub fn levers(seen: &[Seen], rig: &Rig, answer: impl Fn(&[Vec3]) -> Answer) -> V
         let of = lever(HAND_EYE, names, &|s, k| by_hand_eye(s, &h.value, k));
         out.push(Lever { covariance: square(&h.covariance, 6), ..of });
     }
-    if let Some(a) = rig.axis() {
+    if let Some(a) = rig.axis()? {
         let names: &'static [&'static str] = match a.value.kind {
             AxisKind::Linear => &["dx", "dy", "dz", "pitch mm"],
             AxisKind::Turntable => &["dx", "dy", "dz", "pitch rad", "px mm", "py mm", "pz mm"],
@@ -99,7 +103,7 @@ pub fn levers(seen: &[Seen], rig: &Rig, answer: impl Fn(&[Vec3]) -> Answer) -> V
     }
     out.push(supposed(lever("delay", &["shots"], &|s, _| s.late), &[1.0]));
     out.push(supposed(lever("robot's steps", &["share"], &|s, _| s.longer), &[0.01]));
-    out
+    Ok(out)
 }
 
 /// The lever of camera, lens, laser plane and hand-eye, calibrated at once. `None` where the rig has not all of these.

@@ -53,7 +53,7 @@ fn setup(sides: &[(f64, f64)]) -> Setup {
             let seen = seen.moved(&other_side(&part, turn, tilt));
             let own = Matrix6::from_diagonal(&Vector6::new(1e-4, 1e-4, 1e-4, 1e-8, 1e-8, 1e-8));
             Budget {
-                levers: seen.levers(&rig),
+                levers: seen.levers(&rig).unwrap(),
                 base_from_camera: Some(seen.base_from_camera()),
                 seen: Some(seen),
                 ..Budget::of_look(own)

@@ -3,6 +3,7 @@
 //! Frame and unit: camera frame and base frame; answers as in `levers`; mm, rad.
 
 use super::levers::{Answer, Lever, Seen, levers, together};
+use crate::fault::Result;
 use crate::find::measure::options::MeasureOptions;
 use crate::find::measure::points::Ordered;
 use crate::find::measure::points::localise;
@@ -97,7 +98,10 @@ impl PartSeen {
     }
 
     /// What the rig's errors do to the part's pose and sizes, each calibration by itself.
-    pub fn levers(&self, rig: &Rig) -> Vec<Lever> {
+    ///
+    /// # Errors
+    /// A rig with two axes.
+    pub fn levers(&self, rig: &Rig) -> Result<Vec<Lever>> {
         levers(&self.seen, rig, self.answer())
     }
 

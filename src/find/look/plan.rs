@@ -57,7 +57,7 @@ pub fn plan_look(report: &Report, rig: &Rig, turn_deg: f64, tilt_deg: f64) -> Re
             .cause("another station's scan, or too few points of one shot on the part")
             .next("give the station that scanned"));
     };
-    let second = seen.moved(&other_side(part, turn_deg, tilt_deg)).levers(rig);
+    let second = seen.moved(&other_side(part, turn_deg, tilt_deg)).levers(rig)?;
     let shown = report.budget.levers.iter().zip(&second).flat_map(|(a, b)| shares(a, b)).collect();
     Ok(LookPlan { base_from_base: other_side(part, turn_deg, tilt_deg), shown })
 }

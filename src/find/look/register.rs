@@ -223,7 +223,7 @@ pub fn register(scans: &[(String, Ordered)], rig: &Rig) -> Result<Vec<Registered
         };
         let seen = seen_by(points, pieces.iter().map(|p| (p.row, p.point)));
         let [shift, turn] = [0, 3].map(|k| Vec3::new(fit.step[k], fit.step[k + 1], fit.step[k + 2]));
-        let budget = budget(&seen, pieces, &centre, rig, fit.covariance)
+        let budget = budget(&seen, pieces, &centre, rig, fit.covariance)?
             .ok_or_else(|| weak(format!("{name}: the scan does not say how its camera stood")))?;
         out.push(Registered {
             // What brings the scan back is what it is off by.
@@ -236,20 +236,26 @@ pub fn register(scans: &[(String, Ordered)], rig: &Rig) -> Result<Vec<Registered
     Ok(out)
 }
 
-fn budget(seen: &[(usize, Seen)], pieces: &[Piece], centre: &Vec3, rig: &Rig, own: Matrix6<f64>) -> Option<Budget> {
+fn budget(
+    seen: &[(usize, Seen)],
+    pieces: &[Piece],
+    centre: &Vec3,
+    rig: &Rig,
+    own: Matrix6<f64>,
+) -> Result<Option<Budget>> {
     let normals: HashMap<usize, &Piece> = pieces.iter().map(|p| (p.point, p)).collect();
     let (seen, faces): (Vec<Seen>, Vec<&Piece>) = seen.iter().map(|(i, s)| (*s, normals[i])).unzip();
-    let base_from_camera = middle(&seen, centre)?;
+    let Some(base_from_camera) = middle(&seen, centre) else { return Ok(None) };
     let rows: Vec<Vector6> = faces.iter().map(|p| row(&p.at, &p.normal, centre)).collect();
     // One piece weighs as it does in the fit, about: what no surface tells does not follow either.
     let weight = 1e4;
     let normal = rows.iter().map(|j| j * j.transpose() * weight).sum::<Matrix6<f64>>() + known();
-    let follow = normal.try_inverse()? * weight;
+    let Some(follow) = normal.try_inverse().map(|n| n * weight) else { return Ok(None) };
     let levers = levers(&seen, rig, |moved| {
         let right: Vector6 = (0..rows.len()).map(|i| rows[i] * faces[i].normal.dot(&moved[i])).sum();
         let m = follow * right;
         Answer::from_iterator(m.iter().copied().chain([0.0; 3]))
-    });
+    })?;
     let complete = levers.iter().all(|l| l.covariance.is_some());
-    Some(Budget { complete, levers, base_from_camera: Some(base_from_camera), ..Budget::of_look(own) })
+    Ok(Some(Budget { complete, levers, base_from_camera: Some(base_from_camera), ..Budget::of_look(own) }))
 }

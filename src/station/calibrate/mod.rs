@@ -9,6 +9,7 @@ pub(super) mod hand_eye;
 pub(super) mod joint;
 pub(super) mod laser_plane;
 pub(super) mod latency;
+pub(super) mod mount;
 pub(super) mod pointer;
 mod room_light;
 mod straight;

@@ -7,8 +7,8 @@ use crate::raster::{Image, png};
 use crate::recording::{Beam, MotionKind, Recording};
 use crate::web::guard::{Tab, resolve};
 use crate::web::message::{
-    Bar, BoardView, DrawingAsk, DrawingRead, PictureRef, PointsOf, Problem, RecipePoint, RecipeText, RecordingInfo,
-    StationInfo, ViewRef,
+    Bar, BoardView, DrawingAsk, DrawingRead, PictureRef, PointsChange, PointsChanged, PointsOf, Problem, RecipeAsk,
+    RecipePoint, RecipeText, RecordingInfo, StationInfo, ViewRef,
 };
 use crate::web::screen::Screen;
 use crate::web::{station, work};
@@ -146,7 +146,7 @@ pub async fn boards(State(screen): State<Arc<Screen>>) -> Answer<Json<Vec<String
 
 /// GET /recipes
 pub async fn recipes(State(screen): State<Arc<Screen>>) -> Answer<Json<Vec<RecipeText>>> {
-    json(screen, |s| work::recipes(&s.place)).await
+    json(screen, |s| Ok(work::recipes(&s.place))).await
 }
 
 /// PUT /recipes/{name}
@@ -157,8 +157,8 @@ pub async fn save_recipe(
     bytes: Bytes,
 ) -> Answer<Json<RecipeText>> {
     operates(&screen, &tab)?;
-    let recipe = RecipeText { name, ..body::<RecipeText>(&bytes)? };
-    json(screen, move |s| work::save_recipe(&s.place, &recipe).map(|()| recipe)).await
+    let ask: RecipeAsk = body(&bytes)?;
+    json(screen, move |s| work::save_recipe(&s.place, &name, &ask.text, ask.replace)).await
 }
 
 /// POST /drawings
@@ -178,6 +178,12 @@ pub async fn points(State(screen): State<Arc<Screen>>, bytes: Bytes) -> Answer<J
     json(screen, move |_| work::points(&ask.text)).await
 }
 
+/// POST /points/change: of a recipe that need not be stored.
+pub async fn change_points(State(screen): State<Arc<Screen>>, bytes: Bytes) -> Answer<Json<PointsChanged>> {
+    let ask: PointsChange = body(&bytes)?;
+    json(screen, move |_| work::change_points(&ask)).await
+}
+
 /// DELETE /recipes/{name}
 pub async fn remove_recipe(
     State(screen): State<Arc<Screen>>,
@@ -186,13 +192,7 @@ pub async fn remove_recipe(
 ) -> Answer<Json<serde_json::Value>> {
     operates(&screen, &tab)?;
     json(screen, move |s| {
-        let path = work::recipe_path(&s.place, &name)?;
-        if !path.is_file() {
-            return Err(Fault::input(format!("{name}: is no recipe of this station's own"))
-                .cause("shipped recipes stay")
-                .next("choose another"));
-        }
-        crate::files::remove(&path).map_err(|e| Fault::write(&path, e))?;
+        work::remove_recipe(&s.place, &name)?;
         Ok(serde_json::json!({}))
     })
     .await

@@ -184,14 +184,14 @@ fn of_recipes() -> Vec<Route> {
         ),
         route(
             ("PUT", "/recipes/{name}"),
-            "Check and store a recipe",
-            ("RecipeText", "RecipeText"),
+            "Check and store a recipe; an own one of that name is backed up and replaced only with replace",
+            ("RecipeAsk", "RecipeText"),
             put(place::save_recipe),
         )
         .leased(),
         route(
             ("DELETE", "/recipes/{name}"),
-            "Take a recipe of the station away",
+            "Take a recipe of the station away; it is backed up",
             ("", ""),
             delete(place::remove_recipe),
         )
@@ -201,6 +201,12 @@ fn of_recipes() -> Vec<Route> {
             "Shapes and constructed points of a recipe's text, where the drawing has them",
             ("PointsOf", "RecipePoint[]"),
             post(place::points),
+        ),
+        route(
+            ("POST", "/points/change"),
+            "A recipe's text with a constructed point more or less, or with another that the tool goes to",
+            ("PointsChange", "PointsChanged"),
+            post(place::change_points),
         ),
         route(
             ("POST", "/drawings"),

@@ -48,10 +48,12 @@ pub struct Frames {
 /// How old the oldest calibration of the rig is, and what all of them make expect.
 #[derive(Clone, Debug, PartialEq, Serialize, TS)]
 pub struct CalibrationAge {
-    /// Days since the oldest of camera, laser plane and hand-eye was measured.
+    /// Days since the oldest record was measured.
     pub days: f64,
-    /// The worst verdict of them.
+    /// The worst verdict of all records.
     pub verdict: String,
+    /// Which record has it.
+    pub worst: String,
     /// Root of the sum of squares of what each expects at the working distance, mm; null where one does not say.
     pub expected_mm: Option<f64>,
 }

@@ -34,6 +34,66 @@ pub struct DrawingAsk {
     pub tolerance_deg: f64,
     /// The tool's way above the insertion pose before and after, mm.
     pub approach_mm: f64,
+    /// It takes the place of the station's own recipe of that name.
+    #[serde(default)]
+    pub replace: bool,
+}
+
+/// A recipe's text, and what changes of its constructed points.
+#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[serde(deny_unknown_fields)]
+pub struct PointsChange {
+    /// TOML; it need not be stored.
+    pub text: String,
+    /// What changes.
+    pub change: PointChange,
+}
+
+/// What changes of a recipe's constructed points.
+#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[serde(rename_all = "snake_case")]
+pub enum PointChange {
+    /// One more, behind those that it may be built of.
+    Add(NewPoint),
+    /// One less.
+    TakeOut {
+        /// Which one.
+        name: String,
+    },
+    /// Where the tool goes.
+    Choose {
+        /// Which one; null: the part's own place.
+        name: Option<String>,
+    },
+}
+
+/// A point to be constructed.
+#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+#[serde(deny_unknown_fields)]
+pub struct NewPoint {
+    /// By which later ones and the insertion name it.
+    pub name: String,
+    /// midpoint, line, intersection, offset or lattice.
+    pub kind: String,
+    /// Names of shapes, or of points before it.
+    pub of: Vec<String>,
+    /// Of an offset: the line or lattice that gives the direction.
+    #[serde(default)]
+    #[ts(optional = nullable)]
+    pub along: Option<String>,
+    /// Of an offset: along and across, mm.
+    #[serde(default)]
+    #[ts(optional = nullable)]
+    pub by_mm: Option<[f64; 2]>,
+}
+
+/// A recipe's text after a change of its points.
+#[derive(Clone, Debug, PartialEq, Serialize, TS)]
+pub struct PointsChanged {
+    /// TOML, with all comments that it had.
+    pub text: String,
+    /// Its points now.
+    pub points: Vec<RecipePoint>,
 }
 
 /// A recipe's text that is being written.

@@ -19,7 +19,7 @@ mod typescript;
 pub use bar::{Bar, CalibrationAge, Frames, Lease, Mode, RobotState};
 pub use camera::{CameraFeature, CameraState, ExposureSet, PictureLook, SetFeature, StripeSeen};
 pub use door::{Confirmed, Grant, Knock, Redeem, Session, TakeLease};
-pub use drawing::{DrawingAsk, DrawingRead, PointsOf, RecipePoint};
+pub use drawing::{DrawingAsk, DrawingRead, NewPoint, PointChange, PointsChange, PointsChanged, PointsOf, RecipePoint};
 pub use filter::{Filter, FilterOrder, Filtered, Filters};
 pub use job::{Event, Job, JobState, Problem};
 pub use motion::{Arming, Asked, InTheCell, MotionState, SimulatedCell};
@@ -32,7 +32,8 @@ pub use outcome::{
     RepeatsAsk, RobotPoses, ScanFigures, Spread, SquareProposed, SurfaceTouched, Term, Touched,
 };
 pub use place::{
-    BoardView, CalibrationState, FrameInfo, PictureRef, RecipeText, RecordingInfo, StationInfo, SupportAsk, ViewRef,
+    BoardView, CalibrationState, FrameInfo, PictureRef, RecipeAsk, RecipeText, RecordingInfo, StationInfo, SupportAsk,
+    ViewRef,
 };
 pub use settings::{BackupInfo, OutputAsk, SettingsAsk, SettingsState};
 pub use surface::{

@@ -191,6 +191,9 @@ pub struct TeachOrder {
     pub tolerance_deg: f64,
     /// The tool's way above the insertion pose before and after, mm.
     pub approach_mm: f64,
+    /// It takes the place of the station's own recipe of that name.
+    #[serde(default)]
+    pub replace: bool,
 }
 
 impl Order {

@@ -16,6 +16,8 @@ pub struct StationInfo {
     pub program: String,
     /// How its robot writes poses; null: as matrices.
     pub robot: Option<String>,
+    /// eye-in-hand or eye-to-hand; null: not stated.
+    pub mount: Option<String>,
     /// What the work tolerates, mm.
     pub tolerance_mm: Option<f64>,
     /// Camera depths at which points are believed, mm.
@@ -142,18 +144,26 @@ pub struct PictureRef {
 }
 
 /// A recipe as text.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TS)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq, Serialize, TS)]
 pub struct RecipeText {
     /// Name of the file, without extension.
     pub name: String,
     /// What people call the part; read from the text.
-    #[serde(default)]
     pub title: String,
     /// Ships with the program; it is copied when it is changed.
-    #[serde(default)]
     pub shipped: bool,
-    /// TOML.
-    #[serde(default)]
+    /// TOML; empty where it cannot be read at all.
     pub text: String,
+    /// What is wrong with it; null: nothing.
+    pub problem: Option<Problem>,
+}
+
+/// A recipe to be stored. Keys of a listed recipe beside the text may be sent along and are not read.
+#[derive(Clone, Debug, PartialEq, Deserialize, TS)]
+pub struct RecipeAsk {
+    /// TOML.
+    pub text: String,
+    /// It takes the place of the station's own recipe of that name.
+    #[serde(default)]
+    pub replace: bool,
 }

@@ -119,7 +119,18 @@ fn of_station() -> Vec<String> {
 
 /// Recipes and their drawings.
 fn of_recipes() -> Vec<String> {
-    vec![RecipeText::decl(), PointsOf::decl(), RecipePoint::decl(), DrawingAsk::decl(), DrawingRead::decl()]
+    vec![
+        RecipeText::decl(),
+        RecipeAsk::decl(),
+        PointsOf::decl(),
+        RecipePoint::decl(),
+        NewPoint::decl(),
+        PointChange::decl(),
+        PointsChange::decl(),
+        PointsChanged::decl(),
+        DrawingAsk::decl(),
+        DrawingRead::decl(),
+    ]
 }
 
 /// A scan looked at, and measured in.

@@ -2,7 +2,7 @@
 //! Frame and unit: the scan's frame, outlines in the height map's grid; mm, degrees.
 
 use super::found::{FOUND, RECIPE};
-use super::recipes::{load, save_recipe};
+use super::recipes::{load, save_recipe, vacant};
 use super::run::Run;
 use super::store::scan_of;
 use crate::fault::{Fault, Result};
@@ -14,9 +14,7 @@ use crate::geometry::Vec3;
 use crate::raster::RgbImage;
 use crate::robot::Convention;
 use crate::station::{Looked, Settings, find_part_in_all, teach_part};
-use crate::web::message::{
-    FindOrder, GateLight, Notation, Outcome, Position, RecipeText, RobotPoses, TeachOrder, Term,
-};
+use crate::web::message::{FindOrder, GateLight, Notation, Outcome, Position, RobotPoses, TeachOrder, Term};
 use crate::web::surface::between_pins;
 use std::path::PathBuf;
 
@@ -40,6 +38,7 @@ pub(super) fn find(this: &Run, ask: &FindOrder) -> Result<Outcome> {
 
 pub(super) fn teach(this: &Run, order: &TeachOrder) -> Result<Outcome> {
     let place = &this.jobs.place;
+    vacant(place, &order.name, order.replace)?;
     let folders = scan_folders(this, std::slice::from_ref(&order.scan))?;
     let options = TeachOptions {
         name: order.name.clone(),
@@ -56,7 +55,7 @@ pub(super) fn teach(this: &Run, order: &TeachOrder) -> Result<Outcome> {
     let (recipe, proof, picture) = teach_part(&folders[0], &options)?;
     let text = toml::to_string(&recipe).expect("plain data");
     keep(this, &proof, &recipe, &picture)?;
-    save_recipe(place, &RecipeText { name: order.name.clone(), title: String::new(), shipped: false, text })?;
+    save_recipe(place, &order.name, &text, order.replace)?;
     let convention = Settings::load(&place.station)?.robot.unwrap_or(Convention::Matrix);
     let proof = Box::new(position(&proof, &recipe, convention));
     Ok(Outcome::Teach { recipe: order.name.clone(), proof })

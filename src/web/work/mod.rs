@@ -21,6 +21,6 @@ pub use calibrate::{Views, accept, boards};
 pub use found::{insertion_of, lies, report_of};
 pub use jobs::Jobs;
 pub use place::Place;
-pub use recipes::{from_drawing, load as recipe_named, points, recipe_path, recipes, save_recipe};
+pub use recipes::{change_points, from_drawing, load as recipe_named, points, recipes, remove_recipe, save_recipe};
 pub use store::scan_of;
 pub use worker::Worker;

@@ -85,8 +85,13 @@ fn one(name: &str, seed: u64) -> (f64, f64) {
     let (part, moved) = scan(&cell, &fit);
     let lever = part.together(&rig, rig.joint().unwrap().unwrap()).unwrap();
     let whole = lever.of_pose();
-    let alone: Matrix6<f64> =
-        part.levers(&rig).iter().filter(|l| ["laser plane", "hand-eye"].contains(&l.name)).map(|l| l.of_pose()).sum();
+    let alone: Matrix6<f64> = part
+        .levers(&rig)
+        .unwrap()
+        .iter()
+        .filter(|l| ["laser plane", "hand-eye"].contains(&l.name))
+        .map(|l| l.of_pose())
+        .sum();
     let error: Vector6<f64> = part.answer()(&moved).fixed_rows::<6>(0).into();
     let squares = error.dot(&whole.lu().solve(&error).unwrap());
     let shift = |c: &Matrix6<f64>| c.fixed_view::<3, 3>(0, 0).trace().sqrt();

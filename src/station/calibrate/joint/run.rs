@@ -27,7 +27,7 @@ use crate::camera::{CameraCovariance, Intrinsics, PARAMETERS};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Camera, Plane, Ray, Rigid, Vec3};
 use crate::recording::Recording;
-use crate::rig::{Calibration, HandEye, JointCovariance, Kind, Quality, Rig, Verdict, Volume, sealed};
+use crate::rig::{Calibration, HandEye, Joint, JointCovariance, Kind, Quality, Rig, Verdict, Volume, sealed};
 use crate::scan::{Extraction, Where};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -323,8 +323,38 @@ fn contents(rig: &Rig) -> BTreeMap<Kind, String> {
 /// Stores all records, their covariance together (`joint.json`, of no meaning for other records) and the page (`joint.html`), all of
 /// them or none.
 pub fn store_joint(station: &Path, result: &JointResult) -> Result<Vec<Kind>> {
-    result.rig.store_all_with(station, |stored| {
-        let together = JointCovariance { of: contents(stored), ..result.together.clone() };
-        vec![("joint.json", sealed(&together)), ("joint.html", result.page.html())]
+    store_set(station, &result.rig, &result.together, result.page.html())
+}
+
+/// Stores in a station what [`store_joint`] has kept in another folder, all of it or nothing.
+///
+/// # Errors
+/// The folder holds no joint calibration, or one that is badly determined; the disk.
+pub fn accept_joint(kept: &Path, station: &Path) -> Result<Vec<Kind>> {
+    let strange = |what: &str| Fault::input(format!("{}: {what}", kept.display())).next("calibrate again");
+    let rig = Rig::load(kept)?;
+    let quality = &rig.camera.as_ref().ok_or_else(|| strange("holds no calibration"))?.quality;
+    if quality.verdict >= Verdict::BadlyDetermined {
+        return Err(Fault::refused(format!("the calibration is {}", quality.verdict.words()))
+            .cause(quality.reasons.join("; "))
+            .next(quality.advice.first().map_or("take more pictures", String::as_str)));
+    }
+    let together = match &rig.joint {
+        Joint::Stated(together) => together,
+        Joint::Spoilt(why) => return Err(strange(why)),
+        Joint::Absent => return Err(strange("holds no joint.json")),
+    };
+    let page = crate::files::read_text(&kept.join("calibration").join(PAGE))?;
+    store_set(station, &rig, together, page)
+}
+
+/// Covariance of all records, and the page, beside the records.
+const COVARIANCE: &str = "joint.json";
+const PAGE: &str = "joint.html";
+
+fn store_set(station: &Path, rig: &Rig, together: &JointCovariance, page: String) -> Result<Vec<Kind>> {
+    rig.store_all_with(station, |stored| {
+        let together = JointCovariance { of: contents(stored), ..together.clone() };
+        vec![(COVARIANCE, sealed(&together)), (PAGE, page)]
     })
 }

@@ -1,12 +1,11 @@
 // Part: choose or teach a recipe, find it in a scan, see where it lies.
 
-import { put, remove, url } from "../base/api.js";
-import { get } from "../base/api.js";
+import { get, put, remove, url } from "../base/api.js";
 import { fill, h, num } from "../base/dom.js";
 import { jobs, store } from "../base/store.js";
 import { t } from "../base/text.js";
 import { attempt, fault } from "../widgets/problem.js";
-import { choice, field, figures, follow, nothing, order, panel, scanChoice } from "../widgets/parts.js";
+import { choice, field, figures, follow, nothing, order, panel, scanChoice, storing } from "../widgets/parts.js";
 import { operate, operating } from "../widgets/bar.js";
 import { constructions } from "../widgets/part/constructions.js";
 import { drawing } from "../widgets/part/drawing.js";
@@ -17,8 +16,11 @@ export async function show(place, query) {
   const [choose, scan] = scanChoice(query, (id) => (location.hash = `#/part?job=${id}`));
   if (!scan) return void fill(place, h("h1", {}, t("Part")), nothing(t("Nothing was scanned yet."), "scan", t("Scan")));
   let recipes = await get("/recipes");
-  let name = sessionStorage.getItem("recipe") ?? recipes[0]?.name;
-  if (!recipes.some((r) => r.name === name)) name = recipes[0]?.name;
+  const first = () => (recipes.find((r) => !r.problem) ?? recipes[0])?.name;
+  /** Whether the station has a recipe of its own under that name. */
+  const taken = (n) => recipes.some((r) => r.name === n && !r.shipped);
+  let name = sessionStorage.getItem("recipe");
+  if (!recipes.some((r) => r.name === name)) name = first();
   const problem = h("div"), progress = h("div"), picture = h("div", { class: "stack grow" }), found = h("div"), chooser = h("span"), tools = h("div", { class: "tools" }), side = h("div", { class: "stack" });
   let follows = () => {};
   const run = (what, ended) => attempt(async () => {
@@ -27,7 +29,7 @@ export async function show(place, query) {
     follows = follow(progress, job.id, ended);
   }, problem);
   const find = () => run({ procedure: "find", scans: [scan.id], recipe: name }, (j) => shown(j, j.outcome));
-  const recipeChoice = () => fill(chooser, choice(t("Recipe"), recipes.map((r) => [r.name, `${r.name}${r.title ? ` · ${r.title}` : ""}${r.shipped ? "" : ` (${t("own")})`}`]), name, (v) => { name = v; sessionStorage.setItem("recipe", v); editor(); }));
+  const recipeChoice = () => fill(chooser, choice(t("Recipe"), recipes.map((r) => [r.name, `${r.problem ? "⚠ " : ""}${r.name}${r.title ? ` · ${r.title}` : ""}${r.shipped ? "" : ` (${t("own")})`}`]), name, (v) => { name = v; sessionStorage.setItem("recipe", v); editor(); }));
   place.classList.add("fit");
   fill(place,
     h("div", { class: "head" }, h("h1", {}, t("Part")), choose, chooser, h("span", { class: "grow" }), h("button", { class: "main", id: "find", onclick: find }, t("Find"))),
@@ -74,18 +76,18 @@ export async function show(place, query) {
   const [pins, ...teaching] = Object.entries(kinds).map(([k, [words]]) => h("button", { "data-tool": k, "aria-pressed": "false", onclick: () => select(k) }, t(words)));
   fill(tools, pins, h("span", { class: "quiet small" }, t("Teach")), teaching, h("button", { onclick: undo }, t("Undo")), h("button", { onclick: () => select(null) }, t("Move the map")));
   const turn = field(t("Turn"), { type: "number", value: "0", step: "0.5", min: "-180", max: "180", id: "turn", oninput: () => marks() }, "°");
-  const title = field(t("Name"), { type: "text", value: "part", maxlength: "60" });
+  const title = field(t("Name"), { type: "text", value: freeName(taken), maxlength: "60" });
   const bears = field(t("Bears"), { type: "number", value: "0.2", step: "0.05", min: "0.01" }, "mm"), turns = field("", { type: "number", value: "1", step: "0.1", min: "0.01", "aria-label": t("Bears, degrees") }, "°"), above = field(t("Approach"), { type: "number", value: "20", step: "1", min: "1" }, "mm");
   const value = (f) => f.querySelector("input").value;
-  const teach = () => run({ procedure: "teach", scan: scan.id, name: value(title).trim(), outline: part.outline, windows: part.windows, holes: holes(), angle_deg: angle(), tolerance_mm: Number(value(bears)), tolerance_deg: Number(value(turns)), approach_mm: Number(value(above)) },
-    async (j) => { recipes = await get("/recipes"); name = j.outcome.recipe; sessionStorage.setItem("recipe", name); Object.assign(part, { outline: null, windows: [], holes: [], grid: null }); select(null); drawn(); recipeChoice(); shown(j, j.outcome.proof); });
+  const teach = (name_, replace) => run({ procedure: "teach", scan: scan.id, name: name_, replace, outline: part.outline, windows: part.windows, holes: holes(), angle_deg: angle(), tolerance_mm: Number(value(bears)), tolerance_deg: Number(value(turns)), approach_mm: Number(value(above)) },
+    async (j) => { recipes = await get("/recipes"); name = j.outcome.recipe; sessionStorage.setItem("recipe", name); Object.assign(part, { outline: null, windows: [], holes: [], grid: null }); title.querySelector("input").value = freeName(taken); select(null); drawn(); recipeChoice(); shown(j, j.outcome.proof); });
   const gridFields = () => {
     const g = part.grid, one = (words, value, step, min, set, id) => field(words, { type: "number", id, value: String(value), step: String(step), min: String(min), oninput: (e) => { const v = Number(e.target.value); if (v >= min) { set(v); marks(); } } });
     return h("div", { class: "row" }, one(t("Columns"), g.columns, 1, 1, (v) => (g.columns = Math.round(v)), "grid-columns"), one(t("Rows"), g.rows, 1, 1, (v) => (g.rows = Math.round(v)), "grid-rows"),
       one(t("Pitch along, mm"), g.pitch[0], 0.01, 0.1, (v) => (g.pitch[0] = v), "grid-x"), one(t("Pitch across, mm"), g.pitch[1], 0.01, 0.1, (v) => (g.pitch[1] = v), "grid-y"));
   };
   /** A recipe from a drawing: it is looked for at once, in the scan that is shown. */
-  const made = drawing(problem, async (read) => { recipes = await get("/recipes"); name = read.recipe.name; sessionStorage.setItem("recipe", name); recipeChoice(); editor(); find(); });
+  const made = drawing(problem, taken, async (read) => { recipes = await get("/recipes"); name = read.recipe.name; sessionStorage.setItem("recipe", name); recipeChoice(); editor(); find(); });
   let points = null;
   /** Constructed points where the part was found: part frame onto the map. */
   function pointMarks(list) {
@@ -100,7 +102,7 @@ export async function show(place, query) {
     const r = recipes.find((x) => x.name === name);
     if (part.outline) {
       const [x0, y0, x1, y1] = part.outline;
-      fill(side, panel(t("Teach"), h("p", { class: "small" }, `${num(x1 - x0, 2)} × ${num(y1 - y0, 2, "mm")}, ${part.windows.length} ${t("windows")}, ${holes().length} ${t("holes")}`), h("div", { class: "stack" }, part.grid && gridFields(), turn, title, h("div", { class: "row" }, bears, turns), above, h("button", { class: "main", id: "teach", onclick: teach }, t("Teach")))));
+      fill(side, panel(t("Teach"), h("p", { class: "small" }, `${num(x1 - x0, 2)} × ${num(y1 - y0, 2, "mm")}, ${part.windows.length} ${t("windows")}, ${holes().length} ${t("holes")}`), h("div", { class: "stack" }, part.grid && gridFields(), turn, title, h("div", { class: "row" }, bears, turns), above, storing(t("Teach"), { class: "main", id: "teach" }, { name: () => value(title).trim(), taken, store: teach }))));
       return;
     }
     if (!r) return void fill(side, made.panel);
@@ -108,23 +110,30 @@ export async function show(place, query) {
     text.value = r.text;
     const built = h("div", { class: "stack" });
     points = constructions(built, { text: () => text.value, write: (v) => { text.value = v; }, shown: pointMarks, say: (e) => fill(said, fault(e)) });
-    const said = h("div"), as = field(t("Save as"), { type: "text", value: r.name, maxlength: "60" });
-    const save = () => attempt(async () => {
+    const said = h("div", {}, r.problem && fault(r.problem)), as = field(t("Save as"), { type: "text", value: r.name, maxlength: "60" });
+    const save = (new_, replace) => attempt(async () => {
       if (!operating()) await operate(false);
-      const new_ = value(as).trim();
-      await put(`/recipes/${encodeURIComponent(new_)}`, { name: new_, text: text.value });
+      await put(`/recipes/${encodeURIComponent(new_)}`, { text: text.value, replace });
       recipes = await get("/recipes");
       name = new_;
       recipeChoice();
       fill(said, h("p", { class: "good-ink" }, t("Saved.")));
     }, said);
-    const away = () => attempt(async () => { await remove(`/recipes/${encodeURIComponent(name)}`); recipes = await get("/recipes"); name = recipes[0].name; recipeChoice(); editor(); }, said);
-    fill(side, made.panel, panel(t("Constructed points"), built), panel(t("Recipe"), text, said, h("div", { class: "row" }, as, h("button", { onclick: save }, t("Check and save")), !r.shipped && h("button", { onclick: away }, t("Take away")))));
+    const away = () => attempt(async () => { if (!operating()) await operate(false); await remove(`/recipes/${encodeURIComponent(name)}`); recipes = await get("/recipes"); name = first(); recipeChoice(); editor(); }, said);
+    fill(side, made.panel, panel(t("Constructed points"), built), panel(t("Recipe"), text, said, h("div", { class: "row" }, as, storing(t("Check and save"), { id: "save-recipe" }, { name: () => value(as).trim(), taken, store: save }), !r.shipped && h("button", { onclick: away }, t("Delete")))));
   }
   const former = jobs((j) => j.state === "done" && (j.order.procedure === "find" ? j.order.scans[0] === scan.id : j.order.procedure === "teach" && j.order.scan === scan.id))[0];
   if (former) shown(former, former.outcome.proof ?? former.outcome);
   editor();
   return () => { follows(); view.end(); };
+}
+
+/** A name that no recipe has yet. */
+function freeName(taken) {
+  for (let k = 1; ; k++) {
+    const name = k === 1 ? "part" : `part ${k}`;
+    if (!taken(name)) return name;
+  }
 }
 
 /** Places of the part's frame on the map, mm. */

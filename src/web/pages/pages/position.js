@@ -8,7 +8,7 @@ import { t } from "../base/text.js";
 import { operate, operating } from "../widgets/bar.js";
 import { arming, ask, gate, inTheCell } from "../widgets/ask.js";
 import { attempt, fault } from "../widgets/problem.js";
-import { choice, figure, figures, follow, nothing, order, panel, table } from "../widgets/parts.js";
+import { choice, figure, figures, follow, nothing, order, panel, recipes as known, table } from "../widgets/parts.js";
 import { scanMap } from "../widgets/view/scanmap.js";
 import { cloud } from "../widgets/view/cloud.js";
 import { livePicture } from "../widgets/view/live.js";
@@ -57,7 +57,7 @@ const words = (j) => `${j.id} · ${j.order.recipe}${j.order.scans ? ` · ${j.ord
 
 /** Recipe, arming, start; what waits; how far the job is. */
 async function insertion(named, job) {
-  const recipes = await get("/recipes"), simulated = store.motion.simulated;
+  const recipes = await known(), simulated = store.motion.simulated;
   let name = simulated?.holds ?? sessionStorage.getItem("recipe") ?? recipes[0]?.name;
   const problem = h("div"), progress = h("div"), armed = h("div", { class: "stack" }), asked = h("div", { class: "stack ask" }), cell = h("div"), live = h("div"), start = h("div", { class: "stack" });
   const sweep = h("input", { type: "number", id: "sweep", min: "5", step: "1", placeholder: t("auto") });

@@ -6,6 +6,7 @@ import { done, jobs, on } from "../base/store.js";
 import { t } from "../base/text.js";
 import { attempt, fault } from "../widgets/problem.js";
 import { follow, nothing, order, panel, table } from "../widgets/parts.js";
+import { MOUNTS } from "../widgets/settingsform.js";
 
 export async function show(place) {
   const info = await get("/station");
@@ -32,6 +33,7 @@ export async function show(place) {
           : nothing(t("This station is not calibrated yet."), "calibrate", t("Calibrate"))),
         panel(t("Station"), table([t("Setting"), t("Value")], [
           [t("Poses are written as"), info.robot ?? "matrix"],
+          [t("Camera is mounted"), t(MOUNTS[info.mount] ?? "not stated")],
           [t("The work tolerates"), num(info.tolerance_mm, 3, "mm")],
           [t("Scans and poses are in the frame"), t(info.work_frame)],
           ...info.frames.map((f) => [`${t(f.name)} ${t("fixed to")} ${t(f.on)}`, h("span", { "data-frame": f.name }, f.numbers.map((v, i) => `${f.labels[i]} ${num(v, 3)}`).join("  "))]),

@@ -52,7 +52,7 @@ export function bar(place) {
       cell(t("Frames"), `${b.frames.seen} / ${b.frames.measured} / ${dropped}`, `${t("in / measured / dropped")}\n${why}`),
       cell(t("Delay"), b.delay_ms ? `${num(b.delay_ms[0], 0)} / ${num(b.delay_ms[1], 0)} ms` : "–", "p50 / p99"),
       cell("GPU", b.adapter_is_software ? `${t("software")}, ${b.adapter}` : b.adapter, "", b.adapter_is_software ? "amber" : ""),
-      cell(t("Calibration"), c ? `${t(c.verdict)}, ${age(c.days)}${c.expected_mm === null ? "" : `, ${num(c.expected_mm, 3)} mm`}` : t("missing"), "", c && c.verdict === "good" ? "" : "amber"),
+      cell(t("Calibration"), c ? `${t(c.verdict)}${c.verdict === "good" ? "" : ` (${t(c.worst)})`}, ${age(c.days)}${c.expected_mm === null ? "" : `, ${num(c.expected_mm, 3)} mm`}` : t("missing"), "", c && c.verdict === "good" ? "" : "amber"),
       cell(t("Disk"), b.disk_left_gb === null ? "–" : num(b.disk_left_gb, 0, "GB")),
       store.lost && h("span", { class: "alarm", role: "alert" }, t("The program does not answer.")),
       b.alarms.length > 0 && h("span", { class: "alarm", role: "alert", title: b.alarms.join("\n") }, `⚠ ${b.alarms.join(" · ")}`));

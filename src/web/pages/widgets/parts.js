@@ -31,6 +31,22 @@ export function field(name, props, unit = "") {
   return h("label", { for: id }, h("span", { class: "small quiet" }, name), h("input", { ...props, id }), unit && h("span", { class: "small quiet" }, unit));
 }
 
+/** A button that stores something under a name. One that is taken is replaced at the second press alone.
+ * `taken(name)`: whether something of that name is there; `store(name, replace)`. */
+export function storing(words, props, { name, taken, store: keep }) {
+  let sure = null;
+  const button = h("button", { ...props, onclick: () => {
+    const now = name(), replace = taken(now), ask = replace && sure !== now;
+    sure = ask ? now : null;
+    button.textContent = ask ? t("Really replace it?") : words;
+    if (!ask) keep(now, replace);
+  } }, words);
+  return button;
+}
+
+/** Recipes that can be read. */
+export const recipes = async () => (await get("/recipes")).filter((r) => !r.problem);
+
 /** Finished scans, newest first; the one that the address names, else the newest. */
 export function scanChoice(query, changed) {
   const list = scans();

@@ -9,7 +9,7 @@ use crate::fault::{Fault, Result};
 use crate::recording::BoardSpec;
 use crate::rig::Rig;
 use crate::robot::Convention;
-use crate::station::{ArmCell, AutoRun, Settings, calibrate_auto};
+use crate::station::{ArmCell, AutoRun, Settings, calibrate_auto, mount_of};
 use crate::web::guard::plain;
 use crate::web::message::{AutoOrder, Outcome};
 use crate::web::motion::{Person, Session};
@@ -47,8 +47,9 @@ pub(in crate::web::work) fn auto(this: &Run, order: &AutoOrder) -> Result<Outcom
     let camera = desk.links.camera.as_ref().ok_or_else(|| {
         Fault::refused("no camera: the screen was served without --camera").next("start it with --camera URI")
     })?;
+    let mounted = mount_of(&place.station, &settings, None)?;
     let asked = AutoRun {
-        joint: run(&settings),
+        joint: run(&settings, &mounted),
         board: board(place, &order.board)?,
         out: folder(this),
         target_mm: order.target_mm,
@@ -72,7 +73,7 @@ pub(in crate::web::work) fn auto(this: &Run, order: &AutoOrder) -> Result<Outcom
     let result = calibrate_auto(&mut cell, &rig, &asked, &told)?;
     drop(cell);
     drop(session);
-    Ok(Outcome::Auto(Box::new(keep(this, &result.joint)?)))
+    Ok(Outcome::Auto(Box::new(keep(this, &result.joint, &mounted)?)))
 }
 
 /// Where this try's pictures go: one that was cut off keeps those that it has, and the next begins beside it.

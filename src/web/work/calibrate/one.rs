@@ -6,17 +6,17 @@ use super::super::jobs::Jobs;
 use super::super::run::Run;
 use crate::calibrate::camera::procedure::{CameraOptions, calibrate as camera};
 use crate::calibrate::camera::report::page;
-use crate::calibrate::hand_eye::options::Mount;
 use crate::calibrate::laser_plane::options::LaserPlaneOptions;
 use crate::calibrate::report::Page;
 use crate::fault::{Fault, Result};
+use crate::geometry::{Base, Camera as CameraFrame, Rigid};
 use crate::recording::Recording;
 use crate::rig::{Calibration, Kind, Measured, Quality, Rig, Verdict};
 use crate::scan::Where;
 use crate::station::volume::asked;
 use crate::station::{
-    AxisRun, HandEyeResult, HandEyeRun, LaserPlaneRun, PointerRun, Settings, calibrate_axis, calibrate_hand_eye,
-    calibrate_laser_plane, calibrate_pointer,
+    AxisRun, HandEyeResult, HandEyeRun, LaserPlaneRun, PointerRun, Settings, back_up_here, calibrate_axis,
+    calibrate_hand_eye, calibrate_laser_plane, calibrate_pointer, mount_of,
 };
 use crate::web::guard::resolve;
 use crate::web::message::{CalibrationFigures, Job, JobState, Order, Outcome, Target};
@@ -65,18 +65,24 @@ pub(in crate::web::work) fn calibrate(this: &Run, target: Target, name: &str, le
             keep(this, &c.calibration, &c.page, c.missing)
         }
         Target::Camera | Target::HandEye => {
-            let run = HandEyeRun {
-                poses: None,
-                mount: Mount::EyeInHand,
-                solver: Default::default(),
-                asked: asked(&settings, None),
-            };
-            match calibrate_hand_eye(&recording, &rig, &run, &progress)? {
+            let mounted = mount_of(&place.station, &settings, None)?;
+            let (mount, asked) = (mounted.mount, asked(&settings, None));
+            let run = HandEyeRun { poses: None, mount, solver: Default::default(), asked };
+            let kept = match calibrate_hand_eye(&recording, &rig, &run, &progress)? {
                 HandEyeResult::OnFlange(c) => keep(this, &c.calibration, &c.page, c.missing),
                 HandEyeResult::InBase(c) => keep(this, &c.calibration, &c.page, c.missing),
-            }
+            };
+            kept.map(|outcome| saying(outcome, mounted.assumed))
         }
     }
+}
+
+/// An outcome that also says what was assumed.
+fn saying(mut outcome: Outcome, assumed: Option<String>) -> Outcome {
+    if let Outcome::Calibrate(figures) = &mut outcome {
+        figures.reasons.extend(assumed);
+    }
+    outcome
 }
 
 /// The recording less some of its frames; those that stay keep their poses.
@@ -137,18 +143,23 @@ pub fn accept(jobs: &Jobs, job: &Job) -> Result<Job> {
         _ => return refuse(format!("{}: is no finished calibration", job.id)),
     };
     let mut job = job.clone();
-    match &mut job.outcome {
-        Some(Outcome::Calibrate(f) | Outcome::Joint(f) | Outcome::Auto(f)) if !f.accepted => f.accepted = true,
+    let standing = match &mut job.outcome {
+        Some(Outcome::Calibrate(f) | Outcome::Joint(f) | Outcome::Auto(f)) if !f.accepted => {
+            f.accepted = true;
+            f.kind == Kind::BaseCamera.name()
+        }
         _ => return refuse(format!("{}: was accepted already", job.id)),
-    }
+    };
     let (folder, station) = (jobs.folder(&job), &jobs.place.station);
+    back_up_here(station, "before-calibration")?;
     match target {
         None => super::together::store(&folder, station)?,
         Some(Target::Camera) => store::<crate::camera::Intrinsics>(&folder, station)?,
+        Some(Target::HandEye) if standing => store::<Rigid<Base, CameraFrame>>(&folder, station)?,
         Some(Target::HandEye) => store::<crate::rig::HandEye>(&folder, station)?,
-        Some(Target::LaserPlane) => store::<crate::geometry::Plane<crate::geometry::Camera>>(&folder, station)?,
+        Some(Target::LaserPlane) => store::<crate::geometry::Plane<CameraFrame>>(&folder, station)?,
         Some(Target::Axis) => store::<crate::geometry::Axis>(&folder, station)?,
-        Some(Target::Pointer) => store::<crate::geometry::Ray<crate::geometry::Camera>>(&folder, station)?,
+        Some(Target::Pointer) => store::<crate::geometry::Ray<CameraFrame>>(&folder, station)?,
     }
     jobs.put(&job)?;
     Ok(job)

@@ -2,21 +2,18 @@
 //! Frame and unit: mm, degrees.
 
 use super::super::run::Run;
-use crate::calibrate::hand_eye::options::Mount;
 use crate::fault::{Fault, Result};
 use crate::recording::Recording;
-use crate::rig::{Quality, Rig, Verdict};
+use crate::rig::{Quality, Rig};
 use crate::scan::Where;
 use crate::station::volume::asked;
-use crate::station::{JointResult, JointRun, Settings, calibrate_joint, store_joint};
+use crate::station::{JointResult, JointRun, Mounted, Settings, accept_joint, calibrate_joint, mount_of, store_joint};
 use crate::web::guard::resolve;
 use crate::web::message::{CalibrationFigures, JointOrder, Outcome};
 use std::path::Path;
 
 /// The result that waits to be accepted, in the job's folder: laid out as a station's.
 const RESULT: &str = "result";
-/// Files of a joint calibration beside the records.
-const BESIDE: [&str; 2] = ["joint.json", "joint.html"];
 
 pub(in crate::web::work) fn joint(this: &Run, order: &JointOrder) -> Result<Outcome> {
     let place = &this.jobs.place;
@@ -26,18 +23,19 @@ pub(in crate::web::work) fn joint(this: &Run, order: &JointOrder) -> Result<Outc
     let open = |name: &String| Recording::open(&resolve(&place.recordings, name)?);
     let recordings = order.recordings.iter().map(open).collect::<Result<Vec<_>>>()?;
     let (settings, rig) = (Settings::load(&place.station)?, Rig::load_camera(&place.station)?);
-    let run = run(&settings);
+    let mounted = mount_of(&place.station, &settings, None)?;
+    let run = run(&settings, &mounted);
     let result = calibrate_joint(&recordings, &rig, &run, &|done, of| this.progress(done, Some(of)))?;
-    Ok(Outcome::Joint(Box::new(keep(this, &result)?)))
+    Ok(Outcome::Joint(Box::new(keep(this, &result, &mounted)?)))
 }
 
 /// As the station's settings have it.
-pub(super) fn run(settings: &Settings) -> JointRun {
-    JointRun::new(Mount::EyeInHand, asked(settings, None), &settings.extraction, Where::default())
+pub(super) fn run(settings: &Settings, mounted: &Mounted) -> JointRun {
+    JointRun::new(mounted.mount, asked(settings, None), &settings.extraction, Where::default())
 }
 
-/// Keeps a result in the job's folder; its figures.
-pub(super) fn keep(this: &Run, result: &JointResult) -> Result<CalibrationFigures> {
+/// Keeps a result in the job's folder; its figures, and what was assumed.
+pub(super) fn keep(this: &Run, result: &JointResult, mounted: &Mounted) -> Result<CalibrationFigures> {
     let folder = this.folder.join(RESULT);
     crate::files::make_folder(&folder)?;
     store_joint(&folder, result)?;
@@ -46,7 +44,7 @@ pub(super) fn keep(this: &Run, result: &JointResult) -> Result<CalibrationFigure
     Ok(CalibrationFigures {
         kind: "joint".into(),
         verdict: q.verdict.words().into(),
-        reasons: q.reasons.clone(),
+        reasons: q.reasons.iter().chain(&mounted.assumed).cloned().collect(),
         advice: q.advice.clone(),
         figures: q.figures.clone(),
         former: former.unwrap_or_default(),
@@ -56,23 +54,78 @@ pub(super) fn keep(this: &Run, result: &JointResult) -> Result<CalibrationFigure
     })
 }
 
-/// Stores a kept result in the station.
+/// Stores a kept result in the station, all of it or nothing.
 pub(super) fn store(folder: &Path, station: &Path) -> Result<()> {
-    let kept = folder.join(RESULT);
-    let rig = Rig::load(&kept)?;
-    let quality = rig
-        .camera
-        .as_ref()
-        .map(|c| &c.quality)
-        .ok_or_else(|| Fault::input(format!("{}: holds no calibration", kept.display())).next("calibrate again"))?;
-    if quality.verdict >= Verdict::BadlyDetermined {
-        return Err(Fault::refused(format!("the calibration is {}", quality.verdict.words()))
-            .cause(quality.reasons.join("; "))
-            .next(quality.advice.first().map_or("take more pictures", String::as_str)));
+    accept_joint(&folder.join(RESULT), station).map(|_| ())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rig::{JointCovariance, Kind, sealed};
+    use crate::simulate::Station;
+    use std::path::PathBuf;
+    use std::process::Command;
+
+    /// Where the process that is stopped finds the job and the station.
+    const FOLDER: &str = "SHEETLIGHT_TEST_ACCEPTS_IN";
+
+    /// A set of records whose covariance and page tell of which seed it is.
+    fn made(folder: &Path, seed: u64) -> String {
+        let rig = Station::random(seed).calibrations(None);
+        let beside = |stored: &Rig| {
+            let camera = (Kind::Camera, stored.camera.as_ref().unwrap().content());
+            let plane = (Kind::LaserPlane, stored.laser_plane.as_ref().unwrap().content());
+            let hand_eye = (Kind::HandEye, stored.hand_eye.as_ref().unwrap().content());
+            let of = [camera, plane, hand_eye].into();
+            let (parameters, matrix) = (vec!["camera.fx_px".into()], vec![vec![seed as f64]]);
+            let together = JointCovariance { format: 1, of, parameters, matrix };
+            vec![("joint.json", sealed(&together)), ("joint.html", format!("page of {seed}"))]
+        };
+        rig.store_all_with(folder, beside).unwrap();
+        Rig::load(folder).unwrap().fingerprint()
     }
-    rig.store_all(station)?;
-    let read = |name: &str| crate::files::read_text(&kept.join("calibration").join(name));
-    let [json, html] = BESIDE.map(read);
-    let to = station.join("calibration");
-    crate::files::write_beside((&to.join(BESIDE[0]), json?.as_bytes()), &[(&to.join(BESIDE[1]), html?.as_bytes())])
+
+    /// Which seed's set a station holds; fails where it holds parts of two.
+    fn held(station: &Path, sets: &[(u64, String)]) -> u64 {
+        let rig = Rig::load(station).unwrap();
+        rig.belong_together().unwrap();
+        let print = rig.fingerprint();
+        let seed = sets.iter().find(|(_, p)| *p == print).expect("one of the two sets").0;
+        let joint = rig.joint().expect("a covariance").expect("a covariance of these records");
+        assert_eq!(joint.matrix, [[seed as f64]]);
+        let page = std::fs::read_to_string(station.join("calibration/joint.html"));
+        assert!(page.is_ok_and(|p| p == format!("page of {seed}")), "the page is of another set");
+        seed
+    }
+
+    #[test]
+    #[cfg_attr(not(debug_assertions), ignore = "only debug builds can be stopped at a file operation")]
+    fn an_acceptance_that_is_stopped_anywhere_leaves_the_old_set_or_the_new_one() {
+        if let Some(folder) = std::env::var_os(FOLDER).map(PathBuf::from) {
+            std::process::exit(i32::from(store(&folder.join("job"), &folder.join("station")).is_err()));
+        }
+        let dir = tempfile::tempdir().unwrap();
+        let (station, name) = (dir.path().join("station"), std::thread::current().name().unwrap().to_owned());
+        let sets = [(2, made(&dir.path().join("job").join(RESULT), 2)), (1, made(&station, 1))];
+        for variable in ["SHEETLIGHT_DIE_AT", "SHEETLIGHT_FULL_AT"] {
+            let mut seen = [0, 0];
+            for at in 1.. {
+                made(&station, 1);
+                let mut child = Command::new(std::env::current_exe().unwrap());
+                child
+                    .args([&*name, "--exact", "--test-threads=1"])
+                    .env(FOLDER, dir.path())
+                    .env(variable, at.to_string());
+                let done = child.output().unwrap().status.success();
+                let seed = held(&station, &sets);
+                assert!(!done || seed == 2, "{variable}={at}");
+                if done {
+                    break;
+                }
+                seen[seed as usize - 1] += 1;
+            }
+            assert!(seen[0] > 5 && seen[1] > 2, "{variable}: {} old, {} new", seen[0], seen[1]);
+        }
+    }
 }

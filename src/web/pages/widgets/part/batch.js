@@ -5,7 +5,7 @@ import { get, post } from "../../base/api.js";
 import { fill, h, num, svg } from "../../base/dom.js";
 import { done, on } from "../../base/store.js";
 import { t } from "../../base/text.js";
-import { choice, order, recordings, table } from "../parts.js";
+import { choice, order, recipes as known, recordings, table } from "../parts.js";
 import { attempt } from "../problem.js";
 
 /** Pairs of jobs that the server lets wait. */
@@ -13,7 +13,7 @@ const MOST = 15;
 
 /** Fills `place`; `settings()` are those that differ from the station's. Returns what ends it. */
 export async function batch(place, settings, problem) {
-  const [list, recipes] = [await recordings((r) => r.beam !== "pointer" && !r.board), await get("/recipes")];
+  const [list, recipes] = [await recordings((r) => r.beam !== "pointer" && !r.board), await known()];
   const chosen = new Set(list.slice(0, MOST).map((r) => r.name));
   let recipe = sessionStorage.getItem("recipe") ?? recipes[0]?.name ?? "";
   const shown = h("div", { class: "stack" });

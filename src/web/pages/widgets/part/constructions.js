@@ -1,5 +1,4 @@
-// In: a recipe's text. Out: its constructed points beside the picture: built of pins and of each other, chosen for the tool, written into
-// the text.
+// Shows a recipe's constructed points beside the picture. The program writes them into the text, so that its comments stay.
 
 import { post } from "../../base/api.js";
 import { fill, h, num } from "../../base/dom.js";
@@ -12,19 +11,34 @@ const KINDS = { midpoint: "Midpoint", line: "Line", offset: "Offset", lattice: "
 export function constructions(place, recipe) {
   let points = [], kind = "midpoint", turn = 0;
   const now = { of: [], along: "", by: [0, 0] };
-  const load = async () => {
+  /** Asks the program; only the newest answer counts. */
+  const ask = async (what, taken) => {
     const mine = ++turn;
     try {
-      const read = await post("/points", { text: recipe.text() });
-      if (mine !== turn) return;
-      points = read;
-      recipe.shown(points.filter((p) => p.kind !== "grid"));
-      draw();
+      const read = await what();
+      if (mine === turn) taken(read);
     } catch (e) {
-      if (mine === turn) recipe.say(e);
+      if (mine === turn) {
+        recipe.say(e);
+        draw();
+      }
     }
   };
-  const write = (text) => { recipe.write(text); return load(); };
+  const show = (read) => {
+    points = read;
+    recipe.shown(points.filter((p) => p.kind !== "grid"));
+    draw();
+  };
+  const load = () => ask(() => post("/points", { text: recipe.text() }), show);
+  const change = (what) => ask(() => post("/points/change", { text: recipe.text(), change: what }), (read) => {
+    recipe.write(read.text);
+    show(read.points);
+  });
+  const choose = (name) => change({ choose: { name } });
+  const add = (name) => {
+    const of = now.of.slice(0, { midpoint: 2, line: 2 }[kind] ?? 1).filter(Boolean);
+    return change({ add: { name, kind, of, ...(kind === "offset" ? { along: now.along, by_mm: now.by } : {}) } });
+  };
   const built = () => points.filter((p) => p.kind in KINDS || p.kind === "intersection");
   function draw() {
     const name = field(t("Name"), { type: "text", value: free(), maxlength: "60", id: "point-name" });
@@ -42,37 +56,14 @@ export function constructions(place, recipe) {
     const need = { lattice: names(["grid"]).length > 0, offset: ways.length > 0 && names().length > 0 }[kind] ?? names().length > 1;
     fill(place,
       built().length > 0 && table([t("Point"), "#x, mm", "#y, mm", t("Tool"), ""], built().map((p) => [h("span", { "data-point": p.name }, p.name), num(p.at[0], 3), num(p.at[1], 3),
-        p.kind === "line" ? "" : h("input", { type: "radio", name: "chosen", checked: p.chosen, "aria-label": `${t("Tool goes to")} ${p.name}`, onchange: () => write(chosen(recipe.text(), p.name)) }),
-        h("button", { class: "plain", "aria-label": `${t("Take away")} ${p.name}`, onclick: () => write(without(recipe.text(), p.name)) }, "×")])),
-      built().some((p) => p.chosen) && h("button", { onclick: () => write(chosen(recipe.text(), null)) }, t("Tool goes to the part's own place")),
+        p.kind === "line" ? "" : h("input", { type: "radio", name: "chosen", checked: p.chosen, "aria-label": `${t("Tool goes to")} ${p.name}`, onchange: () => choose(p.name) }),
+        h("button", { class: "plain", "aria-label": `${t("Delete")} ${p.name}`, onclick: () => change({ take_out: { name: p.name } }) }, "×")])),
+      built().some((p) => p.chosen) && h("button", { onclick: () => choose(null) }, t("Tool goes to the part's own place")),
       h("div", { class: "row" }, choice(t("Construct"), Object.entries(KINDS).map(([k, w]) => [k, t(w)]), kind, (v) => { kind = v; now.of = []; draw(); }), inputs, name,
-        h("button", { id: "add-point", disabled: !need, onclick: () => write(added(recipe.text(), { name: name.querySelector("input").value.trim(), kind, ...now })) }, t("Add"))),
+        h("button", { id: "add-point", disabled: !need, onclick: () => add(name.querySelector("input").value.trim()) }, t("Add"))),
       !need && h("p", { class: "small quiet" }, t("Shapes need names for this; a lattice needs a grid, an offset a line or lattice.")));
   }
   const free = () => { for (let k = 1; ; k++) if (!points.some((p) => p.name === `point ${k}`)) return `point ${k}`; };
   load();
   return { load };
 }
-
-/** The text with a construction more: before the insertion that may use it, behind those it may be built of. */
-export function added(text, { name, kind, of, along, by }) {
-  const q = (s) => JSON.stringify(s), used = of.slice(0, { midpoint: 2, line: 2 }[kind] ?? 1).filter(Boolean);
-  const more = kind === "offset" ? `along = ${q(along)}\nby_mm = [${by.join(", ")}]\n` : "";
-  const block = `[[construction]]\nname = ${q(name)}\nkind = ${q(kind)}\nof = [${used.map(q).join(", ")}]\n${more}\n`;
-  const at = text.search(/^\[insertion\]/m);
-  return at < 0 ? `${text.trimEnd()}\n\n${block}` : text.slice(0, at) + block + text.slice(at);
-}
-
-/** The text without the construction of that name. */
-export function without(text, name) {
-  const parts = text.split(/^(?=\[)/m), named = (p) => p.startsWith("[[construction]]") && new RegExp(`^name\\s*=\\s*(["'])${escaped(name)}\\1`, "m").test(p);
-  return parts.filter((p) => !named(p)).join("");
-}
-
-/** The text whose insertion goes to that construction; null: to the part's own place. */
-export function chosen(text, name) {
-  const parts = text.split(/^(?=\[)/m), line = name === null ? "" : `construction = ${JSON.stringify(name)}\n`;
-  return parts.map((p) => (!/^\[insertion\]/.test(p) ? p : (() => { const bare = p.replace(/^construction\s*=.*\n/m, ""), end = bare.indexOf("\n") + 1; return bare.slice(0, end) + line + bare.slice(end); })())).join("");
-}
-
-const escaped = (s) => s.replace(/[.*+?^${}()|[\]\\]/g, "\\$&");

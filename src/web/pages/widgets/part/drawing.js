@@ -4,15 +4,15 @@ import { post } from "../../base/api.js";
 import { fill, h, num } from "../../base/dom.js";
 import { t } from "../../base/text.js";
 import { operate, operating } from "../bar.js";
-import { choice, field, panel } from "../parts.js";
+import { choice, field, panel, storing } from "../parts.js";
 import { attempt } from "../problem.js";
 
 const UNITS = ["mm", "inch", "cm", "m", "um", "mil", "foot"];
 /** The server takes requests of 1 MiB. */
 const LARGEST = 1000000;
 
-/** `made(read)` hears of a recipe that was made. */
-export function drawing(problem, made) {
+/** `taken(name)`: whether the station has such a recipe; `made(read)` hears of a recipe that was made. */
+export function drawing(problem, taken, made) {
   let text = null, unit = "", file = "part";
   const said = h("div"), form = h("div", { class: "stack", hidden: true });
   const name = field(t("Name"), { type: "text", value: "part", maxlength: "60", id: "drawing-name" });
@@ -29,14 +29,14 @@ export function drawing(problem, made) {
     fill(said, h("p", { class: "small" }, `${chosen.name} · ${num(chosen.size / 1000, 0, "kB")}`));
   };
   const input = h("input", { type: "file", id: "drawing", accept: ".dxf", "aria-label": t("From a drawing (DXF)"), onchange: () => take(input.files[0]) });
-  const make = () => attempt(async () => {
+  const make = (called, replace) => attempt(async () => {
     if (!operating()) await operate(false);
-    const read = await post("/drawings", { name: value(name).trim(), text, ...(unit ? { unit } : {}), alike_turns: Number(value(alike)), cell_mm: Number(value(cell)), tolerance_mm: Number(value(bears)), tolerance_deg: Number(value(turns)), approach_mm: Number(value(above)) });
+    const read = await post("/drawings", { name: called, replace, text, ...(unit ? { unit } : {}), alike_turns: Number(value(alike)), cell_mm: Number(value(cell)), tolerance_mm: Number(value(bears)), tolerance_deg: Number(value(turns)), approach_mm: Number(value(above)) });
     fill(said, h("p", { class: "good-ink small", "data-drawn": read.recipe.name }, `${num(read.size_mm[0], 2)} × ${num(read.size_mm[1], 2, "mm")}`), read.notes.map((n) => h("p", { class: "note small" }, n)));
     form.hidden = true;
     await made(read);
   }, problem);
   fill(form, name, choice(t("Unit, where it names none"), [["", t("as it says")], ...UNITS.map((u) => [u, u])], unit, (v) => (unit = v)), h("div", { class: "row" }, alike, cell), h("div", { class: "row" }, bears, turns), above,
-    h("button", { class: "main", id: "make-recipe", onclick: make }, t("Make the recipe")));
+    storing(t("Make the recipe"), { class: "main", id: "make-recipe" }, { name: () => value(name).trim(), taken, store: make }));
   return { panel: panel(t("From a drawing (DXF)"), h("div", { class: "stack" }, input, said, form)) };
 }

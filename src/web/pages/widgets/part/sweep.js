@@ -6,7 +6,7 @@ import { fill, h, num, svg } from "../../base/dom.js";
 import { on, store } from "../../base/store.js";
 import { t } from "../../base/text.js";
 import { livePicture } from "../view/live.js";
-import { choice, field, figures, table } from "../parts.js";
+import { choice, field, figures, recipes as known, table } from "../parts.js";
 import { fault } from "../problem.js";
 
 /** Without these nothing says where the line goes. */
@@ -18,7 +18,7 @@ const LIMITS = { camera: "the camera", chain: "what is measured here", speed: "t
 
 /** Fills `place`; returns what ends it. */
 export async function sweep(place) {
-  const [info, recipes] = [await get("/station"), await get("/recipes")];
+  const [info, recipes] = [await get("/station"), await known()];
   if (!recipes.length || NEEDED.some((k) => !info.calibrations.some((c) => c.kind === k))) return void fill(place, h("p", { class: "small quiet" }, t("A sweep needs camera, laser plane and hand-eye, calibrated.")));
   let name = sessionStorage.getItem("recipe") ?? recipes[0].name, plan = null, turn = 0, asked = 0;
   if (!recipes.some((r) => r.name === name)) name = recipes[0].name;

@@ -1,0 +1,26 @@
+//! Reads the option that says where the camera is mounted.
+
+use crate::calibrate::hand_eye::options::Mount;
+use crate::cli::terminal::console::Console;
+use crate::fault::Result;
+use crate::station::{Settings, mount_of};
+use std::path::Path;
+
+/// Where the camera is.
+#[derive(clap::Args)]
+pub struct Where {
+    /// Where the camera is: eye-in-hand (on the flange) or eye-to-hand (it stands still, and the flange carries the
+    /// board); refused where the station says otherwise [default: station.toml's mount, else that of the station's
+    /// stored record, else eye-in-hand, which is said then]
+    #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Mount>)]
+    mount: Option<Mount>,
+}
+
+impl Where {
+    /// The station's mount; what was assumed is said.
+    pub fn of(&self, station: &Path, settings: &Settings, console: &Console) -> Result<Mount> {
+        let mounted = mount_of(station, settings, self.mount)?;
+        mounted.assumed.iter().for_each(|why| console.say(why));
+        Ok(mounted.mount)
+    }
+}
