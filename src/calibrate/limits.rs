@@ -3,6 +3,7 @@
 
 use crate::fault::{Fault, Result};
 use crate::rig::{Verdict, Volume};
+use crate::solve::End;
 
 /// Share of what the sensor sees that counts as the tolerance where nobody states one: the paper's 0.25 mm for
 /// insertion where its camera sees 167 mm. Parts are as large as the view that they are measured in.
@@ -106,6 +107,12 @@ impl Judgement {
         if when {
             self.verdict = self.verdict.max(verdict);
             self.reasons.push(reason());
+        }
+    }
+    /// A fit that ended anywhere but at a minimum is usable at best.
+    pub fn ended(&mut self, end: End) {
+        if let Some(remark) = end.remark() {
+            self.at_best(Verdict::Usable, true, || remark.into());
         }
     }
     /// Where `when` holds, adds this advice.
