@@ -18,7 +18,8 @@ const SETS: [&str; 8] = ["flat", "steps", "shiny", "scan_dimm", "scan_led", "sca
 /// Those whose shots lie near enough to each other to show what print does between them.
 const PRINTED: [&str; 4] = ["scan_dimm", "scan_led", "scan_osc", "scan_flash"];
 
-/// Their bars: rms and median, mm; share of outliers; completeness, of which the part that is missing may be a quarter larger.
+/// Their bars: rms and median, mm; share of outliers; completeness, of which the part that is missing may be a quarter
+/// larger.
 const PRINTED_BARS: [(&str, f64, f64, f64, f64); 4] = [
     ("scan_dimm", 0.048, 0.0147, 0.0005, 0.96),
     ("scan_led", 0.0425, 0.015, 0.0001, 0.9815),
@@ -30,9 +31,9 @@ const PRINTED_BARS: [(&str, f64, f64, f64, f64); 4] = [
 /// fit of the same light has the same error again.
 const CROSSINGS: f64 = 1.15;
 
-/// Every figure with its bar: path, least, most. Errors may be a quarter larger than those of the rig in the reference data
-/// (processor, auto), so that a change that costs a third shows. What is zero but for single points has a floor: heights 0.5 um, a thousandth of the
-/// points' own scatter over a set, shares one in ten thousand.
+/// Every figure with its bar: path, least, most. Errors may be a quarter larger than those measured with the rig in the
+/// reference data, so that a change that costs a third shows. What is zero but for single points has a floor: 0.5 um for
+/// heights, one in ten thousand for shares.
 fn bars() -> Vec<(Vec<&'static str>, f64, f64)> {
     let mut bars = Vec::new();
     let mut limit = |path: &[&'static str], least, most| bars.push((path.to_vec(), least, most));

@@ -128,3 +128,26 @@ pub fn rms(values: impl Iterator<Item = f64>) -> f64 {
     let (s, n) = values.filter(|v| v.is_finite()).fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
     f64::sqrt(s / f64::max(n, 1.0))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fit_that_had_not_come_to_rest_is_usable_at_best() {
+        let limits =
+            Asked { tolerance_mm: Some(1.0), ..Asked::default() }.limits(&Volume::new(100.0, 200.0, ""), |z| z);
+        for (expected, found, hasty) in [
+            (0.1, Verdict::Good, Verdict::Usable),
+            (1.0, Verdict::Usable, Verdict::Usable),
+            (9.0, Verdict::BadlyDetermined, Verdict::BadlyDetermined),
+        ] {
+            for (end, verdict) in [(End::Minimum, found), (End::Exhausted, hasty), (End::Stuck, hasty)] {
+                let mut j = limits.by_error(expected, String::new());
+                let before = j.reasons.len();
+                j.ended(end);
+                assert_eq!((j.verdict, j.reasons.len() - before), (verdict, usize::from(end != End::Minimum)));
+            }
+        }
+    }
+}

@@ -21,7 +21,7 @@ impl Device {
     }
 }
 
-/// How unit tests get an adapter. Where there is none they are skipped aloud, and fail if SHEETLIGHT_REQUIRE_GPU is set.
+/// How unit tests get an adapter. Without one they are skipped aloud, and fail if SHEETLIGHT_REQUIRE_GPU is set.
 #[cfg(test)]
 impl Device {
     /// Any adapter.

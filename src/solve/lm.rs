@@ -90,11 +90,11 @@ impl End {
         match self {
             End::Minimum => None,
             End::Exhausted => Some(
-                "the fit had not come to rest when its last step was taken: the values may still be off by more than their sigmas say",
+                "the fit had not come to rest at its last step: the values may be off by more than their sigmas say",
             ),
-            End::Stuck => Some(
-                "the fit stopped where no further step was possible: a better solution may lie beyond, and the sigmas do not tell",
-            ),
+            End::Stuck => {
+                Some("the fit stopped where no further step was possible: its sigmas do not say how far it is off")
+            }
         }
     }
 }

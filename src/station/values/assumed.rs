@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 /// part would contradict each other by what robot and calibrations are off by.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sigmas {
-    /// Of the robot's place, each axis, mm; usually 0.02, the repeatability that makers state of arms of this reach (ISO 9283).
+    /// Of the robot's place, each axis, mm; usually 0.02, the repeatability (ISO 9283) that makers state of such arms.
     pub robot_mm: Option<f64>,
     /// Of its turn, each axis, degrees; usually 0.004, which moves a tool 300 mm long by those 0.02 mm.
     pub robot_deg: Option<f64>,
@@ -23,7 +23,7 @@ pub struct Sigmas {
     pub plane_mm: Option<f64>,
     /// Of its tilt, degrees; usually 0.006: 0.02 mm over boards that were shown within 200 mm.
     pub plane_deg: Option<f64>,
-    /// Of focal lengths and principal point, px; usually 0.5: the least good rays that a camera's calibration is called usable with.
+    /// Of focal lengths and principal point, px; usually 0.5: rays that are known less well make no usable camera.
     pub camera_px: Option<f64>,
 }
 

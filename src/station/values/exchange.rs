@@ -40,7 +40,9 @@ pub struct Values {
 /// `normal · X = offset_mm` in the camera frame.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct PlaneValue {
+    /// Of unit length.
     pub normal: [f64; 3],
+    /// Along it, mm.
     pub offset_mm: f64,
 }
 
