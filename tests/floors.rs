@@ -261,3 +261,29 @@ fn every_outside_crate_has_a_home_or_is_for_all() {
     known.sort();
     assert_eq!(used, known, "what Cargo.toml depends on, and what HOMES and COMMON name");
 }
+
+/// A test that needs an adapter gets it from the one place of its kind, which skips it aloud, and fails it where an adapter
+/// is required.
+#[test]
+fn tests_get_their_adapter_where_the_skip_is() {
+    const HOMES: [&str; 2] = ["tests/common/mod.rs", "src/gpu/open.rs"];
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let of_tests = |path: &str, text: &str| {
+        let from = if path.starts_with("tests/") { 0 } else { text.find("#[cfg(test)]").unwrap_or(text.len()) };
+        text[from..].to_owned()
+    };
+    let mut files = Vec::new();
+    ["src", "tests"].iter().for_each(|folder| sources(&root.join(folder), &mut files));
+    let mut own = Vec::new();
+    for file in files {
+        let path = file.strip_prefix(root).unwrap().to_string_lossy().into_owned();
+        let text = of_tests(&path, &std::fs::read_to_string(&file).unwrap());
+        // Split, so that this line is not one of them.
+        let [open, required] = [["Device::", "open()"], ["SHEETLIGHT_", "REQUIRE_GPU"]].map(|w| w.concat());
+        let skips = |l: &&str| l.contains(&required) || (l.contains(&open) && !l.contains(&format!("{open}.unwrap()")));
+        if !HOMES.contains(&path.as_str()) {
+            own.extend(text.lines().filter(skips).map(|l| format!("{path}: {}", l.trim())));
+        }
+    }
+    assert!(own.is_empty(), "use common::device or Device::for_tests:\n{}", own.join("\n"));
+}

@@ -19,7 +19,7 @@ use sheetlight::scan::{
     read_cloud, read_foreign, write_cloud,
 };
 use sheetlight::simulate::{RigSpec, Scene, SceneSpec, Truth};
-use sheetlight::station::{Checkpoint, Settings, Values, load_report};
+use sheetlight::station::{Checkpoint, Settings, Sigmas, Values, load_report};
 use std::path::{Path, PathBuf};
 
 const META: &str = r#"{"format": 1, "set": "a", "units": "mm", "beam": "line", "pose_file": "poses",
@@ -167,7 +167,7 @@ fn calibrations() {
     let dir = scratch();
     std::fs::write(dir.path().join("values.json"), VALUES).unwrap();
     let values = Values::load(&dir.path().join("values.json")).unwrap();
-    values.store(dir.path(), &dir.path().join("values.json"), true).unwrap();
+    values.store(dir.path(), &dir.path().join("values.json"), true, &Sigmas::default()).unwrap();
     for kind in ["camera", "laser_plane", "pointer", "hand_eye"] {
         let station = scratch();
         let folder = station.path().join("calibration");
@@ -184,7 +184,7 @@ fn calibrations() {
         seeds(&[VALUES]),
         through_file("values.json", |p| {
             let station = scratch();
-            Values::load(p)?.store(station.path(), p, true).map(drop)
+            Values::load(p)?.store(station.path(), p, true, &Sigmas::default()).map(drop)
         }),
     );
 }

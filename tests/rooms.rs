@@ -137,7 +137,11 @@ fn graph(all: &BTreeMap<Module, String>) -> BTreeMap<Module, BTreeSet<Module>> {
     let follow = |path: &[String]| {
         let mut path = path.to_vec();
         for _ in 0..8 {
-            let hit = (1..=path.len()).rev().find(|&n| doors.contains_key(&path[..n]));
+            let hit = (1..=path.len()).rev().find(|&n| {
+                // `batch` may be a room and the function that its doorway shows: where the path goes on, it is the room.
+                let room = n < path.len() && all.contains_key(&path[..n]);
+                !room && doors.contains_key(&path[..n])
+            });
             let Some(n) = hit else { break };
             path = doors[&path[..n]].iter().chain(&path[n..]).cloned().collect();
         }
@@ -202,4 +206,20 @@ fn imports_are_followed_through_doorways() {
     assert_eq!(graph[&m("b")], BTreeSet::from([m("a::one")]));
     assert!(graph[&m("a")].is_empty());
     assert!(circle(&graph, &m("a::one")).is_some() && circle(&graph, &m("b")).is_none());
+}
+
+#[test]
+fn a_room_wins_over_the_function_of_its_name() {
+    let all = BTreeMap::from([
+        (vec![], code("pub mod batch;\npub use batch::batch;")),
+        (vec!["batch".into()], code("mod files;\nmod run;\npub use run::{Row, batch};")),
+        (vec!["batch".into(), "files".into()], code("use super::run::Row;")),
+        (vec!["batch".into(), "run".into()], code("use super::files::write;")),
+        (vec!["user".into()], code("use crate::batch::batch;\nfn f() { crate::batch::Row::new() }")),
+    ]);
+    let graph = graph(&all);
+    let m = |s: &str| s.split("::").map(str::to_owned).collect::<Module>();
+    assert_eq!(graph[&m("batch::files")], BTreeSet::from([m("batch::run")]));
+    assert_eq!(graph[&m("user")], BTreeSet::from([m("batch::run")]));
+    assert!(circle(&graph, &m("batch::run")).is_some());
 }

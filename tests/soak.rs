@@ -3,8 +3,9 @@
 //! Frame and unit: counts, MB. SHEETLIGHT_LONG runs all of 12 hours' scans, else a sixtieth.
 #![cfg(target_os = "linux")]
 
+mod common;
+
 use sheetlight::find::{LocateOptions, Recipe};
-use sheetlight::gpu::Device;
 use sheetlight::recording::Recording;
 use sheetlight::rig::Rig;
 use sheetlight::scan::{Extraction, GridOptions, RecordingSource, Where};
@@ -113,8 +114,7 @@ fn twelve_hours_of_scans_hold_no_more_than_the_first() {
     });
     // A scan that kept its pictures would be 1,600 MB, one that kept its cloud 200 MB.
     assert!(end.mb < warm.mb + 12.0, "{warm:?} became {end:?}");
-    if Device::open().is_err() {
-        println!("SKIPPED: no GPU adapter");
+    if common::device().is_none() {
         return;
     }
     // Its memory is printed, not judged: each of these scans opens the device and compiles its stages anew, and on lavapipe 0.4 MB

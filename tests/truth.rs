@@ -18,33 +18,44 @@ const SETS: [&str; 8] = ["flat", "steps", "shiny", "scan_dimm", "scan_led", "sca
 /// Those whose shots lie near enough to each other to show what print does between them.
 const PRINTED: [&str; 4] = ["scan_dimm", "scan_led", "scan_osc", "scan_flash"];
 
+/// Their bars: rms and median, mm; share of outliers; completeness, of which the part that is missing may be a quarter
+/// larger.
+const PRINTED_BARS: [(&str, f64, f64, f64, f64); 4] = [
+    ("scan_dimm", 0.048, 0.0147, 0.0005, 0.96),
+    ("scan_led", 0.0425, 0.015, 0.0001, 0.9815),
+    ("scan_osc", 0.0427, 0.0147, 0.00024, 0.9719),
+    ("scan_flash", 0.0389, 0.015, 0.0001, 0.9753),
+];
+
 /// Points over columns that hold any, at most: a stripe crosses a column once, but for steps and what stands over the surface; every further
 /// fit of the same light has the same error again.
 const CROSSINGS: f64 = 1.15;
 
-/// Every figure with its bar: path, least, most.
+/// Every figure with its bar: path, least, most. Errors may be a quarter larger than those measured with the rig in the
+/// reference data, so that a change that costs a third shows. What is zero but for single points has a floor: 0.5 um for
+/// heights, one in ten thousand for shares.
 fn bars() -> Vec<(Vec<&'static str>, f64, f64)> {
     let mut bars = Vec::new();
     let mut limit = |path: &[&'static str], least, most| bars.push((path.to_vec(), least, most));
-    limit(&["flat", "flat", "own_plane_rms_mm"], 0.0, 0.035);
-    limit(&["flat", "flat", "mean_height_mm"], -0.003, 0.003);
+    limit(&["flat", "flat", "own_plane_rms_mm"], 0.0, 0.0205);
+    limit(&["flat", "flat", "mean_height_mm"], -0.0005, 0.0005);
     limit(&["flat", "cloud", "outliers_over_1mm"], 0.0, 0.0);
-    limit(&["flat", "cloud", "completeness_0.3"], 0.98, 1.0);
-    limit(&["steps", "steps", "tread_noise_rms_mm"], 0.0, 0.035);
-    limit(&["shiny", "cloud", "outliers_over_1mm"], 0.0, 0.001);
-    limit(&["shiny", "cloud", "rms_mm_without_outliers"], 0.0, 0.06);
-    for set in PRINTED {
-        limit(&[set, "cloud", "rms_mm_without_outliers"], 0.0, 0.048);
+    limit(&["flat", "cloud", "completeness_0.3"], 0.9999, 1.0);
+    limit(&["steps", "steps", "tread_noise_rms_mm"], 0.0, 0.0209);
+    limit(&["shiny", "cloud", "outliers_over_1mm"], 0.0, 0.0001);
+    limit(&["shiny", "cloud", "rms_mm_without_outliers"], 0.0, 0.0448);
+    for (set, rms, median, outliers, complete) in PRINTED_BARS {
+        limit(&[set, "cloud", "rms_mm_without_outliers"], 0.0, rms);
         // Reported poses that scatter by 0.02 mm would leave 0.018.
-        limit(&[set, "cloud", "median_mm"], 0.0, 0.015);
-        limit(&[set, "cloud", "outliers_over_1mm"], 0.0, 0.001);
-        limit(&[set, "cloud", "completeness_0.3"], 0.96, 1.0);
+        limit(&[set, "cloud", "median_mm"], 0.0, median);
+        limit(&[set, "cloud", "outliers_over_1mm"], 0.0, outliers);
+        limit(&[set, "cloud", "completeness_0.3"], complete, 1.0);
     }
-    limit(&["scan_dimm", "cloud_part", "outliers_over_1mm"], 0.0, 0.005);
-    limit(&["scan_dimm", "cloud_part", "rms_mm_without_outliers"], 0.0, 0.08);
+    limit(&["scan_dimm", "cloud_part", "outliers_over_1mm"], 0.0, 0.0029);
+    limit(&["scan_dimm", "cloud_part", "rms_mm_without_outliers"], 0.0, 0.0688);
     limit(&["scan_led_hires", "cloud", "rms_mm_without_outliers"], 0.0, 0.04);
-    limit(&["scan_led_hires", "cloud", "median_mm"], 0.0, 0.015);
-    limit(&["scan_led_hires", "cloud", "outliers_over_1mm"], 0.0, 0.001);
+    limit(&["scan_led_hires", "cloud", "median_mm"], 0.0, 0.013);
+    limit(&["scan_led_hires", "cloud", "outliers_over_1mm"], 0.0, 0.0001);
     bars
 }
 
@@ -62,7 +73,7 @@ fn worse(score: &serde_json::Value, turned: bool) -> Vec<String> {
             faults.push(format!("{} is {value:.5}, allowed {least}..={most}", path.join(" ")));
         }
     }
-    for (set, most) in [("steps", 0.004), ("shiny", 0.01)] {
+    for (set, most) in [("steps", 0.0025), ("shiny", 0.0043)] {
         for error in score[set]["steps"]["step_errors_mm"].as_array().expect("step errors") {
             let error = error.as_f64().expect("a number");
             if error.abs() > most {

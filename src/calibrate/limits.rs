@@ -3,6 +3,7 @@
 
 use crate::fault::{Fault, Result};
 use crate::rig::{Verdict, Volume};
+use crate::solve::End;
 
 /// Share of what the sensor sees that counts as the tolerance where nobody states one: the paper's 0.25 mm for
 /// insertion where its camera sees 167 mm. Parts are as large as the view that they are measured in.
@@ -108,6 +109,12 @@ impl Judgement {
             self.reasons.push(reason());
         }
     }
+    /// A fit that ended anywhere but at a minimum is usable at best.
+    pub fn ended(&mut self, end: End) {
+        if let Some(remark) = end.remark() {
+            self.at_best(Verdict::Usable, true, || remark.into());
+        }
+    }
     /// Where `when` holds, adds this advice.
     pub fn advise(&mut self, when: bool, advice: impl FnOnce() -> String) {
         if when {
@@ -120,4 +127,27 @@ impl Judgement {
 pub fn rms(values: impl Iterator<Item = f64>) -> f64 {
     let (s, n) = values.filter(|v| v.is_finite()).fold((0.0, 0.0), |(s, n), v| (s + v * v, n + 1.0));
     f64::sqrt(s / f64::max(n, 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_fit_that_had_not_come_to_rest_is_usable_at_best() {
+        let limits =
+            Asked { tolerance_mm: Some(1.0), ..Asked::default() }.limits(&Volume::new(100.0, 200.0, ""), |z| z);
+        for (expected, found, hasty) in [
+            (0.1, Verdict::Good, Verdict::Usable),
+            (1.0, Verdict::Usable, Verdict::Usable),
+            (9.0, Verdict::BadlyDetermined, Verdict::BadlyDetermined),
+        ] {
+            for (end, verdict) in [(End::Minimum, found), (End::Exhausted, hasty), (End::Stuck, hasty)] {
+                let mut j = limits.by_error(expected, String::new());
+                let before = j.reasons.len();
+                j.ended(end);
+                assert_eq!((j.verdict, j.reasons.len() - before), (verdict, usize::from(end != End::Minimum)));
+            }
+        }
+    }
 }

@@ -9,7 +9,7 @@ use crate::camera::{CameraCovariance, Intrinsics, NAMES, PARAMETERS, ParameterMa
 use crate::fault::{Fault, Result};
 use crate::geometry::{Board, Camera, Mat3, Rigid, Twist, Vec2, Vec3, skew};
 use crate::recording::BoardSpec;
-use crate::solve::{LmOptions, Loss, Problem, Residuals, Stop, lm};
+use crate::solve::{LmOptions, Loss, Problem, Residuals, lm};
 use nalgebra::{Matrix6, SMatrix};
 
 /// Change of six pose numbers by the camera's parameters, in the order of [`crate::camera::NAMES`].
@@ -191,12 +191,11 @@ pub fn measure(seen: &SeenBoard, camera: &Intrinsics, start: &Rigid<Camera, Boar
     }
     let problem = PoseProblem { seen, camera };
     let options = LmOptions { loss: Loss::Huber(2.5), estimate_scale: true, ..LmOptions::default() };
-    let found = lm(&problem, *start, &options);
-    if found.stop == Stop::BadStart || found.covariance.is_none() {
-        return Err(Fault::refused(format!("{}: the board's pose is not determined by its pixels", seen.name))
-            .cause("the features lie on a line, or the start was behind the camera")
-            .next("leave this picture out"));
-    }
+    let found = lm(&problem, *start, &options).minimum().filter(|f| f.covariance.is_some()).ok_or_else(|| {
+        Fault::refused(format!("{}: the board's pose is not determined by its pixels", seen.name))
+            .cause("the features lie on a line, the start was behind the camera, or the fit of the pose does not come to rest")
+            .next("leave this picture out")
+    })?;
     let pose = found.state;
     let (mut information, mut mixed, mut squares) = (Matrix6::zeros(), ByIntrinsics::zeros(), 0.0);
     let mut about_camera = AboutCamera::silent();

@@ -8,7 +8,7 @@ use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Board, Camera, LeftStep, Mat3, Rigid, Vec2, Vec3, orthonormalise};
 use crate::recording::BoardSpec;
-use crate::solve::{LmOptions, Loss, Problem, Residuals, Solution, Stop, lm};
+use crate::solve::{LmOptions, Loss, Problem, Residuals, Solution, lm};
 use nalgebra::Matrix6;
 
 /// A board's pose from one picture.
@@ -88,8 +88,9 @@ pub fn pose_of_points(intrinsics: &Intrinsics, features: &[Vec3], view: &BoardVi
         LmOptions { loss: Loss::Huber(2.0), estimate_scale: true, max_iterations: 50, ..LmOptions::default() };
     let mut found: Vec<Solution<Rigid<Camera, Board>>> = [start, mirrored(&start, &Vec3::new(centre.x, centre.y, 0.0))]
         .into_iter()
-        .map(|s| lm(&problem, s, &options))
-        .filter(|s| s.stop != Stop::BadStart && s.state.translation.z > 0.0)
+        // What reports are made of is refined from this, and its end looked at there.
+        .filter_map(|s| lm(&problem, s, &options).so_far())
+        .filter(|s| s.state.translation.z > 0.0)
         .collect();
     found.sort_by(|a, b| a.rms.total_cmp(&b.rms));
     let best = found.first().ok_or_else(|| weak("no pose in front of the camera fits the points".into()))?;

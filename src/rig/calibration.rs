@@ -96,7 +96,7 @@ pub struct Calibration<T> {
     pub covariance: Covariance,
     /// What the solver says of it.
     pub quality: Quality,
-    /// What a person has vouched for, and when; every report shows it.
+    /// What a person has vouched for, and when, and which sigmas an import assumed; every report shows it.
     pub remarks: Vec<String>,
 }
 

@@ -86,17 +86,21 @@ pub fn consensus<M>(
         if score < best_score {
             best_score = score;
             best = Some(model);
-            let clean = (agree as f64 / count as f64).powi(size as i32);
-            needed = if clean >= 1.0 - 1e-12 {
-                draws
-            } else {
-                ((1.0 - options.confidence).ln() / (1.0 - clean).ln()).ceil().min(1e9) as usize
-            };
+            needed = draws_needed((agree as f64 / count as f64).powi(size as i32), options.confidence);
         }
     }
     let model = best?;
     let inliers = (0..count).filter(|&i| misfit(&model, i).abs() < options.threshold).collect();
     Some(Consensus { model, inliers, draws })
+}
+
+/// Draws that give one clean set with this probability, where a share `clean` of all sets is. `ln_1p` keeps the digits
+/// of a share that 1 - clean would round away: without it a share below 1e-16 would need no draw at all.
+fn draws_needed(clean: f64, confidence: f64) -> usize {
+    if clean >= 1.0 - 1e-12 {
+        return 0;
+    }
+    ((-confidence).ln_1p() / (-clean).ln_1p()).ceil().min(1e9) as usize
 }
 
 #[cfg(test)]
@@ -130,5 +134,19 @@ mod tests {
         let found = run(4);
         assert!((found.model.0 - 0.5).abs() < 1e-9 && (found.model.1 - 3.0).abs() < 1e-9);
         assert!(found.inliers.len() >= 120 && found.inliers == run(4).inliers);
+    }
+
+    #[test]
+    fn a_first_draw_with_which_nothing_agrees_does_not_end_the_search() {
+        assert_eq!(draws_needed(1.0, 0.9999), 0);
+        assert_eq!(draws_needed(0.5, 0.9999), 14);
+        for rare in [1e-9, 1e-17, 1e-300, 0.0] {
+            assert_eq!(draws_needed(rare, 0.9999), 1_000_000_000, "{rare}");
+        }
+        // Only the model 7 fits, and the draw that gives it is one in forty.
+        let options = ConsensusOptions { threshold: 0.5, seed: 3, ..Default::default() };
+        let misfit = |m: &usize, _: usize| if *m == 7 { 0.1 } else { 9.0 };
+        let found = consensus(40, 1, &options, |c| Some(c[0]), misfit).unwrap();
+        assert_eq!((found.model, found.inliers.len()), (7, 40));
     }
 }

@@ -73,15 +73,58 @@ impl LmOptions {
     }
 }
 
-/// Why the iteration ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Stop {
+/// Whether what was found is a minimum. The order is from good to bad.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum End {
     /// The cost falls by no more than the tolerance, or by nothing that its digits show.
-    Converged,
-    /// Ran out of iterations.
+    Minimum,
+    /// The steps ran out while the cost still fell.
     Exhausted,
+    /// No step is possible, however short: every one leads to an impossible state.
+    Stuck,
+}
+
+impl End {
+    /// What people are told of a result that is no minimum.
+    pub fn remark(self) -> Option<&'static str> {
+        match self {
+            End::Minimum => None,
+            End::Exhausted => Some(
+                "the fit had not come to rest at its last step: the values may be off by more than their sigmas say",
+            ),
+            End::Stuck => {
+                Some("the fit stopped where no further step was possible: its sigmas do not say how far it is off")
+            }
+        }
+    }
+}
+
+/// How a fit ended. A solution is had only by saying which ends count.
+#[derive(Clone, Debug)]
+#[must_use]
+pub enum Outcome<S> {
+    /// A state to go on from, and whether it is a minimum.
+    Found(Solution<S>, End),
     /// The start itself is impossible.
     BadStart,
+}
+
+impl<S> Outcome<S> {
+    /// The solution with its end, which belongs into whatever is reported of it.
+    pub fn ended(self) -> Option<(Solution<S>, End)> {
+        match self {
+            Outcome::Found(solution, end) => Some((solution, end)),
+            Outcome::BadStart => None,
+        }
+    }
+    /// The solution, if it is a minimum.
+    pub fn minimum(self) -> Option<Solution<S>> {
+        self.ended().filter(|(_, end)| *end == End::Minimum).map(|(solution, _)| solution)
+    }
+    /// The solution whatever its end: as a start of another fit, or to compare models by.
+    pub fn so_far(self) -> Option<Solution<S>> {
+        self.ended().map(|(solution, _)| solution)
+    }
 }
 
 /// What [`lm`] found.
@@ -89,8 +132,6 @@ pub enum Stop {
 pub struct Solution<S> {
     /// Where it ended.
     pub state: S,
-    /// Why it ended there; `state` is a solution only where it converged.
-    pub stop: Stop,
     /// Steps taken, all rounds together.
     pub iterations: usize,
     /// Root mean square of all measured residuals, unweighted, in the residuals' unit.
@@ -122,14 +163,14 @@ impl<S> Solution<S> {
 
 /// Levenberg-Marquardt with Marquardt's scaling and Nielsen's damping [madsen04, alg. 3.16];
 /// robust losses by iterated weights.
-pub fn lm<P: Problem>(problem: &P, start: P::State, options: &LmOptions) -> Solution<P::State> {
+pub fn lm<P: Problem>(problem: &P, start: P::State, options: &LmOptions) -> Outcome<P::State> {
     // An unknown scale and the robust weights depend on each other: a few rounds settle it.
     let rounds = if options.estimate_scale && options.loss != Loss::Squares { 4 } else { 1 };
-    let (mut state, mut iterations, mut stop) = (start, 0, Stop::Converged);
+    let (mut state, mut iterations, mut end) = (start, 0, End::Minimum);
     let mut scale = if rounds > 1 { scale_at(problem, &state) } else { 1.0 };
     for round in 0..rounds {
-        let (next, n, s) = minimise(problem, state, options, scale);
-        (state, stop) = (next, s);
+        let Some((next, n, how)) = minimise(problem, state, options, scale) else { return Outcome::BadStart };
+        (state, end) = (next, how);
         iterations += n;
         if round + 1 < rounds {
             let next = scale_at(problem, &state);
@@ -140,7 +181,7 @@ pub fn lm<P: Problem>(problem: &P, start: P::State, options: &LmOptions) -> Solu
             }
         }
     }
-    finish(problem, state, options, scale, iterations, stop)
+    finish(problem, state, options, scale, iterations).map_or(Outcome::BadStart, |found| Outcome::Found(found, end))
 }
 
 fn scale_at<P: Problem>(problem: &P, state: &P::State) -> f64 {
@@ -151,7 +192,8 @@ fn scale_at<P: Problem>(problem: &P, state: &P::State) -> f64 {
     robust_scale(&mut lengths, size).max(1e-12)
 }
 
-fn minimise<P: Problem>(problem: &P, start: P::State, o: &LmOptions, scale: f64) -> (P::State, usize, Stop) {
+/// Where it ends, the steps taken and whether that is a minimum; `None` where the start is impossible.
+fn minimise<P: Problem>(problem: &P, start: P::State, o: &LmOptions, scale: f64) -> Option<(P::State, usize, End)> {
     let n = problem.width();
     let order = Order::new(n, &o.hold, problem.blocks());
     let free = order.free();
@@ -162,11 +204,12 @@ fn minimise<P: Problem>(problem: &P, start: P::State, o: &LmOptions, scale: f64)
         r.cost.is_finite().then_some(r)
     };
     let mut state = start;
-    let Some(mut here) = evaluate(&state, true) else { return (state, 0, Stop::BadStart) };
+    let mut here = evaluate(&state, true)?;
     let (mut damping, mut growth) = (1e-4, 2.0);
     for iteration in 0..o.max_iterations {
         let (h, g) = (&here.hessian, &here.gradient);
         let floor = 1e-14 * free.iter().map(|&i| h[(i, i)]).fold(0.0, f64::max);
+        let mut possible = false;
         let (next, gain, predicted) = loop {
             let extra = |i: usize| damping * h[(i, i)].max(floor);
             let factor = Factor::new(&order, |i, j| if i == j { h[(i, i)] + extra(i) } else { h[(i, j)] });
@@ -177,13 +220,17 @@ fn minimise<P: Problem>(problem: &P, start: P::State, o: &LmOptions, scale: f64)
                 let predicted: f64 = free.iter().map(|&i| full[i] * (extra(i) * full[i] - g[i])).sum();
                 Some((next, here.cost - cost, predicted))
             });
+            possible |= tried.is_some();
             match tried {
                 Some(t) if t.1 >= 0.0 => break t,
                 // Nothing better within the digits of the cost: this is the bottom.
                 Some((_, _, predicted)) if predicted.abs() <= 1e-15 * here.cost => {
-                    return (state, iteration, Stop::Converged);
+                    return Some((state, iteration, End::Minimum));
                 }
-                _ if damping > 1e15 => return (state, iteration, Stop::Converged),
+                // The shortest steps that the digits show gain nothing, or are all impossible.
+                _ if damping > 1e15 => {
+                    return Some((state, iteration, if possible { End::Minimum } else { End::Stuck }));
+                }
                 _ => {
                     damping *= growth;
                     growth *= 2.0;
@@ -195,13 +242,12 @@ fn minimise<P: Problem>(problem: &P, start: P::State, o: &LmOptions, scale: f64)
         growth = 2.0;
         let done = gain <= o.tolerance * here.cost && predicted <= o.tolerance * here.cost.max(1e-300);
         state = next;
-        let Some(there) = evaluate(&state, true) else { return (state, iteration, Stop::BadStart) };
-        here = there;
+        here = evaluate(&state, true)?;
         if done || here.cost <= 1e-28 {
-            return (state, iteration + 1, Stop::Converged);
+            return Some((state, iteration + 1, End::Minimum));
         }
     }
-    (state, o.max_iterations, Stop::Exhausted)
+    Some((state, o.max_iterations, End::Exhausted))
 }
 
 fn finish<P: Problem>(
@@ -210,12 +256,11 @@ fn finish<P: Problem>(
     o: &LmOptions,
     scale: f64,
     iterations: usize,
-    stop: Stop,
-) -> Solution<P::State> {
+) -> Option<Solution<P::State>> {
     let n = problem.width();
     let order = Order::new(n, &o.hold, problem.blocks());
     let mut r = Residuals::new(n, o.loss, scale, true);
-    let stop = if problem.residuals(&state, &mut r).is_none() { Stop::BadStart } else { stop };
+    problem.residuals(&state, &mut r)?;
     r.settle();
     let measured =
         |f: &dyn Fn(&super::system::Group) -> f64| -> f64 { r.groups.iter().filter(|g| !g.prior).map(f).sum() };
@@ -233,9 +278,8 @@ fn finish<P: Problem>(
     // The hessian was built with residuals in units of `scale`.
     let (covariance, condition) = inverse(&order, &r.hessian);
     let covariance = covariance.map(|c| c / (scale * scale));
-    Solution {
+    Some(Solution {
         state,
-        stop,
         iterations,
         rms,
         sigma0,
@@ -244,7 +288,7 @@ fn finish<P: Problem>(
         weights: r.groups.iter().map(|g| g.weight).collect(),
         lengths: r.groups.iter().map(|g| g.length).collect(),
         condition,
-    }
+    })
 }
 
 /// Largest difference between a problem's gradient and central differences of its cost, relative
@@ -326,8 +370,7 @@ mod tests {
             let options = LmOptions { loss, estimate_scale, ..LmOptions::default() };
             let mut sum = 0.0;
             for seed in 0..300 {
-                let s = lm(&decay(seed, 0.0), [1.0, -1.0, 0.0], &options);
-                assert_eq!(s.stop, Stop::Converged);
+                let s = lm(&decay(seed, 0.0), [1.0, -1.0, 0.0], &options).minimum().unwrap();
                 let c = s.scaled_covariance().unwrap();
                 let truth = [2.0, -0.7, 0.3];
                 sum += (0..3).map(|i| (s.state[i] - truth[i]).powi(2) / c[(i, i)]).sum::<f64>();
@@ -340,8 +383,8 @@ mod tests {
     #[test]
     fn a_fifth_of_wrong_data_does_not_matter_to_cauchy() {
         let options = LmOptions { loss: Loss::Cauchy(2.4), estimate_scale: true, ..LmOptions::default() };
-        let robust = lm(&decay(5, 0.2), [1.0, -1.0, 0.0], &options);
-        let plain = lm(&decay(5, 0.2), [1.0, -1.0, 0.0], &LmOptions::default());
+        let robust = lm(&decay(5, 0.2), [1.0, -1.0, 0.0], &options).minimum().unwrap();
+        let plain = lm(&decay(5, 0.2), [1.0, -1.0, 0.0], &LmOptions::default()).minimum().unwrap();
         assert!((robust.state[0] - 2.0).abs() < 0.05, "{:?}", robust.state);
         assert!((plain.state[2] - 0.3).abs() > 0.1, "plain least squares must suffer: {:?}", plain.state);
         assert!(robust.weights.iter().filter(|w| **w < 0.1).count() > 20);
@@ -350,9 +393,44 @@ mod tests {
     #[test]
     fn held_and_undetermined_parameters_are_told_apart() {
         let d = decay(3, 0.0);
-        let held = lm(&d, [2.0, -0.7, 0.25], &LmOptions { hold: vec![2], ..LmOptions::default() });
+        let options = LmOptions { hold: vec![2], ..LmOptions::default() };
+        let held = lm(&d, [2.0, -0.7, 0.25], &options).minimum().unwrap();
         assert!(held.state[2] == 0.25 && held.covariance.unwrap()[(2, 2)] == 0.0);
         let flat = Decay { data: vec![(1.0, 1.0); 50] };
-        assert!(lm(&flat, [2.0, -0.7, 0.25], &LmOptions::default()).covariance.is_none());
+        assert!(lm(&flat, [2.0, -0.7, 0.25], &LmOptions::default()).so_far().unwrap().covariance.is_none());
+    }
+
+    #[test]
+    fn a_fit_that_runs_out_of_steps_says_so() {
+        let few = LmOptions { max_iterations: 2, ..LmOptions::default() };
+        let outcome = lm(&decay(1, 0.0), [1.0, -1.0, 0.0], &few);
+        assert!(matches!(outcome, Outcome::Found(_, End::Exhausted)), "{outcome:?}");
+        assert!(outcome.clone().minimum().is_none() && outcome.so_far().is_some());
+    }
+
+    /// Its cost falls to the right, and the right is impossible from `wall` on.
+    struct Walled {
+        wall: f64,
+    }
+
+    impl Problem for Walled {
+        type State = f64;
+        fn width(&self) -> usize {
+            1
+        }
+        fn moved(&self, s: &f64, d: &[f64]) -> f64 {
+            s + d[0]
+        }
+        fn residuals(&self, s: &f64, out: &mut Residuals) -> Option<()> {
+            (*s <= self.wall).then(|| out.group(&[s - 3.0], &[0], &[1.0]))
+        }
+    }
+
+    #[test]
+    fn a_fit_whose_every_step_is_impossible_is_stuck_and_no_minimum() {
+        let at = |start: f64, wall: f64| lm(&Walled { wall }, start, &LmOptions::default());
+        assert!(matches!(at(1.0, 1.0), Outcome::Found(_, End::Stuck)), "{:?}", at(1.0, 1.0));
+        assert!(matches!(at(2.0, 1.0), Outcome::BadStart));
+        assert!((at(1.0, 5.0).minimum().unwrap().state - 3.0).abs() < 1e-9);
     }
 }

@@ -14,7 +14,7 @@ mod normal;
 mod system;
 
 pub use consensus::{Consensus, ConsensusOptions, consensus};
-pub use lm::{LmOptions, Problem, Solution, Stop, lm, worst_jacobian_error};
+pub use lm::{End, LmOptions, Outcome, Problem, Solution, lm, worst_jacobian_error};
 pub use loss::{Loss, robust_scale};
 pub use normal::Blocks;
 pub use system::Residuals;

@@ -63,5 +63,5 @@ pub use scan::scan_folder::of_a_scan;
 pub use scan::seen::Seen;
 pub use scan::watch::Watch;
 pub use settings::{Settings, ToolSpec, WorkingVolume};
-pub use values::Values;
+pub use values::{PlaneValue, Sigmas, Values};
 pub use verify::{CalibrationCheck, VerifyReport, VerifyRun, verify};

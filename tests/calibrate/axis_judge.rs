@@ -18,6 +18,7 @@ use sheetlight::camera::{CameraCovariance, Intrinsics, Parameters};
 use sheetlight::geometry::{Axis, AxisKind, Board, Camera, CountUnit, Riding, Rigid, Vec3, exp};
 use sheetlight::recording::BoardSpec;
 use sheetlight::rig::{Verdict, Volume};
+use sheetlight::solve::End;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Flaw {
@@ -266,7 +267,11 @@ fn call(seed: u64, kind: AxisKind, flaw: Flaw) -> Called {
     let known = CameraCovariance::exact();
     let Ok(fit) = solve(&s.stops, kind, CountUnit::Count, &known, &AxisOptions::default()) else { return refused };
     let stood = Volume::new(r.depth, r.depth, "where the boards stood");
-    let quality = judge(&fit, &Asked::default().limits(&stood, |z| r.camera.view_mm(z)), "square_mm");
+    let said = |fit: &AxisFit| judge(fit, &Asked::default().limits(&stood, |z| r.camera.view_mm(z)), "square_mm");
+    let quality = said(&fit);
+    let hasty = said(&AxisFit { end: End::Exhausted, ..fit.clone() });
+    assert_eq!(hasty.verdict, quality.verdict.max(Verdict::Usable), "a fit that had not come to rest");
+    assert!(hasty.reasons.iter().any(|r| r.contains("had not come to rest")), "{:?}", hasty.reasons);
     let (error, sigma) = match flaw {
         Flaw::Unsigned => {
             let [up, down] = [1.0, -1.0].map(|sense| error(&r, &s, &fit, flaw, sense));

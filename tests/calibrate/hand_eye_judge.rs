@@ -15,12 +15,16 @@ use sheetlight::calibrate::hand_eye::expected::expected_error;
 use sheetlight::calibrate::hand_eye::fit::HandEyeFit;
 use sheetlight::calibrate::hand_eye::options::HandEyeOptions;
 use sheetlight::calibrate::hand_eye::options::Mount;
+use sheetlight::calibrate::hand_eye::report;
 use sheetlight::calibrate::hand_eye::solve::solve;
 use sheetlight::calibrate::hand_eye::turns::{read_with, resolve};
+use sheetlight::calibrate::limits::Asked;
 use sheetlight::calibrate::measured_pose::MeasuredPose;
 use sheetlight::camera::{CameraCovariance, ParameterMatrix, Parameters};
 use sheetlight::geometry::{Board, Camera, Rigid, Vec3, exp};
 use sheetlight::recording::BoardSpec;
+use sheetlight::rig::{Verdict, Volume};
+use sheetlight::solve::End;
 
 fn run(s: &Station, pairs: &[Pair], camera_covariance: &CameraCovariance) -> sheetlight::fault::Result<HandEyeFit> {
     solve(pairs, s.mount, camera_covariance, &s.camera, &HandEyeOptions::default())
@@ -141,6 +145,7 @@ fn errors_are_what_the_report_says_and_near_the_bound() {
         judge(&format!("hand-eye, {mount:?}"), &NAMES, LEVELS.len(), make, |(s, bound, noise), rng| {
             let found = run(s, &pairs(rng, s, *noise, &s.camera), &CameraCovariance::exact()).unwrap();
             assert!(found.pairs.iter().filter(|p| !p.used).count() <= 1, "good pairs were left out");
+            assert_eq!(found.end, End::Minimum, "a right fit comes to rest");
             Trial::new(error(&found.chain, &s.truth), &found.covariance, bound)
         });
     }
@@ -171,6 +176,22 @@ fn believed(s: &Station, root: &ParameterMatrix, rng: &mut Pcg64) -> sheetlight:
 }
 
 /// The pictures sharpen the camera as far as they can, and the report says what is left.
+#[test]
+fn a_fit_that_had_not_come_to_rest_is_usable_at_best() {
+    let s = station(&mut Pcg64::seed_from_u64(1000), Mount::EyeInHand, 13);
+    let p = pairs(&mut Pcg64::seed_from_u64(1), &s, LEVELS[0], &s.camera);
+    let fit = run(&s, &p, &CameraCovariance::exact()).unwrap();
+    let seen = Volume::new(200.0, 400.0, "where the boards stood");
+    let limits = Asked { tolerance_mm: Some(5.0), ..Asked::default() }.limits(&seen, |z| s.camera.view_mm(z));
+    let said = |end: End| report::judge(&HandEyeFit { end, ..fit.clone() }, &p, &limits);
+    assert_eq!(said(End::Minimum).verdict, Verdict::Good, "{:?}", said(End::Minimum).reasons);
+    for end in [End::Exhausted, End::Stuck] {
+        let quality = said(end);
+        assert_eq!(quality.verdict, Verdict::Usable, "{end:?}");
+        assert!(quality.reasons.iter().any(|r| r == end.remark().unwrap()), "{:?}", quality.reasons);
+    }
+}
+
 #[test]
 fn a_camera_that_is_not_exact_is_solved_along() {
     judge("hand-eye, camera uncertain", &NAMES, LEVELS.len(), uncertain, |(s, bound, noise, covariance, root), rng| {

@@ -19,6 +19,7 @@ use sheetlight::camera::{CameraCovariance, Intrinsics, Parameters};
 use sheetlight::geometry::{Board, Camera, Plane, Rigid, Vec2, Vec3, exp};
 use sheetlight::recording::BoardSpec;
 use sheetlight::rig::{Verdict, Volume};
+use sheetlight::solve::End;
 
 struct Station {
     camera: Intrinsics,
@@ -327,7 +328,13 @@ fn call(seed: u64, flaw: Flaw) -> Called {
         return refused;
     };
     let lit = Volume::new(fit.reach[0], fit.reach[1], "where the boards were lit");
-    let quality = judge_plane(&fit, &views, &s.camera, &Asked::default().limits(&lit, |z| s.camera.view_mm(z)));
+    let said = |fit: &LaserPlaneFit| {
+        judge_plane(fit, &views, &s.camera, &Asked::default().limits(&lit, |z| s.camera.view_mm(z)))
+    };
+    let quality = said(&fit);
+    let hasty = said(&LaserPlaneFit { end: End::Exhausted, ..fit.clone() });
+    assert_eq!(hasty.verdict, quality.verdict.max(Verdict::Usable), "a fit that had not come to rest");
+    assert!(hasty.reasons.iter().any(|r| r.contains("had not come to rest")), "{:?}", hasty.reasons);
     let places: Vec<Vec3> = s.boards.iter().flat_map(|b| s.line(&s.plane, b, 9)).collect();
     let mean = |of: &dyn Fn(&Vec3) -> f64| (places.iter().map(of).sum::<f64>() / places.len() as f64).sqrt();
     let variance = |p: &Vec3| {

@@ -14,10 +14,11 @@ use sheetlight::calibrate::pointer::range::{
     RIG, RigCovariance, RobotNoise, SharedCovariance, range, surface, to_base,
 };
 use sheetlight::calibrate::pointer::report::judge as judge_pointer;
-use sheetlight::calibrate::pointer::solve::{PointerOptions, SpotView, solve};
+use sheetlight::calibrate::pointer::solve::{PointerFit, PointerOptions, SpotView, solve};
 use sheetlight::camera::{CameraCovariance, Intrinsics, Parameters};
 use sheetlight::geometry::{Base, Board, Camera, Flange, Plane, Ray, Rigid, Vec2, Vec3, exp};
 use sheetlight::rig::{Verdict, Volume};
+use sheetlight::solve::End;
 
 struct Station {
     camera: Intrinsics,
@@ -364,7 +365,12 @@ fn judged(seed: u64, wrong: Wrong, count: usize) -> Judged {
         return (None, 0.0, 0.0, vec![]);
     };
     let lay = Volume::new(fit.reach[0], fit.reach[1], "where the spots lay");
-    let quality = judge_pointer(&fit, &s.camera, px, &Asked::default().limits(&lay, |z| s.camera.view_mm(z)));
+    let said =
+        |fit: &PointerFit| judge_pointer(fit, &s.camera, px, &Asked::default().limits(&lay, |z| s.camera.view_mm(z)));
+    let quality = said(&fit);
+    let hasty = said(&PointerFit { end: End::Exhausted, ..fit.clone() });
+    assert_eq!(hasty.verdict, quality.verdict.max(Verdict::Usable), "a fit that had not come to rest");
+    assert!(hasty.reasons.iter().any(|r| r.contains("had not come to rest")), "{:?}", hasty.reasons);
     let c = fit.covariance.view((0, 0), (6, 6)).into_owned();
     let at = |b: &Ray<Camera>, z: f64| b.at((z - b.origin.z) / b.direction.z);
     let (mut error, mut variance) = (0.0, 0.0);

@@ -4,6 +4,7 @@
 //! SHEETLIGHT_LONG: ten stations of as many designs, thirty right draws each; a design's name: the stations of that one alone.
 
 mod edits;
+mod imported;
 mod pictures;
 mod world;
 

@@ -1,21 +1,14 @@
 //! In: simulated recordings, small and odd ones and deep ones, and scans that begin beside the part. Out: the scan on the GPU and
 //! the scan on the CPU twins give the same points, and the stripe is measured where it is seen. Frame and unit: base frame, mm; pixels.
 
-use crate::common::sheetlight;
+use crate::common::clouds::apart;
+use crate::common::{self, sheetlight};
 use sheetlight::camera::Intrinsics;
 use sheetlight::geometry::{Plane, Rigid, Vec3};
 use sheetlight::raster::Image;
 use sheetlight::recording::{Motion, Stand};
 use sheetlight::rig::Rig;
-use sheetlight::scan::{
-    Carrier, CloudPoint, Engine, Extraction, Format, Optical, Processor, Profile, Scanner, Shot, read_cloud,
-};
-use std::collections::BTreeMap;
-
-/// Points by shot and pixel of the peak, which is unique within half a pixel.
-fn by_place(points: &[CloudPoint]) -> BTreeMap<(u32, i32, i32), &CloudPoint> {
-    points.iter().map(|p| ((p.shot, (p.u * 8.0).round() as i32, (p.v * 8.0).round() as i32), p)).collect()
-}
+use sheetlight::scan::{Carrier, Engine, Extraction, Format, Optical, Processor, Profile, Scanner, Shot, read_cloud};
 
 fn agree(name: &str, simulate: &[&str]) {
     let dir = tempfile::tempdir().unwrap();
@@ -40,25 +33,17 @@ fn agree(name: &str, simulate: &[&str]) {
     };
     let (gpu, cpu) = (scan("gpu"), scan("cpu"));
     assert!(cpu.len() > 1000, "{name}: {} points", cpu.len());
-    // A peak on the edge of a test may fall on either side of it; one in a thousand is plenty for that.
-    let lost = gpu.len().abs_diff(cpu.len());
-    assert!(lost * 1000 <= cpu.len(), "{name}: {} points on the GPU, {} on the twins", gpu.len(), cpu.len());
-    let (a, b) = (by_place(&gpu), by_place(&cpu));
-    let both: Vec<_> = a.iter().filter_map(|(k, p)| b.get(k).map(|q| (p, q))).collect();
-    // Places are rounded to eighths; peaks beside a rounding edge find no partner, whatever agrees.
-    assert!(both.len() * 100 >= cpu.len() * 98, "{name}: {} of {} points have a partner", both.len(), cpu.len());
-    let apart =
-        |p: &CloudPoint, q: &CloudPoint| (0..3).map(|i| (p.position[i] - q.position[i]).powi(2)).sum::<f32>().sqrt();
-    let worst = both.iter().map(|(p, q)| apart(p, q)).fold(0f32, f32::max);
-    println!("{name}: {} points, largest difference {worst:.5} mm", cpu.len());
-    assert!(worst < 0.005, "{name}: points differ by {worst} mm");
+    let found = apart(&gpu, &cpu);
+    println!("{name}: {} points, {found:?}", cpu.len());
+    // One in twenty thousand may fall on the other side of a limit that it lies on. Measured: 6.4e-5 mm, two digits of a
+    // coordinate's f32, on llvmpipe; 1e-4 mm on an H100. A quarter more is allowed.
+    let same = found.alone * 20_000 <= cpu.len() && found.worst_mm < 1.25e-4;
+    assert!(same, "{name}: {found:?} of {} points", cpu.len());
 }
 
 #[test]
 fn gpu_and_twins_give_the_same_points() {
-    if sheetlight::gpu::Device::open().is_err() {
-        assert!(std::env::var_os("SHEETLIGHT_REQUIRE_GPU").is_none(), "no GPU adapter");
-        eprintln!("*** SKIPPED: no GPU adapter ***");
+    if common::device().is_none() {
         return;
     }
     agree("640x480", &["--shots", "40"]);

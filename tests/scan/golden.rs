@@ -5,7 +5,18 @@ use crate::common::sheetlight;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Counts may differ by rounding between processors' exp(); lengths are compared to 1e-3 of their unit.
+/// How far a figure may move: by 1e-4 of itself, a thousand times what processors' exp() differ by. Where a figure is
+/// nearly 0 its unit says what nothing is: 1e-6 mm is a thousandth of the finest sigma, 1e-5 px that of the finest peak. A
+/// place has no size of its own, its frame's origin lies anywhere: 1e-3 mm, a thirtieth of a point's sigma.
+fn allowed(path: &str, was: f64) -> f64 {
+    if path.contains("position_mm") {
+        return 1e-3;
+    }
+    let floor: f64 = if path.ends_with("_px") { 1e-5 } else { 1e-6 };
+    floor.max(1e-4 * was.abs())
+}
+
+/// Counts may differ by rounding between processors' exp(): a peak at an edge falls on the other side of it.
 fn close(path: &str, was: &Value, is: &Value, faults: &mut Vec<String>) {
     match (was, is) {
         (Value::Object(a), Value::Object(b)) => {
@@ -25,7 +36,7 @@ fn close(path: &str, was: &Value, is: &Value, faults: &mut Vec<String>) {
         }
         _ => {
             let same = match (was.as_f64(), is.as_f64()) {
-                (Some(a), Some(b)) if was.is_f64() => (a - b).abs() <= 1e-3,
+                (Some(a), Some(b)) if was.is_f64() => (a - b).abs() <= allowed(path, a),
                 (Some(a), Some(b)) => (a - b).abs() <= 2.0f64.max(2e-3 * a),
                 _ => was == is,
             };
@@ -73,4 +84,30 @@ fn the_scan_of_the_small_recording_is_what_it_was() {
     let mut faults = Vec::new();
     close("", &was, &is, &mut faults);
     assert!(faults.is_empty(), "the scan changed:\n{}", faults.join("\n"));
+}
+
+#[test]
+fn a_figure_that_moved_by_a_thousandth_of_itself_is_seen() {
+    let was = json!({
+        "median_sigma_mm": 0.0325, "mean_position_mm": [481.68], "stripe": { "width_px": 0.5274, "grain_px": 0.0 },
+        "mean_quality": 0.94,
+    });
+    let seen = |path: &str, by: f64| {
+        let mut is = was.clone();
+        let figure = is.pointer_mut(path).unwrap();
+        *figure = json!(figure.as_f64().unwrap() + by);
+        let mut faults = Vec::new();
+        close("", &was, &is, &mut faults);
+        !faults.is_empty()
+    };
+    for (path, moved, rounded) in [
+        ("/median_sigma_mm", 0.0325e-3, 0.0325e-6),
+        ("/mean_position_mm/0", 2e-3, 1e-4),
+        ("/stripe/width_px", 0.5e-3, 0.5e-6),
+        ("/stripe/grain_px", 2e-5, 1e-7),
+        ("/mean_quality", 1e-3, 1e-6),
+    ] {
+        assert!(seen(path, moved) && seen(path, -moved), "{path}: {moved} is not seen");
+        assert!(!seen(path, rounded), "{path}: {rounded} is seen");
+    }
 }

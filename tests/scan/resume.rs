@@ -118,15 +118,7 @@ fn options(out: &Path) -> ScanOptions {
 
 #[test]
 fn a_lost_device_costs_no_finished_shot() {
-    let open = || match Device::open() {
-        Ok(d) => Some(d),
-        Err(e) if std::env::var_os("SHEETLIGHT_REQUIRE_GPU").is_some() => panic!("{e}"),
-        Err(e) => {
-            eprintln!("SKIPPED, no GPU adapter: {e}");
-            None
-        }
-    };
-    let Some(device) = open() else { return };
+    let Some(device) = crate::common::device() else { return };
     let b = Bench::new();
     let recording = Recording::open(&b.at("sim/scan")).unwrap();
     let rig = Rig::load(&b.at("sim/station")).unwrap();
@@ -159,8 +151,8 @@ fn a_lost_device_costs_no_finished_shot() {
     let done = b.done("lost");
     let least = 140u64.saturating_sub(8 + 4 * u64::from(batch));
     assert!((least..=140).contains(&done) && done == told as u64, "{done} shots done, {told} told");
-    run("lost", open().unwrap(), None, &mut told).unwrap();
-    run("whole", open().unwrap(), None, &mut told).unwrap();
+    run("lost", Device::open().unwrap(), None, &mut told).unwrap();
+    run("whole", Device::open().unwrap(), None, &mut told).unwrap();
     let [resumed, whole] = ["lost", "whole"].map(|out| read_cloud(&b.at(out).join("cloud.ply")).unwrap());
     assert!(resumed == whole && whole.len() > 10_000, "{} and {} points", resumed.len(), whole.len());
 }

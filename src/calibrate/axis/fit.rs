@@ -3,6 +3,7 @@
 
 use crate::calibrate::measured_pose::MeasuredPose;
 use crate::geometry::{Axis, AxisKind, Vec3, exp};
+use crate::solve::End;
 use nalgebra::DMatrix;
 
 /// One stop of the axis with the board that rides on it.
@@ -61,6 +62,8 @@ pub struct AxisFit {
     pub bend_mm: [f64; 2],
     /// Whether the counts seem to belong to the pictures.
     pub order: Order,
+    /// Whether the fit is a minimum.
+    pub end: End,
 }
 
 /// How the counts as they are compare with others.

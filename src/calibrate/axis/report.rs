@@ -65,6 +65,7 @@ pub fn judge(fit: &AxisFit, limits: &Limits, board_length: &str) -> Quality {
     contradictions(fit, &mut j);
     order(fit, &mut j);
     evidence.scatter(&mut j);
+    j.ended(fit.end);
     bow(fit, limits.tolerance_mm, &mut j);
     pitch(fit, board_length, &mut j);
     evidence.advise(&mut j);

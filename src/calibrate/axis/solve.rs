@@ -92,6 +92,7 @@ pub fn solve(
         landmarks: stops[used[0]].pose.landmarks.map(|l| back.point(&board.point(&l))),
         bend_mm: checks::bend(&chosen, &state, &scatter),
         order,
+        end: fit.end,
         axis,
     })
 }

@@ -5,7 +5,7 @@
 use super::fit::Stop;
 use crate::calibrate::measured_pose::ByIntrinsics;
 use crate::geometry::{Axis, AxisKind, Board, Camera, CountUnit, Mat3, Riding, Rigid, Vec3, exp, log, skew};
-use crate::solve::{LmOptions, Problem, Residuals, Stop as Ended, lm};
+use crate::solve::{End, LmOptions, Problem, Residuals, lm};
 use nalgebra::{DMatrix, Matrix6, Vector6};
 
 /// What the axis itself scatters by from stop to stop: standard deviations per axis of the board's middle, mm, and of its turn, rad.
@@ -186,6 +186,8 @@ pub(super) struct Fit {
     /// Of the unknowns.
     pub covariance: DMatrix<f64>,
     pub cost: f64,
+    /// Whether it is a minimum.
+    pub end: End,
 }
 
 struct Stops<'a> {
@@ -223,12 +225,9 @@ pub(super) fn fitted(seen: &[&Seen], start: &State, scatter: &Scatter) -> Option
     let roots =
         seen.iter().map(|s| Some(information(s, scatter)?.cholesky()?.l().transpose())).collect::<Option<Vec<_>>>()?;
     let problem = Stops { seen, roots, width: start.width() };
-    let found = lm(&problem, *start, &LmOptions { max_iterations: 60, ..LmOptions::default() });
-    if found.stop == Ended::BadStart {
-        return None;
-    }
+    let (found, end) = lm(&problem, *start, &LmOptions { max_iterations: 60, ..LmOptions::default() }).ended()?;
     let cost = found.lengths.iter().map(|l| l * l).sum();
-    Some(Fit { covariance: found.covariance?, state: found.state, cost })
+    Some(Fit { covariance: found.covariance?, state: found.state, cost, end })
 }
 
 /// d(unknowns) over the camera's parameters: all boards are seen with the same camera.

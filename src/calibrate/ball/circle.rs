@@ -75,11 +75,9 @@ pub(in crate::calibrate) fn circle(profile: &Profile, radius: f64, o: &BallOptio
     let towards = |q: &[f64; 2]| nalgebra::Vector2::new(q[0] - found.model.x, q[1] - found.model.y).normalize();
     let middle: nalgebra::Vector2<f64> = found.inliers.iter().map(|&i| towards(&p[i])).sum();
     let on: Vec<[f64; 2]> = found.inliers.iter().map(|&i| p[i]).filter(|q| towards(q).dot(&middle) > 0.0).collect();
-    let fit = lm(
-        &CircleFit(&on),
-        found.model,
-        &LmOptions { loss: Loss::Huber(2.0), estimate_scale: true, ..Default::default() },
-    );
+    let options = LmOptions { loss: Loss::Huber(2.0), estimate_scale: true, ..Default::default() };
+    let fit = lm(&CircleFit(&on), found.model, &options).minimum();
+    let fit = fit.ok_or_else(|| weak("the circle's fit does not come to rest".into()))?;
     let mut information = Mat3::zeros();
     let mut squares = 0.0;
     for ([x, z], w) in on.iter().zip(&fit.weights) {

@@ -7,7 +7,7 @@ use super::options::BallOptions;
 use super::profile::Profile;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Mat3, Rigid, Sensor, Vec3};
-use crate::solve::{LmOptions, Loss, Problem, Residuals, Stop, lm};
+use crate::solve::{LmOptions, Loss, Problem, Residuals, lm};
 
 /// What [`evaluate`] found.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -98,8 +98,8 @@ pub fn evaluate(
     let fit = |radius: Option<f64>| {
         let first = radius.unwrap_or(o.diameter / 2.0);
         let options = LmOptions { loss: Loss::Huber(2.0), estimate_scale: true, ..LmOptions::default() };
-        let s = lm(&Sphere { points: &points, radius }, (start, first), &options);
-        (s.stop != Stop::BadStart && s.covariance.is_some()).then_some(s.state)
+        let found = lm(&Sphere { points: &points, radius }, (start, first), &options).minimum()?;
+        found.covariance.is_some().then_some(found.state)
     };
     let (ball, _) = fit(Some(radius)).ok_or_else(undetermined)?;
     let (free, free_radius) = fit(None).ok_or_else(undetermined)?;

@@ -8,7 +8,7 @@ use super::profile::Profile;
 use crate::calibrate::components::Components;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, LeftStep, Mat3, Rigid, Sensor, Vec3, orthonormalise, skew};
-use crate::solve::{LmOptions, Loss, Problem, Residuals, Stop, lm};
+use crate::solve::{End, LmOptions, Loss, Problem, Residuals, lm};
 use nalgebra::{DMatrix, DVector, SMatrix};
 
 /// How one profile fits.
@@ -51,6 +51,8 @@ pub struct BallFit {
     pub profiles: Vec<ProfileResidual>,
     /// Squared Mahalanobis distances over their degrees of freedom; near 1.
     pub chi2: f64,
+    /// Whether the fit is a minimum.
+    pub end: End,
 }
 
 #[derive(Clone, Copy)]
@@ -131,6 +133,7 @@ struct Solved {
     state: State,
     covariance: DMatrix<f64>,
     cost: f64,
+    end: End,
 }
 
 fn fit(items: &[Item<'_>], start: &State, radius: f64, n: &Noise, loss: Loss) -> Option<Solved> {
@@ -138,10 +141,10 @@ fn fit(items: &[Item<'_>], start: &State, radius: f64, n: &Noise, loss: Loss) ->
         .iter()
         .map(|i| covariance_of(start, i, radius, n).cholesky()?.l().try_inverse())
         .collect::<Option<Vec<_>>>()?;
-    let s = lm(&Fit { items, whiteners, radius }, *start, &LmOptions { loss, ..Default::default() });
-    (s.stop != Stop::BadStart).then_some(())?;
+    let options = LmOptions { loss, ..Default::default() };
+    let (s, end) = lm(&Fit { items, whiteners, radius }, *start, &options).ended()?;
     let cost = s.lengths.iter().map(|l| l * l).sum();
-    Some(Solved { state: s.state, covariance: s.covariance?, cost })
+    Some(Solved { state: s.state, covariance: s.covariance?, cost, end })
 }
 
 /// One step of the robot's variance component.
@@ -355,6 +358,7 @@ pub fn solve(profiles: &[Profile], poses: &[Rigid<Base, Flange>], o: &BallOption
         side,
         side_margin,
         profiles: residuals,
+        end: solved.end,
     })
 }
 

@@ -6,7 +6,7 @@ use super::bundle::{Bent, Bundle, Corner, State};
 use super::repeat::{repeat, widened};
 use crate::calibrate::boards::shape::{Basis, Shape};
 use crate::camera::{Intrinsics, PARAMETERS, ParameterMatrix, Parameters};
-use crate::solve::{LmOptions, Loss, Solution, lm};
+use crate::solve::{LmOptions, Loss, Outcome, Solution, lm};
 
 /// The corners with what stays the same from one choice of lens terms to the next.
 #[derive(Clone, Copy)]
@@ -24,21 +24,22 @@ impl Fit<'_> {
         let free = (0..shared).filter(|i| !held.contains(i)).collect();
         Bundle { pictures: self.corners, like: self.like, bent: self.bent, free }
     }
-    pub fn with(&self, held: &[usize], from: State, options: LmOptions) -> Solution<State> {
+    pub fn with(&self, held: &[usize], from: State, options: LmOptions) -> Outcome<State> {
         lm(&self.bundle(held), from, &LmOptions { hold: held.to_vec(), ..options })
     }
     /// The optimum with these parameters held.
-    pub fn fine(&self, held: &[usize], from: State) -> Solution<State> {
+    pub fn fine(&self, held: &[usize], from: State) -> Outcome<State> {
         let estimate_scale = self.loss != Loss::Squares;
         self.with(held, from, LmOptions { loss: self.loss, estimate_scale, ..LmOptions::default() })
     }
     /// The same as near as choices need it.
-    pub fn rough(&self, held: &[usize], from: State) -> Solution<State> {
+    pub fn rough(&self, held: &[usize], from: State) -> Option<Solution<State>> {
         let estimate_scale = self.loss != Loss::Squares;
-        self.with(held, from, LmOptions { loss: self.loss, estimate_scale, tolerance: 1e-5, ..LmOptions::default() })
+        let options = LmOptions { loss: self.loss, estimate_scale, tolerance: 1e-5, ..LmOptions::default() };
+        self.with(held, from, options).so_far()
     }
     /// The same with all held but the poses.
-    pub fn placed(&self, from: State) -> Solution<State> {
+    pub fn placed(&self, from: State) -> Option<Solution<State>> {
         let all: Vec<usize> = (0..self.bundle(&[]).shared()).collect();
         self.rough(&all, from)
     }

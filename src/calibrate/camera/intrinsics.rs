@@ -14,7 +14,7 @@ use crate::calibrate::pose::pose_from_homography;
 use crate::camera::{Intrinsics, LENS, PARAMETERS, ParameterMatrix, Parameters, SKEW};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Board, Camera, Mat3, Rigid, Vec2, Vec3};
-use crate::solve::{LmOptions, Loss, Solution, Stop};
+use crate::solve::{End, LmOptions, Loss, Solution};
 
 /// A picture of a board: its name for messages, the board's features, what was seen of them.
 #[derive(Clone, Debug)]
@@ -99,6 +99,8 @@ pub struct Solved {
     pub condition: f64,
     /// Steps that the last solve took.
     pub iterations: usize,
+    /// Whether it is a minimum.
+    pub end: End,
 }
 
 impl Solved {
@@ -137,7 +139,7 @@ pub fn solve(pictures: &[Observation], width: u32, height: u32, options: &SolveO
     let rough: Vec<usize> = (LENS + 1..PARAMETERS).chain(held.iter().copied()).collect();
     let coarse = LmOptions { max_iterations: 15, tolerance: 1e-4, ..LmOptions::default() };
     let first = fit.with(&rough, State { camera: start.parameters(), shape: Vec::new(), poses }, coarse);
-    let mut solution = fit.fine(&held, first.state);
+    let mut solution = first.so_far().and_then(|first| fit.fine(&held, first.state).so_far()).ok_or_else(unsolved)?;
     let basis = (options.boards != Boards::Drawn).then(|| one_board(pictures)).flatten();
     match basis {
         Some(basis) if options.boards == Boards::Evidence => by_shape(&mut fit, basis, &mut solution, &held),
@@ -154,12 +156,18 @@ pub fn solve(pictures: &[Observation], width: u32, height: u32, options: &SolveO
         resized(&mut fit, &mut solution, &held);
         by_evidence(&fit, &mut solution, &mut held);
     }
-    if solution.stop == Stop::BadStart || solution.state.camera.iter().any(|x| !x.is_finite()) {
-        return Err(Fault::refused("the camera could not be solved")
-            .cause("the corners contradict each other, or do not determine so many lens terms")
-            .next("look at the pictures and leave out those where the board was misread; ask for fewer lens terms (--lens five)"));
+    // From the optimum that was chosen it takes a step or two, and tells whether it is one.
+    let (solution, end) = fit.fine(&held, solution.state).ended().ok_or_else(unsolved)?;
+    if solution.state.camera.iter().any(|x| !x.is_finite()) {
+        return Err(unsolved());
     }
-    Ok(finish(&fit, solution, held))
+    Ok(finish(&fit, solution, end, held))
+}
+
+fn unsolved() -> Fault {
+    Fault::refused("the camera could not be solved")
+        .cause("the corners contradict each other, or do not determine so many lens terms")
+        .next("look at the pictures and leave out those where the board was misread; ask for fewer lens terms (--lens five)")
 }
 
 /// The ways in which the board may differ from its drawing, where all pictures show the same one.
@@ -186,7 +194,7 @@ fn see(name: &str, points: &[Corner]) -> Result<Seen> {
     Ok(Seen { plane, pixels, homography })
 }
 
-fn finish(fit: &Fit<'_>, solution: Solution<State>, held: Vec<usize>) -> Solved {
+fn finish(fit: &Fit<'_>, solution: Solution<State>, end: End, held: Vec<usize>) -> Solved {
     let (camera, shape) = (fit.camera(&solution), fit.shape(&solution));
     let place = |x: &Vec3| shape.as_ref().map_or(*x, |s| s.place(x));
     let mut weights = solution.weights.iter();
@@ -222,5 +230,6 @@ fn finish(fit: &Fit<'_>, solution: Solution<State>, held: Vec<usize>) -> Solved 
         sigma0: solution.sigma0,
         condition: solution.condition,
         iterations: solution.iterations,
+        end,
     }
 }

@@ -296,6 +296,7 @@ impl Evidence<'_> {
     /// Whether the model fits the pictures, those held out too, and all of the image.
     fn fits(&self, j: &mut Judgement) {
         let Agreed { solved, contradiction, .. } = self.agreed;
+        j.ended(solved.end);
         j.at_best(Verdict::BadlyDetermined, *contradiction, || {
             "more than a quarter of the pictures contradict the others".into()
         });

@@ -5,6 +5,7 @@ use super::camera_belief::CameraBelief;
 use super::closed::{Agreement, Chain};
 use super::options::Noise;
 use crate::camera::{Intrinsics, PARAMETERS};
+use crate::solve::End;
 use nalgebra::DMatrix;
 use nalgebra::SMatrix;
 
@@ -54,6 +55,8 @@ pub struct HandEyeFit {
     pub pairs: Vec<PairResidual>,
     /// Squared Mahalanobis distances over their degrees of freedom; near 1.
     pub chi2: f64,
+    /// Whether it is a minimum.
+    pub end: End,
     /// The closed form that it started from.
     pub start: Agreement,
 }

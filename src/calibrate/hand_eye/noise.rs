@@ -9,6 +9,7 @@ use super::terms::{Refined, refine, robot_parts, with_camera};
 use crate::calibrate::components::Components;
 use crate::calibrate::measured_pose::pooled_factor;
 use crate::camera::{PARAMETERS, Parameters};
+use crate::solve::End;
 use nalgebra::{DMatrix, DVector};
 
 /// One round of variance components at a fitted chain.
@@ -126,7 +127,7 @@ pub(in crate::calibrate) fn fit(
     o: &HandEyeOptions,
 ) -> Option<Fitted> {
     let camera = given.after(pairs, noise.feature_factor)?;
-    let (mut chain, mut noise) = (*start, noise);
+    let (mut chain, mut noise, mut rest) = (*start, noise, End::Exhausted);
     for _ in 0..30 {
         chain = refine(pairs, &chain, &noise, mount, &camera.belief)?.chain;
         let next = components(pairs, &chain, &noise, mount, &camera.belief, o)?;
@@ -135,9 +136,11 @@ pub(in crate::calibrate) fn fit(
             && (next.feature_factor / noise.feature_factor - 1.0).abs() < 1e-3;
         noise = next;
         if settled {
+            rest = End::Minimum;
             break;
         }
     }
-    let refined = refine(pairs, &chain, &noise, mount, &camera.belief)?;
+    let mut refined = refine(pairs, &chain, &noise, mount, &camera.belief)?;
+    refined.end = refined.end.max(rest);
     Some(Fitted { refined, noise, camera })
 }

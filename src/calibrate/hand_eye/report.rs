@@ -86,6 +86,7 @@ impl Evidence<'_> {
         });
         j.at_best(Verdict::Usable, used < 8, || format!("{used} pairs are in the fit, 8 are needed to be good"));
         j.at_best(Verdict::BadlyDetermined, used < 5, || "fewer than 5 pairs leave nothing to check".into());
+        j.ended(self.fit.end);
     }
 
     fn left_out(&self, j: &mut Judgement) {

@@ -115,6 +115,7 @@ pub fn solve(
         noise,
         pairs: residuals,
         chi2: refined.cost / freedom.max(1.0),
+        end: refined.end,
         start: agreement,
     };
     checks::after(pairs, &fit, o)?;

@@ -7,7 +7,7 @@ use super::closed::{Chain, Pair};
 use super::options::{Mount, Noise};
 use crate::camera::{PARAMETERS, Parameters};
 use crate::geometry::{LeftStep, Mat3, Twist, Vec3, skew};
-use crate::solve::{LmOptions, Problem, Residuals, Stop, lm};
+use crate::solve::{End, LmOptions, Problem, Residuals, lm};
 use nalgebra::{Matrix6, SMatrix, Vector6};
 
 /// Steps of one pair by the 12 unknowns, at the present chain.
@@ -70,6 +70,8 @@ pub(in crate::calibrate) struct Refined {
     /// Of the chain's twelve numbers and the camera's z.
     pub covariance: SMatrix<f64, UNKNOWNS, UNKNOWNS>,
     pub cost: f64,
+    /// Whether it is a minimum.
+    pub end: End,
 }
 
 /// Steps from the boards, as the camera `mean + root z` would have seen them, to the expected ones, with
@@ -129,11 +131,9 @@ pub(in crate::calibrate) fn refine(
     let free: Vec<usize> = (0..12).chain(camera.directions().into_iter().map(|i| 12 + i)).collect();
     let hold = (0..UNKNOWNS).filter(|i| !free.contains(i)).collect();
     let options = LmOptions { hold, ..LmOptions::default() };
-    let found = lm(&Refinement { pairs, whiteners, camera, free }, (*start, Parameters::zeros()), &options);
-    if found.stop == Stop::BadStart {
-        return None;
-    }
+    let (found, end) =
+        lm(&Refinement { pairs, whiteners, camera, free }, (*start, Parameters::zeros()), &options).ended()?;
     let cost = found.lengths.iter().map(|l| l * l).sum();
     let covariance = found.covariance?.fixed_view::<UNKNOWNS, UNKNOWNS>(0, 0).into();
-    Some(Refined { chain: found.state.0, z: found.state.1, covariance, cost })
+    Some(Refined { chain: found.state.0, z: found.state.1, covariance, cost, end })
 }

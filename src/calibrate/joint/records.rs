@@ -160,6 +160,7 @@ pub fn judge(fit: &JointFit, weights: &DMatrix<f64>, beside: &Beside, limits: &L
         j.reasons.push(format!("the robot's poses scatter by {robot_mm:.4} mm and {robot_deg:.4} degrees per axis"));
     }
     by_arm(beside.systematic.as_ref(), &mut j);
+    j.ended(fit.end);
     let names = |shots: usize| format!("{shots} pictures of boards");
     j.at_best(Verdict::Usable, fit.shots.len() < 8, || format!("{}, 8 are needed to be good", names(fit.shots.len())));
     if robot {

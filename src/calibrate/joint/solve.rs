@@ -8,7 +8,7 @@ use super::shots::{LeftOut, Part, Shot};
 use super::terms::{Terms, prior};
 use super::unknowns::{Layout, State};
 use crate::fault::{Fault, Result};
-use crate::solve::{LmOptions, Loss, Stop, lm};
+use crate::solve::{End, LmOptions, Loss, lm};
 use nalgebra::DMatrix;
 
 /// What a joint solve found.
@@ -31,6 +31,8 @@ pub struct JointFit {
     pub left_out: Vec<LeftOut>,
     /// Corners' distance from where they are expected, rms per coordinate, px.
     pub features_rms_px: f64,
+    /// Whether state and noise came to rest at a minimum.
+    pub end: End,
 }
 
 impl JointFit {
@@ -88,7 +90,11 @@ struct Round {
     leavings: Leavings,
     noise: Noise,
     covariance: DMatrix<f64>,
+    end: End,
 }
+
+/// Fits of states and noise by turns, at most.
+const ROUNDS: usize = 60;
 
 /// Fits and learns the noise until both stand still.
 fn settle(shots: &[Shot], start: &State, noise: Noise, layout: &Layout, o: &JointOptions) -> Result<Round> {
@@ -102,22 +108,19 @@ fn settle(shots: &[Shot], start: &State, noise: Noise, layout: &Layout, o: &Join
         ..LmOptions::default()
     };
     let mut state = start.clone();
-    for round in 0..60 {
+    for round in 0..ROUNDS {
         terms.settle(&state);
-        let found = lm(&terms, state, &options);
-        if found.stop == Stop::BadStart {
-            return Err(undetermined(shots));
-        }
+        let (found, end) = lm(&terms, state, &options).ended().ok_or_else(|| undetermined(shots))?;
         state = found.state;
         let covariance = found.covariance.ok_or_else(|| undetermined(shots))?;
         let left = leavings(&terms, &state, &covariance, o.huber).ok_or_else(|| undetermined(shots))?;
         let next = left.noise(&terms.noise);
         let settled = next.factors().iter().zip(terms.noise.factors()).all(|(a, b)| (a / b - 1.0).abs() < 2e-3);
-        if settled && round > 0 {
-            return Ok(Round { state, leavings: left, noise: terms.noise, covariance });
-        }
-        if round == 59 {
-            return Ok(Round { state, leavings: left, noise: terms.noise, covariance });
+        let last = round + 1 == ROUNDS;
+        if (settled && round > 0) || last {
+            // Noise that still moves says as little as a cost that still falls.
+            let end = if settled { end } else { end.max(End::Exhausted) };
+            return Ok(Round { state, leavings: left, noise: terms.noise, covariance, end });
         }
         terms.noise = next;
     }
@@ -169,6 +172,7 @@ pub fn solve(shots: &[Shot], start: &State, noise: Noise, o: &JointOptions) -> R
             features_rms_px: noise.feature * (sigma2 * features.squares / features.count.max(1.0)).sqrt(),
             freedom: round.leavings.parts.map(|p| p.freedom),
             shares: round.leavings.shares,
+            end: round.end,
             state,
             layout,
             noise,

@@ -65,6 +65,7 @@ pub fn judge(fit: &LaserPlaneFit, views: &[StripeView], camera: &Intrinsics, lim
         ),
     );
     j.at_best(Verdict::BadlyDetermined, places.is_empty(), || format!("the camera does not see the sheet at {work}"));
+    j.ended(fit.end);
     contradictions(fit, views, &mut j);
     evidence.determined(camera.view_mm(limits.middle()), &mut j);
     evidence.advise(&mut j);

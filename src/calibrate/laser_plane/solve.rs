@@ -14,7 +14,7 @@ use crate::calibrate::scatter::{inflation, winsorised};
 use crate::camera::{CameraCovariance, Intrinsics};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Board, Camera, Plane, Rigid};
-use crate::solve::{Loss, Solution};
+use crate::solve::{End, Loss, Solution};
 use nalgebra::{DMatrix, Matrix6};
 
 /// Why a peak does not count.
@@ -91,6 +91,8 @@ pub struct LaserPlaneFit {
     pub reach: [f64; 2],
     /// Spread of the stripes across their own direction, mm (rms): what holds the plane's tilt.
     pub depth_spread: f64,
+    /// Whether the fit is a minimum.
+    pub end: End,
 }
 
 /// The fit under way: what counts, where plane and boards are, and how far the stated sigmas are right.
@@ -126,7 +128,7 @@ pub fn solve(
         )));
     }
     let mut fitting = Fitting::start(views, &all, camera, feature_factor, o)?;
-    let solution = fitting.settle(&all, o)?;
+    let (solution, end) = fitting.settle(&all, o)?;
     let Fitting { data, state, used, sigma_ratio, neighbours, factor } = fitting;
     let local = solution.covariance.as_ref().ok_or_else(undetermined)?.view((0, 0), (3, 3)).into_owned();
     mark(&mut uses, &all, &data.peaks, &used);
@@ -149,6 +151,7 @@ pub fn solve(
     let rest: Vec<Seen> = all.iter().filter(rest).copied().collect();
     let second = second_plane(&rest, &data, &state, views, camera, o);
     Ok(LaserPlaneFit {
+        end,
         plane: state.plane,
         covariance,
         covariance_camera_exact: exact,
@@ -187,17 +190,17 @@ impl Fitting {
 
     /// Least squares in rounds, until the sigmas stand still and no picture contradicts the others; of those that do, the
     /// worst leaves each round.
-    fn settle(&mut self, all: &[Seen], o: &LaserPlaneOptions) -> Result<Solution<State>> {
+    fn settle(&mut self, all: &[Seen], o: &LaserPlaneOptions) -> Result<(Solution<State>, End)> {
         let mut solution = None;
         for round in 0..self.used.len() + 3 {
             if self.data.peaks.len() < 3 || self.pictures() < 2 {
                 return Err(refused("fewer than two pictures agree on one laser plane".into()));
             }
             if round == 0 {
-                self.gate_peaks(all, o);
+                self.gate_peaks(all, o)?;
             }
-            let s = self.data.solve(&self.state, Loss::Squares, self.factor);
-            self.state = s.state.clone();
+            let s = self.data.solve(&self.state, Loss::Squares, self.factor).ok_or_else(undetermined)?;
+            self.state = s.0.state.clone();
             solution = Some(s);
             let settled = self.judge_sigmas();
             let beside = consistency(&self.data, &self.state, self.factor).beside(&self.used);
@@ -219,11 +222,12 @@ impl Fitting {
     }
 
     /// Chooses the peaks by their distance from a robust fit, in sigmas as these turn out there.
-    fn gate_peaks(&mut self, all: &[Seen], o: &LaserPlaneOptions) {
-        self.state = self.data.solve(&self.state, Loss::Cauchy(2.4), self.factor).state;
+    fn gate_peaks(&mut self, all: &[Seen], o: &LaserPlaneOptions) -> Result<()> {
+        self.state = self.data.solve(&self.state, Loss::Cauchy(2.4), self.factor).ok_or_else(undetermined)?.0.state;
         let scale = robust_ratio(&self.data, &self.state, self.factor).max(0.2);
         let near = |p: &&Seen| self.used[p.view] && ratio(p, &self.state, 1.0).abs() < o.gate_sigmas * scale;
         self.data.peaks = all.iter().filter(near).copied().collect();
+        Ok(())
     }
 
     /// The factor on the peaks' sigmas by what is left over; true where it stands still.

@@ -5,7 +5,7 @@
 use super::views::{StripePeak, StripeView};
 use crate::camera::{Intrinsics, PARAMETERS, Parameters, difference_step};
 use crate::geometry::{Board, Camera, Plane, Rigid, Twist, Vec2, Vec3};
-use crate::solve::{LmOptions, Loss, Problem, Residuals, Solution, lm};
+use crate::solve::{End, LmOptions, Loss, Problem, Residuals, Solution, lm};
 use nalgebra::{DMatrix, Matrix2, Matrix3, Matrix6, SMatrix};
 
 /// A peak as seen by the solver.
@@ -121,11 +121,9 @@ pub(in crate::calibrate) struct Data {
 }
 
 impl Data {
-    pub(in crate::calibrate) fn solve(&self, start: &State, loss: Loss, factor: f64) -> Solution<State> {
-        let mut state = start.clone();
-        let mut found = None;
-        // The scale from mm to px follows the plane: two rounds fix it.
-        for _ in 0..2 {
+    /// `None` where a sheet or board is where no peak can be.
+    pub(in crate::calibrate) fn solve(&self, start: &State, loss: Loss, factor: f64) -> Option<(Solution<State>, End)> {
+        let fit = |state: &State| {
             let sigma_mm = self
                 .peaks
                 .iter()
@@ -134,11 +132,10 @@ impl Data {
             let fit = Fit { peaks: &self.peaks, sigma_mm, measured: &self.measured, roots: &self.roots };
             // A cost that stands still to 1e-9 is 0.002 sigma from the bottom.
             let o = LmOptions { loss, estimate_scale: loss != Loss::Squares, tolerance: 1e-9, ..LmOptions::default() };
-            let s = lm(&fit, state, &o);
-            state = s.state.clone();
-            found = Some(s);
-        }
-        found.expect("two rounds")
+            lm(&fit, state.clone(), &o)
+        };
+        // The scale from mm to px follows the plane: two rounds fix it.
+        fit(&fit(start).so_far()?.state).ended()
     }
 }
 

@@ -6,7 +6,7 @@ use super::beam::moved_beam;
 use crate::calibrate::measured_pose::MeasuredPose;
 use crate::camera::{Intrinsics, PARAMETERS, Parameters, difference_step};
 use crate::geometry::{Board, Camera, Plane, Ray, Rigid, Twist, Vec2, Vec3};
-use crate::solve::{LmOptions, Problem, Residuals, Stop, lm};
+use crate::solve::{End, LmOptions, Problem, Residuals, lm};
 use nalgebra::{DMatrix, Matrix2, Matrix6, SMatrix};
 
 /// One board with the pointer's spot on it.
@@ -89,8 +89,8 @@ impl Problem for Fit<'_> {
     }
 }
 
-/// Beam and poses, their covariance, the sum of squared residuals.
-pub(super) type Solved = (State, DMatrix<f64>, f64);
+/// Beam and poses, their covariance, the sum of squared residuals, and whether that is a minimum.
+pub(super) type Solved = (State, DMatrix<f64>, f64, End);
 
 /// `shift` is how far the camera is from the one that the boards were measured with.
 pub(super) fn fit(
@@ -110,18 +110,15 @@ pub(super) fn fit(
         .map(|v| Twist::new((v.pose.by_intrinsics * shift).as_slice()).moved(&v.pose.camera_from_board))
         .collect();
     let problem = Fit { camera, views, measured: measured.clone(), roots, whiteners };
-    let found = lm(&problem, State { beam: *start, poses: measured }, &LmOptions::default());
-    if found.stop == Stop::BadStart {
-        return None;
-    }
+    let (found, end) = lm(&problem, State { beam: *start, poses: measured }, &LmOptions::default()).ended()?;
     // Groups alternate: spot, board.
     let cost = found.lengths.iter().map(|l| l * l).sum();
-    Some((found.state, found.covariance?, cost))
+    Some((found.state, found.covariance?, cost, end))
 }
 
 /// Of a spot from a beam, squared, over what is expected.
 pub(super) fn distance2(view: &SpotView, camera: &Intrinsics, s: &Solved, used: bool, factor: f64) -> f64 {
-    let (state, local, _) = s;
+    let (state, local, ..) = s;
     let pose = &view.pose.camera_from_board;
     let Some((_, q)) = spot(camera, &state.beam, pose) else { return f64::INFINITY };
     let mut j = SMatrix::<f64, 2, 10>::zeros();

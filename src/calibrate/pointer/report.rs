@@ -56,6 +56,7 @@ pub fn judge(fit: &PointerFit, camera: &Intrinsics, spot_px: f64, limits: &Limit
             2.0 * limits.usable_mm()
         )
     });
+    j.ended(fit.end);
     by_spots(fit, &used, work, &mut j);
     let [low, high] = fit.reach;
     let loud = format!("the spots scatter {:.1} times more than their sigmas say", fit.sigma_ratio);

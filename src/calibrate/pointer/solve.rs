@@ -9,6 +9,7 @@ use crate::calibrate::scatter::{beside, inflation, winsorised};
 use crate::camera::{CameraCovariance, Intrinsics, PARAMETERS, Parameters};
 use crate::fault::{Fault, Result};
 use crate::geometry::{Camera, Plane, Ray, Vec3};
+use crate::solve::End;
 use nalgebra::DMatrix;
 
 /// Settings of [`solve`].
@@ -91,6 +92,8 @@ pub struct PointerFit {
     pub reach: [f64; 2],
     /// A spot that was left out and one that was not, where the beam through the others goes as well through the one as through the other.
     pub rivals: Option<[String; 2]>,
+    /// Whether the fit is a minimum.
+    pub end: End,
 }
 
 fn refused(what: String) -> Fault {
@@ -264,7 +267,7 @@ pub fn solve(
     let used = spots.agreeing(near, o)?;
     let judged = spots.fit_to(&used)?;
     let reach = spots.reach(&used, o)?;
-    let (state, local, cost) = &judged.solved;
+    let (state, local, cost, end) = &judged.solved;
     let freedom = (2 * used.len()) as f64 - 4.0;
     let sigma_ratio = (cost / freedom.max(1.0)).sqrt();
     let scatter2 = winsorised(sigma_ratio * sigma_ratio, freedom, views.len() - used.len());
@@ -282,5 +285,6 @@ pub fn solve(
         sigma_ratio,
         reach,
         rivals: spots.rivals(&used, *cost, sigma_ratio * sigma_ratio, o),
+        end: *end,
     })
 }

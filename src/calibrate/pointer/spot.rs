@@ -6,7 +6,7 @@ use super::patch::{Brightest, Patch, Shape, locate, profile};
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec2;
 use crate::raster::Image;
-use crate::solve::{LmOptions, Loss, Problem, Residuals, Stop, lm};
+use crate::solve::{End, LmOptions, Loss, Problem, Residuals, lm};
 use nalgebra::Matrix2;
 
 /// Settings of [`find_spots`].
@@ -229,13 +229,10 @@ fn refine(patch: &Patch, start: &Shape, speckle: f64) -> (Shape, Option<Matrix2<
     for _ in 0..4 {
         let problem = SpotProblem { patch, sigma: patch.sigmas(&shape, speckle) };
         let o = LmOptions { loss: Loss::Huber(2.5), max_iterations: 60, tolerance: 1e-10, ..LmOptions::default() };
-        let s = lm(&problem, shape, &o);
-        if s.stop == Stop::BadStart {
-            return (shape, None);
-        }
+        let Some((s, end)) = lm(&problem, shape, &o).ended() else { return (shape, None) };
         let step = Vec2::new(s.state[0] - shape[0], s.state[1] - shape[1]).norm();
         shape = s.state;
-        covariance = s.covariance.map(|c| {
+        covariance = s.covariance.filter(|_| end == End::Minimum).map(|c| {
             let scale = s.sigma0.max(1.0).powi(2);
             Matrix2::new(c[(0, 0)], c[(0, 1)], c[(1, 0)], c[(1, 1)]) * scale
         });

@@ -12,7 +12,7 @@ use crate::fault::{Fault, Result};
 use crate::geometry::{Axis, AxisKind, Base, Camera, Plane, Ray, Rigid};
 use crate::rig::{Calibration, HandEye, Kind, Rig};
 use crate::robot::Convention;
-use crate::station::{Settings, Values};
+use crate::station::{Settings, Sigmas, Values};
 use std::path::{Path, PathBuf};
 
 #[derive(clap::Subcommand)]
@@ -77,6 +77,41 @@ pub struct Import {
     /// The values are right although they look like another unit
     #[arg(long)]
     as_stated: bool,
+    /// How far the robot's poses scatter, each axis, mm (1 sigma, as all of these) [default: 0.02, assumed]
+    #[arg(long)]
+    robot_sigma_mm: Option<f64>,
+    /// The same of its turns, degrees [default: 0.004, assumed]
+    #[arg(long)]
+    robot_sigma_deg: Option<f64>,
+    /// How far the camera's place on the flange (or in the base frame) is off, each axis, mm [default: 0.03, assumed]
+    #[arg(long)]
+    hand_eye_sigma_mm: Option<f64>,
+    /// The same of its turn, degrees [default: 0.006, assumed]
+    #[arg(long)]
+    hand_eye_sigma_deg: Option<f64>,
+    /// How far the laser plane is off where it is used, mm [default: 0.02, assumed]
+    #[arg(long)]
+    plane_sigma_mm: Option<f64>,
+    /// The same of its tilt, degrees [default: 0.006, assumed]
+    #[arg(long)]
+    plane_sigma_deg: Option<f64>,
+    /// How far focal lengths and principal point are off, px [default: 0.5, assumed]
+    #[arg(long)]
+    camera_sigma_px: Option<f64>,
+}
+
+impl Import {
+    fn sigmas(&self) -> Sigmas {
+        Sigmas {
+            robot_mm: self.robot_sigma_mm,
+            robot_deg: self.robot_sigma_deg,
+            hand_eye_mm: self.hand_eye_sigma_mm,
+            hand_eye_deg: self.hand_eye_sigma_deg,
+            plane_mm: self.plane_sigma_mm,
+            plane_deg: self.plane_sigma_deg,
+            camera_px: self.camera_sigma_px,
+        }
+    }
 }
 
 #[derive(clap::Args)]
@@ -118,12 +153,13 @@ pub fn run(command: &Command, console: &Console) -> Result<()> {
             console.result(&Values::of(&rig), &summary(&settings, &rig));
         }
         Command::Import(a) => {
-            let stored = Values::load(&a.values)?.store(&a.station, &a.values, a.as_stated)?;
+            let stored = Values::load(&a.values)?.store(&a.station, &a.values, a.as_stated, &a.sigmas())?;
             if !a.station.join("station.toml").exists() {
                 Settings { name: named(&a.station), ..Settings::default() }.store(&a.station)?;
             }
             let names: Vec<String> = stored.iter().map(|k| k.words()).collect();
             console.result(&stored, &format!("{}: imported {}", a.station.display(), names.join(", ")));
+            Rig::load(&a.station)?.remarks().into_iter().for_each(|remark| console.say(remark));
             stale(&a.station, console);
         }
         Command::Export(a) => {

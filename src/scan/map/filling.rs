@@ -164,11 +164,7 @@ mod tests {
 
     #[test]
     fn gpu_and_twin_fill_the_same_map() {
-        let device = match Device::open() {
-            Ok(d) => d,
-            Err(e) if std::env::var_os("SHEETLIGHT_REQUIRE_GPU").is_some() => panic!("{e}"),
-            Err(e) => return eprintln!("SKIPPED, no GPU adapter: {e}"),
-        };
+        let Some(device) = Device::for_tests() else { return };
         let (frame, mut points) = surface();
         let options =
             GridOptions { cell: Some(0.2), base_from_grid: Some(frame), min_quality: 0.3, ..GridOptions::default() };

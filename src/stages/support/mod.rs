@@ -258,12 +258,8 @@ mod tests {
         let one = fates(None, 1);
         assert!(one.iter().any(|f| f.1 != 0) && one.len() == 6 * 21 + 2);
         assert_eq!(fates(None, 4), one);
-        match Device::open() {
-            Ok(device) => assert_eq!(fates(Some(&device), 4), one),
-            Err(e) => {
-                assert!(std::env::var_os("SHEETLIGHT_REQUIRE_GPU").is_none(), "{e}");
-                eprintln!("SKIPPED, no GPU adapter: {e}");
-            }
+        if let Some(device) = Device::for_tests() {
+            assert_eq!(fates(Some(&device), 4), one);
         }
     }
 }

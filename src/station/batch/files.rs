@@ -1,7 +1,7 @@
 //! In: a batch that was run. Out: batch.json and batch.csv in its folder, together.
 //! Frame and unit: as the columns say; the CSV has a comma between fields, a point in numbers.
 
-use super::run::{Batch, BatchRow};
+use super::rows::{Batch, BatchRow};
 use crate::fault::Result;
 use std::path::Path;
 

@@ -3,7 +3,9 @@
 
 mod files;
 mod repeats;
+mod rows;
 mod run;
 
 pub use repeats::{Placed, Repeats, Spread, repeats};
-pub use run::{Batch, BatchOptions, BatchRow, FoundAt, batch};
+pub use rows::{Batch, BatchRow, FoundAt};
+pub use run::{BatchOptions, batch};

@@ -131,6 +131,7 @@ fn judge(fit: &BallFit, limits: &Limits) -> Quality {
         if fit.side == crate::calibrate::ball::options::Side::Plus { "plus" } else { "minus" },
         fit.side_margin
     ));
+    j.ended(fit.end);
     j.at_best(Verdict::Usable, used.len() < 12, || format!("{} profiles, 12 are needed to be good", used.len()));
     for p in fit.profiles.iter().filter(|p| !p.used) {
         j.at_best(Verdict::Usable, true, || {

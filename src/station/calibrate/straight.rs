@@ -111,7 +111,7 @@ mod tests {
         let mut on_twin = vec![view.clone()];
         keep_straight(&mut on_twin, &camera, None).unwrap();
         assert_eq!(on_twin[0].peaks, view.peaks[..100]);
-        if let Ok(device) = Device::open() {
+        if let Some(device) = Device::for_tests() {
             let mut on_gpu = vec![view];
             keep_straight(&mut on_gpu, &camera, Some(&device)).unwrap();
             assert_eq!(on_gpu[0].peaks, on_twin[0].peaks);

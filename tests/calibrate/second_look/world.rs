@@ -140,11 +140,20 @@ impl World {
 
     /// What is recorded: peaks and the robot's readings with their noise.
     pub fn recorded(&self, rng: &mut Pcg64) -> [Recorded; 2] {
+        self.recorded_by([self.unit * ROBOT_MM, 0.0], rng)
+    }
+
+    /// The same by a robot whose readings scatter by so many mm and degrees on each axis.
+    pub fn recorded_by(&self, [mm, deg]: [f64; 2], rng: &mut Pcg64) -> [Recorded; 2] {
         let mut looks = self.looks.clone();
         let across = across(&self.station);
         for look in &mut looks {
             for pose in &mut look.poses {
-                pose.translation += Vec3::from_fn(|_, _| self.unit * ROBOT_MM * rng.sample::<f64, _>(StandardNormal));
+                pose.translation += Vec3::from_fn(|_, _| mm * rng.sample::<f64, _>(StandardNormal));
+                if deg > 0.0 {
+                    let turn = Vec3::from_fn(|_, _| deg.to_radians() * rng.sample::<f64, _>(StandardNormal));
+                    pose.rotation = exp(&turn) * pose.rotation;
+                }
             }
             for peak in look.peaks.iter_mut().flatten() {
                 peak.px += across * (PEAK_PX * rng.sample::<f64, _>(StandardNormal));
@@ -174,6 +183,16 @@ impl World {
         }
     }
 
+    /// The calibrations as they are.
+    pub fn exact(&self) -> Believed {
+        Believed {
+            station: self.station.clone(),
+            unit: self.unit,
+            plane: self.station.laser.plane(),
+            hand_eye: self.station.flange_from_camera,
+        }
+    }
+
     pub fn cloud(&self, b: &Believed, look: &Recorded) -> Vec<CloudPoint> {
         let mut out = Vec::new();
         for (shot, (peaks, pose)) in look.peaks.iter().zip(&look.poses).enumerate() {
@@ -199,13 +218,17 @@ impl World {
 
     /// Both looks with the station that is believed.
     pub fn look(&self, b: &Believed, looks: &[Recorded; 2]) -> Result<(Vec<Report>, Report), String> {
-        let rig = stored(&rig(b)).map_err(|e| e.what)?;
+        self.look_with(&stored(&rig(b)).map_err(|e| e.what)?, b, looks)
+    }
+
+    /// The same with a rig whose covariances come from elsewhere.
+    pub fn look_with(&self, rig: &Rig, b: &Believed, looks: &[Recorded; 2]) -> Result<(Vec<Report>, Report), String> {
         let mut reports: Vec<Report> = Vec::new();
         for look in looks {
             let options = LocateOptions::default();
             let options = if let Some(first) = reports.first() { options.again(first) } else { options };
             reports.push(
-                locate(&self.cloud(b, look), &b.shots(look), &self.recipe, Some(&rig), &options).map_err(|e| e.what)?,
+                locate(&self.cloud(b, look), &b.shots(look), &self.recipe, Some(rig), &options).map_err(|e| e.what)?,
             );
         }
         let both = agree(reports.clone(), None, &self.recipe, Convention::Matrix).map_err(|e| e.what)?;

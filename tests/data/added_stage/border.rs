@@ -3,6 +3,7 @@
 
 use crate::gpu::Access::*;
 use crate::gpu::{Binding, Stage};
+use crate::raster::Mask;
 use crate::stages::frame::{self, PX_LOG2, SHARED, frame_of, tile_unpack};
 use crate::stages::listing::{self, mask_index};
 use crate::stages::same::Same;
@@ -30,6 +31,14 @@ pub const STEP: Step = Step {
     groups: Groups::Listed("lit header"),
     same: Same::Words,
 };
+
+/// What the stage does, said of the whole picture.
+pub fn plain(thinned: &Mask) -> Mask {
+    let (right, bottom) = (thinned.width - 1, thinned.height - 1);
+    Mask::from_fn(thinned.width, thinned.height, |x, y| {
+        thinned.get(x, y) && x > 0 && x < right && y > 0 && y < bottom
+    })
+}
 
 fn twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
     let f = frame_of(b);

@@ -21,7 +21,7 @@ pub(in crate::calibrate::camera) fn by_evidence(fit: &Fit<'_>, solution: &mut So
         let fewer = [held, block].concat();
         let mut start = solution.state.clone();
         block.iter().for_each(|&i| start.camera[i] = 0.0);
-        let reduced = fit.fine(&fewer, start);
+        let Some(reduced) = fit.fine(&fewer, start).so_far() else { return };
         let cost =
             |s: &Solution<State>| fit.covariance(s).map_or(f64::INFINITY, |c| expected_ray_error(&fit.camera(s), &c));
         if cost(solution) < 1.25 * cost(&reduced) {

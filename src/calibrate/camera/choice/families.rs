@@ -25,7 +25,7 @@ pub(in crate::calibrate::camera) fn by_families(fit: &Fit<'_>, solution: &mut So
     let mut best: Option<(f64, Solution<State>, Vec<usize>)> = None;
     for family in FAMILIES {
         let with: Vec<usize> = family.held().into_iter().chain(skew.then_some(SKEW)).collect();
-        let more = fit.fine(&with, without(&solution.state, &with));
+        let Some(more) = fit.fine(&with, without(&solution.state, &with)).so_far() else { continue };
         // Only what fits its own pictures better can fit others better.
         if !(more.sigma0.powi(2) < (1.0 - WORTH) * solution.sigma0.powi(2)) || !worth_its_noise(fit, solution, &more) {
             continue;

@@ -30,9 +30,10 @@ pub(super) fn held_out(fit: &Fit<'_>, solution: &Solution<State>, held: &[usize]
             (those, corners, poses)
         };
         let (_, corners, poses) = of(false);
-        let others = Fit { corners: &corners, ..*fit }.rough(held, State { poses, ..solution.state.clone() }).state;
+        let others = Fit { corners: &corners, ..*fit }.rough(held, State { poses, ..solution.state.clone() });
         let (those, corners, poses) = of(true);
-        let placed = Fit { corners: &corners, ..*fit }.placed(State { poses, ..others });
+        let placed = others.and_then(|o| Fit { corners: &corners, ..*fit }.placed(State { poses, ..o.state }));
+        let Some(placed) = placed else { continue };
         let mut lengths = placed.lengths.iter();
         for (i, corners) in those.into_iter().zip(&corners) {
             let sum: f64 = lengths.by_ref().take(corners.len()).map(|r| (r * r).min(far)).sum();

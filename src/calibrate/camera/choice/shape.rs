@@ -30,7 +30,7 @@ pub(in crate::calibrate::camera) fn by_shape(
         return;
     }
     let (mut bent, start) = bending(fit, basis, solution);
-    let first = bent.rough(held, start);
+    let Some(first) = bent.rough(held, start) else { return };
     // As many residuals as coefficients go by chance.
     let left = first.sigma0.powi(2) * first.freedom / (first.freedom - Basis::LEN as f64).max(1e-9);
     if !(left < (1.0 - WORTH) * solution.sigma0.powi(2)) {
@@ -52,7 +52,7 @@ pub(in crate::calibrate::camera) fn shaped(
 ) {
     let (mut bent, start) = bending(fit, basis, solution);
     let first = bent.rough(held, start);
-    if let Some(shaped) = settled(&mut bent, first, held) {
+    if let Some(shaped) = first.and_then(|first| settled(&mut bent, first, held)) {
         (*fit, *solution) = (bent, shaped);
     }
 }
@@ -80,12 +80,12 @@ fn settled(fit: &mut Fit<'_>, mut solution: Solution<State>, held: &[usize]) -> 
         let before = bent.usual;
         bent.usual = sizes(bent, &solution)?;
         let still = before.iter().zip(bent.usual).all(|(a, b)| (a / b).max(b / a) < SETTLED);
-        solution = fit.rough(held, solution.state);
+        solution = fit.rough(held, solution.state)?;
         if still {
             break;
         }
     }
-    Some(fit.fine(held, solution.state))
+    fit.fine(held, solution.state).so_far()
 }
 
 /// Usual size of the coefficients in the plane and out of it: their squares over the number of them that the pictures determine.

@@ -2,10 +2,13 @@
 //! and the other way round, for programs that compare.
 //! Frame and unit: keys as in the reference data's format: `flange_T_camera`, mm, row-major.
 
+use super::assumed::{Assumed, Sigmas};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Axis, AxisKind, Base, Camera, ORTHONORMAL_WARN, Plane, Ray, Rigid, Vec3};
-use crate::rig::{Calibration, Covariance, HandEye, Joint, Kind, Quality, Rig, Verdict, asked};
+use crate::rig::{
+    Calibration, Covariance, HandEye, Joint, Kind, Quality, ROBOT_SIGMA_DEG, ROBOT_SIGMA_MM, Rig, Verdict, asked,
+};
 use std::path::Path;
 
 /// The values of a rig as one JSON object; every entry may be missing, other keys are left alone.
@@ -37,7 +40,9 @@ pub struct Values {
 /// `normal · X = offset_mm` in the camera frame.
 #[derive(Clone, Debug, serde::Serialize, serde::Deserialize)]
 pub struct PlaneValue {
+    /// Of unit length.
     pub normal: [f64; 3],
+    /// Along it, mm.
     pub offset_mm: f64,
 }
 
@@ -78,10 +83,15 @@ impl Values {
         }
     }
 
-    /// Makes each value a calibration whose covariance is unknown, naming `source` as its input, and stores all of them or
-    /// none. What looks like another unit is refused unless it is so `as_stated`. Returns what was stored.
-    pub fn store(&self, station: &Path, source: &Path, as_stated: bool) -> Result<Vec<Kind>> {
-        let camera = self.intrinsics.map(|c| imported(Kind::Camera, c, None, None, source)).transpose()?;
+    /// Makes each value a calibration, naming `source` as its input, and stores all of them or none. Camera, laser plane and
+    /// the camera's place have the covariance that `sigmas` says, others an unknown one. What looks like another unit is
+    /// refused unless it is so `as_stated`. Returns what was stored.
+    pub fn store(&self, station: &Path, source: &Path, as_stated: bool, sigmas: &Sigmas) -> Result<Vec<Kind>> {
+        sigmas.check()?;
+        let camera = self
+            .intrinsics
+            .map(|c| Ok::<_, Fault>(known(imported(Kind::Camera, c, None, None, source)?, sigmas.camera())))
+            .transpose()?;
         // What comes without a camera belongs to the one that the station has.
         let theirs = if camera.is_none() { Rig::load_camera(station)?.camera } else { None };
         let with = camera.as_ref().or(theirs.as_ref());
@@ -89,7 +99,7 @@ impl Values {
             let (n, note) = unit("laser_plane_camera.normal", p.normal)?;
             let plane: Plane<Camera> =
                 Plane::new(n, p.offset_mm).ok_or_else(|| no_length("laser_plane_camera.normal"))?;
-            imported(Kind::LaserPlane, plane, with, note, source)
+            Ok::<_, Fault>(known(imported(Kind::LaserPlane, plane, with, note, source)?, sigmas.plane(&plane)))
         });
         let pointer = self.pointer_camera.as_ref().map(|p| {
             let (d, note) = unit("pointer_camera.direction", p.direction)?;
@@ -101,13 +111,17 @@ impl Values {
             let (pose, departure) = HandEye::from_rows(rows).map_err(|e| e.at("flange_T_camera"))?;
             let note = (departure > ORTHONORMAL_WARN)
                 .then(|| format!("the rotation was repaired, it was {departure:.1e} from orthonormal"));
-            imported(Kind::HandEye, pose, with, note, source)
+            let mut hand_eye = known(imported(Kind::HandEye, pose, with, note, source)?, sigmas.pose());
+            let ([mm, deg], remark) = sigmas.robot();
+            hand_eye.quality.figures.extend([(ROBOT_SIGMA_MM.into(), mm), (ROBOT_SIGMA_DEG.into(), deg)]);
+            hand_eye.remarks.push(remark);
+            Ok::<_, Fault>(hand_eye)
         });
         let base_camera = self.base_from_camera.as_ref().map(|rows| {
             let (pose, departure) = Rigid::<Base, Camera>::from_rows(rows).map_err(|e| e.at("base_T_camera"))?;
             let note = (departure > ORTHONORMAL_WARN)
                 .then(|| format!("the rotation was repaired, it was {departure:.1e} from orthonormal"));
-            imported(Kind::BaseCamera, pose, with, note, source)
+            Ok::<_, Fault>(known(imported(Kind::BaseCamera, pose, with, note, source)?, sigmas.pose()))
         });
         let axis = |value: &Option<Axis>, wanted: AxisKind, kind: Kind| {
             value.as_ref().filter(|a| a.kind == wanted).map(|a| imported(kind, *a, with, None, source)).transpose()
@@ -167,13 +181,20 @@ fn imported<T: serde::Serialize>(
     note: Option<String>,
     source: &Path,
 ) -> Result<Calibration<T>> {
-    let known = "imported: the values are as good as their source, their uncertainty is unknown".to_owned();
+    let source_says = "imported: the values are as good as their source".to_owned();
     let quality = Quality {
         verdict: Verdict::Usable,
-        reasons: std::iter::once(known).chain(note).collect(),
+        reasons: std::iter::once(source_says).chain(note).collect(),
         advice: vec![],
         figures: Default::default(),
         per_picture: vec![],
     };
     Calibration::new(kind, value, with, Covariance::default(), quality).with_input(source)
+}
+
+/// The same, known as well as `assumed` says.
+fn known<T>(mut calibration: Calibration<T>, assumed: Assumed) -> Calibration<T> {
+    calibration.covariance = assumed.covariance;
+    calibration.remarks = assumed.remarks;
+    calibration
 }

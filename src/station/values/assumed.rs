@@ -1,0 +1,160 @@
+//! How well imported values are known: as whoever imports them states, else as such calibrations usually are. Standard
+//! deviations in mm, degrees and px.
+
+use crate::camera::{ALWAYS_NAMED, NAMES};
+use crate::fault::{Fault, Result};
+use crate::geometry::{Camera, Mat3, Plane, Vec3};
+use crate::rig::{Covariance, Kind};
+use nalgebra::{DMatrix, DVector};
+
+/// Standard deviations that were stated; what is `None` has its usual value. Nothing counts as exact: two looks at a right
+/// part would contradict each other by what robot and calibrations are off by.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Sigmas {
+    /// Of the robot's place, each axis, mm; usually 0.02, the repeatability (ISO 9283) that makers state of such arms.
+    pub robot_mm: Option<f64>,
+    /// Of its turn, each axis, degrees; usually 0.004, which moves a tool 300 mm long by those 0.02 mm.
+    pub robot_deg: Option<f64>,
+    /// Of a hand-eye's place, each axis, mm; usually 0.03: what 15 to 20 poses of a board leave, with a robot as above.
+    pub hand_eye_mm: Option<f64>,
+    /// Of its turn, each axis, degrees; usually 0.006: those 0.03 mm seen at 300 mm.
+    pub hand_eye_deg: Option<f64>,
+    /// Of a laser plane's distance where it is used, mm; usually 0.02: a tenth of a stripe's width of 0.2 mm.
+    pub plane_mm: Option<f64>,
+    /// Of its tilt, degrees; usually 0.006: 0.02 mm over boards that were shown within 200 mm.
+    pub plane_deg: Option<f64>,
+    /// Of focal lengths and principal point, px; usually 0.5: rays that are known less well make no usable camera.
+    pub camera_px: Option<f64>,
+}
+
+const MM: &str = "mm";
+const DEGREES: &str = "degrees";
+
+/// A standard deviation with its unit and whether somebody stated it.
+struct Sigma {
+    value: f64,
+    unit: &'static str,
+    stated: bool,
+}
+
+fn sigma(stated: Option<f64>, usual: f64, unit: &'static str) -> Sigma {
+    Sigma { value: stated.unwrap_or(usual), unit, stated: stated.is_some() }
+}
+
+/// A covariance with what reports have to say of it.
+pub(super) struct Assumed {
+    pub covariance: Covariance,
+    pub remarks: Vec<String>,
+}
+
+impl Sigmas {
+    /// Refuses what is no standard deviation of a rig.
+    pub fn check(&self) -> Result<()> {
+        let all = [
+            ("robot", self.robot_mm, MM),
+            ("robot", self.robot_deg, DEGREES),
+            ("hand-eye", self.hand_eye_mm, MM),
+            ("hand-eye", self.hand_eye_deg, DEGREES),
+            ("laser plane", self.plane_mm, MM),
+            ("laser plane", self.plane_deg, DEGREES),
+            ("camera", self.camera_px, "px"),
+        ];
+        match all.iter().find(|(_, s, _)| s.is_some_and(|s| !(s > 0.0 && s <= MOST))) {
+            Some((what, s, unit)) => Err(Fault::usage(format!(
+                "the sigma of the {what} is {} {unit}, above 0 and up to {MOST} are allowed",
+                s.expect("just found")
+            ))
+            .cause("nothing is known exactly, and what is off by more than that is no calibration")
+            .next("state one standard deviation, or leave it out: then a usual one is assumed")),
+            None => Ok(()),
+        }
+    }
+
+    /// Of the robot's poses, mm and degrees, and the remark.
+    pub(super) fn robot(&self) -> ([f64; 2], String) {
+        let both = [sigma(self.robot_mm, 0.02, MM), sigma(self.robot_deg, 0.004, DEGREES)];
+        ([both[0].value, both[1].value], said("the robot's poses scatter", &both))
+    }
+
+    /// Of a camera on a flange or in a base frame.
+    pub(super) fn pose(&self) -> Assumed {
+        let both = [sigma(self.hand_eye_mm, 0.03, MM), sigma(self.hand_eye_deg, 0.006, DEGREES)];
+        let (t, w) = (both[0].value.powi(2), both[1].value.to_radians().powi(2));
+        let matrix = DMatrix::from_diagonal(&DVector::from_vec(vec![t, t, t, w, w, w]));
+        let covariance = Covariance::new(Kind::HandEye.parameters().0, &matrix);
+        Assumed { covariance, remarks: vec![said("it is off", &both)] }
+    }
+
+    /// Of a plane that turns about the place where the camera's axis meets it.
+    pub(super) fn plane(&self, plane: &Plane<Camera>) -> Assumed {
+        let both = [sigma(self.plane_mm, 0.02, MM), sigma(self.plane_deg, 0.006, DEGREES)];
+        let n = plane.normal;
+        let ahead = plane.offset / n.z;
+        // A sheet that runs along the camera's axis is met nowhere that matters.
+        let pivot = if ahead > 0.0 && ahead < FARTHEST { Vec3::new(0.0, 0.0, ahead) } else { n * plane.offset };
+        let tilt = (Mat3::identity() - n * n.transpose()) * both[1].value.to_radians();
+        let mut root = DMatrix::zeros(4, 4);
+        root.view_mut((0, 0), (3, 3)).copy_from(&tilt);
+        root.view_mut((3, 0), (1, 3)).copy_from(&(pivot.transpose() * tilt));
+        root[(3, 3)] = both[0].value;
+        let covariance = Covariance::new(Kind::LaserPlane.parameters().0, &(&root * root.transpose()));
+        Assumed { covariance, remarks: vec![said("it is off", &both)] }
+    }
+
+    /// Of a camera; its lens terms count as known.
+    pub(super) fn camera(&self) -> Assumed {
+        let px = sigma(self.camera_px, 0.5, "px");
+        let mut matrix = DMatrix::zeros(ALWAYS_NAMED, ALWAYS_NAMED);
+        (0..4).for_each(|i| matrix[(i, i)] = px.value.powi(2));
+        let covariance = Covariance::new(&NAMES[..ALWAYS_NAMED], &matrix);
+        let remark = said("focal lengths and principal point are off", &[px]);
+        Assumed { covariance, remarks: vec![remark + "; the lens terms count as known"] }
+    }
+}
+
+/// Largest sigma that a calibration may have, mm, degrees or px.
+const MOST: f64 = 10.0;
+/// A camera on an arm works nearer than this, mm.
+const FARTHEST: f64 = 5000.0;
+
+/// What every report says of it.
+fn said(what: &str, sigmas: &[Sigma]) -> String {
+    let each: Vec<String> = sigmas.iter().map(|s| format!("{} {}", s.value, s.unit)).collect();
+    let whose = match (sigmas.iter().all(|s| s.stated), sigmas.iter().any(|s| s.stated)) {
+        (true, _) => "stated at the import",
+        (false, true) => "stated at the import in part, the rest assumed",
+        (false, false) => "assumed at the import",
+    };
+    format!("{what} by {} (1 sigma): {whose}, not measured here", each.join(" and "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sigmas_are_those_that_were_stated_and_reports_say_which_were_not() {
+        let plane = Plane::new(Vec3::new(0.0, 0.6, 0.8), 200.0).unwrap();
+        let usual = Sigmas::default();
+        let [tx, rx] = ["tx_mm", "rx_rad"].map(|n| usual.pose().covariance.sigma(n).unwrap());
+        assert!((tx - 0.03).abs() < 1e-12 && (rx.to_degrees() - 0.006).abs() < 1e-12, "{tx} {rx}");
+        assert!(usual.pose().remarks[0].contains("assumed at the import, not measured here"));
+        assert!(usual.robot().1.contains("0.02 mm and 0.004 degrees"), "{}", usual.robot().1);
+        let c = usual.plane(&plane).covariance;
+        c.check(Kind::LaserPlane).unwrap();
+        usual.camera().covariance.check(Kind::Camera).unwrap();
+        // Where the camera's axis meets the plane its depth is known to the offset's own sigma, whatever the tilt.
+        let at = DVector::from_vec(vec![0.0, 0.0, -250.0, 1.0]);
+        assert!(((&c.to_matrix() * &at).dot(&at).sqrt() - 0.02).abs() < 1e-9);
+        let stated = Sigmas { plane_mm: Some(0.1), plane_deg: Some(0.02), hand_eye_mm: Some(0.2), ..usual };
+        assert!(
+            stated.plane(&plane).remarks[0].contains("0.1 mm and 0.02 degrees (1 sigma): stated at the import, not")
+        );
+        assert!(stated.pose().remarks[0].contains("in part"));
+        for wrong in [0.0, -1.0, f64::NAN, 11.0] {
+            let fault = Sigmas { camera_px: Some(wrong), ..usual }.check().unwrap_err();
+            assert!(fault.what.contains("camera"), "{fault}");
+        }
+        stated.check().unwrap();
+    }
+}

@@ -1,0 +1,7 @@
+//! Values of a rig that come from elsewhere, or go there, and how well they are taken to be known.
+
+mod assumed;
+mod exchange;
+
+pub use assumed::Sigmas;
+pub use exchange::{PlaneValue, Values};
