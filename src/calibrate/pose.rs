@@ -171,7 +171,7 @@ mod tests {
                 BoardPoint { feature_id, pixel: pixel + Vec2::from_fn(|_, _| noise.sample(&mut rng)), sigma_px }
             })
             .collect();
-        BoardView { points, ambiguous: false, dot_diameter: None }
+        BoardView { points, ..BoardView::default() }
     }
 
     #[test]

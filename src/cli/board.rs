@@ -37,9 +37,12 @@ pub struct Args {
     /// Markers: white between two of them, mm [default: 0.3 of the marker]
     #[arg(long)]
     gap_mm: Option<f64>,
-    /// Markers: id of the first one
+    /// ChArUco, markers: id of the first one
     #[arg(long, default_value_t = 0)]
     first_id: u32,
+    /// ChArUco: begin with a white square, as OpenCV did before 4.6 on boards with an even number of rows
+    #[arg(long)]
+    white_first: bool,
     /// ChArUco, markers: OpenCV's name of the dictionary
     #[arg(long, default_value = "DICT_5X5_250")]
     dictionary: String,
@@ -117,6 +120,8 @@ fn asked(args: &Args) -> BoardSpec {
             square_mm: args.square_mm,
             marker_mm: args.marker_mm.unwrap_or(0.7 * args.square_mm),
             dictionary: args.dictionary.clone(),
+            first_id: args.first_id,
+            first_square: args.white_first.then(|| "white".into()),
             border_mm,
         },
         "markers" => BoardSpec::MarkerGrid {

@@ -33,6 +33,13 @@ pub enum BoardSpec {
         marker_mm: f64,
         /// OpenCV's name, e.g. DICT_5X5_250.
         dictionary: String,
+        /// Id of the first marker; the others follow row by row.
+        #[serde(default, skip_serializing_if = "is_zero")]
+        first_id: u32,
+        /// Colour of the square at the origin. Unstated: the markers' ids tell it in each picture. OpenCV draws "black" since
+        /// 4.6; before, and as its "legacy pattern", boards with an even number of rows begin with "white".
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        first_square: Option<String>,
         /// Plain margin around the outer squares, mm, 0..=10000; 0 unless stated.
         #[serde(default)]
         border_mm: f64,
@@ -75,6 +82,10 @@ pub enum BoardSpec {
 
 fn black() -> String {
     "black".into()
+}
+
+fn is_zero(number: &u32) -> bool {
+    *number == 0
 }
 
 impl BoardSpec {
@@ -132,11 +143,40 @@ impl BoardSpec {
                 let least = 0.1 * marker_mm;
                 refuse(format!("the board's gap_mm is {gap_mm}, {least} (a tenth of marker_mm) to 10000 mm is allowed"))
             }
-            BoardSpec::Chessboard { first_square, .. } if first_square != "black" && first_square != "white" => {
-                refuse(format!("the board's first_square is '{first_square}', 'black' or 'white' is allowed"))
+            BoardSpec::Chessboard { first_square: colour, .. }
+            | BoardSpec::Charuco { first_square: Some(colour), .. }
+                if colour != "black" && colour != "white" =>
+            {
+                refuse(format!("the board's first_square is '{colour}', 'black' or 'white' is allowed"))
             }
             _ => Ok(()),
         }
+    }
+
+    /// Whether the square at a ChArUco board's origin is white, and so holds a marker. A board that leaves its first square open
+    /// is drawn with a black one.
+    pub fn begins_white(&self) -> bool {
+        matches!(self, BoardSpec::Charuco { first_square: Some(colour), .. } if colour == "white")
+    }
+
+    /// A picture of part of this ChArUco board may not tell the colour of its first square, which the description leaves open:
+    /// with odd columns and even rows one order of markers is the other, shifted by a column.
+    pub fn first_square_may_stay_open(&self) -> bool {
+        match self {
+            BoardSpec::Charuco { squares: [columns, rows], first_square: None, .. } => {
+                columns % 2 == 1 && rows % 2 == 0
+            }
+            _ => false,
+        }
+    }
+
+    /// A ChArUco board whose description leaves its first square open, with that square as `white` says; any other board as it is.
+    pub fn beginning(&self, white: bool) -> BoardSpec {
+        let mut board = self.clone();
+        if let BoardSpec::Charuco { first_square: open @ None, .. } = &mut board {
+            *open = Some(if white { "white" } else { "black" }.into());
+        }
+        board
     }
 
     /// Diameter of a circle grid's dots as they are drawn: half of the pitch unless stated, mm.

@@ -14,8 +14,9 @@ pub struct Markers {
     cells: [u32; 2],
     pitch_mm: f64,
     marker_mm: f64,
-    /// Only the white cells of a checker pattern hold one, in their middle.
-    checker: bool,
+    /// Only the white cells of a checker pattern hold one, in their middle: those whose column and row add up to an odd
+    /// (1) or an even (0) number. `None`: every cell.
+    white: Option<u32>,
     first_id: usize,
 }
 
@@ -25,12 +26,13 @@ impl Markers {
     /// # Errors
     /// An unknown dictionary, or one with fewer codes than the board has markers.
     pub fn of(board: &BoardSpec) -> Result<Option<Markers>> {
-        let (cells, pitch_mm, marker_mm, name, checker, first_id) = match board {
-            BoardSpec::Charuco { squares, square_mm, marker_mm, dictionary, .. } => {
-                (*squares, *square_mm, *marker_mm, dictionary, true, 0)
+        let (cells, pitch_mm, marker_mm, name, white, first_id) = match board {
+            BoardSpec::Charuco { squares, square_mm, marker_mm, dictionary, first_id, .. } => {
+                let white = Some(u32::from(!board.begins_white()));
+                (*squares, *square_mm, *marker_mm, dictionary, white, *first_id as usize)
             }
             BoardSpec::MarkerGrid { markers, marker_mm, gap_mm, dictionary, first_id, .. } => {
-                (*markers, marker_mm + gap_mm, *marker_mm, dictionary, false, *first_id as usize)
+                (*markers, marker_mm + gap_mm, *marker_mm, dictionary, None, *first_id as usize)
             }
             _ => return Ok(None),
         };
@@ -38,12 +40,18 @@ impl Markers {
             Fault::usage(format!("'{name}' is no known marker dictionary")).next("use OpenCV's name, e.g. DICT_5X5_250")
         })?;
         let all = cells[0] as usize * cells[1] as usize;
-        let needed = first_id + if checker { all / 2 } else { all };
+        // The colour of the first square has one square more where their number is odd.
+        let needed = first_id
+            + match white {
+                None => all,
+                Some(1) => all / 2,
+                Some(_) => all.div_ceil(2),
+            };
         if needed > codes.codes().len() {
             return Err(Fault::usage(format!("the board needs {needed} markers, {name} has {}", codes.codes().len()))
                 .next("choose a larger dictionary, a smaller board or a lower first_id"));
         }
-        Ok(Some(Markers { codes, cells, pitch_mm, marker_mm, checker, first_id }))
+        Ok(Some(Markers { codes, cells, pitch_mm, marker_mm, white, first_id }))
     }
     /// The dictionary that its markers are from.
     pub fn dictionary(&self) -> Dictionary {
@@ -59,14 +67,14 @@ impl Markers {
     }
     /// Places with a marker: column, row and the marker's id.
     pub fn places(&self) -> impl Iterator<Item = (u32, u32, usize)> + use<> {
-        let ([nx, ny], checker, first) = (self.cells, self.checker, self.first_id);
+        let ([nx, ny], white, first) = (self.cells, self.white, self.first_id);
         let all = (0..ny).flat_map(move |j| (0..nx).map(move |i| (i, j)));
-        let with = all.filter(move |(i, j)| !checker || (i + j) % 2 == 1);
+        let with = all.filter(move |(i, j)| white.is_none_or(|w| (i + j) % 2 == w));
         with.enumerate().map(move |(k, (i, j))| (i, j, first + k))
     }
     /// Upper left corner of the marker at (i, j).
     pub fn corner(&self, i: u32, j: u32) -> [f64; 2] {
-        let rim = if self.checker { 0.5 * (self.pitch_mm - self.marker_mm) } else { 0.0 };
+        let rim = if self.white.is_some() { 0.5 * (self.pitch_mm - self.marker_mm) } else { 0.0 };
         [f64::from(i) * self.pitch_mm + rim, f64::from(j) * self.pitch_mm + rim]
     }
     /// Whether a cell of marker `id` is black; codes are row by row from the lowest bit, 1 is black.
@@ -79,16 +87,19 @@ impl Markers {
     pub fn black_at(&self, x: f64, y: f64) -> bool {
         let (i, j) = ((x / self.pitch_mm).floor(), (y / self.pitch_mm).floor());
         let [nx, ny] = self.cells.map(f64::from);
-        if !(i >= 0.0 && j >= 0.0 && i < nx && j < ny) || (self.checker && (i + j) % 2.0 == 0.0) {
+        if !(i >= 0.0 && j >= 0.0 && i < nx && j < ny) {
             return false;
         }
         let (i, j) = (i as u32, j as u32);
+        if self.white.is_some_and(|w| (i + j) % 2 != w) {
+            return false;
+        }
         let [x0, y0] = self.corner(i, j);
         let (c, r) = (((x - x0) / self.cell_mm()).floor(), ((y - y0) / self.cell_mm()).floor());
         let n = self.cells() as f64;
-        // White squares before this one, row by row: every second one is white.
         let before = j * self.cells[0] + i;
-        let id = self.first_id + if self.checker { before / 2 } else { before } as usize;
+        // Of the squares before a white one every second is white.
+        let id = self.first_id + if self.white.is_some() { before / 2 } else { before } as usize;
         c >= 0.0 && r >= 0.0 && c < n && r < n && self.black(id, c as usize, r as usize)
     }
 }
@@ -98,7 +109,17 @@ mod tests {
     use super::*;
 
     fn board(squares: [u32; 2], dictionary: &str) -> BoardSpec {
-        BoardSpec::Charuco { squares, square_mm: 10.0, marker_mm: 7.0, dictionary: dictionary.into(), border_mm: 0.0 }
+        let (dictionary, first_square) = (dictionary.into(), None);
+        let (square_mm, marker_mm, border_mm, first_id) = (10.0, 7.0, 0.0, 0);
+        BoardSpec::Charuco { squares, square_mm, marker_mm, dictionary, first_id, first_square, border_mm }
+    }
+
+    fn white(squares: [u32; 2], from: u32) -> BoardSpec {
+        let mut board = board(squares, "DICT_5X5_250");
+        if let BoardSpec::Charuco { first_square, first_id, .. } = &mut board {
+            (*first_square, *first_id) = (Some("white".into()), from);
+        }
+        board
     }
 
     #[test]
@@ -113,7 +134,8 @@ mod tests {
             border_mm: 2.0,
         };
         let charuco = [[5, 4], [6, 5], [7, 3]].map(|s| (board(s, "DICT_5X5_250"), s[0] * s[1] / 2));
-        for (squares, count) in charuco.into_iter().chain([(grid, 12)]) {
+        let begin_white = [(white([5, 4], 0), 10), (white([6, 5], 3), 15), (white([7, 3], 9), 11)];
+        for (squares, count) in charuco.into_iter().chain(begin_white).chain([(grid, 12)]) {
             let m = Markers::of(&squares).unwrap().unwrap();
             assert_eq!(m.places().count(), count as usize);
             for (i, j, k) in m.places() {

@@ -35,7 +35,8 @@ impl Pattern {
             BoardSpec::Charuco { squares: [nx, ny], square_mm: s, .. } => {
                 let (i, j) = ((x / s).floor(), (y / s).floor());
                 let on = i >= 0.0 && j >= 0.0 && i < f64::from(*nx) && j < f64::from(*ny);
-                on && ((i + j) % 2.0 == 0.0 || self.markers.as_ref().is_some_and(|m| m.black_at(x, y)))
+                let black = f64::from(u8::from(self.board.begins_white()));
+                on && ((i + j) % 2.0 == black || self.markers.as_ref().is_some_and(|m| m.black_at(x, y)))
             }
             BoardSpec::MarkerGrid { .. } => self.markers.as_ref().is_some_and(|m| m.black_at(x, y)),
             BoardSpec::Circles { .. } => {

@@ -104,7 +104,7 @@ fn seen(s: &Station, seed: u64) -> Vec<Observation> {
             Observation {
                 name: format!("picture {i}"),
                 features: s.features.clone(),
-                view: BoardView { points, ambiguous: false, dot_diameter: None },
+                view: BoardView { points, ..BoardView::default() },
             }
         })
         .collect()

@@ -14,6 +14,7 @@ mod guide;
 mod hand_eye_judge;
 mod joint;
 mod laser_plane_judge;
+mod legacy_charuco;
 mod photographs;
 mod pointer_judge;
 mod second_look;

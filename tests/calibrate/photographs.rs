@@ -111,11 +111,7 @@ fn golden(side: &str) -> (Vec<Observation>, serde_json::Value) {
                 sigma_px: 0.1,
             };
             let points = c.iter().enumerate().map(point).collect();
-            Observation {
-                name,
-                features: features.clone(),
-                view: BoardView { points, ambiguous: false, dot_diameter: None },
-            }
+            Observation { name, features: features.clone(), view: BoardView { points, ..BoardView::default() } }
         })
         .collect();
     (pictures, set)

@@ -227,6 +227,8 @@ fn charuco(square_mm: f64) -> BoardSpec {
         square_mm,
         marker_mm: 0.75 * square_mm,
         dictionary: "DICT_5X5_250".into(),
+        first_id: 0,
+        first_square: None,
         border_mm: 0.5 * square_mm,
     }
 }

@@ -48,7 +48,7 @@ pub fn find(image: &Image, board: &BoardSpec, _options: &FindOptions) -> Result<
         let Some(dots) = dots else { continue };
         let (points, radius) = centred(&dots, &features, diameter_mm.map(|d| d / 2.0))?;
         let dot_diameter = diameter_mm.is_none().then_some(2.0 * radius);
-        return Ok(BoardView { points, ambiguous, dot_diameter });
+        return Ok(BoardView { points, ambiguous, dot_diameter, ..BoardView::default() });
     }
     Err(Fault::refused(format!("no grid of {nx}x{ny} dots was found; {most} round spots are in the picture"))
         .cause(if most < features.len() {

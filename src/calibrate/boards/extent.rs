@@ -23,7 +23,7 @@ pub fn to_print_edge(board: &BoardSpec, x: f64, y: f64) -> f64 {
             let (nx, ny) = (f64::from(*nx), f64::from(*ny));
             let square = to_lines(u, v, 0.0, nx, 0.0, ny) * s;
             let on_board = u > 0.0 && v > 0.0 && u < nx && v < ny;
-            let white = (u.floor() as i64 + v.floor() as i64).rem_euclid(2) == 1;
+            let white = (u.floor() as i64 + v.floor() as i64).rem_euclid(2) == i64::from(!board.begins_white());
             if on_board && white {
                 // The marker's own cells are all edges: only the rim around it is plain.
                 let (a, b) = ((u.fract() - 0.5).abs(), (v.fract() - 0.5).abs());
@@ -80,6 +80,8 @@ mod tests {
             square_mm: 10.0,
             marker_mm: 7.0,
             dictionary: "DICT_5X5_250".into(),
+            first_id: 0,
+            first_square: None,
             border_mm: 0.0,
         };
         assert_eq!(to_print_edge(&b, 15.0, 5.0), 0.0);

@@ -60,7 +60,7 @@ pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<B
         })
         .collect();
     points.sort_by_key(|p| p.feature_id);
-    Ok(BoardView { points, ambiguous: false, dot_diameter: None })
+    Ok(BoardView { points, ..BoardView::default() })
 }
 
 /// The marker in a quadrilateral, if it is one of the board's.

@@ -37,7 +37,7 @@ pub fn sheet(board: &BoardSpec) -> Result<Sheet> {
             squares(&mut sheet, *nx + 1, *ny + 1, *s, -s - x0, -s - y0, odd);
         }
         BoardSpec::Charuco { squares: [nx, ny], square_mm: s, .. } => {
-            squares(&mut sheet, *nx, *ny, *s, -x0, -y0, 0);
+            squares(&mut sheet, *nx, *ny, *s, -x0, -y0, u32::from(board.begins_white()));
             let all = Markers::of(board)?.expect("a ChArUco board has markers");
             markers(&mut sheet, &all, [-x0, -y0]);
         }

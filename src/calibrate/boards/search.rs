@@ -16,11 +16,7 @@ pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<B
         BoardSpec::Chessboard { inner_corners, first_square, .. } => {
             chessboard::find(image, *inner_corners, first_square != "white", options)
         }
-        BoardSpec::Charuco { squares, square_mm, marker_mm, dictionary, .. } => {
-            let layout =
-                charuco::Layout { squares: *squares, square_mm: *square_mm, marker_mm: *marker_mm, dictionary };
-            charuco::find(image, &layout, options)
-        }
+        BoardSpec::Charuco { .. } => charuco::find(image, board, options),
         BoardSpec::MarkerGrid { .. } => marker_grid::find(image, board, options),
         BoardSpec::Circles { .. } => circles::find(image, board, options),
     };

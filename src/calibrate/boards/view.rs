@@ -16,7 +16,7 @@ pub struct BoardPoint {
 }
 
 /// A board as seen in one picture.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct BoardView {
     /// The features that were found.
     pub points: Vec<BoardPoint>,
@@ -25,6 +25,9 @@ pub struct BoardView {
     pub ambiguous: bool,
     /// Diameter of a circle grid's dots as this picture shows it, mm, where the description leaves it open.
     pub dot_diameter: Option<f64>,
+    /// A ChArUco board's square at the origin is white: as described, or as its markers' ids say where the description
+    /// leaves it open.
+    pub begins_white: bool,
 }
 
 /// Settings of [`super::find`].

@@ -5,7 +5,7 @@
 use super::intrinsics::Observation;
 use crate::calibrate::boards::{FindOptions, find};
 use crate::fault::{Fault, Kind, Result};
-use crate::recording::{FrameRef, Recording};
+use crate::recording::{BoardSpec, FrameRef, Recording};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -16,6 +16,21 @@ struct Source<'a> {
     frame: &'a FrameRef,
     file: String,
     name: String,
+}
+
+impl Source<'_> {
+    fn first_square_may_be_open(&self) -> bool {
+        let board = self.recording.meta.board_of(self.frame);
+        board.is_some_and(BoardSpec::first_square_may_stay_open)
+    }
+}
+
+/// Looks for the board in one picture; `white` is the colour of its first square where its description leaves that open.
+fn look(source: &Source<'_>, white: Option<bool>, options: &FindOptions) -> Result<Observation> {
+    let board = source.recording.meta.board_of(source.frame).ok_or_else(no_board)?;
+    let known = white.map_or_else(|| board.clone(), |white| board.beginning(white));
+    let view = find(&source.recording.picture(&source.file)?, &known, options)?;
+    Ok(Observation { name: source.name.clone(), features: Arc::new(board.features()), view })
 }
 
 /// What stands before a recording's names: nothing where there is one recording, else its folder.
@@ -81,19 +96,22 @@ pub(in crate::calibrate) fn pictures(
     let all = sources.len();
     let done = std::sync::atomic::AtomicUsize::new(0);
     type Seen = (String, Option<String>, Result<Observation>);
-    let seen: Vec<Seen> = sources
+    let mut seen: Vec<Seen> = sources
         .par_iter()
-        .map(|Source { recording, frame, file, name }| {
-            let look = || {
-                let board = recording.meta.board_of(frame).ok_or_else(no_board)?;
-                let view = find(&recording.picture(file)?, board, options)?;
-                Ok(Observation { name: name.clone(), features: Arc::new(board.features()), view })
-            };
-            let seen = look();
+        .map(|source @ Source { recording, file, name, .. }| {
+            let seen = look(source, None, options);
             progress(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1, all);
             (name.clone(), crate::rig::hash_file(&recording.folder.join(file)).ok(), seen)
         })
         .collect();
+    // A picture that does not tell the colour of its board's first square takes it from those that do.
+    if let Some(white) = seen.iter().find_map(|(.., o)| o.as_ref().ok()).map(|o| o.view.begins_white) {
+        sources.par_iter().zip(&mut seen).filter(|(_, (.., o))| o.is_err()).for_each(|(source, (.., o))| {
+            if source.first_square_may_be_open() {
+                *o = look(source, Some(white), options);
+            }
+        });
+    }
     let (mut pictures, mut left_out): (Vec<Observation>, Vec<(String, Fault)>) = Default::default();
     // SHA-256 to name: a picture that comes again says nothing new.
     let mut known: BTreeMap<String, String> = BTreeMap::new();

@@ -234,6 +234,12 @@ fn judge(
     let mut j = Judgement { verdict: Verdict::Good, reasons: vec![summary], advice: Vec::new() };
     evidence.determined(&mut j);
     evidence.fits(&mut j);
+    j.reasons.extend(pictures.iter().find(|o| o.view.begins_white).map(|o| {
+        format!(
+            "{}: the ChArUco board begins with a white square, as OpenCV drew boards before version 4.6 (\"legacy pattern\")",
+            o.name
+        )
+    }));
     j.reasons.extend(held_parameters(solved, options.solve.lens));
     j.reasons.extend(further_parameters(solved, options.solve.lens));
     let shape = board_shape(pictures, solved);

@@ -22,7 +22,7 @@ use crate::geometry::{Base, Board, Camera, Flange, Plane, Ray, Rigid, Vec3, orth
 pub fn board(camera: &Intrinsics, seen: &SeenBoard) -> Result<MeasuredPose> {
     let points = seen.pixels.iter().zip(&seen.sigmas_px).enumerate();
     let points = points.map(|(feature_id, (&pixel, &sigma_px))| BoardPoint { feature_id, pixel, sigma_px }).collect();
-    let view = BoardView { points, ambiguous: false, dot_diameter: None };
+    let view = BoardView { points, ..BoardView::default() };
     let start = pose_of_points(camera, &seen.points, &view).map_err(|e| e.at(&seen.name))?;
     measure(seen, camera, &start.camera_from_board)
 }

@@ -6,6 +6,7 @@ use crate::calibrate::boards::{FindOptions, find};
 use crate::calibrate::measured_pose::{MeasuredPose, measure_view};
 use crate::camera::Intrinsics;
 use crate::fault::{Fault, Result};
+use crate::raster::Image;
 use crate::recording::{BoardSpec, FrameRef, Recording};
 use crate::rig::Calibration;
 use rayon::prelude::*;
@@ -53,25 +54,19 @@ pub fn boards(
     let done = std::sync::atomic::AtomicUsize::new(0);
     // A picture that is missing or of another size is the recording's fault and ends it; a board that is not
     // found is that picture's.
-    let each: Vec<(String, Result<(FrameBoard, Option<f64>)>)> = frames
+    let each: Vec<(String, Result<Seen>)> = frames
         .par_iter()
         .map(|(index, frame, name)| {
             let board = meta.board_of(frame).ok_or_else(|| {
                 Fault::input(format!("{name}: meta.json describes no board for it"))
                     .next("describe the board under 'board' or 'boards'")
             })?;
-            let picture = recording.picture(name)?;
-            let one = || {
-                let view = find(&picture, board, &FindOptions::default())?;
-                let pose = measure_view(name, camera, board, &view)?;
-                let found = FrameBoard { frame: *index, board: board.clone(), pose, ambiguous: view.ambiguous };
-                Ok((found, view.dot_diameter))
-            };
-            let result = one();
+            let result = one(*index, name, board, &recording.picture(name)?, camera);
             progress(done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1, frames.len());
             Ok((name.to_string(), result))
         })
         .collect::<Result<_>>()?;
+    let each = first_squares(each, &frames, recording, camera)?;
     let mut out = Boards::default();
     let (mut diameters, mut faults) = (Vec::new(), Vec::new());
     for (name, result) in each {
@@ -91,6 +86,34 @@ pub fn boards(
     }
     know_diameter(&mut out.found, diameters);
     Ok(out)
+}
+
+/// A board in a picture, and the diameter of its dots where the description leaves it open.
+type Seen = (FrameBoard, Option<f64>);
+
+fn one(frame: usize, name: &str, board: &BoardSpec, picture: &Image, camera: &Intrinsics) -> Result<Seen> {
+    let view = find(picture, board, &FindOptions::default())?;
+    let pose = measure_view(name, camera, board, &view)?;
+    let board = board.beginning(view.begins_white);
+    Ok((FrameBoard { frame, board, pose, ambiguous: view.ambiguous }, view.dot_diameter))
+}
+
+/// Pictures that do not tell the colour of their board's first square take it from the first one that does.
+fn first_squares(
+    each: Vec<(String, Result<Seen>)>,
+    frames: &[(usize, &FrameRef, &str)],
+    recording: &Recording,
+    camera: &Intrinsics,
+) -> Result<Vec<(String, Result<Seen>)>> {
+    let told = each.iter().find_map(|(_, seen)| seen.as_ref().ok().map(|(found, _)| found.board.begins_white()));
+    let Some(white) = told else { return Ok(each) };
+    let again = |((name, seen), (index, frame, _)): ((String, Result<Seen>), &(usize, &FrameRef, &str))| {
+        let open = recording.meta.board_of(frame).filter(|b| seen.is_err() && b.first_square_may_stay_open());
+        let Some(board) = open else { return Ok((name, seen)) };
+        let seen = one(*index, &name, &board.beginning(white), &recording.picture(&name)?, camera);
+        Ok((name, seen))
+    };
+    each.into_iter().zip(frames).map(again).collect()
 }
 
 /// The fault of a recording none of whose pictures shows its board; one of each picture.

@@ -35,6 +35,8 @@ pub fn board() -> BoardSpec {
         square_mm: 16.0,
         marker_mm: 11.2,
         dictionary: "DICT_5X5_250".into(),
+        first_id: 0,
+        first_square: None,
         border_mm: 9.6,
     }
 }

@@ -1,7 +1,7 @@
-//! In: a picture and a ChArUco description (OpenCV's layout and dictionaries). Out: the inner corners
-//! that are in view with their ids, or why there are none.
-//! Frame and unit: pixels; ids row by row from the inner corner nearest to the board's origin.
+//! Finds the inner corners of a ChArUco board (OpenCV's dictionaries) that are in view, with their ids, in pixels.
+//! Ids count row by row from the inner corner nearest to the board's origin.
 
+use super::first_square::Turned;
 use super::grid::{FrontEnd, Grid, Prepared};
 use super::growth::grown;
 use crate::calibrate::boards::refine::{Grey, Window};
@@ -9,74 +9,155 @@ use crate::calibrate::boards::{BoardPoint, BoardView, FindOptions};
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec2;
 use crate::raster::Image;
-use calib_targets_charuco::{CharucoBoardSpec, CharucoDetector, CharucoParams, MarkerLayout, resolve_dictionary};
+use crate::recording::BoardSpec;
+use calib_targets_charuco::{CharucoBoardSpec, CharucoDetector, CharucoParams, MarkerLayout};
 
 /// Corners at least, below which a view is refused: a pose wants 6 with some to spare.
 const FEWEST: usize = 8;
 
 /// The printed layout, as `BoardSpec::Charuco` states it.
-pub struct Layout<'a> {
-    pub squares: [u32; 2],
-    pub square_mm: f64,
-    pub marker_mm: f64,
-    pub dictionary: &'a str,
+struct Layout {
+    squares: [u32; 2],
+    /// Side of a marker as a share of a square.
+    marker: f64,
+}
+
+/// A board as one order of its markers explains the picture.
+struct Sight {
+    view: BoardView,
+    /// Markers that stand where this order has them.
+    markers: usize,
+    /// Grey levels of the picture, as a share of full scale.
+    span: f64,
+    /// Why nothing was found; empty where something was.
+    reason: String,
 }
 
 /// Finds a ChArUco board that is at least partly in view.
-pub fn find(image: &Image, layout: &Layout<'_>, options: &FindOptions) -> Result<BoardView> {
-    let detector = detector(layout)?;
-    let (columns, rows) = (layout.squares[0] as usize - 1, layout.squares[1] as usize - 1);
+pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<BoardView> {
+    let BoardSpec::Charuco { squares, square_mm, marker_mm, first_square, .. } = board else {
+        return Err(Fault::usage("the board is no ChArUco board").next("describe a ChArUco board"));
+    };
+    let layout = Layout { squares: *squares, marker: marker_mm / square_mm };
     let grey = Grey::new(image);
+    let sight = |white: bool| match Turned::of(*squares, white) {
+        Some(turned) => look(image, &grey, &board.beginning(white), &layout, &turned, options).map(Some),
+        None => Ok(None),
+    };
+    let chosen = match first_square.as_deref() {
+        Some(colour) => sight(colour == "white")?,
+        None => choose(board, sight(false)?, || sight(true), &layout)?,
+    };
+    match chosen {
+        Some(sight) if sight.view.points.len() >= FEWEST => Ok(sight.view),
+        Some(sight) => Err(why_not(&layout, sight.span, &sight.reason)),
+        None => Err(Fault::input(format!(
+            "a ChArUco board of {}x{} squares that begins with a white one is not found",
+            squares[0], squares[1]
+        ))
+        .cause("boards that begin with white are found with an even number of columns or rows")
+        .next("use a board with an even number of rows, or one that begins with a black square")),
+    }
+}
+
+/// The order of markers that explains the picture, of a board whose first square is not stated.
+///
+/// # Errors
+/// Both orders explain it: the columns that would tell are out of view.
+fn choose(
+    board: &BoardSpec,
+    black: Option<Sight>,
+    white: impl FnOnce() -> Result<Option<Sight>>,
+    layout: &Layout,
+) -> Result<Option<Sight>> {
+    let [columns, rows] = layout.squares;
+    let Some(black) = black else { return white() };
+    if !board.first_square_may_stay_open() && black.markers * 2 > markers_between(&black.view, layout) {
+        return Ok(Some(black));
+    }
+    let Some(white) = white()? else { return Ok(Some(black)) };
+    // Of a board that is read a column off, the corners of its outer column are not found: two or more.
+    let more = |a: &Sight, b: &Sight| a.markers > b.markers || a.view.points.len() > b.view.points.len() + 1;
+    match (more(&white, &black), more(&black, &white)) {
+        (true, false) => Ok(Some(white)),
+        (false, true) => Ok(Some(black)),
+        _ if black.markers > 0 => Err(Fault::refused(format!(
+            "the picture does not tell which colour the {columns}x{rows} ChArUco board begins with: {} markers fit both",
+            black.markers
+        ))
+        .cause("the board's outer columns are out of view")
+        .next("state \"first_square\" in the board's description: \"white\" for boards of OpenCV before 4.6, else \"black\"")),
+        _ => Ok(Some(black)),
+    }
+}
+
+/// Markers that must be seen where these corners are: half of the squares with a corner at each corner.
+fn markers_between(view: &BoardView, layout: &Layout) -> usize {
+    let columns = layout.squares[0] as usize - 1;
+    let mut seen = vec![false; columns * (layout.squares[1] as usize - 1)];
+    view.points.iter().for_each(|p| seen[p.feature_id] = true);
+    let whole = (0..seen.len()).filter(|k| k % columns + 1 < columns && k + columns + 1 < seen.len());
+    whole.filter(|k| [0, 1, columns, columns + 1].iter().all(|step| seen[k + step])).count() / 2
+}
+
+/// Looks for a board whose first square is known.
+fn look(
+    image: &Image,
+    grey: &Grey,
+    board: &BoardSpec,
+    layout: &Layout,
+    turned: &Turned,
+    options: &FindOptions,
+) -> Result<Sight> {
+    let detector = detector(board, layout, turned)?;
+    let (columns, rows) = (layout.squares[0] as usize - 1, layout.squares[1] as usize - 1);
     let first = (grey.width.max(grey.height) / options.detector_px).max(1);
     let shrinks: &[usize] = if first > 1 { &[first, 1] } else { &[1] };
-    let mut best: Option<BoardView> = None;
-    let (mut span, mut reason) = (0.0, String::new());
+    let begins_white = board.begins_white();
+    let mut best = Sight { view: BoardView::default(), markers: 0, span: 0.0, reason: String::new() };
     for &shrink in shrinks {
-        let prepared = Prepared::new(image, &grey, shrink);
-        span = prepared.span;
+        let prepared = Prepared::new(image, grey, shrink);
+        best.span = prepared.span;
         // Radon candidates carry no strength that the marker detector could judge: two front ends.
         for front_end in [FrontEnd::Plain, FrontEnd::Enlarged] {
             let candidates = front_end.candidates(&prepared.view());
             let found = match detector.detect_with_corners(&prepared.view(), &candidates) {
                 Ok(found) => found,
                 Err(e) => {
-                    reason = e.to_string();
+                    best.reason = e.to_string();
                     continue;
                 }
             };
             let mut grid = Grid { columns, rows, corners: vec![None; columns * rows] };
             for c in &found.corners {
                 // Positions on the board were given in squares: corner (1, 1) is the first inner one.
-                let (i, j) = (c.target_position.x.round() as usize, c.target_position.y.round() as usize);
-                if (1..=columns).contains(&i) && (1..=rows).contains(&j) {
+                let at = [c.target_position.x.round() as usize, c.target_position.y.round() as usize];
+                let [nx, ny] = turned.squares().map(|n| n as usize);
+                if (1..nx).contains(&at[0]) && (1..ny).contains(&at[1]) {
+                    let [i, j] = turned.back(at);
                     let p = Vec2::new(f64::from(c.position.x), f64::from(c.position.y));
                     grid.corners[(j - 1) * columns + i - 1] = Some(prepared.to_full(&p));
                 }
             }
-            let view = refine(&mut grid, layout, &grey, options);
-            if best.as_ref().is_none_or(|b| b.points.len() < view.points.len()) {
-                best = Some(view);
+            let view = refine(&mut grid, layout, grey, options);
+            if best.view.points.len() < view.points.len() {
+                (best.view, best.markers) = (BoardView { begins_white, ..view }, found.markers.len());
             }
             // The enlarged picture is for boards that the plain one hardly shows.
-            if best.as_ref().is_some_and(|b| b.points.len() >= 3 * FEWEST) {
+            if best.view.points.len() >= 3 * FEWEST {
                 break;
             }
         }
-        if best.as_ref().is_some_and(|b| b.points.len() >= FEWEST) {
+        if best.view.points.len() >= FEWEST {
             break;
         }
     }
-    best.filter(|b| b.points.len() >= FEWEST).ok_or_else(|| why_not(layout, span, &reason))
+    Ok(best)
 }
 
-fn detector(layout: &Layout<'_>) -> Result<CharucoDetector> {
-    let dictionary = resolve_dictionary(layout.dictionary).ok_or_else(|| {
-        Fault::input(format!("'{}' is no known marker dictionary", layout.dictionary))
-            .cause("a misspelt name in the board's description")
-            .next("use OpenCV's name, e.g. DICT_5X5_250")
-    })?;
-    let relative = (layout.marker_mm / layout.square_mm) as f32;
-    let spec = CharucoBoardSpec::new(layout.squares[1], layout.squares[0], 1.0, relative, dictionary)
+fn detector(board: &BoardSpec, layout: &Layout, turned: &Turned) -> Result<CharucoDetector> {
+    let [columns, rows] = turned.squares();
+    let spec = CharucoBoardSpec::new(rows, columns, 1.0, layout.marker as f32, turned.dictionary(board)?)
         .with_marker_layout(MarkerLayout::OpenCvCharuco);
     CharucoDetector::new(CharucoParams::for_board(spec)).map_err(|e| {
         Fault::input(format!("the board's description is impossible: {e}"))
@@ -86,19 +167,19 @@ fn detector(layout: &Layout<'_>) -> Result<CharucoDetector> {
 }
 
 /// Refines what was found and lets the lattice grow over the board.
-fn refine(grid: &mut Grid, layout: &Layout<'_>, grey: &Grey, options: &FindOptions) -> BoardView {
+fn refine(grid: &mut Grid, layout: &Layout, grey: &Grey, options: &FindOptions) -> BoardView {
     // The white margin round a marker, less a quarter for blur.
-    let margin = 0.75 * 0.5 * (1.0 - layout.marker_mm / layout.square_mm);
+    let margin = 0.75 * 0.5 * (1.0 - layout.marker);
     let window = Window { reach: options.reach, longest_px: options.longest_px, margin };
     let points = grown(grid, grey, &window, options.band_px)
         .iter()
         .enumerate()
         .filter_map(|(feature_id, c)| c.map(|c| BoardPoint { feature_id, pixel: c.pixel, sigma_px: c.sigma_px }))
         .collect();
-    BoardView { points, ambiguous: false, dot_diameter: None }
+    BoardView { points, ..BoardView::default() }
 }
 
-fn why_not(layout: &Layout<'_>, span: f64, reason: &str) -> Fault {
+fn why_not(layout: &Layout, span: f64, reason: &str) -> Fault {
     let [c, r] = layout.squares;
     let wanted = format!("fewer than {FEWEST} corners of the {c}x{r} ChArUco board were found");
     if span < 0.06 {

@@ -180,7 +180,7 @@ fn orient(found: &Found, first_bright: bool, black_first: bool) -> Result<BoardV
             Some(BoardPoint { feature_id, pixel: c.pixel, sigma_px: c.sigma_px })
         })
         .collect();
-    Ok(BoardView { points, ambiguous, dot_diameter: None })
+    Ok(BoardView { points, ambiguous, ..BoardView::default() })
 }
 
 /// `order` holds indices into `places`, whose corners are all known.

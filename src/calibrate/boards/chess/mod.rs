@@ -3,6 +3,7 @@
 
 pub(super) mod charuco;
 pub(super) mod chessboard;
+mod first_square;
 mod grid;
 mod growth;
 #[cfg(test)]

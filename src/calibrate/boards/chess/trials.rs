@@ -123,6 +123,21 @@ fn charuco() -> BoardSpec {
         square_mm: 14.0,
         marker_mm: 9.8,
         dictionary: "DICT_5X5_250".into(),
+        first_id: 0,
+        first_square: None,
+        border_mm: 8.0,
+    }
+}
+
+/// The same with a white square at the origin (`None`: the description leaves it open) and another first id.
+fn begins(squares: [u32; 2], colour: Option<&str>, first_id: u32) -> BoardSpec {
+    BoardSpec::Charuco {
+        squares,
+        square_mm: 14.0,
+        marker_mm: 9.8,
+        dictionary: "DICT_5X5_250".into(),
+        first_id,
+        first_square: colour.map(String::from),
         border_mm: 8.0,
     }
 }
@@ -145,6 +160,43 @@ fn every_kind_is_found_where_it_is_from_every_side() {
             assert!(off < limit, "{board:?} {rotation:?}: {off} px");
         }
     }
+}
+
+/// Boards as OpenCV drew them before 4.6, with a first id, and as it draws them now, with descriptions that leave the first
+/// square open.
+#[test]
+fn the_first_square_is_found_out_from_the_ids() {
+    for (squares, printed, first_id) in
+        [([8, 6], "white", 0), ([7, 6], "white", 0), ([8, 5], "white", 7), ([8, 6], "black", 0), ([7, 6], "black", 30)]
+    {
+        let board = begins(squares, Some(printed), first_id);
+        let pose = facing(&board, Vec3::new(0.3, -0.2, 0.7), 230.0);
+        let image = picture(&board, &pose);
+        for told in [Some(printed), None] {
+            let view = find(&image, &begins(squares, told, first_id), &FindOptions::default()).unwrap();
+            let off = worst(&board, &pose, &view);
+            assert!(
+                view.begins_white == (printed == "white") && off < 0.03,
+                "{squares:?} {printed} {told:?}: {off} px"
+            );
+            assert!(view.points.len() * 10 >= board.features().len() * 9);
+        }
+        // Odd columns and even rows: read the other way the board is the same print, shifted by a column.
+        let other = begins(squares, Some(if printed == "white" { "black" } else { "white" }), first_id);
+        let read = find(&image, &other, &FindOptions::default());
+        assert_eq!(read.is_ok(), squares == [7, 6], "{squares:?} {printed}: found as {other:?}");
+    }
+    // Its last column of corners is out of view: nothing tells.
+    let board = begins([7, 6], Some("white"), 0);
+    let mut pose = facing(&board, Vec3::zeros(), 120.0);
+    pose.translation.x += 30.0;
+    let part = picture(&board, &pose);
+    assert!(find(&part, &board, &FindOptions::default()).is_ok());
+    let fault = find(&part, &begins([7, 6], None, 0), &FindOptions::default()).unwrap_err();
+    assert!(fault.what.contains("7x6") && fault.next.contains("first_square"), "{fault}");
+    let odd = begins([7, 5], Some("white"), 0);
+    let image = picture(&odd, &facing(&odd, Vec3::zeros(), 230.0));
+    assert!(find(&image, &odd, &FindOptions::default()).unwrap_err().what.contains("7x5"));
 }
 
 /// Markers whose cells are a whole number of the print's cells.
@@ -307,6 +359,8 @@ fn what_is_not_found_is_explained() {
         square_mm: 14.0,
         marker_mm: 10.0,
         dictionary: "DICT_9X9".into(),
+        first_id: 0,
+        first_square: None,
         border_mm: 0.0,
     };
     assert!(why(&whole, &unknown).contains("DICT_9X9"));

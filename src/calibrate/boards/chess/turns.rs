@@ -51,7 +51,7 @@ impl BoardView {
         let mut points = self.points.clone();
         points.iter_mut().for_each(|p| p.feature_id = turn.ids[p.feature_id]);
         points.sort_by_key(|p| p.feature_id);
-        BoardView { points, ambiguous: self.ambiguous, dot_diameter: self.dot_diameter }
+        BoardView { points, ..self.clone() }
     }
 }
 

@@ -85,7 +85,15 @@ fn seen_in(drawn: &Image, blur: f64, rng: &mut Pcg64) -> Image {
 fn board(seed: u64) -> BoardSpec {
     if seed.is_multiple_of(4) {
         let dictionary = "DICT_5X5_250".into();
-        return BoardSpec::Charuco { squares: [12, 9], square_mm: 10.0, marker_mm: 7.0, dictionary, border_mm: 7.0 };
+        return BoardSpec::Charuco {
+            squares: [12, 9],
+            square_mm: 10.0,
+            marker_mm: 7.0,
+            dictionary,
+            first_id: 0,
+            first_square: None,
+            border_mm: 7.0,
+        };
     }
     let first_square = if seed.is_multiple_of(2) { "black" } else { "white" }.into();
     BoardSpec::Chessboard { inner_corners: [11, 8], square_mm: 10.0, border_mm: 7.0, first_square }
