@@ -3,7 +3,7 @@
 //! values in grey levels (intensity) or mm (height).
 
 use crate::fault::{Fault, Result};
-use crate::raster::Image;
+use crate::raster::{Image, Mask};
 
 /// What a layer's numbers are; a model edge is looked for in the layer of its own kind only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -155,6 +155,19 @@ impl Scene {
     /// A picture's grey levels as the only layer, without scale.
     pub fn from_image(image: &Image) -> Scene {
         Scene { layers: vec![Layer::from_image(image)], mm_per_px: None }
+    }
+    /// The same, with the cells missing where `hidden` is lit.
+    pub fn from_image_in_part(image: &Image, hidden: Option<&Mask>) -> Scene {
+        let mut scene = Scene::from_image(image);
+        if let Some(hidden) = hidden {
+            let columns = image.width as usize;
+            for (i, v) in scene.layers[0].values.iter_mut().enumerate() {
+                if hidden.get((i % columns) as u32, (i / columns) as u32) {
+                    *v = f32::NAN;
+                }
+            }
+        }
+        scene
     }
     /// Columns, px.
     pub fn width(&self) -> usize {

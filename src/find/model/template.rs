@@ -5,7 +5,7 @@
 use super::shape_model::{MIN_POINTS, ModelOptions, ModelPoint, ShapeModel};
 use crate::fault::{Fault, Result};
 use crate::find::scene::{Kind, Region, Scene};
-use crate::raster::Image;
+use crate::raster::{Image, Mask};
 
 /// A part as one picture shows it. What `teach --region` writes and `match` reads.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -44,10 +44,25 @@ impl Template {
         source: (String, String),
         options: &ModelOptions,
     ) -> Result<Template> {
+        Template::teach_in_part(name, image, None, region, source, options)
+    }
+
+    /// The same of a picture that is hidden where `hidden` is lit: nothing is learnt there, and no rim of it.
+    ///
+    /// # Errors
+    /// As [`Template::teach`].
+    pub fn teach_in_part(
+        name: &str,
+        image: &Image,
+        hidden: Option<&Mask>,
+        region: Option<[u32; 4]>,
+        source: (String, String),
+        options: &ModelOptions,
+    ) -> Result<Template> {
         let [x, y, w, h] = region.unwrap_or([0, 0, image.width, image.height]);
         let end = |a: u32, b: u32| a as usize + b as usize;
         let cells = Region { x0: x as usize, y0: y as usize, x1: end(x, w), y1: end(y, h) };
-        let model = ShapeModel::from_region(&Scene::from_image(image), cells, None, options)?;
+        let model = ShapeModel::from_region(&Scene::from_image_in_part(image, hidden), cells, None, options)?;
         Ok(Template {
             format: 1,
             name: name.into(),

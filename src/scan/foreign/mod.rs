@@ -3,6 +3,7 @@
 
 mod fields;
 mod lines;
+mod missing;
 mod pcd;
 mod picture;
 mod ply;
@@ -11,4 +12,4 @@ mod read;
 
 pub use lines::{Lines, Stated, lines};
 pub use raw::Raw;
-pub use read::read_foreign;
+pub use read::{read_foreign, read_foreign_page};

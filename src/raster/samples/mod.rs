@@ -1,0 +1,17 @@
+//! Reads the samples of a picture file as they are written, and what the file itself says about them.
+
+mod kind;
+mod other;
+mod pgm;
+mod png;
+mod read;
+mod says;
+mod tiff;
+mod tiff_pages;
+mod tiff_tags;
+mod turn;
+
+pub use kind::Kind;
+pub(super) use kind::Values;
+pub use read::{Samples, Wanted};
+pub use says::Says;
