@@ -127,8 +127,8 @@ fn hidden(samples: &Samples) -> Option<Mask> {
     (mask.count() > 0).then_some(mask)
 }
 
-/// The picture of samples that are shades: levels of fewer than 8 bits are stretched to 8, since the largest is saturation;
-/// where white is 0 they are turned round.
+/// The picture of samples that are shades: levels of fewer than 8 bits are stretched to 8, since the largest is
+/// saturation; where white is 0 they are turned round.
 fn image(samples: Samples, channel: Channel, depth: Depth) -> Result<Image> {
     let Samples { width, height, channels, kind, values, says, .. } = samples;
     let stored = match (kind, &values) {

@@ -35,7 +35,9 @@ pub fn read_float_tiff(bytes: &[u8]) -> Result<(u32, u32, Vec<f32>)> {
     let samples = read.map_err(|e| strange(e.what))?;
     match (samples.kind, samples.channels, samples.values) {
         (Kind::Float(32), 1, Values::F32(values)) => Ok((samples.width, samples.height, values)),
-        (kind, channels, _) => Err(strange(format!("its pixels are {channels} x {kind}, wanted one 32-bit float each"))),
+        (kind, channels, _) => {
+            Err(strange(format!("its pixels are {channels} x {kind}, wanted one 32-bit float each")))
+        }
     }
 }
 

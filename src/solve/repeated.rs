@@ -11,8 +11,8 @@ const SHARE: f64 = 0.002;
 /// Alone on one side of all others, so many times as far away as they reach.
 const APART: f64 = 3.0;
 
-/// Numbers that may stand for a missing one, with how many there are of each, the most first. A flat surface that was computed,
-/// not measured, looks the same; so this is a reason to ask, not to drop.
+/// Numbers that may stand for a missing one, with how many there are of each, the most first. A flat surface that was
+/// computed, not measured, looks the same; so this is a reason to ask, not to drop.
 pub fn repeated(values: impl Iterator<Item = f64>) -> Vec<(f64, usize)> {
     let mut sorted: Vec<f64> = values.filter(|v| v.is_finite()).collect();
     sorted.par_sort_unstable_by(f64::total_cmp);
@@ -56,7 +56,8 @@ mod tests {
         // Two at once; steps of a coarse sensor with a missing level far from them.
         let two = (0..1000).map(|i| [0.0, -9999.0, noise(300.0, 10.0)][(i % 10).min(2)]).collect::<Vec<_>>();
         assert_eq!(repeated(two.into_iter()), [(-9999.0, 100), (0.0, 100)]);
-        let coarse = (0..1000).map(|i| if i % 9 == 0 { -32_768.0 } else { noise(50.0, 5.0).round() }).collect::<Vec<_>>();
+        let coarse =
+            (0..1000).map(|i| if i % 9 == 0 { -32_768.0 } else { noise(50.0, 5.0).round() }).collect::<Vec<_>>();
         assert_eq!(repeated(coarse.into_iter()), [(-32_768.0, 112)]);
         // Measured: noise, steps of a coarse sensor, a plate with two heights, one flat height.
         let fine = (0..1000).map(|_| noise(5.0, 0.5)).collect::<Vec<_>>();

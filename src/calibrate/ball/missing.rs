@@ -29,8 +29,8 @@ pub fn cleaned(mut profiles: Vec<Profile>, missing: Option<f64>) -> Cleaned {
     let found = repeated(profiles.iter().flat_map(|p| &p.points).map(|point| point[1]));
     warnings.extend(found.iter().map(|(z, n)| {
         format!(
-            "{n} of {left} points have exactly the z {z}: if that means 'not measured', give --missing {z}; where the error is \
-             stated they are left out of the points' depth"
+            "{n} of {left} points have exactly the z {z}: if that means 'not measured', give --missing {z}; where the \
+             error is stated they are left out of the points' depth"
         )
     }));
     Cleaned { profiles, suspects: found.into_iter().map(|f| f.0).collect(), warnings }

@@ -1,4 +1,4 @@
-//! Runs ffmpeg as a camera: it opens what it is told in its own words, and gives grey frames with the levels that were sent.
+//! Runs ffmpeg as a camera: it opens what it is told in its own words, and gives grey frames with the levels as sent.
 
 use super::pipe::Pipe;
 use crate::capture::format::{Format, RawFormat};
@@ -81,8 +81,8 @@ fn size(arguments: &[String], bits: u8) -> Result<Format> {
         .next(format!("try it by itself: ffmpeg {} -f null -", arguments.join(" "))))
 }
 
-/// Leaves levels as the camera sends them: without it ffmpeg takes luma without a tag for 16 to 235 and stretches that to 0 to
-/// 255. It comes behind the filters that a person asks for.
+/// Leaves levels as the camera sends them: without it ffmpeg takes luma without a tag for 16 to 235 and stretches that
+/// to 0 to 255. It comes behind the filters that a person asks for.
 const AS_SENT: &str = "scale=in_range=full:out_range=full";
 
 /// The arguments with that filter, behind those of the last `-vf`, which is the one that ffmpeg takes.
@@ -98,8 +98,12 @@ fn as_sent(arguments: &[String]) -> Vec<String> {
 
 fn start(arguments: &[String], format: Format) -> Result<(Child, Pipe, Receiver<String>)> {
     let out = ["-map", "0:v:0", "-fps_mode", "passthrough", "-f", "rawvideo", "-pix_fmt", layout(format.bits), "-"];
-    let mut child =
-        command(&as_sent(arguments)).args(out).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().map_err(missing)?;
+    let mut child = command(&as_sent(arguments))
+        .args(out)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .map_err(missing)?;
     let (stdout, stderr) = (child.stdout.take().expect("piped"), child.stderr.take().expect("piped"));
     let (send, said) = channel();
     let listen = move || {

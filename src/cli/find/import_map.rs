@@ -10,11 +10,12 @@ use std::path::PathBuf;
 
 /// Take in a height map or cloud of another sensor, so that find works on it
 ///
-/// Reads TIFF and BigTIFF (whole numbers of 1 to 64 bits with or without sign, floats of 16, 32 and 64 bits), PNG, PGM and BMP whose
-/// levels are heights, PLY (text, binary) and PCD (text, binary, compressed). What the file says about its levels (orientation,
-/// missing level, scale, transparency) is honoured. Units, distances and the level that means nothing was measured are stated, never guessed; how much heights scatter
-/// is measured unless stated. The result is a scan folder with cloud, height map and scan.json, which names the file and its hash.
-/// Its frame is called map: poses that find gives are in it, not in a robot's base, and no calibration is in their error budget.
+/// Reads TIFF and BigTIFF (whole numbers of 1 to 64 bits with or without sign, floats of 16, 32 and 64 bits), PNG, PGM and
+/// BMP whose levels are heights, PLY (text, binary) and PCD (text, binary, compressed). What the file says about its levels
+/// (orientation, missing level, scale, transparency) is honoured. Units, distances and the level that means nothing was
+/// measured are stated, never guessed; how much heights scatter is measured unless stated. The result is a scan folder with
+/// cloud, height map and scan.json, which names the file and its hash. Its frame is called map: poses that find gives are in
+/// it, not in a robot's base, and no calibration is in their error budget.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight import-map plate.png --unit-mm 0.02 --spacing-mm 0.216,0.209 --missing 0 \\

@@ -126,9 +126,14 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let (mut all, mut drawn) = (Vec::new(), Vec::new());
     for (k, path) in args.pictures.iter().enumerate() {
         let (image, hidden) = load_in_part(path, args.channel, depth(args.bits))?;
-        let matches =
-            find_in(&Scene::from_image_in_part(&image, hidden.as_ref()), &template.model, &options, area.as_ref(), accelerator.as_ref())
-                .map_err(|e| e.at(path.display()))?;
+        let matches = find_in(
+            &Scene::from_image_in_part(&image, hidden.as_ref()),
+            &template.model,
+            &options,
+            area.as_ref(),
+            accelerator.as_ref(),
+        )
+        .map_err(|e| e.at(path.display()))?;
         if let Some(file) = overlays.get(k) {
             drawn.push((file, draw(&image, &template.model, &matches).to_png()));
         }
@@ -189,7 +194,11 @@ fn template(args: &Args) -> Result<Template> {
 }
 
 fn depth(bits: u8) -> Depth {
-    Depth { bits, declared: "--bits says", correct: "give --bits the depth of the sensor: 8, or 9 to 16 for files of 16 bits" }
+    Depth {
+        bits,
+        declared: "--bits says",
+        correct: "give --bits the depth of the sensor: 8, or 9 to 16 for files of 16 bits",
+    }
 }
 
 /// Largest picture file that a part is taught from.

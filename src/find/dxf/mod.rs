@@ -157,8 +157,8 @@ fn contradicted(unit: Unit, measurement: Option<i64>) -> Option<String> {
     let imperial = ["inch", "mil", "foot"].contains(&unit.name);
     (imperial && measurement == Some(1)).then(|| {
         format!(
-            "the file says that it is drawn in {0} ($INSUNITS) and that it is metric ($MEASUREMENT 1): one of them is wrong; {0} was \
-             taken, --unit mm overrules it",
+            "the file says that it is drawn in {0} ($INSUNITS) and that it is metric ($MEASUREMENT 1): one of them is \
+             wrong; {0} was taken, --unit mm overrules it",
             unit.name
         )
     })

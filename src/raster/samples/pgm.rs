@@ -1,5 +1,4 @@
-//! Reads PGM (P5 and P2) with its levels as they are written: other readers stretch a 12-bit sensor's levels, whose file
-//! says 4095, to 16 bits.
+//! Reads PGM (P5 and P2) with its levels as they are written: other readers stretch a 12-bit sensor's levels to 16 bits.
 
 use super::kind::{Kind, Values};
 use super::read::{Samples, Wanted};

@@ -66,7 +66,9 @@ fn samples(info: &Info, raw: Vec<u8>) -> Result<Samples> {
     };
     let mut notes = Vec::new();
     if let Some(s) = info.sbit.as_ref().and_then(|s| s.iter().max()).filter(|s| **s < bits) {
-        notes.push(format!("the file says that {s} of its {bits} bits count (sBIT); levels are taken as they are written"));
+        notes.push(format!(
+            "the file says that {s} of its {bits} bits count (sBIT); levels are taken as they are written"
+        ));
     }
     let says = Says { notes, ..Says::default() };
     let kind = Kind::Unsigned(bits);

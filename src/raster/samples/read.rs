@@ -47,7 +47,9 @@ impl Wanted {
     pub(super) fn fits(&self, orientation: u16, stored: [u32; 2]) -> Result<()> {
         let [width, height] = turn::size(orientation, stored);
         let turned = |e: Fault| {
-            e.cause(format!("the file's orientation (tag 274 = {orientation}) swaps columns and rows of what it stores"))
+            e.cause(format!(
+                "the file's orientation (tag 274 = {orientation}) swaps columns and rows of what it stores"
+            ))
         };
         let swapped = [width, height] != stored;
         fits(width, height, self.size).map_err(|e| if swapped { turned(e) } else { e })?;
@@ -69,8 +71,9 @@ impl Samples {
     pub fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
         let paged = tiff::begins(bytes);
         if let Some(page) = wanted.page.filter(|_| !paged) {
-            return Err(Fault::usage(format!("page {page} is asked for, but only a TIFF has pages"))
-                .next("leave the page out"));
+            return Err(
+                Fault::usage(format!("page {page} is asked for, but only a TIFF has pages")).next("leave the page out")
+            );
         }
         if paged {
             return tiff::read(bytes, wanted);
@@ -134,7 +137,9 @@ impl Samples {
             self.hidden = Some(Mask::from_fn(self.width, self.height, |_, _| from.next().is_some_and(at)));
         }
         self.says.orientation = Some(orientation);
-        self.says.notes.push(format!("the picture was turned upright as its orientation says (tag 274 = {orientation})"));
+        self.says
+            .notes
+            .push(format!("the picture was turned upright as its orientation says (tag 274 = {orientation})"));
         self
     }
 }

@@ -46,7 +46,9 @@ type File<'a> = Decoder<Cursor<&'a [u8]>>;
 
 fn number(file: &mut File, tag: Tag, otherwise: u16) -> Result<u16> {
     let found = file.find_tag_unsigned::<u16>(tag);
-    found.map(|n| n.unwrap_or(otherwise)).map_err(|e| refused(format!("has a tag {} that is no number: {e}", tag.to_u16())))
+    found
+        .map(|n| n.unwrap_or(otherwise))
+        .map_err(|e| refused(format!("has a tag {} that is no number: {e}", tag.to_u16())))
 }
 
 fn numbers(file: &mut File, tag: Tag) -> Vec<u16> {
@@ -91,7 +93,7 @@ pub(super) fn tags(file: &mut File) -> Result<Tags> {
         (Some(1), []) if shades == Shades::Rgb => true,
         _ => {
             return Err(refused(format!(
-                "has {samples} samples a pixel where {colours} are meant (SamplesPerPixel, tag 277; ExtraSamples, tag 338)"
+                "has {samples} samples a pixel where {colours} are meant (SamplesPerPixel, tag 277; ExtraSamples, 338)"
             ))
             .cause("several bands or measurements in one picture; which of them is meant is not said")
             .next("save the band that is meant as a TIFF of its own"));
@@ -121,10 +123,7 @@ pub(super) fn tags(file: &mut File) -> Result<Tags> {
     }
     let palette = if shades == Shades::Palette { numbers(file, Tag::ColorMap) } else { vec![] };
     if shades == Shades::Palette && (!matches!(kind, Kind::Unsigned(1..=8)) || palette.len() != 3 << bits) {
-        return Err(refused(format!(
-            "has a palette of {} numbers for {kind} (ColorMap, tag 320)",
-            palette.len()
-        )));
+        return Err(refused(format!("has a palette of {} numbers for {kind} (ColorMap, tag 320)", palette.len())));
     }
     let says = says(file, photometric)?;
     Ok(Tags { shades, kind, bits: bits as u8, samples: usize::from(samples), alpha, orientation, palette, says })
@@ -139,14 +138,17 @@ fn says(file: &mut File, photometric: u16) -> Result<Says> {
     };
     if let Some(text) = text(file, Tag::GdalNodata) {
         says.missing = Some(text.parse().map_err(|_| {
-            Fault::input(format!("names '{text}' as the sample of a missing pixel (GDAL_NODATA, tag 42113), which is no number"))
-                .cause("a slip of the program that wrote the file")
-                .next("correct the tag, or take it out")
+            Fault::input(format!(
+                "names '{text}' as the sample of a missing pixel (GDAL_NODATA, tag 42113), which is no number"
+            ))
+            .cause("a slip of the program that wrote the file")
+            .next("correct the tag, or take it out")
         })?);
     }
     let gdal = text(file, GDAL_METADATA).map(|xml| scale_of_gdal(&xml)).transpose()?.flatten();
     let imagej = text(file, Tag::ImageDescription).map(|t| scale_of_imagej(&t)).transpose()?.flatten();
-    if let Some(([factor, offset], by)) = gdal.map(|s| (s, "GDAL, tag 42112")).or(imagej.map(|s| (s, "ImageJ, tag 270")))
+    if let Some(([factor, offset], by)) =
+        gdal.map(|s| (s, "GDAL, tag 42112")).or(imagej.map(|s| (s, "ImageJ, tag 270")))
         && [factor, offset] != [1.0, 0.0]
     {
         says.scale = Some([factor, offset]);
@@ -193,8 +195,10 @@ fn scale_of_imagej(description: &str) -> Result<Option<[f64; 2]>> {
     match value("cf").map(str::trim) {
         None => Ok(None),
         Some("0") => line(value("c1"), value("c0")),
-        Some(other) => Err(refused(format!("calibrates its samples by ImageJ's function {other}, wanted 0, a straight line"))
-            .next("in ImageJ apply the calibration and save the result as 32 bits")),
+        Some(other) => {
+            Err(refused(format!("calibrates its samples by ImageJ's function {other}, wanted 0, a straight line"))
+                .next("in ImageJ apply the calibration and save the result as 32 bits"))
+        }
     }
 }
 

@@ -1,6 +1,6 @@
-//! In: what a foreign file holds, and what its user states about it. Out: a cloud in lines, as if a scan had made one shot of each.
-//! Frame and unit: the file's own frame, mm. A height picture's x runs along its columns, z towards the sensor, and y makes the frame
-//! right-handed: against the rows of a picture that is seen from the sensor.
+//! Makes of a foreign file, and of what its user states about it, a cloud in lines, as if a scan had made a shot of each.
+//! Places are in the file's own frame, mm. A height picture's x runs along its columns, z towards the sensor, and y makes the
+//! frame right-handed: against the rows of a picture that is seen from the sensor.
 
 use super::missing;
 use super::raw::Raw;
@@ -17,8 +17,8 @@ pub struct Stated {
     pub unit_mm: Option<f64>,
     /// Height of level 0, mm.
     pub offset_mm: f64,
-    /// The level of a picture, or the z of a cloud, where nothing was measured; `Some(None)`: every one is a height, whatever the
-    /// file says.
+    /// The level of a picture, or the z of a cloud, where nothing was measured; `Some(None)`: every one is a height,
+    /// whatever the file says.
     pub missing: Option<Option<f64>>,
     /// The picture is seen from behind the sensor, or its rows run upwards: y runs along the rows.
     pub rows_up: bool,
@@ -160,22 +160,22 @@ fn said(says: &Says, [dx, dy]: [f64; 2], stated: &Stated, notes: &mut Vec<String
     notes.extend(says.notes.iter().cloned());
     if says.white_is_zero {
         notes.push(
-            "the file says that 0 is white (PhotometricInterpretation, tag 262), which is how to show it: the levels were \
-             taken as heights as they are written"
+            "the file says that 0 is white (PhotometricInterpretation, tag 262), which is how to show it: the levels \
+             were taken as heights as they are written"
                 .into(),
         );
     }
     if says.orientation.is_some() && stated.rows_up {
         notes.push(
-            "--rows-up came on top of the file's orientation, which was obeyed already: leave it out if rows counted from \
-             the bottom were the reason"
+            "--rows-up came on top of the file's orientation, which was obeyed already: leave it out if rows counted \
+             from the bottom were the reason"
                 .into(),
         );
     }
     if let Some([x, y]) = says.spacing.filter(|s| (s[0] / dx - 1.0).abs() > 0.01 || (s[1] / dy - 1.0).abs() > 0.01) {
         notes.push(format!(
-            "the file says that its pixels are {x} x {y} apart, in a unit that it does not name (ModelPixelScale, tag 33550); \
-             {dx} x {dy} mm are used, as stated"
+            "the file says that its pixels are {x} x {y} apart, in a unit that it does not name (ModelPixelScale, \
+             tag 33550); {dx} x {dy} mm are used, as stated"
         ));
     }
 }
@@ -194,9 +194,11 @@ fn brightness(light: &Raw, [width, height]: [usize; 2]) -> Result<Vec<f32>> {
         (false, _) => None,
         (true, Some(most)) => Some(most),
         (true, None) => {
-            return Err(Fault::input("the picture of the light says that 0 is white (PhotometricInterpretation, tag 262)")
-                .cause("numbers with a sign or a point do not say which of them is black")
-                .next("save it with 0 as black"));
+            return Err(Fault::input(
+                "the picture of the light says that 0 is white (PhotometricInterpretation, tag 262)",
+            )
+            .cause("numbers with a sign or a point do not say which of them is black")
+            .next("save it with 0 as black"));
         }
     };
     let known = |v: f64| !says.missing.is_some_and(|level| kind.same(v, level));

@@ -1,4 +1,4 @@
-//! Which numbers mean "not measured": what a person states, what the file says, and what looks as if nobody had said it.
+//! Which numbers mean "not measured": what a person states, what the file says, and what looks as if nobody said it.
 
 use super::lines::Stated;
 use crate::fault::{Fault, Result};
@@ -35,7 +35,8 @@ pub(super) fn of_picture(
         (Some(None), None) => vec![],
         (Some(None), Some((level, n))) => {
             notes.push(format!(
-                "the file names the level {} as missing (GDAL_NODATA), --missing none overrules it: {n} pixels with it are heights",
+                "the file names the level {} as missing (GDAL_NODATA), --missing none overrules it: {n} pixels with it \
+                 are heights",
                 Plain(level)
             ));
             vec![]
@@ -52,7 +53,9 @@ pub(super) fn of_picture(
     if let Some(Some(level)) = stated.missing
         && count(level) == 0
     {
-        notes.push(format!("no pixel has the level {level:?} that --missing names: every other pixel counts as measured"));
+        notes.push(format!(
+            "no pixel has the level {level:?} that --missing names: every other pixel counts as measured"
+        ));
     }
     Ok(missing)
 }
@@ -79,7 +82,12 @@ pub(super) fn of_cloud<'a>(
 }
 
 /// Names numbers that look as if they stood for "not measured", which nobody has stated.
-pub(super) fn suspects(stated: &Stated, heights: impl Iterator<Item = f64> + Clone, what: &str, notes: &mut Vec<String>) {
+pub(super) fn suspects(
+    stated: &Stated,
+    heights: impl Iterator<Item = f64> + Clone,
+    what: &str,
+    notes: &mut Vec<String>,
+) {
     if stated.missing == Some(None) {
         return;
     }

@@ -143,14 +143,13 @@ fn all_formats_hold_the_same_points() {
 
 #[test]
 fn nothing_is_guessed() {
-    let picture =
-        Raw::Picture {
-            width: 40,
-            height: 4,
-            levels: (0..160).map(|i| f64::from(i % 5)).collect(),
-            kind: Kind::Unsigned(8),
-            says: Says::default(),
-        };
+    let picture = Raw::Picture {
+        width: 40,
+        height: 4,
+        levels: (0..160).map(|i| f64::from(i % 5)).collect(),
+        kind: Kind::Unsigned(8),
+        says: Says::default(),
+    };
     let scattered = Raw::Points { line: None, points: vec![[0.0, 0.0, 1.0]; 100], intensity: None };
     let full =
         Stated { unit_mm: Some(0.1), spacing_mm: Some([1.0, 1.0]), missing: Some(Some(0.0)), ..Stated::default() };
