@@ -4,7 +4,9 @@ use rayon::slice::ParallelSliceMut;
 
 /// Fewer equal numbers happen by chance.
 const LEAST: usize = 8;
-/// So many times as often as the next one, a number is no measurement among others.
+/// A file stands in for missing measurements with at most so many numbers.
+const AT_MOST: usize = 3;
+/// So many times as often as those that come after these, a number is no measurement among others.
 const OFTEN: usize = 8;
 /// Least share of all numbers, for one that lies among the others.
 const SHARE: f64 = 0.002;
@@ -29,14 +31,13 @@ pub fn repeated(values: impl Iterator<Item = f64>) -> Vec<(f64, usize)> {
         ends.extend(alone(n - 1, n - 2, 0).then(|| runs[n - 1]));
     }
     runs.sort_unstable_by_key(|run| std::cmp::Reverse(run.1));
-    if let [first, second, ..] = runs[..]
-        && first.1 >= LEAST.max((SHARE * all as f64) as usize)
-        && first.1 >= OFTEN * second.1
-        && !ends.contains(&first)
-    {
-        ends.push(first);
+    if let Some(usual) = runs.get(AT_MOST) {
+        let least = LEAST.max((SHARE * all as f64) as usize).max(OFTEN * usual.1);
+        ends.extend(runs[..AT_MOST].iter().filter(|run| run.1 >= least));
+        ends.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        ends.dedup();
     }
-    ends.sort_unstable_by_key(|run| std::cmp::Reverse(run.1));
+    ends.sort_by_key(|run| std::cmp::Reverse(run.1));
     ends
 }
 
@@ -56,6 +57,8 @@ mod tests {
         // Two at once; steps of a coarse sensor with a missing level far from them.
         let two = (0..1000).map(|i| [0.0, -9999.0, noise(300.0, 10.0)][(i % 10).min(2)]).collect::<Vec<_>>();
         assert_eq!(repeated(two.into_iter()), [(-9999.0, 100), (0.0, 100)]);
+        let near = (0..1000).map(|i| [0.0, 1.0, noise(1.0, 3.0)][(i % 10).min(2)]).collect::<Vec<_>>();
+        assert_eq!(repeated(near.into_iter()), [(0.0, 100), (1.0, 100)]);
         let coarse =
             (0..1000).map(|i| if i % 9 == 0 { -32_768.0 } else { noise(50.0, 5.0).round() }).collect::<Vec<_>>();
         assert_eq!(repeated(coarse.into_iter()), [(-32_768.0, 112)]);

@@ -81,7 +81,9 @@ fn samples(info: &Info, raw: Vec<u8>) -> Result<Samples> {
         return Ok(samples.parted(opaque));
     }
     if let Some(clear) = &info.trns {
-        let clear: Vec<f64> = clear.chunks_exact(2).map(|b| f64::from(u16::from_be_bytes([b[0], b[1]]))).collect();
+        // The `png` crate keeps one byte of each level of up to 8 bits.
+        let level = |b: &[u8]| f64::from(b.iter().fold(0u16, |v, b| v << 8 | u16::from(*b)));
+        let clear: Vec<f64> = clear.chunks_exact(if bits == 16 { 2 } else { 1 }).map(level).collect();
         let there: Vec<f64> = (0..samples.pixel_count())
             .map(|i| f64::from(!clear.iter().enumerate().all(|(c, v)| samples.get(i, c) == *v)))
             .collect();

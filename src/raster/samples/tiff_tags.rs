@@ -78,8 +78,6 @@ pub(super) fn tags(file: &mut File) -> Result<Tags> {
                 5 => "CMYK",
                 6 => "YCbCr",
                 8..=10 => "CIE L*a*b*",
-                32_803 => "the mosaic of a colour sensor",
-                34_892 => "linear raw data of a camera",
                 _ => "unknown",
             };
             return Err(refused(format!("has colours of kind {other}, {name} (PhotometricInterpretation, tag 262)")));
