@@ -63,6 +63,27 @@ impl Layer {
         }
     }
 
+    /// Gives missing cells the values of their neighbours, ring by ring; a layer without any value stays as it is.
+    fn carry_on(&mut self) {
+        let (w, h) = (self.width, self.height);
+        let mut ring: Vec<usize> = (0..w * h).filter(|i| !self.values[*i].is_nan()).collect();
+        while !ring.is_empty() {
+            let mut next = vec![];
+            for i in ring {
+                let (x, y) = (i % w, i / w);
+                let beside =
+                    [(x > 0, i.wrapping_sub(1)), (x + 1 < w, i + 1), (y > 0, i.wrapping_sub(w)), (y + 1 < h, i + w)];
+                for (_, k) in beside.into_iter().filter(|b| b.0) {
+                    if self.values[k].is_nan() {
+                        self.values[k] = self.values[i];
+                        next.push(k);
+                    }
+                }
+            }
+            ring = next;
+        }
+    }
+
     /// Share of cells that hold a value.
     pub fn coverage(&self) -> f64 {
         self.values.iter().filter(|v| !v.is_nan()).count() as f64 / self.values.len() as f64
@@ -168,6 +189,11 @@ impl Scene {
             }
         }
         scene
+    }
+    /// The same, with every missing cell holding the value of a nearest one that is there, in steps along columns and rows.
+    pub fn carried_on(mut self) -> Scene {
+        self.layers.iter_mut().for_each(Layer::carry_on);
+        self
     }
     /// Columns, px.
     pub fn width(&self) -> usize {

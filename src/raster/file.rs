@@ -1,6 +1,6 @@
 //! Makes grey images with the depth the sensor had of picture files, grey or colour.
 
-use super::samples::{Kind, Samples, Values, Wanted};
+use super::samples::{Kind, Samples, Values, Wanted, read_samples};
 use super::size::MOST_PIXELS;
 use super::{Image, Mask, Pixels};
 use crate::fault::{Fault, Result};
@@ -104,7 +104,7 @@ fn whole(shown: Result<(Image, Option<Mask>)>) -> Result<Image> {
 }
 
 fn shown(bytes: &[u8], channel: Channel, depth: Depth, size: Option<[u32; 2]>) -> Result<(Image, Option<Mask>)> {
-    let samples = Samples::read(bytes, &Wanted { size, most: MOST_PIXELS, page: None })?;
+    let samples = read_samples(bytes, &Wanted { size, most: MOST_PIXELS, page: None })?;
     if samples.veiled > 0 {
         return Err(Fault::input(format!("{} pixels are transparent in part", samples.veiled))
             .cause("an editor's soft rim; what such a pixel showed is not known")

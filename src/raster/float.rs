@@ -1,7 +1,7 @@
 //! In: float values on a grid. Out: a single-channel 32-bit float TIFF, and the way back.
 //! Frame and unit: the caller's; NaN stays NaN.
 
-use super::samples::{Kind, Samples, Values, Wanted};
+use super::samples::{Kind, Values, Wanted, read_samples};
 use crate::fault::{Fault, Result};
 use std::io::Cursor;
 use tiff::encoder::{TiffEncoder, colortype::Gray32Float};
@@ -31,7 +31,7 @@ pub fn read_float_tiff(bytes: &[u8]) -> Result<(u32, u32, Vec<f32>)> {
             .cause("another kind of picture, or a truncated file")
             .next("give the height.tif of a scan, or a single-channel 32-bit float TIFF")
     };
-    let read = Samples::read(bytes, &Wanted { size: None, most: MOST_CELLS, page: None });
+    let read = read_samples(bytes, &Wanted { size: None, most: MOST_CELLS, page: None });
     let samples = read.map_err(|e| strange(e.what))?;
     match (samples.kind, samples.channels, samples.values) {
         (Kind::Float(32), 1, Values::F32(values)) => Ok((samples.width, samples.height, values)),

@@ -19,7 +19,7 @@ pub use image8::{Rgb, RgbImage};
 pub use light::Light;
 pub use mask::Mask;
 pub use response::Response;
-pub use samples::{Kind, Samples, Says, Wanted};
+pub use samples::{Kind, Samples, Says, Wanted, read_samples};
 pub use size::{MOST_PIXELS, MOST_SIDE};
 pub use text::text_width;
 

@@ -102,10 +102,10 @@ fn lists_and_other_elements_of_a_ply_are_passed_over() {
         };
         let plain: Vec<u8> = all.iter().flat_map(|p| bytes(big, p)).collect();
         // Lists of different lengths in each vertex, of faces before the vertices, and of both.
-        let listed = |k: usize| [&length(big, (k % 3) as u16)[..], &vec![9; k % 3]].concat();
+        let listed = |k: usize| [&length(big, (k % 3) as u16)[..], &vec![9; 2 * (k % 3)]].concat();
         let inside: Vec<u8> = all.iter().enumerate().flat_map(|(k, p)| [bytes(big, p), listed(k)].concat()).collect();
         let faces: Vec<u8> = (0..5).flat_map(listed).collect();
-        let list = "property list ushort uchar seen\n";
+        let list = "property list ushort ushort seen\n";
         let before = format!("element face 5\n{list}");
         for (k, file) in [
             [head("", "").into_bytes(), plain.clone()].concat(),

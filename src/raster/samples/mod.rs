@@ -3,6 +3,7 @@
 mod kind;
 mod other;
 mod pgm;
+mod picture;
 mod png;
 mod read;
 mod says;
@@ -13,5 +14,6 @@ mod turn;
 
 pub use kind::Kind;
 pub(super) use kind::Values;
-pub use read::{Samples, Wanted};
+pub use picture::{Samples, Wanted};
+pub use read::read_samples;
 pub use says::Says;

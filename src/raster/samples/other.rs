@@ -1,7 +1,7 @@
 //! Reads JPEG, BMP and the rarer kinds of PNM through the `image` crate.
 
 use super::kind::{Kind, Values};
-use super::read::{DECODING, Samples, Wanted, unreadable};
+use super::picture::{DECODING, Samples, Wanted, unreadable};
 use super::says::Says;
 use crate::fault::{Fault, Result};
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};

@@ -1,7 +1,7 @@
 //! Reads PGM (P5 and P2) with its levels as they are written: other readers stretch a 12-bit sensor's levels to 16 bits.
 
 use super::kind::{Kind, Values};
-use super::read::{Samples, Wanted};
+use super::picture::{Samples, Wanted};
 use super::says::Says;
 use crate::fault::{Fault, Result};
 

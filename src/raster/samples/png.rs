@@ -1,7 +1,7 @@
 //! Reads PNG: levels of 1, 2 and 4 bits as written, palettes, transparency and the orientation of an eXIf chunk.
 
 use super::kind::{Kind, Values};
-use super::read::{DECODING, Samples, Wanted, unreadable};
+use super::picture::{DECODING, Samples, Wanted, unreadable};
 use super::says::Says;
 use crate::fault::{Fault, Result};
 use image::metadata::Orientation;

@@ -1,8 +1,8 @@
 //! Reads TIFF and BigTIFF: one page, every kind of number, samples as they are written.
 
 use super::kind::{Kind, Values};
+use super::picture::{DECODING, Samples, Wanted};
 use super::png::unpacked;
-use super::read::{DECODING, Samples, Wanted};
 use super::tiff_pages::pages;
 use super::tiff_tags::{Shades, Tags, tags};
 use crate::fault::{Fault, Result};

@@ -1,6 +1,6 @@
 //! Which numbers mean "not measured": what a person states, what the file says, and what looks as if nobody said it.
 
-use super::lines::Stated;
+use super::stated::Stated;
 use crate::fault::{Fault, Result};
 use crate::raster::{Kind, Says};
 use crate::solve::repeated;

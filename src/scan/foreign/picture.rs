@@ -2,11 +2,11 @@
 
 use super::raw::{MOST_POINTS, Raw};
 use crate::fault::{Fault, Result};
-use crate::raster::{Samples, Wanted};
+use crate::raster::{Wanted, read_samples};
 
 pub(super) fn read(bytes: &[u8], page: Option<usize>) -> Result<Raw> {
     let wanted = Wanted { size: None, most: MOST_POINTS as u64, page };
-    let samples = Samples::read(bytes, &wanted)?;
+    let samples = read_samples(bytes, &wanted)?;
     if samples.says.lossy {
         return Err(Fault::input("is compressed as JPEG: its levels are no longer those that were measured")
             .cause("a picture of the heights for people")
