@@ -89,11 +89,12 @@ fn lists_and_other_elements_of_a_ply_are_passed_over() {
     let all = points();
     let n = all.len();
     let bytes = |big: bool, v: &[f32]| -> Vec<u8> {
-        v.iter().flat_map(|v| if big { v.to_be_bytes() } else { v.to_le_bytes() }).collect()
+        let xyz = v.iter().flat_map(|v| if big { v.to_be_bytes() } else { v.to_le_bytes() });
+        xyz.chain([7; 8]).collect()
     };
     let length = |big: bool, v: u16| if big { v.to_be_bytes() } else { v.to_le_bytes() };
     for (big, name) in [(false, "binary_little_endian"), (true, "binary_big_endian")] {
-        let xyz = "property float x\nproperty FLOAT32 y\nproperty Float z\n";
+        let xyz = "property float x\nproperty FLOAT32 y\nproperty Float z\nproperty uint64 t\n";
         let head = |before: &str, after: &str| {
             format!(
                 "ply\nformat {name} 1.0\ncomment this end_header is none\nobj_info num_cols 40\n{before}element vertex {n}\n{xyz}\

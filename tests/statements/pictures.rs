@@ -350,8 +350,8 @@ fn colours_are_refused_where_one_number_is_meant() {
         assert!(decode(&coloured, Channel::Green, 8).is_ok());
     }
     assert_eq!(decode(&rgb(&colours), Channel::Blue, 8).unwrap().to_u8(), [30, 10]);
-    let offsets = tiff(&[planes.short(284, 1)], false, false);
-    assert_eq!(decode(&offsets, Channel::Green, 8).unwrap().to_u8(), [10, 30]);
+    let offsets = tiff(&[planes.planes(3)], false, false);
+    assert_eq!(decode(&offsets, Channel::Green, 8).unwrap().to_u8(), [20, 10]);
     refused(read_foreign(&written([8, 8], &[9; 64], Kind::L8, image::ImageFormat::Jpeg)), "JPEG");
     refused(read_foreign(b"P4 8 1\n\xaa"), "two shades");
 }

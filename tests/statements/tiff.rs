@@ -7,6 +7,8 @@ pub struct Page {
     data: Vec<u8>,
     /// Bytes of a sample, for the other byte order.
     sample: usize,
+    /// Strips of equal length that the samples are stored in; more than one where channels are planes.
+    strips: usize,
 }
 
 const SHORT: u16 = 3;
@@ -18,7 +20,7 @@ fn bytes_of(kind: u16) -> usize {
 impl Page {
     /// Grey samples of `bits` and `format` (1 whole, 2 with a sign, 3 floating point), given as little-endian bytes.
     pub fn grey([width, height]: [u16; 2], bits: u16, format: u16, data: Vec<u8>) -> Page {
-        let page = Page { tags: vec![], data, sample: usize::from(bits).div_ceil(8) };
+        let page = Page { tags: vec![], data, sample: usize::from(bits).div_ceil(8), strips: 1 };
         let page = page.short(256, width).short(257, height).short(258, bits).short(259, 1).short(262, 1);
         page.short(277, 1).short(278, height).short(339, format)
     }
@@ -26,6 +28,11 @@ impl Page {
     /// A page of 32-bit floats.
     pub fn floats(size: [u16; 2], values: &[f32]) -> Page {
         Page::grey(size, 32, 3, values.iter().flat_map(|v| v.to_le_bytes()).collect())
+    }
+
+    /// Channels one after another (PlanarConfiguration 2), so many of them.
+    pub fn planes(self, strips: usize) -> Page {
+        Page { strips, ..self }.short(284, 2)
     }
 
     pub fn with(mut self, tag: u16, kind: u16, value: Vec<u8>) -> Page {
@@ -69,8 +76,9 @@ pub fn tiff(pages: &[Page], big: bool, swapped: bool) -> Vec<u8> {
         let mut tags = page.tags.clone();
         let strip = out.len() as u64;
         out.extend(turned(&page.data, page.sample.max(1)));
-        tags.push((273, 4, (strip as u32).to_le_bytes().to_vec()));
-        tags.push((279, 4, (page.data.len() as u32).to_le_bytes().to_vec()));
+        let each = (page.data.len() / page.strips) as u32;
+        tags.push((273, 4, (0..page.strips as u32).flat_map(|k| (strip as u32 + k * each).to_le_bytes()).collect()));
+        tags.push((279, 4, each.to_le_bytes().repeat(page.strips)));
         tags.sort_by_key(|t| t.0);
         let mut entries = Vec::new();
         for (tag, kind, value) in &tags {
