@@ -5,7 +5,7 @@ use super::picture::{DECODING, Samples, Wanted, unreadable};
 use super::says::Says;
 use crate::fault::{Fault, Result};
 use image::metadata::Orientation;
-use png::{ColorType, Info};
+use png::{BitDepth, ColorType, Info};
 use std::io::Cursor;
 
 pub(super) const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
@@ -26,15 +26,24 @@ pub(super) fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
     }
     let buffer = reader.output_buffer_size().ok_or_else(|| unreadable(bytes, &"too large for this machine"))?;
     let _memory = DECODING.hold(3 * buffer as u64);
-    let mut raw = vec![0; buffer];
-    reader.next_frame(&mut raw).map_err(strange)?;
+    // Decoded in place: levels of 16 bits need no copy.
+    let values = if reader.info().bit_depth == BitDepth::Sixteen {
+        let mut levels = vec![0u16; buffer / 2];
+        reader.next_frame(bytemuck::cast_slice_mut(&mut levels)).map_err(strange)?;
+        levels.iter_mut().for_each(|v| *v = u16::from_be(*v));
+        Values::U16(levels)
+    } else {
+        let mut levels = vec![0u8; buffer];
+        reader.next_frame(&mut levels).map_err(strange)?;
+        Values::U8(levels)
+    };
     // An eXIf chunk may come after the pixels; a file that ends before its end mark is whole enough without.
     let _ = reader.finish();
     let info = reader.info();
     let orientation = orientation(info);
     wanted.fits(orientation, size.into())?;
     single(info)?;
-    Ok(samples(info, raw)?.upright(orientation))
+    Ok(samples(info, values)?.upright(orientation))
 }
 
 /// Refuses animations, whose other pictures nobody would look at.
@@ -55,14 +64,13 @@ fn orientation(info: &Info) -> u16 {
     Orientation::from_exif_chunk(exif).map_or(1, |o| u16::from(o.to_exif()))
 }
 
-fn samples(info: &Info, raw: Vec<u8>) -> Result<Samples> {
+fn samples(info: &Info, stored: Values) -> Result<Samples> {
     let (width, height) = info.size();
     let bits = info.bit_depth as u8;
     let in_file = info.color_type.samples();
-    let values = match bits {
-        8 => Values::U8(raw),
-        16 => Values::U16(raw.chunks_exact(2).map(|b| u16::from_be_bytes([b[0], b[1]])).collect()),
-        _ => Values::U8(unpacked(&raw, bits, width as usize * in_file)),
+    let values = match stored {
+        Values::U8(packed) if bits < 8 => Values::U8(unpacked(&packed, bits, width as usize * in_file)),
+        stored => stored,
     };
     let mut notes = Vec::new();
     if let Some(s) = info.sbit.as_ref().and_then(|s| s.iter().max()).filter(|s| **s < bits) {
