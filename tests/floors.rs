@@ -118,6 +118,7 @@ const HOMES: &[(&str, &str)] = &[
     ("mimalloc", "main"),
     ("multiversion", "stages"),
     ("notify", "capture"),
+    ("png", "raster"),
     ("pollster", "gpu"),
     ("rs_opw_kinematics", "cell"),
     ("rust_embed", "web"),

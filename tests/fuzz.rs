@@ -11,7 +11,7 @@ use proptest::prelude::*;
 use sheetlight::find::dxf::{self, DxfOptions};
 use sheetlight::find::{Drawing, ModelOptions, Recipe, Scene as FindScene, SearchOptions, Template, find};
 use sheetlight::geometry::{Base, Flange, Plane, Rigid, Vec3};
-use sheetlight::raster::{Channel, Image, decode, float_tiff, png, read_float_tiff};
+use sheetlight::raster::{Channel, Image, decode, decode_in_part, float_tiff, png, read_float_tiff};
 use sheetlight::recording::{BoardSpec, Markers, Meta, load_board_poses, load_poses};
 use sheetlight::rig::Rig;
 use sheetlight::scan::{
@@ -286,6 +286,8 @@ fn foreign_maps() {
     let ply = |format: &str| {
         format!("ply\nformat {format} 1.0\nelement vertex 90\n{xyz}property uchar intensity\nend_header\n")
     };
+    let lists = ply("binary_little_endian")
+        .replace("property uchar intensity", "property list uchar uchar seen\nobj_info of another program");
     let pcd = |data: &str| {
         format!(
             "VERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH 30\nHEIGHT 3\nPOINTS 90\nDATA {data}\n"
@@ -304,6 +306,7 @@ fn foreign_maps() {
     let seeds = vec![
         with(ply("ascii"), words.clone().into_bytes()),
         with(ply("binary_little_endian"), bytes(&[9])),
+        with(lists, bytes(&[2, 8, 9])),
         with(pcd("ascii"), words.into_bytes()),
         with(pcd("binary"), bytes(&[1, 2, 3, 4])),
         with(pcd("binary_compressed"), [lengths, stored].concat()),
@@ -345,6 +348,43 @@ fn pictures() {
     }
     let tiff = float_tiff(4, 3, &[1.5; 12], "mm");
     survives("TIFF", vec![tiff.clone()], |b| read_float_tiff(b).map(drop));
+    // Files that say something about their own samples, as heights and as light.
+    let stated = |names: &[&str]| -> Vec<Vec<u8>> {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/statements");
+        names.iter().map(|name| std::fs::read(folder.join(name)).expect("a file")).collect()
+    };
+    let seeds_of = [
+        (
+            "TIFF that says something",
+            stated(&[
+                "02-float-tiff-white-is-zero/white16.tif",
+                "07-gdal-nodata/n.tif",
+                "13-tiff-of-several-pages/thumb.tif",
+                "19-tiff-kinds/big.tif",
+                "19-tiff-kinds/i16.tif",
+                "19-tiff-kinds/f16.tif",
+            ]),
+        ),
+        (
+            "PNG that says something",
+            stated(&[
+                "09-template-with-alpha/template.png",
+                "10-four-bit-png/g4.png",
+                "11-colour-picture-as-heights/jet.png",
+            ]),
+        ),
+        ("PCD of many fields", stated(&["20-pcd-64-bit-field/u8.pcd"])),
+    ];
+    for (name, seeds) in seeds_of {
+        survives(name, seeds, |b| {
+            let shown = decode_in_part(b, Channel::Luma, 8);
+            let heights = read_foreign(b).map(drop);
+            match (shown, heights) {
+                (Err(e), _) | (_, Err(e)) if e.next.is_empty() => Err(e),
+                _ => Ok(()),
+            }
+        });
+    }
     survives("TIFF as a picture", vec![tiff], |b| match decode(b, Channel::Luma, 8) {
         // Floats are no grey levels.
         Err(e) if e.next.is_empty() => Err(e),

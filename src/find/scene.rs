@@ -3,7 +3,7 @@
 //! values in grey levels (intensity) or mm (height).
 
 use crate::fault::{Fault, Result};
-use crate::raster::Image;
+use crate::raster::{Image, Mask};
 
 /// What a layer's numbers are; a model edge is looked for in the layer of its own kind only.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -60,6 +60,27 @@ impl Layer {
             width: image.width as usize,
             height: image.height as usize,
             values: image.to_f32(),
+        }
+    }
+
+    /// Gives missing cells the values of their neighbours, ring by ring; a layer without any value stays as it is.
+    fn carry_on(&mut self) {
+        let (w, h) = (self.width, self.height);
+        let mut ring: Vec<usize> = (0..w * h).filter(|i| !self.values[*i].is_nan()).collect();
+        while !ring.is_empty() {
+            let mut next = vec![];
+            for i in ring {
+                let (x, y) = (i % w, i / w);
+                let beside =
+                    [(x > 0, i.wrapping_sub(1)), (x + 1 < w, i + 1), (y > 0, i.wrapping_sub(w)), (y + 1 < h, i + w)];
+                for (_, k) in beside.into_iter().filter(|b| b.0) {
+                    if self.values[k].is_nan() {
+                        self.values[k] = self.values[i];
+                        next.push(k);
+                    }
+                }
+            }
+            ring = next;
         }
     }
 
@@ -155,6 +176,24 @@ impl Scene {
     /// A picture's grey levels as the only layer, without scale.
     pub fn from_image(image: &Image) -> Scene {
         Scene { layers: vec![Layer::from_image(image)], mm_per_px: None }
+    }
+    /// The same, with the cells missing where `hidden` is lit.
+    pub fn from_image_in_part(image: &Image, hidden: Option<&Mask>) -> Scene {
+        let mut scene = Scene::from_image(image);
+        if let Some(hidden) = hidden {
+            let columns = image.width as usize;
+            for (i, v) in scene.layers[0].values.iter_mut().enumerate() {
+                if hidden.get((i % columns) as u32, (i / columns) as u32) {
+                    *v = f32::NAN;
+                }
+            }
+        }
+        scene
+    }
+    /// The same, with every missing cell holding the value of a nearest one that is there, in steps along columns and rows.
+    pub fn carried_on(mut self) -> Scene {
+        self.layers.iter_mut().for_each(Layer::carry_on);
+        self
     }
     /// Columns, px.
     pub fn width(&self) -> usize {

@@ -1,12 +1,9 @@
-//! In: PNG, JPEG, TIFF, BMP and PGM files, grey or colour. Out: grey images with the depth the sensor had.
-//! Frame and unit: pixels, grey levels. The only place that names the `image` crate with `image8`.
+//! Makes grey images with the depth the sensor had of picture files, grey or colour.
 
-use super::budget::Budget;
-use super::size::{MOST_PIXELS, fits};
-use super::{Image, Pixels};
+use super::samples::{Kind, Samples, Values, Wanted, read_samples};
+use super::size::MOST_PIXELS;
+use super::{Image, Mask, Pixels};
 use crate::fault::{Fault, Result};
-use image::{DynamicImage, ImageDecoder, ImageReader};
-use std::io::Cursor;
 use std::path::Path;
 
 /// Which part of a colour picture is taken as grey. A grey picture ignores it.
@@ -41,99 +38,167 @@ fn unknown(word: &str) -> String {
     crate::fault::unknown::<Channel>("channel", word)
 }
 
-/// Memory for pictures while they are decoded, by all threads together, bytes.
-static DECODING: Budget = Budget::new(1 << 30);
+/// How deep the pictures are that are wanted, and who says so.
+#[derive(Clone, Copy, Debug)]
+pub struct Depth {
+    /// 8, or 9..=16 for 16-bit files.
+    pub bits: u8,
+    /// Who says so, with its verb: "the recording declares".
+    pub declared: &'static str,
+    /// What to do about a picture of another depth.
+    pub correct: &'static str,
+}
 
-/// Reads a picture of any size. `bits` is the depth the recording declares: 8, or 9..=16 for 16-bit files.
-pub fn load(path: &Path, channel: Channel, bits: u8) -> Result<Image> {
-    read(path, channel, bits, None)
+impl From<u8> for Depth {
+    fn from(bits: u8) -> Depth {
+        Depth { bits, declared: "the caller wants", correct: "give pictures of that depth" }
+    }
+}
+
+/// Reads a picture of any size.
+pub fn load(path: &Path, channel: Channel, depth: impl Into<Depth>) -> Result<Image> {
+    read(path, channel, depth.into(), None)
 }
 
 /// Reads a picture whose width and height are known; of another size none is decoded.
-pub fn load_sized(path: &Path, channel: Channel, bits: u8, size: [u32; 2]) -> Result<Image> {
-    read(path, channel, bits, Some(size))
+pub fn load_sized(path: &Path, channel: Channel, depth: impl Into<Depth>, size: [u32; 2]) -> Result<Image> {
+    read(path, channel, depth.into(), Some(size))
 }
 
-fn read(path: &Path, channel: Channel, bits: u8, size: Option<[u32; 2]>) -> Result<Image> {
+fn read(path: &Path, channel: Channel, depth: Depth, size: Option<[u32; 2]>) -> Result<Image> {
     // Four channels of 16 bits, uncompressed, and what cameras write before them.
     let pixels = size.map_or(MOST_PIXELS, |[w, h]| u64::from(w) * u64::from(h));
     let bytes = crate::files::read(path, 8 * pixels + (16 << 20))?;
-    decode_sized(&bytes, channel, bits, size).map_err(|e| e.at(path.display()))
+    let shown = whole(shown(&bytes, channel, depth, size));
+    shown.map_err(|e| e.at(path.display()))
+}
+
+/// Reads a picture of any size, of which a part may be hidden: where it is, the mask is lit.
+pub fn load_in_part(path: &Path, channel: Channel, depth: impl Into<Depth>) -> Result<(Image, Option<Mask>)> {
+    let bytes = crate::files::read(path, 8 * MOST_PIXELS + (16 << 20))?;
+    decode_in_part(&bytes, channel, depth).map_err(|e| e.at(path.display()))
 }
 
 /// Decodes a picture held in memory.
-pub fn decode(bytes: &[u8], channel: Channel, bits: u8) -> Result<Image> {
-    decode_sized(bytes, channel, bits, None)
+pub fn decode(bytes: &[u8], channel: Channel, depth: impl Into<Depth>) -> Result<Image> {
+    whole(shown(bytes, channel, depth.into(), None))
 }
 
-fn decode_sized(bytes: &[u8], channel: Channel, bits: u8, size: Option<[u32; 2]>) -> Result<Image> {
-    if bytes.starts_with(b"P5") {
-        return within_depth(super::pgm::decode(bytes, bits, size)?);
-    }
-    let unreadable = |e: &dyn std::fmt::Display| {
-        Fault::input(format!("is not a readable picture ({} bytes): {e}", bytes.len()))
-            .cause("the file is truncated, empty, or of a format other than PNG, JPEG, TIFF, BMP and PGM")
-            .next("record the shot again, or pass --skip-bad to leave it out")
-    };
-    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| unreadable(&e))?;
-    // The size is judged here, by its own numbers.
-    reader.no_limits();
-    let decoder = reader.into_decoder().map_err(|e| unreadable(&e))?;
-    let (width, height) = decoder.dimensions();
-    fits(width, height, size)?;
-    // The picture, a copy of it in grey or RGB of the same depth, and the result.
-    let _memory = DECODING.hold(3 * decoder.total_bytes());
-    let picture = DynamicImage::from_decoder(decoder).map_err(|e| unreadable(&e))?;
-    let deep = matches!(picture.color().bytes_per_pixel() / picture.color().channel_count(), 2..);
-    if deep != (bits > 8) {
-        return Err(Fault::input(format!(
-            "holds {} bits a pixel, the recording declares {bits}",
-            if deep { 16 } else { 8 }
+/// Decodes a picture held in memory, of which a part may be hidden: where it is, the mask is lit.
+pub fn decode_in_part(bytes: &[u8], channel: Channel, depth: impl Into<Depth>) -> Result<(Image, Option<Mask>)> {
+    shown(bytes, channel, depth.into(), None)
+}
+
+/// Refuses pictures with hidden pixels: what lies under them was not meant to be seen.
+fn whole(shown: Result<(Image, Option<Mask>)>) -> Result<Image> {
+    match shown? {
+        (image, None) => Ok(image),
+        (image, Some(hidden)) => Err(Fault::input(format!(
+            "{} of {} pixels are transparent, or named as missing by the file",
+            hidden.count(),
+            image.pixel_count()
         ))
-        .cause("meta.json and the pictures are from different cameras or exports")
-        .next("correct image.bits in meta.json"));
+        .cause("cut out in an editor, or made by a program that marks missing pixels (alpha, tRNS, GDAL_NODATA)")
+        .next("save the picture without transparency, or the whole picture as the camera took it")),
     }
-    if picture.color().has_color() {
-        return Ok(from_colour(&picture, channel, bits, width, height));
-    }
-    if !deep {
-        return Ok(Image::from_u8(width, height, picture.into_luma8().into_raw()));
-    }
-    within_depth(Image::from_u16(width, height, bits, picture.into_luma16().into_raw()))
 }
 
-fn within_depth(image: Image) -> Result<Image> {
+fn shown(bytes: &[u8], channel: Channel, depth: Depth, size: Option<[u32; 2]>) -> Result<(Image, Option<Mask>)> {
+    let samples = read_samples(bytes, &Wanted { size, most: MOST_PIXELS, page: None })?;
+    if samples.veiled > 0 {
+        return Err(Fault::input(format!("{} pixels are transparent in part", samples.veiled))
+            .cause("an editor's soft rim; what such a pixel showed is not known")
+            .next("save the picture without transparency"));
+    }
+    let hidden = hidden(&samples);
+    Ok((image(samples, channel, depth)?, hidden))
+}
+
+/// Pixels that the file hides, or whose level it names as missing.
+fn hidden(samples: &Samples) -> Option<Mask> {
+    let Some(missing) = samples.says.missing else { return samples.hidden.clone() };
+    let (width, channels) = (samples.width as usize, samples.channels);
+    let there = |x: u32, y: u32| {
+        let i = y as usize * width + x as usize;
+        let seen = samples.hidden.as_ref().is_none_or(|h| !h.get(x, y));
+        seen && !(0..channels).all(|c| samples.kind.same(samples.get(i, c), missing))
+    };
+    let mask = Mask::from_fn(samples.width, samples.height, |x, y| !there(x, y));
+    (mask.count() > 0).then_some(mask)
+}
+
+/// The picture of samples that are shades: levels of fewer than 8 bits are stretched to 8, since the largest is
+/// saturation; where white is 0 they are turned round.
+fn image(samples: Samples, channel: Channel, depth: Depth) -> Result<Image> {
+    let Samples { width, height, channels, kind, values, says, .. } = samples;
+    let stored = match (kind, &values) {
+        (Kind::Unsigned(bits @ 1..=8), Values::U8(_)) | (Kind::Unsigned(bits @ 16), Values::U16(_)) => bits,
+        _ => {
+            return Err(Fault::input(format!("holds {kind}, which are no levels of light"))
+                .cause("a map of heights or a result of computing, not a picture of a camera")
+                .next("give the picture as it was taken, with levels of 8 or 16 bits"));
+        }
+    };
+    if (stored == 16) != (depth.bits > 8) {
+        let bits = if stored == 16 { 16 } else { 8 };
+        return Err(Fault::input(format!("holds {bits} bits a pixel, {} {}", depth.declared, depth.bits))
+            .cause("the depth that is stated is another camera's or export's than the picture's")
+            .next(depth.correct));
+    }
+    let most = (1u32 << stored) - 1;
+    if says.white_is_zero && stored == 16 && depth.bits < 16 {
+        return Err(Fault::input(format!(
+            "holds levels that are darker the larger they are (PhotometricInterpretation 0, tag 262), {} {} bits",
+            depth.declared, depth.bits
+        ))
+        .cause("which of the 65536 levels is black is not said")
+        .next("save the picture with 0 as black"));
+    }
+    let shade = |v: u16| if says.white_is_zero { most as u16 - v } else { v };
+    Ok(match values {
+        Values::U8(v) => {
+            let plain = stored == 8 && !says.white_is_zero;
+            let level = |v: u8| (u32::from(shade(v.into())) * 255 / most) as u8;
+            let v = if plain { v } else { v.into_iter().map(level).collect() };
+            let grey = |c: &[u8]| mixed([c[0], c[1], c[2]].map(u16::from), channel) as u8;
+            Image::from_u8(width, height, if channels == 1 { v } else { v.chunks_exact(channels).map(grey).collect() })
+        }
+        Values::U16(mut v) => {
+            if says.white_is_zero {
+                v.iter_mut().for_each(|v| *v = shade(*v));
+            }
+            let grey = |c: &[u16]| mixed([c[0], c[1], c[2]], channel);
+            let v = if channels == 1 { v } else { v.chunks_exact(channels).map(grey).collect() };
+            within_depth(Image::from_u16(width, height, depth.bits, v), depth)?
+        }
+        Values::F32(_) | Values::F64(_) => unreachable!("other kinds were refused"),
+    })
+}
+
+fn within_depth(image: Image, depth: Depth) -> Result<Image> {
     let Pixels::U16(p) = &image.pixels else { return Ok(image) };
     let largest = p.iter().copied().max().unwrap_or(0);
     if largest > image.full_scale() {
         return Err(Fault::input(format!(
-            "holds the grey level {largest}, above the {} of a {}-bit sensor",
+            "holds the grey level {largest}, above the {} of a {}-bit sensor, and {} {}",
             image.full_scale(),
-            image.bits
+            image.bits,
+            depth.declared,
+            depth.bits
         ))
-        .cause("image.bits in meta.json is too small, or the file was stretched to 16 bits")
-        .next("set image.bits to the depth that the files really have"));
+        .cause("the depth that is stated is too small, or the file was stretched to 16 bits")
+        .next(depth.correct));
     }
     Ok(image)
 }
 
-fn from_colour(picture: &image::DynamicImage, channel: Channel, bits: u8, width: u32, height: u32) -> Image {
-    let grey = |c: &[u16]| -> u16 {
-        match channel {
-            Channel::Red => c[0],
-            Channel::Green => c[1],
-            Channel::Blue => c[2],
-            Channel::Luma => {
-                ((299 * u32::from(c[0]) + 587 * u32::from(c[1]) + 114 * u32::from(c[2]) + 500) / 1000) as u16
-            }
-        }
-    };
-    if bits > 8 {
-        let rgb = picture.to_rgb16();
-        return Image::from_u16(width, height, bits, rgb.pixels().map(|p| grey(&p.0)).collect());
+fn mixed([r, g, b]: [u16; 3], channel: Channel) -> u16 {
+    match channel {
+        Channel::Red => r,
+        Channel::Green => g,
+        Channel::Blue => b,
+        Channel::Luma => ((299 * u32::from(r) + 587 * u32::from(g) + 114 * u32::from(b) + 500) / 1000) as u16,
     }
-    let rgb = picture.to_rgb8();
-    Image::from_u8(width, height, rgb.pixels().map(|p| grey(&p.0.map(u16::from)) as u8).collect())
 }
 
 /// Writes a grey image as PNG, 8 or 16 bits. Not waited for: recordings are simulated by hundreds of pictures.

@@ -1,9 +1,9 @@
 //! In: float values on a grid. Out: a single-channel 32-bit float TIFF, and the way back.
 //! Frame and unit: the caller's; NaN stays NaN.
 
+use super::samples::{Kind, Values, Wanted, read_samples};
 use crate::fault::{Fault, Result};
 use std::io::Cursor;
-use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::encoder::{TiffEncoder, colortype::Gray32Float};
 
 /// The bytes of a TIFF with one float a pixel; `values` is row-major. `description` goes into the
@@ -26,24 +26,18 @@ const MOST_CELLS: u64 = 1 << 26;
 
 /// Width, height and values of a single-channel float TIFF.
 pub fn read_float_tiff(bytes: &[u8]) -> Result<(u32, u32, Vec<f32>)> {
-    let strange = |e: &dyn std::fmt::Display| {
-        Fault::input(format!("is not a float TIFF: {e}"))
+    let strange = |what: String| {
+        Fault::input(format!("is not a float TIFF: {what}"))
             .cause("another kind of picture, or a truncated file")
             .next("give the height.tif of a scan, or a single-channel 32-bit float TIFF")
     };
-    let decoder = Decoder::new(Cursor::new(bytes)).map_err(|e| strange(&e))?;
-    // One float a cell, whatever number of samples the file claims.
-    let mut limits = Limits::default();
-    limits.decoding_buffer_size = 4 * MOST_CELLS as usize;
-    let mut decoder = decoder.with_limits(limits);
-    let (width, height) = decoder.dimensions().map_err(|e| strange(&e))?;
-    let cells = u64::from(width) * u64::from(height);
-    if cells > MOST_CELLS {
-        return Err(strange(&format!("{width}x{height} are {cells} cells, limit {MOST_CELLS}")));
-    }
-    match decoder.read_image().map_err(|e| strange(&e))? {
-        DecodingResult::F32(values) if values.len() == width as usize * height as usize => Ok((width, height, values)),
-        _ => Err(strange(&"its pixels are not one 32-bit float each")),
+    let read = read_samples(bytes, &Wanted { size: None, most: MOST_CELLS, page: None });
+    let samples = read.map_err(|e| strange(e.what))?;
+    match (samples.kind, samples.channels, samples.values) {
+        (Kind::Float(32), 1, Values::F32(values)) => Ok((samples.width, samples.height, values)),
+        (kind, channels, _) => {
+            Err(strange(format!("its pixels are {channels} x {kind}, wanted one 32-bit float each")))
+        }
     }
 }
 

@@ -8,17 +8,18 @@ mod float;
 mod image8;
 mod light;
 mod mask;
-mod pgm;
 mod response;
+mod samples;
 mod size;
 mod text;
 
-pub use file::{Channel, decode, load, load_sized, png, save_png};
+pub use file::{Channel, Depth, decode, decode_in_part, load, load_in_part, load_sized, png, save_png};
 pub use float::{float_tiff, read_float_tiff};
 pub use image8::{Rgb, RgbImage};
 pub use light::Light;
 pub use mask::Mask;
 pub use response::Response;
+pub use samples::{Kind, Samples, Says, Wanted, read_samples};
 pub use size::{MOST_PIXELS, MOST_SIDE};
 pub use text::text_width;
 

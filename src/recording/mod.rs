@@ -31,7 +31,7 @@ pub use taken::{Pairing, Slip, Taken};
 
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid};
-use crate::raster::{Channel, Image};
+use crate::raster::{Channel, Depth, Image};
 use std::path::{Component, Path, PathBuf};
 
 /// A recording on disk. Pictures are read one at a time, never all at once.
@@ -143,7 +143,12 @@ impl Recording {
     /// none is decoded.
     pub fn load(&self, path: &Path) -> Result<Image> {
         let spec = &self.meta.image;
-        let image = crate::raster::load_sized(path, self.channel, spec.bits, [spec.width, spec.height])?;
+        let depth = Depth {
+            bits: spec.bits,
+            declared: "the recording declares",
+            correct: "correct image.bits in meta.json, or take the odd pictures out",
+        };
+        let image = crate::raster::load_sized(path, self.channel, depth, [spec.width, spec.height])?;
         Ok(spec.response.linear(image))
     }
 

@@ -27,7 +27,7 @@ pub use carrier::{Carrier, Place, parts_for};
 pub use cloud::{CloudFile, CloudPoint, CloudWriter, PointSource, read_cloud, write_cloud};
 pub use engine::{Engine, Measured, Optical, StripeSeen};
 pub use extraction::Extraction;
-pub use foreign::{Lines, Raw, Stated, lines, read_foreign};
+pub use foreign::{Lines, Raw, Stated, lines, read_foreign, read_foreign_page};
 pub use hot::HotPixels;
 pub use live::Live;
 pub use map::files::{MAP_FILES, MapScale};

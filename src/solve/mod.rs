@@ -11,10 +11,12 @@ mod consensus;
 mod lm;
 mod loss;
 mod normal;
+mod repeated;
 mod system;
 
 pub use consensus::{Consensus, ConsensusOptions, consensus};
 pub use lm::{End, LmOptions, Outcome, Problem, Solution, lm, worst_jacobian_error};
 pub use loss::{Loss, robust_scale};
 pub use normal::Blocks;
+pub use repeated::repeated;
 pub use system::Residuals;

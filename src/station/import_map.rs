@@ -11,7 +11,7 @@ use crate::files::Lock;
 use crate::geometry::Vec3;
 use crate::recording::Motion;
 use crate::rig::hash_text;
-use crate::scan::{CloudWriter, Extraction, Format, GridOptions, Lines, Stated, lines, read_foreign};
+use crate::scan::{CloudWriter, Extraction, Format, GridOptions, Lines, Stated, lines, read_foreign_page};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
@@ -23,23 +23,29 @@ const NO_RIG: &str = "imported";
 /// Longest file, bytes: 64 million points of 36 bytes.
 const MOST_BYTES: u64 = 36 << 26;
 
-/// Makes a scan folder of a file; `light` is the picture of the light that came with a picture of heights.
+/// Makes a scan folder of a file, or of the `page` of it (from 1 on); `light` is the picture of the light that came with a picture of heights.
 ///
 /// # Errors
 /// Files that are not read, what must be stated and is not, a folder that holds a scan of a rig.
-pub fn import_map(file: &Path, light: Option<&Path>, stated: &Stated, out: &Path) -> Result<ScanReport> {
+pub fn import_map(
+    file: &Path,
+    page: Option<usize>,
+    light: Option<&Path>,
+    stated: &Stated,
+    out: &Path,
+) -> Result<ScanReport> {
     let begun = Instant::now();
     if out.join("scan.json").exists() && super::load_report(out)?.imported.is_none() {
         return Err(Fault::usage(format!("{}: holds a scan", out.display()))
             .cause("an imported map would replace it")
             .next("give another --out"));
     }
-    let read = |path: &Path| {
+    let read = |path: &Path, page: Option<usize>| {
         let bytes = crate::files::read(path, MOST_BYTES)?;
-        Ok((read_foreign(&bytes).map_err(|e: Fault| e.at(path.display()))?, hash_text(&bytes)))
+        Ok((read_foreign_page(&bytes, page).map_err(|e: Fault| e.at(path.display()))?, hash_text(&bytes)))
     };
-    let (raw, sha256) = read(file)?;
-    let light = light.map(read).transpose()?;
+    let (raw, sha256) = read(file, page)?;
+    let light = light.map(|light| read(light, None)).transpose()?;
     let made = lines(&raw, light.as_ref().map(|l| &l.0), stated).map_err(|e| e.at(file.display()))?;
     scan_folder::make(out)?;
     let _lock = Lock::take(out, "scan", "scan")?;
@@ -54,6 +60,7 @@ pub fn import_map(file: &Path, light: Option<&Path>, stated: &Stated, out: &Path
     let imported = Imported {
         file: file.file_name().unwrap_or_default().to_string_lossy().into_owned(),
         sha256,
+        page,
         light_sha256: light.map(|l| l.1),
         unit_mm: stated.unit_mm.unwrap_or(f64::NAN),
         spacing_mm: stated.spacing_mm,

@@ -172,8 +172,26 @@ fn what_cannot_be_read_is_refused_with_its_reason() {
         assert!(refused(&text, &none).what.contains("no unit"));
         assert_eq!(read(text.as_bytes(), &unit("cm")).unwrap().drawing.shape[0].radius, Some(50.0));
     }
-    let e = refused(&file(MM, "", &ring), &unit("inch"));
-    assert!(e.what.contains("mm") && e.what.contains("inch") && e.exit_code() == 2, "{e}");
+    // A person overrules the header, and a header that contradicts itself is doubted.
+    for (header, wanted, taken, word) in [
+        (MM, Some("inch"), "inch", "drawn in mm; --unit inch overrules it"),
+        (INCH, Some("mm"), "mm", "drawn in inch; --unit mm overrules it"),
+        ("9\n$INSUNITS\n70\n12\n", Some("mm"), "mm", "$INSUNITS 12; --unit mm overrules it"),
+        ("9\n$INSUNITS\n70\n1\n9\n$MEASUREMENT\n70\n1\n", None, "inch", "$MEASUREMENT 1"),
+        ("9\n$MEASUREMENT\n70\n1\n9\n$INSUNITS\n70\n2\n", None, "foot", "$MEASUREMENT 1"),
+        ("9\n$INSUNITS\n70\n9\n9\n$MEASUREMENT\n70\n1\n", None, "mil", "--unit mm"),
+        ("9\n$INSUNITS\n70\n1\n9\n$MEASUREMENT\n70\n1\n", Some("inch"), "inch", ""),
+        ("9\n$INSUNITS\n70\n1\n9\n$MEASUREMENT\n70\n0\n", None, "inch", ""),
+        ("9\n$INSUNITS\n70\n4\n9\n$MEASUREMENT\n70\n0\n", None, "mm", ""),
+        ("9\n$INSUNITS\n70\n4\n9\n$MEASUREMENT\n70\n1\n", None, "mm", ""),
+        ("9\n$MEASUREMENT\n70\n1\n", Some("cm"), "cm", ""),
+    ] {
+        let options = wanted.map_or(none.clone(), unit);
+        let part = read(file(header, "", &ring).as_bytes(), &options).unwrap();
+        assert_eq!(part.unit, taken, "{header}");
+        let said = part.warnings.join("; ");
+        assert!(said.contains(word) && said.is_empty() == word.is_empty(), "{header}: {said}");
+    }
     assert!(refused(&file("9\n$INSUNITS\n70\n12\n", "", &ring), &none).what.contains("12"));
     let insert = |name: &str| entity!("INSERT", 8: "0", 2: name, 10: 0, 20: 0);
     let selfish = entity!("BLOCK", 8: "0", 2: "A", 10: 0, 20: 0) + &insert("A") + &entity!("ENDBLK", 8: "0");

@@ -3,6 +3,7 @@
 
 mod circle;
 pub mod evaluate;
+pub mod missing;
 pub mod options;
 pub mod profile;
 pub mod profiles;

@@ -41,12 +41,23 @@ pub struct BallOptions {
     pub min_profiles: usize,
     /// Same seed, same result.
     pub seed: u64,
+    /// The z of a point where nothing was measured, mm.
+    pub missing: Option<f64>,
 }
 
 impl BallOptions {
     /// The defaults for a ball of this diameter, mm.
     pub fn new(diameter: f64) -> BallOptions {
-        BallOptions { diameter, side: None, gate_mm: 0.3, gate: 21.0, clear: 25.0, min_profiles: 8, seed: 1 }
+        BallOptions {
+            diameter,
+            side: None,
+            gate_mm: 0.3,
+            gate: 21.0,
+            clear: 25.0,
+            min_profiles: 8,
+            seed: 1,
+            missing: None,
+        }
     }
     /// Refuses values out of the ranges that the fields state.
     pub fn check(&self) -> Result<()> {

@@ -1,5 +1,4 @@
-//! In: what ffmpeg is to open, in its own words. Out: grey frames from its pipe; its errors in ours.
-//! Frame and unit: the host's time of a frame's last byte, ns.
+//! Runs ffmpeg as a camera: it opens what it is told in its own words, and gives grey frames with the levels as sent.
 
 use super::pipe::Pipe;
 use crate::capture::format::{Format, RawFormat};
@@ -82,10 +81,29 @@ fn size(arguments: &[String], bits: u8) -> Result<Format> {
         .next(format!("try it by itself: ffmpeg {} -f null -", arguments.join(" "))))
 }
 
+/// Leaves levels as the camera sends them: without it ffmpeg takes luma without a tag for 16 to 235 and stretches that
+/// to 0 to 255. It comes behind the filters that a person asks for.
+const AS_SENT: &str = "scale=in_range=full:out_range=full";
+
+/// The arguments with that filter, behind those of the last `-vf`, which is the one that ffmpeg takes.
+fn as_sent(arguments: &[String]) -> Vec<String> {
+    let mut all = arguments.to_vec();
+    let filters = |a: &String| ["-vf", "-filter:v", "-filter:v:0"].contains(&a.as_str());
+    match all.iter().rposition(filters).and_then(|i| all.get_mut(i + 1)) {
+        Some(chain) => *chain = format!("{chain},{AS_SENT}"),
+        None => all.extend(["-vf", AS_SENT].map(str::to_owned)),
+    }
+    all
+}
+
 fn start(arguments: &[String], format: Format) -> Result<(Child, Pipe, Receiver<String>)> {
     let out = ["-map", "0:v:0", "-fps_mode", "passthrough", "-f", "rawvideo", "-pix_fmt", layout(format.bits), "-"];
-    let mut child =
-        command(arguments).args(out).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().map_err(missing)?;
+    let mut child = command(&as_sent(arguments))
+        .args(out)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .map_err(missing)?;
     let (stdout, stderr) = (child.stdout.take().expect("piped"), child.stderr.take().expect("piped"));
     let (send, said) = channel();
     let listen = move || {

@@ -5,7 +5,7 @@ use crate::capture::clock::now_ns;
 use crate::capture::format::Format;
 use crate::capture::picture::{Event, Picture, PictureSource};
 use crate::fault::{Fault, Result};
-use crate::raster::{Channel, load};
+use crate::raster::{Channel, Depth, load};
 use notify::Watcher;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -114,7 +114,12 @@ impl FolderCamera {
             return None;
         }
         let given_up = seen.2.elapsed() > SPOILT;
-        match load(&path, Channel::default(), self.bits) {
+        let depth = Depth {
+            bits: self.bits,
+            declared: "the camera's name says",
+            correct: "state the sensor's depth: folder:PATH?bits=12",
+        };
+        match load(&path, Channel::default(), depth) {
             Ok(image) if self.next == 0 || Format::of(&image) == self.format => {
                 let host_ns = now_ns();
                 let id = self.over(path);

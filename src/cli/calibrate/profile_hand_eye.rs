@@ -34,6 +34,9 @@ pub struct Args {
     /// Side of the ball's centre: plus (y > 0 of the sensor, y = z × x) or minus [default: the data must tell]
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Side>)]
     side: Option<Side>,
+    /// z of a point where nothing was measured, mm; points that are not finite are always left out
+    #[arg(long, value_name = "Z", allow_negative_numbers = true)]
+    missing: Option<f64>,
     /// Station folder that the result is stored in
     #[arg(long, required_unless_present = "evaluate")]
     station: Option<PathBuf>,
@@ -49,7 +52,7 @@ pub struct Args {
 }
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
-    let options = BallOptions { side: args.side, ..BallOptions::new(args.ball_diameter_mm) };
+    let options = BallOptions { side: args.side, missing: args.missing, ..BallOptions::new(args.ball_diameter_mm) };
     if let Some(transform) = &args.evaluate {
         return put_to_the_test(args, transform, &options, console);
     }

@@ -10,10 +10,12 @@ use std::path::PathBuf;
 
 /// Take in a height map or cloud of another sensor, so that find works on it
 ///
-/// Reads float TIFF, TIFF, PNG, PGM and BMP of 8 or 16 bits whose levels are heights, PLY (text, binary) and PCD (text, binary,
-/// compressed). Units, distances and the level that means nothing was measured are stated, never guessed; how much heights scatter
-/// is measured unless stated. The result is a scan folder with cloud, height map and scan.json, which names the file and its hash.
-/// Its frame is called map: poses that find gives are in it, not in a robot's base, and no calibration is in their error budget.
+/// Reads TIFF and BigTIFF (whole numbers of 1 to 64 bits with or without sign, floats of 16, 32 and 64 bits), PNG, PGM and
+/// BMP whose levels are heights, PLY (text, binary) and PCD (text, binary, compressed). What the file says about its levels
+/// (orientation, missing level, scale, transparency) is honoured. Units, distances and the level that means nothing was
+/// measured are stated, never guessed; how much heights scatter is measured unless stated. The result is a scan folder with
+/// cloud, height map and scan.json, which names the file and its hash. Its frame is called map: poses that find gives are in
+/// it, not in a robot's base, and no calibration is in their error budget.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   sheetlight import-map plate.png --unit-mm 0.02 --spacing-mm 0.216,0.209 --missing 0 \\
@@ -34,12 +36,16 @@ pub struct Args {
     /// Height of a picture's level 0, mm
     #[arg(long, default_value_t = 0.0, allow_hyphen_values = true)]
     offset_mm: f64,
-    /// Level of a picture where nothing was measured, or none; NaN of a float TIFF is always missing
+    /// Level of a picture, or z of a cloud in its own unit, where nothing was measured, or none; NaN is always missing
+    /// [default: the one that the file names]
     #[arg(long, value_name = "LEVEL", value_parser = level, allow_hyphen_values = true)]
     missing: Option<Level>,
     /// A picture whose rows run upwards, or that is seen from behind: y runs along the rows, not against them
     #[arg(long)]
     rows_up: bool,
+    /// Page of a TIFF that has several of full size, from 1 on
+    #[arg(long)]
+    page: Option<usize>,
     /// Picture of the light that came with a height picture, of the same size
     #[arg(long)]
     light: Option<PathBuf>,
@@ -69,7 +75,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         rows_up: args.rows_up,
         sigma_mm: args.sigma_mm,
     };
-    let report = import_map(&args.file, args.light.as_deref(), &stated, &args.out)?;
+    let report = import_map(&args.file, args.page, args.light.as_deref(), &stated, &args.out)?;
     console.result(&report, &summary(&report));
     console.say(format!("see {}", args.out.display()));
     Ok(())

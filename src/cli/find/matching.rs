@@ -8,7 +8,7 @@ use crate::cli::terminal::outputs::Inputs;
 use crate::fault::{Fault, Result};
 use crate::find::search::picture::draw;
 use crate::find::{Accelerator, Area, Match, ModelOptions, Scene, SearchOptions, Template, find_in};
-use crate::raster::{Channel, Image, decode, load};
+use crate::raster::{Channel, Depth, Image, decode_in_part, load_in_part};
 use crate::rig::hash_text;
 use std::path::{Path, PathBuf};
 
@@ -67,7 +67,7 @@ pub struct Args {
     /// Part of a colour picture to use: red, green, blue or luma
     #[arg(long, default_value = "luma", value_parser = parse::<Channel>)]
     channel: Channel,
-    /// Depth of the pictures, 8 to 16 bits
+    /// Depth of template and pictures, 8 to 16 bits
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u8).range(8..=16))]
     bits: u8,
     /// File for the matches (JSON); a table (.csv) and a picture of each searched one (.png) go beside it
@@ -125,10 +125,15 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     let accelerator = Accelerator::open();
     let (mut all, mut drawn) = (Vec::new(), Vec::new());
     for (k, path) in args.pictures.iter().enumerate() {
-        let image = load(path, args.channel, args.bits)?;
-        let matches =
-            find_in(&Scene::from_image(&image), &template.model, &options, area.as_ref(), accelerator.as_ref())
-                .map_err(|e| e.at(path.display()))?;
+        let (image, hidden) = load_in_part(path, args.channel, depth(args.bits))?;
+        let matches = find_in(
+            &Scene::from_image_in_part(&image, hidden.as_ref()),
+            &template.model,
+            &options,
+            area.as_ref(),
+            accelerator.as_ref(),
+        )
+        .map_err(|e| e.at(path.display()))?;
         if let Some(file) = overlays.get(k) {
             drawn.push((file, draw(&image, &template.model, &matches).to_png()));
         }
@@ -188,6 +193,14 @@ fn template(args: &Args) -> Result<Template> {
     taught(path, &name, args.template_region, (args.channel, args.bits), &options).map(|t| t.0)
 }
 
+fn depth(bits: u8) -> Depth {
+    Depth {
+        bits,
+        declared: "--bits says",
+        correct: "give --bits the depth of the sensor: 8, or 9 to 16 for files of 16 bits",
+    }
+}
+
 /// Largest picture file that a part is taught from.
 const MOST_BYTES: u64 = 1 << 30;
 
@@ -211,9 +224,9 @@ pub(super) fn taught(
     };
     let bytes = crate::files::read(path, MOST_BYTES)?;
     let at = |e: Fault| e.at(path.display());
-    let image = decode(&bytes, channel, bits).map_err(at)?;
+    let (image, hidden) = decode_in_part(&bytes, channel, depth(bits)).map_err(at)?;
     let source = (path.file_name().unwrap_or_default().to_string_lossy().into_owned(), hash_text(&bytes));
-    Ok((Template::teach(name, &image, region, source, options).map_err(at)?, image))
+    Ok((Template::teach_in_part(name, &image, hidden.as_ref(), region, source, options).map_err(at)?, image))
 }
 
 /// One picture a searched one beside the list; numbered where there are several.

@@ -28,7 +28,7 @@ pub struct Args {
     /// A name for the part
     #[arg(long)]
     name: String,
-    /// Unit of the drawing where it names none: mm, inch, cm, m, um, mil or foot [default: the one it names; none is guessed]
+    /// Unit of the drawing, whatever it names itself: mm, inch, cm, m, um, mil or foot [default: the one it names; none is guessed]
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Unit>)]
     unit: Option<Unit>,
     /// A layer that holds edges of the part, switched off or not; several times [default: all that are shown]

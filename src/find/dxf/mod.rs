@@ -51,7 +51,7 @@ pub const LARGEST: u64 = 64 << 20;
 /// What a person says about a drawing.
 #[derive(Clone, Debug, Default)]
 pub struct DxfOptions {
-    /// Needed where the file names no unit, refused where it names another.
+    /// Needed where the file names no unit, and obeyed where it names another: headers are often wrong.
     pub unit: Option<Unit>,
     /// Layers that hold the part's edges, switched off or not. Default all that are shown.
     pub layers: Vec<String>,
@@ -77,7 +77,7 @@ pub struct Imported {
 /// Reads a drawing.
 pub fn read(bytes: &[u8], options: &DxfOptions) -> Result<Imported> {
     let file = tags::read(bytes)?;
-    let unit = unit(file.units, options.unit)?;
+    let (unit, doubt) = unit(&file, options.unit)?;
     let read = curves::curves(&file, &options.layers, FLAT / unit.mm)?;
     let mut notes: Vec<String> = read.passed_over.iter().map(|(what, n)| format!("passed over: {n} {what}")).collect();
     let scaled: Vec<Curve> = read.curves.iter().map(|c| moved(c, [0.0; 2], unit.mm)).collect();
@@ -103,7 +103,7 @@ pub fn read(bytes: &[u8], options: &DxfOptions) -> Result<Imported> {
     if joined.duplicates > 0 {
         notes.push(format!("{} edges are drawn twice and count once", joined.duplicates));
     }
-    let mut warnings = Vec::new();
+    let mut warnings: Vec<String> = doubt.into_iter().collect();
     if joined.forks > 0 {
         warnings.push(format!("at {} places more than two edges meet: the edges there close no outline", joined.forks));
     }
@@ -128,27 +128,40 @@ pub fn read(bytes: &[u8], options: &DxfOptions) -> Result<Imported> {
     Ok(Imported { drawing, unit: unit.name, origin, notes, warnings })
 }
 
-fn unit(said: Option<i64>, wanted: Option<Unit>) -> Result<Unit> {
-    let named = said.filter(|&code| code != 0);
+/// The drawing's unit, and why it may be another one.
+fn unit(file: &tags::File, wanted: Option<Unit>) -> Result<(Unit, Option<String>)> {
+    let named = file.units.filter(|&code| code != 0);
+    let known = named.map(|code| (code, UNITS.iter().copied().find(|u| u.code == code)));
     let names: Vec<&str> = UNITS.iter().map(|u| u.name).collect();
-    let known = named.map(|code| {
-        UNITS.iter().copied().find(|u| u.code == code).ok_or_else(|| {
-            Fault::input(format!("its unit is $INSUNITS {code}, which is none of {}", names.join(", ")))
-                .cause("a drawing of something other than a part")
-                .next("scale the drawing to millimetres")
-        })
-    });
-    match (known.transpose()?, wanted) {
-        (Some(file), Some(person)) if file != person => {
-            Err(Fault::usage(format!("the file says {}, --unit says {}", file.name, person.name))
-                .cause("one of them is wrong")
-                .next("leave --unit out, or correct $INSUNITS in the drawing"))
+    match (known, wanted) {
+        (Some((_, Some(file))), Some(person)) if file == person => Ok((person, None)),
+        (Some((code, file)), Some(person)) => {
+            let said = file.map_or_else(|| format!("$INSUNITS {code}"), |u| u.name.to_owned());
+            Ok((person, Some(format!("the file says that it is drawn in {said}; --unit {} overrules it", person.name))))
         }
-        (Some(unit), _) | (None, Some(unit)) => Ok(unit),
+        (Some((_, Some(unit))), None) => Ok((unit, contradicted(unit, file.measurement))),
+        (Some((code, None)), None) => {
+            Err(Fault::input(format!("its unit is $INSUNITS {code}, which is none of {}", names.join(", ")))
+                .cause("a drawing of something other than a part, or a wrong header")
+                .next("scale the drawing to millimetres, or state its unit with --unit"))
+        }
+        (None, Some(unit)) => Ok((unit, None)),
         (None, None) => Err(Fault::input("names no unit ($INSUNITS is missing or 0)")
             .cause("many programs do not write it, and no unit is guessed")
             .next(format!("state it with --unit, one of {}", names.join(", ")))),
     }
+}
+
+/// $MEASUREMENT 1 is metric. The opposite, 0 beside millimetres, is what templates leave in right drawings.
+fn contradicted(unit: Unit, measurement: Option<i64>) -> Option<String> {
+    let imperial = ["inch", "mil", "foot"].contains(&unit.name);
+    (imperial && measurement == Some(1)).then(|| {
+        format!(
+            "the file says that it is drawn in {0} ($INSUNITS) and that it is metric ($MEASUREMENT 1): one of them is \
+             wrong; {0} was taken, --unit mm overrules it",
+            unit.name
+        )
+    })
 }
 
 fn moved(c: &Curve, origin: [f64; 2], mm: f64) -> Curve {

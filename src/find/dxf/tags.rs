@@ -28,6 +28,8 @@ pub struct Entity {
 pub struct File {
     /// $INSUNITS; `None` where it is missing.
     pub units: Option<i64>,
+    /// $MEASUREMENT: 0 inches and feet, 1 metric.
+    pub measurement: Option<i64>,
     /// By `key`.
     pub layers: BTreeMap<String, Layer>,
     /// By `key`.
@@ -193,8 +195,11 @@ fn section(tags: &[Tag], file: &mut File) -> Result<()> {
     let Some(name) = tags.first().filter(|t| t.code == 2) else { return Ok(()) };
     match name.value.trim() {
         "HEADER" => {
-            let at = tags.iter().position(|t| t.code == 9 && t.value.trim() == "$INSUNITS");
-            file.units = at.and_then(|i| tags.get(i + 1)).filter(|t| t.code == 70).map(Tag::whole).transpose()?;
+            let value = |name: &str| {
+                let at = tags.iter().position(|t| t.code == 9 && t.value.trim() == name);
+                at.and_then(|i| tags.get(i + 1)).filter(|t| t.code == 70).map(Tag::whole).transpose()
+            };
+            (file.units, file.measurement) = (value("$INSUNITS")?, value("$MEASUREMENT")?);
         }
         "TABLES" => {
             for layer in entities(&tags[1..]).iter().filter(|e| e.kind == "LAYER") {

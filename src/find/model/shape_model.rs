@@ -161,6 +161,15 @@ impl ShapeModel {
         Self::finish(levels, "the drawing")
     }
 
+    /// The model of those edge places that `keep` names.
+    ///
+    /// # Errors
+    /// Too few of them.
+    pub fn only(self, keep: impl Fn(&ModelPoint) -> bool) -> Result<ShapeModel> {
+        let chosen = |level: Vec<ModelPoint>| level.into_iter().filter(&keep).collect();
+        Self::finish(self.levels.into_iter().map(chosen).collect(), "the part of the region that is seen")
+    }
+
     fn finish(mut levels: Vec<Vec<ModelPoint>>, origin: &str) -> Result<ShapeModel> {
         let found = levels[0].len();
         if found < MIN_POINTS {

@@ -5,7 +5,7 @@
 use super::shape_model::{MIN_POINTS, ModelOptions, ModelPoint, ShapeModel};
 use crate::fault::{Fault, Result};
 use crate::find::scene::{Kind, Region, Scene};
-use crate::raster::Image;
+use crate::raster::{Image, Mask};
 
 /// A part as one picture shows it. What `teach --region` writes and `match` reads.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -44,10 +44,38 @@ impl Template {
         source: (String, String),
         options: &ModelOptions,
     ) -> Result<Template> {
+        Template::teach_in_part(name, image, None, region, source, options)
+    }
+
+    /// The same of a picture that is hidden where `hidden` is lit, as a part that was cut out in an editor: nothing is learnt there.
+    /// Visible levels are carried on behind the rim, so that the rim itself makes no edge, and an edge along it is kept.
+    ///
+    /// # Errors
+    /// As [`Template::teach`].
+    pub fn teach_in_part(
+        name: &str,
+        image: &Image,
+        hidden: Option<&Mask>,
+        region: Option<[u32; 4]>,
+        source: (String, String),
+        options: &ModelOptions,
+    ) -> Result<Template> {
         let [x, y, w, h] = region.unwrap_or([0, 0, image.width, image.height]);
         let end = |a: u32, b: u32| a as usize + b as usize;
         let cells = Region { x0: x as usize, y0: y as usize, x1: end(x, w), y1: end(y, h) };
-        let model = ShapeModel::from_region(&Scene::from_image(image), cells, None, options)?;
+        let model = match hidden {
+            None => ShapeModel::from_region(&Scene::from_image(image), cells, None, options)?,
+            Some(hidden) => {
+                let reference = [f64::from(x) + 0.5 * f64::from(w - 1), f64::from(y) + 0.5 * f64::from(h - 1)];
+                let carried = Scene::from_image_in_part(image, Some(hidden)).carried_on();
+                let model = ShapeModel::from_region(&carried, cells, Some(reference), options)?;
+                let [columns, rows] = [hidden.width, hidden.height].map(|n| f64::from(n - 1));
+                let place = |v: f64, most: f64| v.round().clamp(0.0, most) as u32;
+                let seen =
+                    |p: &ModelPoint| !hidden.get(place(reference[0] + p.x, columns), place(reference[1] + p.y, rows));
+                model.only(seen)?
+            }
+        };
         Ok(Template {
             format: 1,
             name: name.into(),

@@ -1,5 +1,4 @@
-//! In: how the records of a binary or text file are laid out. Out: numbers of single fields.
-//! Frame and unit: the file's own.
+//! Reads single fields out of the records of a binary or text file.
 
 /// Kinds of numbers in records.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,6 +9,8 @@ pub(super) enum Number {
     U16,
     I32,
     U32,
+    I64,
+    U64,
     F32,
     F64,
 }
@@ -20,7 +21,7 @@ impl Number {
             Number::I8 | Number::U8 => 1,
             Number::I16 | Number::U16 => 2,
             Number::I32 | Number::U32 | Number::F32 => 4,
-            Number::F64 => 8,
+            Number::I64 | Number::U64 | Number::F64 => 8,
         }
     }
 
@@ -40,6 +41,8 @@ impl Number {
             Number::U16 => f64::from(u16::from_le_bytes([b0, b1])),
             Number::I32 => f64::from(i32::from_le_bytes([b0, b1, b2, b3])),
             Number::U32 => f64::from(u32::from_le_bytes([b0, b1, b2, b3])),
+            Number::I64 => i64::from_le_bytes(b) as f64,
+            Number::U64 => u64::from_le_bytes(b) as f64,
             Number::F32 => f64::from(f32::from_le_bytes([b0, b1, b2, b3])),
             Number::F64 => f64::from_le_bytes(b),
         }
@@ -54,9 +57,12 @@ pub(super) struct Wanted {
 }
 
 impl Wanted {
-    /// `None` where a coordinate is missing.
+    /// `None` where a coordinate is missing. Names in capitals are taken where there are no small ones.
     pub fn among<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Option<Wanted> {
-        let at = |name: &str| names.clone().position(|n| n == name);
+        let at = |name: &str| {
+            let any_case = || names.clone().position(|n| n.eq_ignore_ascii_case(name));
+            names.clone().position(|n| n == name).or_else(any_case)
+        };
         Some(Wanted { xyz: [at("x")?, at("y")?, at("z")?], light: at("intensity") })
     }
 }

@@ -1,27 +1,13 @@
-//! In: what a foreign file holds, and what its user states about it. Out: a cloud in lines, as if a scan had made one shot of each.
-//! Frame and unit: the file's own frame, mm. A height picture's x runs along its columns, z towards the sensor, and y makes the frame
-//! right-handed: against the rows of a picture that is seen from the sensor.
+//! Makes of a foreign file, and of what its user states about it, a cloud in lines, as if a scan had made a shot of each.
+//! Places are in the file's own frame, mm. A height picture's x runs along its columns, z towards the sensor, and y makes the
+//! frame right-handed: against the rows of a picture that is seen from the sensor.
 
+use super::missing;
 use super::raw::Raw;
+use super::stated::Stated;
 use crate::fault::{Fault, Result};
+use crate::raster::{Kind, Says};
 use crate::scan::CloudPoint;
-
-/// What no file says for certain, and nobody guesses.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Stated {
-    /// Columns and rows of a height picture are so far apart, mm; points of a cloud without lines are taken as so far apart.
-    pub spacing_mm: Option<[f64; 2]>,
-    /// mm in one level of a height picture, or in one unit of a cloud's coordinates.
-    pub unit_mm: Option<f64>,
-    /// Height of level 0, mm.
-    pub offset_mm: f64,
-    /// The level of a picture of whole numbers where nothing was measured; `Some(None)`: every level is a height.
-    pub missing: Option<Option<f64>>,
-    /// The picture is seen from behind the sensor, or its rows run upwards: y runs along the rows.
-    pub rows_up: bool,
-    /// Standard deviation of a height, mm; measured where `None`.
-    pub sigma_mm: Option<f64>,
-}
 
 /// The cloud, and what was found on the way.
 #[derive(Clone, Debug)]
@@ -72,12 +58,24 @@ pub fn lines(raw: &Raw, light: Option<&Raw>, stated: &Stated) -> Result<Lines> {
     }
     let mut notes = Vec::new();
     let placed = match raw {
-        Raw::Picture { width, height, levels, whole } => {
-            picture([*width, *height], levels, *whole, light, unit, stated, &mut notes)?
+        Raw::Picture { width, height, levels, kind, says } => {
+            let pixels = Pixels { size: [*width, *height], levels, kind: *kind, says };
+            picture(&pixels, light, unit, stated, &mut notes)?
         }
-        Raw::Points { line: Some(line), points, intensity } => organised(*line, points, intensity.as_deref(), unit),
-        Raw::Points { line: None, points, intensity } => {
-            scattered(points, intensity.as_deref(), unit, stated, &mut notes)?
+        Raw::Points { line, points, intensity } => {
+            for_pictures_only(light, stated)?;
+            let there = missing::of_cloud(stated, points, &mut notes);
+            let heights = points.iter().filter(|p| there(p)).map(|p| p[2]);
+            missing::suspects(stated, heights, "points", &mut notes);
+            match line {
+                Some(line) => {
+                    if stated.spacing_mm.is_some() {
+                        notes.push("the cloud has lines of its own: --spacing-mm was not needed".into());
+                    }
+                    organised(*line, points, intensity.as_deref(), unit, there)
+                }
+                None => scattered(points, intensity.as_deref(), unit, stated, &mut notes, there)?,
+            }
         }
     };
     finish(placed, stated, notes)
@@ -86,61 +84,123 @@ pub fn lines(raw: &Raw, light: Option<&Raw>, stated: &Stated) -> Result<Lines> {
 /// A point with its line and its place in the line.
 type Placed = (u32, u32, [f64; 3], f32);
 
+/// A picture of heights.
+struct Pixels<'a> {
+    size: [usize; 2],
+    levels: &'a [f64],
+    kind: Kind,
+    says: &'a Says,
+}
+
+/// What is stated about pictures does nothing to a cloud.
+fn for_pictures_only(light: Option<&Raw>, stated: &Stated) -> Result<()> {
+    let option = match () {
+        () if light.is_some() => "--light",
+        () if stated.rows_up => "--rows-up",
+        () if stated.offset_mm != 0.0 => "--offset-mm",
+        () => return Ok(()),
+    };
+    Err(Fault::usage(format!("{option} is of a picture of heights, the file is a cloud"))
+        .cause("the points of a cloud say where they lie, and bring their own light")
+        .next(format!("leave {option} out")))
+}
+
 fn picture(
-    [width, height]: [usize; 2],
-    levels: &[f32],
-    whole: bool,
+    pixels: &Pixels,
     light: Option<&Raw>,
     unit: f64,
     stated: &Stated,
     notes: &mut Vec<String>,
 ) -> Result<Vec<Placed>> {
+    let Pixels { size: [width, height], levels, kind, says } = *pixels;
     let [dx, dy] = stated.spacing_mm.ok_or_else(|| {
         Fault::usage("the distance of columns and rows is not stated")
             .cause("a picture of heights does not say how large its pixels are")
             .next("give --spacing-mm X,Y")
     })?;
-    let missing = match stated.missing {
-        None if whole => {
-            return Err(Fault::usage("it is not stated which level means that nothing was measured")
-                .cause("whole numbers have no sign for it: often 0, of signed maps -32768")
-                .next("give --missing LEVEL, or --missing none"));
-        }
-        None => None,
-        Some(level) => level,
-    };
-    let light = match light {
-        None => None,
-        Some(Raw::Picture { width: w, height: h, levels, .. }) if (*w, *h) == (width, height) => Some(levels),
-        Some(_) => {
-            return Err(Fault::input(format!("the picture of the light is not one of {width}x{height} pixels"))
-                .cause("it belongs to another map")
-                .next("give the picture that was taken with the heights"));
-        }
-    };
+    said(says, [dx, dy], stated, notes);
+    let missing = missing::of_picture(stated, says, kind, levels, notes)?;
+    let light = light.map(|light| brightness(light, [width, height])).transpose()?;
     let sign = if stated.rows_up { 1.0 } else { -1.0 };
     notes.push(format!(
         "frame 'map': origin at the first pixel, x along the columns, y {} the rows, z up",
         if stated.rows_up { "along" } else { "against" }
     ));
-    let at = |i: usize, v: f32| {
+    let there = |v: f64| v.is_finite() && !missing.iter().any(|level| kind.same(v, *level));
+    let seen = levels.iter().enumerate().filter(|(_, v)| there(**v));
+    missing::suspects(stated, seen.clone().map(|(_, v)| *v), "pixels", notes);
+    let [factor, offset] = says.scale.unwrap_or([1.0, 0.0]);
+    let at = |i: usize, v: f64| {
         let (x, y) = (i % width, i / width);
-        let place = [x as f64 * dx, sign * y as f64 * dy, stated.offset_mm + unit * f64::from(v)];
-        (y as u32, x as u32, place, light.map_or(1.0, |l| l[i]))
+        let place = [x as f64 * dx, sign * y as f64 * dy, stated.offset_mm + unit * (factor * v + offset)];
+        (y as u32, x as u32, place, light.as_ref().map_or(1.0, |l| l[i]))
     };
-    if let Some(level) = missing.filter(|level| !levels.iter().any(|v| f64::from(*v) == *level)) {
-        notes.push(format!("no pixel has the level {level:?} that --missing names: every pixel counts as measured"));
-    }
-    let there = |v: f32| v.is_finite() && missing != Some(f64::from(v));
-    Ok(levels.iter().enumerate().filter(|(_, v)| there(**v)).map(|(i, v)| at(i, *v)).collect())
+    Ok(seen.map(|(i, v)| at(i, *v)).collect())
 }
 
-fn organised(line: usize, points: &[[f64; 3]], light: Option<&[f32]>, unit: f64) -> Vec<Placed> {
+/// What the file says about itself, as far as it concerns people.
+fn said(says: &Says, [dx, dy]: [f64; 2], stated: &Stated, notes: &mut Vec<String>) {
+    notes.extend(says.notes.iter().cloned());
+    if says.white_is_zero {
+        notes.push(
+            "the file says that 0 is white (PhotometricInterpretation, tag 262), which is how to show it: the levels \
+             were taken as heights as they are written"
+                .into(),
+        );
+    }
+    if says.orientation.is_some() && stated.rows_up {
+        notes.push(
+            "--rows-up came on top of the file's orientation, which was obeyed already: leave it out if rows counted \
+             from the bottom were the reason"
+                .into(),
+        );
+    }
+    if let Some([x, y]) = says.spacing.filter(|s| (s[0] / dx - 1.0).abs() > 0.01 || (s[1] / dy - 1.0).abs() > 0.01) {
+        notes.push(format!(
+            "the file says that its pixels are {x} x {y} apart, in a unit that it does not name (ModelPixelScale, \
+             tag 33550); {dx} x {dy} mm are used, as stated"
+        ));
+    }
+}
+
+/// The levels of a picture of light: larger is brighter, not finite where nothing is known.
+fn brightness(light: &Raw, [width, height]: [usize; 2]) -> Result<Vec<f32>> {
+    let (levels, kind, says) = match light {
+        Raw::Picture { width: w, height: h, levels, kind, says } if (*w, *h) == (width, height) => (levels, kind, says),
+        _ => {
+            return Err(Fault::input(format!("the picture of the light is not one of {width}x{height} pixels"))
+                .cause("it belongs to another map")
+                .next("give the picture that was taken with the heights"));
+        }
+    };
+    let most = match (says.white_is_zero, kind.most()) {
+        (false, _) => None,
+        (true, Some(most)) => Some(most),
+        (true, None) => {
+            return Err(Fault::input(
+                "the picture of the light says that 0 is white (PhotometricInterpretation, tag 262)",
+            )
+            .cause("numbers with a sign or a point do not say which of them is black")
+            .next("save it with 0 as black"));
+        }
+    };
+    let known = |v: f64| !says.missing.is_some_and(|level| kind.same(v, level));
+    let level = |v: &f64| if known(*v) { most.map_or(*v, |most| most - *v) as f32 } else { f32::NAN };
+    Ok(levels.iter().map(level).collect())
+}
+
+fn organised(
+    line: usize,
+    points: &[[f64; 3]],
+    light: Option<&[f32]>,
+    unit: f64,
+    there: impl Fn(&[f64; 3]) -> bool,
+) -> Vec<Placed> {
     let at = |(i, p): (usize, &[f64; 3])| {
         let level = light.map_or(1.0, |l| l[i]);
         ((i / line) as u32, (i % line) as u32, p.map(|v| unit * v), level)
     };
-    points.iter().enumerate().filter(|(_, p)| p.iter().all(|v| v.is_finite())).map(at).collect()
+    points.iter().enumerate().filter(|(_, p)| there(p)).map(at).collect()
 }
 
 fn scattered(
@@ -149,17 +209,18 @@ fn scattered(
     unit: f64,
     stated: &Stated,
     notes: &mut Vec<String>,
+    there: impl Fn(&[f64; 3]) -> bool,
 ) -> Result<Vec<Placed>> {
     let [dx, dy] = stated.spacing_mm.ok_or_else(|| {
         Fault::usage("the distance of the points is not stated")
             .cause("the file has points in no order; they are put in lines along x, one every Y mm")
             .next("give --spacing-mm X,Y: the distance along a line, and of the lines")
     })?;
-    let finite = |p: &&[f64; 3]| p.iter().all(|v| v.is_finite());
-    let low = points.iter().filter(finite).fold([f64::MAX; 2], |m, p| [m[0].min(unit * p[0]), m[1].min(unit * p[1])]);
+    let seen = points.iter().enumerate().filter(|(_, p)| there(p));
+    let low = seen.clone().fold([f64::MAX; 2], |m, (_, p)| [m[0].min(unit * p[0]), m[1].min(unit * p[1])]);
     notes.push(format!("points in no order were put in lines along x, {dy} mm apart, {dx} mm from point to point"));
     let mut out = Vec::with_capacity(points.len());
-    for (i, p) in points.iter().enumerate().filter(|(_, p)| finite(p)) {
+    for (i, p) in seen {
         let p = p.map(|v| unit * v);
         let (column, line) = (((p[0] - low[0]) / dx).round(), ((p[1] - low[1]) / dy).round());
         if column.max(line) >= MOST_PLACES as f64 {

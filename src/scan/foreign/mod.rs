@@ -3,12 +3,15 @@
 
 mod fields;
 mod lines;
+mod missing;
 mod pcd;
 mod picture;
 mod ply;
 mod raw;
 mod read;
+mod stated;
 
-pub use lines::{Lines, Stated, lines};
+pub use lines::{Lines, lines};
 pub use raw::Raw;
-pub use read::read_foreign;
+pub use read::{read_foreign, read_foreign_page};
+pub use stated::Stated;

@@ -1,5 +1,4 @@
-//! In: a PCD (Point Cloud Library): text, binary or compressed. Out: its points, in lines where it is organised.
-//! Frame and unit: the file's own.
+//! Reads a PCD (Point Cloud Library), text, binary or compressed: its points, in lines where it is organised.
 
 use super::fields::{Number, Points, Wanted};
 use super::raw::{MOST_POINTS, Raw};
@@ -18,13 +17,17 @@ fn strange(what: impl std::fmt::Display) -> Fault {
 pub(super) fn begins(bytes: &[u8]) -> bool {
     let head = &bytes[..bytes.len().min(4096)];
     let mut lines = head.split(|&b| b == b'\n').skip_while(|l| l.starts_with(b"#") || l.trim_ascii().is_empty());
-    lines.next().is_some_and(|l| l.starts_with(b"VERSION") || l.starts_with(b"FIELDS"))
+    let key = |l: &[u8], key: &[u8]| l.get(..key.len()).is_some_and(|k| k.eq_ignore_ascii_case(key));
+    lines.next().is_some_and(|l| key(l, b"VERSION") || key(l, b"FIELDS"))
 }
 
 #[derive(Default)]
 struct Header {
     names: Vec<String>,
-    numbers: Vec<Number>,
+    /// Bytes of one number of each field.
+    sizes: Vec<usize>,
+    /// What kind of number it is; `None` for kinds that are known by their size alone.
+    numbers: Vec<Option<Number>>,
     counts: Vec<usize>,
     width: usize,
     height: usize,
@@ -37,7 +40,11 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
     let wanted = Wanted::among(h.names.iter().map(String::as_str)).ok_or_else(|| strange("x, y or z is missing"))?;
     let body = &bytes[start..];
     let mut found = Points::default();
-    let each: Vec<usize> = h.numbers.iter().zip(&h.counts).map(|(n, c)| n.bytes() * c).collect();
+    if let Some(k) = wanted.xyz.into_iter().chain(wanted.light).find(|k| h.numbers[*k].is_none()) {
+        return Err(strange(format!("its field {} is of {} bytes and no known type", h.names[k], h.sizes[k])));
+    }
+    let number = |k: usize, bytes: &[u8]| h.numbers[k].map_or(f64::NAN, |n| n.read(bytes, false));
+    let each: Vec<usize> = h.sizes.iter().zip(&h.counts).map(|(n, c)| n * c).collect();
     let starts = |sizes: &[usize]| -> Vec<usize> {
         sizes.iter().scan(0usize, |at, n| Some(std::mem::replace(at, *at + n))).collect()
     };
@@ -62,7 +69,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
             let offsets = starts(&each);
             let body = body.get(..whole).ok_or_else(|| strange(format!("it ends before its {} points", h.points)))?;
             for r in body.chunks_exact(record) {
-                found.take(&wanted, |k| h.numbers[k].read(&r[offsets[k]..], false));
+                found.take(&wanted, |k| number(k, &r[offsets[k]..]));
             }
         }
         "binary_compressed" => {
@@ -78,7 +85,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
             // Field by field: all x, then all y, ...
             let columns: Vec<usize> = starts(&each).iter().map(|s| s * h.points).collect();
             for i in 0..h.points {
-                found.take(&wanted, |k| h.numbers[k].read(&body[columns[k] + i * each[k]..], false));
+                found.take(&wanted, |k| number(k, &body[columns[k] + i * each[k]..]));
             }
         }
         other => return Err(strange(format!("its data are '{other}'"))),
@@ -89,7 +96,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
 
 fn header(bytes: &[u8]) -> Result<(Header, usize)> {
     let mut h = Header::default();
-    let (mut sizes, mut kinds) = (Vec::new(), String::new());
+    let mut kinds = String::new();
     let mut at = 0;
     while h.data.is_empty() {
         let rest = &bytes[at..bytes.len().min(MOST_HEADER)];
@@ -97,15 +104,16 @@ fn header(bytes: &[u8]) -> Result<(Header, usize)> {
         let line = std::str::from_utf8(&rest[..end]).map_err(strange)?;
         at += end + 1;
         let mut words = line.split_ascii_whitespace();
-        let key = words.next().unwrap_or("");
+        let key = words.next().unwrap_or("").to_ascii_uppercase();
         let count = |words: &mut std::str::SplitAsciiWhitespace| {
             let n = words.next().and_then(|w| w.parse().ok()).filter(|&n| n <= MOST_POINTS);
             n.ok_or_else(|| strange(format!("'{line}', limit {MOST_POINTS}")))
         };
-        match key {
+        match key.as_str() {
             "FIELDS" => h.names = words.map(str::to_owned).collect(),
-            "SIZE" => sizes = words.map(str::to_owned).collect::<Vec<_>>(),
-            "TYPE" => kinds = words.collect(),
+            "SIZE" => h.sizes = words.map(|w| w.parse().unwrap_or(0)).collect(),
+            "TYPE" => kinds = words.collect::<String>().to_ascii_uppercase(),
+            "VIEWPOINT" => viewed(&words.collect::<Vec<_>>())?,
             "COUNT" => h.counts = words.map(|w| w.parse().unwrap_or(0)).collect(),
             "WIDTH" => h.width = count(&mut words)?,
             "HEIGHT" => h.height = count(&mut words)?,
@@ -117,10 +125,10 @@ fn header(bytes: &[u8]) -> Result<(Header, usize)> {
     if h.counts.is_empty() {
         h.counts = vec![1; h.names.len()];
     }
-    let numbers: Option<Vec<Number>> = sizes.iter().zip(kinds.chars()).map(|(s, k)| number(k, s)).collect();
-    h.numbers = numbers.ok_or_else(|| strange("a field's size and type are of no number"))?;
+    h.numbers = h.sizes.iter().zip(kinds.chars()).map(|(s, k)| number(k, *s)).collect();
     let n = h.names.len();
-    if [h.numbers.len(), h.counts.len(), sizes.len()] != [n; 3] || h.counts.iter().any(|c| !(1..=4096).contains(c)) {
+    let sound = |v: &[usize], most: usize| v.len() == n && v.iter().all(|c| (1..=most).contains(c));
+    if kinds.len() != n || !sound(&h.sizes, 16) || !sound(&h.counts, 4096) {
         return Err(strange("FIELDS, SIZE, TYPE and COUNT do not go together"));
     }
     if h.width.saturating_mul(h.height) != h.points {
@@ -129,16 +137,30 @@ fn header(bytes: &[u8]) -> Result<(Header, usize)> {
     Ok((h, at))
 }
 
-fn number(kind: char, size: &str) -> Option<Number> {
+/// Where the sensor stood: programs do not agree whether the points are moved there already, so it must be the origin.
+fn viewed(words: &[&str]) -> Result<()> {
+    let numbers: Vec<f64> = words.iter().filter_map(|w| w.parse().ok()).collect();
+    let none = numbers.iter().all(|v| *v == 0.0);
+    match numbers[..] {
+        [x, y, z, w, i, j, k] if [x, y, z, i, j, k] == [0.0; 6] && (w.abs() == 1.0 || none) => Ok(()),
+        _ => Err(Fault::input(format!("says that its sensor stood at VIEWPOINT {}", words.join(" ")))
+            .cause("some programs move the points there, others do not; which is meant is not said")
+            .next("move the points as they are meant and write the cloud with VIEWPOINT 0 0 0 1 0 0 0")),
+    }
+}
+
+fn number(kind: char, size: usize) -> Option<Number> {
     Some(match (kind, size) {
-        ('I', "1") => Number::I8,
-        ('U', "1") => Number::U8,
-        ('I', "2") => Number::I16,
-        ('U', "2") => Number::U16,
-        ('I', "4") => Number::I32,
-        ('U', "4") => Number::U32,
-        ('F', "4") => Number::F32,
-        ('F', "8") => Number::F64,
+        ('I', 1) => Number::I8,
+        ('U', 1) => Number::U8,
+        ('I', 2) => Number::I16,
+        ('U', 2) => Number::U16,
+        ('I', 4) => Number::I32,
+        ('U', 4) => Number::U32,
+        ('I', 8) => Number::I64,
+        ('U', 8) => Number::U64,
+        ('F', 4) => Number::F32,
+        ('F', 8) => Number::F64,
         _ => return None,
     })
 }

@@ -1,31 +1,42 @@
-//! In: a picture whose pixels are heights: 32-bit float TIFF, 8- or 16-bit TIFF, PNG, PGM, BMP. Out: its levels.
-//! Frame and unit: columns and rows from the top left; whatever the levels mean.
+//! Reads a picture whose pixels are heights, or the light beside them: its numbers as they are written.
 
 use super::raw::{MOST_POINTS, Raw};
 use crate::fault::{Fault, Result};
-use crate::raster::{Channel, decode, read_float_tiff};
+use crate::raster::{Wanted, read_samples};
 
-pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
-    let tiff = bytes.starts_with(b"II*\0") || bytes.starts_with(b"MM\0*");
-    if tiff && let Ok((width, height, levels)) = read_float_tiff(bytes) {
-        let levels = levels.into_iter().map(|v| if v.is_finite() { v } else { f32::NAN }).collect();
-        return Ok(Raw::Picture { width: width as usize, height: height as usize, levels, whole: false });
-    }
-    if bytes.starts_with(&[0xff, 0xd8]) {
-        return Err(Fault::input("is a JPEG: its levels are no longer those that were measured")
+pub(super) fn read(bytes: &[u8], page: Option<usize>) -> Result<Raw> {
+    let wanted = Wanted { size: None, most: MOST_POINTS as u64, page };
+    let samples = read_samples(bytes, &wanted)?;
+    if samples.says.lossy {
+        return Err(Fault::input("is compressed as JPEG: its levels are no longer those that were measured")
             .cause("a picture of the heights for people")
             .next("export the heights as TIFF or PNG of 16 bits, or as float TIFF"));
     }
-    // A depth of 16 takes every level as it stands; pictures of 8 bits say so by themselves.
-    let image = decode(bytes, Channel::Luma, 16).or_else(|_| decode(bytes, Channel::Luma, 8)).map_err(|e| {
-        Fault::input(format!("is neither a height picture nor a PLY or PCD: {}", e.what))
-            .cause("another format, or a damaged file")
-            .next("give a TIFF, PNG, PGM, PLY or PCD")
-    })?;
-    if image.pixel_count() > MOST_POINTS {
-        return Err(Fault::input(format!("has {} pixels, limit {MOST_POINTS}", image.pixel_count()))
-            .cause("several maps in one picture")
-            .next("cut out the part that is to be searched"));
+    if samples.says.two_levels {
+        return Err(Fault::input("is a picture of two shades, not of numbers")
+            .cause("a mask, or a bitmap for printing")
+            .next("give the picture whose levels are measured"));
     }
-    Ok(Raw::Picture { width: image.width as usize, height: image.height as usize, levels: image.to_f32(), whole: true })
+    if !samples.grey() {
+        return Err(Fault::input("is a picture in colour; one number a pixel is wanted")
+            .cause("false colours of a viewer, a palette, or numbers packed into red, green and blue")
+            .next("export the numbers themselves as one grey channel: TIFF or PNG of 16 bits, or float TIFF"));
+    }
+    if samples.veiled > 0 {
+        return Err(Fault::input(format!("{} pixels are transparent in part (alpha)", samples.veiled))
+            .cause("an editor's soft rim; whether such a pixel was measured is not known")
+            .next("make every pixel wholly transparent, which is not measured, or opaque"));
+    }
+    let (width, height) = (samples.width as usize, samples.height as usize);
+    let there = |i: usize| {
+        let hidden = samples.hidden.as_ref().is_some_and(|h| h.get((i % width) as u32, (i / width) as u32));
+        let level = samples.get(i, 0);
+        if hidden || !level.is_finite() { f64::NAN } else { level }
+    };
+    let levels = (0..width * height).map(there).collect();
+    let mut says = samples.says;
+    if let Some(hidden) = &samples.hidden {
+        says.notes.push(format!("{} transparent or masked pixels count as not measured", hidden.count()));
+    }
+    Ok(Raw::Picture { width, height, levels, kind: samples.kind, says })
 }

@@ -1,5 +1,4 @@
-//! In: a PLY of any program: text, or binary in either byte order. Out: its vertices.
-//! Frame and unit: the file's own.
+//! Reads the vertices of a PLY of any program: text, or binary in either byte order.
 
 use super::fields::{Number, Points, Wanted};
 use super::raw::{MOST_POINTS, Raw};
@@ -14,13 +13,61 @@ enum Layout {
     Binary { big_endian: bool },
 }
 
+/// What a property holds.
+#[derive(Clone, Copy)]
+enum Holds {
+    One(Number),
+    /// How many items follow, then the items.
+    List {
+        count: Number,
+        item: Number,
+    },
+}
+
 struct Element {
     name: String,
     count: usize,
-    /// Its scalar properties.
-    properties: Vec<(Number, String)>,
-    /// Whether it has a list, whose length only its own records tell.
-    lists: bool,
+    properties: Vec<(Holds, String)>,
+}
+
+impl Element {
+    /// Bytes of every record, where no list makes them differ.
+    fn size(&self) -> Option<usize> {
+        self.properties.iter().map(|p| if let Holds::One(n) = p.0 { Some(n.bytes()) } else { None }).sum()
+    }
+
+    /// Where the properties of the record that begins `bytes` begin, into `offsets`; gives the record's length.
+    fn places(&self, bytes: &[u8], big_endian: bool, offsets: &mut Vec<usize>) -> Option<usize> {
+        offsets.clear();
+        let mut at = 0usize;
+        for (holds, _) in &self.properties {
+            offsets.push(at);
+            at += match *holds {
+                Holds::One(n) => n.bytes(),
+                Holds::List { count, item } => {
+                    let n = count.read(bytes.get(at..at + count.bytes())?, big_endian);
+                    // A list is within the file.
+                    let n = (n >= 0.0 && n <= bytes.len() as f64).then_some(n as usize)?;
+                    count.bytes() + n * item.bytes()
+                }
+            };
+        }
+        (at <= bytes.len()).then_some(at)
+    }
+
+    /// The same for a record of words: which word each property begins with.
+    fn words(&self, words: &[&str], offsets: &mut Vec<usize>) -> Option<()> {
+        offsets.clear();
+        let mut at = 0usize;
+        for (holds, _) in &self.properties {
+            offsets.push(at);
+            at += match *holds {
+                Holds::One(_) => 1,
+                Holds::List { .. } => words.get(at)?.parse::<usize>().ok().filter(|n| *n <= words.len())? + 1,
+            };
+        }
+        Some(())
+    }
 }
 
 fn strange(what: impl std::fmt::Display) -> Fault {
@@ -33,14 +80,17 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
     let (layout, elements, start) = header(bytes)?;
     let vertex = elements.iter().position(|e| e.name == "vertex").ok_or_else(|| strange("it has no vertices"))?;
     let before = &elements[..vertex];
-    if elements[..=vertex].iter().any(|e| e.lists) {
-        return Err(strange("a list stands in or before its vertices"));
-    }
     let e = &elements[vertex];
     let wanted =
         Wanted::among(e.properties.iter().map(|p| p.1.as_str())).ok_or_else(|| strange("x, y or z is missing"))?;
+    let kinds: Vec<Option<Number>> =
+        e.properties.iter().map(|p| if let Holds::One(n) = p.0 { Some(n) } else { None }).collect();
+    if wanted.xyz.into_iter().chain(wanted.light).any(|k| kinds[k].is_none()) {
+        return Err(strange("x, y, z or intensity is a list"));
+    }
     let body = &bytes[start..];
     let mut found = Points::default();
+    let mut offsets = Vec::with_capacity(e.properties.len());
     match layout {
         Layout::Text => {
             let text = std::str::from_utf8(body).map_err(strange)?;
@@ -50,26 +100,41 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
             for k in 0..e.count {
                 words.clear();
                 words.extend(records.next().unwrap_or("").split_ascii_whitespace());
-                if !found.take_text(&wanted, &words) {
+                let placed = e.words(&words, &mut offsets).is_some();
+                let wanted = Wanted { xyz: wanted.xyz.map(|k| offsets[k]), light: wanted.light.map(|k| offsets[k]) };
+                if !placed || !found.take_text(&wanted, &words) {
                     return Err(strange(format!("vertex {k} of {} is missing or no numbers", e.count)));
                 }
             }
         }
         Layout::Binary { big_endian } => {
-            let size = |e: &Element| e.properties.iter().map(|p| p.0.bytes()).sum::<usize>();
-            let skip: usize = before.iter().map(|e| e.count.saturating_mul(size(e))).fold(0, usize::saturating_add);
-            let record = size(e);
-            let end = e.count.saturating_mul(record).saturating_add(skip);
-            let body =
-                body.get(skip..end).ok_or_else(|| strange(format!("it ends before its {} vertices", e.count)))?;
-            let mut offsets = Vec::with_capacity(e.properties.len());
-            let mut at = 0;
-            for p in &e.properties {
-                offsets.push(at);
-                at += p.0.bytes();
+            let ends = || strange(format!("it ends before its {} vertices", e.count));
+            let mut at = 0usize;
+            for b in before {
+                match b.size() {
+                    Some(size) => at = at.saturating_add(b.count.saturating_mul(size)),
+                    None => {
+                        for _ in 0..b.count {
+                            let rest = body.get(at..).ok_or_else(ends)?;
+                            at += b.places(rest, big_endian, &mut offsets).ok_or_else(ends)?;
+                        }
+                    }
+                }
             }
-            for r in body.chunks_exact(record) {
-                found.take(&wanted, |k| e.properties[k].0.read(&r[offsets[k]..], big_endian));
+            let size = e.size();
+            if size.is_some_and(|size| at.saturating_add(e.count.saturating_mul(size)) > body.len()) {
+                return Err(ends());
+            }
+            for k in 0..e.count {
+                let record = body.get(at..).ok_or_else(ends)?;
+                if k == 0 || size.is_none() {
+                    e.places(record, big_endian, &mut offsets).ok_or_else(ends)?;
+                }
+                found.take(&wanted, |k| kinds[k].map_or(f64::NAN, |n| n.read(&record[offsets[k]..], big_endian)));
+                at += match size {
+                    Some(size) => size,
+                    None => e.places(record, big_endian, &mut offsets).ok_or_else(ends)?,
+                };
             }
         }
     }
@@ -78,9 +143,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<Raw> {
 }
 
 fn header(bytes: &[u8]) -> Result<(Layout, Vec<Element>, usize)> {
-    const END: &[u8] = b"end_header";
+    const END: &[u8] = b"\nend_header";
     let head = &bytes[..bytes.len().min(MOST_HEADER)];
     let end = head.windows(END.len()).position(|w| w == END).ok_or_else(|| strange("its header has no end"))?;
+    let end = end + 1;
     let line = head[end..].iter().position(|&b| b == b'\n').ok_or_else(|| strange("its header has no end"))?;
     let text = std::str::from_utf8(&head[..end]).map_err(strange)?;
     let (mut layout, mut elements) = (None, Vec::<Element>::new());
@@ -98,12 +164,18 @@ fn header(bytes: &[u8]) -> Result<(Layout, Vec<Element>, usize)> {
             ["element", name, count] => {
                 let count = count.parse().ok().filter(|&n| n <= MOST_POINTS);
                 let count = count.ok_or_else(|| strange(format!("'{l}', limit {MOST_POINTS}")))?;
-                elements.push(Element { name: name.into(), count, properties: vec![], lists: false });
+                elements.push(Element { name: name.into(), count, properties: vec![] });
             }
-            ["property", "list", ..] => elements.last_mut().ok_or_else(|| strange(l))?.lists = true,
-            ["property", kind, name] => {
-                let kind = number(kind).ok_or_else(|| strange(format!("'{l}'")))?;
-                elements.last_mut().ok_or_else(|| strange(l))?.properties.push((kind, name.into()));
+            ["property", ref kind @ .., name] => {
+                let holds = match kind {
+                    ["list", count, item] => {
+                        number(count).zip(number(item)).map(|(count, item)| Holds::List { count, item })
+                    }
+                    [kind] => number(kind).map(Holds::One),
+                    _ => None,
+                };
+                let holds = holds.ok_or_else(|| strange(format!("'{l}'")))?;
+                elements.last_mut().ok_or_else(|| strange(l))?.properties.push((holds, name.into()));
             }
             _ => {}
         }
@@ -112,13 +184,15 @@ fn header(bytes: &[u8]) -> Result<(Layout, Vec<Element>, usize)> {
 }
 
 fn number(name: &str) -> Option<Number> {
-    Some(match name {
+    Some(match name.to_ascii_lowercase().as_str() {
         "char" | "int8" => Number::I8,
         "uchar" | "uint8" => Number::U8,
         "short" | "int16" => Number::I16,
         "ushort" | "uint16" => Number::U16,
         "int" | "int32" => Number::I32,
         "uint" | "uint32" => Number::U32,
+        "int64" => Number::I64,
+        "uint64" => Number::U64,
         "float" | "float32" => Number::F32,
         "double" | "float64" => Number::F64,
         _ => return None,

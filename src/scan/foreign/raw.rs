@@ -1,19 +1,22 @@
-//! In: nothing. Out: what a foreign file holds: points as numbers, no unit given to them yet.
-//! Frame and unit: the file's own.
+//! What a foreign file holds: numbers, with no unit given to them yet.
+
+use crate::raster::{Kind, Says};
 
 /// What a file holds.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Raw {
-    /// A picture of heights: levels by column and row, row 0 at the top; NaN where the file itself says that nothing is there.
+    /// A picture of heights: levels by column and row, row 0 at the top.
     Picture {
         /// Columns.
         width: usize,
         /// Rows.
         height: usize,
-        /// Row by row.
-        levels: Vec<f32>,
-        /// True for whole numbers, which cannot say by themselves that a value is missing.
-        whole: bool,
+        /// Row by row, as written; NaN where the file hides a pixel.
+        levels: Vec<f64>,
+        /// What kind of numbers they are; whole ones cannot say by themselves that a value is missing.
+        kind: Kind,
+        /// What the file says about them, which is not applied yet.
+        says: Says,
     },
     /// Points in the order of the file; a missing one has a coordinate that is not finite.
     Points {

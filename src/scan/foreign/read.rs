@@ -1,20 +1,30 @@
-//! In: the bytes of a TIFF, PNG, PGM, BMP, PLY or PCD. Out: what it holds.
-//! Frame and unit: the file's own.
+//! Reads a height picture, a PLY or a PCD by what it begins with.
 
 use super::raw::Raw;
 use super::{pcd, picture, ply};
-use crate::fault::Result;
+use crate::fault::{Fault, Result};
 
 /// Reads a file by what it begins with.
 ///
 /// # Errors
-/// Other files, damaged ones, more than 64 million points.
+/// Other files, damaged ones, more than 64 million points, several pages.
 pub fn read_foreign(bytes: &[u8]) -> Result<Raw> {
-    if bytes.starts_with(b"ply") {
-        return ply::read(bytes);
+    read_foreign_page(bytes, None)
+}
+
+/// Reads a file of which `page`, counted from 1, is meant.
+///
+/// # Errors
+/// As [`read_foreign`]; a page that is not there.
+pub fn read_foreign_page(bytes: &[u8], page: Option<usize>) -> Result<Raw> {
+    let cloud = match () {
+        () if bytes.starts_with(b"ply") => ply::read(bytes),
+        () if pcd::begins(bytes) => pcd::read(bytes),
+        () => return picture::read(bytes, page),
+    };
+    match page {
+        Some(page) => Err(Fault::usage(format!("page {page} of a cloud is asked for; only a TIFF has pages"))
+            .next("leave --page out")),
+        None => cloud,
     }
-    if pcd::begins(bytes) {
-        return pcd::read(bytes);
-    }
-    picture::read(bytes)
 }

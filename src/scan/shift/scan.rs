@@ -5,7 +5,7 @@
 use super::crossing::{Crossing, stripe_by_row};
 use super::plateau::{Plateau, plateau, spread};
 use crate::fault::{Fault, Result};
-use crate::raster::Channel;
+use crate::raster::{Channel, Depth};
 use crate::scan::CloudPoint;
 use std::path::{Path, PathBuf};
 
@@ -196,7 +196,9 @@ pub fn shift_scan(
     let all = names.len() + empty.len();
     let mut done = 0;
     let mut rows = |path: &PathBuf| {
-        let found = stripe_by_row(&crate::raster::load(path, rig.channel, 8)?);
+        let depth =
+            Depth { bits: 8, declared: "a shift scan takes", correct: "export the pictures with 8 bits a pixel" };
+        let found = stripe_by_row(&crate::raster::load(path, rig.channel, depth)?);
         done += 1;
         progress(done, all);
         Ok(found)

@@ -4,6 +4,7 @@
 
 use super::hand_eye::Calibrated;
 use crate::calibrate::ball::evaluate::{Evaluation, evaluate};
+use crate::calibrate::ball::missing::{Cleaned, cleaned};
 use crate::calibrate::ball::options::BallOptions;
 use crate::calibrate::ball::profiles::load;
 use crate::calibrate::ball::solve::{BallFit, solve};
@@ -27,10 +28,12 @@ pub fn calibrate_profile_hand_eye(
     asked: &Asked,
 ) -> Result<(Calibrated<Rigid<Flange, Sensor>>, Vec<String>)> {
     asked.check()?;
-    let all = load(profiles)?;
-    let (read, warnings) = poses_of(poses)?;
+    let Cleaned { profiles: all, suspects, warnings: strange } = cleaned(load(profiles)?, options.missing);
+    let (read, mut warnings) = poses_of(poses)?;
+    warnings.extend(strange);
     let fit = solve(&all, &read, options)?;
-    let points = || all.iter().flat_map(|p| &p.points);
+    let measured = |p: &&[f64; 2]| !suspects.contains(&p[1]);
+    let points = || all.iter().flat_map(|p| &p.points).filter(measured);
     let span = |axis: usize| Volume::spanned(points().map(|p| p[axis]), "where the profiles' points lie");
     let (seen, width) = (span(1).expect("profiles with points"), span(0).expect("profiles with points").length());
     let quality = judge(&fit, &asked.limits(&seen, |_| width));
@@ -64,8 +67,10 @@ pub fn evaluate_profile_hand_eye(
     options: &BallOptions,
 ) -> Result<(Evaluation, Vec<String>)> {
     let sensor = sensor_of(transform)?;
-    let (read, warnings) = poses_of(poses)?;
-    Ok((evaluate(&load(profiles)?, &read, &sensor, options)?, warnings))
+    let (read, mut warnings) = poses_of(poses)?;
+    let cleaned = cleaned(load(profiles)?, options.missing);
+    warnings.extend(cleaned.warnings);
+    Ok((evaluate(&cleaned.profiles, &read, &sensor, options)?, warnings))
 }
 
 /// `flange_T_sensor` of a JSON file: a calibration's record, or an object with that key.

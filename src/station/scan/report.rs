@@ -117,6 +117,9 @@ pub struct Imported {
     pub file: String,
     /// SHA-256 of it.
     pub sha256: String,
+    /// The page of it that was chosen, from 1 on.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub page: Option<usize>,
     /// SHA-256 of the picture of the light that came with it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub light_sha256: Option<String>,

@@ -8,7 +8,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, Normal};
 use rand_pcg::Pcg64;
 use serde_json::Value;
-use sheetlight::raster::{Image, save_png};
+use sheetlight::raster::{Image, Kind, Says, save_png};
 use sheetlight::scan::{CloudPoint, Raw, Stated, lines, read_foreign};
 use std::path::Path;
 
@@ -143,8 +143,13 @@ fn all_formats_hold_the_same_points() {
 
 #[test]
 fn nothing_is_guessed() {
-    let picture =
-        Raw::Picture { width: 40, height: 4, levels: (0..160).map(|i| (i % 5) as f32).collect(), whole: true };
+    let picture = Raw::Picture {
+        width: 40,
+        height: 4,
+        levels: (0..160).map(|i| f64::from(i % 5)).collect(),
+        kind: Kind::Unsigned(8),
+        says: Says::default(),
+    };
     let scattered = Raw::Points { line: None, points: vec![[0.0, 0.0, 1.0]; 100], intensity: None };
     let full =
         Stated { unit_mm: Some(0.1), spacing_mm: Some([1.0, 1.0]), missing: Some(Some(0.0)), ..Stated::default() };
@@ -159,7 +164,8 @@ fn nothing_is_guessed() {
     refused(&scattered, &Stated { spacing_mm: None, ..full.clone() }, "distance of the points");
     refused(&picture, &Stated { unit_mm: Some(1e5), ..full.clone() }, "a point lies at");
     refused(&scattered, &Stated { spacing_mm: Some([1e-5, 1.0]), ..full.clone() }, "neighbours");
-    let empty = Raw::Picture { width: 2, height: 2, levels: vec![0.0; 4], whole: true };
+    let (kind, says) = (Kind::Unsigned(8), Says::default());
+    let empty = Raw::Picture { width: 2, height: 2, levels: vec![0.0; 4], kind, says };
     refused(&empty, &full, "no point");
     assert!(lines(&picture, Some(&empty), &full).unwrap_err().what.contains("light"));
 }

@@ -1,0 +1,37 @@
+//! Takes points out of profiles whose z means "not measured", and names a z that looks as if it did.
+
+use super::profile::Profile;
+use crate::raster::Kind;
+use crate::solve::repeated;
+
+/// Profiles without what was not measured, what is suspected, and both in words.
+pub struct Cleaned {
+    /// The profiles.
+    pub profiles: Vec<Profile>,
+    /// A z that so many points share that it may not be measured, mm.
+    pub suspects: Vec<f64>,
+    /// A sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// Takes the points with the z `missing` out.
+pub fn cleaned(mut profiles: Vec<Profile>, missing: Option<f64>) -> Cleaned {
+    let count = |profiles: &[Profile]| profiles.iter().map(|p| p.points.len()).sum::<usize>();
+    let all = count(&profiles);
+    let mut warnings = vec![];
+    if let Some(z) = missing {
+        profiles.iter_mut().for_each(|p| p.points.retain(|point| !Kind::Text.same(point[1], z)));
+        if count(&profiles) == all {
+            warnings.push(format!("no point has the z {z} that --missing names"));
+        }
+    }
+    let left = count(&profiles);
+    let found = repeated(profiles.iter().flat_map(|p| &p.points).map(|point| point[1]));
+    warnings.extend(found.iter().map(|(z, n)| {
+        format!(
+            "{n} of {left} points have exactly the z {z}: if that means 'not measured', give --missing {z}; where the \
+             error is stated they are left out of the points' depth"
+        )
+    }));
+    Cleaned { profiles, suspects: found.into_iter().map(|f| f.0).collect(), warnings }
+}

@@ -1,0 +1,135 @@
+//! Reads PNG: levels of 1, 2 and 4 bits as written, palettes, transparency and the orientation of an eXIf chunk.
+
+use super::kind::{Kind, Values};
+use super::picture::{DECODING, Samples, Wanted, unreadable};
+use super::says::Says;
+use crate::fault::{Fault, Result};
+use image::metadata::Orientation;
+use png::{BitDepth, ColorType, Info};
+use std::io::Cursor;
+
+pub(super) const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
+
+pub(super) fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
+    let strange = |e: png::DecodingError| unreadable(bytes, &e);
+    // The size is judged here, by its own numbers.
+    let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), png::Limits { bytes: usize::MAX });
+    decoder.set_transformations(png::Transformations::IDENTITY);
+    decoder.set_ignore_text_chunk(true);
+    decoder.set_ignore_iccp_chunk(true);
+    let size = decoder.read_header_info().map_err(strange)?.size();
+    // Columns and rows may be swapped by what comes later; the number of pixels stays.
+    Wanted { size: None, ..*wanted }.fits(1, size.into())?;
+    let mut reader = decoder.read_info().map_err(strange)?;
+    if reader.info().exif_metadata.is_none() {
+        wanted.fits(1, size.into())?;
+    }
+    let buffer = reader.output_buffer_size().ok_or_else(|| unreadable(bytes, &"too large for this machine"))?;
+    let _memory = DECODING.hold(3 * buffer as u64);
+    // Decoded in place: levels of 16 bits need no copy.
+    let values = if reader.info().bit_depth == BitDepth::Sixteen {
+        let mut levels = vec![0u16; buffer / 2];
+        reader.next_frame(bytemuck::cast_slice_mut(&mut levels)).map_err(strange)?;
+        levels.iter_mut().for_each(|v| *v = u16::from_be(*v));
+        Values::U16(levels)
+    } else {
+        let mut levels = vec![0u8; buffer];
+        reader.next_frame(&mut levels).map_err(strange)?;
+        Values::U8(levels)
+    };
+    // An eXIf chunk may come after the pixels; a file that ends before its end mark is whole enough without.
+    let _ = reader.finish();
+    let info = reader.info();
+    let orientation = orientation(info);
+    wanted.fits(orientation, size.into())?;
+    single(info)?;
+    Ok(samples(info, values)?.upright(orientation))
+}
+
+/// Refuses animations, whose other pictures nobody would look at.
+fn single(info: &Info) -> Result<()> {
+    match info.animation_control {
+        Some(control) if control.num_frames > 1 => {
+            Err(Fault::input(format!("is an animation of {} pictures (acTL)", control.num_frames))
+                .cause("one picture is wanted, and which is not said")
+                .next("save the one that is meant as a PNG of its own"))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn orientation(info: &Info) -> u16 {
+    let exif = info.exif_metadata.as_deref().unwrap_or_default();
+    let exif = exif.strip_prefix(b"Exif\0\0").unwrap_or(exif);
+    Orientation::from_exif_chunk(exif).map_or(1, |o| u16::from(o.to_exif()))
+}
+
+fn samples(info: &Info, stored: Values) -> Result<Samples> {
+    let (width, height) = info.size();
+    let bits = info.bit_depth as u8;
+    let in_file = info.color_type.samples();
+    let values = match stored {
+        Values::U8(packed) if bits < 8 => Values::U8(unpacked(&packed, bits, width as usize * in_file)),
+        stored => stored,
+    };
+    let mut notes = Vec::new();
+    if let Some(s) = info.sbit.as_ref().and_then(|s| s.iter().max()).filter(|s| **s < bits) {
+        notes.push(format!(
+            "the file says that {s} of its {bits} bits count (sBIT); levels are taken as they are written"
+        ));
+    }
+    let says = Says { notes, ..Says::default() };
+    let kind = Kind::Unsigned(bits);
+    let mut samples = Samples { width, height, channels: in_file, kind, values, hidden: None, veiled: 0, says };
+    if info.color_type == ColorType::Indexed {
+        return coloured(samples, info);
+    }
+    let opaque = kind.most().unwrap_or(1.0);
+    if matches!(info.color_type, ColorType::GrayscaleAlpha | ColorType::Rgba) {
+        return Ok(samples.parted(opaque));
+    }
+    if let Some(clear) = &info.trns {
+        // The `png` crate keeps one byte of each level of up to 8 bits.
+        let level = |b: &[u8]| f64::from(b.iter().fold(0u16, |v, b| v << 8 | u16::from(*b)));
+        let clear: Vec<f64> = clear.chunks_exact(if bits == 16 { 2 } else { 1 }).map(level).collect();
+        let there: Vec<f64> = (0..samples.pixel_count())
+            .map(|i| f64::from(!clear.iter().enumerate().all(|(c, v)| samples.get(i, c) == *v)))
+            .collect();
+        samples.hide(|i| there[i]);
+    }
+    Ok(samples)
+}
+
+/// Numbers of a palette's colours, with the colours put in their place; a palette of greys makes a grey picture.
+fn coloured(mut samples: Samples, info: &Info) -> Result<Samples> {
+    let palette = info.palette.as_deref().unwrap_or_default();
+    let Values::U8(numbers) = &samples.values else { return Ok(samples) };
+    let most = usize::from(numbers.iter().copied().max().unwrap_or(0));
+    if 3 * most + 2 >= palette.len() {
+        return Err(Fault::input(format!("names colour {most} of a palette of {}", palette.len() / 3))
+            .cause("a damaged file")
+            .next("write the picture again"));
+    }
+    let colour = |n: &u8| -> [u8; 3] { [0, 1, 2].map(|c| palette[3 * usize::from(*n) + c]) };
+    let grey = numbers.iter().all(|n| colour(n) == [colour(n)[0]; 3]);
+    let alpha = |n: u8| info.trns.as_ref().and_then(|t| t.get(usize::from(n))).map_or(1.0, |a| f64::from(*a) / 255.0);
+    let there: Vec<f64> = numbers.iter().map(|n| alpha(*n)).collect();
+    let channels = if grey { 1 } else { 3 };
+    let values = Values::U8(numbers.iter().flat_map(|n| colour(n).into_iter().take(channels)).collect());
+    (samples.values, samples.channels, samples.kind) = (values, channels, Kind::Unsigned(8));
+    if info.trns.is_some() {
+        samples.hide(|i| there[i]);
+    }
+    Ok(samples)
+}
+
+/// Samples of 1, 2 or 4 bits, the first in the highest bits, each row in whole bytes.
+pub(super) fn unpacked(raw: &[u8], bits: u8, in_row: usize) -> Vec<u8> {
+    let bits = usize::from(bits);
+    let stride = (in_row * bits).div_ceil(8);
+    let sample = |row: &[u8], k: usize| {
+        let shift = 8 - bits - (k * bits) % 8;
+        (row[k * bits / 8] >> shift) & ((1u16 << bits) - 1) as u8
+    };
+    raw.chunks_exact(stride).flat_map(|row| (0..in_row).map(move |k| sample(row, k))).collect()
+}

@@ -1,0 +1,22 @@
+//! What a picture file says about its samples beside the samples themselves.
+
+/// What a file says about its samples; nothing of it is applied to them but the orientation.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Says {
+    /// Which of the eight orientations of TIFF and Exif the file had; the samples are upright.
+    pub orientation: Option<u16>,
+    /// The sample of a pixel without a value (GDAL_NODATA).
+    pub missing: Option<f64>,
+    /// The sample of a pixel means `scale[0] * sample + scale[1]`.
+    pub scale: Option<[f64; 2]>,
+    /// Distance of columns and rows, in a unit that the file does not name (ModelPixelScale).
+    pub spacing: Option<[f64; 2]>,
+    /// The smallest sample is the brightest one.
+    pub white_is_zero: bool,
+    /// Compression changed the samples (JPEG).
+    pub lossy: bool,
+    /// A picture of two levels, which are shades and no numbers.
+    pub two_levels: bool,
+    /// Facts that may surprise, a sentence each.
+    pub notes: Vec<String>,
+}
