@@ -55,18 +55,16 @@ pub async fn refuse(State(screen): Shared, Extension(tab): Extension<Tab>, bytes
 
 /// POST /motion/release: the button was let go. Needs no lease: who lost it lets go too.
 pub async fn release(State(screen): Shared, Extension(tab): Extension<Tab>) -> Answer<Json<Value>> {
-    json(screen, move |s| {
-        s.desk.let_go(&tab, "the button was let go");
-        Ok(object!({}))
-    })
-    .await
+    // Here, not in the queue of work that waits for the disk: a hand that opens halts the arm at once.
+    screen.desk.let_go(&tab, "the button was let go");
+    Ok(Json(object!({})))
 }
 
 /// POST /stop: everybody may.
 pub async fn stop(State(screen): Shared) -> Answer<Json<Value>> {
+    // The robot first, and here: every thread for the work below may be busy with pictures.
+    screen.desk.stop();
     json(screen, |s| {
-        // The robot first: what is on the disk can wait.
-        s.desk.stop();
         for job in s.jobs.list(JOBS) {
             if matches!(job.state, JobState::Running | JobState::Queued) {
                 // One that has just ended needs no stop.

@@ -76,6 +76,8 @@ struct Hold {
 pub(super) struct At {
     /// Here while no job has it.
     pub guard: Option<Guard>,
+    /// Counts the times that the robot was taken and given back: a guard of an earlier time is never put back.
+    turn: u64,
     pub button: Option<StopButton>,
     armed: Option<Tab>,
     hold: Option<Hold>,
@@ -93,6 +95,27 @@ impl At {
             self.shown.silence_ms = self.shown.silence_ms.map(|longest| longest.max(ms));
         }
     }
+}
+
+impl At {
+    /// Puts a guard back that was taken in this turn; false, and it is dropped, where the robot was given back meanwhile.
+    pub(super) fn put_back(&mut self, guard: Guard, turn: u64) -> bool {
+        let same = self.turn == turn && self.guard.is_none();
+        if same {
+            self.guard = Some(guard);
+        }
+        same
+    }
+}
+
+/// Takes the guard out, so that nobody holds the desk while the controller is asked. With it comes the turn that it is of.
+pub(super) fn taken(at: &mut At) -> Result<(Guard, u64)> {
+    let guard = at.guard.take().ok_or_else(|| {
+        Fault::refused("the robot is in use")
+            .cause("a job, or a test of its outputs, has it")
+            .next("wait until it has ended")
+    })?;
+    Ok((guard, at.turn))
 }
 
 fn no(what: impl Into<String>) -> Fault {
@@ -159,7 +182,7 @@ impl Desk {
         };
         let mut at = self.at();
         if let Some(guard) = made.filter(|_| at.button.is_none()) {
-            (at.button, at.guard) = (Some(guard.stop_button()), Some(guard));
+            (at.button, at.guard, at.turn) = (Some(guard.stop_button()), Some(guard), at.turn + 1);
         }
         at.armed = Some(tab.clone());
         self.tell(&at);
@@ -172,7 +195,7 @@ impl Desk {
         if at.stop.is_some() {
             return Err(Fault::refused("a job has the robot").next("stop the job first"));
         }
-        (at.armed, at.button) = (None, None);
+        (at.armed, at.button, at.turn) = (None, None, at.turn + 1);
         let guard = at.guard.take();
         self.tell(&at);
         let state = self.seen(&at);
@@ -194,17 +217,11 @@ impl Desk {
                 .cause("outputs are switched by who stands beside the cell")
                 .next("press Arm first"));
         }
-        let Some(mut guard) = at.guard.take() else {
-            return Err(Fault::refused("the robot is in use").cause("a job has it").next("wait until it has ended"));
-        };
+        let (mut guard, turn) = taken(&mut at)?;
         drop(at);
         let outputs = Settings::load(&self.links.station).map(|s| s.outputs.unwrap_or_default());
         let tried = outputs.and_then(|o| try_output(guard.link(), &o, what, &self.links.stop));
-        let mut at = self.at();
-        // Given back meanwhile: it stays given back.
-        if at.button.is_some() {
-            at.guard = Some(guard);
-        }
+        self.at().put_back(guard, turn);
         tried
     }
 
@@ -214,11 +231,17 @@ impl Desk {
         if at.stop.is_some() {
             return Err(Fault::refused("a job has the robot").next("wait until it has ended"));
         }
-        if let Some(guard) = &mut at.guard {
-            guard.looked()?;
-        }
-        if let Some(button) = &at.button {
-            button.release();
+        if at.button.is_some() {
+            let (mut guard, turn) = taken(&mut at)?;
+            // The controller may take seconds to answer: STOP must not wait for it.
+            drop(at);
+            let looked = guard.looked();
+            at = self.at();
+            let same = at.put_back(guard, turn);
+            looked?;
+            if let Some(button) = at.button.as_ref().filter(|_| same) {
+                button.release();
+            }
         }
         at.shown.look = None;
         self.tell(&at);

@@ -130,6 +130,10 @@ impl Jobs {
     /// Goes on with a job that was cut off or stopped; `back_out`: an insertion goes back up instead.
     pub fn resume(&self, id: &str, back_out: bool) -> Result<Job> {
         let mut job = self.get(id)?;
+        let number = number_of(id).expect("a job's id");
+        // Looked at and queued under one lock: a request that comes twice queues the job once.
+        let mut state = self.state();
+        job.state = state.all.get(&number).map_or(job.state, |j| j.state);
         if back_out && !matches!(job.order, Order::Insert(_)) {
             return Err(Fault::usage(format!("{id}: moves no robot, there is nothing to back out of"))
                 .next("take it away, or resume it"));
@@ -143,8 +147,11 @@ impl Jobs {
             ask.back_out = back_out;
         }
         (job.state, job.problem, job.outcome) = (JobState::Queued, None, None);
-        self.put(&job)?;
-        self.state().waiting.push_back(number_of(id).expect("a job's id"));
+        store::save(&self.place.jobs(), &job)?;
+        state.all.insert(number, job.clone());
+        state.waiting.push_back(number);
+        drop(state);
+        self.tell(&job);
         self.wake.notify_all();
         Ok(job)
     }
@@ -207,12 +214,11 @@ impl Jobs {
                 return None;
             }
             if let Some(number) = state.waiting.pop_front() {
+                // A job whose folder vanished is not begun.
+                let Some(job) = state.all.get(&number).cloned() else { continue };
                 let stop = Arc::new(AtomicBool::new(false));
                 state.running = Some(Running { number, stop: stop.clone(), told: Instant::now() });
-                let job = state.all.get(&number).cloned();
-                if let Some(job) = job {
-                    return Some(Taken { job, stop });
-                }
+                return Some(Taken { job, stop });
             }
             state = self.wake.wait(state).unwrap_or_else(|e| e.into_inner());
         }
