@@ -12,8 +12,8 @@ mod state;
 pub mod ur;
 mod uri;
 
-pub use link::{Arm, Halt, PoseSource};
-pub use motion::{Allowed, Motion, Way};
+pub use link::{Arm, Halt, PoseSource, SIMULATED};
+pub use motion::{Allowed, Motion, Pace, Way};
 pub use outputs::Outputs;
 pub use state::{ControllerError, Mode, Reach, State, TimedPose};
 pub use uri::{RobotUri, open};

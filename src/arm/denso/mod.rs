@@ -6,4 +6,4 @@ mod halt;
 mod session;
 mod words;
 
-pub(super) use arm::Denso;
+pub(super) use arm::{Denso, Full};

@@ -162,7 +162,11 @@ impl<'a> Job<'a> {
         if !self.state.moving {
             return Ok(());
         }
-        self.operator.tell("the last motion was cut off: where the arm is was not known, look at the robot");
+        if !self.operator.looked("the last motion was cut off: where the arm is was not known, look at the robot")? {
+            return Err(Fault::refused("nobody has looked at the robot since its last motion was cut off")
+                .cause("the question was answered with no")
+                .next("look at the robot, then begin again"));
+        }
         self.guard.looked()?;
         self.state.moving = false;
         self.state.phase = match self.state.phase {
@@ -253,8 +257,7 @@ impl<'a> Job<'a> {
     }
 
     pub(super) fn plan(&self, name: &str, why: String, legs: Vec<Motion>, evidence: Evidence) -> Plan {
-        let tool_at = self.settings.tool.map(|t| t.flange_from_tool.translation);
-        Plan { name: name.into(), why, legs, tool_at, evidence }
+        Plan { name: name.into(), why, legs, evidence }
     }
 
     /// Looks squarely at the board, and sweeps the line over it.
