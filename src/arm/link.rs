@@ -6,6 +6,9 @@ use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid};
 use std::sync::Arc;
 
+/// The variable that only a simulated controller has, and what it holds: so a link knows it, whatever its address.
+pub const SIMULATED: [&str; 2] = ["@SIMULATED_BY", "sheetlight cell"];
+
 /// Something that says where a flange is. Each has a connection of its own, so that one can be read while the arm moves.
 pub trait PoseSource: Send {
     /// The pose now; for poses from a file the next one.
@@ -33,6 +36,16 @@ pub trait Arm: PoseSource {
 
     /// Mode, motor, errors, frames.
     fn state(&mut self) -> Result<State>;
+
+    /// The controller says that it is a simulated one. An address says nothing: a tunnel to a real one begins on this machine too.
+    fn simulated(&mut self) -> Result<bool> {
+        Ok(false)
+    }
+
+    /// What people take for granted and the controller does not say, in words.
+    fn unsaid(&self) -> Option<&'static str> {
+        None
+    }
 
     /// A second reader of poses over a connection of its own.
     fn watch(&self) -> Result<Box<dyn PoseSource>>;

@@ -13,8 +13,8 @@ mod switchboard;
 pub mod ur;
 mod uri;
 
-pub use link::{Arm, Halt, PoseSource, Switch};
-pub use motion::{Allowed, Motion, Way};
+pub use link::{Arm, Halt, PoseSource, SIMULATED, Switch};
+pub use motion::{Allowed, Motion, Pace, Way};
 pub use outputs::Outputs;
 pub use state::{ControllerError, Mode, Reach, State, TimedPose};
 pub use switchboard::Switchboard;

@@ -1,5 +1,5 @@
 //! In: a motion that someone asks for. Out: the same with the right to be made once.
-//! Frame and unit: base_from_flange, mm; speed of the flange, mm/s.
+//! Frame and unit: base_from_flange, mm; speeds mm/s and degrees/s.
 
 use crate::geometry::{Base, Flange, Rigid};
 
@@ -20,22 +20,38 @@ pub struct Motion {
     pub to: Rigid<Base, Flange>,
     /// On which way.
     pub way: Way,
-    /// Greatest speed of the flange's origin, mm/s.
+    /// Greatest speed of any point that the flange carries, mm/s.
     pub speed_mm_s: f64,
+}
+
+/// How fast a motion is made, so that no point that the flange carries is too fast.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pace {
+    /// Greatest speed of the flange's origin on a straight way, of any carried point where the arm chooses the way; mm/s.
+    pub flange_mm_s: f64,
+    /// Greatest turning rate, degrees/s.
+    pub turn_deg_s: f64,
+    /// How far the farthest carried point lies from the flange's origin, mm.
+    pub lever_mm: f64,
 }
 
 /// A motion that met every rule and was confirmed. Only the rules make one, and making the motion uses it up.
 #[derive(Debug)]
 pub struct Allowed {
     motion: Motion,
+    pace: Pace,
 }
 
 impl Allowed {
-    pub(in crate::arm) fn new(motion: Motion) -> Allowed {
-        Allowed { motion }
+    pub(in crate::arm) fn new(motion: Motion, pace: Pace) -> Allowed {
+        Allowed { motion, pace }
     }
     /// What may be done.
     pub fn motion(&self) -> &Motion {
         &self.motion
+    }
+    /// How fast.
+    pub fn pace(&self) -> &Pace {
+        &self.pace
     }
 }

@@ -1,6 +1,7 @@
 //! In: what a controller says of itself. Out: the same in one form for all makes.
 //! Frame and unit: poses base_from_flange, mm; times of this machine's monotonic clock.
 
+use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid};
 use std::time::{Duration, Instant};
 
@@ -28,6 +29,19 @@ impl TimedPose {
     pub fn round_trip(&self) -> Duration {
         self.here.saturating_duration_since(self.asked)
     }
+}
+
+/// Longest time that a controller's clock is believed to have counted, s: thirty thousand years.
+const LONGEST_S: f64 = 1e12;
+
+/// The controller's stamp of a pose. Errors: no number, or one that no clock shows: the link is lost.
+pub(super) fn stamp(seconds: f64) -> Result<Duration> {
+    let believed = Duration::try_from_secs_f64(seconds).ok().filter(|_| seconds <= LONGEST_S);
+    believed.ok_or_else(|| {
+        Fault::device(format!("a pose of the time {seconds:e} s, 0 to {LONGEST_S:e} are believed"))
+            .cause("the stream of poses is damaged, or the controller's answer means something else")
+            .next("look at the robot, then connect again")
+    })
 }
 
 /// Who may move the arm.
@@ -83,4 +97,17 @@ pub enum Reach {
     Refused(String),
     /// The link cannot ask.
     Unasked,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stamp_that_no_clock_shows_is_refused() {
+        assert_eq!(stamp(12.5).unwrap(), Duration::from_millis(12_500));
+        for wrong in [f64::INFINITY, f64::NAN, -1.0, 1e17, 1e30] {
+            assert!(stamp(wrong).unwrap_err().what.contains("are believed"), "{wrong}");
+        }
+    }
 }

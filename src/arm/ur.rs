@@ -2,6 +2,7 @@
 //! itself; it is read, nothing is sent.
 //! Frame and unit: metres and rotation vector on the wire, base_from_flange in mm here: the tool centre point must be the flange.
 
+use super::state::stamp;
 use super::{Arm, Mode, PoseSource, State, TimedPose};
 use crate::fault::{Fault, Result};
 use crate::robot::Convention;
@@ -127,7 +128,7 @@ impl PoseSource for UrPoses {
         }
         let (packet, here) = held.1.expect("one came");
         let base_from_flange = Convention::Ur.read(&packet.tool).map_err(|e| e.at(&self.name))?;
-        let device = Duration::try_from_secs_f64(packet.time_s).ok();
+        let device = Some(stamp(packet.time_s).map_err(|e| e.at(&self.name))?);
         Ok(TimedPose { base_from_flange, figure: None, asked, here, device })
     }
 }
@@ -140,6 +141,9 @@ impl Arm for UrPoses {
         let model = "Universal Robots, poses only".into();
         let (motor, busy, emergency_stop) = (None, None, None);
         Ok(State { model, mode: Mode::Unknown, motor, busy, emergency_stop, errors: vec![], tool: None, work: None })
+    }
+    fn unsaid(&self) -> Option<&'static str> {
+        Some("the flange: the controller does not say whether its tool centre point is the flange, as it has to be")
     }
     fn watch(&self) -> Result<Box<dyn PoseSource>> {
         Ok(Box::new(UrPoses::open(&self.name, &self.address)?))

@@ -9,7 +9,8 @@ use std::path::PathBuf;
 /// Where a robot is.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RobotUri {
-    /// `bcap://HOST[:PORT][?network=udp][&full=MM_S]`: a Denso controller; `full` is the speed of straight motions at 100 %.
+    /// `bcap://HOST[:PORT][?network=udp][&full=MM_S][&turn=DEG_S]`: a Denso controller; `full` and `turn` are the speeds of straight motions at
+    /// 100 %.
     Bcap {
         /// HOST:PORT.
         address: String,
@@ -17,6 +18,8 @@ pub enum RobotUri {
         network: Network,
         /// Speed of the flange at 100 %, mm/s.
         full_mm_s: f64,
+        /// Turning rate of the flange at 100 %, degrees/s.
+        full_deg_s: f64,
     },
     /// `ur://HOST[:PORT]`: poses of a Universal Robots controller, read from its real-time interface: HOST:PORT.
     Ur(String),
@@ -30,6 +33,8 @@ const BCAP_PORT: u16 = 5007;
 const UR_PORT: u16 = 30_003;
 /// Straight motions at 100 %, mm/s. What the VS-060 does is to be measured; a motion that is faster than asked is halted.
 const FULL_MM_S: f64 = 1000.0;
+/// The same for turning, degrees/s.
+const FULL_DEG_S: f64 = 200.0;
 
 impl std::str::FromStr for RobotUri {
     type Err = Fault;
@@ -53,7 +58,8 @@ impl std::str::FromStr for RobotUri {
         }
         match scheme {
             "bcap" => {
-                let (mut network, mut full_mm_s) = (Network::Tcp, FULL_MM_S);
+                let (mut network, mut full_mm_s, mut full_deg_s) = (Network::Tcp, FULL_MM_S, FULL_DEG_S);
+                let within = |v: &str, low: f64, high: f64| v.parse().ok().filter(|x| (low..=high).contains(x));
                 for (key, value) in
                     query.split('&').filter(|p| !p.is_empty()).map(|p| p.split_once('=').unwrap_or((p, "")))
                 {
@@ -61,17 +67,21 @@ impl std::str::FromStr for RobotUri {
                         ("network", "tcp") => network = Network::Tcp,
                         ("network", "udp") => network = Network::Udp,
                         ("full", v) => {
-                            let full = v.parse().ok().filter(|x| (50.0..=20_000.0).contains(x));
-                            full_mm_s = full.ok_or_else(|| bad(format!("full={v}, wanted 50 to 20000 mm/s")))?;
+                            full_mm_s = within(v, 50.0, 20_000.0)
+                                .ok_or_else(|| bad(format!("full={v}, wanted 50 to 20000 mm/s")))?;
+                        }
+                        ("turn", v) => {
+                            full_deg_s = within(v, 10.0, 2000.0)
+                                .ok_or_else(|| bad(format!("turn={v}, wanted 10 to 2000 degrees/s")))?;
                         }
                         _ => {
                             return Err(bad(format!(
-                                "knows no {key}={value}; there are network=tcp, network=udp, full=MM_S"
+                                "knows no {key}={value}; there are network=tcp, network=udp, full=MM_S, turn=DEG_S"
                             )));
                         }
                     }
                 }
-                Ok(RobotUri::Bcap { address: with_port(host, BCAP_PORT).map_err(bad)?, network, full_mm_s })
+                Ok(RobotUri::Bcap { address: with_port(host, BCAP_PORT).map_err(bad)?, network, full_mm_s, full_deg_s })
             }
             "ur" => Ok(RobotUri::Ur(with_port(host, UR_PORT).map_err(bad)?)),
             other => Err(bad(format!("'{other}' is no kind of link"))),
@@ -92,8 +102,9 @@ fn with_port(host: &str, port: u16) -> std::result::Result<String, String> {
 /// Opens the link that a URI names. Errors: a URI that says nothing, a controller that does not answer.
 pub fn open(uri: &str) -> Result<Box<dyn Arm>> {
     Ok(match uri.parse()? {
-        RobotUri::Bcap { address, network, full_mm_s } => {
-            Box::new(denso::Denso::open(uri, &address, network, full_mm_s)?)
+        RobotUri::Bcap { address, network, full_mm_s, full_deg_s } => {
+            let full = denso::Full { mm_s: full_mm_s, deg_s: full_deg_s };
+            Box::new(denso::Denso::open(uri, &address, network, full)?)
         }
         RobotUri::Ur(address) => Box::new(ur::UrPoses::open(uri, &address)?),
         RobotUri::File(path) => Box::new(file::PosesOfFile::open(uri, &path)?),
@@ -107,9 +118,15 @@ mod tests {
     #[test]
     fn addresses_are_read_and_slips_are_named() {
         let read = |s: &str| s.parse::<RobotUri>();
-        let bcap = |address: &str, network, full_mm_s| RobotUri::Bcap { address: address.into(), network, full_mm_s };
+        let bcap = |address: &str, network, full_mm_s| {
+            let full_deg_s = if full_mm_s == 1500.0 { 90.0 } else { 200.0 };
+            RobotUri::Bcap { address: address.into(), network, full_mm_s, full_deg_s }
+        };
         assert_eq!(read("bcap://10.0.0.2").unwrap(), bcap("10.0.0.2:5007", Network::Tcp, 1000.0));
-        assert_eq!(read("bcap://rc8:6000/?network=udp&full=1500").unwrap(), bcap("rc8:6000", Network::Udp, 1500.0));
+        assert_eq!(
+            read("bcap://rc8:6000/?network=udp&full=1500&turn=90").unwrap(),
+            bcap("rc8:6000", Network::Udp, 1500.0)
+        );
         assert_eq!(read("bcap://[::1]").unwrap(), bcap("[::1]:5007", Network::Tcp, 1000.0));
         assert_eq!(read("file:a/poses.json").unwrap(), RobotUri::File("a/poses.json".into()));
         for (uri, says) in [
@@ -119,6 +136,7 @@ mod tests {
             ("bcap://rc8:70000", "no port"),
             ("bcap://rc8?speed=3", "speed=3"),
             ("bcap://rc8?full=nan", "full=nan"),
+            ("bcap://rc8?turn=5", "turn=5"),
             ("file:", "no file"),
         ] {
             assert!(read(uri).unwrap_err().what.contains(says), "{uri}");

@@ -276,6 +276,10 @@ impl Cell {
     pub fn arm_error(&self) -> ArmError {
         self.0.arm_error
     }
+    /// Where the flange was as its controller has it.
+    pub fn reported(&self, t: f64) -> Rigid<Base, Flange> {
+        self.world().reported(t)
+    }
     /// Where the flange truly was.
     pub fn true_flange(&self, t: f64) -> Rigid<Base, Flange> {
         self.world().true_flange(t)

@@ -4,7 +4,7 @@
 use crate::arm::{Outputs, rules::Limits};
 use crate::calibrate::hand_eye::options::Mount;
 use crate::fault::{Fault, Result};
-use crate::geometry::{Flange, Rigid, Tool};
+use crate::geometry::{Flange, Rigid, Tool, Vec3};
 use crate::rig::Volume;
 use crate::robot::Convention;
 use std::path::Path;
@@ -36,6 +36,9 @@ pub struct Settings {
     /// The gripper's tool on the flange.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tool: Option<ToolSpec>,
+    /// What of the sensor rides on the flange; without it the hand-eye calibration says where it is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub head: Option<HeadSpec>,
     /// How the stripe is found; docs/file-formats.md lists every key.
     pub extraction: crate::scan::Extraction,
 }
@@ -47,6 +50,18 @@ pub struct ToolSpec {
     /// Flange from tool, 16 numbers row by row, mm. The tool's origin is what goes to the part's, its z points against the insertion.
     pub flange_from_tool: Rigid<Flange, Tool>,
 }
+
+/// The sensor head on the flange.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HeadSpec {
+    /// Its outermost points in the flange's frame, mm, at most 2000 from the flange: every motion keeps them slow and out of keep-outs.
+    /// None of them: nothing of the sensor rides on the flange.
+    pub points_mm: Vec<[f64; 3]>,
+}
+
+/// Nothing on a flange reaches farther from it, mm.
+const LEVER: f64 = 2000.0;
 
 /// Where parts can be: camera-frame depths between which the laser plane is believed.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -131,6 +146,16 @@ impl Settings {
             .cause(format!("{unit} instead of millimetres"))
             .next("give what the work tolerates in millimetres, or leave the key out"));
         }
+        let head = self.head.iter().flat_map(|h| &h.points_mm).map(|p| ("head.points_mm", Vec3::from(*p)));
+        let tool = self.tool.iter().map(|t| ("tool.flange_from_tool", t.flange_from_tool.translation));
+        if let Some((name, p)) = head.chain(tool).find(|(_, p)| !(p.norm() <= LEVER)) {
+            return Err(Fault::input(format!(
+                "{name}: a point lies {:.0} mm from the flange, at most {LEVER} is believed",
+                p.norm()
+            ))
+            .cause("another unit than millimetres, or a point that is not in the flange's frame")
+            .next("give it in millimetres from the flange's middle"));
+        }
         self.motion.as_ref().map_or(Ok(()), Limits::check)?;
         self.extraction.check()
     }
@@ -162,6 +187,11 @@ mod tests {
         assert!(metres.what.contains("looks like metres"), "{metres}");
         assert!(Settings::parse("tolerance_mm = 0.0001").unwrap_err().what.contains("looks like metres"));
         assert!(Settings::parse("tolerance_mm = 250").unwrap_err().what.contains("looks like micrometres"));
+        let head = |p: &str| Settings::parse(&format!("[head]\npoints_mm = [[0, 0, 90], {p}]"));
+        assert!(head("[-40, 0, 120.5]").is_ok());
+        for p in ["[3000, 0, 0]", "[nan, 0, 0]"] {
+            assert!(head(p).unwrap_err().what.contains("head.points_mm"), "{p}");
+        }
         let comma = Settings::parse("[working_volume]\nnear_mm = 60,5\nfar_mm = 320").unwrap_err();
         assert!(comma.cause.contains("decimal comma") && comma.what.contains("line 2"), "{comma}");
         let s = Settings { name: "x".into(), robot: Some(Convention::Denso), ..Settings::default() };

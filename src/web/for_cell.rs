@@ -12,7 +12,8 @@ use std::path::Path;
 /// Where a VS-060 on its own table may work, mm.
 const WORKSPACE: Space = Space { from_mm: [150.0, -350.0, 200.0], to_mm: [650.0, 350.0, 750.0] };
 
-/// Writes calibrations and station.toml of a cell into `folder`; its link may be silent for `silence_ms`, `None`: as usual.
+/// Writes calibrations and station.toml of a cell into `folder`; its link may be silent, and its poses
+/// stand, for `silence_ms`; `None`: as usual.
 ///
 /// # Errors
 /// A file cannot be written.
@@ -20,7 +21,8 @@ pub fn station_for(cell: &Cell, folder: &Path, name: &str, silence_ms: Option<f6
     crate::files::make_folder(folder)?;
     cell.station().calibrations(cell.base_from_camera()).store_all(folder)?;
     let usual = Limits::within(WORKSPACE);
-    let motion = Limits { max_silence_ms: silence_ms.unwrap_or(usual.max_silence_ms), ..usual };
+    let (max_silence_ms, max_still_ms) = silence_ms.map_or((usual.max_silence_ms, usual.max_still_ms), |ms| (ms, ms));
+    let motion = Limits { max_silence_ms, max_still_ms, ..usual };
     let tool = Some(ToolSpec { flange_from_tool: cell.flange_from_tool() });
     let mount = Some(if cell.options().eye_to_hand { Mount::EyeToHand } else { Mount::EyeInHand });
     let (name, robot, motion) = (name.into(), Some(Convention::Denso), Some(motion));

@@ -3,7 +3,7 @@
 //! Frame and unit: base frame; mm, degrees, s.
 
 use super::workplace::{Yes, scene};
-use sheetlight::arm::rules::{Confirmation, Guard, Limits, MotionLog, Plan, Space};
+use sheetlight::arm::rules::{Confirmation, Guard, Limits, Plan, Space};
 use sheetlight::arm::{Motion, Outputs, Way};
 use sheetlight::calibrate::hand_eye::closed::{Far, Near};
 use sheetlight::calibrate::hand_eye::options::Mount;
@@ -22,7 +22,7 @@ use sheetlight::scan::{Extraction, Where};
 use sheetlight::simulate::RigSpec;
 use sheetlight::station::job::{Job, JobOptions, Operator, Outcome};
 use sheetlight::station::{
-    ArmCell, AutoResult, AutoRun, JointRun, Settings, ToolSpec, WorkingVolume, calibrate_auto, store_joint,
+    ArmCell, AutoResult, AutoRun, JointRun, Settings, ToolSpec, WorkingVolume, calibrate_auto, guarded, store_joint,
 };
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -46,7 +46,7 @@ impl Cold {
         let station = dir.path().join("station");
         let tool = Some(ToolSpec { flange_from_tool: served.cell.flange_from_tool() });
         // Two busy cores may keep the link's threads waiting for long; that a silent link halts is shown by the rules' own test.
-        let motion = Limits { max_silence_ms: 5000.0, ..Limits::within(SPACE) };
+        let motion = Limits { max_silence_ms: 5000.0, max_still_ms: 5000.0, ..Limits::within(SPACE) };
         let [near_mm, far_mm] = working;
         let working_volume = Some(WorkingVolume { near_mm, far_mm });
         Settings { motion: Some(motion), tool, working_volume, ..Settings::default() }.store(&station).unwrap();
@@ -54,9 +54,7 @@ impl Cold {
     }
 
     pub fn guard(&self) -> Guard {
-        let limits = Settings::load(&self.station).unwrap().motion;
-        let log = MotionLog::file(&self.dir.path().join("motions.jsonl"));
-        let mut guard = Guard::new(sheetlight::arm::open(&self.served.robot_uri()).unwrap(), limits, log);
+        let mut guard = guarded(&self.station, &self.served.robot_uri()).unwrap();
         guard.arm(true).unwrap();
         guard
     }

@@ -2,6 +2,7 @@
 //! allowed is not asked of it, what goes wrong halts it, and what is done stands in the log first.
 //! Frame and unit: base frame; mm.
 
+use super::workplace::bare;
 use sheetlight::arm::rules::{Confirmation, Evidence, Guard, Limits, MotionLog, Plan, Space};
 use sheetlight::arm::{Allowed, Arm, Halt, Mode, Motion, PoseSource, State, TimedPose, Way};
 use sheetlight::fault::{Fault, Result};
@@ -103,9 +104,10 @@ fn fake(dir: &tempfile::TempDir, change: impl FnOnce(&mut Limits)) -> (Fake, Gua
     };
     let arm = Fake(Arc::new(Mutex::new(inside)));
     // It jumps to its goal: slower, the watch would find it too fast. A machine that stands still is no silent link.
-    let mut limits = Limits { speed_mm_s: 250.0, max_silence_ms: 5000.0, ..Limits::within(SPACE) };
+    let mut limits =
+        Limits { speed_mm_s: 250.0, max_silence_ms: 5000.0, max_still_ms: 5000.0, ..Limits::within(SPACE) };
     change(&mut limits);
-    (arm.clone(), Guard::new(Box::new(arm), Some(limits), MotionLog::file(&log)))
+    (arm.clone(), Guard::new(Box::new(arm), Some(limits), bare(), MotionLog::file(&log)))
 }
 
 /// Legs that go down by so much each.
@@ -116,7 +118,7 @@ fn down(fake: &Fake, by: &[f64]) -> Plan {
         Motion { to: at, way: Way::Straight, speed_mm_s: 250.0 }
     });
     let legs = legs.collect();
-    Plan { name: "down".into(), why: "a test".into(), legs, tool_at: None, evidence: Evidence::default() }
+    Plan { name: "down".into(), why: "a test".into(), legs, evidence: Evidence::default() }
 }
 
 type Each<'a> = &'a mut dyn FnMut(&mut dyn Arm, usize) -> Result<()>;

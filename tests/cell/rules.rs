@@ -3,8 +3,9 @@
 //! Frame and unit: base frame; mm, degrees; ms.
 
 use super::cell;
+use super::workplace::bare;
 use crate::common::tries::{judged, tries};
-use sheetlight::arm::rules::{Confirmation, Evidence, Guard, Limits, MotionLog, Plan, Space, StopButton};
+use sheetlight::arm::rules::{Carried, Confirmation, Evidence, Guard, Limits, MotionLog, Plan, Space, StopButton};
 use sheetlight::arm::{Allowed, Arm, ControllerError, Halt, Mode, Motion, PoseSource, State, TimedPose, Way};
 use sheetlight::cell::{Event, Served};
 use sheetlight::fault::{Fault, Gate};
@@ -17,16 +18,21 @@ const SPACE: Space = Space { from_mm: [150.0, -300.0, 200.0], to_mm: [500.0, 300
 
 /// The usual limits, and the longest silence: a machine that stands still is silent too, and only one test is about silence.
 fn limits() -> Limits {
-    Limits { max_silence_ms: 5000.0, ..Limits::within(SPACE) }
+    Limits { max_silence_ms: 5000.0, max_still_ms: 5000.0, ..Limits::within(SPACE) }
 }
 
 fn guard(served: &Served, change: impl FnOnce(&mut Limits)) -> Guard {
     served.controller.set_motor(true);
     let mut limits = limits();
     change(&mut limits);
-    let mut guard = Guard::new(sheetlight::arm::open(&served.robot_uri()).unwrap(), Some(limits), MotionLog::default());
+    let mut guard = carrying(served, limits, bare());
     guard.arm(true).unwrap();
     guard
+}
+
+fn carrying(served: &Served, limits: Limits, carried: Carried) -> Guard {
+    let link = sheetlight::arm::open(&served.robot_uri()).unwrap();
+    Guard::new(link, Some(limits), carried, MotionLog::default())
 }
 
 /// A straight motion from the start pose by so much, at a speed.
@@ -36,7 +42,7 @@ fn leg(guard: &mut Guard, by: [f64; 3], speed_mm_s: f64) -> Motion {
 }
 
 fn plan(legs: Vec<Motion>) -> Plan {
-    Plan { name: "test".into(), why: "a test".into(), legs, tool_at: None, evidence: Evidence::default() }
+    Plan { name: "test".into(), why: "a test".into(), legs, evidence: Evidence::default() }
 }
 
 /// What making a plan says; its own hash confirms it.
@@ -100,17 +106,6 @@ fn each_gate_that_is_broken_by_itself_moves_nothing() {
     );
     let wall = |l: &mut Limits| l.keep_out.push(Space { from_mm: [280.0, -50.0, 560.0], to_mm: [400.0, 50.0, 575.0] });
     broken("way through a keep-out", &wall, &|_, _| {}, &nothing);
-    broken(
-        "way through a keep-out",
-        &wall,
-        &|p, _| {
-            // The flange goes beside the box, the tool through it.
-            let at = p.legs[0].to.rotation;
-            p.legs[0].to = Rigid::new(at, Vec3::new(320.0, 0.0, 690.0));
-            p.tool_at = Some(Vec3::new(0.0, 0.0, 120.0));
-        },
-        &nothing,
-    );
     broken("automatic mode is 0.000, limit 1.000", &none, &|_, s| s.controller.set_mode(2), &|s| {
         s.controller.set_mode(3)
     });
@@ -169,11 +164,11 @@ fn nothing_moves_unarmed_nor_while_another_has_the_arm() {
     let served = cell(6, 50.0);
     served.controller.set_motor(true);
     let open = || sheetlight::arm::open(&served.robot_uri()).unwrap();
-    let mut reader = Guard::new(open(), Some(limits()), MotionLog::default());
+    let mut reader = Guard::new(open(), Some(limits()), bare(), MotionLog::default());
     let good = leg(&mut reader, [0.0, 0.0, -10.0], 50.0);
     assert!(made(&mut reader, plan(vec![good])).unwrap_err().contains("armed"));
     assert!(reader.arm(false).unwrap_err().next.contains("--allow-motion"));
-    assert!(Guard::new(open(), None, MotionLog::default()).arm(true).unwrap_err().cause.contains("[motion]"));
+    assert!(Guard::new(open(), None, bare(), MotionLog::default()).arm(true).unwrap_err().cause.contains("[motion]"));
     let _first = guard(&served, |_| {});
     let said = reader.arm(true).unwrap_err().what;
     assert!(said.contains("TakeArm") && said.contains("8320F001"), "{said}");
@@ -186,6 +181,8 @@ struct Stopped<'a> {
     uri: &'a str,
     /// Longest silence, ms.
     silence_ms: f64,
+    /// Longest stand on the way, ms.
+    still_ms: f64,
     /// What is done to it on its way; none: the motion itself is what is wrong, from its beginning on.
     does: Option<fn(&Served, &StopButton, &AtomicBool)>,
     /// What the guard says of it, in part.
@@ -201,8 +198,8 @@ impl Stopped<'_> {
         let served = cell(7, 1.0);
         served.controller.set_motor(true);
         let link = sheetlight::arm::open(&format!("{}{}", served.robot_uri(), self.uri)).unwrap();
-        let limits = Limits { max_silence_ms: self.silence_ms, ..limits() };
-        let mut guard = Guard::new(link, Some(limits), MotionLog::default());
+        let limits = Limits { max_silence_ms: self.silence_ms, max_still_ms: self.still_ms, ..limits() };
+        let mut guard = Guard::new(link, Some(limits), bare(), MotionLog::default());
         guard.arm(true).unwrap();
         let (button, signal) = (guard.stop_button(), Arc::new(AtomicBool::new(false)));
         button.listen(signal.clone());
@@ -242,7 +239,7 @@ impl Stopped<'_> {
 
 #[test]
 fn whoever_goes_while_the_arm_moves_halts_it_in_time() {
-    let usual = Stopped { uri: "", silence_ms: 5000.0, does: None, says: "", within_ms: 50.0 };
+    let usual = Stopped { uri: "", silence_ms: 5000.0, still_ms: 5000.0, does: None, says: "", within_ms: 50.0 };
     let stop = Stopped { does: Some(|_, button, _| button.press()), says: "STOP", ..usual }.in_time();
     let signal = Stopped { does: Some(|_, _, up| up.store(true, SeqCst)), says: "told to end", ..usual }.in_time();
     let lease = Stopped {
@@ -416,7 +413,7 @@ fn refused_by(fault: fn() -> Fault, then: fn(&mut Stubborn)) -> (bool, bool, usi
     };
     let halts = Arc::new(AtomicUsize::new(0));
     let arm = Stubborn { at, fault, then, state, mute: false, halts: halts.clone() };
-    let mut guard = Guard::new(Box::new(arm), Some(limits()), MotionLog::default());
+    let mut guard = Guard::new(Box::new(arm), Some(limits()), bare(), MotionLog::default());
     guard.arm(true).unwrap();
     let down = leg(&mut guard, [0.0, 0.0, -10.0], 50.0);
     let proposal = guard.propose(plan(vec![down])).unwrap();

@@ -202,6 +202,9 @@ impl Operator for TrapPerson {
         self.trap.asked(ask.step);
         Ok(Some(Confirmation::of(&*ask.proposal.hash)))
     }
+    fn looked(&mut self, _why: &str) -> Result<bool> {
+        Ok(true)
+    }
     fn tell(&mut self, line: &str) {
         self.told.push(line.to_owned());
         if matches!(self.trap.0.when, When::Told(words) if line.contains(words)) {

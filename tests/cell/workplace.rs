@@ -2,7 +2,7 @@
 //! what every test of a job begins with.
 //! Frame and unit: mm, degrees.
 
-use sheetlight::arm::rules::{Confirmation, Guard, Limits, MotionLog, Space};
+use sheetlight::arm::rules::{Carried, Confirmation, Guard, Limits, Space};
 use sheetlight::capture::source::cell::CellCamera;
 use sheetlight::cell::{Cell, CellOptions, Event, Served};
 use sheetlight::fault::Result;
@@ -10,7 +10,7 @@ use sheetlight::robot::Convention;
 use sheetlight::scan::Where;
 use sheetlight::simulate::SceneSpec;
 use sheetlight::station::job::{Ask, Job, JobOptions, JobReport, Operator};
-use sheetlight::station::{Settings, ToolSpec};
+use sheetlight::station::{Settings, ToolSpec, guarded};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -19,11 +19,18 @@ pub struct Yes {
     pub no_at: Option<&'static str>,
     pub asked: Vec<&'static str>,
     pub told: Vec<String>,
+    /// What he says when he is asked whether he has looked at the robot.
+    pub has_looked: bool,
+}
+
+/// A flange that carries nothing.
+pub fn bare() -> Carried {
+    Carried::new(None, Ok(vec![]))
 }
 
 impl Yes {
     pub fn always() -> Yes {
-        Yes { no_at: None, asked: vec![], told: vec![] }
+        Yes { no_at: None, asked: vec![], told: vec![], has_looked: true }
     }
 }
 
@@ -31,6 +38,10 @@ impl Operator for Yes {
     fn confirm(&mut self, ask: &Ask) -> Result<Option<Confirmation>> {
         self.asked.push(ask.step);
         Ok((self.no_at != Some(ask.step)).then(|| Confirmation::of(&*ask.proposal.hash)))
+    }
+    fn looked(&mut self, why: &str) -> Result<bool> {
+        self.told.push(why.to_owned());
+        Ok(self.has_looked)
     }
     fn tell(&mut self, line: &str) {
         self.told.push(line.to_owned());
@@ -86,7 +97,7 @@ pub fn set_but(mut spec: SceneSpec, seed: u64, tilt_deg: f64, but: impl FnOnce(&
     let workspace = Space { from_mm: [150.0, -300.0, 250.0], to_mm: [600.0, 300.0, 700.0] };
     let tool = Some(ToolSpec { flange_from_tool: served.cell.flange_from_tool() });
     // Two busy cores may keep the link's threads waiting for long; that a silent link halts is shown by the rules' own test.
-    let motion = Limits { max_silence_ms: 5000.0, ..Limits::within(workspace) };
+    let motion = Limits { max_silence_ms: 5000.0, max_still_ms: 5000.0, ..Limits::within(workspace) };
     Settings { motion: Some(motion), tool, ..Settings::default() }.store(&station).unwrap();
     Set { served, station, dir }
 }
@@ -137,9 +148,7 @@ impl Set {
     }
 
     pub fn guard(&self) -> Guard {
-        let limits = Settings::load(&self.station).unwrap().motion;
-        let log = MotionLog::file(&self.dir.path().join("motions.jsonl"));
-        let mut guard = Guard::new(sheetlight::arm::open(&self.served.robot_uri()).unwrap(), limits, log);
+        let mut guard = guarded(&self.station, &self.served.robot_uri()).unwrap();
         guard.arm(true).unwrap();
         guard
     }

@@ -307,7 +307,7 @@ def killed(former):
             settings = f.read()
         # Two busy cores may keep the link's threads waiting.
         with open(toml, "w") as f:
-            f.write(settings.replace("max_silence_ms = 400.0", "max_silence_ms = 3000.0"))
+            f.write(settings.replace("max_silence_ms = 400.0", "max_silence_ms = 3000.0").replace("max_still_ms = 300.0", "max_still_ms = 3000.0"))
         more = ("--recordings", second, "--robot", uris["robot"], "--camera", uris["camera"])
         s = Server(program, second, *more)
         s.json("POST", "/lease")

@@ -5,20 +5,31 @@ use super::halt::DensoHalt;
 use super::session::Session;
 use super::spare::Spare;
 use super::words;
-use crate::arm::{Allowed, Arm, Halt, Mode, PoseSource, Reach, State, Switch, TimedPose, Way};
+use crate::arm::{Allowed, Arm, Halt, Mode, Pace, PoseSource, Reach, SIMULATED, State, Switch, TimedPose, Way};
 use crate::bcap::{Call, Network, Variant};
-use crate::fault::{Fault, Result};
+use crate::fault::{Fault, Kind, Result};
 use crate::geometry::{Base, Flange, Rigid};
 use std::sync::Arc;
 
 /// Speed of the flange when all joints go at 100 %, mm/s: an upper bound for the VS-060 (joint 1 at 213.75 degrees a second,
 /// 0.92 m out).
 const JOINTS_FULL_MM_S: f64 = 3500.0;
+/// Turning rate of the flange then, degrees/s: the sum of the VS-060's joints, which no way of theirs exceeds.
+const JOINTS_FULL_DEG_S: f64 = 1240.0;
 /// Slowest speed in per cent that is sent; below it controllers round to none.
 const LEAST_PERCENT: f64 = 0.1;
 
 /// Gentlest acceleration that is asked for, per cent.
 const LEAST_RAMP: f32 = 5.0;
+
+/// Speeds of a straight motion at 100 %.
+#[derive(Clone, Copy, Debug)]
+pub struct Full {
+    /// Of the flange, mm/s.
+    pub mm_s: f64,
+    /// Of its turn, degrees/s.
+    pub deg_s: f64,
+}
 
 /// A Denso arm: one connection for reading and moving, one that only halts; those that switch outputs are made as they
 /// are asked for.
@@ -26,18 +37,18 @@ pub struct Denso {
     name: String,
     address: String,
     network: Network,
-    full_mm_s: f64,
+    full: Full,
     session: Session,
     halt: Arc<DensoHalt>,
     taken: bool,
 }
 
 impl Denso {
-    pub fn open(name: &str, address: &str, network: Network, full_mm_s: f64) -> Result<Denso> {
+    pub fn open(name: &str, address: &str, network: Network, full: Full) -> Result<Denso> {
         let session = Session::open(address, network)?;
         let halt = Arc::new(DensoHalt::open(address)?);
         let (name, address) = (name.to_owned(), address.to_owned());
-        Ok(Denso { name, address, network, full_mm_s, session, halt, taken: false })
+        Ok(Denso { name, address, network, full, session, halt, taken: false })
     }
 
     fn robot_variable(&mut self, name: &str) -> Result<Variant> {
@@ -47,10 +58,16 @@ impl Denso {
         self.session.client.read(Call::ControllerGetVariable, self.session.controller, name)
     }
 
-    /// Share of the full speed, %.
-    fn percent(&self, way: Way, speed_mm_s: f64) -> f64 {
-        let full = if way == Way::Straight { self.full_mm_s } else { JOINTS_FULL_MM_S.max(self.full_mm_s) };
-        (100.0 * speed_mm_s / full).clamp(LEAST_PERCENT, 100.0)
+    /// Share of the full speeds, %. On a straight way shift and turn end together: whichever takes longer sets the time.
+    fn percent(&self, way: Way, pace: &Pace) -> f64 {
+        let share = match way {
+            Way::Straight => (pace.flange_mm_s / self.full.mm_s).max(pace.turn_deg_s / self.full.deg_s),
+            Way::Joint => {
+                let fastest = JOINTS_FULL_MM_S.max(self.full.mm_s) + JOINTS_FULL_DEG_S.to_radians() * pace.lever_mm;
+                (pace.flange_mm_s / fastest).min(pace.turn_deg_s / JOINTS_FULL_DEG_S)
+            }
+        };
+        (100.0 * share).clamp(LEAST_PERCENT, 100.0)
     }
 }
 
@@ -87,6 +104,16 @@ impl Arm for Denso {
             tool: self.session.number("CurTool")?,
             work: self.session.number("CurWork")?,
         })
+    }
+
+    fn simulated(&mut self) -> Result<bool> {
+        let [variable, says] = SIMULATED;
+        match self.controller_variable(variable) {
+            Ok(value) => Ok(matches!(value, Variant::Text(text) if text == says)),
+            // A real controller does not know the variable.
+            Err(e) if e.kind == Kind::Refused => Ok(false),
+            Err(e) => Err(e),
+        }
     }
 
     fn watch(&self) -> Result<Box<dyn PoseSource>> {
@@ -130,7 +157,7 @@ impl Arm for Denso {
 
     fn make(&mut self, allowed: Allowed) -> Result<()> {
         let motion = allowed.motion();
-        let percent = self.percent(motion.way, motion.speed_mm_s) as f32;
+        let percent = self.percent(motion.way, allowed.pace()) as f32;
         // Left to itself a controller takes the square of the speed, with which steps of less than a millimetre take as long as they
         // are many: 0.25 % at 50 mm/s.
         let ramps = (2.0 * percent).clamp(LEAST_RAMP, 100.0);

@@ -7,4 +7,4 @@ mod session;
 mod spare;
 mod words;
 
-pub(super) use arm::Denso;
+pub(super) use arm::{Denso, Full};

@@ -2,10 +2,11 @@
 //! Frame and unit: mm and degrees on the wire, base_from_flange in mm here.
 
 use super::words;
+use crate::arm::state::stamp;
 use crate::arm::{ControllerError, PoseSource, TimedPose};
 use crate::bcap::{Call, Client, ClientOptions, Handle, Network, Outcome, Variant};
 use crate::fault::{Fault, Result};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Errors that are read out of a controller's list; more say nothing more.
 const MOST_ERRORS: i32 = 10;
@@ -94,7 +95,7 @@ impl PoseSource for Session {
         let here = Instant::now();
         let numbers = answer.as_f64s().unwrap_or_default();
         let (device, numbers) = match numbers.split_first() {
-            Some((ms, pose)) if self.timed => (Some(Duration::from_secs_f64(ms.max(0.0) * 1e-3)), pose),
+            Some((ms, pose)) if self.timed => (Some(stamp(ms * 1e-3).map_err(|e| e.at(command))?), pose),
             _ => (None, &numbers[..]),
         };
         let (base_from_flange, figure) = words::read_position(numbers).map_err(|e| e.at(command))?;

@@ -2,10 +2,13 @@
 //! Frame and unit: base frame; mm, mm/s, degrees, s; gates of yes and no have 1 and 0.
 
 use super::super::{Mode, Motion, State};
+use super::carried::Carried;
 use super::limits::{Limits, MOST_SPEED_MM_S};
+use super::pace::pace;
 use super::plan::Plan;
+use super::straight::Straight;
 use crate::fault::Gate;
-use crate::geometry::{Base, Flange, Rigid, Vec3};
+use crate::geometry::{Base, Flange, Rigid};
 
 /// The robot as it is now.
 #[derive(Clone, Debug)]
@@ -25,6 +28,11 @@ pub struct Situation {
 /// Largest departure of a rotation from orthonormal that is believed.
 const ORTHONORMAL: f64 = 1e-6;
 
+/// No leg is slower, mm/s: below it an arm that moves cannot be told from one that stands.
+pub const SLOWEST_MM_S: f64 = 0.1;
+/// A way is looked at in turns of at most so much, rad: a point 300 mm off the flange passes 0.02 mm from the chord of such a turn.
+const PIECE: f64 = 0.02;
+
 /// How far a matrix is from a rotation; infinite where a number is.
 fn departure(pose: &Rigid<Base, Flange>) -> f64 {
     let r = &pose.rotation;
@@ -39,7 +47,7 @@ fn must(name: &'static str, yes: bool) -> Gate {
 }
 
 /// All gates of a plan.
-pub fn gates(plan: &Plan, limits: &Limits, now: &Situation) -> Vec<Gate> {
+pub fn gates(plan: &Plan, limits: &Limits, carried: &Carried, now: &Situation) -> Vec<Gate> {
     let worst = |of: &dyn Fn(&Rigid<Base, Flange>, &Motion) -> f64| {
         let mut from = now.at;
         let mut most = 0f64;
@@ -51,16 +59,18 @@ pub fn gates(plan: &Plan, limits: &Limits, now: &Situation) -> Vec<Gate> {
         }
         most
     };
+    let turning = limits.max_turn_deg_s;
     let mut out = vec![
         must("armed", now.armed),
         must("the arm's place is known", !now.unknown),
         Gate::least("motions", plan.legs.len() as f64, 1.0),
         Gate::most("departure from a rotation", worst(&|_, leg| departure(&leg.to)), ORTHONORMAL),
         Gate::most("speed, mm/s", worst(&|_, leg| leg.speed_mm_s), limits.speed_mm_s.min(MOST_SPEED_MM_S)),
-        Gate::least("slowest speed, mm/s", slowest(plan), 0.1),
+        Gate::least("slowest speed, mm/s", slowest(plan), SLOWEST_MM_S),
+        Gate::most("turning rate, degrees/s", worst(&|from, leg| pace(from, leg, carried, limits).turn_deg_s), turning),
         Gate::most("outside the workspace, mm", worst(&|_, leg| limits.workspace.outside(&leg.to.translation)), 0.0),
         Gate::most("starts outside the workspace, mm", limits.workspace.outside(&now.at.translation), 0.0),
-        Gate::most("way through a keep-out, mm", worst(&|from, leg| kept_out(plan, limits, from, &leg.to)), 0.0),
+        Gate::most("way through a keep-out, mm", worst(&|from, leg| kept_out(carried, limits, from, &leg.to)), 0.0),
         Gate::most("step, mm", worst(&|from, leg| (leg.to.translation - from.translation).norm()), limits.max_step_mm),
         Gate::most("turn, degrees", worst(&|from, leg| from.difference(&leg.to).0.to_degrees()), limits.max_turn_deg),
     ];
@@ -74,20 +84,21 @@ fn slowest(plan: &Plan) -> f64 {
     speeds.fold(f64::INFINITY, f64::min)
 }
 
-/// How much of the way of flange and tool lies in keep-outs. A tool's way is taken in small turns.
-fn kept_out(plan: &Plan, limits: &Limits, from: &Rigid<Base, Flange>, to: &Rigid<Base, Flange>) -> f64 {
-    let places: Vec<Vec3> = [Vec3::zeros()].into_iter().chain(plan.tool_at).collect();
-    let turn = crate::geometry::log(&(to.rotation * from.rotation.transpose()));
-    let pieces = (turn.norm() / 0.02).ceil().clamp(1.0, 200.0) as usize;
-    let at = |u: f64| {
-        let rotation = crate::geometry::exp(&(turn * u)) * from.rotation;
-        Rigid::<Base, Flange>::new(rotation, from.translation + (to.translation - from.translation) * u)
+/// How much of the way of the flange and of all that it carries lies in keep-outs, mm.
+fn kept_out(carried: &Carried, limits: &Limits, from: &Rigid<Base, Flange>, to: &Rigid<Base, Flange>) -> f64 {
+    let way = Straight::new(from, to);
+    let pieces = (way.turn.norm() / PIECE).ceil().clamp(1.0, 200.0) as usize;
+    let stops: Vec<_> = (0..=pieces).map(|k| way.at(k as f64 / pieces as f64)).collect();
+    let inside = |[a, b]: [&Rigid<Base, Flange>; 2], p| {
+        limits.keep_out.iter().map(|space| space.inside_of(&a.point(p), &b.point(p))).sum::<f64>()
     };
-    let piece = |k: usize, p: &Vec3| {
-        let ends = [k, k + 1].map(|k| at(k as f64 / pieces as f64).point(p));
-        limits.keep_out.iter().map(|s| s.inside_of(&ends[0], &ends[1])).sum::<f64>()
-    };
-    places.iter().map(|p| (0..pieces).map(|k| piece(k, p)).sum::<f64>()).fold(0.0, f64::max)
+    let through = |p| stops.windows(2).map(|w| inside([&w[0], &w[1]], p)).sum::<f64>();
+    carried.points().map(through).fold(0.0, f64::max)
+}
+
+/// Whether a straight way ends inside the workspace and keeps out of the keep-outs.
+pub fn free(carried: &Carried, limits: &Limits, from: &Rigid<Base, Flange>, to: &Rigid<Base, Flange>) -> bool {
+    limits.workspace.outside(&to.translation) <= 0.0 && kept_out(carried, limits, from, to) <= 0.0
 }
 
 /// What mode, motor, errors and frames have to be before anything moves.

@@ -3,28 +3,27 @@
 //! Frame and unit: base_from_flange, mm, degrees, mm/s.
 
 use super::super::{Allowed, Arm, Halt, Motion, PoseSource, Reach, TimedPose, Way};
-use super::gates::{Situation, gates, of_the_state};
+use super::carried::Carried;
+use super::gates::{Situation, free, gates, of_the_state};
 use super::limits::Limits;
 use super::log::MotionLog;
+use super::pace::pace;
 use super::plan::{Confirmation, Plan, Proposal, hash};
 use super::stop::StopButton;
-use super::watch::Watch;
-use crate::fault::{Fault, Kind, Result};
+use super::straight::Straight;
+use super::tolerances::{ARRIVED, MOVED, STILL};
+use super::watch::{Confirmed, Watch};
+use crate::fault::{Fault, Gate, Kind, Result};
+use crate::geometry::{Base, Flange, Rigid};
 use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Instant;
-
-/// The arm may have moved by so much since a plan was shown, mm and degrees: more, and it was moved by someone else.
-const MOVED: (f64, f64) = (0.2, 0.05);
-/// A motion has arrived within so much of its goal, mm and degrees.
-const ARRIVED: (f64, f64) = (0.2, 0.05);
-/// Two readings of an arm that has not moved differ by no more, mm and degrees.
-const STILL: (f64, f64) = (0.01, 0.005);
 
 /// A robot behind its rules. Read-only until it is armed.
 pub struct Guard {
     link: Box<dyn Arm>,
     limits: Option<Limits>,
+    carried: Carried,
     log: MotionLog,
     armed: Option<Armed>,
     /// Why nobody knows where the arm is.
@@ -38,14 +37,17 @@ pub struct Guard {
 struct Armed {
     halt: Arc<dyn Halt>,
     poses: Box<dyn PoseSource>,
+    /// The link says that there is no arm: a simulated controller's time is its own.
+    simulated: bool,
 }
 
 impl Guard {
-    /// Read-only. Without limits it cannot be armed.
-    pub fn new(link: Box<dyn Arm>, limits: Option<Limits>, log: MotionLog) -> Guard {
+    /// Read-only. Without limits it cannot be armed. What the flange carries is judged in every motion.
+    pub fn new(link: Box<dyn Arm>, limits: Option<Limits>, carried: Carried, log: MotionLog) -> Guard {
         Guard {
             link,
             limits,
+            carried,
             log,
             armed: None,
             unknown: None,
@@ -91,9 +93,9 @@ impl Guard {
                 .next("write [motion] with workspace = { from_mm = [...], to_mm = [...] } (docs/robots.md)"));
         };
         limits.check()?;
-        let (halt, poses) = (self.link.stop()?, self.link.watch()?);
+        let (halt, poses, simulated) = (self.link.stop()?, self.link.watch()?, self.link.simulated()?);
         self.link.take()?;
-        self.armed = Some(Armed { halt, poses });
+        self.armed = Some(Armed { halt, poses, simulated });
         Ok(())
     }
 
@@ -103,7 +105,13 @@ impl Guard {
         self.link.give()
     }
 
-    /// Somebody has looked at the robot after a motion that was stopped; the pose is read anew.
+    /// Whether a straight way keeps inside the workspace and out of the keep-outs, with all that the flange carries. Nothing is asked of
+    /// the robot; without limits no way is free.
+    pub fn keeps_clear(&self, from: &Rigid<Base, Flange>, to: &Rigid<Base, Flange>) -> bool {
+        self.limits.as_ref().is_some_and(|limits| free(&self.carried, limits, from, to))
+    }
+
+    /// A person has looked at the robot after a motion that was stopped, and said so: no program says it by itself. The pose is read anew.
     pub fn looked(&mut self) -> Result<TimedPose> {
         let pose = self.link.pose()?;
         self.unknown = None;
@@ -129,35 +137,44 @@ impl Guard {
         self.proposed += 1;
         let number = self.proposed;
         let now = self.situation()?;
-        let hash = hash(&plan, &now.at, number);
+        let hash = hash(&plan, &self.carried, &now.at, number);
         let (from, figure, shown) = (now.at, now.figure, Instant::now());
-        let mut proposal = Proposal { plan, from, figure, gates: vec![], reasons: vec![], hash, shown };
-        (proposal.gates, proposal.reasons) = self.judge(&proposal.plan, &now)?;
+        let Judged { gates, reasons, unjudged } = self.judge(&plan, &now)?;
+        let proposal = Proposal { plan, from, figure, gates, reasons, unjudged, hash, shown };
         self.log.note("asked", &proposal, proposal.missed())?;
         Ok(proposal)
     }
 
-    fn judge(&mut self, plan: &Plan, now: &Situation) -> Result<(Vec<crate::fault::Gate>, Vec<String>)> {
+    fn judge(&mut self, plan: &Plan, now: &Situation) -> Result<Judged> {
         let Some(limits) = &self.limits else {
             return Err(
                 Fault::refused("no workspace is stated").next("write [motion] into station.toml (docs/robots.md)")
             );
         };
-        let gates = gates(plan, limits, now);
+        let gates = gates(plan, limits, &self.carried, now);
+        let mut unjudged = self.carried.unknown().to_vec();
+        unjudged.extend(self.link.unsaid().map(str::to_owned));
         let mut reasons: Vec<String> =
             now.state.errors.iter().map(|e| format!("on the controller stands {:08X} {}", e.code, e.text)).collect();
         reasons.extend(self.unknown.clone());
         reasons.extend(self.stop.why());
         // A plan that cannot be a pose is not shown to the controller. Along straight legs its ends stand for the rest.
         if gates.iter().all(|g| g.passed) {
-            for leg in ends(&plan.legs) {
-                if let Reach::Refused(why) = self.link.reach(&leg.to)? {
-                    reasons.push(why);
+            let mut answered = 0;
+            for leg in ends(&now.at, &plan.legs) {
+                match self.link.reach(&leg.to)? {
+                    Reach::Refused(why) => reasons.push(why),
+                    Reach::Free => answered += 1,
+                    Reach::Unasked => {}
                 }
+            }
+            let legs = plan.legs.len();
+            if reasons.is_empty() && answered < legs {
+                unjudged.push(format!("reach: the controller answered for {answered} of {legs} poses"));
             }
         }
         reasons.dedup();
-        Ok((gates, reasons))
+        Ok(Judged { gates, reasons, unjudged })
     }
 
     /// Makes a plan that was confirmed, once. `each` is called after each leg, the arm standing still, with the leg's number; its
@@ -193,7 +210,7 @@ impl Guard {
         self.used.insert(confirmation.hash);
         // What is begun stands in the log before it begins.
         self.log.note("begun", proposal, vec![])?;
-        let made = self.run(&proposal.plan, proposal.figure, each);
+        let made = self.run(proposal, each);
         match &made {
             Ok(None) => self.log.note("done", proposal, vec![])?,
             Ok(Some(refusal)) => self.log.note("not begun", proposal, vec![refusal.what.clone()])?,
@@ -249,8 +266,9 @@ impl Guard {
                 "somebody moved it to the same place by another way of its joints",
             );
         }
-        let (gates, reasons) = self.judge(&proposal.plan, &now)?;
-        let missed: Vec<String> = gates.iter().filter(|g| !g.passed).map(|g| g.words()).chain(reasons).collect();
+        let judged = self.judge(&proposal.plan, &now)?;
+        let missed: Vec<String> =
+            judged.gates.iter().filter(|g| !g.passed).map(|g| g.words()).chain(judged.reasons).collect();
         if missed.is_empty() {
             return Ok(());
         }
@@ -260,15 +278,22 @@ impl Guard {
     /// What the controller said where it would not begin a leg.
     fn run(
         &mut self,
-        plan: &Plan,
-        figure: Option<i32>,
+        proposal: &Proposal,
         each: &mut dyn FnMut(&mut dyn Arm, usize) -> Result<()>,
     ) -> Result<Option<Fault>> {
+        let plan = &proposal.plan;
         let (Some(limits), Some(armed)) = (&self.limits, &mut self.armed) else { unreachable!("gates ask for both") };
-        let speed = plan.legs.iter().map(|leg| leg.speed_mm_s).fold(0.0, f64::max);
+        let speed_mm_s = plan.legs.iter().map(|leg| leg.speed_mm_s).fold(0.0, f64::max);
+        let mut from = proposal.from;
+        let turns = plan
+            .legs
+            .iter()
+            .map(|leg| pace(&std::mem::replace(&mut from, leg.to), leg, &self.carried, limits).turn_deg_s);
+        let turn_deg_s = turns.fold(0.0, f64::max);
         let straight = plan.legs.iter().all(|leg| leg.way == Way::Straight);
-        let figure = figure.filter(|_| straight);
-        let watch = Watch::new(limits, &self.stop, &*armed.halt, speed, figure);
+        let figure = proposal.figure.filter(|_| straight);
+        let confirmed = Confirmed { speed_mm_s, turn_deg_s, figure, simulated: armed.simulated };
+        let watch = Watch::new(limits, &self.carried, &self.stop, &*armed.halt, confirmed);
         let link = &mut *self.link;
         let poses = &mut *armed.poses;
         let made = std::thread::scope(|threads| {
@@ -314,10 +339,28 @@ impl Drop for Guard {
     }
 }
 
-/// Where a plan's ways turn: the ends of its legs, those in the middle of a straight row left out.
-fn ends(legs: &[Motion]) -> impl Iterator<Item = &Motion> {
-    let stride = (legs.len() / 8).max(1);
-    legs.iter().enumerate().filter(move |(k, _)| k % stride == 0 || k + 1 == legs.len()).map(|(_, leg)| leg)
+/// What was found of a plan.
+struct Judged {
+    gates: Vec<Gate>,
+    reasons: Vec<String>,
+    unjudged: Vec<String>,
+}
+
+/// In a row of legs the controller is asked for so many of them besides its ends.
+const ASKED: usize = 8;
+
+/// The poses for which the controller is asked: those where a plan's way bends, and some of those in the middle of a straight row.
+fn ends<'a>(from: &Rigid<Base, Flange>, legs: &'a [Motion]) -> impl Iterator<Item = &'a Motion> {
+    let stride = (legs.len() / ASKED).max(1);
+    let from = *from;
+    let bends = move |k: usize| {
+        let before = if k == 0 { from } else { legs[k - 1].to };
+        let Some(next) = legs.get(k + 1) else { return true };
+        let ways = [Straight::new(&before, &legs[k].to), Straight::new(&legs[k].to, &next.to)];
+        let turns = ways.iter().any(|w| w.turn.norm().to_degrees() > STILL.1);
+        turns || ways[0].shift.cross(&ways[1].shift).norm() > STILL.0 * ways[1].shift.norm()
+    };
+    legs.iter().enumerate().filter(move |(k, _)| k % stride == 0 || bends(*k)).map(|(_, leg)| leg)
 }
 
 /// Makes a plan's legs up to one that the controller would not begin; what it said of that one.
@@ -332,7 +375,11 @@ fn all(
             return Err(stopped(why));
         }
         let before = link.pose()?;
-        if let Err(fault) = link.make(Allowed::new(*leg)) {
+        let pace = pace(&before.base_from_flange, leg, watch.carried, watch.limits);
+        watch.begin(leg.to);
+        let made = link.make(Allowed::new(*leg, pace));
+        watch.arrived();
+        if let Err(fault) = made {
             return not_begun(link, &before, fault).map(Some);
         }
         arrived(link, leg, &before)?;

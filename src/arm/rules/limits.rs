@@ -1,10 +1,11 @@
 //! In: the table `[motion]` of station.toml. Out: what every motion has to keep.
-//! Frame and unit: base frame; mm, mm/s, degrees, s.
+//! Frame and unit: base frame; mm, mm/s, degrees, degrees/s, s.
 
 use crate::fault::{Fault, Result};
 use crate::geometry::Vec3;
 
-/// No motion of ours is faster, whatever is asked for: the speed that a person beside an arm can step back from.
+/// No carried point is faster, whatever is asked for, mm/s: ISO 10218-1:2011, 5.6.2, under reduced speed control the speed of the tool centre
+/// point is at most this. It is no reduced speed control in that standard's sense: that has to be the controller's own.
 pub const MOST_SPEED_MM_S: f64 = 250.0;
 
 /// A box, base frame, mm.
@@ -50,10 +51,10 @@ impl Space {
 pub struct Limits {
     /// Where the flange may be.
     pub workspace: Space,
-    /// Where neither flange nor tool may be.
+    /// Where nothing may be that the flange carries, nor the flange.
     #[serde(default)]
     pub keep_out: Vec<Space>,
-    /// Speed of the flange, mm/s, 1 to 250.
+    /// Speed of the fastest of flange, tool's tip and sensor head, mm/s, 1 to 250.
     #[serde(default = "speed")]
     pub speed_mm_s: f64,
     /// Longest single motion, mm, 1 to 2000.
@@ -62,6 +63,9 @@ pub struct Limits {
     /// Largest turn of a single motion, degrees, 1 to 180.
     #[serde(default = "turn")]
     pub max_turn_deg: f64,
+    /// Greatest turning rate of the flange, degrees/s, 1 to 180: it bounds what nobody has described.
+    #[serde(default = "turning")]
+    pub max_turn_deg_s: f64,
     /// Largest angle between the flange's axis and the measured normal, where one was measured, degrees, 0.1 to 60.
     #[serde(default = "tilt")]
     pub max_tilt_deg: f64,
@@ -74,6 +78,9 @@ pub struct Limits {
     /// Poses that do not come for so long while the arm moves stop it, ms, 50 to 5000.
     #[serde(default = "silence")]
     pub max_silence_ms: f64,
+    /// A pose that does not change for so long on the way stops the motion, ms, 200 to 5000.
+    #[serde(default = "still")]
+    pub max_still_ms: f64,
 }
 
 fn speed() -> f64 {
@@ -97,6 +104,12 @@ fn shown() -> f64 {
 fn silence() -> f64 {
     400.0
 }
+fn turning() -> f64 {
+    30.0
+}
+fn still() -> f64 {
+    300.0
+}
 
 impl Limits {
     /// The usual limits within a space.
@@ -107,10 +120,12 @@ impl Limits {
             speed_mm_s: speed(),
             max_step_mm: step(),
             max_turn_deg: turn(),
+            max_turn_deg_s: turning(),
             max_tilt_deg: tilt(),
             max_scan_age_s: age(),
             max_shown_s: shown(),
             max_silence_ms: silence(),
+            max_still_ms: still(),
         }
     }
 
@@ -120,10 +135,12 @@ impl Limits {
             ("speed_mm_s", self.speed_mm_s, 1.0, MOST_SPEED_MM_S),
             ("max_step_mm", self.max_step_mm, 1.0, 2000.0),
             ("max_turn_deg", self.max_turn_deg, 1.0, 180.0),
+            ("max_turn_deg_s", self.max_turn_deg_s, 1.0, 180.0),
             ("max_tilt_deg", self.max_tilt_deg, 0.1, 60.0),
             ("max_scan_age_s", self.max_scan_age_s, 1.0, 86_400.0),
             ("max_shown_s", self.max_shown_s, 1.0, 600.0),
             ("max_silence_ms", self.max_silence_ms, 50.0, 5000.0),
+            ("max_still_ms", self.max_still_ms, 200.0, 5000.0),
         ];
         if let Some((name, v, low, high)) = ranges.iter().find(|(_, v, low, high)| !(*low..=*high).contains(v)) {
             return Err(Fault::input(format!("motion.{name} is {v}, allowed {low}..={high}"))

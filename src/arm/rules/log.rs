@@ -24,6 +24,8 @@ struct Line<'a> {
     speed_mm_s: Option<f64>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     reasons: Vec<String>,
+    #[serde(skip_serializing_if = "<[String]>::is_empty")]
+    unjudged: &'a [String],
 }
 
 impl MotionLog {
@@ -50,6 +52,7 @@ impl MotionLog {
             to: asked.then(|| plan.legs.iter().map(|leg| leg.to.to_rows()).collect()),
             speed_mm_s: asked.then(|| plan.legs.iter().map(|leg| leg.speed_mm_s).fold(0.0, f64::max)),
             reasons,
+            unjudged: if asked { &of.unjudged } else { &[] },
         })
     }
 }

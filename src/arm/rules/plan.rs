@@ -2,6 +2,7 @@
 //! Frame and unit: base_from_flange, mm; mm/s.
 
 use super::super::Motion;
+use super::carried::Carried;
 use crate::fault::Gate;
 use crate::geometry::{Base, Flange, Rigid, Vec3};
 use sha2::{Digest, Sha256};
@@ -29,8 +30,6 @@ pub struct Plan {
     pub why: String,
     /// One after the other; each begins where the one before ends.
     pub legs: Vec<Motion>,
-    /// The tool on the flange, where there is one: it has to stay out of keep-outs too.
-    pub tool_at: Option<Vec3>,
     /// What it rests on.
     pub evidence: Evidence,
 }
@@ -38,7 +37,7 @@ pub struct Plan {
 impl Plan {
     /// One motion that rests on nothing but the robot.
     pub fn single(name: &str, why: impl Into<String>, leg: Motion) -> Plan {
-        Plan { name: name.into(), why: why.into(), legs: vec![leg], tool_at: None, evidence: Evidence::default() }
+        Plan { name: name.into(), why: why.into(), legs: vec![leg], evidence: Evidence::default() }
     }
 }
 
@@ -55,7 +54,9 @@ pub struct Proposal {
     pub gates: Vec<Gate>,
     /// Why it cannot be made where a gate has no words of its own (reach, controller's errors).
     pub reasons: Vec<String>,
-    /// Names this proposal and no other: its poses, speeds and reason, and its number.
+    /// What nobody has judged, in words: no gate stands for it, and whoever confirms has to know.
+    pub unjudged: Vec<String>,
+    /// Names this proposal and no other: its poses, speeds, reason and evidence, what the flange carries, and its number.
     pub hash: String,
     pub(super) shown: Instant,
 }
@@ -85,18 +86,76 @@ impl Confirmation {
 }
 
 /// The hash of a plan that was proposed as number `number` from a pose.
-pub fn hash(plan: &Plan, from: &Rigid<Base, Flange>, number: u64) -> String {
+pub fn hash(plan: &Plan, carried: &Carried, from: &Rigid<Base, Flange>, number: u64) -> String {
+    let Plan { name, why, legs, evidence } = plan;
     let mut sha = Sha256::new();
-    sha.update(number.to_le_bytes());
-    sha.update((plan.name.len() as u64).to_le_bytes());
-    sha.update(&plan.name);
-    sha.update(&plan.why);
-    let mut pose = |p: &Rigid<Base, Flange>| p.to_rows().iter().for_each(|x| sha.update(x.to_bits().to_le_bytes()));
-    pose(from);
-    plan.legs.iter().for_each(|leg| pose(&leg.to));
-    for leg in &plan.legs {
-        sha.update([leg.way as u8]);
-        sha.update(leg.speed_mm_s.to_bits().to_le_bytes());
+    let mut text = |t: &str| {
+        sha.update((t.len() as u64).to_le_bytes());
+        sha.update(t);
+    };
+    text(name);
+    text(why);
+    let (station, scan) = evidence.fingerprints.as_ref().map_or(("", ""), |f| (&f.0, &f.1));
+    [station, scan].into_iter().for_each(&mut text);
+    evidence.measured.iter().for_each(|gate| text(gate.name));
+    carried.unknown().iter().for_each(|why| text(why));
+    // Of each list its length first: no number can pass for one of another list.
+    let mut numbers = |list: &[f64]| {
+        sha.update((list.len() as u64).to_le_bytes());
+        list.iter().for_each(|x| sha.update(x.to_bits().to_le_bytes()));
+    };
+    numbers(&from.to_rows());
+    for leg in legs {
+        numbers(&leg.to.to_rows());
+        numbers(&[f64::from(leg.way as u8), leg.speed_mm_s]);
     }
+    numbers(evidence.normal.as_ref().map_or(&[][..], |n| n.as_slice()));
+    numbers(evidence.scan_age_s.as_slice());
+    evidence.measured.iter().for_each(|gate| numbers(&[gate.value, gate.limit]));
+    carried.points().for_each(|p| numbers(p.as_slice()));
+    sha.update(number.to_le_bytes());
     sha.finalize().iter().map(|b| format!("{b:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::Way;
+    use super::*;
+
+    #[test]
+    fn a_hash_names_everything_that_a_person_is_shown() {
+        let pose = |x: f64| Rigid::from_vectors(&Vec3::new(0.1, 0.2, 0.3), Vec3::new(x, 0.0, 400.0));
+        let leg = Motion { to: pose(300.0), way: Way::Straight, speed_mm_s: 50.0 };
+        let plan = Plan::single("a", "b", leg);
+        let with = |change: &dyn Fn(&mut Plan)| {
+            let mut other = plan.clone();
+            change(&mut other);
+            other
+        };
+        let carried = |tool: f64| Carried::new(Some(Vec3::new(0.0, 0.0, tool)), Ok(vec![]));
+        let measured = |value, limit| move |p: &mut Plan| p.evidence.measured.push(Gate::least("score", value, limit));
+        let plans = [
+            plan.clone(),
+            with(&|p| p.name = "ab".into()),
+            with(&|p| p.why = "c".into()),
+            with(&|p| p.legs.push(leg)),
+            with(&|p| p.legs[0].speed_mm_s = 49.0),
+            with(&|p| p.legs[0].way = Way::Joint),
+            with(&|p| p.evidence.normal = Some(Vec3::z())),
+            with(&|p| p.evidence.fingerprints = Some(("a".into(), "b".into()))),
+            with(&|p| p.evidence.scan_age_s = Some(1.0)),
+            with(&measured(0.5, 0.4)),
+            with(&measured(0.5, 0.3)),
+            with(&measured(0.6, 0.4)),
+        ];
+        let mut hashes: Vec<String> = plans.iter().map(|p| hash(p, &carried(160.0), &pose(310.0), 1)).collect();
+        hashes.push(hash(&plan, &carried(161.0), &pose(310.0), 1));
+        hashes.push(hash(&plan, &Carried::new(None, Ok(vec![])), &pose(310.0), 1));
+        hashes.push(hash(&plan, &carried(160.0), &pose(311.0), 1));
+        hashes.push(hash(&plan, &carried(160.0), &pose(310.0), 2));
+        let all = hashes.len();
+        hashes.sort();
+        hashes.dedup();
+        assert_eq!(hashes.len(), all);
+    }
 }

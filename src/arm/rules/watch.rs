@@ -3,49 +3,87 @@
 //! Frame and unit: base frame; mm, mm/s; ms.
 
 use super::super::{Halt, PoseSource, TimedPose};
+use super::carried::Carried;
+use super::clocks::Clocks;
 use super::limits::Limits;
+use super::standing::{Leg, Standing};
 use super::stop::StopButton;
-use crate::geometry::Vec3;
+use crate::geometry::{Base, Flange, Rigid};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// How often is looked whether the arm has to stop.
-const LOOK: Duration = Duration::from_millis(2);
+pub const LOOK: Duration = Duration::from_millis(2);
 /// How often a pose is read.
 const READ: Duration = Duration::from_millis(4);
-/// Speeds are taken over at least this time: controllers state theirs in whole milliseconds.
-const SPAN_S: f64 = 0.04;
-/// Measured speeds may be above the allowed one by this share and this much, mm/s: noise of readings, ramps.
-const SPEED_SLACK: (f64, f64) = (1.25, 10.0);
-/// A flange this far outside the workspace has left it, mm.
-const OUTSIDE_MM: f64 = 1.0;
+/// Speeds are taken over at least this time, s: controllers state theirs in whole milliseconds.
+pub const SPAN_S: f64 = 0.04;
+/// Measured speeds may be above the confirmed one by this share and this much, mm/s: noise of readings (0.01 mm in [`SPAN_S`] is
+/// 0.25 mm/s), ramps, a stamp that is late by a cycle of 8 ms.
+pub const SPEED_SLACK: (f64, f64) = (1.25, 10.0);
+/// The same for turning rates, degrees/s.
+pub const TURN_SLACK: (f64, f64) = (1.25, 2.0);
+/// A flange this far outside the workspace has left it, mm: a straight way bends by less on a controller that keeps it.
+pub const OUTSIDE_MM: f64 = 1.0;
+
+/// What was confirmed and has to stay so on the way.
+#[derive(Clone, Copy, Debug)]
+pub struct Confirmed {
+    /// Greatest speed of any carried point, mm/s.
+    pub speed_mm_s: f64,
+    /// Greatest turning rate, degrees/s.
+    pub turn_deg_s: f64,
+    /// The figure that has to stay, where the controller says it and the way is straight.
+    pub figure: Option<i32>,
+    /// A simulated controller's time is its own, faster or slower than this machine's.
+    pub simulated: bool,
+}
 
 /// What a watch shares with the motion that it watches.
 pub struct Watch<'a> {
     pub limits: &'a Limits,
+    pub carried: &'a Carried,
     pub stop: &'a StopButton,
-    pub halt: &'a dyn Halt,
-    /// Greatest speed that was confirmed, mm/s.
-    pub speed_mm_s: f64,
-    /// The figure that has to stay, where the controller says it and the way is straight.
-    pub figure: Option<i32>,
+    halt: &'a dyn Halt,
+    confirmed: Confirmed,
     over: AtomicBool,
+    /// The leg that is under way.
+    leg: Mutex<Option<Leg>>,
     /// When a pose was read last.
     heard: Mutex<Instant>,
     why: Mutex<Option<String>>,
 }
 
+/// What the poses before said.
+#[derive(Default)]
+struct Seen {
+    before: Option<(f64, Rigid<Base, Flange>)>,
+    clocks: Clocks,
+    standing: Standing,
+}
+
 impl<'a> Watch<'a> {
     pub fn new(
         limits: &'a Limits,
+        carried: &'a Carried,
         stop: &'a StopButton,
         halt: &'a dyn Halt,
-        speed_mm_s: f64,
-        figure: Option<i32>,
+        confirmed: Confirmed,
     ) -> Watch<'a> {
-        let (over, heard, why) = (AtomicBool::new(false), Mutex::new(Instant::now()), Mutex::new(None));
-        Watch { limits, stop, halt, speed_mm_s, figure, over, heard, why }
+        let (over, leg) = (AtomicBool::new(false), Mutex::new(None));
+        let (heard, why) = (Mutex::new(Instant::now()), Mutex::new(None));
+        Watch { limits, carried, stop, halt, confirmed, over, leg, heard, why }
+    }
+
+    /// A leg is ordered now.
+    pub fn begin(&self, to: Rigid<Base, Flange>) {
+        *self.leg.lock().unwrap_or_else(PoisonError::into_inner) = Some(Leg { to, ordered: Instant::now() });
+    }
+
+    /// The leg has ended: until the next one the arm may stand.
+    pub fn arrived(&self) {
+        *self.leg.lock().unwrap_or_else(PoisonError::into_inner) = None;
     }
 
     /// The motion has ended.
@@ -88,15 +126,14 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Reads poses until the motion ends; leaving the workspace or going too fast halts it.
+    /// Reads poses until the motion ends; one that is not as it has to be halts it.
     pub fn follow(&self, poses: &mut dyn PoseSource) {
-        let mut before = None::<(f64, Vec3)>;
-        let begun = Instant::now();
+        let (mut seen, begun) = (Seen::default(), Instant::now());
         while !self.over.load(Ordering::SeqCst) && self.halted().is_none() {
             match poses.pose() {
                 Ok(pose) => {
                     *self.heard.lock().unwrap_or_else(PoisonError::into_inner) = pose.here;
-                    if let Some(why) = self.judge(&pose, &mut before, begun) {
+                    if let Some(why) = self.judge(&pose, &mut seen, begun) {
                         self.halt(why);
                     }
                 }
@@ -106,29 +143,57 @@ impl<'a> Watch<'a> {
         }
     }
 
-    fn judge(&self, pose: &TimedPose, before: &mut Option<(f64, Vec3)>, begun: Instant) -> Option<String> {
-        let at = pose.base_from_flange.translation;
-        let outside = self.limits.workspace.outside(&at);
+    fn judge(&self, pose: &TimedPose, seen: &mut Seen, begun: Instant) -> Option<String> {
+        let outside = self.limits.workspace.outside(&pose.base_from_flange.translation);
         if !(outside <= OUTSIDE_MM) {
             return Some(format!("the flange is {outside:.1} mm outside the workspace, limit {OUTSIDE_MM}"));
         }
-        if let (Some(stays), Some(figure)) = (self.figure, pose.figure)
+        if let (Some(stays), Some(figure)) = (self.confirmed.figure, pose.figure)
             && stays != figure
         {
             return Some(format!("the figure changed on the way, from {stays} to {figure}"));
         }
-        let t = pose
-            .device
-            .map_or_else(|| pose.moment().saturating_duration_since(begun).as_secs_f64(), |d| d.as_secs_f64());
+        let leg = *self.leg.lock().unwrap_or_else(PoisonError::into_inner);
+        let still = Duration::from_secs_f64(self.limits.max_still_ms * 1e-3);
+        let standing = seen.standing.judge(pose, leg.as_ref(), self.carried, still);
+        let clocks = (!self.confirmed.simulated).then(|| seen.clocks.judge(pose)).flatten();
+        clocks.or(standing).or_else(|| self.too_fast(pose, &mut seen.before, begun))
+    }
+
+    /// Speeds by the controller's clock where it has one, else by the moments of the poses.
+    fn too_fast(
+        &self,
+        pose: &TimedPose,
+        before: &mut Option<(f64, Rigid<Base, Flange>)>,
+        begun: Instant,
+    ) -> Option<String> {
+        let at = pose.base_from_flange;
+        let moment = || pose.moment().saturating_duration_since(begun);
+        let t = pose.device.unwrap_or_else(moment).as_secs_f64();
         let Some((since, from)) = *before else {
             *before = Some((t, at));
             return None;
         };
-        if t - since < SPAN_S {
+        let passed = t - since;
+        if passed < SPAN_S {
             return None;
         }
         *before = Some((t, at));
-        let (speed, most) = ((at - from).norm() / (t - since), self.speed_mm_s * SPEED_SLACK.0 + SPEED_SLACK.1);
-        (speed > most).then(|| format!("the flange moves at {speed:.0} mm/s, limit {most:.0}: the controller's full speed is another than the link was told (?full=)"))
+        let (name, mm) = self.carried.moved(&from, &at);
+        let (speed, most) = (mm / passed, self.confirmed.speed_mm_s * SPEED_SLACK.0 + SPEED_SLACK.1);
+        if !(speed <= most) {
+            return Some(format!(
+                "{name} moves at {speed:.0} mm/s, limit {most:.0}: the controller's full speed is another than the link was told \
+                 (?full=, ?turn=)"
+            ));
+        }
+        let turning = from.difference(&at).0.to_degrees() / passed;
+        let most = self.confirmed.turn_deg_s * TURN_SLACK.0 + TURN_SLACK.1;
+        (!(turning <= most)).then(|| {
+            format!(
+                "the flange turns at {turning:.1} degrees/s, limit {most:.1}: the controller's full turning rate is another than \
+                 the link was told (?turn=)"
+            )
+        })
     }
 }

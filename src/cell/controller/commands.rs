@@ -50,10 +50,14 @@ impl Connection {
         let controller = self.controller.clone();
         let cell = controller.cell();
         let now = cell.clock().now();
-        let joints = cell.world().joints(now);
+        let (told, stamp) = {
+            let panel = controller.panel();
+            (panel.frozen.unwrap_or(now), panel.stamp)
+        };
+        let joints = cell.world().joints(told);
         let figure = controller.panel().figure.unwrap_or_else(|| goal::figure_of(&joints));
-        let pose = || goal::position(&cell.world().reported(now), figure);
-        let ms = (now * 1e3).round();
+        let pose = || goal::position(&cell.world().reported(told), figure);
+        let ms = stamp((now * 1e3).round());
         let timed = |values: Vec<f64>| Variant::F64s([ms].into_iter().chain(values).collect());
         match command {
             "curpos" => Ok(Some(Variant::F64s(pose()))),

@@ -47,6 +47,19 @@ impl Controller {
     pub fn set_japanese(&self, on: bool) {
         self.panel().japanese = on;
     }
+    /// Says no more that it is a simulated one, as a real controller at the end of a tunnel does not.
+    pub fn as_real(&self) {
+        self.panel().as_real = true;
+    }
+    /// Stamps poses with something else than its time in ms.
+    pub fn stamp_with(&self, stamp: fn(f64) -> f64) {
+        self.panel().stamp = stamp;
+    }
+    /// Tells the pose of now from now on, whatever the arm does.
+    pub fn freeze(&self) {
+        let now = self.cell.clock().now();
+        self.panel().frozen = Some(now);
+    }
     /// Sets tool and work frame as a program on the pendant does.
     pub fn set_frames(&self, tool: i32, work: i32) {
         let mut panel = self.panel();

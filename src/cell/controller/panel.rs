@@ -46,6 +46,12 @@ pub struct Panel {
     pub objects: BTreeMap<i32, (u64, Object)>,
     /// Error texts in Japanese.
     pub japanese: bool,
+    /// It does not say that it is a simulated one.
+    pub as_real: bool,
+    /// What it stamps poses with, ms, from its own time.
+    pub stamp: fn(f64) -> f64,
+    /// The poses that it tells stand still since then, s.
+    pub frozen: Option<f64>,
 }
 
 impl Default for Panel {
@@ -69,6 +75,9 @@ impl Default for Panel {
             ended: BTreeMap::new(),
             objects: BTreeMap::new(),
             japanese: false,
+            as_real: false,
+            stamp: |ms| ms,
+            frozen: None,
         }
     }
 }

@@ -2,6 +2,7 @@
 //! Frame and unit: mm and degrees as Denso writes them.
 
 use super::{Connection, Done, Object, Outcome, goal};
+use crate::arm::SIMULATED;
 use crate::bcap::Variant;
 
 /// Kinds of variables that programs have, by their letters, the longer first.
@@ -45,7 +46,7 @@ fn fits(kind: &str, value: &Variant) -> Option<Variant> {
 /// Names of the system's variables: of the robot, of the controller.
 const OF_ROBOT: [&str; 6] =
     ["@BUSY_STATUS", "@SERVO_ON", "@CURRENT_POSITION", "@CURRENT_ANGLE", "@TYPE_NAME", "@EXTSPEED"];
-const OF_CONTROLLER: [&str; 3] = ["@MODE", "@ERROR_CODE", "@EMERGENCY_STOP"];
+const OF_CONTROLLER: [&str; 4] = ["@MODE", "@ERROR_CODE", "@EMERGENCY_STOP", SIMULATED[0]];
 
 impl Connection {
     pub(super) fn variable(&mut self, arguments: &[Variant], of_robot: bool) -> Done {
@@ -60,7 +61,7 @@ impl Connection {
         } else {
             OF_CONTROLLER.contains(&&*name) || kind(&name).is_some()
         };
-        if !known {
+        if !known || (name == SIMULATED[0] && self.controller.panel().as_real) {
             return Err(Outcome::NO_SUCH_OBJECT);
         }
         self.grant(Object::Variable(name))
@@ -74,6 +75,7 @@ impl Connection {
         let joints = cell.world().joints(now);
         let panel = controller.panel();
         Ok(Some(match &*name {
+            name if name == SIMULATED[0] => Variant::Text(SIMULATED[1].into()),
             "@MODE" => Variant::I32(panel.mode),
             "@ERROR_CODE" => Variant::I32(panel.errors.first().map_or(0, |e| e.0 as i32)),
             "@EMERGENCY_STOP" => Variant::Bool(panel.emergency),

@@ -54,7 +54,6 @@ pub struct Args {
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let moving = &args.moving;
-    moving.check()?;
     let (settings, rig) = (Settings::load(&moving.station)?, Rig::load_camera(&moving.station)?);
     let mount = args.mount.of(&moving.station, &settings, console)?;
     let run = AutoRun {
@@ -69,7 +68,7 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
     };
     run.check()?;
     let camera = moving.camera.open(None)?;
-    let mut guard = moving.guard(&settings)?;
+    let mut guard = moving.guard()?;
     let mut person = moving.person(console);
     let outputs = settings.outputs.unwrap_or_default();
     let mut cell = ArmCell::new(&mut guard, camera, outputs, &mut person, moving.speed)?;

@@ -51,9 +51,8 @@ pub struct Args {
 
 pub fn run(args: &Args, console: &Console) -> Result<()> {
     let moving = &args.moving;
-    moving.check()?;
     let settings = Settings::load(&moving.station)?;
-    let mut guard = moving.guard(&settings)?;
+    let mut guard = moving.guard()?;
     let robot = args.notation.or(settings.robot).unwrap_or(Convention::Denso);
     let mut reports = Vec::new();
     for k in 0..args.repeat.max(1) {

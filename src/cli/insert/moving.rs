@@ -2,12 +2,12 @@
 //! taken; the person at the terminal, who is asked before each motion.
 //! Frame and unit: mm/s.
 
-use crate::arm::rules::{Confirmation, Guard, MotionLog};
+use crate::arm::rules::{Confirmation, Guard};
 use crate::capture::CameraUri;
 use crate::cli::terminal::console::Console;
 use crate::cli::terminal::interrupt;
 use crate::fault::{Fault, Result};
-use crate::station::Settings;
+use crate::station::guarded;
 use crate::station::job::{Ask, Operator};
 use std::io::{BufRead, IsTerminal};
 use std::path::PathBuf;
@@ -18,7 +18,7 @@ pub(in crate::cli) struct Moving {
     /// Station folder; its station.toml states [motion], [outputs] and [tool] (docs/robots.md)
     #[arg(long)]
     pub station: PathBuf,
-    /// The robot: bcap://HOST[:5007][?network=udp][&full=MM_S]
+    /// The robot: bcap://HOST[:5007][?network=udp][&full=MM_S][&turn=DEG_S]
     #[arg(long)]
     pub robot: String,
     /// The camera (docs/live.md)
@@ -30,26 +30,24 @@ pub(in crate::cli) struct Moving {
     /// Speed of every motion, mm/s, at most the station's [default: the station's, else 50]
     #[arg(long)]
     pub speed: Option<f64>,
-    /// Say yes to every motion: for simulated cells on this machine alone
+    /// Say yes to every motion: for simulated cells alone
     #[arg(long)]
     pub yes: bool,
 }
 
 impl Moving {
-    /// Refuses `--yes` for a robot that is not on this machine. Comes before anything is opened.
-    pub fn check(&self) -> Result<()> {
-        if self.yes && !on_this_machine(&self.robot) {
+    /// The robot behind its rules, taken for motions; Ctrl-C halts it, the station's motions.jsonl has what is asked and made.
+    ///
+    /// # Errors
+    /// `--yes` for a robot that does not say that it is a simulated one; no leave to move; no controller.
+    pub fn guard(&self) -> Result<Guard> {
+        let mut guard = guarded(&self.station, &self.robot)?;
+        // An address on this machine says nothing: a tunnel to a real controller has one too.
+        if self.yes && !guard.link().simulated()? {
             return Err(Fault::usage(format!("--yes with the robot {}", self.robot))
-                .cause("only a simulated cell on this machine may be moved without a person's yes")
+                .cause("its controller does not say that it is a simulated one, and only such a robot moves without a person's yes")
                 .next("leave --yes out"));
         }
-        Ok(())
-    }
-
-    /// The robot behind its rules, taken for motions; Ctrl-C halts it, the station's motions.jsonl has what is asked and made.
-    pub fn guard(&self, settings: &Settings) -> Result<Guard> {
-        let log = MotionLog::file(&self.station.join("motions.jsonl"));
-        let mut guard = Guard::new(crate::arm::open(&self.robot)?, settings.motion.clone(), log);
         guard.stop_button().listen(interrupt::asked_for());
         guard.arm(self.allow_motion)?;
         Ok(guard)
@@ -61,16 +59,28 @@ impl Moving {
     }
 }
 
-fn on_this_machine(uri: &str) -> bool {
-    let host = uri.split_once("://").map_or("", |(_, rest)| rest);
-    ["127.0.0.1:", "localhost:", "[::1]:"].iter().any(|h| host.starts_with(h))
-}
-
 /// Whoever sits at the terminal.
 pub(in crate::cli) struct Person<'a> {
     console: &'a Console,
-    /// Every motion is confirmed without asking.
+    /// Every question is answered with yes: the robot is a simulated one.
     yes: bool,
+}
+
+impl Person<'_> {
+    fn answered(&self, question: &str) -> Result<bool> {
+        if self.yes {
+            return Ok(true);
+        }
+        if !std::io::stdin().is_terminal() {
+            return Err(Fault::usage(format!("nobody can answer '{question}': standard input is no terminal"))
+                .next("run it in a terminal"));
+        }
+        self.console.ask(&format!("   {question} [y/N] "));
+        let mut line = String::new();
+        let read = std::io::stdin().lock().read_line(&mut line);
+        read.map_err(|e| Fault::input(format!("standard input: {e}")).next("run it in a terminal"))?;
+        Ok(matches!(line.trim(), "y" | "Y" | "yes"))
+    }
 }
 
 impl Operator for Person<'_> {
@@ -86,20 +96,16 @@ impl Operator for Person<'_> {
             ask.proposal.gates.len(),
             &ask.proposal.hash[..12]
         );
+        for what in &ask.proposal.unjudged {
+            words += &format!("\n   not judged: {what}");
+        }
         self.console.say(words);
-        let yes = || Some(Confirmation::of(&*ask.proposal.hash));
-        if self.yes {
-            return Ok(yes());
-        }
-        if !std::io::stdin().is_terminal() {
-            return Err(Fault::usage(format!("nobody can answer '{}': standard input is no terminal", ask.question))
-                .next("run it in a terminal"));
-        }
-        self.console.ask(&format!("   {} [y/N] ", ask.question));
-        let mut line = String::new();
-        let read = std::io::stdin().lock().read_line(&mut line);
-        read.map_err(|e| Fault::input(format!("standard input: {e}")).next("run it in a terminal"))?;
-        Ok(if matches!(line.trim(), "y" | "Y" | "yes") { yes() } else { None })
+        Ok(self.answered(ask.question)?.then(|| Confirmation::of(&*ask.proposal.hash)))
+    }
+
+    fn looked(&mut self, why: &str) -> Result<bool> {
+        self.console.say(why.to_owned());
+        self.answered("have you looked at the robot?")
     }
 
     fn tell(&mut self, line: &str) {

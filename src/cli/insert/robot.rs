@@ -1,7 +1,6 @@
 //! In: a station, a camera, recipes, an address. Out: what a robot's own program asks for over TCP, answered until Ctrl-C.
 //! Frame and unit: poses in the robot's own notation.
 
-use crate::arm::rules::{Guard, MotionLog};
 use crate::capture::CameraUri;
 use crate::cli::terminal::console::Console;
 use crate::cli::terminal::interrupt;
@@ -9,7 +8,7 @@ use crate::fault::{Fault, Result};
 use crate::robot::Convention;
 use crate::scan::Where;
 use crate::station::socket::{Patience, Session, SocketOptions, serve};
-use crate::station::{Output, Settings, try_output};
+use crate::station::{Output, Settings, guarded, try_output};
 use std::net::TcpListener;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -41,8 +40,7 @@ pub struct TryOutput {
 
 fn output(args: &TryOutput, console: &Console) -> Result<()> {
     let settings = Settings::load(&args.station)?;
-    let log = MotionLog::file(&args.station.join("motions.jsonl"));
-    let mut guard = Guard::new(crate::arm::open(&args.robot)?, settings.motion.clone(), log);
+    let mut guard = guarded(&args.station, &args.robot)?;
     // From here on a signal ends the wait, not the program with the laser on.
     let stop = interrupt::asked_for();
     guard.arm(args.allow_motion)?;

@@ -160,7 +160,12 @@ impl<'a> Job<'a> {
     /// Takes up what was stopped or cut off: before the part it measures anew, at the part it goes back up.
     fn pick_up(&mut self) -> Result<()> {
         if self.state.moving {
-            self.operator.tell("the last motion was cut off: where the arm is was not known, look at the robot");
+            let cut_off = "the last motion was cut off: where the arm is was not known, look at the robot";
+            if !self.operator.looked(cut_off)? {
+                return Err(Fault::refused("nobody has looked at the robot since its last motion was cut off")
+                    .cause("the question was answered with no")
+                    .next("look at the robot, then begin again"));
+            }
             self.guard.looked()?;
         }
         match self.state.resumes() {
@@ -256,8 +261,7 @@ impl<'a> Job<'a> {
     }
 
     pub(super) fn plan(&self, name: &str, why: String, legs: Vec<Motion>, evidence: Evidence) -> Plan {
-        let tool_at = self.settings.tool.map(|t| t.flange_from_tool.translation);
-        Plan { name: name.into(), why, legs, tool_at, evidence }
+        Plan { name: name.into(), why, legs, evidence }
     }
 
     /// Looks squarely at the board, and sweeps the line over it.

@@ -27,6 +27,9 @@ pub trait Operator {
     }
     /// The motion that was confirmed has ended, or was stopped.
     fn over(&mut self) {}
+    /// Asks whether a person has looked at the robot; `why` says what was not known. Only a person's own act makes this true, or a robot
+    /// that is a simulated one.
+    fn looked(&mut self, why: &str) -> Result<bool>;
     /// Says what happens.
     fn tell(&mut self, line: &str);
 }

@@ -5,9 +5,9 @@
 use super::grants::Grants;
 use super::simulated::SimulatedRobot;
 use crate::arm::Switchboard;
-use crate::arm::rules::{Guard, MotionLog, StopButton};
+use crate::arm::rules::{Guard, StopButton};
 use crate::fault::{Fault, Result};
-use crate::station::{Output, Settings, try_output};
+use crate::station::{Output, Settings, guarded, try_output};
 use crate::web::camera::Camera;
 use crate::web::event::Hub;
 use crate::web::guard::Tab;
@@ -171,13 +171,12 @@ impl Desk {
         let made = if taken {
             None
         } else {
-            let settings = Settings::load(&self.links.station)?;
-            let log = MotionLog::file(&self.links.station.join("motions.jsonl"));
-            let mut guard = Guard::new(crate::arm::open(uri)?, settings.motion, log);
+            let mut guard = guarded(&self.links.station, uri)?;
             guard.stop_button().listen(self.links.stop.clone());
             guard.arm(self.links.may_move)?;
             // What a program that was killed left lit goes off before anybody goes near.
-            settings.outputs.map(|o| Switchboard::of(guard.link(), o)).transpose()?;
+            let outputs = Settings::load(&self.links.station)?.outputs;
+            outputs.map(|o| Switchboard::of(guard.link(), o)).transpose()?;
             Some(guard)
         };
         let mut at = self.at();

@@ -31,11 +31,12 @@ pub struct Person<'a> {
 impl Person<'_> {
     fn asked(&self, ask: &Ask) -> Asked {
         let plan = &ask.proposal.plan;
+        let unjudged = ask.proposal.unjudged.iter().map(|what| format!("not judged: {what}"));
         let ends = plan.legs.last().map_or(ask.proposal.from, |leg| leg.to);
         Asked {
             job: self.job.to_owned(),
             step: ask.step.to_owned(),
-            says: ask.says.clone(),
+            says: ask.says.iter().cloned().chain(unjudged).collect(),
             question: ask.question.to_owned(),
             hash: ask.proposal.hash.clone(),
             gates: ask.proposal.gates.iter().map(GateLight::from).collect(),
@@ -71,6 +72,12 @@ impl Operator for Person<'_> {
 
     fn over(&mut self) {
         self.desk.over();
+    }
+
+    /// Whoever pressed Arm stands beside the robot, and since a halt somebody has pressed that he has looked: without these no job has it.
+    fn looked(&mut self, why: &str) -> Result<bool> {
+        self.tell(why);
+        Ok(self.desk.state().look.is_none())
     }
 
     fn tell(&mut self, line: &str) {

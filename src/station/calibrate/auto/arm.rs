@@ -2,11 +2,11 @@
 //! Frame and unit: base_from_flange, mm, mm/s. Every move is shown and confirmed; what the rules do not allow is not made.
 
 use super::cell::{Cell, Light, Went};
-use crate::arm::rules::{Confirmation, Guard, Limits, Plan, Proposal};
+use crate::arm::rules::{Confirmation, Guard, Limits, Plan, Proposal, Straight};
 use crate::arm::{Motion, Outputs, Reach, Switchboard, Way};
 use crate::capture::PictureSource;
 use crate::fault::{Fault, Result};
-use crate::geometry::{Base, Flange, Rigid, exp, log};
+use crate::geometry::{Base, Flange, Rigid};
 use crate::raster::Image;
 use crate::recording::Beam;
 use crate::station::job::eye::Eye;
@@ -77,21 +77,13 @@ impl<'a> ArmCell<'a> {
     }
 }
 
-/// Share k of n of a straight way.
-fn share(from: &Rigid<Base, Flange>, to: &Rigid<Base, Flange>, k: usize, n: usize) -> Rigid<Base, Flange> {
-    if k == n {
-        return *to;
-    }
-    let (u, turn) = (k as f64 / n as f64, log(&(to.rotation * from.rotation.transpose())));
-    Rigid::new(exp(&(turn * u)) * from.rotation, from.translation + (to.translation - from.translation) * u)
-}
-
 /// A straight way in steps that keep the rules.
-fn legs(from: &Rigid<Base, Flange>, to: &Rigid<Base, Flange>, limits: &Limits, speed_mm_s: f64) -> Vec<Motion> {
-    let turn = log(&(to.rotation * from.rotation.transpose())).norm().to_degrees();
-    let steps = (to.translation - from.translation).norm() / (BELOW * limits.max_step_mm);
-    let n = steps.max(turn / (BELOW * limits.max_turn_deg)).ceil().max(1.0) as usize;
-    (1..=n).map(|k| Motion { to: share(from, to, k, n), way: Way::Straight, speed_mm_s }).collect()
+fn legs(way: &Straight, limits: &Limits, speed_mm_s: f64) -> Vec<Motion> {
+    let steps = way.shift.norm() / (BELOW * limits.max_step_mm);
+    let turns = way.turn.norm().to_degrees() / (BELOW * limits.max_turn_deg);
+    let n = steps.max(turns).ceil().max(1.0) as usize;
+    let leg = |k: usize| Motion { to: way.at(k as f64 / n as f64), way: Way::Straight, speed_mm_s };
+    (1..=n).map(leg).collect()
 }
 
 impl Cell for ArmCell<'_> {
@@ -100,15 +92,14 @@ impl Cell for ArmCell<'_> {
     }
 
     fn may(&mut self, to: &Rigid<Base, Flange>) -> Result<bool> {
-        let (limits, from) = (self.limits()?, self.pose()?);
-        let free = limits.workspace.outside(&to.translation) <= 0.0
-            && limits.keep_out.iter().all(|k| k.inside_of(&from.translation, &to.translation) <= 0.0);
-        if !free {
+        let from = self.pose()?;
+        if !self.guard.keeps_clear(&from, to) {
             return Ok(false);
         }
+        let way = Straight::new(&from, to);
         // What is reached at its end may be out of reach on the way there.
         for k in (1..=ASKED).rev() {
-            if matches!(self.guard.link().reach(&share(&from, to, k, ASKED))?, Reach::Refused(_)) {
+            if matches!(self.guard.link().reach(&way.at(k as f64 / ASKED as f64))?, Reach::Refused(_)) {
                 return Ok(false);
             }
         }
@@ -118,7 +109,7 @@ impl Cell for ArmCell<'_> {
     fn go(&mut self, to: &Rigid<Base, Flange>) -> Result<Went> {
         let (limits, from) = (self.limits()?, self.pose()?);
         let speed = self.speed_mm_s.map_or(limits.speed_mm_s, |s| s.min(limits.speed_mm_s));
-        let legs = legs(&from, to, &limits, speed);
+        let legs = legs(&Straight::new(&from, to), &limits, speed);
         let last = *legs.last().expect("one or more");
         let plan = Plan { legs, ..Plan::single("calibrate", "the next picture of the board", last) };
         self.stops += 1;
