@@ -22,6 +22,8 @@ mod refusals;
 mod rules;
 #[path = "cell/socket.rs"]
 mod socket;
+#[path = "cell/speeds.rs"]
+mod speeds;
 #[path = "cell/wire.rs"]
 mod wire;
 #[path = "cell/workplace.rs"]
