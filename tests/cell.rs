@@ -26,6 +26,8 @@ mod resumed;
 mod rules;
 #[path = "cell/socket.rs"]
 mod socket;
+#[path = "cell/speeds.rs"]
+mod speeds;
 #[path = "cell/trap.rs"]
 mod trap;
 #[path = "cell/wire.rs"]

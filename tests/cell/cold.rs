@@ -2,6 +2,7 @@
 //! drives by itself over the robot's and the camera's wires, and whether parts are inserted with it; judged by the cell's truth.
 //! Frame and unit: base frame; mm, degrees, s.
 
+use super::speeds::{HEAD, ROOM, Speeds};
 use super::workplace::{Yes, scene};
 use sheetlight::arm::rules::{Confirmation, Guard, Limits, Plan, Space};
 use sheetlight::arm::{Motion, Outputs, Way};
@@ -22,7 +23,8 @@ use sheetlight::scan::{Extraction, Where};
 use sheetlight::simulate::RigSpec;
 use sheetlight::station::job::{Job, JobOptions, Operator, Outcome};
 use sheetlight::station::{
-    ArmCell, AutoResult, AutoRun, JointRun, Settings, ToolSpec, WorkingVolume, calibrate_auto, guarded, store_joint,
+    ArmCell, AutoResult, AutoRun, HeadSpec, JointRun, Settings, ToolSpec, WorkingVolume, calibrate_auto, guarded,
+    store_joint,
 };
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -49,7 +51,8 @@ impl Cold {
         let motion = Limits { max_silence_ms: 5000.0, max_still_ms: 5000.0, ..Limits::within(SPACE) };
         let [near_mm, far_mm] = working;
         let working_volume = Some(WorkingVolume { near_mm, far_mm });
-        Settings { motion: Some(motion), tool, working_volume, ..Settings::default() }.store(&station).unwrap();
+        let head = Some(HeadSpec { points_mm: vec![HEAD] });
+        Settings { motion: Some(motion), tool, head, working_volume, ..Settings::default() }.store(&station).unwrap();
         Cold { served, station, dir, working }
     }
 
@@ -397,7 +400,12 @@ fn a_cold_cell_whose_sensor_stands_still_calibrates_itself() {
 /// What is in the station afterwards, and stops of the check whose stripe lay on the board.
 fn coarse(of: impl Fn(CellOptions) -> CellOptions) -> (Rig, usize) {
     let cold = Cold::new(of(coarse_options()));
+    let tip = cold.served.cell.flange_from_tool().translation;
+    let speeds = Speeds::follow(&cold.served.cell, vec![Vec3::zeros(), tip, HEAD.into()]);
     let result = cold.calibrate(0.2, 40).unwrap_or_else(|e| panic!("{e}"));
+    let (most, limit) = (speeds.fastest(), Limits::within(SPACE).speed_mm_s);
+    println!("fastest of flange, tip and head {most:.1} mm/s");
+    assert!(most > 0.9 * limit && most <= ROOM * limit, "{most} mm/s, limit {limit}");
     let (off, expected) = (cold.off(&result), result.joint.expected_mm());
     println!(
         "{} stops, {:?}, off {off:.4} mm, expected {expected:.4}, refused {}, {:?}",

@@ -2,15 +2,19 @@
 //! cell's truth; whether it keeps away from what is missing, wrong or hidden; whether it survives being cut off.
 //! Frame and unit: mm, degrees, s.
 
+use super::speeds::ROOM;
 use super::workplace::{Yes, scene, set};
 use sheetlight::cell::Insertion;
+use sheetlight::station::Settings;
 use sheetlight::station::job::{JobReport, JobState, Outcome, Phase};
 
 /// Runs a job to its end; the insertion as the truth judges it.
 fn inserted(part: &str, seed: u64, tilt_deg: f64, sweep_mm: f64) -> (JobReport, Option<Insertion>, usize, Vec<String>) {
     let set = set(scene(part, seed), seed, tilt_deg);
-    let mut who = Yes::always();
+    let (mut who, speeds) = (Yes::always(), set.speeds());
     let report = set.run(&set.options(&format!("{part}.toml"), "job", sweep_mm), &mut who).unwrap();
+    let (most, limit) = (speeds.fastest(), Settings::load(&set.station).unwrap().motion.unwrap().speed_mm_s);
+    assert!(most > 0.9 * limit && most <= ROOM * limit, "{most} mm/s, limit {limit}");
     let t = set.served.cell.clock().now();
     println!("{part} seed {seed}: {:?} after {:.0} s of the cell; {:?}", report.outcome, t, report.why);
     for line in &who.told {
@@ -112,6 +116,11 @@ fn a_job_that_was_cut_off_backs_out_or_goes_on() {
         ..JobState::new(start)
     };
     state.store(&options.out).unwrap();
+    // Nobody has looked at the robot since: no program says so by itself.
+    let mut who = Yes { has_looked: false, ..Yes::always() };
+    let refused = set.run(&options, &mut who).unwrap_err().what;
+    assert!(refused.contains("nobody has looked at the robot") && who.asked.is_empty(), "{refused}");
+    assert_eq!(set.served.cell.moves(), 0);
     let mut who = Yes::always();
     let report = set.run(&options, &mut who).unwrap();
     assert_eq!(who.asked, ["retract"]);

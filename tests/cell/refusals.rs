@@ -103,6 +103,19 @@ fn a_cell_that_is_not_ready_is_told_in_words_and_nothing_moves() {
 }
 
 #[test]
+fn yes_to_everything_is_taken_from_no_controller_that_does_not_say_it_is_simulated() {
+    let set = set(scene("osc", 2), 2, 2.0);
+    // A tunnel to a real controller begins on this machine too.
+    set.served.controller.as_real();
+    let (code, said) = job(&set, &set.served.robot_uri(), &set.served.camera_uri());
+    assert!(code == 2 && said.contains("--yes with the robot bcap://127.0.0.1:"), "{code}: {said}");
+    assert!(said.contains("does not say that it is a simulated one"), "{said}");
+    assert_eq!(set.served.cell.moves(), 0);
+    // The arm was not taken either.
+    drop(set.guard());
+}
+
+#[test]
 fn another_tool_is_put_down_by_taking_the_arm_and_one_selected_later_stops_it() {
     // TakeArm without Keep selects tool 0 and work 0; what somebody selects afterwards is a gate.
     let set = set(scene("osc", 2), 2, 2.0);

@@ -185,6 +185,8 @@ struct Stopped<'a> {
     still_ms: f64,
     /// What is done to it on its way; none: the motion itself is what is wrong, from its beginning on.
     does: Option<fn(&Served, &StopButton, &AtomicBool)>,
+    /// What is wrong with the controller before it is armed.
+    before: fn(&Served),
     /// What the guard says of it, in part.
     says: &'a str,
     /// The Halt has to be at the controller within so many ms.
@@ -197,6 +199,7 @@ impl Stopped<'_> {
     fn once(&self) -> Result<f64, String> {
         let served = cell(7, 1.0);
         served.controller.set_motor(true);
+        (self.before)(&served);
         let link = sheetlight::arm::open(&format!("{}{}", served.robot_uri(), self.uri)).unwrap();
         let limits = Limits { max_silence_ms: self.silence_ms, max_still_ms: self.still_ms, ..limits() };
         let mut guard = Guard::new(link, Some(limits), bare(), MotionLog::default());
@@ -232,6 +235,11 @@ impl Stopped<'_> {
         judged(ms, said.contains(self.says) && ms > 0.0 && ms < self.within_ms, format!("{ms} ms, {said}"))
     }
 
+    /// The same with a controller that does not say that it is simulated, and whose stamps turn wrong on the way.
+    fn stamped(&self, does: fn(&Served, &StopButton, &AtomicBool)) -> f64 {
+        Stopped { does: Some(does), before: |s| s.controller.as_real(), ..*self }.in_time()
+    }
+
     fn in_time(&self) -> f64 {
         tries(10, || self.once())
     }
@@ -239,7 +247,15 @@ impl Stopped<'_> {
 
 #[test]
 fn whoever_goes_while_the_arm_moves_halts_it_in_time() {
-    let usual = Stopped { uri: "", silence_ms: 5000.0, still_ms: 5000.0, does: None, says: "", within_ms: 50.0 };
+    let usual = Stopped {
+        uri: "",
+        silence_ms: 5000.0,
+        still_ms: 5000.0,
+        does: None,
+        before: |_| {},
+        says: "",
+        within_ms: 50.0,
+    };
     let stop = Stopped { does: Some(|_, button, _| button.press()), says: "STOP", ..usual }.in_time();
     let signal = Stopped { does: Some(|_, _, up| up.store(true, SeqCst)), says: "told to end", ..usual }.in_time();
     let lease = Stopped {
@@ -262,9 +278,103 @@ fn whoever_goes_while_the_arm_moves_halts_it_in_time() {
         ..usual
     };
     let silent = silent.in_time();
+    // Its poses stand while it moves, with fresh times.
+    let frozen = Stopped {
+        still_ms: 300.0,
+        does: Some(|s, _, _| s.controller.freeze()),
+        says: "has not changed for",
+        within_ms: 400.0,
+        ..usual
+    };
+    let frozen = frozen.in_time();
+    println!("halt at the controller after ms: poses that stand for 300 {frozen:.1}");
     println!(
         "halt at the controller after ms: STOP {stop:.1}, signal {signal:.1}, lease of 100 {lease:.1}, link cut {cut:.1}, four times as fast {fast:.1}, silence of 200 {silent:.1}"
     );
+}
+
+#[test]
+fn a_controller_whose_time_is_not_ours_is_halted() {
+    let usual = Stopped {
+        uri: "",
+        silence_ms: 5000.0,
+        still_ms: 5000.0,
+        does: None,
+        before: |_| {},
+        says: "stamps stand still or are in another unit",
+        within_ms: 400.0,
+    };
+    let stamps: [fn(&Served, &StopButton, &AtomicBool); 3] = [
+        |s, _, _| s.controller.stamp_with(|ms| ms * 1e-3),
+        |s, _, _| s.controller.stamp_with(|ms| ms * 1e3),
+        |s, _, _| s.controller.stamp_with(|_| 12345.0),
+    ];
+    for stamp in stamps {
+        println!("halt at the controller after {:.1} ms", usual.stamped(stamp));
+    }
+    let lost = Stopped { says: "are believed", within_ms: 50.0, ..usual };
+    let never: [fn(&Served, &StopButton, &AtomicBool); 2] =
+        [|s, _, _| s.controller.stamp_with(|_| f64::INFINITY), |s, _, _| s.controller.stamp_with(|_| 1e20)];
+    for stamp in never {
+        println!("lost link: halt at the controller after {:.1} ms", lost.stamped(stamp));
+    }
+}
+
+#[test]
+fn a_right_motion_at_the_slowest_speed_is_not_halted() {
+    tries(5, || {
+        let served = cell(7, 1.0);
+        served.controller.as_real();
+        let mut guard = guard(&served, |l| l.max_still_ms = 300.0);
+        // The link sends 0.1 % at least, 1 mm/s.
+        let slow = leg(&mut guard, [0.0, 0.0, -1.5], 0.1);
+        let said = made(&mut guard, plan(vec![slow]));
+        judged((), said.is_ok(), format!("{said:?}"))
+    });
+}
+
+#[test]
+fn a_turn_that_is_faster_than_it_was_confirmed_is_halted() {
+    let served = cell(7, 1.0);
+    served.controller.set_motor(true);
+    // The controller turns ten times as fast as its link was told.
+    let link = sheetlight::arm::open(&format!("{}?turn=20", served.robot_uri())).unwrap();
+    let mut guard = Guard::new(link, Some(limits()), bare(), MotionLog::default());
+    guard.arm(true).unwrap();
+    let mut turned = leg(&mut guard, [0.0; 3], 50.0);
+    turned.to.rotation *= exp(&Vec3::new(0.0, 0.0, 90f64.to_radians()));
+    let said = made(&mut guard, plan(vec![turned])).unwrap_err();
+    assert!(said.contains("the flange turns at") && said.contains("limit 39.5"), "{said}");
+    assert!(served.cell.log().iter().any(|e| matches!(e.event, Event::Halt { moving: true, .. })));
+}
+
+#[test]
+fn what_the_flange_carries_keeps_out_and_what_nobody_judged_is_shown() {
+    let served = cell(4, 50.0);
+    served.controller.set_motor(true);
+    let wall = Space { from_mm: [280.0, -50.0, 400.0], to_mm: [400.0, 50.0, 480.0] };
+    let proposal = |carried: Carried| {
+        let mut guard = carrying(&served, Limits { keep_out: vec![wall], ..limits() }, carried);
+        guard.arm(true).unwrap();
+        let beside = leg(&mut guard, [20.0, 0.0, -20.0], 50.0);
+        let from = guard.link().pose().unwrap().base_from_flange;
+        let clear = guard.keeps_clear(&from, &beside.to);
+        (guard.propose(plan(vec![beside])).unwrap(), clear)
+    };
+    let far = |x: f64, z: f64| Vec3::new(x, 0.0, z);
+    // The flange passes above the wall; a tool, or the sensor's far corner alone, would not.
+    let (shown, clear) = proposal(bare());
+    assert!(shown.passed() && clear, "{:?}", shown.missed());
+    assert_eq!(shown.unjudged, ["the tool: none is described in station.toml"]);
+    for carried in [
+        Carried::new(Some(far(0.0, 140.0)), Ok(vec![])),
+        Carried::new(None, Ok(vec![far(0.0, 30.0), far(20.0, 120.0)])),
+    ] {
+        let (shown, clear) = proposal(carried);
+        assert!(!clear && shown.missed()[0].starts_with("way through a keep-out"), "{:?}", shown.missed());
+    }
+    let (shown, _) = proposal(Carried::new(Some(far(0.0, 20.0)), Err("nobody knows".into())));
+    assert!(shown.passed() && shown.unjudged == ["the sensor head: nobody knows"], "{:?}", shown.unjudged);
 }
 
 #[test]

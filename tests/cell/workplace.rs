@@ -2,15 +2,17 @@
 //! what every test of a job begins with.
 //! Frame and unit: mm, degrees.
 
+use super::speeds::{HEAD, Speeds};
 use sheetlight::arm::rules::{Carried, Confirmation, Guard, Limits, Space};
 use sheetlight::capture::source::cell::CellCamera;
 use sheetlight::cell::{Cell, CellOptions, Event, Served};
 use sheetlight::fault::Result;
+use sheetlight::geometry::Vec3;
 use sheetlight::robot::Convention;
 use sheetlight::scan::Where;
 use sheetlight::simulate::SceneSpec;
 use sheetlight::station::job::{Ask, Job, JobOptions, JobReport, Operator};
-use sheetlight::station::{Settings, ToolSpec, guarded};
+use sheetlight::station::{HeadSpec, Settings, ToolSpec, guarded};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -98,7 +100,8 @@ pub fn set_but(mut spec: SceneSpec, seed: u64, tilt_deg: f64, but: impl FnOnce(&
     let tool = Some(ToolSpec { flange_from_tool: served.cell.flange_from_tool() });
     // Two busy cores may keep the link's threads waiting for long; that a silent link halts is shown by the rules' own test.
     let motion = Limits { max_silence_ms: 5000.0, max_still_ms: 5000.0, ..Limits::within(workspace) };
-    Settings { motion: Some(motion), tool, ..Settings::default() }.store(&station).unwrap();
+    let head = Some(HeadSpec { points_mm: vec![HEAD] });
+    Settings { motion: Some(motion), tool, head, ..Settings::default() }.store(&station).unwrap();
     Set { served, station, dir }
 }
 
@@ -151,6 +154,12 @@ impl Set {
         let mut guard = guarded(&self.station, &self.served.robot_uri()).unwrap();
         guard.arm(true).unwrap();
         guard
+    }
+
+    /// Of flange, tip and head from now on.
+    pub fn speeds(&self) -> Speeds {
+        let tip = self.served.cell.flange_from_tool().translation;
+        Speeds::follow(&self.served.cell, vec![Vec3::zeros(), tip, HEAD.into()])
     }
 
     pub fn run(&self, options: &JobOptions, who: &mut Yes) -> Result<JobReport> {

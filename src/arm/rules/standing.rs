@@ -72,3 +72,45 @@ impl Standing {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Vec3, exp};
+
+    /// Poses every 4 ms of a leg along x that follows `mm`; the lever is `lever` mm. Why it is halted, and when, s.
+    fn judged(mm: impl Fn(f64) -> f64, deg: impl Fn(f64) -> f64, lever: f64, goal: f64) -> Option<(f64, String)> {
+        let carried = Carried::new(Some(Vec3::new(lever, 0.0, 0.0)), Ok(vec![]));
+        let pose = |t: f64| {
+            // Controllers state micrometres.
+            let x = (mm(t) * 1e3).round() * 1e-3;
+            let turn = Vec3::z() * deg(t).to_radians();
+            Rigid::<Base, Flange>::new(exp(&turn), Vec3::new(x, 0.0, 400.0))
+        };
+        let leg = Leg { to: pose(goal), ordered: Instant::now() };
+        let (mut standing, most) = (Standing::default(), Duration::from_millis(300));
+        (0..2000).find_map(|k| {
+            let t = 0.004 * f64::from(k);
+            let asked = leg.ordered + Duration::from_secs_f64(t);
+            let device = Some(Duration::from_secs_f64(7.0 + t));
+            let pose = TimedPose { base_from_flange: pose(t), figure: None, asked, here: asked, device };
+            standing.judge(&pose, Some(&leg), &carried, most).map(|why| (t, why))
+        })
+    }
+
+    #[test]
+    fn what_stands_on_its_way_is_seen_and_the_slowest_leg_is_not_halted() {
+        let still = |_: f64| 0.0;
+        assert_eq!(judged(|t| 0.1 * t, still, 0.0, 100.0), None, "0.1 mm/s");
+        // 0.1 mm/s of a point 300 mm out, and the flange does not shift.
+        assert_eq!(judged(still, |t| 0.1 / 300.0_f64.to_radians() * t, 300.0, 100.0), None);
+        assert_eq!(judged(|t| 20.0 * (t - 0.9).max(0.0), still, 0.0, 100.0), None, "it begins late");
+        assert_eq!(judged(|t| 20.0 * t.min(1.0), still, 0.0, 1.0), None, "it waits at its goal");
+        let (t, why) = judged(|t| 20.0 * t.min(1.0), still, 0.0, 100.0).expect("it stands on its way");
+        assert!((1.29..1.32).contains(&t) && why.contains("limit 300"), "{t} {why}");
+        let (t, _) = judged(still, still, 0.0, 100.0).map_or((0.0, String::new()), |j| j);
+        assert_eq!(t, 0.0, "its goal is where it stands");
+        let (t, why) = judged(|t| if t > 50.0 { 50.0 } else { 0.0 }, still, 0.0, 60.0).expect("it does not begin");
+        assert!((1.0..1.02).contains(&t) && why.contains("limit 1000"), "{t} {why}");
+    }
+}
