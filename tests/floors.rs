@@ -263,8 +263,8 @@ fn every_outside_crate_has_a_home_or_is_for_all() {
     assert_eq!(used, known, "what Cargo.toml depends on, and what HOMES and COMMON name");
 }
 
-/// A test that needs an adapter gets it from the one place of its kind, which skips it aloud, and fails it where an adapter
-/// is required.
+/// A test that needs an adapter gets it from the one place of its kind, which skips it aloud, and fails it where an
+/// adapter is required.
 #[test]
 fn tests_get_their_adapter_where_the_skip_is() {
     const HOMES: [&str; 2] = ["tests/common/mod.rs", "src/gpu/open.rs"];

@@ -6,8 +6,8 @@ use serde_json::{Value, json};
 use std::path::Path;
 
 /// How far a figure may move: by 1e-4 of itself, a thousand times what processors' exp() differ by. Where a figure is
-/// nearly 0 its unit says what nothing is: 1e-6 mm is a thousandth of the finest sigma, 1e-5 px that of the finest peak. A
-/// place has no size of its own, its frame's origin lies anywhere: 1e-3 mm, a thirtieth of a point's sigma.
+/// nearly 0 its unit says what nothing is: 1e-6 mm is a thousandth of the finest sigma, 1e-5 px that of the finest
+/// peak. A place has no size of its own, its frame's origin lies anywhere: 1e-3 mm, a thirtieth of a point's sigma.
 fn allowed(path: &str, was: f64) -> f64 {
     if path.contains("position_mm") {
         return 1e-3;

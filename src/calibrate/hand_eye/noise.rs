@@ -9,7 +9,6 @@ use super::terms::{Refined, refine, robot_parts, with_camera};
 use crate::calibrate::components::Components;
 use crate::calibrate::measured_pose::pooled_factor;
 use crate::camera::{PARAMETERS, Parameters};
-use crate::solve::End;
 use nalgebra::{DMatrix, DVector};
 
 /// One round of variance components at a fitted chain.
@@ -127,7 +126,7 @@ pub(in crate::calibrate) fn fit(
     o: &HandEyeOptions,
 ) -> Option<Fitted> {
     let camera = given.after(pairs, noise.feature_factor)?;
-    let (mut chain, mut noise, mut rest) = (*start, noise, End::Exhausted);
+    let (mut chain, mut noise) = (*start, noise);
     for _ in 0..30 {
         chain = refine(pairs, &chain, &noise, mount, &camera.belief)?.chain;
         let next = components(pairs, &chain, &noise, mount, &camera.belief, o)?;
@@ -136,11 +135,10 @@ pub(in crate::calibrate) fn fit(
             && (next.feature_factor / noise.feature_factor - 1.0).abs() < 1e-3;
         noise = next;
         if settled {
-            rest = End::Minimum;
             break;
         }
     }
-    let mut refined = refine(pairs, &chain, &noise, mount, &camera.belief)?;
-    refined.end = refined.end.max(rest);
+    // That the rounds ran out says nothing against the chain: a robot too exact to be seen has a noise that shrinks on and on.
+    let refined = refine(pairs, &chain, &noise, mount, &camera.belief)?;
     Some(Fitted { refined, noise, camera })
 }

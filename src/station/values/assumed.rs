@@ -7,8 +7,8 @@ use crate::geometry::{Camera, Mat3, Plane, Vec3};
 use crate::rig::{Covariance, Kind};
 use nalgebra::{DMatrix, DVector};
 
-/// Standard deviations that were stated; what is `None` has its usual value. Nothing counts as exact: two looks at a right
-/// part would contradict each other by what robot and calibrations are off by.
+/// Standard deviations that were stated; what is `None` has its usual value. Nothing counts as exact: two looks at a
+/// right part would contradict each other by what robot and calibrations are off by.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sigmas {
     /// Of the robot's place, each axis, mm; usually 0.02, the repeatability (ISO 9283) that makers state of such arms.

@@ -1,5 +1,5 @@
-//! A true station whose values were imported without covariance, and a robot that scatters by 0.02 mm and 0.004 degrees:
-//! right parts pass two looks, wrong ones do not. SHEETLIGHT_LONG: a hundred draws.
+//! A true station whose values were imported without covariance, and a robot that scatters by 0.02 mm and 0.004
+//! degrees: right parts pass two looks, wrong ones do not. SHEETLIGHT_LONG: a hundred draws.
 
 use super::edits::EDITS;
 use super::world::{Believed, Recorded, World};
