@@ -18,7 +18,7 @@ pub(super) fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
     decoder.set_ignore_text_chunk(true);
     decoder.set_ignore_iccp_chunk(true);
     let [width, height] = <[u32; 2]>::from(decoder.read_header_info().map_err(strange)?.size());
-    // An orientation that comes later may swap columns and rows; another number of pixels is refused before anything is decoded.
+    // An orientation that comes later may swap columns and rows; any other size is refused before anything is decoded.
     let swapped = wanted.size == Some([height, width]);
     wanted.fits(if swapped { 6 } else { 1 }, [width, height])?;
     let mut reader = decoder.read_info().map_err(strange)?;
