@@ -190,7 +190,7 @@ pub fn measure(seen: &SeenBoard, camera: &Intrinsics, start: &Rigid<Camera, Boar
         .next("take the picture again with the whole board in view"));
     }
     let problem = PoseProblem { seen, camera };
-    // With Huber's weights the last digits of the cost move on and on; 1e-11 of it is far below a thousandth of a sigma.
+    // With Huber's weights the last digits of the cost move on; 1e-11 of it is far below a thousandth of a sigma.
     let options = LmOptions { loss: Loss::Huber(2.5), estimate_scale: true, tolerance: 1e-11, ..LmOptions::default() };
     let found = lm(&problem, *start, &options).minimum().filter(|f| f.covariance.is_some()).ok_or_else(|| {
         Fault::refused(format!("{}: the board's pose is not determined by its pixels", seen.name))

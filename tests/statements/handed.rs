@@ -262,9 +262,10 @@ fn a_depth_that_stands_for_no_measurement_does_not_judge_the_error() {
         assert_eq!(warned, missing.is_empty(), "{said}");
         figures.push(stored()["quality"].clone());
     }
-    assert_eq!(figures[0], figures[1]);
-    assert_eq!(figures[0]["verdict"], "good", "{}", figures[0]);
-    assert!(!figures[0].to_string().contains("541"), "{}", figures[0]);
+    // As without these points, but for the points that chance picks first.
+    let expected = |k: usize| figures[k]["figures"]["expected_error_at_working_distance_mm"].as_f64().unwrap();
+    assert!((expected(1) / expected(0) - 1.0).abs() < 0.01 && expected(0) < 0.004, "{figures:?}");
+    assert!(figures.iter().all(|f| f["verdict"] == "good" && !f.to_string().contains("541")), "{figures:?}");
 }
 
 #[test]

@@ -138,7 +138,7 @@ pub(in crate::calibrate) fn fit(
             break;
         }
     }
-    // That the rounds ran out says nothing against the chain: a robot too exact to be seen has a noise that shrinks on and on.
+    // That the rounds ran out says nothing against the chain: of a robot too exact to be seen the noise shrinks on and on.
     let refined = refine(pairs, &chain, &noise, mount, &camera.belief)?;
     Some(Fitted { refined, noise, camera })
 }

@@ -17,13 +17,11 @@ pub(super) fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
     decoder.set_transformations(png::Transformations::IDENTITY);
     decoder.set_ignore_text_chunk(true);
     decoder.set_ignore_iccp_chunk(true);
-    let size = decoder.read_header_info().map_err(strange)?.size();
-    // Columns and rows may be swapped by what comes later; the number of pixels stays.
-    Wanted { size: None, ..*wanted }.fits(1, size.into())?;
+    let [width, height] = <[u32; 2]>::from(decoder.read_header_info().map_err(strange)?.size());
+    // An orientation that comes later may swap columns and rows; any other size is refused before anything is decoded.
+    let swapped = wanted.size == Some([height, width]);
+    wanted.fits(if swapped { 6 } else { 1 }, [width, height])?;
     let mut reader = decoder.read_info().map_err(strange)?;
-    if reader.info().exif_metadata.is_none() {
-        wanted.fits(1, size.into())?;
-    }
     let buffer = reader.output_buffer_size().ok_or_else(|| unreadable(bytes, &"too large for this machine"))?;
     let _memory = DECODING.hold(3 * buffer as u64);
     // Decoded in place: levels of 16 bits need no copy.
@@ -41,7 +39,7 @@ pub(super) fn read(bytes: &[u8], wanted: &Wanted) -> Result<Samples> {
     let _ = reader.finish();
     let info = reader.info();
     let orientation = orientation(info);
-    wanted.fits(orientation, size.into())?;
+    wanted.fits(orientation, [width, height])?;
     single(info)?;
     Ok(samples(info, values)?.upright(orientation))
 }
