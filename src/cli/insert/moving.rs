@@ -104,7 +104,7 @@ impl Operator for Person<'_> {
     }
 
     fn looked(&mut self, why: &str) -> Result<bool> {
-        self.console.say(why.to_owned());
+        self.console.say(why);
         self.answered("have you looked at the robot?")
     }
 

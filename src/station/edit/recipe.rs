@@ -168,7 +168,7 @@ mod tests {
         (bare.insertion.two_pin, bare.insertion.lattice) = (None, None);
         let m = point("m", Build::Midpoint, &["pin[1,1]", "pin[2,1]"]);
         let written = point_added(&toml::to_string(&bare).unwrap(), &m).unwrap();
-        assert_eq!(Recipe::parse(&written).unwrap().construction, [m.clone()]);
+        assert_eq!(Recipe::parse(&written).unwrap().construction, std::slice::from_ref(&m));
         let text = "construction = [ # one\n{ name = 'a', kind = 'line', of = ['pin[1,1]', 'pin[2,1]'] }, # two\n]\n"
             .to_owned();
         let text = text + &toml::to_string(&bare).unwrap().replace("construction = []\n", "");
