@@ -3,6 +3,7 @@
 use super::{Arm, Outputs, Switch};
 use crate::fault::{Fault, Kind, Result};
 use crate::recording::Beam;
+use std::io::Write;
 
 /// Lasers, lamp and gripper. Dropped, on whatever way, it switches the lasers off. The gripper stays as it is: what it
 /// holds would
@@ -122,7 +123,8 @@ impl Drop for Switchboard {
         if let Err(fault) = self.dark()
             && !told
         {
-            eprintln!("{fault}");
+            // The output may be closed: a destructor must not panic for that.
+            let _ = writeln!(std::io::stderr(), "{fault}");
         }
     }
 }

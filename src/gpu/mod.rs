@@ -6,6 +6,8 @@ mod alias;
 mod background;
 mod description;
 mod device;
+#[cfg(test)]
+mod for_tests;
 mod open;
 mod rates;
 mod recording;

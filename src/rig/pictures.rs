@@ -49,9 +49,7 @@ impl Calibration<Intrinsics> {
         if size == self.size() && self.for_pictures(size, readout)? == self.value {
             return Ok(());
         }
-        Err(self
-            .another(size)
-            .next("set the camera as it was when it was calibrated, or calibrate it with pictures of the same kind"))
+        Err(self.another(size))
     }
 
     fn size(&self) -> [u32; 2] {
@@ -62,6 +60,7 @@ impl Calibration<Intrinsics> {
         let ([width, height], readout) = (self.size(), self.readout.map_or(String::new(), |r| format!(" ({r})")));
         Fault::input(format!("pictures are {w}x{h}, the camera was calibrated at {width}x{height}{readout}"))
             .cause("another camera, or another region, binning or decimation set in it")
+            .next("set the camera as it was when it was calibrated, or calibrate it with pictures of the same kind")
     }
 }
 

@@ -68,7 +68,10 @@ mod tests {
             let at = |i: i32| way.at(f64::from(i) / f64::from(n)).point(&point);
             let sampled = (0..n).map(|i| (at(i + 1) - at(i)).norm()).fold(0.0, f64::max) * f64::from(n);
             let found = way.fastest(&point);
-            assert!((found / sampled - 1.0).abs() < 1e-5, "{k}: {found} {sampled}");
+            // A sample is a mean over a step. Where a point is fastest at an end, it is slower half a step on: by no more than
+            // half of itself for each radian.
+            let bias = 0.25 * turn.norm() / f64::from(n) + 1e-8;
+            assert!((-1e-8..bias).contains(&(found / sampled - 1.0)), "{k}: {found} {sampled}");
         }
         let nothing = Rigid::new(from.rotation, Vec3::repeat(f64::NAN));
         assert!(Straight::new(&from, &nothing).fastest(&Vec3::x()).is_nan());

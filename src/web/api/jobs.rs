@@ -45,7 +45,10 @@ pub async fn act(
     UrlPath((id, what)): UrlPath<(String, String)>,
 ) -> Answer<Json<Job>> {
     // Everybody may stop.
-    if what != "stop" {
+    if what == "stop" {
+        // Before the queue, as in POST /stop.
+        screen.desk.stop_job(&id);
+    } else {
         operates(&screen, &tab)?;
     }
     json(screen, move |s| match what.as_str() {

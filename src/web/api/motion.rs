@@ -97,3 +97,42 @@ pub async fn simulated(
     })
     .await
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::web::event::Hub;
+    use crate::web::guard::Sessions;
+    use crate::web::message::Mode;
+    use crate::web::motion::{Desk, Links};
+    use crate::web::work::{Jobs, Place};
+    use std::sync::atomic::{AtomicBool, Ordering};
+    use std::sync::mpsc::channel;
+    use std::time::Duration;
+
+    /// STOP acts although every thread for other work sleeps; its answer, which writes the jobs' states, may wait.
+    #[test]
+    fn stop_waits_for_no_other_work() {
+        let dir = tempfile::tempdir().unwrap();
+        let [station, recordings] = ["station", "recordings"].map(|name| dir.path().join(name));
+        let hub = Arc::new(Hub::default());
+        let desk = Arc::new(Desk::new(Links { station: station.clone(), ..Links::default() }, hub.clone()));
+        let place = Place { station, recordings, mode: Mode::Replay };
+        std::fs::create_dir_all(place.jobs()).unwrap();
+        let jobs = Jobs::open(place, hub, desk.clone()).unwrap();
+        let screen = Arc::new(Screen::new(jobs, Arc::new(Sessions::new("token")), "cookie".into(), None));
+        let stopped = Arc::new(AtomicBool::new(false));
+        desk.a_job_runs(&stopped);
+        let runtime =
+            tokio::runtime::Builder::new_multi_thread().worker_threads(1).max_blocking_threads(1).enable_all().build();
+        let runtime = runtime.unwrap();
+        let (wake, sleeps) = channel::<()>();
+        runtime.spawn_blocking(move || sleeps.recv());
+        runtime.block_on(async {
+            let asked = tokio::time::timeout(Duration::from_millis(200), stop(State(screen)));
+            assert!(asked.await.is_err(), "the answer waits for a free thread");
+        });
+        assert!(stopped.load(Ordering::SeqCst), "the job goes on");
+        wake.send(()).unwrap();
+    }
+}

@@ -80,9 +80,10 @@ pub async fn take(
 /// POST /lease/release: let go.
 pub async fn release(State(screen): State<Arc<Screen>>, Extension(tab): Extension<Tab>) -> Answer<Json<Lease>> {
     operates(&screen, &tab)?;
+    // Before the queue, as in POST /motion/release.
+    screen.desk.let_go(&tab, "the operator let another screen operate");
     json(screen, move |screen| {
         screen.leases.release(&tab);
-        screen.desk.let_go(&tab, "the operator let another screen operate");
         screen.hub.tell(&Event::Bar(screen.bar()));
         Ok(screen.leases.state())
     })

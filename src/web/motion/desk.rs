@@ -98,13 +98,14 @@ impl At {
 }
 
 impl At {
-    /// Puts a guard back that was taken in this turn; false, and it is dropped, where the robot was given back meanwhile.
-    pub(super) fn put_back(&mut self, guard: Guard, turn: u64) -> bool {
-        let same = self.turn == turn && self.guard.is_none();
-        if same {
-            self.guard = Some(guard);
+    /// Puts a guard back that was taken in this turn. It comes out again where the robot was given back meanwhile: the
+    /// caller drops it after the desk, because giving an arm back asks the controller.
+    pub(super) fn put_back(&mut self, guard: Guard, turn: u64) -> Option<Guard> {
+        if self.turn != turn || self.guard.is_some() {
+            return Some(guard);
         }
-        same
+        self.guard = Some(guard);
+        None
     }
 }
 
@@ -180,12 +181,23 @@ impl Desk {
             Some(guard)
         };
         let mut at = self.at();
-        if let Some(guard) = made.filter(|_| at.button.is_none()) {
-            (at.button, at.guard, at.turn) = (Some(guard.stop_button()), Some(guard), at.turn + 1);
+        // Of two who arm at once the second one's guard is dropped after the desk: giving an arm back asks the controller.
+        let late = match made {
+            Some(guard) if at.button.is_none() => {
+                (at.button, at.guard, at.turn) = (Some(guard.stop_button()), Some(guard), at.turn + 1);
+                None
+            }
+            other => other,
+        };
+        if at.button.is_none() {
+            return Err(Fault::refused("the robot was given back meanwhile").next("press Arm again"));
         }
         at.armed = Some(tab.clone());
         self.tell(&at);
-        Ok(self.seen(&at))
+        let state = self.seen(&at);
+        drop(at);
+        drop(late);
+        Ok(state)
     }
 
     /// Gives the arm back.
@@ -220,7 +232,8 @@ impl Desk {
         drop(at);
         let outputs = Settings::load(&self.links.station).map(|s| s.outputs.unwrap_or_default());
         let tried = outputs.and_then(|o| try_output(guard.link(), &o, what, &self.links.stop));
-        self.at().put_back(guard, turn);
+        let former = self.at().put_back(guard, turn);
+        drop(former);
         tried
     }
 
@@ -236,11 +249,13 @@ impl Desk {
             drop(at);
             let looked = guard.looked();
             at = self.at();
-            let same = at.put_back(guard, turn);
-            looked?;
-            if let Some(button) = at.button.as_ref().filter(|_| same) {
-                button.release();
+            let former = at.put_back(guard, turn);
+            if former.is_some() {
+                drop(at);
+                return Err(Fault::refused("the robot was given back meanwhile").next("press Arm, then look again"));
             }
+            looked?;
+            at.button.iter().for_each(StopButton::release);
         }
         at.shown.look = None;
         self.tell(&at);
@@ -352,6 +367,16 @@ impl Desk {
         self.wake.notify_all();
     }
 
+    /// STOP for one job: what it moves is halted where it is the one that has the robot.
+    pub fn stop_job(&self, id: &str) {
+        let at = self.at();
+        let has_it = at.stop.is_some() && at.shown.job.as_deref() == Some(id);
+        drop(at);
+        if has_it {
+            self.stop();
+        }
+    }
+
     fn halt(&self, at: &mut At, why: &str) {
         if let Some(button) = &at.button {
             button.press_for(why);
@@ -408,5 +433,40 @@ impl Desk {
         let mut at = self.at();
         at.shown.expected.push((stops, mm));
         self.tell(&at);
+    }
+}
+
+#[cfg(test)]
+impl Desk {
+    /// A job with this flag has the robot.
+    pub fn a_job_runs(&self, stop: &Arc<AtomicBool>) {
+        self.at().stop = Some(stop.clone());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arm::rules::{Carried, MotionLog};
+
+    fn guard(folder: &std::path::Path) -> Guard {
+        let poses = folder.join("poses.csv");
+        std::fs::write(&poses, "# convention: denso\nframe,x,y,z,rx,ry,rz\n0,1,2,3,0,0,0\n").unwrap();
+        let link = crate::arm::open(&format!("file:{}", poses.display())).unwrap();
+        Guard::new(link, None, Carried::new(None, Ok(vec![])), MotionLog::default())
+    }
+
+    /// A test of an output runs, the robot is given back and armed anew meanwhile: the former guard does not come back.
+    #[test]
+    fn a_guard_of_an_earlier_time_is_not_put_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let mut at = At { guard: Some(guard(dir.path())), ..At::default() };
+        let (former, turn) = taken(&mut at).unwrap();
+        assert!(taken(&mut at).is_err(), "it is in use");
+        at.turn += 1;
+        assert!(at.put_back(former, turn).is_some() && at.guard.is_none());
+        at.guard = Some(guard(dir.path()));
+        let (held, turn) = taken(&mut at).unwrap();
+        assert!(at.put_back(held, turn).is_none() && at.guard.is_some());
     }
 }

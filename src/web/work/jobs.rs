@@ -133,7 +133,7 @@ impl Jobs {
         let number = number_of(id).expect("a job's id");
         // Looked at and queued under one lock: a request that comes twice queues the job once.
         let mut state = self.state();
-        job.state = state.all.get(&number).map_or(job.state, |j| j.state);
+        job.state = state.all.get(&number).map_or(JobState::Done, |j| j.state);
         if back_out && !matches!(job.order, Order::Insert(_)) {
             return Err(Fault::usage(format!("{id}: moves no robot, there is nothing to back out of"))
                 .next("take it away, or resume it"));
@@ -273,5 +273,46 @@ impl Jobs {
         }
         drop(state);
         self.wake.notify_all();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::web::message::{Mode, Plain};
+    use crate::web::motion::Links;
+
+    fn jobs(folder: &std::path::Path) -> Arc<Jobs> {
+        let hub = Arc::new(Hub::default());
+        let desk = Arc::new(Desk::new(Links { station: folder.to_owned(), ..Links::default() }, hub.clone()));
+        let place = Place { station: folder.to_owned(), recordings: folder.to_owned(), mode: Mode::Replay };
+        std::fs::create_dir_all(place.jobs()).unwrap();
+        Jobs::open(place, hub, desk).unwrap()
+    }
+
+    #[test]
+    fn a_request_to_resume_that_comes_twice_queues_the_job_once() {
+        let dir = tempfile::tempdir().unwrap();
+        let jobs = jobs(dir.path());
+        let job = jobs.order(Order::Check(Plain {})).unwrap();
+        jobs.stop(&job.id).unwrap();
+        let both = std::thread::scope(|scope| {
+            let ask = || scope.spawn(|| jobs.resume(&job.id, false).is_ok());
+            let both = [ask(), ask()];
+            both.map(|asked| asked.join().unwrap())
+        });
+        assert_eq!(both.iter().filter(|ok| **ok).count(), 1);
+        assert_eq!(jobs.state().waiting.len(), 1);
+    }
+
+    #[test]
+    fn a_job_whose_record_vanished_is_not_left_running() {
+        let dir = tempfile::tempdir().unwrap();
+        let jobs = jobs(dir.path());
+        let gone = jobs.order(Order::Check(Plain {})).unwrap();
+        let next = jobs.order(Order::Check(Plain {})).unwrap();
+        jobs.state().all.remove(&number_of(&gone.id).unwrap());
+        assert_eq!(jobs.take().unwrap().job.id, next.id);
+        assert_eq!(jobs.running(), Some(next.id));
     }
 }
