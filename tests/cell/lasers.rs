@@ -44,7 +44,8 @@ const ALL: [(Where, &[What]); 10] = [
     (Where::Insert, &[Gone, DiskFull, Panic, LinkCut, Killed]),
     (Where::Retract, &[Panic, DiskFull, LinkCut, Gone, Killed]),
     (Where::Auto, &[Panic, DiskFull, LinkCut, Gone, Killed, CameraLost]),
-    (Where::Tune, &[LinkCut, Panic, Gone, Killed, CameraLost]),
+    // The simulated camera has no exposure to set: what goes wrong in a tune is not seen here yet.
+    (Where::Tune, &[]),
     (Where::TryLine, &[Gone, LinkCut, Killed]),
     (Where::TryPointer, &[Killed, LinkCut, Gone]),
 ];
