@@ -80,7 +80,7 @@ fn corners(side: &str) -> Vec<Observation> {
         Observation {
             name: i.to_string(),
             features: features.clone(),
-            view: BoardView { points, ambiguous: false, dot_diameter: None },
+            view: BoardView { points, ..BoardView::default() },
         }
     };
     corners.into_iter().enumerate().map(observation).collect()
