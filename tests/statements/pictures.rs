@@ -89,7 +89,7 @@ fn all_eight_orientations_are_obeyed_in_every_format() {
         let plain = Page::grey([3, 2], 8, 1, STORED.to_vec()).short(274, number);
         let floats = Page::floats([3, 2], &STORED.map(f32::from)).short(274, number);
         for file in [
-            tiff(&[plain.clone()], false, false),
+            tiff(std::slice::from_ref(&plain), false, false),
             tiff(&[plain], true, true),
             with_chunk(png(), b"eXIf", &exif(orientation), false),
             with_chunk(png(), b"eXIf", &exif(orientation), true),
