@@ -246,6 +246,20 @@ impl Cell {
         Ok(())
     }
 
+    /// A person moves the arm with the pendant until the sensor looks at the part that the gripper's component belongs to.
+    /// The arm stays where the gripper holds nothing, and where the sensor stands still.
+    ///
+    /// # Errors
+    /// As [`Cell::jog`].
+    pub fn jog_over_its_part(&self) -> Result<()> {
+        let held = self.world().held.as_ref().map(|c| c.part.clone());
+        let part = self.0.options.scene.part.iter().find(|p| Some(&p.name) == held.as_ref());
+        match part {
+            Some(part) if self.0.base_from_camera.is_none() => self.jog(Over::Place([part.at_mm[0], part.at_mm[1]])),
+            _ => Ok(()),
+        }
+    }
+
     // What only tests may know.
 
     /// The specimen on the flange.

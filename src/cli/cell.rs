@@ -33,13 +33,14 @@ pub struct Args {
     /// Design of the sensor (TOML; data/rigs holds some) [default: the paper's]
     #[arg(long)]
     rig: Option<PathBuf>,
-    /// Name of the part of the scene whose component is in the gripper [default: the first with holes]
+    /// Name of the part of the scene whose component is in the gripper, and over which the arm begins
+    /// [default: the first with holes]
     #[arg(long)]
     part: Option<String>,
     /// A calibration board beside the scene (JSON as sheetlight board writes it)
     #[arg(long)]
     board: Option<PathBuf>,
-    /// The arm begins over the board, as an operator jogs it there for `calibrate auto`; else over the scene
+    /// The arm begins over the board, as an operator jogs it there for `calibrate auto`; else over the part
     #[arg(long, requires = "board")]
     over_board: bool,
     /// The sensor stands still and the flange carries the board before it, for `calibrate auto --mount eye-to-hand`
@@ -111,6 +112,9 @@ fn simulate(args: &Args, console: &Console) -> Result<()> {
         ..CellOptions::of(scene, args.seed)
     };
     let cell = Cell::new(options)?;
+    if !args.over_board {
+        cell.jog_over_its_part()?;
+    }
     if let Some(folder) = &args.station {
         station_for(&cell, folder, "simulated cell", None)?;
     }

@@ -114,7 +114,7 @@ fn every_fault_has_a_next_step() {
     let mut files = Vec::new();
     sources(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"), &mut files);
     let (mut wrong, mut seen) = (Vec::new(), 0);
-    for file in files.iter().filter(|f| !f.ends_with("fault/mod.rs")) {
+    for file in files.iter().filter(|f| !f.ends_with("fault/mod.rs") && !only_tested(f)) {
         let text = std::fs::read_to_string(file).unwrap();
         seen += text.matches("Fault::").count();
         wrong.extend(without_next(&text).into_iter().map(|line| format!("{}:{line}", file.display())));
