@@ -3,10 +3,12 @@
 //! Frame and unit: pixels; points in the camera's frame, mm; seconds.
 
 use super::machine;
+use crate::camera::{Distortion, Intrinsics};
 use crate::fault::{Fault, Result};
+use crate::geometry::{Plane, Vec3};
 use crate::gpu::Device;
 use crate::raster::Image;
-use crate::scan::{Extraction, Format};
+use crate::scan::{Engine, Extraction, Format, Optical, Processor};
 use crate::stages::chain::batches::{Batch, Chain};
 use crate::stages::chain::config::ChainConfig;
 use crate::stages::chain::measure::Measure;
@@ -38,10 +40,12 @@ struct Setup {
     /// Laser plane: normal · X = offset, mm.
     normal: [f32; 3],
     offset_mm: f32,
-    /// Sigma of the stripe, px.
-    width_px: f32,
+    /// Sigma of the stripe, px; left out, it is learned from the pictures as a scan learns it.
+    width_px: Option<f32>,
 }
 
+/// Every depth is believed: nothing is left out while the stripe is learned, mm.
+const DEPTH_MM: [f64; 2] = [1.0, 1e5];
 /// Every point in the camera's own frame.
 const STILL: [f32; 12] = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 
@@ -80,7 +84,7 @@ pub fn serve(device: &Device, mut input: impl BufRead, mut output: impl Write) -
         images.push(Image::from_u8(setup.width, setup.height, pixels));
     }
     let mut ours = Ours::new(device, &setup, images)?;
-    writeln!(output, "{}", serde_json::json!({"ready": device.info.name})).map_err(lost)?;
+    writeln!(output, "{}", serde_json::json!({"ready": device.info.name, "width_px": ours.width_px})).map_err(lost)?;
     output.flush().map_err(lost)?;
     loop {
         line.clear();
@@ -107,6 +111,35 @@ fn lost(e: std::io::Error) -> Fault {
     broken(e)
 }
 
+fn format(setup: &Setup) -> Format {
+    Format { width: setup.width, height: setup.height, bits: 8 }
+}
+
+/// The stripe as a scan with this camera and laser plane learns it before its first profile.
+fn learned(setup: &Setup, images: &[Image]) -> Result<Stripe> {
+    let [fx, fy, cx, cy, skew] = setup.pinhole.map(f64::from);
+    let terms = setup.distortion.map(f64::from);
+    let normal = Vec3::from(setup.normal.map(f64::from));
+    let (width, height) = (setup.width, setup.height);
+    let optical = Optical {
+        camera: Intrinsics {
+            fx,
+            fy,
+            cx,
+            cy,
+            skew,
+            distortion: Distortion::from_opencv(&terms).expect("five terms"),
+            width,
+            height,
+        },
+        laser: Plane::new(normal, f64::from(setup.offset_mm)).ok_or_else(|| broken("the plane's normal is zero"))?,
+        depth_mm: DEPTH_MM,
+    };
+    let engine = Engine::new(format(setup), &optical, &Extraction::default(), None, Processor::host());
+    let seen = engine.measure(&images.iter().collect::<Vec<_>>());
+    Ok(seen.ok_or_else(|| broken("no picture shows enough of a stripe to learn its width"))?.stripe)
+}
+
 /// The peer's pictures, and this program's chains under its settings.
 struct Ours {
     images: Vec<Image>,
@@ -116,6 +149,7 @@ struct Ours {
     /// With the settings of a scan; and on the processor.
     full: Chain,
     host: Host,
+    width_px: f32,
 }
 
 impl Ours {
@@ -128,7 +162,11 @@ impl Ours {
             normal: setup.normal.into(),
             offset: setup.offset_mm,
         };
-        let peak = PeakParams { width_px: setup.width_px, ..PeakParams::default() };
+        let stripe = match setup.width_px {
+            Some(width_px) => Stripe { width_px, noise: noise(&images[0]), ..Stripe::default() },
+            None => learned(setup, &images)?,
+        };
+        let peak = PeakParams { width_px: stripe.width_px, ..PeakParams::default() };
         // The other side refuses nothing either.
         let pixels =
             Measure { peak: PeakParams { method: Method::Pixel, ..peak }, choose: ChooseParams::lenient(), optics };
@@ -146,14 +184,11 @@ impl Ours {
         let mut chain = Chain::new(device, &config)?;
         run(&mut chain, &images, 1)?;
         let single = Chain::new(device, &ChainConfig { shots: 1, slots: 1, ..config })?;
-        let stripe =
-            Stripe { width_px: setup.width_px, speckle: peak.speckle, noise: noise(&images[0]), ..Stripe::default() };
-        let format = Format { width: setup.width, height: setup.height, bits: 8 };
-        let scan = Extraction::default().for_stripe(&stripe).chain(format, optics, setup.width_px);
+        let scan = Extraction::default().for_stripe(&stripe).chain(format(setup), optics, stripe.width_px);
         let host = Host::new(&scan)?;
         let mut full = Chain::new(device, &ChainConfig { shots: setup.shots_per_batch, ..scan })?;
         run(&mut full, &images, 1)?;
-        Ok(Ours { images, chain, single, full, host })
+        Ok(Ours { images, chain, single, full, host, width_px: stripe.width_px })
     }
 
     /// Seconds of all pictures so many times over, on the chain that the command names.
