@@ -94,8 +94,11 @@ fn changed(score: &serde_json::Value, straight: &serde_json::Value) -> Vec<Strin
 
 /// Scans a recording with a station's calibration; gives the cloud.
 fn scan(recording: &Path, station: &str, on: &str, out: &Path) -> Vec<CloudPoint> {
-    let [recording, to] = [recording, out].map(|p| p.to_str().unwrap());
-    sheetlight(&["scan", recording, "--station", station, "--out", to, "--on", on, "--overlays", "0", "--quiet"]);
+    let [from, to] = [recording, out].map(|p| p.to_str().unwrap());
+    // Rendered with the calibrated lens on a finer sensor; nothing in its files says so.
+    let word: &[&str] = if recording.ends_with("scan_led_hires") { &["--same-view"] } else { &[] };
+    let scan = ["scan", from, "--station", station, "--out", to, "--on", on, "--overlays", "0", "--quiet"];
+    sheetlight(&[&scan[..], word].concat());
     read_cloud(&out.join("cloud.ply")).unwrap()
 }
 

@@ -23,6 +23,10 @@ pub struct Readout {
     /// Size of the whole sensor, px; none where the camera does not say.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sensor_px: Option<[u32; 2]>,
+    /// The picture shows what the calibration's pictures show, at another resolution: of a camera that scales its
+    /// pictures, or of two modes of one sensor. It stands alone: a region or binning says another thing.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub same_view: bool,
 }
 
 impl Intrinsics {
@@ -39,12 +43,22 @@ fn each() -> [u32; 2] {
 impl Default for Readout {
     /// All of the sensor, every pixel.
     fn default() -> Readout {
-        Readout { offset_px: [0; 2], binning: each(), decimation: each(), reversed: [false; 2], sensor_px: None }
+        Readout {
+            offset_px: [0; 2],
+            binning: each(),
+            decimation: each(),
+            reversed: [false; 2],
+            sensor_px: None,
+            same_view: false,
+        }
     }
 }
 
 impl std::fmt::Display for Readout {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        if self.same_view {
+            f.write_str("the same view at another resolution, ")?;
+        }
         let ([x, y], [bx, by], [dx, dy]) = (self.offset_px, self.binning, self.decimation);
         write!(f, "offset {x}, {y}, binning {bx}x{by}, decimation {dx}x{dy}")?;
         if self.reversed != [false; 2] {

@@ -5,6 +5,8 @@
 use super::{Mat3, Vec3};
 use crate::fault::{Fault, Result};
 
+/// Departure that a few products of rotations in double precision leave.
+const ROUNDED: f64 = 1e-13;
 /// Departure from orthonormality (Frobenius norm of RᵀR − I) above which a repair is reported.
 pub const ORTHONORMAL_WARN: f64 = 1e-3;
 /// Departure above which a matrix is no rotation and is refused.
@@ -83,13 +85,29 @@ pub fn repair(m: &Mat3) -> Result<Repaired> {
         .cause("columns and rows swapped, a left-handed frame, or too few digits printed")
         .next("give the pose with more digits, or name the convention it was written in"));
     }
-    Ok(Repaired { rotation: orthonormalise(m), departure })
+    // What rounding alone leaves stays as it is, bit for bit: a record that is read and stored again must not change.
+    let rotation = if departure < ROUNDED { *m } else { orthonormalise(m) };
+    Ok(Repaired { rotation, departure })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    #[test]
+    fn a_rotation_in_all_its_digits_is_kept_bit_for_bit() {
+        let mut r = exp(&Vec3::new(0.3, -1.1, 0.7));
+        for k in 0..100 {
+            r *= exp(&Vec3::new(0.01 * f64::from(k), 0.2, -0.1));
+            let read = repair(&r).unwrap().rotation;
+            assert_eq!(read, r);
+        }
+        let rounded = r.map(|v| (v * 1e6).round() / 1e6);
+        let repaired = repair(&rounded).unwrap().rotation;
+        assert!((repaired.transpose() * repaired - Mat3::identity()).norm() < 1e-15 && repaired != rounded);
+        assert_eq!(repair(&repaired).unwrap().rotation, repaired);
+    }
 
     proptest! {
         #[test]

@@ -13,6 +13,9 @@ impl Calibration<Intrinsics> {
     /// send.
     pub fn for_pictures(&self, size: [u32; 2], readout: Option<&Readout>) -> Result<Intrinsics> {
         let (camera, same_size) = (&self.value, size == self.size());
+        if let Some(stated) = readout.filter(|r| r.same_view) {
+            return self.rescaled(size, stated);
+        }
         let known = match (self.readout.as_ref(), readout) {
             (Some(known), Some(stated)) if !same_size || !same(known, stated) => *known,
             // Made before calibrations said what they were made with: of the whole sensor, or of pictures like these.
@@ -41,6 +44,25 @@ impl Calibration<Intrinsics> {
         Ok(stated.of_whole(&whole, size))
     }
 
+    /// The camera of pictures that show the calibrated view at another resolution.
+    fn rescaled(&self, [w, h]: [u32; 2], stated: &Readout) -> Result<Intrinsics> {
+        if *stated != (Readout { same_view: true, ..Readout::default() }) {
+            return Err(Fault::input(format!("the pictures are said to be two things at once: {stated}"))
+                .cause("a region, binning or mirroring changes the view")
+                .next("state 'same_view' alone, or the other keys of 'readout' without it"));
+        }
+        let [width, height] = self.size();
+        // One side is rounded to whole pixels.
+        let expected = f64::from(w) * f64::from(height) / f64::from(width);
+        if (expected - f64::from(h)).abs() > 1.0 {
+            return Err(self
+                .another([w, h])
+                .cause(format!("the same view would be {expected:.0} px high, these pictures are {h}"))
+                .next("say what the pictures show: --region X,Y or --binned N"));
+        }
+        Ok(self.value.scaled_to(w, h))
+    }
+
     /// Refuses pictures that are not as the camera was calibrated: of work that goes with the calibrated camera only.
     ///
     /// # Errors
@@ -64,7 +86,7 @@ impl Calibration<Intrinsics> {
     }
 }
 
-const UNSTATED: &str = "say what the pictures show: --region X,Y or --binned N, or 'readout' in meta.json \
+const UNSTATED: &str = "say what the pictures show: --region X,Y, --binned N or --same-view, or 'readout' in meta.json \
      (docs/file-formats.md); or record with the settings that the camera was calibrated with";
 
 /// Two statements of one and the same setting.
@@ -122,6 +144,18 @@ mod tests {
             assert_eq!((half.fx, half.cx), (300.0, 159.75));
             assert!(camera.same_pictures([320, 240], Some(&binned)).is_err());
         }
+    }
+
+    #[test]
+    fn the_same_view_at_another_resolution_is_scaled_about_its_corner() {
+        let (camera, word) = (calibrated(None), Readout { same_view: true, ..Readout::default() });
+        let fine = camera.for_pictures([4096, 3072], Some(&word)).unwrap();
+        let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
+        assert!(close(fine.fx, 6.4 * 600.0) && close(fine.cx, 6.4 * 320.5 - 0.5) && fine.width == 4096);
+        assert_eq!(camera.for_pictures([640, 480], Some(&word)).unwrap(), camera.value);
+        assert!(camera.for_pictures([4096, 3000], Some(&word)).unwrap_err().cause.contains("3072"));
+        let both = Readout { same_view: true, ..region(5, 5) };
+        assert!(camera.for_pictures([320, 240], Some(&both)).unwrap_err().what.contains("two things"));
     }
 
     #[test]

@@ -84,7 +84,11 @@ def lit(b):
         b.page("settings")
         b.click("#arm")
         b.until("armed", "return document.querySelector('#arm')?.getAttribute('aria-pressed') === 'true'")
-        line = lambda: [e["on"] for e in events(cell_folder) if e["what"] == "output" and e["number"] == 24]
+        def line():
+            """How the line changed. Before it lights, the program switches it off once more, to know how it stands."""
+            said = [e["on"] for e in events(cell_folder) if e["what"] == "output" and e["number"] == 24]
+            return [on for before, on in zip([False] + said, said) if on != before]
+
         until("a laser that is off", lambda: s.json("GET", "/bar")["laser"] is False)
         assert line() == [], line()
         meter = stalls.Meter()

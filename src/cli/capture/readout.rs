@@ -13,6 +13,10 @@ pub struct ReadoutArgs {
     /// neither camera nor meta.json says so
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
     binned: Option<u32>,
+    /// Pictures of another size show the same view as those of the calibration, at another resolution; only where
+    /// neither camera nor meta.json says what they show
+    #[arg(long, conflicts_with_all = ["region", "binned"])]
+    same_view: bool,
 }
 
 /// X,Y in pixels.
@@ -32,6 +36,9 @@ impl std::str::FromStr for Corner {
 impl ReadoutArgs {
     /// What was said; none where nothing was.
     pub fn stated(&self) -> Option<Readout> {
+        if self.same_view {
+            return Some(Readout { same_view: true, ..Readout::default() });
+        }
         if self.region.is_none() && self.binned.is_none() {
             return None;
         }

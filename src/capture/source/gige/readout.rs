@@ -24,7 +24,7 @@ pub fn of(camera: &Camera<GigeRegisterIo>) -> Option<Readout> {
         binning,
         decimation,
         reversed: [flag("ReverseX")?, flag("ReverseY")?],
-        sensor_px: None,
+        ..Readout::default()
     };
     let step = readout.step();
     if step.contains(&0) {

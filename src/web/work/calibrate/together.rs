@@ -91,7 +91,7 @@ mod tests {
         rig.belong_together().unwrap();
         let joint = rig.joint().expect("a covariance").expect("a covariance of these records");
         let seed = joint.matrix[0][0] as u64;
-        // Read as the station's is: a normal read from its digits is brought to length 1 again.
+        // Read from its files, as the station is.
         let made = Rig::load(sets[seed as usize - 1]).unwrap();
         let values = |rig: &Rig| {
             let camera = rig.camera.as_ref().unwrap().value;
