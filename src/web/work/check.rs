@@ -229,7 +229,8 @@ mod tests {
         assert!(part == "good" && says.contains(&format!("offset {}", w / 4)), "{part} {says}");
         // The calibrated aspect alone says nothing of what is shown: it may be a crop.
         assert_eq!(state([w / 2, h / 2], None).0, "bad");
-        assert_eq!(state([w, h], Some(&Readout { offset_px: [9, 9], ..region })).0, "bad");
+        let beyond = Readout { offset_px: [w, h], ..region };
+        assert_eq!(state([w / 2, h / 2], Some(&beyond)).0, "bad");
         assert_eq!(picture_size(None, [w, h], None).0, "absent");
     }
 }
