@@ -6,6 +6,8 @@ mod common;
 
 #[path = "cell/cold.rs"]
 mod cold;
+#[path = "cell/exposure.rs"]
+mod exposure;
 #[path = "cell/faults.rs"]
 mod faults;
 #[path = "cell/golden.rs"]

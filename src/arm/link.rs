@@ -27,6 +27,9 @@ pub trait Switch: Send {
     /// Returns when the controller has taken the order. Errors: it could not be told, or it refused; nobody knows then
     /// what is on.
     fn put(&mut self, number: u16, on: bool) -> Result<()>;
+
+    /// What the controller says of an output. Errors: it does not answer, or refuses.
+    fn is_on(&mut self, number: u16) -> Result<bool>;
 }
 
 /// A robot on a wire. Reading is always possible; what changes the world is refused by links that only read.

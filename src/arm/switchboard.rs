@@ -4,6 +4,11 @@ use super::{Arm, Outputs, Switch};
 use crate::fault::{Fault, Kind, Result};
 use crate::recording::Beam;
 use std::io::Write;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::time::Duration;
+
+/// While something is done with a laser on, the controller is asked this often whether it is still there.
+const ASKED: Duration = Duration::from_millis(100);
 
 /// Lasers, lamp and gripper. Dropped, on whatever way, it switches the lasers off. The gripper stays as it is: what it
 /// holds would
@@ -44,12 +49,47 @@ impl Switchboard {
     }
 
     /// Does something with one laser on, the lamp as it is; the laser is off when this returns, whatever came of it.
+    /// Where the controller is not reached meanwhile, the laser goes off as soon as it is reached again.
     ///
     /// # Errors
-    /// Those of the work, and of [`Switchboard::after`].
+    /// Those of the work, and of [`Switchboard::after`]; the controller was not reached meanwhile.
     pub fn lit<T>(&mut self, beam: Beam, work: impl FnOnce() -> Result<T>) -> Result<T> {
-        let done = self.burn(beam).and_then(|()| work());
+        let done = self.burn(beam).and_then(|()| self.watched(work));
         self.after(done)
+    }
+
+    /// Does the work while another thread asks the controller again and again.
+    fn watched<T>(&mut self, work: impl FnOnce() -> Result<T>) -> Result<T> {
+        let (goes_on, over) = channel();
+        std::thread::scope(|threads| {
+            let watch = std::thread::Builder::new().name("laser".into());
+            let watch = watch.spawn_scoped(threads, move || self.watch(&over));
+            let watch = watch.map_err(|e| Fault::threads(&e))?;
+            // Dropped where the work panics, too: then the watch ends.
+            let goes_on = goes_on;
+            let done = work();
+            drop(goes_on);
+            match watch.join() {
+                Ok(None) => done,
+                Ok(Some(lost)) => Err(Fault::device(format!("while a laser was on, the link was lost: {}", lost.what))
+                    .cause(lost.cause)
+                    .next("look at the link and at the laser, then begin again")),
+                Err(panic) => std::panic::resume_unwind(panic),
+            }
+        })
+    }
+
+    /// Until the work is over; why the controller was not reached meanwhile.
+    fn watch(&mut self, over: &Receiver<()>) -> Option<Fault> {
+        let mut lost = None;
+        while over.recv_timeout(ASKED) == Err(RecvTimeoutError::Timeout) {
+            lost = lost.or_else(|| self.switch.is_on(self.outputs.line).err());
+            if lost.is_some() && self.burns {
+                // Tried again until it succeeds; the hand that lets go says it where it never does.
+                let _ = self.off();
+            }
+        }
+        lost
     }
 
     /// Both lasers off, the lamp as it is.
@@ -126,5 +166,16 @@ impl Drop for Switchboard {
             // The output may be closed: a destructor must not panic for that.
             let _ = writeln!(std::io::stderr(), "{fault}");
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ASKED;
+
+    #[test]
+    fn the_document_states_how_often_the_controller_is_asked() {
+        let says = format!("is asked every {} ms", ASKED.as_millis());
+        assert!(include_str!("../../docs/robots.md").contains(&says), "{says}");
     }
 }

@@ -142,4 +142,10 @@ mod tests {
             assert!(read(uri).unwrap_err().what.contains(says), "{uri}");
         }
     }
+
+    #[test]
+    fn the_document_states_the_full_speeds() {
+        let says = format!("in mm/s (default {FULL_MM_S}) and degrees/s (default {FULL_DEG_S})");
+        assert!(include_str!("../../docs/robots.md").contains(&says), "{says}");
+    }
 }

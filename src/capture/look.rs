@@ -51,7 +51,7 @@ pub struct Piece {
 }
 
 /// Pieces that a stripe is looked at in.
-const PIECES: usize = 32;
+pub const PIECES: usize = 32;
 
 /// Where the peak is to stand, and how many may be saturated.
 pub const WANTED: [f64; 2] = [0.70, 0.85];

@@ -45,6 +45,10 @@ impl<'a> Fresh<'a> {
 
     fn next(&mut self) -> Result<Image> {
         let until = Instant::now() + self.patience;
+        if self.source.trigger()? {
+            // It takes no picture but the one that is asked for.
+            (self.since, self.skip) = (None, 0);
+        }
         while Instant::now() < until {
             match self.source.next(Duration::from_millis(100)) {
                 Event::Picture(picture) if self.former(picture.device_ns) => {}

@@ -30,9 +30,9 @@
 //! | `stop` | no picture comes any more |
 //! | `snap` | one picture, taken now |
 //! | `time` | `ok NS`: the cell's clock |
-//! | `format` | `ok WIDTH HEIGHT BITS` |
+//! | `format` | `ok WIDTH HEIGHT BITS`: of its pictures, which show the whole sensor |
 //! | `features` | `ok`, then a line each: name, value, unit, low, high, parted by tabs |
-//! | `set NAME VALUE` | `ok` |
+//! | `set NAME VALUE` | `ok`; what is set stays so for whoever connects next, as in a camera |
 
 use super::format::Format;
 use crate::fault::{Fault, Result};

@@ -1,14 +1,44 @@
-//! In: the cell at a moment. Out: the picture that the camera on the flange takes, or the small one in the gripper.
-//! Frame and unit: grey levels of the sensor's depth; s of the cell. A picture shows the middle of its exposure, unmoved.
+//! The pictures that the cell's cameras take: that of the sensor, and the small one in the gripper. Levels of the sensor's
+//! depth, exposures in us. A picture shows the middle of its exposure, unmoved.
 
 use crate::geometry::{Camera, Flange, Rigid, Vec3};
 use crate::raster::Image;
 use crate::simulate::{Canvas, InScene, Scene, Sensor, Station, View, expose};
+use std::sync::{Mutex, PoisonError};
 
 /// Rays a pixel's side of pictures in room light.
 const RAYS: u32 = 2;
 /// The gripper's camera looks from beside the fingers at what is below the tool, mm before the tool's origin.
 const GRIPPER_ABOVE_MM: f64 = 60.0;
+
+/// Exposure that the levels of [`Sensor`] are stated for, and that a camera begins with, us.
+pub(super) const EXPOSURE_US: f64 = 1000.0;
+/// What a camera can be set to, us.
+pub(super) const EXPOSURES_US: [f64; 2] = [20.0, 10_000.0];
+
+/// How long a camera exposes. It keeps this as a camera does: whoever connects next finds it.
+pub(super) struct Exposure(Mutex<f64>);
+
+impl Exposure {
+    pub fn us(&self) -> f64 {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether it can be set to that.
+    pub fn set(&self, us: f64) -> bool {
+        let can = (EXPOSURES_US[0]..=EXPOSURES_US[1]).contains(&us);
+        if can {
+            *self.0.lock().unwrap_or_else(PoisonError::into_inner) = us;
+        }
+        can
+    }
+}
+
+impl Default for Exposure {
+    fn default() -> Exposure {
+        Exposure(Mutex::new(EXPOSURE_US))
+    }
+}
 
 /// What was lit at the moment of a picture.
 #[derive(Clone, Copy, Debug)]
@@ -16,6 +46,13 @@ pub(super) struct Lit {
     pub line: bool,
     pub pointer: bool,
     pub room: bool,
+}
+
+/// The same camera, and its hot pixels, exposed as long as it is set to.
+pub(super) fn exposed(of: &Station, hot: &[(usize, f32)], exposure: &Exposure) -> (Station, Vec<(usize, f32)>) {
+    let times = exposure.us() / EXPOSURE_US;
+    let station = Station { sensor: of.sensor.exposed(times), ..of.clone() };
+    (station, hot.iter().map(|(place, extra)| (*place, extra * times as f32)).collect())
 }
 
 /// One picture. `number` keeps its noise apart from others'.

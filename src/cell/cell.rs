@@ -1,7 +1,7 @@
 //! In: options. Out: a robot cell that exists only here: time, arm, outputs, camera, truth. Everything else talks to it.
 //! Frame and unit: base frame, mm; s of the cell.
 
-use super::camera::{self, Lit};
+use super::camera::{self, Exposure, Lit};
 use super::clock::Clock;
 use super::component::Component;
 use super::kinematics::{ArmError, Joints, Vs060};
@@ -54,6 +54,7 @@ struct Inside {
     arm_error: ArmError,
     world: Mutex<World>,
     pictures: AtomicU64,
+    exposures: [Exposure; 2],
     stuck: Mutex<BTreeMap<u16, bool>>,
 }
 
@@ -94,6 +95,7 @@ impl Cell {
             arm_error,
             world: Mutex::new(world),
             pictures: AtomicU64::new(0),
+            exposures: Default::default(),
             stuck: Mutex::default(),
             station,
             options,
@@ -119,7 +121,8 @@ impl Cell {
     pub fn picture(&self, t: f64) -> Image {
         let (lit, scene_from_camera) = self.seen(t, &self.0.station);
         let number = self.0.pictures.fetch_add(1, Ordering::Relaxed);
-        camera::picture(&self.0.station, &self.scene(), &self.0.hot, scene_from_camera, lit, number)
+        let (station, hot) = camera::exposed(&self.0.station, &self.0.hot, self.exposure(false));
+        camera::picture(&station, &self.scene(), &hot, scene_from_camera, lit, number)
     }
 
     /// The picture of the small camera in the gripper, in room light.
@@ -127,12 +130,18 @@ impl Cell {
         let (lit, scene_from_camera) = self.seen(t, &self.0.gripper);
         let lit = Lit { line: false, pointer: false, ..lit };
         // Its hot pixels are its own: none.
-        let view = crate::simulate::View { station: &self.0.gripper, scene: &self.scene(), scene_from_camera };
-        let (w, h) = (self.0.gripper.camera.width, self.0.gripper.camera.height);
-        let (room, sensor) = (view.ambient(1), &self.0.gripper.sensor);
+        let (station, _) = camera::exposed(&self.0.gripper, &[], self.exposure(true));
+        let view = crate::simulate::View { station: &station, scene: &self.scene(), scene_from_camera };
+        let (w, h) = (station.camera.width, station.camera.height);
+        let (room, sensor) = (view.ambient(1), &station.sensor);
         let gain = if lit.room { sensor.ambient_white } else { sensor.ambient_leak };
         let mut rng = self.0.gripper.rng("gripper picture", self.0.pictures.fetch_add(1, Ordering::Relaxed));
         crate::simulate::expose(sensor, &crate::simulate::Canvas::new(w, h), &room, gain as f32, &[], &mut rng)
+    }
+
+    /// How long the sensor's camera exposes, or the one in the gripper.
+    pub(super) fn exposure(&self, in_gripper: bool) -> &Exposure {
+        &self.0.exposures[usize::from(in_gripper)]
     }
 
     /// Width and height of the gripper's pictures, px.

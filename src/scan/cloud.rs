@@ -29,6 +29,9 @@ pub struct CloudPoint {
     pub v: f32,
 }
 
+// Points are read and written as they lie in memory, and the file is little endian.
+const _: () = assert!(cfg!(target_endian = "little"), "clouds are read and written on little-endian machines only");
+
 impl CloudPoint {
     /// Where it lies, the cloud's frame, mm.
     pub fn at(&self) -> Vec3 {

@@ -48,6 +48,17 @@ impl Default for Sensor {
 }
 
 impl Sensor {
+    /// The same sensor when it is exposed `times` as long as its levels are stated for.
+    #[must_use]
+    pub fn exposed(self, times: f64) -> Sensor {
+        Sensor {
+            ambient_leak: times * self.ambient_leak,
+            ambient_white: times * self.ambient_white,
+            laser_white: times * self.laser_white,
+            ..self
+        }
+    }
+
     /// Refuses values out of the ranges that the fields state.
     pub fn check(&self) -> Result<()> {
         let limits = [

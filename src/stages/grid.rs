@@ -113,7 +113,7 @@ impl Layer {
 }
 
 impl GridFrame {
-    /// `cell` and `z_step` in mm, at least 0.005 and 1 / 32767; no points yet.
+    /// `cell` and `z_step` in mm, at least 0.0001 and 1 / 32767; no points yet.
     pub fn new(
         base_from_grid: &Rigid<Base, Grid>,
         [width, height]: [u32; 2],

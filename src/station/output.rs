@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// A lamp or laser that is tried is lit so long: long enough to look, short enough to look away.
-const LIT: Duration = Duration::from_millis(1500);
+pub const LIT: Duration = Duration::from_millis(1500);
 /// How often is looked meanwhile whether the program is to end.
 const GLANCE: Duration = Duration::from_millis(20);
 

@@ -11,12 +11,13 @@ use sheetlight::calibrate::hand_eye::options::Mount;
 use sheetlight::calibrate::joint::unknowns::State;
 use sheetlight::calibrate::joint::volume::{apart, places, scanned};
 use sheetlight::calibrate::limits::Asked;
+use sheetlight::camera::Readout;
 use sheetlight::capture::PictureSource;
 use sheetlight::capture::source::cell::CellCamera;
 use sheetlight::cell::{Cell, CellOptions, Event, Served, Vs060};
 use sheetlight::fault::Result;
 use sheetlight::geometry::{Base, Board, Camera, Flange, Mat3, Rigid, Vec3, exp, log};
-use sheetlight::recording::BoardSpec;
+use sheetlight::recording::{BoardSpec, Recording};
 use sheetlight::rig::{Rig, Volume};
 use sheetlight::robot::Convention;
 use sheetlight::scan::{Extraction, Where};
@@ -416,6 +417,14 @@ fn coarse(of: impl Fn(CellOptions) -> CellOptions) -> (Rig, usize) {
     );
     assert!(off < 3.0 * expected && expected < 0.25, "{off} {expected}");
     assert!(cold.outside() == 0 && cold.stood() <= 40, "{} poses", cold.stood());
+    // What the camera says of its pictures stands in recordings and calibration.
+    let camera = Rig::load(&cold.station).unwrap().camera.unwrap();
+    let whole = Readout { sensor_px: Some([camera.value.width, camera.value.height]), ..Readout::default() };
+    assert_eq!(camera.readout, Some(whole));
+    for recording in ["line", "pointer"] {
+        let recording = Recording::open(&cold.dir.path().join("pictures").join(recording)).unwrap();
+        assert_eq!(recording.meta.image.readout, Some(whole));
+    }
     (Rig::load(&cold.station).unwrap(), result.check.unwrap().stops)
 }
 

@@ -2,6 +2,7 @@
 
 use super::workplace::lit;
 use sheetlight::arm::rules::{Confirmation, StopButton};
+use sheetlight::camera::Readout;
 use sheetlight::capture::source::cell::CellCamera;
 use sheetlight::capture::{Event, Feature, Format, PictureSource, RoundTrip};
 use sheetlight::cell::{Cell, Faults, Served};
@@ -151,6 +152,9 @@ pub struct TrapCamera(pub CellCamera, pub Trap);
 impl PictureSource for TrapCamera {
     fn format(&self) -> Format {
         self.0.format()
+    }
+    fn readout(&self) -> Option<Readout> {
+        self.0.readout()
     }
     fn next(&mut self, within: Duration) -> Event {
         if self.1.signal().load(SeqCst) {

@@ -139,4 +139,9 @@ def outputs(s, b, events):
     b.click("#save-settings")
     b.until("saved", "return /Saved/.test(document.querySelector('.head').innerText)")
     assert "speed_mm_s = 45" in text(s), text(s)
+    for name, value in (("max_turn_deg_s", "20"), ("max_still_ms", "2500")):
+        change(b, f"motion.{name}", value)
+        b.click("#save-settings")
+        b.until("saved", "return /Saved/.test(document.querySelector('.head').innerText) && document.querySelector('#save-settings').disabled")
+        assert f"{name} = {value}" in text(s), text(s)
     quiet(b, "outputs", refused=1)

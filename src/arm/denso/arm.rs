@@ -7,7 +7,7 @@ use super::spare::Spare;
 use super::words;
 use crate::arm::{Allowed, Arm, Halt, Mode, Pace, PoseSource, Reach, SIMULATED, State, Switch, TimedPose, Way};
 use crate::bcap::{Call, Network, Variant};
-use crate::fault::{Fault, Kind, Result};
+use crate::fault::{Kind, Result};
 use crate::geometry::{Base, Flange, Rigid};
 use std::sync::Arc;
 
@@ -177,11 +177,7 @@ impl Arm for Denso {
     }
 
     fn signal(&mut self, number: u16) -> Result<bool> {
-        let value = self.controller_variable(&format!("IO{number}"))?;
-        value.as_f64().map(|x| x != 0.0).ok_or_else(|| {
-            Fault::device(format!("{}: IO{number} is {value:?}, true or false was expected", self.name))
-                .next("use the number of a digital input or output")
-        })
+        self.session.signal(number).map_err(|e| e.at(&self.name))
     }
 }
 

@@ -76,6 +76,15 @@ impl Session {
         Ok(errors)
     }
 
+    /// An input or an output.
+    pub fn signal(&mut self, number: u16) -> Result<bool> {
+        let value = self.client.read(Call::ControllerGetVariable, self.controller, &format!("IO{number}"))?;
+        value.as_f64().map(|x| x != 0.0).ok_or_else(|| {
+            Fault::device(format!("IO{number} is {value:?}, true or false was expected"))
+                .next("use the number of a digital input or output")
+        })
+    }
+
     /// Adds the controller's own errors to a refusal.
     pub fn in_its_words(&mut self, mut fault: Fault) -> Fault {
         let said = self.errors().unwrap_or_default();

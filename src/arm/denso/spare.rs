@@ -21,17 +21,17 @@ impl Spare {
     }
 
     /// Asks; what is asked must bear to be done twice.
-    pub fn ask(&mut self, question: impl Fn(&mut Session) -> Result<()>) -> Result<()> {
+    pub fn ask<T>(&mut self, question: impl Fn(&mut Session) -> Result<T>) -> Result<T> {
         if let Some(session) = self.session.as_mut()
-            && question(session).is_ok()
+            && let Ok(answer) = question(session)
         {
-            return Ok(());
+            return Ok(answer);
         }
         self.session = None;
         let mut fresh = connect(&self.address)?;
-        question(&mut fresh)?;
+        let answer = question(&mut fresh)?;
         self.session = Some(fresh);
-        Ok(())
+        Ok(answer)
     }
 }
 
@@ -43,5 +43,9 @@ impl Switch for Spare {
     fn put(&mut self, number: u16, on: bool) -> Result<()> {
         let name = format!("IO{number}");
         self.ask(|s| s.client.write(Call::ControllerGetVariable, s.controller, &name, Variant::Bool(on)))
+    }
+
+    fn is_on(&mut self, number: u16) -> Result<bool> {
+        self.ask(|s| s.signal(number))
     }
 }

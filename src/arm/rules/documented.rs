@@ -27,6 +27,9 @@ fn the_limits_of_the_example_are_the_usual_ones() {
     let example = toml::from_str::<Example>(&text).expect("the example is read").motion;
     assert_eq!(Limits { keep_out: example.keep_out.clone(), ..Limits::within(example.workspace) }, example);
     assert!(text.contains(&format!("never above {MOST_SPEED_MM_S}")));
+    let cited =
+        format!("{MOST_SPEED_MM_S} mm/s is the speed that ISO 10218-1:2011, 5.6.2 allows the tool centre point");
+    assert!(DOCUMENT.contains(&cited), "{cited}");
     for key in toml::Table::try_from(&example).expect("plain data").keys() {
         assert!(text.contains(key), "{key} is not in the example");
     }
@@ -49,6 +52,7 @@ fn the_numbers_of_the_watch_are_those_of_the_document() {
         ("a motion has arrived within", pair(tolerances::ARRIVED)),
         ("an arm was moved by others from", pair(tolerances::MOVED)),
         ("no leg is slower than", vec![gates::SLOWEST_MM_S]),
+        ("speed of the fastest point; slowest speed", vec![MOST_SPEED_MM_S, gates::SLOWEST_MM_S]),
     ] {
         let stated = stated(what);
         let same = stated.len() == is.len() && stated.iter().zip(&is).all(|(a, b)| (a - b).abs() < 1e-9);

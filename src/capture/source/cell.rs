@@ -1,6 +1,6 @@
-//! In: host and port of a cell's camera ([`crate::capture::wire`]). Out: its pictures as a source.
-//! Frame and unit: the cell's clock and the host's, ns.
+//! The camera of a simulated cell as a source of pictures, over the wire of [`crate::capture::wire`].
 
+use crate::camera::Readout;
 use crate::capture::clock::{RoundTrip, now_ns};
 use crate::capture::feature::{Feature, Range, Value};
 use crate::capture::format::Format;
@@ -168,6 +168,10 @@ fn message(reader: &mut TcpStream) -> Result<Message> {
 impl PictureSource for CellCamera {
     fn format(&self) -> Format {
         self.format
+    }
+
+    fn readout(&self) -> Option<Readout> {
+        Some(Readout { sensor_px: Some([self.format.width, self.format.height]), ..Readout::default() })
     }
 
     fn next(&mut self, within: Duration) -> Event {

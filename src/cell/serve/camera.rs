@@ -1,8 +1,9 @@
-//! In: lines of text from whoever looks at a camera of the cell. Out: its pictures and answers (capture::wire has the protocol).
-//! Frame and unit: grey levels; ns of the cell's clock.
+//! Answers whoever looks at a camera of the cell, and sends its pictures (`capture::wire` has the protocol). Times in ns of
+//! the cell's clock.
 
 use super::Faults;
 use crate::capture::wire::{Message, Sent, write};
+use crate::cell::camera::EXPOSURES_US;
 use crate::cell::cell::Cell;
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
@@ -11,8 +12,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 const LOOK: Duration = Duration::from_millis(5);
-/// Exposure that is stated, s; a picture shows its middle.
-const EXPOSURE_S: f64 = 1e-3;
+/// Pictures that can be asked for in a second.
+const RATES_HZ: [f64; 2] = [0.01, 2000.0];
 
 /// What one client has asked for, and what it was sent.
 struct Viewer {
@@ -72,14 +73,19 @@ impl Viewer {
         self.send(&message)
     }
 
+    fn exposure_us(&self) -> f64 {
+        self.cell.exposure(self.in_gripper).us()
+    }
+
     /// The picture of a moment that has come.
     fn picture(&self, t: f64) -> Message {
+        let exposure_s = 1e-6 * self.exposure_us();
         let image = if self.in_gripper { self.cell.gripper_picture(t) } else { self.cell.picture(t) };
         let mut taken = self.taken.lock().unwrap_or_else(PoisonError::into_inner);
         let [id, sent] = *taken;
         *taken = [id + 1, sent + 1];
-        let begun = t - 0.5 * EXPOSURE_S + 1e-3 * self.cell.options().camera_delay_ms;
-        let (device_ns, exposure_ns) = ((begun.max(0.0) * 1e9) as u64, (EXPOSURE_S * 1e9) as u64);
+        let begun = t - 0.5 * exposure_s + 1e-3 * self.cell.options().camera_delay_ms;
+        let (device_ns, exposure_ns) = ((begun.max(0.0) * 1e9) as u64, (exposure_s * 1e9).round() as u64);
         let sent = Sent { image, id, device_ns, exposure_ns, count: None, sent: sent + 1 };
         Message::Picture(Box::new(sent))
     }
@@ -108,7 +114,7 @@ impl Viewer {
                     *rate = Some(self.cell.options().fps);
                     "ok".into()
                 }
-                Ok(fps) if (0.01..=2000.0).contains(&fps) => {
+                Ok(fps) if (RATES_HZ[0]..=RATES_HZ[1]).contains(&fps) => {
                     *rate = Some(fps);
                     "ok".into()
                 }
@@ -129,14 +135,23 @@ impl Viewer {
                 format!("ok {} {} {}", camera[0], camera[1], station.sensor.bits)
             }
             ("features", _) => {
-                format!("ok\nAcquisitionFrameRate\t{}\tHz\t0.01\t2000", rate.unwrap_or(self.cell.options().fps))
+                let ([short, long], [slow, fast]) = (EXPOSURES_US, RATES_HZ);
+                let (us, fps) = (self.exposure_us(), rate.unwrap_or(self.cell.options().fps));
+                format!("ok\nExposureTime\t{us}\tus\t{short}\t{long}\nAcquisitionFrameRate\t{fps}\tHz\t{slow}\t{fast}")
             }
             ("set", words) => match words.split_once(' ').map(|(k, v)| (k, v.trim().parse::<f64>())) {
-                Some(("AcquisitionFrameRate", Ok(fps))) if (0.01..=2000.0).contains(&fps) => {
+                Some(("AcquisitionFrameRate", Ok(fps))) if (RATES_HZ[0]..=RATES_HZ[1]).contains(&fps) => {
                     *rate = rate.map(|_| fps);
                     "ok".into()
                 }
-                _ => format!("error '{words}' cannot be set; AcquisitionFrameRate 0.01 to 2000 can"),
+                Some(("ExposureTime", Ok(us))) if self.cell.exposure(self.in_gripper).set(us) => "ok".into(),
+                _ => {
+                    let ([short, long], [slow, fast]) = (EXPOSURES_US, RATES_HZ);
+                    format!(
+                        "error '{words}' cannot be set; ExposureTime {short} to {long} us and \
+                         AcquisitionFrameRate {slow} to {fast} Hz can"
+                    )
+                }
             },
             _ => "error unknown; start FPS, stop, snap, time, format, features, set NAME VALUE are known".into(),
         }
@@ -148,11 +163,13 @@ impl Viewer {
         let mut next = None::<f64>;
         while !over.load(Ordering::Relaxed) && !Faults::on(&faults.camera_gone) {
             let rate = *self.rate.lock().unwrap_or_else(PoisonError::into_inner);
-            let Some(fps) = rate else {
+            let Some(asked) = rate else {
                 next = None;
                 std::thread::sleep(LOOK);
                 continue;
             };
+            // One exposure ends before the next begins.
+            let fps = asked.min(1e6 / self.exposure_us());
             let at = next.unwrap_or_else(|| self.cell.clock().now());
             if !self.cell.clock().wait(at, LOOK) {
                 next = Some(at);

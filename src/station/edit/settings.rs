@@ -147,9 +147,10 @@ mod tests {
     fn changes() -> Vec<(&'static str, [Value; 2])> {
         let numbers = ["working_volume.near_mm", "working_volume.far_mm", "motion.speed_mm_s", "motion.max_step_mm"]
             .into_iter()
-            .chain(["motion.max_turn_deg", "motion.max_tilt_deg"]);
+            .chain(["motion.max_turn_deg", "motion.max_turn_deg_s", "motion.max_tilt_deg"]);
         let outputs = ["outputs.line", "outputs.pointer", "outputs.room", "outputs.gripper"];
         let mut all: Vec<_> = numbers.map(|n| (n, [json!(55), json!(20.5)])).collect();
+        all.push(("motion.max_still_ms", [json!(250), json!(1200.5)]));
         all.extend(outputs.map(|n| (n, [json!(3), json!(60)])));
         all.push(("name", [json!("cell \"4\" # b"), json!("")]));
         all.push(("robot", [json!("kuka"), json!("ur")]));

@@ -16,7 +16,7 @@ use crate::station::settings::Settings;
 use std::path::Path;
 
 /// A stripe over the board has at least so many points as a share of the picture's short side.
-const LEAST_SHARE: f64 = 0.1;
+pub(super) const LEAST_SHARE: f64 = 0.1;
 
 /// Refuses where a picture with the line on has no stripe at a depth that can be.
 pub fn line_is_seen(eye: &mut Eye, arm: &mut dyn Arm, rig: &Rig, settings: &Settings, folder: &Path) -> Result<()> {

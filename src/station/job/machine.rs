@@ -68,7 +68,7 @@ const AWAY_MM: f64 = 30.0;
 /// Shorter ways are none: an arm reads its own pose to some hundredths of a millimetre.
 const LEAST_WAY_MM: f64 = 0.05;
 /// A part whose pose is not known well enough is swept again so often, in steps half as long each time.
-const HALVINGS: u32 = 1;
+pub(super) const HALVINGS: u32 = 1;
 
 impl<'a> Job<'a> {
     /// Begins the job of a folder, or goes on with the one that stands there.

@@ -13,7 +13,7 @@ use crate::station::settings::Settings;
 use crate::station::volume;
 
 /// A known part lies so near to the picture's middle, as a share of the field's short side.
-const ASIDE: f64 = 1.0 / 8.0;
+pub(super) const ASIDE: f64 = 1.0 / 8.0;
 /// Steps a cell of the recipe's map: about two.
 const STEP: f64 = 0.6;
 /// Pieces of a side that is drawn.

@@ -20,7 +20,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Waited for a picture at most so long; the page asks again.
-const LONGEST: Duration = Duration::from_secs(1);
+pub(super) const LONGEST: Duration = Duration::from_secs(1);
 /// Looked for one this often.
 const OFTEN: Duration = Duration::from_millis(4);
 

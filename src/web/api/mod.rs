@@ -3,6 +3,8 @@
 
 mod answer;
 mod camera;
+#[cfg(test)]
+mod documented;
 mod jobs;
 mod motion;
 mod openapi;

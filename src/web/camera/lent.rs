@@ -2,6 +2,7 @@
 //! Frame and unit: as its pictures and features.
 
 use super::state::{Looked, State, Use, lock};
+use crate::camera::Readout;
 use crate::capture::{Event, Feature, Format, PictureSource, RoundTrip};
 use crate::fault::{Fault, Result};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -30,6 +31,9 @@ impl Lent {
 impl PictureSource for Lent {
     fn format(&self) -> Format {
         self.inner.as_ref().expect("opened").format()
+    }
+    fn readout(&self) -> Option<Readout> {
+        self.inner.as_ref().expect("opened").readout()
     }
     fn name(&self) -> String {
         self.inner.as_ref().expect("opened").name()

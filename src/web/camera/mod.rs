@@ -7,3 +7,5 @@ mod state;
 mod watch;
 
 pub use watch::Camera;
+#[cfg(test)]
+pub use watch::FRESH;

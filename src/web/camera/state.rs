@@ -1,6 +1,7 @@
 //! In: pictures, settings, who has the camera. Out: the same, shared by who looks and who borrows.
 //! Frame and unit: px, grey levels, ms; ns of the host's clock.
 
+use crate::camera::Readout;
 use crate::capture::{Account, Feature};
 use crate::raster::Image;
 use axum::body::Bytes;
@@ -57,6 +58,8 @@ impl Looked {
 #[derive(Default)]
 pub(super) struct State {
     pub newest: Option<Arc<Looked>>,
+    /// How the camera reads its pictures from the sensor, where it says so.
+    pub readout: Option<Readout>,
     /// What the camera can be set to, as it said last.
     pub features: Option<Vec<Feature>>,
     /// What was set from here, in that order: a camera that forgets it is told again when it is opened.

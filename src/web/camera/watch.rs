@@ -4,6 +4,7 @@
 
 use super::lent::Lent;
 use super::state::{Looked, State, Use, lock};
+use crate::camera::Readout;
 use crate::capture::{CameraUri, Fate, Fed, Feed, FeedOptions, Mode, PictureSource, Pictures, RawFormat, now_ns};
 use crate::fault::{Fault, Result};
 use crate::rig::Rig;
@@ -22,7 +23,7 @@ const AGAIN: Duration = Duration::from_secs(1);
 /// A camera is given up by who looks at it within this.
 const GIVEN_UP: Duration = Duration::from_secs(5);
 /// While a job runs a picture that somebody asks for came no longer before that, ns.
-const FRESH: u64 = 50_000_000;
+pub const FRESH: u64 = 50_000_000;
 /// Delays that p50 and p99 are of.
 const DELAYS: usize = 512;
 
@@ -143,6 +144,11 @@ impl Camera {
         lock(&self.state).newest.as_ref().filter(|l| l.number != number).cloned()
     }
 
+    /// How its pictures are read from the sensor, where it says so.
+    pub fn readout(&self) -> Option<Readout> {
+        lock(&self.state).readout
+    }
+
     /// Pictures a second, as it sent them lately; `None`: not known.
     pub fn rate_hz(&self) -> Option<f64> {
         lock(&self.state).rate_hz
@@ -197,6 +203,7 @@ fn open(uri: &CameraUri, raw: Option<RawFormat>, state: &Mutex<State>) -> Result
             state.wrong = Some(fault.what);
         }
     }
+    lock(state).readout = source.readout();
     if !known {
         let features = source.features().unwrap_or_default();
         lock(state).features = Some(features);

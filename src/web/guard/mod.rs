@@ -10,6 +10,8 @@ mod session;
 mod tls;
 
 pub use door::{Door, MOST_BODY, door};
+#[cfg(test)]
+pub use lease::IDLE;
 pub use lease::{Leases, Tab};
 pub use names::{plain, resolve};
 pub use password::{hashed, verify};

@@ -19,7 +19,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
 /// While something moves the tab that holds the button says so again and again; silence for so long halts.
-const SILENCE: Duration = Duration::from_secs(1);
+pub const SILENCE: Duration = Duration::from_secs(1);
 /// Lines of what a job said that are kept.
 const MOST_SAID: usize = 60;
 

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 /// The button has to be held at least so long before anything moves.
 pub const HELD: Duration = Duration::from_millis(800);
 /// A right that was not used for so long is gone.
-const LONGEST: Duration = Duration::from_secs(5);
+pub const LONGEST: Duration = Duration::from_secs(5);
 
 struct Grant {
     name: String,

@@ -8,7 +8,11 @@ mod person;
 mod session;
 mod simulated;
 
+#[cfg(test)]
+pub use desk::SILENCE;
 pub use desk::{Desk, Links};
+#[cfg(test)]
+pub use grants::{HELD, LONGEST};
 pub use person::Person;
 pub use session::Session;
 pub use simulated::{SimulatedRobot, board};

@@ -1,10 +1,10 @@
-//! In: a station, this machine. Out: one line a check, good or with what is wrong; the GPU's stages run in a process of their
-//! own, because a driver can end it.
-//! Frame and unit: mm, days, GB.
+//! Checks the station and this machine, a line each. The GPU's stages run in a process of their own, because a driver can
+//! end it.
 
 use super::run::Run;
+use crate::camera::{Intrinsics, Readout};
 use crate::fault::{Fault, Result};
-use crate::rig::Rig;
+use crate::rig::{Calibration, Rig};
 use crate::station::Settings;
 use crate::web::camera::Camera;
 use crate::web::message::{CheckLine, Outcome};
@@ -26,9 +26,8 @@ pub(super) fn check(this: &Run) -> Result<Outcome> {
     };
     station(this, &mut add);
     let links = &this.jobs.desk.links;
-    let calibrated =
-        Rig::load(&this.jobs.place.station).ok().and_then(|r| r.camera).map(|c| [c.value.width, c.value.height]);
-    camera(links.camera.as_deref(), calibrated, &mut add);
+    let calibrated = Rig::load(&this.jobs.place.station).ok().and_then(|r| r.camera);
+    camera(links.camera.as_deref(), calibrated.as_ref(), &mut add);
     robot(links.watched.as_deref(), &mut add);
     match crate::web::disk::left_gb(&this.jobs.place.station) {
         Some(gb) => add("disk", "space", if gb < LITTLE_DISK { "poor" } else { "good" }, format!("{gb:.1} GB left")),
@@ -70,8 +69,12 @@ fn station(this: &Run, add: &mut impl FnMut(&str, &str, &str, String)) {
     }
 }
 
-/// What the camera sends, against the size that it was calibrated at.
-fn camera(camera: Option<&Camera>, calibrated: Option<[u32; 2]>, add: &mut impl FnMut(&str, &str, &str, String)) {
+/// What the camera sends, against the pictures that it was calibrated with.
+fn camera(
+    camera: Option<&Camera>,
+    calibrated: Option<&Calibration<Intrinsics>>,
+    add: &mut impl FnMut(&str, &str, &str, String),
+) {
     let Some(camera) = camera else {
         return add("camera", "camera", "absent", "the screen was served without --camera".into());
     };
@@ -84,13 +87,25 @@ fn camera(camera: Option<&Camera>, calibrated: Option<[u32; 2]>, add: &mut impl 
     let delay = delay.map_or(String::new(), |[p50, p99]| format!(", delay p50 {p50:.0} ms, p99 {p99:.0} ms"));
     let sent = format!("pictures of {w}x{h}, {} came, {} measured{delay}", frames.seen, frames.measured);
     add("camera", "camera", if wrong.is_some() { "poor" } else { "good" }, wrong.unwrap_or(sent));
-    match calibrated {
-        // The same lens at another resolution has the same shape of picture.
-        Some([cw, ch]) if u64::from(w) * u64::from(ch) != u64::from(h) * u64::from(cw) => {
-            add("camera", "picture size", "bad", format!("pictures are {w}x{h}, it was calibrated at {cw}x{ch}"));
+    let (state, says) = picture_size(calibrated, [w, h], camera.readout().as_ref());
+    add("camera", "picture size", state, says);
+}
+
+/// Whether pictures of this size, read from the sensor like this, can be measured with the calibration.
+fn picture_size(
+    calibrated: Option<&Calibration<Intrinsics>>,
+    size: [u32; 2],
+    readout: Option<&Readout>,
+) -> (&'static str, String) {
+    let Some(calibrated) = calibrated else { return ("absent", "the camera is not calibrated".into()) };
+    let ([w, h], Intrinsics { width, height, .. }) = (size, calibrated.value);
+    match (calibrated.for_pictures(size, readout), calibrated.same_pictures(size, readout)) {
+        (Err(fault), _) => ("bad", fault.what),
+        (Ok(_), Ok(())) => ("good", format!("{w}x{h}, calibrated at {width}x{height}")),
+        (Ok(_), Err(_)) => {
+            let how = readout.map_or(String::new(), |r| format!(" ({r})"));
+            ("good", format!("{w}x{h}{how}, part of the calibrated {width}x{height}; jobs of the robot need all of it"))
         }
-        Some([cw, ch]) => add("camera", "picture size", "good", format!("{w}x{h}, calibrated at {cw}x{ch}")),
-        None => add("camera", "picture size", "absent", "the camera is not calibrated".into()),
     }
 }
 
@@ -193,5 +208,29 @@ fn finish(this: &Run, mut child: Child) -> Result<String> {
             Ok(None) => std::thread::sleep(Duration::from_millis(50)),
             _ => return Ok(reader.join().unwrap_or_default()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::Station;
+
+    #[test]
+    fn pictures_that_say_what_they_show_are_good_and_others_of_another_size_are_bad() {
+        let folder = tempfile::tempdir().unwrap();
+        Station::design().store(folder.path()).unwrap();
+        let camera = Rig::load(folder.path()).unwrap().camera.unwrap();
+        let [w, h] = [camera.value.width, camera.value.height];
+        let region = Readout { offset_px: [w / 4, h / 4], sensor_px: Some([w, h]), ..Readout::default() };
+        let state = |size, readout| picture_size(Some(&camera), size, readout);
+        assert_eq!(state([w, h], None).0, "good");
+        let (part, says) = state([w / 2, h / 2], Some(&region));
+        assert!(part == "good" && says.contains(&format!("offset {}", w / 4)), "{part} {says}");
+        // The calibrated aspect alone says nothing of what is shown: it may be a crop.
+        assert_eq!(state([w / 2, h / 2], None).0, "bad");
+        let beyond = Readout { offset_px: [w, h], ..region };
+        assert_eq!(state([w / 2, h / 2], Some(&beyond)).0, "bad");
+        assert_eq!(picture_size(None, [w, h], None).0, "absent");
     }
 }

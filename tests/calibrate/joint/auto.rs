@@ -8,6 +8,7 @@ use rand_pcg::Pcg64;
 use sheetlight::calibrate::hand_eye::options::Mount;
 use sheetlight::calibrate::joint::volume::{apart, places};
 use sheetlight::calibrate::limits::Asked;
+use sheetlight::camera::Readout;
 use sheetlight::fault::Result;
 use sheetlight::geometry::{Base, Board, Camera, Flange, Mat3, Rigid, Vec2, Vec3, exp};
 use sheetlight::raster::Image;
@@ -71,6 +72,9 @@ impl Drives for Simulated {
         }
         self.pose = *to;
         Ok(Went::There(self.pose()?))
+    }
+    fn readout(&self) -> Option<Readout> {
+        Some(self.cell.station.camera.whole_sensor())
     }
     fn picture(&mut self, light: Light) -> Result<Image> {
         let station = &self.cell.station;

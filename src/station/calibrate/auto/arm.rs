@@ -4,6 +4,7 @@
 use super::cell::{Cell, Light, Went};
 use crate::arm::rules::{Confirmation, Guard, Limits, Plan, Proposal, Straight};
 use crate::arm::{Motion, Outputs, Reach, Switchboard, Way};
+use crate::camera::Readout;
 use crate::capture::PictureSource;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid};
@@ -121,6 +122,10 @@ impl Cell for ArmCell<'_> {
         }
         std::thread::sleep(SETTLE);
         Ok(Went::There(self.pose()?))
+    }
+
+    fn readout(&self) -> Option<Readout> {
+        self.eye.pictures().readout
     }
 
     fn picture(&mut self, light: Light) -> Result<Image> {

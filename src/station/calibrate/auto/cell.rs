@@ -1,6 +1,6 @@
-//! In: nothing. Out: what a calibration that drives itself asks of the cell that it drives.
-//! Frame and unit: base_from_flange, mm.
+//! What a calibration that drives itself asks of the cell that it drives; poses are base_from_flange, mm.
 
+use crate::camera::Readout;
 use crate::fault::Result;
 use crate::geometry::{Base, Flange, Rigid};
 use crate::raster::Image;
@@ -33,6 +33,8 @@ pub trait Cell {
     fn may(&mut self, to: &Rigid<Base, Flange>) -> Result<bool>;
     /// Goes there, and waits until it stands still.
     fn go(&mut self, to: &Rigid<Base, Flange>) -> Result<Went>;
+    /// How its pictures are read from the sensor; none where the camera does not say.
+    fn readout(&self) -> Option<Readout>;
     /// Takes one picture where it stands.
     fn picture(&mut self, light: Light) -> Result<Image>;
 }

@@ -5,6 +5,7 @@
 use super::cell::{Cell, Light};
 use crate::calibrate::boards::{FindOptions, find};
 use crate::calibrate::joint::shots::Reported;
+use crate::camera::Readout;
 use crate::fault::{Fault, Result};
 use crate::geometry::{Base, Flange, Rigid};
 use crate::raster::{Channel, Image, Response, save_png};
@@ -54,7 +55,7 @@ impl Notebook {
     pub fn stop(&mut self, cell: &mut dyn Cell, pose: &Rigid<Base, Flange>) -> Result<(Option<usize>, String)> {
         let room = cell.picture(Light::Room)?;
         self.visits += 1;
-        self.same_size(&room)?;
+        self.same_pictures(&room, cell.readout())?;
         let view = match find(&room, &self.board, &FindOptions::default()) {
             Ok(view) => view,
             Err(fault) => return Ok((None, format!("{} ({})", fault.what, fault.cause))),
@@ -86,7 +87,7 @@ impl Notebook {
         Ok((Some(i), String::new()))
     }
 
-    fn same_size(&mut self, picture: &Image) -> Result<()> {
+    fn same_pictures(&mut self, picture: &Image, readout: Option<Readout>) -> Result<()> {
         let spec = ImageSpec {
             width: picture.width,
             height: picture.height,
@@ -94,13 +95,14 @@ impl Notebook {
             channels: 1,
             response: Response::Linear,
             pixel_centre: "integer coordinates".into(),
-            readout: None,
+            readout,
         };
         match self.image.get_or_insert_with(|| spec.clone()) {
             known if *known == spec => Ok(()),
             known => Err(Fault::input(format!(
-                "the camera delivers {}x{} now and delivered {}x{} before",
-                spec.width, spec.height, known.width, known.height
+                "the camera delivers {} now and delivered {} before",
+                said(&spec),
+                said(known)
             ))
             .cause("its settings were changed while it calibrates, or another camera answered")
             .next("begin again")),
@@ -155,4 +157,9 @@ impl Notebook {
         };
         NAMES.into_iter().filter_map(open).collect()
     }
+}
+
+fn said(image: &ImageSpec) -> String {
+    let ImageSpec { width, height, bits, .. } = image;
+    format!("{width}x{height} of {bits} bits{}", image.readout.map_or(String::new(), |r| format!(" ({r})")))
 }

@@ -7,7 +7,9 @@ import { choice, field, table } from "./parts.js";
 /** Names with dots, words, unit; a star: only where the station has that table. */
 const NUMBERS = [
   ["tolerance_mm", "The work tolerates", "mm"], ["working_volume.near_mm", "Working volume from", "mm"], ["working_volume.far_mm", "Working volume to", "mm"],
-  ["motion.speed_mm_s", "Speed of motions", "mm/s"], ["motion.max_step_mm", "Longest motion", "mm"], ["motion.max_turn_deg", "Largest turn", "°"], ["motion.max_tilt_deg", "Largest tilt", "°"],
+  ["motion.speed_mm_s", "Speed of motions", "mm/s"], ["motion.max_step_mm", "Longest motion", "mm"], ["motion.max_turn_deg", "Largest turn", "°"],
+  ["motion.max_turn_deg_s", "Turning rate at most", "°/s"], ["motion.max_tilt_deg", "Largest tilt", "°"],
+  ["motion.max_still_ms", "Halt when the pose stands still for", "ms"],
   ["outputs.line", "Output of the line laser", ""], ["outputs.pointer", "Output of the pointer", ""], ["outputs.room", "Output of the lamp", ""], ["outputs.gripper", "Output of the gripper", ""],
 ];
 

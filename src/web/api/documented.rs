@@ -1,0 +1,58 @@
+//! Whether docs/api.md and docs/operator.md state the numbers that the screen keeps.
+
+use super::camera;
+use crate::capture::PIECES;
+use crate::station::LIT;
+use crate::web::camera::FRESH;
+use crate::web::guard::{IDLE, MOST_BODY};
+use crate::web::motion::{HELD, LONGEST, SILENCE};
+use std::time::Duration;
+
+/// A time as these texts say it.
+fn spoken(time: Duration) -> &'static str {
+    match time.as_millis() {
+        800 => "most of a second",
+        1000 => "a second",
+        1500 => "a second and a half",
+        60_000 => "a minute",
+        ms => panic!("no words for {ms} ms"),
+    }
+}
+
+/// Fails where a document does not say one of these.
+fn says(name: &str, document: &str, all: &[String]) {
+    let text = document.split_whitespace().collect::<Vec<_>>().join(" ");
+    all.iter().for_each(|says| assert!(text.contains(says), "{name} does not say: {says}"));
+}
+
+#[test]
+fn the_api_is_described_with_the_numbers_that_it_keeps() {
+    says(
+        "docs/api.md",
+        include_str!("../../../docs/api.md"),
+        &[
+            format!("falls free after {} s without a request", IDLE.as_secs()),
+            format!("redeems it once, {} to {} s later", HELD.as_secs_f64(), LONGEST.as_secs_f64()),
+            format!("at least once {};", spoken(SILENCE)),
+            format!("413 longer than {} MiB", MOST_BODY >> 20),
+            format!("in {PIECES} pieces along it"),
+            format!("at most {} ms before it was asked for", FRESH / 1_000_000),
+            format!("204 where none came within {}", spoken(camera::LONGEST)),
+        ],
+    );
+    assert_eq!((MOST_BODY % (1 << 20), FRESH % 1_000_000), (0, 0));
+}
+
+#[test]
+fn operators_are_told_the_numbers_that_the_screen_keeps() {
+    says(
+        "docs/operator.md",
+        include_str!("../../../docs/operator.md"),
+        &[
+            format!("{} without a touch lets it go", spoken(IDLE)),
+            format!("After {} under the finger", spoken(HELD)),
+            format!("a lost network and {} of silence", spoken(SILENCE)),
+            format!("each laser and the lamp light for {}", spoken(LIT)),
+        ],
+    );
+}
