@@ -2,11 +2,15 @@
 //! go halts.
 //! Frame and unit: base frame; mm, mm/s, s.
 
+mod arming;
+mod brake;
+mod button;
 mod desk;
 mod grants;
 mod person;
 mod session;
 mod simulated;
+mod state;
 
 pub use desk::{Desk, Links};
 pub use person::Person;

@@ -9,7 +9,7 @@ use crate::simulate::{DEFAULT_SCENE, SceneSpec};
 use crate::web::message::SimulatedCell;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// Parts whose components there are, each with the scene that has its socket.
@@ -44,7 +44,10 @@ pub fn board() -> BoardSpec {
 /// A simulated cell and who stands beside it.
 pub struct SimulatedRobot {
     served: Served,
+    /// What the gripper holds and whether the arm stands over the board: never held over what takes long.
     at: Mutex<(String, bool)>,
+    /// One person works in the cell at a time.
+    hands: Mutex<()>,
     over: Arc<AtomicBool>,
 }
 
@@ -72,7 +75,8 @@ impl SimulatedRobot {
         served.controller.set_motor(true);
         let over = Arc::new(AtomicBool::new(false));
         follow(served.cell.clone(), folder.join("cell.jsonl"), over.clone())?;
-        let robot = SimulatedRobot { served, at: Mutex::new((part.to_owned(), false)), over };
+        let at = Mutex::new((part.to_owned(), false));
+        let robot = SimulatedRobot { served, at, hands: Mutex::default(), over };
         robot.put(None, false)?;
         Ok(robot)
     }
@@ -90,21 +94,25 @@ impl SimulatedRobot {
         format!("cell://{}?rate={GLANCES}", self.served.camera)
     }
 
+    fn at(&self) -> MutexGuard<'_, (String, bool)> {
+        self.at.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// As pages see it.
     pub fn state(&self) -> SimulatedCell {
-        let (holds, over_board) = self.at.lock().unwrap_or_else(|e| e.into_inner()).clone();
+        let (holds, over_board) = self.at().clone();
         SimulatedCell { parts: PARTS.iter().map(|(name, _)| (*name).to_owned()).collect(), holds, over_board }
     }
 
     /// A person lays the board with a part's socket before the robot, puts its component into the gripper, and jogs the arm there, or
     /// over the calibration board.
     pub fn put(&self, holds: Option<&str>, over_board: bool) -> Result<()> {
-        let mut at = self.at.lock().unwrap_or_else(|e| e.into_inner());
-        let part = holds.unwrap_or(&at.0).to_owned();
+        let _one = self.hands.lock().unwrap_or_else(PoisonError::into_inner);
+        let part = holds.map_or_else(|| self.at().0.clone(), str::to_owned);
         let spec = scene(&part)?;
         self.served.cell.jog(if over_board { Over::Board } else { Over::Place(JOGGED_OFF_MM) })?;
         self.served.cell.lay(&spec, Some(&part))?;
-        *at = (part, over_board);
+        *self.at() = (part, over_board);
         Ok(())
     }
 }
@@ -120,12 +128,12 @@ fn follow(cell: Cell, path: PathBuf, over: Arc<AtomicBool>) -> Result<()> {
     let body = move || {
         let mut said = 0;
         while !over.load(Ordering::SeqCst) {
-            let log = cell.log();
-            for entry in &log[said..] {
+            let news = cell.log_after(said);
+            said += news.len();
+            for entry in &news {
                 // A log that cannot be written stops no cell.
                 let _ = crate::files::append_line(&path, &serde_json::to_string(entry).expect("plain data"));
             }
-            said = log.len();
             std::thread::sleep(LOG);
         }
     };
