@@ -253,3 +253,93 @@ impl Desk {
         (at.robot, at.by) = (Robot::Rests(Box::new(guard)), Some(tab.clone()));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::session::Session;
+    use super::*;
+    use crate::arm::rules::{Carried, MotionLog, StopButton};
+    use std::time::{Duration, Instant};
+
+    fn tab() -> Tab {
+        Tab { session: "s".into(), tab: "a".into() }
+    }
+
+    fn desk() -> (tempfile::TempDir, Arc<Desk>, StopButton) {
+        let dir = tempfile::tempdir().unwrap();
+        let poses = dir.path().join("poses.csv");
+        std::fs::write(&poses, "# convention: denso\nframe,x,y,z,rx,ry,rz\n0,1,2,3,0,0,0\n").unwrap();
+        let link = crate::arm::open(&format!("file:{}", poses.display())).unwrap();
+        let guard = Guard::new(link, None, Carried::new(None, Ok(vec![])), MotionLog::default());
+        let button = guard.stop_button();
+        let desk = Arc::new(Desk::new(Links::default(), Arc::default()));
+        desk.is_armed(guard, &tab());
+        (dir, desk, button)
+    }
+
+    /// While somebody holds the desk, for as long as it takes, STOP has acted.
+    #[test]
+    fn stop_does_not_wait_for_the_desk() {
+        let (_dir, desk, button) = desk();
+        let stop = Arc::new(AtomicBool::new(false));
+        let _session = Session::begin(&desk, "0001-insert", &stop).unwrap();
+        let held = desk.at();
+        let presses = std::thread::spawn({
+            let desk = desk.clone();
+            move || desk.stop()
+        });
+        let until = Instant::now() + Duration::from_secs(20);
+        while !(stop.load(Ordering::SeqCst) && button.why().is_some()) && Instant::now() < until {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        assert!(stop.load(Ordering::SeqCst) && button.why().as_deref() == Some("STOP was pressed"));
+        drop(held);
+        presses.join().unwrap();
+        assert!(desk.state().look.is_some());
+    }
+
+    /// While one has the robot nobody else gets it, and nobody gives it back: no guard of an earlier time comes back.
+    #[test]
+    fn one_has_the_robot_at_a_time() {
+        let (_dir, desk, _) = desk();
+        let stop = Arc::new(AtomicBool::new(false));
+        let tried = Session::request(&desk, &mut desk.at(), &stop).unwrap();
+        assert!(Session::begin(&desk, "0001-insert", &stop).is_err() && desk.disarm().is_err());
+        drop(tried);
+        let job = Session::begin(&desk, "0001-insert", &stop).unwrap();
+        assert!(desk.disarm().is_err() && desk.looked().is_err() && desk.has_job());
+        drop(job);
+        assert!(desk.disarm().unwrap().armed.is_none() && !desk.armed());
+        assert!(Session::begin(&desk, "0001-insert", &stop).is_err(), "it is not armed");
+    }
+
+    /// A job that was stopped before it takes the robot does not get it; one that is stopped leaves the next one alone.
+    #[test]
+    fn a_stop_is_for_whoever_has_the_robot() {
+        let (_dir, desk, button) = desk();
+        let [first, second] = [true, false].map(|set| Arc::new(AtomicBool::new(set)));
+        assert!(Session::begin(&desk, "0001-insert", &first).is_err());
+        desk.stop();
+        assert!(button.why().is_none() && desk.state().look.is_none(), "nobody has the robot: nothing is to be halted");
+        let _session = Session::begin(&desk, "0002-insert", &second).unwrap();
+        desk.stop_job("0001-insert");
+        assert!(!second.load(Ordering::SeqCst) && button.why().is_none());
+        desk.stop_job("0002-insert");
+        assert!(second.load(Ordering::SeqCst) && button.why().is_some());
+    }
+
+    /// STOP while somebody says that he has looked stands; so does one from before.
+    #[test]
+    fn a_stop_while_somebody_looks_is_not_undone() {
+        let (_dir, desk, button) = desk();
+        let stop = Arc::new(AtomicBool::new(false));
+        let asks = Session::request(&desk, &mut desk.at(), &stop).unwrap();
+        desk.stop();
+        drop(asks);
+        assert!(!desk.brake.looked(&stop) && button.why().is_some() && desk.state().look.is_some());
+        assert!(
+            desk.looked().unwrap().look.is_none() && button.why().is_none(),
+            "and is over when he has looked again"
+        );
+    }
+}
