@@ -120,6 +120,7 @@ const HOMES: &[(&str, &str)] = &[
     ("notify", "capture"),
     ("png", "raster"),
     ("pollster", "gpu"),
+    ("rpassword", "cli"),
     ("rs_opw_kinematics", "cell"),
     ("rust_embed", "web"),
     ("signal_hook", "cli"),

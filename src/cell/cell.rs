@@ -181,7 +181,12 @@ impl Cell {
 
     /// What happened so far.
     pub fn log(&self) -> Vec<Entry> {
-        self.world().log.clone()
+        self.log_after(0)
+    }
+
+    /// The same without the first `known` entries: who reads on keeps nobody waiting for a copy of all of it.
+    pub fn log_after(&self, known: usize) -> Vec<Entry> {
+        self.world().log.get(known..).unwrap_or_default().to_vec()
     }
 
     /// How the component was let go; `None` while it is held.
@@ -210,7 +215,9 @@ impl Cell {
         let flange_from_tool = self.flange_from_tool();
         *self.0.scene.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(scene.clone());
         let parts = parts(spec, &base_from_scene);
-        self.world().replace(Places { scene, base_from_scene, flange_from_scene, parts, flange_from_tool }, held);
+        let places = Places { scene, base_from_scene, flange_from_scene, parts, flange_from_tool };
+        // The former scene is large: it is freed after the world's lock, which a Halt waits for.
+        let _former = self.world().replace(places, held);
         let gripper = self.0.options.outputs.gripper;
         let now = self.0.clock.now();
         self.world().switch(now, gripper, true);

@@ -234,9 +234,10 @@ impl World {
         &self.places
     }
 
-    /// Other things lie before the robot now.
-    pub fn replace(&mut self, places: Places, held: Option<Component>) {
+    /// Other things lie before the robot now; gives those that lay there.
+    pub fn replace(&mut self, places: Places, held: Option<Component>) -> Places {
         self.hull = held.as_ref().map_or(Vec::new(), |c| c.hull.clone());
-        (self.places, self.held) = (places, held);
+        self.held = held;
+        std::mem::replace(&mut self.places, places)
     }
 }

@@ -4,7 +4,7 @@
 use super::camera::Camera;
 use super::event::Hub;
 use super::found_part::FoundParts;
-use super::guard::{Leases, Sessions};
+use super::guard::{Leases, Sessions, Tries};
 use super::message::{Bar, CalibrationAge, Event, JobState};
 use super::motion::Desk;
 use super::robot::Robot;
@@ -40,8 +40,8 @@ pub struct Screen {
     pub leases: Leases,
     /// What moves the robot, and who confirms it.
     pub desk: Arc<Desk>,
-    /// Argon2 hash, where others than this machine may ask.
-    pub password: Option<String>,
+    /// The password, where others than this machine may ask.
+    pub password: Option<Tries>,
     /// Name of the cookie.
     pub cookie: String,
     /// Corners in calibrations' pictures.
@@ -68,7 +68,7 @@ struct Read {
 
 impl Screen {
     /// Nothing is read from the disk yet.
-    pub fn new(jobs: Arc<Jobs>, sessions: Arc<Sessions>, cookie: String, password: Option<String>) -> Screen {
+    pub fn new(jobs: Arc<Jobs>, sessions: Arc<Sessions>, cookie: String, password: Option<Tries>) -> Screen {
         Screen {
             place: jobs.place.clone(),
             hub: jobs.hub.clone(),

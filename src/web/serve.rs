@@ -4,7 +4,7 @@
 use super::api::router;
 use super::camera::Camera;
 use super::event::Hub;
-use super::guard::{Door, Doorway, Sessions, door, tls, verify};
+use super::guard::{Door, Doorway, Hosts, Peer, Sessions, Tries, door, tls, verify};
 use super::message::Event;
 use super::motion::{Desk, Links, SimulatedRobot};
 use super::port::listen;
@@ -17,11 +17,12 @@ use crate::files::Lock;
 use crate::station::settle_restore;
 use crate::web::message::Mode;
 use axum::middleware::from_fn_with_state;
-use std::net::{IpAddr, SocketAddr};
+use std::net::IpAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
+use tokio::runtime::{Builder, Runtime};
 
 /// What guards a screen that other machines may open.
 #[derive(Clone, Debug)]
@@ -32,7 +33,7 @@ pub struct Secured {
     pub certificates: PathBuf,
     /// Its private key, PEM.
     pub key: PathBuf,
-    /// Names by which browsers call this machine, beside the address that is listened on.
+    /// Names by which browsers call this machine, beside the address that they connect to.
     pub names: Vec<String>,
 }
 
@@ -84,12 +85,7 @@ pub fn serve(
     settle_restore(&place.station)?;
     crate::files::make_folder(&place.jobs())?;
     let _lock = Lock::take(&place.jobs(), "serve", "screen")?;
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(2)
-        .max_blocking_threads(8)
-        .enable_all()
-        .build()
-        .map_err(|e| Fault::threads(&e))?;
+    let runtime = runtime()?;
     let hub = Arc::new(Hub::default());
     let camera = options.camera.as_ref();
     let camera = camera.map(|(uri, raw)| Camera::watch(uri, *raw, &options.station)).transpose()?.map(Arc::new);
@@ -113,12 +109,22 @@ pub fn serve(
     served
 }
 
+/// Threads for work that takes long: pictures, clouds, the disk.
+const WORKERS: usize = 8;
+
+/// Two threads that answer, and those that work.
+fn runtime() -> Result<Runtime> {
+    let threads = Builder::new_multi_thread().worker_threads(2).max_blocking_threads(WORKERS).enable_all().build();
+    threads.map_err(|e| Fault::threads(&e))
+}
+
 fn check(options: &ServeOptions) -> Result<()> {
     if !options.station.join("station.toml").is_file() {
         return Err(Fault::usage(format!("{}: is no station, it has no station.toml", options.station.display()))
             .cause("another folder was given, or the station was never made")
             .next("make one with sheetlight station new --station FOLDER, or look around first with --simulate"));
     }
+    hosts(options)?;
     match &options.secured {
         Some(s) => verify("", &s.password).map(|_| ()),
         None if options.address.is_loopback() => Ok(()),
@@ -145,18 +151,19 @@ async fn run(
     let acceptor = options.secured.as_ref().map(|s| tls(&s.certificates, &s.key)).transpose()?;
     let sessions = Arc::new(Sessions::new(token));
     let cookie = format!("sheetlight_{}", address.port());
-    let scheme = if acceptor.is_some() { "https" } else { "http" };
-    let guard =
-        Arc::new(Door { hosts: hosts(options, address), scheme, sessions: sessions.clone(), cookie: cookie.clone() });
-    let password = options.secured.as_ref().map(|s| s.password.clone());
+    let hosts = hosts(options)?;
+    let url = hosts.url(address);
+    let guard = Arc::new(Door { hosts, sessions: sessions.clone(), cookie: cookie.clone() });
+    let password = options.secured.as_ref().map(|s| Tries::against(s.password.clone())).transpose()?;
     let screen = Arc::new(Screen::new(jobs, sessions, cookie, password));
     let app = router(screen.clone()).layer(from_fn_with_state(guard, door));
+    let app = app.into_make_service_with_connect_info::<Peer>();
     let doorway = Doorway::new(listener, acceptor).map_err(lost)?;
     let first = screen.clone();
     // Adapters are asked for before the first page needs them.
     tokio::task::spawn_blocking(move || first.bar());
     tokio::spawn(bars(screen));
-    ready(&format!("{scheme}://{address}/#token={token}"), instead.as_deref())?;
+    ready(&format!("{url}/#token={token}"), instead.as_deref())?;
     let stop = options.stop.clone();
     let asked = async move {
         while !stop.load(Ordering::Relaxed) {
@@ -170,15 +177,9 @@ async fn run(
 }
 
 /// Names by which a browser may call this server.
-fn hosts(options: &ServeOptions, address: SocketAddr) -> Vec<String> {
-    let port = address.port();
-    let mut hosts = vec![address.to_string()];
-    if options.address.is_loopback() || options.address.is_unspecified() {
-        hosts.extend([format!("localhost:{port}"), format!("127.0.0.1:{port}"), format!("[::1]:{port}")]);
-    }
-    let names = options.secured.iter().flat_map(|s| &s.names);
-    hosts.extend(names.flat_map(|n| [format!("{}:{port}", n.to_lowercase()), n.to_lowercase()]));
-    hosts
+fn hosts(options: &ServeOptions) -> Result<Hosts> {
+    let secured = options.secured.as_ref();
+    Hosts::new(secured.is_some(), secured.map_or(&[][..], |s| &s.names))
 }
 
 /// Tells the bar, while anybody looks on.
@@ -191,5 +192,177 @@ async fn bars(screen: Arc<Screen>) {
             let shared = screen.clone();
             let _ = tokio::task::spawn_blocking(move || shared.hub.tell(&Event::Bar(shared.bar()))).await;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arm::rules::{Confirmation, Plan};
+    use crate::arm::{Motion, Way};
+    use crate::cell::{Cell, Event as Happened};
+    use crate::web::guard::Tab;
+    use crate::web::motion::Session;
+    use crate::web::simulated::{SimulatedOptions, simulated};
+    use std::io::{Read, Write};
+    use std::net::TcpStream;
+    use std::sync::mpsc::channel;
+    use std::time::Instant;
+
+    /// Browsers that look on, what each asks for beside its socket, and connections that say nothing.
+    const VIEWERS: usize = 50;
+    const GALLERY: usize = 6;
+    const IDLE: usize = 300;
+    /// What sleeps never wakes: whatever waits for it waits for longer than this.
+    const PATIENCE: Duration = Duration::from_secs(30);
+    /// A motion takes longer than any STOP, mm/s.
+    const SLOWLY: f64 = 20.0;
+
+    struct Client(String);
+
+    impl Client {
+        /// A request that is sent; its answer may be waited for.
+        fn sends(&self, method: &str, path: &str, more: &str) -> TcpStream {
+            let mut stream = TcpStream::connect(&self.0).unwrap();
+            stream.set_read_timeout(Some(PATIENCE)).unwrap();
+            let host = &self.0;
+            let head = format!("{method} {path} HTTP/1.1\r\nhost: {host}\r\nauthorization: Bearer token\r\n");
+            stream.write_all(format!("{head}x-sheetlight-tab: a\r\n{more}\r\n").as_bytes()).unwrap();
+            stream
+        }
+
+        /// The first line of an answer.
+        fn asks(&self, method: &str, path: &str) -> String {
+            let mut answer = [0; 64];
+            let read = self.sends(method, path, "content-length: 0\r\n").read(&mut answer).unwrap();
+            String::from_utf8_lossy(&answer[..read]).lines().next().unwrap_or("").to_owned()
+        }
+    }
+
+    /// When the cell's log says so for the first time after this many entries.
+    fn when(cell: &Cell, known: usize, what: impl Fn(&Happened) -> bool) -> f64 {
+        let until = Instant::now() + PATIENCE;
+        loop {
+            if let Some(entry) = cell.log_after(known).iter().find(|e| what(&e.event)) {
+                return entry.t_s;
+            }
+            assert!(Instant::now() < until, "not within {PATIENCE:?}");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+
+    /// A motion of a job, as slow as it may be, that somebody halts; gives why it ended.
+    fn moves(desk: &Desk) -> String {
+        desk.looked().unwrap();
+        let mut session = Session::begin(desk, "0001-insert", &Arc::default()).unwrap();
+        let guard = session.guard();
+        let mut to = guard.link().pose().unwrap().base_from_flange;
+        to.translation.y -= to.translation.y.signum() * 200.0;
+        let leg = Motion { to, way: Way::Straight, speed_mm_s: SLOWLY };
+        let proposal = guard.propose(Plan::single("test", "to be halted", leg)).unwrap();
+        assert!(proposal.passed(), "{:?}", proposal.missed());
+        let yes = Confirmation::of(&*proposal.hash);
+        guard.make(&proposal, yes, &mut |_, _| Ok(())).unwrap_err().what
+    }
+
+    /// STOP reaches the controller although every worker sleeps for ever, viewers wait for their galleries and more
+    /// connections than there are places say nothing; pages are answered meanwhile. How long it takes depends on the
+    /// machine: it is printed, and judged in the long form alone.
+    #[test]
+    fn stop_reaches_the_controller_whatever_else_is_asked() {
+        let long = std::env::var_os("SHEETLIGHT_LONG").is_some();
+        let dir = tempfile::tempdir().unwrap();
+        let made = SimulatedOptions { shots: 1, sets: vec![], part: "osc".into(), seed: 3, speed: 1.0 };
+        let (station, robot) = simulated(dir.path(), &made, &|_, _| {}).unwrap();
+        let (cell, uri) = (robot.cell().clone(), robot.robot_uri());
+        let (hub, place) =
+            (Arc::new(Hub::default()), Place { recordings: dir.path().into(), station, mode: Mode::Simulated });
+        crate::files::make_folder(&place.jobs()).unwrap();
+        let options = ServeOptions {
+            station: place.station.clone(),
+            recordings: place.recordings.clone(),
+            mode: place.mode,
+            address: IpAddr::from([127, 0, 0, 1]),
+            port: 0,
+            next_free: false,
+            camera: None,
+            robot: Some(uri.clone()),
+            may_move: true,
+            secured: None,
+            stop: Arc::default(),
+        };
+        let links = Links {
+            station: place.station.clone(),
+            robot: Some(uri),
+            may_move: true,
+            simulated: Some(robot),
+            ..Links::default()
+        };
+        let desk = Arc::new(Desk::new(links, hub.clone()));
+        desk.arm(&Tab { session: "token".into(), tab: "a".into() }).unwrap();
+        let jobs = Jobs::open(place, hub, desk.clone()).unwrap();
+        let (runtime, (tell, told)) = (runtime().unwrap(), channel());
+        runtime.spawn(async move {
+            let ready = |url: &str, _: Option<&str>| {
+                tell.send(url.to_owned()).unwrap();
+                Ok(())
+            };
+            run(&options, "token", jobs, ready).await.unwrap();
+        });
+        let url = told.recv_timeout(PATIENCE).unwrap();
+        let client = Client(url["http://".len()..].split('/').next().unwrap().to_owned());
+
+        // Every worker sleeps. The first bar may still be made: it comes before them.
+        let (asleep, sleeping) = channel();
+        let wake: Vec<_> = (0..WORKERS)
+            .map(|_| {
+                let ((wake, sleeps), asleep) = (channel::<()>(), asleep.clone());
+                runtime.spawn_blocking(move || {
+                    asleep.send(()).unwrap();
+                    sleeps.recv()
+                });
+                wake
+            })
+            .collect();
+        (0..WORKERS).for_each(|_| sleeping.recv_timeout(PATIENCE).unwrap());
+        let upgrade = "upgrade: websocket\r\nconnection: upgrade\r\nsec-websocket-version: 13\r\n\
+                       sec-websocket-key: AAAAAAAAAAAAAAAAAAAAAA==\r\n";
+        let mut viewers = Vec::new();
+        for _ in 0..VIEWERS {
+            let mut socket = client.sends("GET", "/api/v1/events", upgrade);
+            let mut answer = [0; 12];
+            socket.read_exact(&mut answer).unwrap();
+            assert_eq!(&answer, b"HTTP/1.1 101");
+            viewers.push(socket);
+            let picture = |k: usize| client.sends("GET", &format!("/api/v1/picture?recording=scan&frame={k}"), "");
+            viewers.extend((0..GALLERY).map(picture));
+        }
+        let idle: Vec<TcpStream> = (0..IDLE).map(|_| TcpStream::connect(&client.0).unwrap()).collect();
+
+        let mut took_ms: Vec<f64> = (0..if long { 20 } else { 5 })
+            .filter_map(|_| {
+                let known = cell.log().len();
+                std::thread::scope(|scope| {
+                    let moving = scope.spawn(|| moves(&desk));
+                    when(&cell, known, |e| matches!(e, Happened::Move { .. }));
+                    std::thread::sleep(Duration::from_millis(100));
+                    let pressed = cell.clock().now();
+                    assert_eq!(client.asks("POST", "/api/v1/stop"), "HTTP/1.1 200 OK");
+                    let halted = when(&cell, known, |e| matches!(e, Happened::Halt { moving: true, .. }));
+                    // Where the machine stands still for seconds the link's own silence may halt first.
+                    (moving.join().unwrap() == "STOP was pressed").then_some((halted - pressed) * 1e3)
+                })
+            })
+            .collect();
+        took_ms.sort_by(f64::total_cmp);
+        assert!(!took_ms.is_empty(), "no motion was halted by STOP");
+        let page = Instant::now();
+        for path in ["/", "/api/v1/motion", "/api/v1/jobs"] {
+            assert_eq!(client.asks("GET", path), "HTTP/1.1 200 OK", "{path}");
+        }
+        let page = page.elapsed();
+        println!("STOP at the controller after {took_ms:.1?} ms; three pages in {page:.1?}");
+        assert!(!long || *took_ms.last().unwrap() <= 50.0, "{took_ms:?} ms");
+        drop((wake, idle, viewers));
     }
 }

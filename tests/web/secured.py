@@ -5,10 +5,12 @@ Frame and unit: s."""
 import http.client
 import json
 import os
+import pty
 import shutil
 import ssl
 import subprocess
 import sys
+import threading
 import time
 
 from server import Server
@@ -22,7 +24,37 @@ def file(name):
     return os.path.join(folder, name)
 
 
+def typed(out, *lines):
+    """What a terminal shows while somebody types a password, and how the program ends."""
+    pid, terminal = pty.fork()
+    if pid == 0:
+        os.execv(program, [program, "station", "password", "--out", out])
+    shown, asked = b"", 0
+    try:
+        while more := os.read(terminal, 4096):
+            shown += more
+            # It asks before each line, and shows nothing from then on.
+            if asked < len(lines) and shown.count(b": ") > asked:
+                time.sleep(0.3)
+                os.write(terminal, lines[asked].encode() + b"\n")
+                asked += 1
+    except OSError:
+        # The terminal is gone with the program.
+        pass
+    return shown.decode(), os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+
+
+def unseen():
+    shown, code = typed(file("typed"), PASSWORD, PASSWORD)
+    assert code == 0 and "once more" in shown and "horse" not in shown, (code, shown)
+    with open(file("typed")) as f:
+        assert f.read().startswith("$argon2id$")
+    shown, code = typed(file("slip"), PASSWORD, PASSWORD + "x")
+    assert code != 0 and "not the same" in shown and "horse" not in shown and not os.path.exists(file("slip")), (code, shown)
+
+
 def main():
+    unseen()
     made = subprocess.run([program, "station", "password", "--out", file("pw")], input=PASSWORD + "\n", capture_output=True, text=True)
     assert made.returncode == 0, made.stderr
     with open(file("pw")) as f:
@@ -47,9 +79,9 @@ def main():
     port = int(s.host.rsplit(":", 1)[1])
     context = ssl.create_default_context(cafile=file("cert.pem"))
 
-    def ask(method, path, body=None, host=None, **headers):
-        c = http.client.HTTPSConnection("127.0.0.1", port, timeout=PATIENCE, context=context)
-        c.request(method, path, None if body is None else json.dumps(body), {"Host": host or f"127.0.0.1:{port}", "X-Sheetlight-Tab": "tests", **headers})
+    def ask(method, path, body=None, host=None, source="127.0.0.1", to="127.0.0.1", **headers):
+        c = http.client.HTTPSConnection(to, port, timeout=PATIENCE, context=context, source_address=(source, 0))
+        c.request(method, path, None if body is None else json.dumps(body), {"Host": host or f"{to}:{port}", "X-Sheetlight-Tab": "tests", **headers})
         answer = c.getresponse()
         data = answer.read()
         c.close()
@@ -62,14 +94,43 @@ def main():
         assert ask("POST", "/api/v1/session", knock)[0] == 401, knock
         # Passwords are tried slowly.
         assert "token" in knock or time.time() - begun > 0.5
+    # Another machine tries one wrong password after the other, ten at a time. It is told to wait, and the right one of this machine does not.
+    answers, over = [], threading.Event()
+
+    def guesses():
+        while not over.is_set():
+            status, head, _ = ask("POST", "/api/v1/session", {"password": "wrong horse battery"}, source="127.0.0.2")
+            answers.append((status, head.get("retry-after")))
+
+    guessing = [threading.Thread(target=guesses, daemon=True) for _ in range(10)]
+    for one in guessing:
+        one.start()
+    time.sleep(3)
+    begun = time.time()
     status, head, _ = ask("POST", "/api/v1/session", {"password": PASSWORD})
+    took = time.time() - begun
+    over.set()
+    for one in guessing:
+        one.join(PATIENCE)
     assert status == 200, status
+    print(f"{len(answers)} wrong passwords from another machine, {sum(s == 429 for s, _ in answers)} of them refused untried; the right one took {took:.2f} s")
+    assert all(s in (401, 429) and (s == 401 or int(after) >= 1) for s, after in answers), answers
+    assert any(s == 429 for s, _ in answers) and sum(s == 401 for s, _ in answers) < 30, answers
+    # In a row with theirs it would take more than two seconds.
+    assert took < 2, took
     cookie = head["set-cookie"]
     assert all(word in cookie for word in ("Secure", "HttpOnly", "SameSite=Strict")), cookie
     cookie = cookie.split(";")[0]
     assert ask("GET", "/api/v1/bar", Cookie=cookie)[0] == 200
     assert ask("GET", "/api/v1/bar", host=f"cell3.plant:{port}", Cookie=cookie)[0] == 200
-    assert 400 <= ask("GET", "/api/v1/bar", host=f"cell4.plant:{port}", Cookie=cookie)[0] < 500
+    # By the address that was connected to, and by the name without a port, as where a router leads from 443 to here; by nothing else.
+    context.check_hostname = False
+    assert ask("GET", "/api/v1/bar", to="127.0.0.3", Cookie=cookie)[0] == 200
+    assert ask("GET", "/api/v1/bar", host="cell3.plant", Cookie=cookie)[0] == 200
+    assert ask("GET", "/api/v1/bar", host="CELL3.plant.:443", Cookie=cookie)[0] == 200
+    for host in (f"cell4.plant:{port}", f"0.0.0.0:{port}", f"10.1.2.3:{port}", f"[fd00::1]:{port}", "127.0.0.1", f"cell3.plant:{port + 1}", f"me@cell3.plant:{port}"):
+        assert 400 <= ask("GET", "/api/v1/bar", host=host, Cookie=cookie)[0] < 500, host
+    assert s.url.startswith(f"https://cell3.plant:{port}/#token="), s.url
     assert 400 <= ask("POST", "/api/v1/lease", {}, Cookie=cookie, Origin=f"http://cell3.plant:{port}")[0] < 500, "a page without TLS"
     assert ask("POST", "/api/v1/lease", {}, Cookie=cookie, Origin=f"https://cell3.plant:{port}")[0] == 200
     # Plain HTTP on the same port gets no answer.

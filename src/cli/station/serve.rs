@@ -155,15 +155,27 @@ fn make(args: &Serve, console: &Console) -> Result<(PathBuf, SimulatedRobot)> {
 }
 
 pub fn password(args: &Password, console: &Console) -> Result<()> {
-    if std::io::stdin().is_terminal() {
-        console.ask("password (it is shown while you type): ");
-    }
-    let mut line = String::new();
-    std::io::stdin().lock().read_line(&mut line).map_err(|e| {
-        Fault::input(format!("the password cannot be read: {e}")).next("type it, or send it to standard input")
-    })?;
-    let hash = hashed(line.trim_end_matches(['\r', '\n']))?;
+    let hash = hashed(&asked(console)?)?;
     crate::files::write(&args.out, format!("{hash}\n").as_bytes())?;
     console.result(&serde_json::json!({ "written": args.out }), &format!("{}: written", args.out.display()));
     Ok(())
+}
+
+/// The password as it is typed twice, unseen, at a terminal; else a line of standard input.
+fn asked(console: &Console) -> Result<String> {
+    let unreadable = |e: std::io::Error| {
+        Fault::input(format!("the password cannot be read: {e}")).next("type it, or send it to standard input")
+    };
+    if !std::io::stdin().is_terminal() {
+        let mut line = String::new();
+        std::io::stdin().lock().read_line(&mut line).map_err(unreadable)?;
+        return Ok(line.trim_end_matches(['\r', '\n']).to_owned());
+    }
+    console.ask("password (it is not shown while you type): ");
+    let first = rpassword::read_password().map_err(unreadable)?;
+    console.ask("once more: ");
+    if rpassword::read_password().map_err(unreadable)? != first {
+        return Err(Fault::usage("the two passwords are not the same").next("type the same one twice"));
+    }
+    Ok(first)
 }

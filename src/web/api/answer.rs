@@ -60,6 +60,11 @@ pub async fn beside<T: Send + 'static>(
     }
 }
 
+/// Does something that may take long after the answer, which does not wait for it.
+pub fn afterwards(screen: Arc<Screen>, work: impl FnOnce(&Screen) + Send + 'static) {
+    drop(tokio::task::spawn_blocking(move || work(&screen)));
+}
+
 /// Reads a body as JSON.
 pub fn body<T: DeserializeOwned>(bytes: &Bytes) -> Result<T> {
     serde_json::from_slice(bytes).map_err(|e| {

@@ -1,7 +1,7 @@
 //! In: orders and questions about jobs. Out: jobs, and the files that they left.
 //! Frame and unit: bytes.
 
-use super::answer::{Answer, beside, body, json, operates};
+use super::answer::{Answer, afterwards, beside, body, json, operates};
 use crate::fault::{Fault, Result};
 use crate::web::guard::{Tab, resolve};
 use crate::web::message::{BoardView, Job, Order};
@@ -44,15 +44,14 @@ pub async fn act(
     Extension(tab): Extension<Tab>,
     UrlPath((id, what)): UrlPath<(String, String)>,
 ) -> Answer<Json<Job>> {
-    // Everybody may stop.
+    // Everybody may stop, and it acts here, before the queue of work that waits for the disk.
     if what == "stop" {
-        // Before the queue, as in POST /stop.
-        screen.desk.stop_job(&id);
-    } else {
-        operates(&screen, &tab)?;
+        let job = screen.jobs.stop(&id)?;
+        afterwards(screen, move |s| s.jobs.keep(&[id]));
+        return Ok(Json(job));
     }
+    operates(&screen, &tab)?;
     json(screen, move |s| match what.as_str() {
-        "stop" => s.jobs.stop(&id),
         "resume" => s.jobs.resume(&id, false),
         "back_out" => s.jobs.resume(&id, true),
         "accept" => {

@@ -19,3 +19,6 @@ mod sweep;
 
 pub use openapi::openapi;
 pub use router::router;
+
+#[cfg(test)]
+mod queue_test;

@@ -1,11 +1,11 @@
 //! In: a robot to arm, a button that goes down over a motion that is shown, is held, is let go. Out: that motion, once; or why not.
 //! Frame and unit: motions by their hash.
 
-use super::answer::{Answer, body, json, operates};
+use super::answer::{Answer, afterwards, body, json, operates};
 use crate::fault::{Fault, Result};
 use crate::web::guard::Tab;
-use crate::web::message::{Arming, Confirmed, Grant, InTheCell, JobState, MotionState, Redeem};
-use crate::web::screen::{JOBS, Screen};
+use crate::web::message::{Arming, Confirmed, Grant, InTheCell, MotionState, Redeem};
+use crate::web::screen::Screen;
 use axum::body::Bytes;
 use axum::extract::State;
 use axum::{Extension, Json};
@@ -60,20 +60,11 @@ pub async fn release(State(screen): Shared, Extension(tab): Extension<Tab>) -> A
     Ok(Json(object!({})))
 }
 
-/// POST /stop: everybody may.
-pub async fn stop(State(screen): Shared) -> Answer<Json<Value>> {
-    // The robot first, and here: every thread for the work below may be busy with pictures.
-    screen.desk.stop();
-    json(screen, |s| {
-        for job in s.jobs.list(JOBS) {
-            if matches!(job.state, JobState::Running | JobState::Queued) {
-                // One that has just ended needs no stop.
-                let _ = s.jobs.stop(&job.id);
-            }
-        }
-        Ok(object!({}))
-    })
-    .await
+/// POST /stop: everybody may. It acts here: every thread for work that takes long may be busy with pictures.
+pub async fn stop(State(screen): Shared) -> Json<Value> {
+    let stopped = screen.jobs.stop_all();
+    afterwards(screen, move |s| s.jobs.keep(&stopped));
+    Json(object!({}))
 }
 
 /// POST /simulated: what a person does in the simulated cell.
@@ -96,43 +87,4 @@ pub async fn simulated(
         Ok(s.desk.told())
     })
     .await
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::web::event::Hub;
-    use crate::web::guard::Sessions;
-    use crate::web::message::Mode;
-    use crate::web::motion::{Desk, Links};
-    use crate::web::work::{Jobs, Place};
-    use std::sync::atomic::{AtomicBool, Ordering};
-    use std::sync::mpsc::channel;
-    use std::time::Duration;
-
-    /// STOP acts although every thread for other work sleeps; its answer, which writes the jobs' states, may wait.
-    #[test]
-    fn stop_waits_for_no_other_work() {
-        let dir = tempfile::tempdir().unwrap();
-        let [station, recordings] = ["station", "recordings"].map(|name| dir.path().join(name));
-        let hub = Arc::new(Hub::default());
-        let desk = Arc::new(Desk::new(Links { station: station.clone(), ..Links::default() }, hub.clone()));
-        let place = Place { station, recordings, mode: Mode::Replay };
-        std::fs::create_dir_all(place.jobs()).unwrap();
-        let jobs = Jobs::open(place, hub, desk.clone()).unwrap();
-        let screen = Arc::new(Screen::new(jobs, Arc::new(Sessions::new("token")), "cookie".into(), None));
-        let stopped = Arc::new(AtomicBool::new(false));
-        desk.a_job_runs(&stopped);
-        let runtime =
-            tokio::runtime::Builder::new_multi_thread().worker_threads(1).max_blocking_threads(1).enable_all().build();
-        let runtime = runtime.unwrap();
-        let (wake, sleeps) = channel::<()>();
-        runtime.spawn_blocking(move || sleeps.recv());
-        runtime.block_on(async {
-            let asked = tokio::time::timeout(Duration::from_millis(200), stop(State(screen)));
-            assert!(asked.await.is_err(), "the answer waits for a free thread");
-        });
-        assert!(stopped.load(Ordering::SeqCst), "the job goes on");
-        wake.send(()).unwrap();
-    }
 }

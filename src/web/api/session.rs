@@ -1,38 +1,33 @@
 //! In: the token of this start or a password; tabs that want to operate. Out: a session's cookie; the lease.
 //! Frame and unit: seconds.
 
-use super::answer::{Answer, Refusal, body, json, operates};
-use crate::fault::{Fault, Result};
+use super::answer::{Answer, Refusal, afterwards, body, operates};
+use crate::fault::Fault;
 use crate::web::event::stream;
-use crate::web::guard::{Tab, verify};
+use crate::web::guard::{Peer, Tab, Tried};
 use crate::web::message::{Event, Knock, Lease, Session, TakeLease};
 use crate::web::screen::Screen;
 use axum::body::Bytes;
-use axum::extract::{Query, State, WebSocketUpgrade};
+use axum::extract::{ConnectInfo, Query, State, WebSocketUpgrade};
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::{Extension, Json};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Passwords are tried one at a time, and no faster than this.
-const SLOWLY: Duration = Duration::from_millis(700);
-static TRYING: tokio::sync::Mutex<()> = tokio::sync::Mutex::const_new(());
-
 /// POST /session: `{"token"}` or `{"password"}`; sets the cookie.
-pub async fn open(State(screen): State<Arc<Screen>>, bytes: Bytes) -> Answer<Response> {
+pub async fn open(
+    State(screen): State<Arc<Screen>>,
+    ConnectInfo(peer): ConnectInfo<Peer>,
+    bytes: Bytes,
+) -> Answer<Response> {
     let knock: Knock = body(&bytes)?;
-    let known = match (knock.token, knock.password, screen.password.clone()) {
+    let known = match (knock.token, knock.password, &screen.password) {
         (Some(token), None, _) => screen.sessions.is_token(&token),
-        (None, Some(password), Some(hash)) => {
-            let _one = TRYING.lock().await;
-            tokio::time::sleep(SLOWLY).await;
-            let tried = tokio::task::spawn_blocking(move || verify(&password, &hash)).await;
-            tried.unwrap_or_else(|e| {
-                Err(Fault::device(format!("the password could not be tried: {e}"))
-                    .next("try again; if it stays so, start the server again"))
-            })?
-        }
+        (None, Some(password), Some(tries)) => match tries.one(peer.machine(), password).await? {
+            Tried::TooMany(after) => return Ok(too_many(after)),
+            tried => matches!(tried, Tried::Right),
+        },
         _ => false,
     };
     if !known {
@@ -46,6 +41,14 @@ pub async fn open(State(screen): State<Arc<Screen>>, bytes: Bytes) -> Answer<Res
     let mut headers = HeaderMap::new();
     headers.insert(header::SET_COOKIE, HeaderValue::from_str(&cookie).expect("hexadecimal digits"));
     Ok((headers, Json(serde_json::json!({}))).into_response())
+}
+
+fn too_many(after: Duration) -> Response {
+    let seconds = after.as_secs_f64().ceil().max(1.0);
+    let fault = Fault::refused(format!("too many passwords were tried from here: the next one in {seconds} s"))
+        .cause("each machine's tries come one after the other")
+        .next("wait, then try again");
+    ([(header::RETRY_AFTER, seconds.to_string())], Refusal(StatusCode::TOO_MANY_REQUESTS, fault)).into_response()
 }
 
 /// GET /session: whether there is one, and whether a password opens one.
@@ -65,29 +68,28 @@ pub async fn take(
             .next("send the header X-Sheetlight-Tab with a name of your own")
             .into());
     }
-    json(screen, move |screen| -> Result<Lease> {
-        let other = screen.leases.take(&tab, ask.firmly)?;
-        let lease = screen.leases.state();
-        if other {
-            screen.desk.handed_over();
-            screen.hub.tell(&Event::Bar(screen.bar()));
-        }
-        Ok(lease)
-    })
-    .await
+    // Here, as STOP: what the former operator moves halts at once. The bar looks at the disk and comes afterwards.
+    let other = screen.leases.take(&tab, ask.firmly)?;
+    let lease = screen.leases.state();
+    if other {
+        screen.desk.handed_over();
+        afterwards(screen, tell_bar);
+    }
+    Ok(Json(lease))
 }
 
 /// POST /lease/release: let go.
 pub async fn release(State(screen): State<Arc<Screen>>, Extension(tab): Extension<Tab>) -> Answer<Json<Lease>> {
     operates(&screen, &tab)?;
-    // Before the queue, as in POST /motion/release.
     screen.desk.let_go(&tab, "the operator let another screen operate");
-    json(screen, move |screen| {
-        screen.leases.release(&tab);
-        screen.hub.tell(&Event::Bar(screen.bar()));
-        Ok(screen.leases.state())
-    })
-    .await
+    screen.leases.release(&tab);
+    let lease = screen.leases.state();
+    afterwards(screen, tell_bar);
+    Ok(Json(lease))
+}
+
+fn tell_bar(screen: &Screen) {
+    screen.hub.tell(&Event::Bar(screen.bar()));
 }
 
 /// Which tab looks on.

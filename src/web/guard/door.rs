@@ -2,9 +2,11 @@
 //! page to itself.
 //! Frame and unit: bytes.
 
+use super::host::Hosts;
+use super::tls::Peer;
 use super::{Sessions, Tab};
 use axum::body::Body;
-use axum::extract::{Request, State};
+use axum::extract::{ConnectInfo, Request, State};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
@@ -15,10 +17,8 @@ pub const MOST_BODY: usize = 1 << 20;
 
 /// What the door knows.
 pub struct Door {
-    /// Hosts that this server is called by, with port, lower case.
-    pub hosts: Vec<String>,
-    /// https where certificates were given.
-    pub scheme: &'static str,
+    /// By which names this server is called.
+    pub hosts: Hosts,
     /// Who is let in.
     pub sessions: Arc<Sessions>,
     /// Name of the cookie: of the port too, because cookies do not know ports.
@@ -39,13 +39,19 @@ const HEADERS: [(HeaderName, &str); 6] = [
 ];
 
 /// The middleware.
-pub async fn door(State(door): State<Arc<Door>>, mut request: Request<Body>, next: Next) -> Response {
-    let mut response = match door.refuses(&request) {
+pub async fn door(
+    State(door): State<Arc<Door>>,
+    ConnectInfo(peer): ConnectInfo<Peer>,
+    mut request: Request<Body>,
+    next: Next,
+) -> Response {
+    let mut response = match door.refuses(&request, &peer) {
         Some((status, why)) => refusal(status, why),
         None => {
             let open = is_open(request.method(), request.uri().path());
             match door.tab(request.headers()) {
                 Some(tab) => {
+                    peer.shows_session();
                     request.extensions_mut().insert(tab);
                     next.run(request).await
                 }
@@ -78,15 +84,14 @@ fn is_open(method: &Method, path: &str) -> bool {
 }
 
 impl Door {
-    fn refuses(&self, request: &Request<Body>) -> Option<(StatusCode, &'static str)> {
+    fn refuses(&self, request: &Request<Body>, peer: &Peer) -> Option<(StatusCode, &'static str)> {
         let headers = request.headers();
         let text = |name: HeaderName| headers.get(name).and_then(|v| v.to_str().ok()).map(str::to_ascii_lowercase);
         // A page of another name that leads here (DNS rebinding) is not ours.
-        if !text(header::HOST).is_some_and(|h| self.hosts.contains(&h)) {
+        if !text(header::HOST).is_some_and(|host| self.hosts.are(&host, peer.local)) {
             return Some((StatusCode::MISDIRECTED_REQUEST, "another host's name: open the address that was printed"));
         }
-        let ours = |origin: &String| self.hosts.iter().any(|h| *origin == format!("{}://{h}", self.scheme));
-        if text(header::ORIGIN).is_some_and(|o| !ours(&o)) {
+        if text(header::ORIGIN).is_some_and(|origin| !self.hosts.origin(&origin, peer.local)) {
             return Some((StatusCode::FORBIDDEN, "a page of another origin asks"));
         }
         if text(HeaderName::from_static("sec-fetch-site")).is_some_and(|s| s == "cross-site" || s == "same-site")

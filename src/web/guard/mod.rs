@@ -3,17 +3,22 @@
 //! Frame and unit: none; bytes, seconds.
 
 mod door;
+mod host;
 mod lease;
 mod names;
 mod password;
+mod places;
 mod session;
 mod tls;
+mod tries;
 
 pub use door::{Door, MOST_BODY, door};
+pub use host::Hosts;
 #[cfg(test)]
 pub use lease::IDLE;
 pub use lease::{Leases, Tab};
 pub use names::{plain, resolve};
 pub use password::{hashed, verify};
 pub use session::{Sessions, random_hex};
-pub use tls::{Doorway, tls};
+pub use tls::{Doorway, Peer, tls};
+pub use tries::{Tried, Tries};

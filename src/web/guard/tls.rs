@@ -1,22 +1,20 @@
-//! In: a listening socket, perhaps a certificate and its key. Out: connections, encrypted where those were given, never more
-//! than a bounded number at a time.
-//! Frame and unit: connections, seconds.
+//! Connections from a listening socket, encrypted where a certificate was given, never more than there are places.
 
+use super::places::{Place, Places, Seat, machine};
 use crate::fault::{Fault, Result};
-use axum::serve::Listener;
-use futures_util::task::AtomicWaker;
-use std::collections::VecDeque;
+use axum::extract::connect_info::Connected;
+use axum::serve::{IncomingStream, Listener};
+use std::future::poll_fn;
 use std::io;
-use std::net::SocketAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::path::Path;
 use std::pin::Pin;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError, Weak};
+use std::sync::Arc;
 use std::task::{Context, Poll};
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
+use tokio::sync::mpsc;
 use tokio::time::{Instant, Sleep};
 use tokio_rustls::TlsAcceptor;
 use tokio_rustls::rustls::ServerConfig;
@@ -24,15 +22,11 @@ use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use tokio_rustls::server::TlsStream;
 
-/// Connections at a time; a browser has a handful. When all places are taken, the connection that has been silent for longest
-/// since it was opened makes room: a client that opens connections and says nothing locks nobody out.
-const MOST: usize = 256;
-/// A connection on which nothing was ever read is closed after this time. Browsers open some in advance and never use them.
+/// A connection that has shown no session is closed when nothing moved on it for so long. Browsers open some in advance
+/// and never use them.
 const SILENT: Duration = Duration::from_secs(10);
-/// A connection on which nothing moves either way is closed after this time; the screen's own socket is told something every second.
+/// One that has is closed after this time; the screen's own socket is told something every second.
 const IDLE: Duration = Duration::from_secs(300);
-/// A place becomes free within this time after a silent connection was told to go.
-const ROOM: Duration = Duration::from_secs(1);
 /// A client that does not finish its handshake in so long is let go.
 const HANDSHAKE: Duration = Duration::from_secs(10);
 
@@ -62,45 +56,41 @@ impl Doorway {
     pub fn new(listener: TcpListener, tls: Option<TlsAcceptor>) -> io::Result<Doorway> {
         let address = listener.local_addr()?;
         let (give, ready) = mpsc::channel(16);
-        let (room, silent) = (Arc::new(Semaphore::new(MOST)), Silent::default());
-        tokio::spawn(async move {
-            loop {
-                let (stream, peer) = match listener.accept().await {
-                    Ok(pair) => pair,
-                    Err(_) => {
-                        // Out of file handles: others have to go first.
-                        tokio::time::sleep(Duration::from_millis(100)).await;
-                        continue;
-                    }
-                };
-                let permit = match room.clone().try_acquire_owned() {
-                    Ok(permit) => permit,
-                    Err(_) => {
-                        silent.oldest_goes();
-                        match tokio::time::timeout(ROOM, room.clone().acquire_owned()).await {
-                            Ok(Ok(permit)) => permit,
-                            // All others are at work: this one comes again.
-                            _ => continue,
-                        }
-                    }
-                };
-                let _ = stream.set_nodelay(true);
-                let unheard = silent.one();
-                let (give, tls) = (give.clone(), tls.clone());
-                tokio::spawn(async move {
-                    let io = match tls {
-                        None => Stream::Plain(stream),
-                        Some(tls) => match tokio::time::timeout(HANDSHAKE, tls.accept(stream)).await {
-                            Ok(Ok(stream)) => Stream::Tls(Box::new(stream)),
-                            _ => return,
-                        },
-                    };
-                    let idle = Box::pin(tokio::time::sleep(SILENT));
-                    let _ = give.send(Connection { io, peer, unheard: Some(unheard), idle, _permit: permit }).await;
-                });
-            }
-        });
+        tokio::spawn(accept(listener, tls, give));
         Ok(Doorway { address, ready })
+    }
+}
+
+async fn accept(listener: TcpListener, tls: Option<TlsAcceptor>, give: mpsc::Sender<Connection>) {
+    let places = Arc::new(Places::default());
+    loop {
+        let Ok((stream, from)) = listener.accept().await else {
+            // Out of file handles: others have to go first.
+            tokio::time::sleep(Duration::from_millis(100)).await;
+            continue;
+        };
+        let Ok(local) = stream.local_addr() else { continue };
+        let _ = stream.set_nodelay(true);
+        let seat = places.take(from.ip());
+        let (give, tls) = (give.clone(), tls.clone());
+        tokio::spawn(async move {
+            let io = match tls {
+                None => Stream::Plain(stream),
+                Some(tls) => Stream::Tls(Box::new(shaken(tls.accept(stream), &seat.place).await?)),
+            };
+            let peer = Peer { from, local, seat: Arc::new(seat) };
+            let idle = Box::pin(tokio::time::sleep(SILENT));
+            give.send(Connection { io, peer, moved: Instant::now(), idle }).await.ok()
+        });
+    }
+}
+
+/// A finished handshake; `None` where it fails, takes too long, or makes room for another connection.
+async fn shaken<T>(handshake: impl Future<Output = io::Result<T>>, place: &Place) -> Option<T> {
+    let gone = poll_fn(|cx| if place.is_gone(cx) { Poll::Ready(()) } else { Poll::Pending });
+    tokio::select! {
+        done = tokio::time::timeout(HANDSHAKE, handshake) => done.ok()?.ok(),
+        () = gone => None,
     }
 }
 
@@ -110,9 +100,9 @@ impl Listener for Doorway {
 
     async fn accept(&mut self) -> (Connection, SocketAddr) {
         match self.ready.recv().await {
-            Some(c) => {
-                let peer = c.peer;
-                (c, peer)
+            Some(connection) => {
+                let from = connection.peer.from;
+                (connection, from)
             }
             None => std::future::pending().await,
         }
@@ -123,57 +113,62 @@ impl Listener for Doorway {
     }
 }
 
+/// The other end of a connection, as requests know it.
+#[derive(Clone, Debug)]
+pub struct Peer {
+    from: SocketAddr,
+    /// Where the connection came in.
+    pub local: SocketAddr,
+    seat: Arc<Seat>,
+}
+
+impl Peer {
+    /// The machine there.
+    pub fn machine(&self) -> IpAddr {
+        machine(self.from.ip())
+    }
+
+    /// A request of this connection showed a session.
+    pub fn shows_session(&self) {
+        self.seat.places.shows_session(&self.seat.place);
+    }
+}
+
+impl Connected<IncomingStream<'_, Doorway>> for Peer {
+    fn connect_info(stream: IncomingStream<'_, Doorway>) -> Peer {
+        stream.io().peer.clone()
+    }
+}
+
 enum Stream {
     Plain(TcpStream),
     Tls(Box<TlsStream<TcpStream>>),
 }
 
-/// A connection on which nothing was read yet.
-#[derive(Default)]
-struct Unheard {
-    goes: AtomicBool,
-    task: AtomicWaker,
-}
-
-/// All of these, the oldest first.
-#[derive(Clone, Default)]
-struct Silent(Arc<Mutex<VecDeque<Weak<Unheard>>>>);
-
-impl Silent {
-    fn one(&self) -> Arc<Unheard> {
-        let one = Arc::new(Unheard::default());
-        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        all.retain(|c| c.strong_count() > 0);
-        all.push_back(Arc::downgrade(&one));
-        one
-    }
-
-    fn oldest_goes(&self) {
-        let mut all = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        while let Some(oldest) = all.pop_front() {
-            if let Some(oldest) = oldest.upgrade() {
-                oldest.goes.store(true, Ordering::SeqCst);
-                return oldest.task.wake();
-            }
-        }
-    }
-}
-
-/// One connection; it counts until it is dropped.
+/// One connection; its place is given back when it and its requests have gone.
 pub struct Connection {
     io: Stream,
-    peer: SocketAddr,
-    /// `None` as soon as something was read.
-    unheard: Option<Arc<Unheard>>,
-    /// Ends the connection where nothing moves.
+    peer: Peer,
+    moved: Instant,
+    /// Wakes the task when the connection may have been idle for too long.
     idle: Pin<Box<Sleep>>,
-    _permit: OwnedSemaphorePermit,
 }
 
 impl Connection {
-    /// Something moved: the clock of an idle connection begins again.
-    fn moved(&mut self) {
-        self.idle.as_mut().reset(Instant::now() + IDLE);
+    /// Why the connection ends although its other end has not closed it: it made room, or nothing moved for too long.
+    fn over(&mut self, cx: &mut Context) -> Poll<io::Error> {
+        let place = &self.peer.seat.place;
+        if place.is_gone(cx) {
+            return Poll::Ready(io::ErrorKind::ConnectionAborted.into());
+        }
+        let until = self.moved + if place.is_guest() { IDLE } else { SILENT };
+        loop {
+            std::task::ready!(self.idle.as_mut().poll(cx));
+            if until <= Instant::now() {
+                return Poll::Ready(io::ErrorKind::TimedOut.into());
+            }
+            self.idle.as_mut().reset(until);
+        }
     }
 }
 
@@ -184,30 +179,27 @@ impl AsyncRead for Connection {
             Stream::Plain(s) => Pin::new(s).poll_read(cx, buf),
             Stream::Tls(s) => Pin::new(s).poll_read(cx, buf),
         };
-        if read.is_ready() {
-            if buf.filled().len() > before {
-                self.unheard = None;
-                self.moved();
-            }
-            return read;
+        if read.is_pending() {
+            return self.over(cx).map(Err);
         }
-        if let Some(unheard) = &self.unheard {
-            unheard.task.register(cx.waker());
-            if unheard.goes.load(Ordering::SeqCst) {
-                return Poll::Ready(Err(io::ErrorKind::ConnectionAborted.into()));
-            }
+        if buf.filled().len() > before {
+            self.moved = Instant::now();
         }
-        self.idle.as_mut().poll(cx).map(|()| Err(io::ErrorKind::TimedOut.into()))
+        read
     }
 }
 
 impl AsyncWrite for Connection {
     fn poll_write(mut self: Pin<&mut Self>, cx: &mut Context, buf: &[u8]) -> Poll<io::Result<usize>> {
-        self.moved();
-        match &mut self.io {
+        let written = match &mut self.io {
             Stream::Plain(s) => Pin::new(s).poll_write(cx, buf),
             Stream::Tls(s) => Pin::new(s).poll_write(cx, buf),
+        };
+        if written.is_pending() {
+            return self.over(cx).map(Err);
         }
+        self.moved = Instant::now();
+        written
     }
     fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context) -> Poll<io::Result<()>> {
         match &mut self.io {
@@ -227,6 +219,7 @@ impl AsyncWrite for Connection {
 mod tests {
     use super::*;
     use axum::Router;
+    use axum::extract::ConnectInfo;
     use axum::routing::get;
     use tokio::io::{AsyncReadExt, AsyncWriteExt};
 
@@ -238,25 +231,56 @@ mod tests {
         Ok(answer)
     }
 
-    /// More connections than there are places, all silent: who speaks is answered, and a silent one ends by itself.
-    #[test]
-    fn silent_connections_lock_nobody_out() {
+    /// A server that takes every request with the word `me` for one with a session.
+    fn served(what: impl AsyncFnOnce(SocketAddr)) {
         let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().unwrap();
         runtime.block_on(async {
             let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
             let to = listener.local_addr().unwrap();
             let doorway = Doorway::new(listener, None).unwrap();
-            let app = Router::new().route("/", get(async || "here"));
+            let shows = async |ConnectInfo(peer): ConnectInfo<Peer>| {
+                peer.shows_session();
+                "here"
+            };
+            let app = Router::new().route("/", get(async || "here")).route("/me", get(shows));
+            let app = app.into_make_service_with_connect_info::<Peer>();
             tokio::spawn(axum::serve(doorway, app).into_future());
+            what(to).await;
+        });
+    }
+
+    /// Another request on a connection that stays open.
+    async fn again(stream: &mut TcpStream, path: &str) -> io::Result<bool> {
+        stream.write_all(format!("GET {path} HTTP/1.1\r\nhost: here\r\n\r\n").as_bytes()).await?;
+        let mut answer = [0; 1024];
+        let read = stream.read(&mut answer).await?;
+        Ok(answer[..read].ends_with(b"here"))
+    }
+
+    /// More connections than there are places, some silent, some in the midst of a request that they never end: who
+    /// speaks is answered, who has shown a session keeps his connection, and a silent one ends by itself.
+    #[test]
+    fn idle_connections_lock_nobody_out() {
+        served(async |to| {
+            let mut mine = TcpStream::connect(to).await.unwrap();
+            assert!(again(&mut mine, "/me").await.unwrap());
             let mut idle = Vec::new();
-            for _ in 0..MOST + 44 {
-                idle.push(TcpStream::connect(to).await.unwrap());
+            for k in 0..600 {
+                let mut stream = TcpStream::connect(to).await.unwrap();
+                if k % 2 == 1 {
+                    // Whose place was taken meanwhile is told so.
+                    let _ = stream.write_all(b"GET /me HTTP/1.1\r\nhost").await;
+                }
+                idle.push(stream);
             }
-            let answer = tokio::time::timeout(Duration::from_secs(5), asks(to)).await.expect("within 5 s").unwrap();
+            let answer = tokio::time::timeout(Duration::from_secs(20), asks(to)).await.expect("in time").unwrap();
             assert!(answer.ends_with("here"), "{answer}");
-            let mut byte = [0];
-            let ended = tokio::time::timeout(SILENT * 2, idle.last_mut().unwrap().read(&mut byte)).await;
-            assert_eq!(ended.expect("it is closed").unwrap_or(0), 0);
+            assert!(again(&mut mine, "/me").await.unwrap(), "a session's connection made room for them");
+            for last in idle.iter_mut().rev().take(2) {
+                let ended = tokio::time::timeout(SILENT * 3, last.read(&mut [0])).await;
+                assert_eq!(ended.expect("it is closed").unwrap_or(0), 0);
+            }
+            assert!(again(&mut mine, "/me").await.unwrap(), "it was idle for less than its own time");
         });
     }
 }

@@ -197,11 +197,6 @@ pub struct TeachOrder {
 }
 
 impl Order {
-    /// It moves the robot.
-    pub fn moves(&self) -> bool {
-        matches!(self, Order::Auto(_) | Order::Insert(_))
-    }
-
     /// The word that folders and pages call it by.
     pub fn word(&self) -> &'static str {
         match self {

@@ -2,14 +2,18 @@
 //! go halts.
 //! Frame and unit: base frame; mm, mm/s, s.
 
+mod arming;
+mod brake;
+mod button;
 mod desk;
 mod grants;
 mod person;
 mod session;
 mod simulated;
+mod state;
 
 #[cfg(test)]
-pub use desk::SILENCE;
+pub use button::SILENCE;
 pub use desk::{Desk, Links};
 #[cfg(test)]
 pub use grants::{HELD, LONGEST};

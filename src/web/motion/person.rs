@@ -1,13 +1,14 @@
 //! In: what a job is about to do. Out: the yes of whoever holds the button at the screen.
 //! Frame and unit: base frame, in the station's notation.
 
-use super::desk::{Answer, Desk};
+use super::button::Answer;
+use super::desk::Desk;
 use crate::arm::rules::Confirmation;
 use crate::fault::{Fault, Result};
 use crate::robot::Convention;
 use crate::station::job::{Ask, Operator};
 use crate::web::message::{Asked, GateLight};
-use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Steps that only look, far from the part: the button may stay down from one to the next.
 const LOOKING: [&str; 3] = ["touch", "scan", "calibrate"];
@@ -15,9 +16,11 @@ const LOOKING: [&str; 3] = ["touch", "scan", "calibrate"];
 /// Whoever operates.
 pub struct Person<'a> {
     /// Where he sits.
-    pub desk: &'a Arc<Desk>,
+    pub desk: &'a Desk,
     /// The job that asks him.
     pub job: &'a str,
+    /// Ends that job.
+    pub stop: &'a AtomicBool,
     /// Notation of the poses that he is shown.
     pub robot: Convention,
     /// A motion is good for so long after it was shown, s.
@@ -54,7 +57,7 @@ impl Person<'_> {
 impl Operator for Person<'_> {
     fn confirm(&mut self, ask: &Ask) -> Result<Option<Confirmation>> {
         (self.step)(ask.step);
-        let answer = self.desk.ask(self.asked(ask));
+        let answer = self.desk.ask(self.asked(ask), self.stop);
         self.late = answer == Answer::Late;
         match answer {
             Answer::Yes => Ok(Some(Confirmation::of(&*ask.proposal.hash))),

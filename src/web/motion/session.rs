@@ -1,32 +1,38 @@
-//! In: an armed robot. Out: the same for one job; whatever ends the job, it comes back to the desk with what has to be looked at.
-//! Frame and unit: none.
+//! A job's, or a request's, time with the robot: whatever ends it, the guard comes back to the desk.
 
 use super::desk::Desk;
+use super::state::At;
 use crate::arm::rules::Guard;
-use crate::fault::{Fault, Result};
+use crate::fault::Result;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// A job's time with the robot; ends when it is dropped.
-pub struct Session {
-    desk: Arc<Desk>,
-    guard: Option<Guard>,
+/// The time with the robot; ends when it is dropped.
+pub struct Session<'a> {
+    desk: &'a Desk,
+    guard: Option<Box<Guard>>,
 }
 
-impl Session {
-    /// Takes the robot for a job. Errors: it is not armed.
-    pub fn begin(desk: &Arc<Desk>, job: &str, stop: &Arc<AtomicBool>) -> Result<Session> {
+impl Session<'_> {
+    /// Takes the robot for a job.
+    ///
+    /// # Errors
+    /// It is not armed, in use, or `stop` is set already.
+    pub fn begin<'a>(desk: &'a Desk, job: &str, stop: &Arc<AtomicBool>) -> Result<Session<'a>> {
         let mut at = desk.at();
-        let Some(guard) = at.guard.take() else {
-            return Err(Fault::refused("the robot is not armed")
-                .cause("a job that moves it is begun by whoever stands beside it")
-                .next("press Arm, then begin it again"));
-        };
-        at.stop = Some(stop.clone());
-        at.shown.job = Some(job.to_owned());
-        (at.shown.said, at.shown.expected) = (Vec::new(), Vec::new());
+        let guard = desk.lend(&mut at, Some(job), stop)?;
+        at.told.job = Some(job.to_owned());
+        (at.told.said, at.told.expected) = (Vec::new(), Vec::new());
         desk.tell(&at);
-        Ok(Session { desk: desk.clone(), guard: Some(guard) })
+        Ok(Session { desk, guard: Some(guard) })
+    }
+
+    /// Takes it for a request.
+    ///
+    /// # Errors
+    /// As [`Session::begin`].
+    pub(super) fn request<'a>(desk: &'a Desk, at: &mut At, stop: &Arc<AtomicBool>) -> Result<Session<'a>> {
+        Ok(Session { desk, guard: Some(desk.lend(at, None, stop)?) })
     }
 
     /// The robot behind its rules.
@@ -35,15 +41,10 @@ impl Session {
     }
 }
 
-impl Drop for Session {
+impl Drop for Session<'_> {
     fn drop(&mut self) {
-        let guard = self.guard.take();
-        let mut at = self.desk.at();
-        if let Some(why) = guard.as_ref().and_then(Guard::unknown) {
-            at.shown.look.get_or_insert_with(|| why.to_owned());
+        if let Some(guard) = self.guard.take() {
+            self.desk.back(guard);
         }
-        (at.guard, at.stop) = (guard, None);
-        (at.shown.asked, at.shown.moving) = (None, false);
-        self.desk.tell(&at);
     }
 }

@@ -9,7 +9,7 @@ use crate::simulate::{DEFAULT_SCENE, SceneSpec};
 use crate::web::message::SimulatedCell;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// Parts whose components there are, each with the scene that has its socket.
@@ -44,7 +44,10 @@ pub fn board() -> BoardSpec {
 /// A simulated cell and who stands beside it.
 pub struct SimulatedRobot {
     served: Served,
+    /// What the gripper holds and whether the arm stands over the board: never held over what takes long.
     at: Mutex<(String, bool)>,
+    /// One person works in the cell at a time.
+    hands: Mutex<()>,
     over: Arc<AtomicBool>,
 }
 
@@ -72,7 +75,8 @@ impl SimulatedRobot {
         served.controller.set_motor(true);
         let over = Arc::new(AtomicBool::new(false));
         follow(served.cell.clone(), folder.join("cell.jsonl"), over.clone())?;
-        let robot = SimulatedRobot { served, at: Mutex::new((part.to_owned(), false)), over };
+        let at = Mutex::new((part.to_owned(), false));
+        let robot = SimulatedRobot { served, at, hands: Mutex::default(), over };
         robot.put(None, false)?;
         Ok(robot)
     }
@@ -90,21 +94,25 @@ impl SimulatedRobot {
         format!("cell://{}?rate={GLANCES}", self.served.camera)
     }
 
+    fn at(&self) -> MutexGuard<'_, (String, bool)> {
+        self.at.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
     /// As pages see it.
     pub fn state(&self) -> SimulatedCell {
-        let (holds, over_board) = self.at.lock().unwrap_or_else(|e| e.into_inner()).clone();
+        let (holds, over_board) = self.at().clone();
         SimulatedCell { parts: PARTS.iter().map(|(name, _)| (*name).to_owned()).collect(), holds, over_board }
     }
 
     /// A person lays the board with a part's socket before the robot, puts its component into the gripper, and jogs the arm there, or
     /// over the calibration board.
     pub fn put(&self, holds: Option<&str>, over_board: bool) -> Result<()> {
-        let mut at = self.at.lock().unwrap_or_else(|e| e.into_inner());
-        let part = holds.unwrap_or(&at.0).to_owned();
+        let _one = self.hands.lock().unwrap_or_else(PoisonError::into_inner);
+        let part = holds.map_or_else(|| self.at().0.clone(), str::to_owned);
         let spec = scene(&part)?;
         self.served.cell.jog(if over_board { Over::Board } else { Over::Place(JOGGED_OFF_MM) })?;
         self.served.cell.lay(&spec, Some(&part))?;
-        *at = (part, over_board);
+        *self.at() = (part, over_board);
         Ok(())
     }
 }
@@ -120,14 +128,88 @@ fn follow(cell: Cell, path: PathBuf, over: Arc<AtomicBool>) -> Result<()> {
     let body = move || {
         let mut said = 0;
         while !over.load(Ordering::SeqCst) {
-            let log = cell.log();
-            for entry in &log[said..] {
+            let news = cell.log_after(said);
+            said += news.len();
+            for entry in &news {
                 // A log that cannot be written stops no cell.
                 let _ = crate::files::append_line(&path, &serde_json::to_string(entry).expect("plain data"));
             }
-            said = log.len();
             std::thread::sleep(LOG);
         }
     };
     std::thread::Builder::new().name("cell log".into()).spawn(body).map(|_| ()).map_err(|e| Fault::threads(&e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cell::Event;
+    use crate::station::Output;
+    use crate::web::for_cell::station_for;
+    use crate::web::guard::Tab;
+    use crate::web::motion::{Desk, Links};
+    use std::sync::mpsc::channel;
+    use std::time::Instant;
+
+    const PATIENCE: Duration = Duration::from_secs(20);
+
+    /// Pages hear of the cell while somebody works in it, however long that takes.
+    #[test]
+    fn who_looks_does_not_wait_for_hands_in_the_cell() {
+        let dir = tempfile::tempdir().unwrap();
+        let robot = Arc::new(SimulatedRobot::start(dir.path(), "osc", 3, 1.0).unwrap());
+        let (tell, told) = channel();
+        // It holds what whoever works in the cell holds all the while.
+        let works = robot.hands.lock().unwrap();
+        let (looks, puts) = (robot.clone(), robot.clone());
+        std::thread::spawn(move || tell.send(looks.state()));
+        let putting = std::thread::spawn(move || puts.put(Some("led"), false));
+        assert_eq!(told.recv_timeout(PATIENCE).expect("it waits").holds, "osc");
+        drop(works);
+        putting.join().unwrap().unwrap();
+        assert_eq!(robot.state().holds, "led");
+    }
+
+    /// A laser that is tried goes off when STOP is pressed, long before its time.
+    #[test]
+    fn stop_switches_off_what_is_tried() {
+        let dir = tempfile::tempdir().unwrap();
+        let robot = SimulatedRobot::start(dir.path(), "osc", 3, 1.0).unwrap();
+        let (cell, station) = (robot.cell().clone(), dir.path().join("station"));
+        station_for(&cell, &station, "simulated", Some(2000.0)).unwrap();
+        let uri = Some(robot.robot_uri());
+        let links = Links { station, robot: uri, may_move: true, simulated: Some(robot), ..Links::default() };
+        let (desk, tab) = (Arc::new(Desk::new(links, Arc::default())), Tab { session: "s".into(), tab: "a".into() });
+        desk.arm(&tab).unwrap();
+        let line = cell.options().outputs.line;
+        let switched = |to: bool, after: f64| {
+            let until = Instant::now() + PATIENCE;
+            let switch = |e: &crate::cell::Entry| {
+                matches!(e.event, Event::Output { number, on } if number == line && on == to) && e.t_s > after
+            };
+            loop {
+                if let Some(entry) = cell.log().iter().find(|e| switch(e)) {
+                    return entry.t_s;
+                }
+                assert!(Instant::now() < until, "the laser was not switched to {to}");
+                std::thread::sleep(Duration::from_millis(2));
+            }
+        };
+        // The whole time, for comparison.
+        let begun = cell.clock().now();
+        desk.try_output(&tab, Output::Line).unwrap();
+        let lit = switched(true, begun);
+        let whole = switched(false, lit) - lit;
+        let tries = std::thread::spawn({
+            let (desk, tab) = (desk.clone(), tab.clone());
+            move || desk.try_output(&tab, Output::Line)
+        });
+        let lit = switched(true, lit);
+        desk.stop();
+        let stopped = switched(false, lit) - lit;
+        println!("lit for {whole:.3} s, with STOP for {stopped:.3} s");
+        assert!(stopped < whole / 2.0, "{stopped} s of {whole}");
+        tries.join().unwrap().unwrap();
+        assert!(desk.state().look.is_some() && desk.looked().unwrap().look.is_none());
+    }
 }

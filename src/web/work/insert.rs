@@ -47,7 +47,7 @@ pub(super) fn insert(this: &Run, order: &InsertOrder) -> Result<Outcome> {
         let done = STEPS.iter().position(|s| *s == name).unwrap_or(0);
         this.progress(done, Some(STEPS.len()));
     };
-    let mut person = Person { desk, job: &this.id, robot, within_s, step: &step, late: false };
+    let mut person = Person { desk, job: &this.id, stop: &this.stop, robot, within_s, step: &step, late: false };
     let job = Job::open(&options, session.guard(), camera.lend()?, &mut person)?;
     let report = if order.back_out { job.back_out() } else { job.run() }?;
     if report.outcome == Ended::Stopped {

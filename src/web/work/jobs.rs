@@ -28,14 +28,20 @@ pub struct Jobs {
     pub desk: Arc<Desk>,
     /// Frames of the scan that runs, or of the last one.
     pub frames: Mutex<Frames>,
+    /// Whoever changes a record on the disk holds the pen, so that two changes of one job come one after the other.
+    /// It is taken before the state, and may be held for as long as the disk takes.
+    pen: Mutex<()>,
+    /// Memory alone: nobody reads or writes the disk while he holds it. STOP waits for it.
     state: Mutex<State>,
     wake: Condvar,
 }
 
 struct State {
-    all: BTreeMap<u32, Job>,
+    all: BTreeMap<u32, Arc<Job>>,
     waiting: VecDeque<u32>,
     running: Option<Running>,
+    /// Presses of STOP so far: an order that was being written when it was pressed is stopped too.
+    stops: u64,
     closing: bool,
 }
 
@@ -43,6 +49,15 @@ struct Running {
     number: u32,
     stop: Arc<AtomicBool>,
     told: Instant,
+}
+
+impl State {
+    /// A job that waited is stopped.
+    fn stopped(&mut self, number: u32) -> Option<Job> {
+        let job = Arc::make_mut(self.all.get_mut(&number)?);
+        (job.state, job.resumable) = (JobState::Stopped, true);
+        Some(job.clone())
+    }
 }
 
 /// What the worker takes up.
@@ -55,12 +70,14 @@ impl Jobs {
     /// Reads what there is.
     pub fn open(place: Place, hub: Arc<Hub>, desk: Arc<Desk>) -> Result<Arc<Jobs>> {
         let all = store::load(&place.jobs())?;
-        let state = State { all, waiting: VecDeque::new(), running: None, closing: false };
+        let all = all.into_iter().map(|(number, job)| (number, Arc::new(job))).collect();
+        let state = State { all, waiting: VecDeque::new(), running: None, stops: 0, closing: false };
         Ok(Arc::new(Jobs {
             place,
             hub,
             desk,
             frames: Mutex::default(),
+            pen: Mutex::default(),
             state: Mutex::new(state),
             wake: Condvar::new(),
         }))
@@ -70,15 +87,20 @@ impl Jobs {
         self.state.lock().unwrap_or_else(|e| e.into_inner())
     }
 
+    fn pen(&self) -> MutexGuard<'_, ()> {
+        self.pen.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
     /// Newest first, at most `most`.
     pub fn list(&self, most: usize) -> Vec<Job> {
-        self.state().all.values().rev().take(most).cloned().collect()
+        let some: Vec<Arc<Job>> = self.state().all.values().rev().take(most).cloned().collect();
+        some.iter().map(|job| Job::clone(job)).collect()
     }
 
     /// One of them.
     pub fn get(&self, id: &str) -> Result<Job> {
         let found = number_of(id).and_then(|n| self.state().all.get(&n).filter(|j| j.id == id).cloned());
-        found.ok_or_else(|| {
+        found.map(|job| Job::clone(&job)).ok_or_else(|| {
             Fault::input(format!("{id:?}: is no job of this station"))
                 .cause("it was taken away meanwhile")
                 .next("reload the page")
@@ -98,13 +120,16 @@ impl Jobs {
 
     /// Takes an order. Errors: too many wait; the disk.
     pub fn order(&self, order: Order) -> Result<Job> {
-        let mut state = self.state();
+        let _pen = self.pen();
+        let state = self.state();
         if state.waiting.len() >= MOST_WAITING {
             return Err(
                 Fault::refused(format!("{MOST_WAITING} jobs wait already")).next("wait for some of them, or stop them")
             );
         }
         let number = state.all.keys().next_back().map_or(1, |n| n + 1);
+        let stops = state.stops;
+        drop(state);
         let job = Job {
             format: FORMAT,
             id: format!("{number:04}-{}", order.word()),
@@ -118,22 +143,15 @@ impl Jobs {
             outcome: None,
             resumable: false,
         };
-        store::save(&self.place.jobs(), &job)?;
-        state.all.insert(number, job.clone());
-        state.waiting.push_back(number);
-        drop(state);
-        self.tell(&job);
-        self.wake.notify_all();
-        Ok(job)
+        self.queue(job, stops)
     }
 
     /// Goes on with a job that was cut off or stopped; `back_out`: an insertion goes back up instead.
     pub fn resume(&self, id: &str, back_out: bool) -> Result<Job> {
+        // Looked at and queued under one pen: a request that comes twice queues the job once.
+        let _pen = self.pen();
+        let stops = self.state().stops;
         let mut job = self.get(id)?;
-        let number = number_of(id).expect("a job's id");
-        // Looked at and queued under one lock: a request that comes twice queues the job once.
-        let mut state = self.state();
-        job.state = state.all.get(&number).map_or(JobState::Done, |j| j.state);
         if back_out && !matches!(job.order, Order::Insert(_)) {
             return Err(Fault::usage(format!("{id}: moves no robot, there is nothing to back out of"))
                 .next("take it away, or resume it"));
@@ -147,42 +165,84 @@ impl Jobs {
             ask.back_out = back_out;
         }
         (job.state, job.problem, job.outcome) = (JobState::Queued, None, None);
+        self.queue(job, stops)
+    }
+
+    /// Writes a job's record and lets it wait its turn; the caller holds the pen. Where STOP was pressed since `stops`
+    /// was read it is stopped instead.
+    fn queue(&self, mut job: Job, stops: u64) -> Result<Job> {
         store::save(&self.place.jobs(), &job)?;
-        state.all.insert(number, job.clone());
-        state.waiting.push_back(number);
+        let number = number_of(&job.id).expect("a job's id");
+        let mut state = self.state();
+        state.all.insert(number, Arc::new(job.clone()));
+        if state.stops == stops {
+            state.waiting.push_back(number);
+        } else {
+            job = state.stopped(number).expect("just put there");
+        }
         drop(state);
+        if job.state == JobState::Stopped {
+            store::save(&self.place.jobs(), &job)?;
+        }
         self.tell(&job);
         self.wake.notify_all();
         Ok(job)
     }
 
-    /// Stops a job that runs or waits; what it did is kept.
+    /// STOP: what runs ends, what waits is stopped, at once and in memory; what they did is kept. Gives the names of
+    /// those whose records are to be written ([`Jobs::keep`]).
+    pub fn stop_all(&self) -> Vec<String> {
+        let mut state = self.state();
+        state.stops += 1;
+        if let Some(r) = &state.running {
+            r.stop.store(true, Ordering::SeqCst);
+        }
+        let waiting = std::mem::take(&mut state.waiting);
+        let stopped: Vec<Job> = waiting.into_iter().filter_map(|number| state.stopped(number)).collect();
+        drop(state);
+        // After the flag: a job that takes the robot only now sees it.
+        self.desk.stop();
+        stopped.iter().for_each(|job| self.tell(job));
+        stopped.into_iter().map(|job| job.id).collect()
+    }
+
+    /// Stops a job that runs or waits, in the same way; what it did is kept.
     pub fn stop(&self, id: &str) -> Result<Job> {
-        let mut job = self.get(id)?;
+        let job = self.get(id)?;
         let number = number_of(id).expect("a job's id");
         let mut state = self.state();
         if let Some(r) = state.running.as_ref().filter(|r| r.number == number) {
-            r.stop.store(true, Ordering::Relaxed);
+            r.stop.store(true, Ordering::SeqCst);
             drop(state);
-            if job.order.moves() {
-                self.desk.stop();
-            }
+            self.desk.stop_job(id);
             return Ok(job);
         }
         let waited = state.waiting.len();
         state.waiting.retain(|n| *n != number);
-        if state.waiting.len() == waited {
-            return Err(Fault::usage(format!("{id}: neither runs nor waits")).next("nothing is to be stopped"));
-        }
+        let stopped = if state.waiting.len() < waited { state.stopped(number) } else { None };
         drop(state);
-        job.state = JobState::Stopped;
-        job.resumable = true;
-        self.put(&job)?;
-        Ok(job)
+        let stopped = stopped
+            .ok_or_else(|| Fault::usage(format!("{id}: neither runs nor waits")).next("nothing is to be stopped"))?;
+        self.tell(&stopped);
+        Ok(stopped)
+    }
+
+    /// Writes jobs' records as they are in memory now. One that cannot be written says so; after a restart it counts as
+    /// cut off.
+    pub fn keep(&self, ids: &[String]) {
+        let _pen = self.pen();
+        for mut job in ids.iter().filter_map(|id| self.get(id).ok()) {
+            if let Err(fault) = store::save(&self.place.jobs(), &job) {
+                job.problem = Some(Problem::from(&fault));
+                self.set(&job);
+            }
+        }
     }
 
     /// Takes a job and its files away; refused while it runs or waits.
     pub fn remove(&self, id: &str) -> Result<()> {
+        // With the pen: nobody resumes it while its files go.
+        let _pen = self.pen();
         let job = self.get(id)?;
         if matches!(job.state, JobState::Running | JobState::Queued) {
             return Err(Fault::usage(format!("{id}: runs or waits")).next("stop it first"));
@@ -194,12 +254,19 @@ impl Jobs {
         Ok(())
     }
 
-    /// Keeps a job's record and tells of it.
+    /// Keeps a job's record and tells of it. Errors: it was taken away meanwhile; the disk.
     pub(super) fn put(&self, job: &Job) -> Result<()> {
+        let _pen = self.pen();
+        self.get(&job.id)?;
         store::save(&self.place.jobs(), job)?;
-        self.state().all.insert(number_of(&job.id).expect("a job's id"), job.clone());
-        self.tell(job);
+        self.set(job);
         Ok(())
+    }
+
+    /// Changes a job in memory and tells of it.
+    fn set(&self, job: &Job) {
+        self.state().all.insert(number_of(&job.id).expect("a job's id"), Arc::new(job.clone()));
+        self.tell(job);
     }
 
     fn tell(&self, job: &Job) {
@@ -218,7 +285,7 @@ impl Jobs {
                 let Some(job) = state.all.get(&number).cloned() else { continue };
                 let stop = Arc::new(AtomicBool::new(false));
                 state.running = Some(Running { number, stop: stop.clone(), told: Instant::now() });
-                return Some(Taken { job, stop });
+                return Some(Taken { job: Job::clone(&job), stop });
             }
             state = self.wake.wait(state).unwrap_or_else(|e| e.into_inner());
         }
@@ -234,7 +301,8 @@ impl Jobs {
             running.told = Instant::now();
         }
         let Some(job) = state.all.get_mut(&number) else { return };
-        (job.done, job.of) = (done, of);
+        let now = Arc::make_mut(job);
+        (now.done, now.of) = (done, of);
         let job = job.clone();
         drop(state);
         if tell {
@@ -259,8 +327,7 @@ impl Jobs {
         if let Err(fault) = self.put(&job) {
             // The disk that the record belongs on is full or gone: those who look on hear it at least.
             (job.state, job.problem) = (JobState::Failed, Some(Problem::from(&fault)));
-            self.tell(&job);
-            self.state().all.insert(number_of(&job.id).expect("a job's id"), job);
+            self.set(&job);
         }
     }
 
@@ -269,9 +336,11 @@ impl Jobs {
         let mut state = self.state();
         state.closing = true;
         if let Some(r) = &state.running {
-            r.stop.store(true, Ordering::Relaxed);
+            r.stop.store(true, Ordering::SeqCst);
         }
         drop(state);
+        // An output that is tried goes off before the program ends.
+        self.desk.stop();
         self.wake.notify_all();
     }
 }
@@ -303,6 +372,56 @@ mod tests {
         });
         assert_eq!(both.iter().filter(|ok| **ok).count(), 1);
         assert_eq!(jobs.state().waiting.len(), 1);
+    }
+
+    /// While somebody writes a record, for as long as the disk takes, STOP has acted and pages are answered. An order
+    /// that is being written then is stopped too.
+    #[test]
+    fn stop_and_lists_do_not_wait_for_the_disk() {
+        let dir = tempfile::tempdir().unwrap();
+        let jobs = jobs(dir.path());
+        let waits = jobs.order(Order::Check(Plain {})).unwrap();
+        let runs = jobs.take().unwrap();
+        let queued = jobs.order(Order::Check(Plain {})).unwrap();
+        let at_the_disk = jobs.pen();
+        let stops = jobs.state().stops;
+        let (tell, told) = std::sync::mpsc::channel();
+        std::thread::spawn({
+            let jobs = jobs.clone();
+            move || tell.send((jobs.stop_all(), jobs.list(10)))
+        });
+        let (stopped, list) = told.recv_timeout(Duration::from_secs(20)).expect("it waits for the disk");
+        assert!(runs.stop.load(Ordering::SeqCst) && runs.job.id == waits.id);
+        assert_eq!((stopped.as_slice(), list[0].state), (&[queued.id.clone()][..], JobState::Stopped));
+        let late = Job { id: "0009-check".into(), ..queued.clone() };
+        assert_eq!(jobs.queue(late, stops).unwrap().state, JobState::Stopped);
+        assert!(jobs.state().waiting.is_empty());
+        drop(at_the_disk);
+        jobs.keep(&stopped);
+        let of = |id: &str| std::fs::read_to_string(dir.path().join("jobs").join(id).join("job.json")).unwrap();
+        assert!(of(&queued.id).contains("\"stopped\"") && of("0009-check").contains("\"stopped\""));
+    }
+
+    /// Whoever resumes a job while another one takes it away: one of them is refused, and what is queued is there.
+    #[test]
+    fn a_job_is_not_taken_away_while_it_is_resumed() {
+        let dir = tempfile::tempdir().unwrap();
+        let jobs = jobs(dir.path());
+        for _ in 0..30 {
+            let job = jobs.order(Order::Check(Plain {})).unwrap();
+            jobs.stop(&job.id).unwrap();
+            let files = jobs.folder(&job).join("files");
+            std::fs::create_dir(&files).unwrap();
+            (0..50).for_each(|k| std::fs::write(files.join(k.to_string()), "").unwrap());
+            let (resumed, removed) = std::thread::scope(|scope| {
+                let resumes = scope.spawn(|| jobs.resume(&job.id, false).is_ok());
+                let removes = scope.spawn(|| jobs.remove(&job.id).is_ok());
+                (resumes.join().unwrap(), removes.join().unwrap())
+            });
+            assert!(resumed != removed, "resumed {resumed}, removed {removed}");
+            assert_eq!(jobs.folder(&job).exists(), resumed);
+            assert_eq!(jobs.state().waiting.pop_front().is_some(), resumed);
+        }
     }
 
     #[test]

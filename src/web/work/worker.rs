@@ -51,6 +51,9 @@ fn one(jobs: &Arc<Jobs>, Taken { mut job, stop }: Taken) {
     let camera = jobs.desk.links.camera.as_ref();
     camera.inspect(|c| c.make_way(true));
     let ended = jobs.put(&job).and_then(|()| {
+        if this.stopped() {
+            return Err(Fault::refused("stopped before it began").next("resume it, or take it away"));
+        }
         catch_unwind(AssertUnwindSafe(|| run(&this, &order))).unwrap_or_else(|panic| {
             let said = panic.downcast_ref::<String>().map(String::as_str).or(panic.downcast_ref::<&str>().copied());
             Err(Fault::device(format!("the procedure ended in a bug: {}", said.unwrap_or("no message")))

@@ -62,7 +62,7 @@ pub(in crate::web::work) fn auto(this: &Run, order: &AutoOrder) -> Result<Outcom
     let mut session = Session::begin(desk, &this.id, &this.stop)?;
     let within_s = session.guard().limits().map_or(0.0, |l| l.max_shown_s);
     let robot = settings.robot.unwrap_or(Convention::Denso);
-    let mut person = Person { desk, job: &this.id, robot, within_s, step: &|_| {}, late: false };
+    let mut person = Person { desk, job: &this.id, stop: &this.stop, robot, within_s, step: &|_| {}, late: false };
     let mut cell =
         ArmCell::new(session.guard(), camera.lend()?, settings.outputs.unwrap_or_default(), &mut person, None)?;
     let most = asked.most;
