@@ -1,5 +1,5 @@
-//! What asks the controller for a screen: arming, trying an output, reading the pose after somebody has looked. None of it
-//! holds the desk's lock meanwhile.
+//! What asks the controller for a screen: arming, trying an output, reading the pose after somebody has looked. None of
+//! it holds the desk's lock meanwhile.
 
 use super::desk::Desk;
 use super::session::Session;
@@ -18,7 +18,7 @@ impl Desk {
     pub fn arm(&self, tab: &Tab) -> Result<MotionState> {
         let made = if self.armed() { None } else { Some(self.guarded()?) };
         let mut at = self.at();
-        // Of two who arm at once the second one's guard is dropped after the desk: giving an arm back asks the controller.
+        // Of two who arm at once the second one's guard is dropped after the desk: that asks the controller.
         let late = match made {
             Some(guard) if !at.armed() => {
                 self.brake.arm(Some(guard.stop_button()));
