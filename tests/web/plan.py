@@ -74,7 +74,7 @@ def drawn(s, b, recipe):
             limits, [f"{pace['speed_mm_s']:.1f}", f"{pace['rate_hz']:.1f}"],
         )
     assert s.ask("GET", f"/api/v1/sweep?recipe={recipe}&sweep_mm=2")[0] == 400
-    assert s.ask("GET", "/api/v1/sweep?recipe=../x")[0] == 404
+    assert s.ask("GET", "/api/v1/sweep?recipe=../x")[0] in (400, 404)
     quiet(b, "path over the part")
     return plan
 
