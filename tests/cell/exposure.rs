@@ -1,11 +1,24 @@
 //! How long the simulated camera exposes: as it was set, over its wire, and as tuning finds it.
 
-use super::workplace::{Set, scene, set};
+use super::workplace::{Set, scene, set_but};
 use sheetlight::arm::{Outputs, Switchboard};
 use sheetlight::capture::source::cell::CellCamera;
 use sheetlight::capture::{Event, PictureSource, WANTED, fresh, tune};
 use sheetlight::recording::Beam;
+use sheetlight::simulate::{Material, ShapeSpec, SolidSpec};
 use std::time::Duration;
+
+/// A cell with a white matte plate before the sensor: nothing on it glints.
+fn white() -> Set {
+    set_but(scene("osc", 3), 3, 2.0, |spec| {
+        let (shape, material) =
+            (ShapeSpec::Block { size_mm: [300.0, 300.0, 2.0] }, Material { albedo: 0.9, ..Material::default() });
+        let at_mm = [spec.part[0].at_mm[0], spec.part[0].at_mm[1], 0.0];
+        spec.part.clear();
+        spec.solid =
+            vec![SolidSpec { shape, at_mm, turn_deg: 0.0, material, cut: vec![], repeat: [1, 1], pitch_mm: [0.0; 2] }];
+    })
+}
 
 fn camera(set: &Set, rate_hz: f64) -> CellCamera {
     CellCamera::open(&set.served.camera.to_string(), rate_hz).unwrap()
@@ -19,7 +32,7 @@ fn light(camera: &mut CellCamera) -> f64 {
 
 #[test]
 fn tuning_finds_the_exposure_and_the_camera_keeps_it() {
-    let set = set(scene("osc", 3), 3, 2.0);
+    let set = white();
     let arm = sheetlight::arm::open(&set.served.robot_uri()).unwrap();
     // Pictures at the camera's own pace, and those that are asked for one by one.
     for (rate_hz, from) in [(50.0, "40"), (-1.0, "9000")] {
@@ -46,7 +59,7 @@ fn tuning_finds_the_exposure_and_the_camera_keeps_it() {
 
 #[test]
 fn light_goes_with_the_exposure_and_what_cannot_be_set_is_refused() {
-    let set = set(scene("osc", 3), 3, 2.0);
+    let set = white();
     let mut camera = camera(&set, -1.0);
     let mut at = |us: &str| {
         camera.set("ExposureTime", us).unwrap();
