@@ -11,7 +11,7 @@ use std::path::Path;
 /// What happens to a result that is badly determined.
 #[derive(clap::Args)]
 pub struct Keep {
-    /// Store the result even where it is badly determined
+    /// Store the result even if it is badly determined
     #[arg(long)]
     keep_badly_determined: bool,
 }

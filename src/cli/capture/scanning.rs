@@ -37,7 +37,7 @@ pub fn scan_camera(
     bar: &ProgressBar,
 ) -> Result<ScanReport> {
     let motion = capture.motion().ok_or_else(|| {
-        Fault::usage("a scan needs to know where things stood at each picture, and --pair says none")
+        Fault::usage("a scan needs a pose for each picture, but --pair none gives no poses")
             .next("say how pictures are paired: --pair given, step, count or clock (docs/live.md)")
     })?;
     if options.resume {

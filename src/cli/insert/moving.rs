@@ -15,22 +15,22 @@ use std::path::PathBuf;
 /// A robot with a camera that may be moved.
 #[derive(clap::Args)]
 pub(in crate::cli) struct Moving {
-    /// Station folder; its station.toml states [motion], [outputs] and [tool] (docs/robots.md)
+    /// Station folder; station.toml needs [motion], [outputs] and [tool] (docs/robots.md)
     #[arg(long)]
     pub station: PathBuf,
-    /// The robot: bcap://HOST[:5007][?network=udp][&full=MM_S][&turn=DEG_S]
+    /// The robot: bcap://HOST[:5007][?network=udp][&full=MM_S][&turn=DEG_S] (docs/robots.md)
     #[arg(long)]
     pub robot: String,
     /// The camera (docs/live.md)
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<CameraUri>)]
     pub camera: CameraUri,
-    /// The arm may move
+    /// Allow robot motion
     #[arg(long)]
     pub allow_motion: bool,
-    /// Speed of every motion, mm/s, at most the station's [default: the station's, else 50]
+    /// Speed of every motion, mm/s, up to the station's [default: the station's, else 50]
     #[arg(long)]
     pub speed: Option<f64>,
-    /// Say yes to every motion: for simulated cells alone
+    /// Confirm every motion automatically; simulated cells only
     #[arg(long)]
     pub yes: bool,
 }
@@ -72,7 +72,7 @@ impl Person<'_> {
             return Ok(true);
         }
         if !std::io::stdin().is_terminal() {
-            return Err(Fault::usage(format!("nobody can answer '{question}': standard input is no terminal"))
+            return Err(Fault::usage(format!("nobody can answer '{question}': standard input is not a terminal"))
                 .next("run it in a terminal"));
         }
         self.console.ask(&format!("   {question} [y/N] "));

@@ -55,7 +55,7 @@ impl Console {
         match &*self.failed.borrow() {
             Some(e) if e.kind() != ErrorKind::BrokenPipe => Err(Fault::output(format!("standard output: {e}"))
                 .cause("the disk that it is sent to is full, or it was closed")
-                .next("free some space, or send it elsewhere; what the command wrote into files is whole")),
+                .next("free some space, or send it elsewhere; the command's files are complete")),
             _ => Ok(()),
         }
     }

@@ -72,7 +72,7 @@ pub fn check_scan(out: &Path, label: &str) -> Result<()> {
     }
     match load_report(out) {
         Ok(report) if report.recording == label => Ok(()),
-        _ => Err(Fault::usage(format!("{}: holds a scan of something else", out.display()))
+        _ => Err(Fault::usage(format!("{}: contains a scan of another recording", out.display()))
             .cause("the folder of a real scan was given")
             .next("give another --out")),
     }
