@@ -3,7 +3,7 @@
 
 // Directions that are taken in turn beside a border.
 const BORDER_STEPS = 2u;
-// Share of a stripe's direction that leads out of the picture, from which on it leaves there.
+// From this share of its direction on a stripe counts as leaving the picture there.
 const LEAVES = 0.3;
 
 fn whole(x: i32, y: i32) -> i32 {
@@ -70,7 +70,7 @@ fn turn_of(sc: vec2<f32>, c: vec4<f32>) -> f32 {
     return c.x * sc.x + (c.y * s4 + (c.z * (s4 * sc.y + c4 * sc.x) + c.w * (2.0 * (s4 * c4))));
 }
 
-// Across the stripe; what so far differences make of the direction is put right.
+// Across the stripe. Corrects the error that differences over this distance make in the direction.
 fn direction_at(x: i32, y: i32) -> vec2<f32> {
     var t = tensor(x, y, frame.lattice_u, frame.lattice_v);
     let seen = twice(t);

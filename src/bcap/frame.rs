@@ -106,7 +106,7 @@ fn length_of(bytes: &[u8]) -> Result<Option<usize>> {
 
 fn spoilt(what: String) -> Fault {
     Fault::input(what)
-        .cause("damage on the way, or something else than b-CAP answers there")
+        .cause("damaged in transit, or the server there does not speak b-CAP")
         .next("check the address and the port (b-CAP: 5007)")
 }
 

@@ -38,7 +38,7 @@ impl Link {
     pub fn open(address: &str, network: Network, patience: Duration) -> Result<Link> {
         let mut last = None;
         let all = address.to_socket_addrs().map_err(|e| {
-            Fault::input(format!("{address}: is no address: {e}"))
+            Fault::input(format!("{address}: is not an address: {e}"))
                 .cause("a misspelt name, or the port is missing")
                 .next("write HOST:PORT, for example 192.168.0.1:5007")
         })?;

@@ -86,7 +86,7 @@ fn at((width, height): (u32, u32), rate_hz: f64, seconds: f64, place: Where) -> 
     let a = feed.account();
     if waits.is_empty() {
         return Err(Fault::refused(format!("no picture was measured in {seconds} s"))
-            .cause("at so few pictures a second none came in that time, or this machine is at a stand")
+            .cause("no picture came in that time at this rate, or this machine is overloaded")
             .next("measure for longer"));
     }
     Ok(KeptUp {

@@ -194,7 +194,7 @@ pub fn measure(seen: &SeenBoard, camera: &Intrinsics, start: &Rigid<Camera, Boar
     let options = LmOptions { loss: Loss::Huber(2.5), estimate_scale: true, tolerance: 1e-11, ..LmOptions::default() };
     let found = lm(&problem, *start, &options).minimum().filter(|f| f.covariance.is_some()).ok_or_else(|| {
         Fault::refused(format!("{}: the board's pose is not determined by its pixels", seen.name))
-            .cause("the features lie on a line, the start was behind the camera, or the fit of the pose does not come to rest")
+            .cause("the features lie on a line, the start was behind the camera, or the fit of the pose does not converge")
             .next("leave this picture out")
     })?;
     let pose = found.state;

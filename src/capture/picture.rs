@@ -135,7 +135,7 @@ pub trait PictureSource: Send {
     fn set(&mut self, name: &str, value: &str) -> Result<()> {
         let _ = value;
         Err(Fault::usage(format!("{name}: this source has no features to set"))
-            .cause("a pipe, a folder or a file is no camera")
+            .cause("a pipe, a folder or a file is not a camera")
             .next("set it in the program that fills it"))
     }
 

@@ -19,7 +19,7 @@ pub enum Streamed {
     Ended(Option<Fault>),
 }
 
-/// Pictures left out that are kept by name; of more only the number is.
+/// Excluded pictures that are kept by name; of more only the number is.
 const LISTED: usize = 10_000;
 /// How long is slept where pictures wait for a pose.
 const GLANCE: Duration = Duration::from_millis(4);

@@ -56,7 +56,7 @@ impl<'a> Fresh<'a> {
             }
         }
         Err(Fault::input(format!("{}: no picture within {:.0} s", self.source.name(), self.patience.as_secs_f64()))
-            .cause("it waits for a trigger, or its packets do not come through (packet size, firewall)")
+            .cause("it waits for a trigger, or its packets are lost (packet size, firewall)")
             .next("see TriggerMode: sheetlight camera show; or try gige://...?packet=1500"))
     }
 }
@@ -133,7 +133,7 @@ fn changes(what: String) -> Fault {
 pub fn unexposed(name: &str) -> Fault {
     Fault::usage(format!("{name}: has no ExposureTime to set"))
         .cause("a pipe, a folder, a file, or a camera whose exposure is set elsewhere")
-        .next("set the exposure there; sheetlight camera snap says how the stripe looks")
+        .next("set the exposure there; sheetlight camera snap reports the stripe")
 }
 
 /// The feature's name, its range, its value.

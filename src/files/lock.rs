@@ -51,7 +51,7 @@ fn open(folder: &Path, name: &str) -> Result<(PathBuf, File)> {
     let path = folder.join(format!("{name}.lock"));
     if std::fs::symlink_metadata(&path).is_ok_and(|m| !m.is_file()) {
         return Err(Fault::output(format!("{}: is a link or a folder where a lock is to be", path.display()))
-            .cause("somebody else made it; what it points at is left alone")
+            .cause("it was not made by this program; its target is not touched")
             .next("take it away, or choose another folder"));
     }
     let file = File::options().create(true).truncate(false).write(true).open(&path);

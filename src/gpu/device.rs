@@ -276,7 +276,7 @@ impl Device {
             // SAFETY: a storage buffer that is not mapped, on a software adapter, whose memory is the host's.
             let made = unsafe { alias::buffer(&self.raw, &descriptor, zeroed) };
             let (raw, aliased) = made.ok_or_else(|| {
-                Fault::device(format!("{}: {size} bytes for '{label}' cannot be had", self.info.name))
+                Fault::device(format!("{}: {size} bytes for '{label}' cannot be allocated", self.info.name))
                     .cause("the memory ran out")
                     .next("close other programs; what has --on runs in less memory with --on cpu")
             })?;

@@ -86,7 +86,7 @@ impl Element {
 /// The element of a binding's array; panics where a stage promises texels of what has none.
 fn element_of(stage: &Stage, binding: &str) -> Element {
     let found = ELEMENTS.into_iter().find(|e| stage.wgsl.contains(&e.declaration(binding)));
-    found.unwrap_or_else(|| panic!("{}: '{binding}' is no read-only array of u32, vec2<u32> or vec4<u32>", stage.name))
+    found.unwrap_or_else(|| panic!("{}: '{binding}' is not a read-only array of u32, vec2<u32> or vec4<u32>", stage.name))
 }
 
 /// What a binding's texels are.

@@ -151,7 +151,7 @@ impl fmt::Display for Light {
         match self.bright {
             None => write!(f, "; nothing stands out"),
             Some(Bright { centre: [x, y], share, stripe: None }) => {
-                write!(f, "; {:.1} % of it stands out, about ({x:.0}, {y:.0}), and is no stripe", 100.0 * share)
+                write!(f, "; {:.1} % of it stands out, about ({x:.0}, {y:.0}), and is not a stripe", 100.0 * share)
             }
             Some(Bright { centre: [x, y], stripe: Some(s), .. }) => {
                 let (way, place) = if s.upright { ("upright", x) } else { ("lying", y) };

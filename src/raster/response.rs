@@ -95,9 +95,9 @@ impl Response {
         // Slope of light over level at the top, where a stripe's peak is.
         let steep = (self.light(1.0) - self.light(0.999)) / 0.001;
         Some(format!(
-            "the pictures follow {name} and were made linear at load, {bits} bits to {}: near full scale one of their levels \
-             is {steep:.1} linear ones, so bright pixels are that much coarser and noisier than a linear camera's; saturated \
-             ones stay saturated",
+            "the pictures follow {name} and were made linear at load, {bits} bits to {}. Near full scale one of their levels \
+             is {steep:.1} linear ones, so bright pixels are coarser and noisier than a linear camera's. Saturated pixels \
+             stay saturated",
             self.depth(bits)
         ))
     }

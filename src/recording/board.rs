@@ -93,7 +93,7 @@ impl BoardSpec {
     pub fn load(path: &Path) -> Result<BoardSpec> {
         let text = crate::files::read_text(path)?;
         let board: BoardSpec = serde_json::from_str(&text).map_err(|e| {
-            Fault::input(format!("{}: is no board description: {e}", path.display()))
+            Fault::input(format!("{}: is not a board description: {e}", path.display()))
                 .cause(crate::files::slip_in(&text, e.line(), "a misspelt key or a missing size"))
                 .next("compare it with docs/file-formats.md, or write one with sheetlight board")
         })?;

@@ -32,7 +32,7 @@ fn read(text: &str, json: bool) -> Result<Vec<(usize, Rigid<Camera, Board>)>> {
                 Some(other) => format!("transform is '{}', only '{TRANSFORM}' is read", other.trim()),
                 None => "does not say what its poses are".into(),
             })
-            .cause("a board's pose may be written as camera_T_board or the other way round, and this program does not guess")
+            .cause("a board's pose may be written as camera_T_board or board_T_camera, and this program does not guess")
             .next(format!("put a line '# transform: {TRANSFORM}' first, with poses that map board to camera coordinates")));
         }
         pose_csv::read(text)?.rows

@@ -23,9 +23,9 @@ pub(super) fn load(path: &Path) -> Result<Vec<FrameRef>> {
             return Ok(frames);
         }
         let frame = serde_json::from_slice(&line).map_err(|e| {
-            Fault::input(format!("{}: line {} is no frame: {e}", path.display(), frames.len() + 1))
+            Fault::input(format!("{}: line {} is not a frame: {e}", path.display(), frames.len() + 1))
                 .cause("the file was edited, or the disk failed")
-                .next("correct the line, or leave it out")
+                .next("correct or remove the line")
         })?;
         frames.push(frame);
     }
@@ -61,9 +61,9 @@ impl FollowedFrames {
             self.next += 1;
         }
         serde_json::from_slice(&self.line).map_err(|e| {
-            Fault::input(format!("{}: line {} is no frame: {e}", self.path.display(), index + 1))
+            Fault::input(format!("{}: line {} is not a frame: {e}", self.path.display(), index + 1))
                 .cause("another program writes into the recording, or the disk failed")
-                .next("see the disk; what was recorded before can be scanned")
+                .next("check the disk; the finished part can be scanned")
         })
     }
 }

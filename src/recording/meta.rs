@@ -180,7 +180,7 @@ impl Meta {
             meta.check()?;
         } else if !meta.frames.is_empty() {
             return Err(Fault::input("frames are in meta.json and in a frames_file")
-                .cause("meta.json was edited, or put together of two")
+                .cause("meta.json was edited, or merged from two files")
                 .next("leave one of them out"));
         }
         Ok(meta)

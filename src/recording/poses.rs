@@ -120,10 +120,10 @@ fn collect(rows: Vec<Row>) -> Result<PoseFile> {
         let far = pose.translation.norm();
         if far > FARTHEST {
             return Err(Fault::input(format!(
-                "pose {index}: the flange is {far:.0} mm from its base, at most {FARTHEST:.0} is believed"
+                "pose {index}: the flange is {far:.0} mm from its base, at most {FARTHEST:.0} is accepted"
             ))
             .cause("millimetres written as micrometres, a number without its decimal point, or a spoilt file")
-            .next("correct the pose, or leave its frame out of meta.json"));
+            .next("correct the pose, or remove its frame from meta.json"));
         }
         out.poses.push(pose);
     }
@@ -155,7 +155,7 @@ fn from_csv(text: &str) -> Result<PoseFile> {
     match file.metres() {
         Some(what) if !read.length_stated => Err(Fault::refused(what)
             .cause("positions in metres under a convention in millimetres")
-            .next("convert them, or write the unit into the header where they are right: X_mm,Y_mm,Z_mm")),
+            .next("convert them, or state the unit in the header if they are correct: X_mm,Y_mm,Z_mm")),
         _ => Ok(file),
     }
 }
@@ -171,7 +171,7 @@ fn looks_like_another_unit(convention: Convention, rows: &[Row]) -> Result<()> {
         Err(Fault::refused(format!("no angle is above {largest:.3} in {} poses: {is}, {name} has {want}", rows.len()))
             .cause(format!("the file is in {is} or of another convention"))
             .next(format!(
-                "name the right convention, or write the unit into the header where it is right: {column},..."
+                "name the right convention, or state the unit in the header if it is correct: {column},..."
             )))
     };
     if degrees && largest > 0.0 && largest < 7.0 {
@@ -180,7 +180,7 @@ fn looks_like_another_unit(convention: Convention, rows: &[Row]) -> Result<()> {
     if !degrees && largest > TURN + 0.01 {
         return Err(Fault::refused(format!("an angle is {largest:.3}, above a turn in radians, which {name} has"))
             .cause("the file is in degrees")
-            .next(format!("convert it, or write the unit into the header where it is right: {column},...")));
+            .next(format!("convert it, or state the unit in the header if it is correct: {column},...")));
     }
     Ok(())
 }

@@ -32,7 +32,7 @@ pub(super) fn load(path: &Path, number: u64, [width, height]: [u32; 2], bits: u8
             path.display()
         ))
         .cause("the recording was cut off, or meta.json is of another one")
-        .next("leave the shot out with --skip-bad, or record again")
+        .next("exclude the shot with --skip-bad, or record again")
     })?;
     if bits == 8 {
         return Ok(Image::from_u8(width, height, frame));

@@ -160,11 +160,11 @@ impl<T: Measured> Calibration<T> {
                 kind.place()
             ))
             .cause("calibration files were renamed or swapped")
-            .next("put the right file there, or calibrate again"));
+            .next("restore the right file, or calibrate again"));
         }
         if self.quality.verdict == Verdict::Refused {
             return Err(Fault::input(format!("was refused when it was made: {}", self.quality.reasons.join("; ")))
-                .cause("a result that determines nothing was put in place by hand")
+                .cause("a result that determines nothing was copied there by hand")
                 .next("calibrate again as its reasons advise"));
         }
         self.value.check()?;

@@ -151,7 +151,7 @@ impl Measured for Axis {
         // A nanometre to a metre a count, and a turntable that does not pass half a turn a count.
         let most = if self.kind == AxisKind::Linear { 1e3 } else { std::f64::consts::PI };
         if !(self.pitch.abs() > 1e-9 && self.pitch.abs() < most) {
-            let what = format!("the pitch is {} a count, 1e-9 to {most:.4} is believed", self.pitch);
+            let what = format!("the pitch is {} a count, 1e-9 to {most:.4} is accepted", self.pitch);
             return Err(bad(what, "an axis that did not move, or another unit"));
         }
         Ok(())

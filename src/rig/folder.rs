@@ -214,7 +214,7 @@ impl Rig {
         match (&self.linear_axis, &self.turntable) {
             (Some(_), Some(_)) => {
                 Err(Fault::refused("the rig has a linear axis and a turntable, one of them is needed")
-                    .cause("nothing says which of the two moved the part")
+                    .cause("it is unknown which of the two moved the part")
                     .next("take the parts of the rig that the recording's motion rests on"))
             }
             (linear, turntable) => Ok(linear.as_ref().or(turntable.as_ref())),
@@ -263,7 +263,7 @@ impl Rig {
             Some(then) => format!("the {what} was measured with camera {then:.12}, the station now has {now:.12}"),
             None => format!("the {what} names no camera, the station has camera {now:.12}"),
         })
-        .cause("the camera was calibrated or imported anew, or files of two stations were mixed")
+        .cause("the camera was calibrated or imported again, or files of two stations were mixed")
         .next(again(kind)))
     }
 
@@ -327,7 +327,7 @@ pub fn asked(value: &impl Measured) -> Result<()> {
     value.doubt().map_or(Ok(()), |doubt| {
         Err(Fault::refused(doubt)
             .cause("metres, or another unit than millimetres")
-            .next("convert it to mm, or say --as-stated where it is right as it is"))
+            .next("convert it to mm, or confirm it with --as-stated"))
     })
 }
 

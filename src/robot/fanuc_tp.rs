@@ -68,7 +68,7 @@ fn bad(what: String) -> Fault {
 /// One position: what stands in its brackets and in its braces.
 fn position<To: Frame, From: Frame>(head: &str, body: &str) -> Result<TpPosition<To, From>> {
     let (number, comment) = head.split_once(':').unwrap_or((head, ""));
-    let number: u32 = number.trim().parse().map_err(|_| bad(format!("P[{number}]: is no position number")))?;
+    let number: u32 = number.trim().parse().map_err(|_| bad(format!("P[{number}]: is not a position number")))?;
     // Further motion groups (a positioner) follow the robot's.
     let group = body.find("GP2").map_or(body, |g| &body[..g]);
     if body.contains('*') {
@@ -106,7 +106,7 @@ fn numbers(number: u32, group: &str) -> Result<Vec<f64>> {
             let digits = value
                 .strip_suffix(unit)
                 .ok_or_else(|| bad(format!("P[{number}]: {key} = {value} is not in {unit}")))?;
-            digits.trim().parse::<f64>().map_err(|_| bad(format!("P[{number}]: {key} = {value} is no number")))
+            digits.trim().parse::<f64>().map_err(|_| bad(format!("P[{number}]: {key} = {value} is not a number")))
         })
         .collect()
 }

@@ -126,7 +126,7 @@ impl Convention {
             // No wrist turns more often, whatever it counts.
             let (limit, unit) = if degrees { (3600.0, "degrees") } else { (63.0, "radians") };
             if let Some(angle) = numbers[place].iter().find(|a| a.abs() > limit) {
-                return Err(Fault::input(format!("an angle of {angle:?} {unit}, at most {limit} are believed"))
+                return Err(Fault::input(format!("an angle of {angle:?} {unit}, at most {limit} are accepted"))
                     .cause("a spoilt file, or numbers in another order or unit")
                     .next("export the pose again"));
             }

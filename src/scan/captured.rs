@@ -31,8 +31,8 @@ impl StreamSource {
 }
 
 fn without_stand(index: u32, name: &str) -> BadShot {
-    let fault = Fault::usage("a picture comes without where things stood")
-        .cause("nothing is said to move")
+    let fault = Fault::usage("a picture has no pose")
+        .cause("no motion is stated")
         .next("say how pictures are paired with what moves: --pair count, step or clock, or given");
     BadShot { index, name: name.into(), fault, last: true }
 }
@@ -86,7 +86,7 @@ impl Source for StreamSource {
     fn remarks(&self) -> Vec<String> {
         let left = self.stream.left_out();
         let Some(first) = left.first() else { return Vec::new() };
-        vec![format!("{} pictures left out, the first ({}): {}", self.stream.account().unpaired, first.id, first.why)]
+        vec![format!("{} pictures excluded, the first ({}): {}", self.stream.account().unpaired, first.id, first.why)]
     }
 }
 
@@ -182,7 +182,7 @@ impl Source for RecordedSource {
             Some(Err(fault)) => vec![fault.what.clone()],
             Some(Ok(r)) if !r.left_out.is_empty() => {
                 vec![format!(
-                    "{} pictures left out, the first ({}): {}",
+                    "{} pictures excluded, the first ({}): {}",
                     r.left_out.len(),
                     r.left_out[0].id,
                     r.left_out[0].why

@@ -143,9 +143,9 @@ impl Carrier {
                 Ok(Place { from_camera, covariance: None })
             }
             (Way::Axis(on), Stand::Count(count)) => on.place(*count, anchor),
-            _ => Err(Fault::input("a shot tells where something else stood than what moves")
+            _ => Err(Fault::input("a shot has the pose of something else than what moves")
                 .cause("the recording's motion and its shots do not belong together")
-                .next("state the motion of meta.json as it was")),
+                .next("restore the motion of meta.json")),
         }
     }
 }
@@ -155,7 +155,7 @@ impl OnAxis {
         let far = (self.axis.pitch * count).abs();
         if self.axis.kind == AxisKind::Linear && far > FARTHEST {
             return Err(Fault::input(format!(
-                "the axis stands {far:.0} mm from its zero, at most {FARTHEST:.0} is believed"
+                "the axis stands {far:.0} mm from its zero, at most {FARTHEST:.0} is accepted"
             ))
             .cause("an encoder that counts on for days")
             .next("state a \"zero\" in meta.json's motion that lies near the part's counts"));

@@ -133,8 +133,8 @@ impl CloudWriter {
         // A count that no file holds is a length that none has.
         let wanted = keep.saturating_mul(RECORD).saturating_add(start);
         if head.is_none() || length < wanted {
-            return Err(Fault::input(format!("{}: holds {length} bytes, {wanted} needed to resume", part.display()))
-                .cause("another program's file, or the disk lost what was written")
+            return Err(Fault::input(format!("{}: has {length} bytes, {wanted} needed to resume", part.display()))
+                .cause("another program's file, or the disk lost written data")
                 .next("start the scan again without resuming"));
         }
         file.set_len(wanted).and_then(|()| file.seek(SeekFrom::End(0))).map_err(|e| Fault::write(&part, e))?;

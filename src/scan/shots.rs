@@ -151,7 +151,7 @@ impl Shots {
 
 fn missing(folder: &Path) -> Fault {
     Fault::input(format!("{}: is not there", folder.join(SHOTS_FILE).display()))
-        .cause("scanned by a former version, which did not keep where the camera stood")
+        .cause("scanned by an earlier version, which did not store the camera's poses")
         .next("scan again, without --resume: the pictures are still there")
 }
 

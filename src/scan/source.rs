@@ -193,7 +193,7 @@ fn posed(recording: &Recording, poses: Option<&str>) -> Result<Vec<Stood>> {
                 poses.len()
             ))
             .cause("the pose file was cut short, or belongs to another recording")
-            .next("record the poses again, or leave the frames without poses out of meta.json"));
+            .next("record the poses again, or remove the frames without poses from meta.json"));
         };
         Ok((name.clone(), Ok(Stand::Robot(*base_from_flange)), slip_of(&recording.meta.frames[i])))
     };
@@ -208,7 +208,7 @@ fn counted(recording: &Recording) -> Result<Vec<Stood>> {
         let unknown = || {
             Fault::input(format!("frame {i} ({name}) has no count"))
                 .cause("the encoder's reading was lost")
-                .next("add its count to the recording, or leave the shot out with --skip-bad")
+                .next("add its count to the recording, or exclude the shot with --skip-bad")
         };
         (name.clone(), count.map(Stand::Count).ok_or_else(unknown), slip_of(&recording.meta.frames[i]))
     };
@@ -276,8 +276,8 @@ impl<R: Read> RawSource<R> {
             n => format!(" and {n} missing frames are named"),
         };
         Fault::input(format!("the pipe gave {frames}, the pose file has {} poses{missing}", self.poses.len()))
-            .cause("frames were lost or doubled on the way, so later ones stand at poses of others")
-            .next("record again, or name the frames that never came: --missing 17,80")
+            .cause("frames were lost or doubled, so later ones have other frames' poses")
+            .next("record again, or name the missing frames: --missing 17,80")
     }
 }
 

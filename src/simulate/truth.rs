@@ -154,7 +154,7 @@ impl Truth {
         let strange = |what: String| {
             Fault::input(format!("{}: {what}", path.display()))
                 .cause("not the truth.json of a simulated scan")
-                .next("give the truth.json beside the scan's meta.json")
+                .next("give the truth.json beside the recording's meta.json")
         };
         let file: TruthFile = serde_json::from_str(&text).map_err(|e| strange(format!("cannot be read: {e}")))?;
         let (Some(spec), Some(pose)) = (file.scene.clone(), file.base_from_scene) else {

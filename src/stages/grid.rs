@@ -328,7 +328,7 @@ pub(crate) fn pick_twin(b: &mut [Vec<u32>], _: &[(&'static str, f64)]) {
 }
 
 /// Cases of one of the three stages: a tilted plate with a block and strays far from the base's origin, all points in one
-/// cell, numbers that are none.
+/// cell, numbers that are not finite.
 pub fn cases(stage: &str) -> Vec<Case> {
     let mut noise = super::noise::Noise(11);
     let mut normal = |sigma: f64| sigma * noise.normal();
@@ -354,7 +354,7 @@ pub fn cases(stage: &str) -> Vec<Case> {
     [
         ("tilted plate", GridFrame::new(&tilt, [61, 43], (0.5, 0.001), 300, 0.0, 80.0), &plate),
         ("one cell, quality", GridFrame::new(&tilt, [1, 1], (50.0, 0.003), 100, 0.6, 60_000.0), &plate),
-        ("numbers that are none", GridFrame::new(&flat, [5, 3], (1.0, 1.0 / 32_767.0), 10, 0.0, 255.0), &strange),
+        ("numbers that are not finite", GridFrame::new(&flat, [5, 3], (1.0, 1.0 / 32_767.0), 10, 0.0, 255.0), &strange),
     ]
     .into_iter()
     .map(|(name, mut f, records)| {

@@ -98,7 +98,7 @@ impl Backup {
                 .cause("another file, edited, or cut off")
                 .next("give a file that sheetlight station backup wrote")
         };
-        let b: Backup = serde_json::from_str(text).map_err(|e| strange(format!("is no backup of a station: {e}")))?;
+        let b: Backup = serde_json::from_str(text).map_err(|e| strange(format!("is not a backup of a station: {e}")))?;
         if b.format != FORMAT {
             return Err(strange(format!("is of format {}, this version reads {FORMAT}", b.format)));
         }

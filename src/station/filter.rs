@@ -51,7 +51,7 @@ pub fn filter_scan(scan: &Path, filters: &[Filter], out: &Path) -> Result<ScanRe
     let stays = left(&before, &map);
     let points: Vec<CloudPoint> = cloud.into_iter().filter(|p| stays(&p.position)).collect();
     if points.len() < FEWEST {
-        return Err(Fault::refused(format!("{} points are left, {FEWEST} are wanted", points.len()))
+        return Err(Fault::refused(format!("{} points are left, {FEWEST} are needed", points.len()))
             .cause("the filters take nearly everything away")
             .next("take the strictest of them back"));
     }

@@ -60,8 +60,8 @@ pub fn find_part_in_all(
 /// with itself whatever is wrong.
 fn comparable(scans: &[PathBuf], station: Option<&Path>) -> Result<()> {
     if station.is_none() {
-        return Err(Fault::usage("looks are to be compared, and no station is given")
-            .cause("what they may disagree about comes from the covariances of the calibrations")
+        return Err(Fault::usage("several scans are compared, but no station is given")
+            .cause("the expected disagreement follows from the covariances of the calibrations")
             .next("name the station that scanned with --station"));
     }
     different(scans)
@@ -107,8 +107,8 @@ pub fn second_look(
     let motion = load_report(scan)?.motion;
     if motion.frame() != "base" {
         return Err(Fault::usage(format!("{}: was scanned in the {} frame", scan.display(), motion.frame()))
-            .cause("no robot moved the sensor, so none can be sent for a second look")
-            .next("scan the part again as it lies otherwise on the axis"));
+            .cause("no robot moved the sensor, so no second scan can be planned")
+            .next("scan the part again in another position on the axis"));
     }
     let (report, _) = find_part(scan, recipe, Some(station), &LocateOptions::default())?;
     let plan = plan_look(&report, &parts_for(&Rig::load(station)?, &motion), turn_deg, tilt_deg)?;

@@ -40,7 +40,7 @@ impl Lies {
     /// It is none.
     pub fn parse(text: &str) -> Result<Lies> {
         serde_json::from_str(text).map_err(|e| {
-            Fault::input(format!("is no report of a part that was found: {e}"))
+            Fault::input(format!("is not a report of a part that was found: {e}"))
                 .cause(format!("another file (SHA-256 {:.12})", hash_text(text.as_bytes())))
                 .next("give the JSON that sheetlight find --out wrote")
         })

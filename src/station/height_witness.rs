@@ -43,7 +43,7 @@ pub(super) fn height_witness(
     for (picture, p) in &points {
         match height(&part.inverse().point(&p.point), recipe) {
             Ok(height) => on.push((height, p)),
-            Err(why) => said.push(format!("range: {picture}: {why}; left out")),
+            Err(why) => said.push(format!("range: {picture}: {why}; excluded")),
         }
     }
     if on.is_empty() {
@@ -52,7 +52,7 @@ pub(super) fn height_witness(
             points.len(),
             said.join("; ")
         ))
-        .cause("the pointer was aimed beside the part, or at an edge or a hole of it")
+        .cause("the pointer did not hit the part, or hit an edge or a hole of it")
         .next("aim the pointer at plain places of the part's top"));
     }
     Ok((witness(&on, &shared, &part.direction(&Vec3::z()), &part.translation), said))

@@ -35,7 +35,7 @@ pub enum Output {
     Pointer,
     /// The room's lamp.
     Room,
-    /// The gripper opens: what it holds falls.
+    /// The gripper opens and drops its component.
     Open,
     /// The gripper closes.
     Close,

@@ -136,21 +136,21 @@ impl Settings {
         }
         if let Some(mm) = self.tolerance_mm.filter(|mm| !(*mm > 0.0 && mm.is_finite())) {
             return Err(Fault::input(format!("tolerance_mm is {mm}, a length above 0 mm is needed"))
-                .next("give what the work tolerates in millimetres, or leave the key out"));
+                .next("give the tolerance in millimetres, or remove the key"));
         }
         if let Some(mm) = self.tolerance_mm.filter(|mm| !(FINEST..=COARSEST).contains(mm)) {
             let unit = if mm < FINEST { "metres" } else { "micrometres" };
             return Err(Fault::input(format!(
-                "tolerance_mm is {mm}, which looks like {unit}; {FINEST} to {COARSEST} is believed"
+                "tolerance_mm is {mm}, which looks like {unit}; {FINEST} to {COARSEST} is accepted"
             ))
             .cause(format!("{unit} instead of millimetres"))
-            .next("give what the work tolerates in millimetres, or leave the key out"));
+            .next("give the tolerance in millimetres, or remove the key"));
         }
         let head = self.head.iter().flat_map(|h| &h.points_mm).map(|p| ("head.points_mm", Vec3::from(*p)));
         let tool = self.tool.iter().map(|t| ("tool.flange_from_tool", t.flange_from_tool.translation));
         if let Some((name, p)) = head.chain(tool).find(|(_, p)| !(p.norm() <= LEVER)) {
             return Err(Fault::input(format!(
-                "{name}: a point lies {:.0} mm from the flange, at most {LEVER} is believed",
+                "{name}: a point lies {:.0} mm from the flange, at most {LEVER} is accepted",
                 p.norm()
             ))
             .cause("another unit than millimetres, or a point that is not in the flange's frame")

@@ -88,7 +88,7 @@ pub fn verify(rig: &Rig, run: &VerifyRun) -> Result<VerifyReport> {
     add("linear axis", rig.linear_axis.as_ref().map(check));
     add("turntable", rig.turntable.as_ref().map(check));
     if calibrations.is_empty() {
-        return Err(Fault::input("the station holds no calibration")
+        return Err(Fault::input("the station has no calibration")
             .cause("another folder was given as --station")
             .next("calibrate it first"));
     }

@@ -29,7 +29,7 @@ pub fn view(settings: &Settings, rig: &Rig) -> Result<Volume> {
     let plane = rig.need_laser_plane()?.value;
     let z = plane.offset / plane.normal.z;
     if !(z > 0.0 && z.is_finite()) {
-        return Err(Fault::usage("how far the camera is to look at the surface from is not known")
+        return Err(Fault::usage("the distance of the square view is unknown")
             .cause("the sheet does not meet the camera's axis in front of it, and no working volume is stated")
             .next("state the distance with --view-mm, or [working_volume] in station.toml"));
     }

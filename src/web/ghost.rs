@@ -18,7 +18,7 @@ pub fn moment(screen: &Screen, number: u64) -> Result<u64> {
         Fault::input("no camera: the screen was served without --camera").next("start it with --camera URI")
     })?;
     if screen.robot().is_none() {
-        return Err(Fault::input("no robot: where the camera stands is not known")
+        return Err(Fault::input("no robot: the camera's pose is unknown")
             .cause("the screen was served without --robot")
             .next("start it with --robot URI"));
     }
@@ -37,7 +37,7 @@ pub fn known(screen: &Screen, at_ns: u64) -> bool {
 pub fn over(screen: &Screen, id: &str, number: u64, at_ns: u64) -> Result<Ghost> {
     let about = screen.robot().and_then(|r| r.track().about(at_ns));
     let Some([before, after]) = about else {
-        return Err(Fault::refused("where the robot stood when this picture was taken is not known")
+        return Err(Fault::refused("the robot's pose of this picture is unknown")
             .cause("its controller does not answer, or the picture is older than the link to it")
             .next("look at the robot's state in the bar; the ghost comes back with its poses"));
     };

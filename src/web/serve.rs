@@ -115,7 +115,7 @@ pub fn serve(
 
 fn check(options: &ServeOptions) -> Result<()> {
     if !options.station.join("station.toml").is_file() {
-        return Err(Fault::usage(format!("{}: is no station, it has no station.toml", options.station.display()))
+        return Err(Fault::usage(format!("{}: not a station (no station.toml)", options.station.display()))
             .cause("another folder was given, or the station was never made")
             .next("make one with sheetlight station new --station FOLDER, or look around first with --simulate"));
     }
@@ -123,8 +123,8 @@ fn check(options: &ServeOptions) -> Result<()> {
         Some(s) => verify("", &s.password).map(|_| ()),
         None if options.address.is_loopback() => Ok(()),
         None => Err(Fault::usage(format!("{} is not this machine's own address", options.address))
-            .cause("who reaches this screen can order scans, and motions where a robot is linked")
-            .next("give --password-file, --tls-cert and --tls-key, or leave --listen out")),
+            .cause("anybody who reaches this screen can order scans and, with a linked robot, motions")
+            .next("give --password-file, --tls-cert and --tls-key, or omit --listen")),
     }
 }
 

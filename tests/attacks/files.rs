@@ -202,7 +202,7 @@ fn an_import_is_all_or_nothing() {
         ("[1, 0, 0, 90", "[-1, 0, 0, 90", ""),
         ("[1, 0, 0, 90", "[1, 0.1, 0, 90", "orthonormal"),
         ("-0.6, 0.8", "-0.6, 0.9", "long"),
-        ("\"offset_mm\": 72", "\"offset_mm\": \"72\"", "holds no rig values"),
+        ("\"offset_mm\": 72", "\"offset_mm\": \"72\"", "contains no rig values"),
     ] {
         let text = VALUES.replacen(from, to, 1);
         assert_ne!(text, VALUES, "{from}");

@@ -329,7 +329,7 @@ fn one_outlier_picture_is_found_and_named() {
     let result = judged(pictures, &s);
     assert_eq!(result.left_out.len(), 1);
     assert_eq!(result.left_out[0].0, "picture 5");
-    assert!(result.calibration.quality.reasons.iter().any(|r| r.contains("picture 5 was left out")));
+    assert!(result.calibration.quality.reasons.iter().any(|r| r.contains("picture 5 was excluded")));
 }
 
 #[test]

@@ -105,5 +105,5 @@ fn an_operator_is_led_from_the_touch_to_the_retract() {
         .collect();
     let (code, said) = sheetlight_fails(&swapped.iter().map(String::as_str).collect::<Vec<_>>());
     println!("{code}: {said}");
-    assert!(code == 1 && said.contains("the pointer is wanted here"), "{said}");
+    assert!(code == 1 && said.contains("the pointer is needed here"), "{said}");
 }

@@ -72,8 +72,8 @@ fn each_gate_that_is_broken_by_itself_moves_nothing() {
     let (none, nothing) = (|_: &mut Limits| {}, |_: &Served| {});
     let up = |p: &mut Plan| p.evidence.normal = Some(Vec3::z());
     let poses: [(&str, &dyn Fn(&mut Plan)); 11] = [
-        ("departure from a rotation", &|p| p.legs[0].to.rotation[(0, 0)] = f64::NAN),
-        ("departure from a rotation", &|p| p.legs[0].to.rotation *= 1.001),
+        ("orthonormality error of the rotation", &|p| p.legs[0].to.rotation[(0, 0)] = f64::NAN),
+        ("orthonormality error of the rotation", &|p| p.legs[0].to.rotation *= 1.001),
         ("speed, mm/s is 51.000, limit 50.000", &|p| p.legs[0].speed_mm_s = 51.0),
         ("slowest speed", &|p| p.legs[0].speed_mm_s = 0.0),
         ("slowest speed", &|p| p.legs[0].speed_mm_s = f64::NAN),
@@ -312,7 +312,7 @@ fn a_controller_whose_time_is_not_ours_is_halted() {
     for stamp in stamps {
         println!("halt at the controller after {:.1} ms", usual.stamped(stamp));
     }
-    let lost = Stopped { says: "are believed", within_ms: 50.0, ..usual };
+    let lost = Stopped { says: "are accepted", within_ms: 50.0, ..usual };
     let never: [fn(&Served, &StopButton, &AtomicBool); 2] =
         [|s, _, _| s.controller.stamp_with(|_| f64::INFINITY), |s, _, _| s.controller.stamp_with(|_| 1e20)];
     for stamp in never {

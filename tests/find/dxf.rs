@@ -203,10 +203,10 @@ fn what_cannot_be_read_is_refused_with_its_reason() {
     let plain = entity!("BLOCK", 8: "0", 2: "P", 70: 0, 10: 0, 20: 0) + &ring + &entity!("ENDBLK", 8: "0");
     let cases = [
         (file(MM, &selfish, &insert("A")), "in itself"),
-        (file(MM, "", &insert("B")), "no block"),
+        (file(MM, "", &insert("B")), "not a block"),
         (file(MM, "", &(ring.clone() + &spline)), "1 SPLINE of fit points"),
         (file(MM, "", &knots(0)), "do not rise"),
-        (file(MM, "", &knots(1).replacen("40\n0\n", "", 1)), "3 knots, wanted above 1 points and 4 knots"),
+        (file(MM, "", &knots(1).replacen("40\n0\n", "", 1)), "3 knots; allowed: above 1 points and 4 knots"),
         (file(MM, "", &(ring.clone() + &entity!("SOLID", 8: "0", 10: 0, 20: 0))), "1 SOLID"),
         (file(MM, &elsewhere, &insert("X")), "another file"),
         (file(MM, &plain, &(insert("P") + "41\n0\n")), "scaled by 0"),
@@ -215,7 +215,7 @@ fn what_cannot_be_read_is_refused_with_its_reason() {
         (file(MM, "", &entity!("CIRCLE", 8: "0", 10: 0, 20: 0, 40: 5, 210: 0.6, 230: 0.8)), "normal"),
         (file(MM, "", &entity!("LINE", 8: "0", 10: 0, 20: 0, 30: 0, 11: 1, 21: 0, 31: 7)), "rises"),
         (file(MM, "", &entity!("CIRCLE", 8: "0", 10: "nan", 20: 0, 40: 5)), "no usable number"),
-        (file(MM, "", &entity!("INSERT", 8: "0", 2: "A", 10: 0, 20: 0, 70: 30000, 71: 30000)), "no block"),
+        (file(MM, "", &entity!("INSERT", 8: "0", 2: "A", 10: 0, 20: 0, 70: 30000, 71: 30000)), "not a block"),
         (file(MM, "", &entity!("LWPOLYLINE", 8: "0", 90: 9, 70: 1, 10: 0, 20: 0)), "9 are announced"),
         (file(MM, "", &ring).replace("0\nEOF\n", ""), "cut off"),
         (file(MM, "", &ring)[..200].to_owned(), "cut off"),

@@ -64,7 +64,7 @@ pub fn gates(plan: &Plan, limits: &Limits, carried: &Carried, now: &Situation) -
         must("armed", now.armed),
         must("the arm's place is known", !now.unknown),
         Gate::least("motions", plan.legs.len() as f64, 1.0),
-        Gate::most("departure from a rotation", worst(&|_, leg| departure(&leg.to)), ORTHONORMAL),
+        Gate::most("orthonormality error of the rotation", worst(&|_, leg| departure(&leg.to)), ORTHONORMAL),
         Gate::most("speed, mm/s", worst(&|_, leg| leg.speed_mm_s), limits.speed_mm_s.min(MOST_SPEED_MM_S)),
         Gate::least("slowest speed, mm/s", slowest(plan), SLOWEST_MM_S),
         Gate::most("turning rate, degrees/s", worst(&|from, leg| pace(from, leg, carried, limits).turn_deg_s), turning),

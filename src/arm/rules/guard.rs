@@ -85,10 +85,10 @@ impl Guard {
         if !allowed {
             return Err(Fault::refused(format!("{}: read-only", self.link.name()))
                 .cause("motion was not allowed")
-                .next("give --allow-motion where the arm may move and somebody stands at the emergency stop"));
+                .next("give --allow-motion when somebody stands at the emergency stop"));
         }
         let Some(limits) = &self.limits else {
-            return Err(Fault::refused("no workspace is stated: nothing says where the arm may be")
+            return Err(Fault::refused("no workspace is stated: the limits of the arm are unknown")
                 .cause("station.toml has no [motion]")
                 .next("write [motion] with workspace = { from_mm = [...], to_mm = [...] } (docs/robots.md)"));
         };
@@ -272,7 +272,7 @@ impl Guard {
         if missed.is_empty() {
             return Ok(());
         }
-        refused(missed.join("; "), "what is named is not as it has to be")
+        refused(missed.join("; "), "a condition named above is not met")
     }
 
     /// What the controller said where it would not begin a leg.
@@ -346,7 +346,7 @@ struct Judged {
     unjudged: Vec<String>,
 }
 
-/// In a row of legs the controller is asked for so many of them besides its ends.
+/// Number of legs within a row whose reach the controller is asked about, besides the row's two ends.
 const ASKED: usize = 8;
 
 /// The poses for which the controller is asked: those where a plan's way bends, and some of those in the middle of a straight row.
@@ -405,7 +405,7 @@ fn not_begun(link: &mut dyn Arm, before: &TimedPose, fault: Fault) -> Result<Fau
     }
     Ok(fault
         .cause("the controller would not begin this motion; the arm has not moved")
-        .next("go there another way: from another place, or in parts"))
+        .next("reach the pose from another start, or in several motions"))
 }
 
 /// Looks where the arm has come to.
@@ -424,8 +424,8 @@ fn arrived(link: &mut dyn Arm, leg: &Motion, before: &TimedPose) -> Result<()> {
     }
     match (before.figure, after.figure) {
         (Some(a), Some(b)) if a != b && leg.way == Way::Straight => {
-            Err(Fault::device(format!("the figure changed on the way, from {a} to {b}"))
-                .cause("the controller found another way for its joints")
+            Err(Fault::device(format!("the arm configuration changed on the way, from {a} to {b}"))
+                .cause("the controller chose other joint angles")
                 .next("look at the robot, and approach from another side"))
         }
         _ => Ok(()),
@@ -433,13 +433,13 @@ fn arrived(link: &mut dyn Arm, leg: &Motion, before: &TimedPose) -> Result<()> {
 }
 
 fn unwatched(e: std::io::Error) -> Fault {
-    Fault::device(format!("no thread can be had that watches the motion: {e}"))
+    Fault::device(format!("cannot start the thread that watches the motion: {e}"))
         .cause("too many threads or too little memory; nothing was moved")
         .next("end other programs, then try again")
 }
 
 fn stopped(why: String) -> Fault {
     Fault::device(why)
-        .cause("the motion was stopped; where the arm stands is not known")
-        .next("look at the robot, then go on")
+        .cause("the motion was stopped; the arm's pose is unknown")
+        .next("look at the robot, then continue")
 }

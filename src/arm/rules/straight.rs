@@ -46,7 +46,7 @@ impl Straight {
         };
         let peak = sine.atan2(cosine);
         let inside = (0.0..=angle).contains(&peak).then(|| speed(peak));
-        // `f64::max` passes over what is no number: a pose that is none has no speed that may be believed.
+        // `f64::max` ignores NaN, so a pose that is not finite would seem to have a speed.
         if speed(0.0).is_nan() { f64::NAN } else { speed(0.0).max(speed(angle)).max(inside.unwrap_or(0.0)) }
     }
 }

@@ -183,7 +183,7 @@ impl<'a> Watch<'a> {
         let (speed, most) = (mm / passed, self.confirmed.speed_mm_s * SPEED_SLACK.0 + SPEED_SLACK.1);
         if !(speed <= most) {
             return Some(format!(
-                "{name} moves at {speed:.0} mm/s, limit {most:.0}: the controller's full speed is another than the link was told \
+                "{name} moves at {speed:.0} mm/s, limit {most:.0}: the controller's full speed differs from the one stated for the link \
                  (?full=, ?turn=)"
             ));
         }
@@ -191,7 +191,7 @@ impl<'a> Watch<'a> {
         let most = self.confirmed.turn_deg_s * TURN_SLACK.0 + TURN_SLACK.1;
         (!(turning <= most)).then(|| {
             format!(
-                "the flange turns at {turning:.1} degrees/s, limit {most:.1}: the controller's full turning rate is another than \
+                "the flange turns at {turning:.1} degrees/s, limit {most:.1}: the controller's full turning rate differs from \
                  the link was told (?turn=)"
             )
         })

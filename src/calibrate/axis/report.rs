@@ -58,7 +58,7 @@ pub fn judge(fit: &AxisFit, limits: &Limits, board_length: &str) -> Quality {
     let mut j = limits.by_error(
         expected,
         format!(
-            "a point that rides along is put right to {expected:.4} mm (1 sigma) over {over}: {own:.4} mm by direction and pitch, \
+            "a point that rides along is corrected to {expected:.4} mm (1 sigma) over {over}: {own:.4} mm by direction and pitch, \
              the rest scatters from stop to stop or bows"
         ),
     );
@@ -191,7 +191,7 @@ fn contradictions(fit: &AxisFit, j: &mut Judgement) {
     for s in fit.stops.iter().filter(|s| !s.used) {
         j.at_best(Verdict::Usable, true, || {
             format!(
-                "{} at count {} was left out: the board lies {:.3} mm from where the others predict it (it slipped, or the count is \
+                "{} at count {} was excluded: the board lies {:.3} mm from where the others predict it (it slipped, or the count is \
                  another picture's)",
                 s.name, s.count, s.holdout_mm
             )
@@ -259,7 +259,7 @@ pub fn page(fit: &AxisFit, quality: &Quality) -> Page {
                 format!("{:.4}", s.mm),
                 format!("{:.4}", s.holdout_mm),
                 format!("{:.1}", s.surprise.sqrt()),
-                if s.used { "used" } else { "left out" }.into(),
+                if s.used { "used" } else { "excluded" }.into(),
             ]
         })
         .collect();
@@ -274,7 +274,7 @@ pub fn page(fit: &AxisFit, quality: &Quality) -> Page {
     for (i, name) in ["x", "y", "z"].iter().enumerate() {
         let points: Vec<(f64, f64)> = fit.stops.iter().filter(|s| s.used).map(|s| (s.count, s.off[i])).collect();
         let caption = format!(
-            "What is left of the board's place along the camera's {name}, over the count: a bow is no straight axis"
+            "What is left of the board's place along the camera's {name}, over the count: a bow is not a straight axis"
         );
         page.figure(&caption, &scatter(&points, "count", "mm"));
     }

@@ -32,7 +32,7 @@ impl Default for AxisOptions {
 fn refused(what: String) -> Fault {
     Fault::refused(what)
         .cause("too few stops, an axis that hardly moved, or counts and pictures that do not belong together")
-        .next("show the board at eight or more stops, unevenly apart, along as much of the way as the camera sees")
+        .next("show the board at eight or more stops, unevenly apart, along as much of the travel as the camera sees")
 }
 
 /// Fits the axis. `camera_covariance` is that of the camera's parameters.

@@ -408,13 +408,13 @@ fn told_side(data: &Data<'_>, mut sides: Vec<Solution>) -> Result<(Solution, f64
     };
     let found = match data.o.side {
         Some(wanted) => sides.into_iter().find(|s| s.side == wanted).ok_or_else(|| {
-            Fault::refused(format!("no solution has the ball on the side that was stated ({wanted:?})"))
+            Fault::refused(format!("no solution has the ball on the stated side ({wanted:?})"))
                 .cause("the side is counted along the sensor's y axis: y = z × x")
                 .next("check the direction of the sensor's x axis, or leave the side to the data")
         })?,
         None if margin < data.o.clear => {
             return Err(Fault::refused(format!(
-                "the data does not tell on which side of the profile plane the ball lies: the other side fits worse by {margin:.1} only, {} are needed",
+                "the data does not show on which side of the profile plane the ball is: the other side fits worse by {margin:.1} only, {} are needed",
                 data.o.clear
             ))
             .cause("the profiles all pass near the ball's middle, or the poses are too alike")

@@ -166,8 +166,8 @@ pub fn solve(pictures: &[Observation], width: u32, height: u32, options: &SolveO
 
 fn unsolved() -> Fault {
     Fault::refused("the camera could not be solved")
-        .cause("the corners contradict each other, or do not determine so many lens terms")
-        .next("look at the pictures and leave out those where the board was misread; ask for fewer lens terms (--lens five)")
+        .cause("the corners contradict each other, or do not determine this number of lens terms")
+        .next("look at the pictures and exclude those where the board was misread; ask for fewer lens terms (--lens five)")
 }
 
 /// The ways in which the board may differ from its drawing, where all pictures show the same one.
@@ -189,7 +189,7 @@ fn see(name: &str, points: &[Corner]) -> Result<Seen> {
     let homography = (points.len() >= 6).then(|| homography(&plane, &pixels)).flatten().ok_or_else(|| {
         Fault::refused(format!("{name}: the {} corners seen do not determine the board's place", points.len()))
             .cause("fewer than 6 corners, or all on one line")
-            .next("leave this picture out, or take it again with more of the board in view")
+            .next("exclude this picture, or take it again with more of the board in view")
     })?;
     Ok(Seen { plane, pixels, homography })
 }

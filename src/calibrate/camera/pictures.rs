@@ -72,7 +72,7 @@ pub(in crate::calibrate) fn one_size(recordings: &[Recording]) -> Result<(u32, u
             size(other).1
         ))
         .cause("two cameras, or one at two resolutions")
-        .next("calibrate each camera and resolution by itself")),
+        .next("calibrate each camera and resolution separately")),
     }
 }
 
@@ -119,7 +119,7 @@ pub(in crate::calibrate) fn pictures(
         let first = hash.as_ref().and_then(|h| known.get(h));
         if let (Some(first), Ok(_)) = (first, &seen) {
             let again = Fault::refused(format!("it is the same picture as {first}"))
-                .cause("a copied picture: its board is parallel to the first one's and tells nothing new")
+                .cause("a copied picture: its board is parallel to the first one's and adds no information")
                 .next("take a picture of the board at another tilt instead");
             left_out.push((name, again));
             continue;

@@ -51,7 +51,7 @@ pub struct CameraResult {
     pub used: Vec<Observation>,
     /// The camera with every board's pose and every corner's residual.
     pub solved: Solved,
-    /// Pictures left out: name and reason.
+    /// Excluded pictures: name and reason.
     pub left_out: Vec<(String, String)>,
     /// Leave-one-out rms of each used picture, px.
     pub hold_out_px: Vec<Option<f64>>,
@@ -90,7 +90,7 @@ const OUTLIER_PICTURE: f64 = 3.5;
 struct Agreed {
     pictures: Vec<Observation>,
     solved: Solved,
-    /// Pictures left out: name and reason.
+    /// Excluded pictures: name and reason.
     left_out: Vec<(String, String)>,
     /// More than a quarter of the pictures would have to go.
     contradiction: bool,
@@ -255,7 +255,7 @@ fn judge(
             format!("the board's shape was estimated with the camera, as was asked: {off}")
         }
     }));
-    j.reasons.extend(agreed.left_out.iter().map(|(name, why)| format!("{name} was left out: {why}")));
+    j.reasons.extend(agreed.left_out.iter().map(|(name, why)| format!("{name} was excluded: {why}")));
     if let Some((name, id, r)) = worst.first() {
         j.reasons.push(format!("worst corner: {name}, feature {id}, {r:.2} px ({} stand out)", worst.len()));
     }
@@ -284,7 +284,7 @@ impl Evidence<'_> {
         j.at_best(Verdict::Usable, (3..8).contains(&pictures), || format!("only {pictures} pictures"));
         j.at_best(Verdict::BadlyDetermined, tilt < 10.0, || {
             format!(
-                "all boards are parallel within {tilt:.1} degrees; 10 are needed: focal length and distance cannot be told apart"
+                "all boards are parallel within {tilt:.1} degrees; 10 are needed: focal length and distance cannot be separated"
             )
         });
         j.at_best(Verdict::BadlyDetermined, expected > 0.5, || {

@@ -39,7 +39,7 @@ pub fn page(result: &CameraResult, title: &str) -> Page {
     page.table("Boards", &["picture", "corners", "x mm", "y mm", "z mm", "tilt degrees"], &boards(result));
     let left: Vec<Vec<String>> = result.left_out.iter().map(|(n, why)| vec![n.clone(), why.clone()]).collect();
     if !left.is_empty() {
-        page.table("Pictures left out", &["picture", "why"], &left);
+        page.table("Excluded pictures", &["picture", "why"], &left);
     }
     page
 }

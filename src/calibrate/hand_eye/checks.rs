@@ -56,7 +56,7 @@ pub fn before(pairs: &[Pair], o: &HandEyeOptions) -> Result<()> {
              {second:.2} degrees about the next axis, {} are needed",
             axis.x, axis.y, axis.z, o.min_second_axis_deg
         ))
-        .cause("with one axis of rotation the camera's place along that axis cannot be told")
+        .cause("with one axis of rotation the camera's position along that axis is not determined")
         .next("tilt the flange about an axis at right angles to the first by 20 degrees or more and take more pictures"));
     }
     Ok(())
@@ -98,7 +98,7 @@ pub fn after(pairs: &[Pair], fit: &HandEyeFit, o: &HandEyeOptions) -> Result<()>
     if !agree || (chance > SURELY && other_order(pairs, o).is_some()) {
         let what = format!(
             "pictures and robot poses do not belong together: {used} of {} pairs agree, the robot would scatter by {:.2} mm and \
-             {:.3} degrees; their misfit is {:.0} % of that of poses dealt out at random (limit {:.0} %)",
+             {:.3} degrees; the misfit is {:.0} % of that of random pairs (limit {:.0} %)",
             pairs.len(),
             fit.noise.robot_mm,
             fit.noise.robot_rad.to_degrees(),

@@ -94,7 +94,7 @@ impl Evidence<'_> {
             let whose = belongs_to(self.pairs, self.fit, i);
             let whose = whose.map_or(String::new(), |n| format!("; its picture fits the pose of {n}"));
             j.at_best(Verdict::Usable, true, || {
-                format!("{} was left out: its pose and picture disagree by {:.2} mm{whose}", r.name, r.mm)
+                format!("{} was excluded: its pose and picture disagree by {:.2} mm{whose}", r.name, r.mm)
             });
         }
     }
@@ -266,7 +266,7 @@ pub fn page(fit: &HandEyeFit, pairs: &[Pair], quality: &Quality, carrier: &str) 
         .iter()
         .zip(pairs)
         .map(|(p, pair)| {
-            let fate = if p.used { "used" } else { "left out" };
+            let fate = if p.used { "used" } else { "excluded" };
             let in_px = |px: f64| if pixels { format!("{px:.3}") } else { "-".into() };
             vec![
                 p.name.clone(),
@@ -284,7 +284,7 @@ pub fn page(fit: &HandEyeFit, pairs: &[Pair], quality: &Quality, carrier: &str) 
         fit.pairs.iter().map(|p| (p.name.clone(), f(p))).filter(|(_, v)| v.is_finite()).collect()
     };
     page.figure("Residual of each pose in the fit, mm at the board's corners", &bars(&bar(&|p| p.mm), "mm", None));
-    page.paragraph("Verification: each pose in turn was left out of the fit and then predicted. This is the error to expect, the robot's own scatter included.");
+    page.paragraph("Verification: each pose in turn was excluded from the fit and then predicted. This is the error to expect, the robot's own scatter included.");
     page.figure(
         "Error of each pose predicted by the others, mm at the board's corners",
         &bars(&bar(&|p| p.holdout_mm), "mm", None),

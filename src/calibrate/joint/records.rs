@@ -167,7 +167,7 @@ pub fn judge(fit: &JointFit, weights: &DMatrix<f64>, beside: &Beside, limits: &L
         by_stops(fit, &mut j);
     }
     for l in &fit.left_out {
-        j.at_best(Verdict::Usable, true, || format!("{}: {} was left out: {}", l.name, l.part.words(), l.why));
+        j.at_best(Verdict::Usable, true, || format!("{}: {} was excluded: {}", l.name, l.part.words(), l.why));
     }
     j.reasons.extend(beside.missing.iter().map(|(name, why)| format!("{name} was not used: {why}")));
     let figures = figures(fit, mm, beside);
@@ -184,7 +184,7 @@ fn by_arm(systematic: Option<&Systematic>, j: &mut Judgement) {
     if let Some(s) = systematic.filter(|s| s.found()) {
         j.at_best(Verdict::Usable, true, || {
             format!(
-                "the arm itself limits this: {:.0} % of its misfit at a pose left out is predicted by the other poses (chance: {:.0} %): its links \
+                "the arm itself limits this: {:.0} % of its misfit at an excluded pose is predicted by the other poses (chance: {:.0} %): its links \
                  or joint zeros are not what its controller believes",
                 100.0 * s.predicted,
                 100.0 * s.by_chance.max(0.0)

@@ -59,7 +59,7 @@ pub fn start(
         }
     });
     if shots.is_empty() {
-        return Err(Fault::refused("no picture shows a board whose pose can be told")
+        return Err(Fault::refused("no picture shows a board whose pose is determined")
             .cause("boards were not found, or the camera is another one")
             .next("take pictures with the whole board in view"));
     }

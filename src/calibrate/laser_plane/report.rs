@@ -167,7 +167,7 @@ fn contradictions(fit: &LaserPlaneFit, views: &[StripeView], j: &mut Judgement) 
     for v in fit.views.iter().filter(|v| !v.used) {
         j.at_best(Verdict::Usable, true, || {
             let why = if v.contradicts { "a board that moved, a reflection, another rig" } else { "too little light" };
-            format!("{} was left out: {:.3} px from the plane of the others ({why})", v.name, v.px)
+            format!("{} was excluded: {:.3} px from the plane of the others ({why})", v.name, v.px)
         });
     }
     let against = fit.views.iter().filter(|v| v.contradicts).count();
@@ -239,7 +239,7 @@ pub fn page(fit: &LaserPlaneFit, views: &[StripeView], quality: &Quality, size: 
         .views
         .iter()
         .map(|v| {
-            let fate = if v.used { "used" } else { "left out" };
+            let fate = if v.used { "used" } else { "excluded" };
             vec![
                 v.name.clone(),
                 format!("{} of {}", v.peaks_used, v.peaks),
@@ -255,7 +255,7 @@ pub fn page(fit: &LaserPlaneFit, views: &[StripeView], quality: &Quality, size: 
         "Residual of each picture in the fit, px",
         &bars(&fit.views.iter().map(|v| (v.name.clone(), v.px)).collect::<Vec<_>>(), "px", None),
     );
-    page.paragraph("Verification: each picture in turn was left out of the fit and then predicted.");
+    page.paragraph("Verification: each picture in turn was excluded from the fit and then predicted.");
     let held: Vec<(String, f64)> =
         fit.views.iter().filter(|v| v.holdout_mm.is_finite()).map(|v| (v.name.clone(), v.holdout_mm)).collect();
     page.figure("Distance of each picture's stripe from the plane of the others, mm", &bars(&held, "mm", None));

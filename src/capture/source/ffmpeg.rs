@@ -77,8 +77,8 @@ fn size(arguments: &[String], bits: u8) -> Result<Format> {
     }
     let errors = String::from_utf8_lossy(&output.stderr).trim().replace('\n', "; ");
     Err(Fault::input(format!("ffmpeg gives no picture: {errors}"))
-        .cause("the device or file is not there or in use, or the words are not ffmpeg's")
-        .next(format!("try it by itself: ffmpeg {} -f null -", arguments.join(" "))))
+        .cause("the device or file is missing or in use, or ffmpeg does not know these options")
+        .next(format!("try it alone: ffmpeg {} -f null -", arguments.join(" "))))
 }
 
 /// Leaves levels as the camera sends them: without it ffmpeg takes luma without a tag for 16 to 235 and stretches that
@@ -138,7 +138,7 @@ impl PictureSource for Ffmpeg {
                 Event::Lost(
                     Fault::input(format!("ffmpeg ended ({how}): {words}"))
                         .cause("the device was unplugged, the network failed, or the file is damaged")
-                        .next("plug it in again and run the command again; what was recorded is kept"),
+                        .next("plug it in again and run the command again; the finished part is stored"),
                 )
             }
         }

@@ -44,7 +44,7 @@ impl FolderCamera {
         let (send, changes) = channel();
         let cannot = |e: &dyn std::fmt::Display| {
             Fault::input(format!("{}: cannot be watched: {e}", folder.display()))
-                .cause("the folder is not there, or the limit of watched folders is reached")
+                .cause("the folder is missing, or the limit of watched folders is reached")
                 .next("make the folder before the other program fills it")
         };
         let mut watcher = notify::recommended_watcher(send).map_err(|e| cannot(&e))?;

@@ -112,7 +112,7 @@ impl Viewer {
                     *rate = Some(fps);
                     "ok".into()
                 }
-                _ => format!("error '{fps}' is no rate, 0.01 to 2000 pictures a second are"),
+                _ => format!("error '{fps}' is not a rate; allowed: 0.01 to 2000 pictures per second"),
             },
             ("stop", _) => {
                 *rate = None;

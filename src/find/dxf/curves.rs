@@ -200,7 +200,7 @@ impl Reader<'_> {
         let block = self.file.blocks.get(&key(&name));
         // Flags 4 and 8: the block's content is in another file.
         let Some(block) = block.filter(|b| b.head.whole(70, 0).is_ok_and(|flags| flags & 12 == 0)) else {
-            let what = if block.is_some() { "which is in another file" } else { "which is no block" };
+            let what = if block.is_some() { "which is in another file" } else { "which is not a block" };
             return Err(e.fault(format!("it inserts '{name}', {what}")).next("bind external references"));
         };
         if open.len() >= DEEPEST || !open.insert(key(&name)) {

@@ -27,12 +27,12 @@ impl Spline {
         }
         let degree = e.whole(71, 3)?;
         if !(1..=HIGHEST_DEGREE).contains(&degree) {
-            return Err(e.fault(format!("its degree is {degree}, wanted 1 to {HIGHEST_DEGREE}")));
+            return Err(e.fault(format!("its degree is {degree}; allowed: 1 to {HIGHEST_DEGREE}")));
         }
         let (n, degree) = (x.len(), degree as usize);
         if n <= degree || y.len() != n || knots.len() != n + degree + 1 {
             let what = format!(
-                "degree {degree} with {n} control points and {} knots, wanted above {degree} points and {} knots",
+                "degree {degree} with {n} control points and {} knots; allowed: above {degree} points and {} knots",
                 knots.len(),
                 n + degree + 1
             );

@@ -94,7 +94,7 @@ impl Tag {
     pub fn number(&self) -> Result<f64> {
         let value = self.value.trim().parse::<f64>().ok().filter(|v| v.is_finite() && v.abs() < 1e12);
         value.ok_or_else(|| {
-            Fault::input(format!("line {}: '{}' is no usable number (finite, below 1e12)", self.line, self.short()))
+            Fault::input(format!("line {}: '{}' is not a usable number (finite, below 1e12)", self.line, self.short()))
                 .cause(DAMAGED)
                 .next(EXPORT)
         })
@@ -103,7 +103,7 @@ impl Tag {
     pub fn whole(&self) -> Result<i64> {
         let value = self.value.trim().parse();
         value.map_err(|_| {
-            Fault::input(format!("line {}: '{}' is no whole number", self.line, self.short()))
+            Fault::input(format!("line {}: '{}' is not a whole number", self.line, self.short()))
                 .cause(DAMAGED)
                 .next(EXPORT)
         })
@@ -146,7 +146,7 @@ pub fn read(bytes: &[u8]) -> Result<File> {
 fn cut(tags: &[Tag]) -> Fault {
     let line = tags.last().map_or(0, |t| t.line);
     Fault::input(format!("ends at line {line} without ENDSEC and EOF"))
-        .cause("the file was cut off, or is no DXF")
+        .cause("the file was cut off, or is not a DXF")
         .next("export the drawing again as ASCII DXF")
 }
 
@@ -181,8 +181,8 @@ fn tags(text: &str) -> Result<Vec<Tag>> {
         }
         let Ok(number) = code.trim().parse() else {
             let short: String = code.chars().take(40).collect();
-            return Err(Fault::input(format!("line {}: '{short}' is no group code", i + 1))
-                .cause("the file is no DXF, or is damaged")
+            return Err(Fault::input(format!("line {}: '{short}' is not a group code", i + 1))
+                .cause("the file is not a DXF, or is damaged")
                 .next("export the drawing again as ASCII DXF"));
         };
         let Some((_, value)) = lines.next() else { break };

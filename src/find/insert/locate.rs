@@ -95,8 +95,8 @@ fn search(map: &HeightMap, recipe: &Recipe, options: &LocateOptions) -> Result<V
             "'{}' was not found: nothing scores {:.2} or more",
             recipe.name, search.min_score
         ))
-        .cause("the part is not there, is another one, is hidden, or lies outside the scan")
-        .next("look at the height map of the scan; scan the part again, or teach it anew"));
+        .cause("the part is missing, different, hidden, or outside the scan")
+        .next("look at the height map of the scan; scan the part again, or teach it again"));
     }
     Ok(matches)
 }

@@ -275,7 +275,7 @@ fn range(name: &str, v: f64, a: f64, b: f64) -> Result<()> {
     if (a..=b).contains(&v) {
         Ok(())
     } else {
-        Err(Fault::input(format!("{name} is {v}, wanted {a} to {b}")).next("correct the recipe"))
+        Err(Fault::input(format!("{name} is {v}; allowed: {a} to {b}")).next("correct the recipe"))
     }
 }
 
@@ -290,7 +290,7 @@ fn above(name: &str, mm: f64, least: f64) -> Result<()> {
     if (least..=MOST_ABOVE_MM).contains(&mm) {
         return Ok(());
     }
-    Err(Fault::input(format!("insertion.{name} is {mm}, wanted {least:.3} to {MOST_ABOVE_MM}"))
+    Err(Fault::input(format!("insertion.{name} is {mm}; allowed: {least:.3} to {MOST_ABOVE_MM}"))
         .cause(format!(
             "below {least:.3} mm, the drawn depth of the part and {CLEAR_MM} mm, the tool there is not clear of the part"
         ))
@@ -324,7 +324,7 @@ impl InsertionSpec {
         let named = [Some(&self.construction).filter(|n| *n != "pose"), self.two_pin.as_ref(), self.lattice.as_ref()];
         for name in named.into_iter().flatten() {
             if !constructions.iter().any(|c| c.name == *name) {
-                return Err(Fault::input(format!("the insertion refers to '{name}', which is no construction"))
+                return Err(Fault::input(format!("the insertion refers to '{name}', which is not a construction"))
                     .cause("a misspelt name")
                     .next("add it under [[construction]]"));
             }

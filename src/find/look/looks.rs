@@ -105,7 +105,7 @@ impl Disagreement {
 /// that cannot be inverted.
 pub fn agree(looks: &[Look], witness: Option<&Witness>, size_sigma: f64, ratio: f64) -> Result<Agreed> {
     if looks.is_empty() || (looks.len() < 2 && witness.is_none()) {
-        return Err(Fault::usage(format!("{} look given, two or more can be compared", looks.len()))
+        return Err(Fault::usage(format!("{} scan given, two or more can be compared", looks.len()))
             .next("name the second scan's folder behind the first"));
     }
     let stack = Stack::new(looks, witness, size_sigma);

@@ -224,7 +224,7 @@ pub fn register(scans: &[(String, Ordered)], rig: &Rig) -> Result<Vec<Registered
         let seen = seen_by(points, pieces.iter().map(|p| (p.row, p.point)));
         let [shift, turn] = [0, 3].map(|k| Vec3::new(fit.step[k], fit.step[k + 1], fit.step[k + 2]));
         let budget = budget(&seen, pieces, &centre, rig, fit.covariance)?
-            .ok_or_else(|| weak(format!("{name}: the scan does not say how its camera stood")))?;
+            .ok_or_else(|| weak(format!("{name}: the scan does not state its camera's poses")))?;
         out.push(Registered {
             // What brings the scan back is what it is off by.
             base_from_object: Rigid::new(exp(&-turn), centre - shift),

@@ -217,7 +217,7 @@ impl Stack {
 }
 
 pub(in crate::find) fn singular() -> Fault {
-    Fault::refused("the looks' covariances cannot be combined: a standard deviation is zero")
-        .cause("a calibration or recipe whose uncertainty is stated as nothing")
+    Fault::refused("the scans' covariances cannot be combined: a standard deviation is zero")
+        .cause("a calibration or recipe with a stated uncertainty of zero")
         .next("calibrate with uncertainty, or give the recipe's robot its repeatability")
 }

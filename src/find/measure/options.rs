@@ -40,7 +40,7 @@ impl MeasureOptions {
             if (a..=b).contains(&v) {
                 Ok(())
             } else {
-                Err(Fault::usage(format!("{name} is {v}, wanted {a} to {b}")).next("correct [measure] in the recipe"))
+                Err(Fault::usage(format!("{name} is {v}; allowed: {a} to {b}")).next("correct [measure] in the recipe"))
             }
         };
         range("height_gate_mm", self.height_gate_mm, 1e-4, 100.0)?;

@@ -64,16 +64,16 @@ impl ModelOptions {
     pub fn check(&self) -> Result<()> {
         if !(0.02..=1.0).contains(&self.contrast) {
             return Err(
-                Fault::usage(format!("contrast is {}, wanted 0.02 to 1", self.contrast)).next("correct contrast")
+                Fault::usage(format!("contrast is {}; allowed: 0.02 to 1", self.contrast)).next("correct contrast")
             );
         }
         if !(30..=5000).contains(&self.max_points) {
-            return Err(Fault::usage(format!("max_points is {}, wanted 30 to 5000", self.max_points))
+            return Err(Fault::usage(format!("max_points is {}; allowed: 30 to 5000", self.max_points))
                 .next("correct max_points"));
         }
         if !(1..=8).contains(&self.max_levels) {
             return Err(
-                Fault::usage(format!("max_levels is {}, wanted 1 to 8", self.max_levels)).next("correct max_levels")
+                Fault::usage(format!("max_levels is {}; allowed: 1 to 8", self.max_levels)).next("correct max_levels")
             );
         }
         Ok(())
@@ -134,7 +134,7 @@ impl ShapeModel {
         options.check()?;
         drawing.check()?;
         if !(mm_per_px > 0.0 && mm_per_px.is_finite()) {
-            return Err(Fault::usage(format!("mm_per_px is {mm_per_px}, wanted above 0"))
+            return Err(Fault::usage(format!("mm_per_px is {mm_per_px}; allowed: above 0"))
                 .next("give the edge of the map's cells in mm"));
         }
         // Of long edges no more places than the model can hold, many times over.

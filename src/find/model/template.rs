@@ -93,7 +93,7 @@ impl Template {
     /// Text that is no template, and numbers that no picture gives.
     pub fn parse(text: &str) -> Result<Template> {
         let strange = |what: String| {
-            Fault::input(format!("is no taught part: {what}"))
+            Fault::input(format!("is not a taught part: {what}"))
                 .cause("another file, another version, or edited by hand")
                 .next("teach the part again: sheetlight teach PICTURE --region X,Y,W,H --out PART.json")
         };
@@ -109,11 +109,11 @@ impl Template {
 
 fn check(model: &ShapeModel) -> std::result::Result<(), String> {
     if !(1..=8).contains(&model.levels.len()) {
-        return Err(format!("{} levels, wanted 1 to 8", model.levels.len()));
+        return Err(format!("{} levels; allowed: 1 to 8", model.levels.len()));
     }
     for (level, points) in model.levels.iter().enumerate() {
         if !(MIN_POINTS..=MOST_PLACES).contains(&points.len()) {
-            return Err(format!("{} edge places on level {level}, wanted {MIN_POINTS} to {MOST_PLACES}", points.len()));
+            return Err(format!("{} edge places on level {level}; allowed: {MIN_POINTS} to {MOST_PLACES}", points.len()));
         }
         let strange = |p: &ModelPoint| {
             let unit = (p.gx.hypot(p.gy) - 1.0).abs() < 1e-6;
@@ -134,7 +134,7 @@ fn check(model: &ShapeModel) -> std::result::Result<(), String> {
         return Err(format!("a radius of {} px, its edges reach {reach:.3} px", model.radius));
     }
     if !(1.0..=MOST_PLACES as f64).contains(&model.redundancy) {
-        return Err(format!("a redundancy of {}, wanted 1 to {MOST_PLACES}", model.redundancy));
+        return Err(format!("a redundancy of {}; allowed: 1 to {MOST_PLACES}", model.redundancy));
     }
     Ok(())
 }

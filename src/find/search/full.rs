@@ -99,7 +99,7 @@ fn search(
     for p in &model.levels[0] {
         if !scene.layers.iter().any(|l| l.kind == p.kind) {
             return Err(Fault::usage(format!("the model has {:?} edges, the scene has no such layer", p.kind))
-                .cause("a model of heights is searched in a picture, or the other way round")
+                .cause("a model of heights is searched in a picture, or the reverse")
                 .next("teach the model from a map of the same kind"));
         }
     }

@@ -109,7 +109,7 @@ impl std::str::FromStr for Filter {
             }
             _ => {
                 return Err(format!(
-                    "'{text}' is no filter: sigma:MM, heights:LOW,HIGH, cut:X0,Y0,X1,Y1, keep:X0,Y0,X1,Y1 or islands:CELLS,STEP"
+                    "'{text}' is not a filter: sigma:MM, heights:LOW,HIGH, cut:X0,Y0,X1,Y1, keep:X0,Y0,X1,Y1 or islands:CELLS,STEP"
                 ));
             }
         };

@@ -212,8 +212,8 @@ pub fn shift_scan(
                 folder.display(),
                 empty.len()
             ))
-            .cause("no stripe there, or pictures of another set-up")
-            .next("give pictures of the empty bed, taken as the others, or leave --reference out")
+            .cause("no stripe there, or pictures of another setup")
+            .next("give pictures of the empty bed, taken like the others, or omit --reference")
         })?,
     };
     let mut report = ShiftReport {

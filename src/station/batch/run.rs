@@ -57,7 +57,7 @@ pub fn batch(options: &BatchOptions, mut each: impl FnMut(&BatchRow)) -> Result<
     let settings = changed(&settings, "extraction", &options.settings)?;
     let names = names(&options.recordings);
     if let Some(taken) = names.iter().map(|n| options.out.join(n)).find(|f| f.join("meta.json").exists()) {
-        return Err(Fault::usage(format!("{}: is a recording, a scan would go there", taken.display()))
+        return Err(Fault::usage(format!("{}: is a recording, but the scan would be written there", taken.display()))
             .cause("the folder of the recordings was given for the results")
             .next("give another folder for the results"));
     }

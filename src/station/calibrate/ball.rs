@@ -81,7 +81,7 @@ fn sensor_of(path: &Path) -> Result<Rigid<Flange, Sensor>> {
             .cause("another file, or another transform")
             .next("give calibration/profile_hand_eye.json, or {\"flange_T_sensor\": [16 numbers, row by row, mm]}")
     };
-    let file: serde_json::Value = serde_json::from_str(&text).map_err(|e| refuse(format!("is no JSON: {e}")))?;
+    let file: serde_json::Value = serde_json::from_str(&text).map_err(|e| refuse(format!("is not JSON: {e}")))?;
     let frame = file.get("frame").and_then(|f| f.as_str());
     let rows = match (file.get("flange_T_sensor"), frame) {
         (Some(rows), _) => rows,
@@ -90,7 +90,7 @@ fn sensor_of(path: &Path) -> Result<Rigid<Flange, Sensor>> {
         (None, None) => return Err(refuse("holds no flange_T_sensor".into())),
     };
     let rows: [f64; 16] = serde_json::from_value(rows.clone())
-        .map_err(|e| refuse(format!("flange_T_sensor is no list of 16 numbers: {e}")))?;
+        .map_err(|e| refuse(format!("flange_T_sensor is not a list of 16 numbers: {e}")))?;
     Rigid::from_rows(&rows).map(|(pose, _)| pose).map_err(|e| e.at(path.display()))
 }
 
@@ -140,7 +140,7 @@ fn judge(fit: &BallFit, limits: &Limits) -> Quality {
     j.at_best(Verdict::Usable, used.len() < 12, || format!("{} profiles, 12 are needed to be good", used.len()));
     for p in fit.profiles.iter().filter(|p| !p.used) {
         j.at_best(Verdict::Usable, true, || {
-            format!("{} was left out: {:.2} mm from what the others expect", p.name, p.mm)
+            format!("{} was excluded: {:.2} mm from what the others predict", p.name, p.mm)
         });
     }
     let high = fit.profiles.iter().map(|p| p.height).fold(f64::NEG_INFINITY, f64::max);
@@ -195,7 +195,7 @@ fn page(fit: &BallFit, quality: &Quality) -> Page {
         .profiles
         .iter()
         .map(|p| {
-            let fate = if p.used { "used" } else { "left out" };
+            let fate = if p.used { "used" } else { "excluded" };
             vec![
                 p.name.clone(),
                 format!("{} of {}", p.points[0], p.points[1]),
@@ -207,7 +207,7 @@ fn page(fit: &BallFit, quality: &Quality) -> Page {
         .collect();
     page.paragraph("Fit: the circle of each profile against the fitted ball.");
     page.table("Fit", &["profile", "points on the ball", "mm", "ball over the plane, mm", ""], &fits);
-    page.paragraph("Verification: each profile in turn was left out of the fit and then predicted.");
+    page.paragraph("Verification: each profile in turn was excluded from the fit and then predicted.");
     let held: Vec<(String, f64)> =
         fit.profiles.iter().filter(|p| p.holdout_mm.is_finite()).map(|p| (p.name.clone(), p.holdout_mm)).collect();
     page.figure("Error of each profile predicted by the others, mm", &bars(&held, "mm", None));

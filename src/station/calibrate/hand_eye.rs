@@ -241,7 +241,7 @@ fn one_origin(pairs: &mut [Pair], found: &[FrameBoard], seed: u64) -> Result<Opt
     }
     let anew = chosen.iter().filter(|k| **k != 0).count();
     Ok(Some(format!(
-        "the board looks the same after a turn: its origin was told by the robot's poses, {anew} of {} pictures are read turned",
+        "the board looks the same after a turn: its origin follows from the robot's poses, {anew} of {} pictures are read turned",
         chosen.len()
     )))
 }

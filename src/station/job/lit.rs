@@ -37,5 +37,5 @@ pub fn line_is_seen(eye: &mut Eye, arm: &mut dyn Arm, rig: &Rig, settings: &Sett
         "the line is not seen with its laser on: {points} points, at least {least} are asked for{why}"
     ))
     .cause("the laser is not switched by its output, its shutter is closed, or the board is out of its reach")
-    .next("look whether the line is lit and lies on the board, then begin again"))
+    .next("check that the line is on and lies on the board, then begin again"))
 }

@@ -29,7 +29,7 @@ pub fn shoot(eye: &mut Eye, arm: &mut dyn Arm, record: &mut Record, beam: Option
             "the arm moved by {mm:.3} mm while the picture was taken, limit {}",
             STILL[0]
         ))
-        .cause("it still swings, or somebody jogs it")
+        .cause("the arm still swings, or somebody jogs it")
         .next("begin again"));
     }
     record.shot(&picture, &after)

@@ -49,7 +49,7 @@ impl Board {
         });
         let distance = distance_mm.map_or_else(|| volume::view(settings, rig).map(|v| v.middle()), Ok)?;
         if !(distance > 0.0 && distance.is_finite()) {
-            return Err(Fault::usage(format!("the board is {distance} mm before the camera, more than 0 is wanted"))
+            return Err(Fault::usage(format!("the board is {distance} mm before the camera, more than 0 is needed"))
                 .next("give the distance along the camera's axis, mm"));
         }
         let camera = start * hand_eye;
@@ -194,7 +194,7 @@ pub(super) fn checked(mm: f64) -> Result<f64> {
     if STATED.contains(&mm) {
         return Ok(mm);
     }
-    Err(Fault::usage(format!("the sweep is {mm} mm, wanted {} to {}", STATED.start(), STATED.end()))
+    Err(Fault::usage(format!("the sweep is {mm} mm; allowed: {} to {}", STATED.start(), STATED.end()))
         .next("correct the option"))
 }
 
@@ -249,7 +249,7 @@ fn stripe(plane: &Plane<Camera>, depth: f64, field: &[f64; 4]) -> Result<[f64; 2
         "at {depth:.0} mm the line lies {:.1} mm beside the picture's middle, out of the picture",
         from.norm()
     ))
-    .cause("the working volume lies where sheet and picture do not meet, or the laser plane is another rig's")
+    .cause("sheet and picture do not meet in the working volume, or the laser plane belongs to another rig")
     .next("state [working_volume] in station.toml where the line is seen, or calibrate the laser plane"))
 }
 

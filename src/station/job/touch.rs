@@ -118,7 +118,7 @@ impl Job<'_> {
         let (points, on) = self.on_one_plane(&touches, distance)?;
         if on.is_empty() {
             return Err(Fault::refused(format!(
-                "of {} touches no more than half lie on one plane within {:.2} mm",
+                "at most half of {} touches lie on one plane within {:.2} mm",
                 points.len(),
                 ONE_PLANE * distance
             ))
@@ -143,7 +143,7 @@ impl Job<'_> {
         let missing = |what: String| {
             Fault::refused(format!("the pointer's spot is not in the first picture: {what}"))
                 .cause("the board is out of view or out of the pointer's range, or the pointer is not switched by its output")
-                .next("jog the arm until the board is in view, look whether the pointer is lit, then begin again")
+                .next("jog the arm until the board is in view, check that the pointer is on, then begin again")
         };
         let seen = seen.map_err(|e| missing(e.what))?;
         let first = seen

@@ -226,7 +226,7 @@ fn peaks(r: &ScanReport) -> Markup {
             p { (r.seen.words()) "." }
             @if !r.dark_shots.is_empty() { p { (r.dark_shots.len()) " shots without a stripe." } }
             @for remark in &r.remarks { p { "Note: " (remark) } }
-            @for (name, why) in &r.skipped { p { "Left out " (name) ": " (why) } }
+            @for (name, why) in &r.skipped { p { "Excluded " (name) ": " (why) } }
         }
     }
 }

@@ -127,7 +127,7 @@ fn state(id: &str, rig: &Rig, options: &ScanOptions, part: &Path) -> Result<Chec
             .next("scan again without --resume, or into another folder")),
         None if options.resume && options.out.join(FORMER_PROGRESS).exists() => {
             Err(Fault::usage(format!("{}: a former version was interrupted here", options.out.display()))
-                .cause("this version keeps what is unfinished in another way and cannot go on with it")
+                .cause("this version stores unfinished scans in another format and cannot continue it")
                 .next("scan again without --resume: the pictures are still there"))
         }
         None => Ok(Checkpoint::new(identity)),

@@ -82,12 +82,12 @@ pub(in crate::station) fn make(out: &Path) -> Result<()> {
         if out.join(file).exists() {
             return Err(Fault::usage(format!("{}: is {what}, it has a {file}", out.display()))
                 .cause("the folder of the results was exchanged with another")
-                .next("give the scan a folder of its own"));
+                .next("give the scan a separate folder"));
         }
     }
     if out.join("scan.part").is_symlink() {
         return Err(Fault::output(format!("{}: scan.part is a link", out.display()))
-            .cause("somebody else made it; what it points at is left alone")
+            .cause("it was not made by this program; its target is not touched")
             .next("take it away, or choose another folder"));
     }
     crate::files::make_folder(out)

@@ -109,7 +109,7 @@ pub fn read(line: &str) -> Result<Request, Wrong> {
         "" => Err(Wrong::new(Code::Word, "an empty line")),
         _ => Err(Wrong::new(
             Code::Word,
-            format!("'{}' is no word; HELLO, STATUS, SCAN, POSE, FIND, GIVE and BYE are", shown(word)),
+            format!("'{}' is not a word; HELLO, STATUS, SCAN, POSE, FIND, GIVE and BYE are", shown(word)),
         )),
     }
 }
@@ -119,7 +119,7 @@ fn numbers(text: &str) -> Result<Vec<f64>, Wrong> {
     let parts = |c: char| c.is_whitespace() || matches!(c, ',' | ';' | '[' | ']' | '(' | ')');
     let read = |word: &str| match word.parse::<f64>() {
         Ok(x) if x.is_finite() => Ok(x),
-        _ => Err(Wrong::new(Code::Numbers, format!("'{}' is no number", shown(word)))),
+        _ => Err(Wrong::new(Code::Numbers, format!("'{}' is not a number", shown(word)))),
     };
     text.split(parts).filter(|w| !w.is_empty()).map(read).collect()
 }
@@ -132,7 +132,7 @@ fn recipe(name: &str) -> Result<String, Wrong> {
     }
     Err(Wrong::new(
         Code::Word,
-        format!("'{}' is no name of a recipe: 1 to 40 letters, digits, - and _ are", shown(name)),
+        format!("'{}' is not a recipe's name: 1 to 40 letters, digits, - and _ are", shown(name)),
     ))
 }
 

@@ -105,7 +105,7 @@ pub async fn events(
     upgrade: WebSocketUpgrade,
 ) -> Answer<Response> {
     let Some(seat) = screen.hub.sit() else {
-        let fault = Fault::refused("64 browsers look on already").next("close one of them");
+        let fault = Fault::refused("64 browsers are connected already").next("close one of them");
         return Err(Refusal(StatusCode::SERVICE_UNAVAILABLE, fault));
     };
     let hub = screen.hub.clone();

@@ -80,7 +80,7 @@ fn values<'a>(map: &'a HeightMap, layer: &str) -> Result<&'a [f32]> {
         "height" => Ok(&map.z),
         "sigma" => Ok(&map.sigma),
         "intensity" => Ok(&map.intensity),
-        other => Err(Fault::usage(format!("{other:?} is no layer")).next("height, sigma or intensity")),
+        other => Err(Fault::usage(format!("{other:?} is not a layer")).next("height, sigma or intensity")),
     }
 }
 

@@ -158,7 +158,7 @@ impl Camera {
         let state = lock(&self.state);
         let a = &state.account;
         let dropped = [
-            ("passed over: a newer one came", a.dropped_processing),
+            ("skipped: a newer one came", a.dropped_processing),
             ("no stripe", state.without_stripe),
             ("nobody looked while a job ran", state.unlooked),
             ("incomplete", a.incomplete),

@@ -52,7 +52,7 @@ pub async fn door(State(door): State<Arc<Door>>, mut request: Request<Body>, nex
                 None if open => next.run(request).await,
                 None => refusal(
                     StatusCode::UNAUTHORIZED,
-                    "no session: open the address that the program printed when it was started; one of a former start is no good",
+                    "not signed in: open the address printed by the running server; addresses from earlier runs no longer work",
                 ),
             }
         }

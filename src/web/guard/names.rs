@@ -23,7 +23,7 @@ pub fn plain(word: &str) -> bool {
 pub fn resolve(root: &Path, name: &str) -> Result<PathBuf> {
     let words: Vec<&str> = name.split('/').collect();
     if words.len() > DEEPEST || !words.iter().all(|w| plain(w)) {
-        return Err(Fault::usage(format!("{name:?} is no name here"))
+        return Err(Fault::usage(format!("{name:?} is an invalid file name"))
             .cause("names have letters, digits, blanks and . _ - + ( ), no folder above, at most 6 folders")
             .next("take one from the list"));
     }

@@ -225,7 +225,7 @@ impl Desk {
         let mut at = self.at();
         if at.armed.as_ref() != Some(tab) {
             return Err(Fault::refused("the robot is not armed from this screen")
-                .cause("outputs are switched by who stands beside the cell")
+                .cause("only the person beside the cell switches outputs")
                 .next("press Arm first"));
         }
         let (mut guard, turn) = taken(&mut at)?;
@@ -269,7 +269,7 @@ impl Desk {
         let asked = at.shown.asked.as_ref().expect("it may");
         let down = at.hold.as_ref().is_some_and(|h| h.heard.elapsed() < SILENCE);
         if down && !asked.stays_down {
-            return Err(no(format!("'{}' wants the button pressed anew", asked.step)));
+            return Err(no(format!("'{}' wants the button pressed again", asked.step)));
         }
         Ok(self.grants.give(tab, what.clone()))
     }

@@ -19,7 +19,7 @@ impl Session {
         let mut at = desk.at();
         let Some(guard) = at.guard.take() else {
             return Err(Fault::refused("the robot is not armed")
-                .cause("a job that moves it is begun by whoever stands beside it")
+                .cause("only the person beside the robot begins a job that moves it")
                 .next("press Arm, then begin it again"));
         };
         at.stop = Some(stop.clone());

@@ -29,7 +29,7 @@ struct Pointed {
 fn pointed(map: &HeightMap, at: &[f64; 2]) -> Result<Pointed> {
     let Some((z, sigma)) = cell_at(map, at[0], at[1]) else {
         return Err(Fault::refused(format!("nothing was measured at {:.3} {:.3} mm", at[0], at[1]))
-            .cause("the cell is missing: shadow, glare, or beside the scan")
+            .cause("the cell is missing: shadow, glare, or outside the scan")
             .next("point at a place that has a height"));
     };
     let flat = map.cell * map.cell / 12.0;
@@ -57,7 +57,7 @@ fn point_to_plane(map: &HeightMap, p: &Pointed, corners: &[f64; 4]) -> Result<Me
     let places = in_box(map, corners);
     let Some(plane) = Surface::fit(&places, false) else {
         return Err(Fault::refused(format!("{} measured cells in the box, which make no plane", places.len()))
-            .cause("the box is too small, or lies where nothing was seen")
+            .cause("the box is too small, or contains no cells")
             .next("draw a larger box over the surface"));
     };
     let (height, sigma) = plane.at(p.place.x, p.place.y);

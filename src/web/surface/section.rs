@@ -17,7 +17,7 @@ pub fn section(map: &HeightMap, ask: &SectionAsk) -> Result<Section> {
     let length = dx.hypot(dy);
     if !(length > map.cell && length < 1e6) {
         return Err(Fault::usage(format!(
-            "the section is {length:.4} mm long, more than a cell of {} mm is wanted",
+            "the section is {length:.4} mm long, more than a cell of {} mm is needed",
             map.cell
         ))
         .next("draw a longer line"));
@@ -76,7 +76,7 @@ fn line(map: &HeightMap, ask: &SectionAsk, piece: &[f64; 2], length: f64) -> Res
     }
     Surface::fit(&places, true).ok_or_else(|| {
         Fault::refused(format!("{} measured cells between {from:.3} and {to:.3} mm, 2 are needed", places.len()))
-            .cause("the piece lies where nothing was seen, or is shorter than a cell")
+            .cause("the piece contains no cells, or is shorter than a cell")
             .next("draw it longer, over measured ground")
     })
 }

@@ -171,7 +171,7 @@ fn gpu(this: &Run) -> Result<Vec<(String, &'static str, String)>> {
 
 fn no_check(e: std::io::Error) -> Fault {
     Fault::device(format!("the check of the GPU cannot be started: {e}"))
-        .cause("the program's file was moved or replaced while it runs, or there is no memory")
+        .cause("the program's file was moved or replaced while it runs, or there is not enough memory")
         .next("start the server again, or run `sheetlight doctor` in a terminal")
 }
 

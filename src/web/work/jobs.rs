@@ -79,7 +79,7 @@ impl Jobs {
     pub fn get(&self, id: &str) -> Result<Job> {
         let found = number_of(id).and_then(|n| self.state().all.get(&n).filter(|j| j.id == id).cloned());
         found.ok_or_else(|| {
-            Fault::input(format!("{id:?}: is no job of this station"))
+            Fault::input(format!("{id:?}: is not a job of this station"))
                 .cause("it was taken away meanwhile")
                 .next("reload the page")
         })
@@ -135,7 +135,7 @@ impl Jobs {
         let mut state = self.state();
         job.state = state.all.get(&number).map_or(JobState::Done, |j| j.state);
         if back_out && !matches!(job.order, Order::Insert(_)) {
-            return Err(Fault::usage(format!("{id}: moves no robot, there is nothing to back out of"))
+            return Err(Fault::usage(format!("{id}: moves no robot, so it cannot back out"))
                 .next("take it away, or resume it"));
         }
         if !matches!(job.state, JobState::CutOff | JobState::Stopped | JobState::Failed) {

@@ -112,7 +112,7 @@ fn points_off(cell: &Cell, arm: &Arm, fit: &JointFit) -> f64 {
     let w = fit.state.far_from_board[0];
     let found: Rigid<Base, Board> = Rigid::new(w.rotation, w.translation);
     let mut off = Vec::new();
-    for view in cell.views(25, 35.0, "left out") {
+    for view in cell.views(25, 35.0, "excluded") {
         let Some((seen, asked)) = sent(cell, arm, &view) else { continue };
         for pixel in lit.iter().step_by(7) {
             let (Some(p), Some(q)) = (scanned(&fit.state, pixel), scanned(&truth, pixel)) else { continue };

@@ -36,7 +36,7 @@ struct Sight {
 /// Finds a ChArUco board that is at least partly in view.
 pub fn find(image: &Image, board: &BoardSpec, options: &FindOptions) -> Result<BoardView> {
     let BoardSpec::Charuco { squares, square_mm, marker_mm, first_square, .. } = board else {
-        return Err(Fault::usage("the board is no ChArUco board").next("describe a ChArUco board"));
+        return Err(Fault::usage("the board is not a ChArUco board").next("describe a ChArUco board"));
     };
     let layout = Layout { squares: *squares, marker: marker_mm / square_mm };
     let grey = Grey::new(image);
@@ -82,7 +82,7 @@ fn choose(
         (true, false) => Ok(Some(white)),
         (false, true) => Ok(Some(black)),
         _ if black.markers > 0 => Err(Fault::refused(format!(
-            "the picture does not tell which colour the {columns}x{rows} ChArUco board begins with: {} markers fit both",
+            "the picture does not show which colour the {columns}x{rows} ChArUco board begins with: {} markers fit both",
             black.markers
         ))
         .cause("the board's outer columns are out of view")

@@ -92,7 +92,7 @@ impl Turned {
             .collect();
         let codes = kept(codes.into_values().collect());
         Dictionary::from_static_codes(all.name(), bits, all.max_correction_bits(), codes).map_err(|e| {
-            Fault::input(format!("the markers cannot be told apart: {e}"))
+            Fault::input(format!("the markers cannot be distinguished: {e}"))
                 .cause("two markers of the board have one code")
                 .next("correct the dictionary and first_id in the board's description")
         })

@@ -110,7 +110,7 @@ pub fn camera(stops: &[Stop], mount: Mount, size: [u32; 2]) -> Result<Intrinsics
                     Mount::EyeToHand => "the board slips on the flange, the robot's poses are of another tool or in another unit, or the camera moves",
                 })
                 .next(
-                    "check tool and work number of the controller (0), that the board is fast, and where the camera is \
+                    "check tool and work number of the controller (0), that the board is fixed, and where the camera is \
                      (mount in station.toml)",
                 )
         })

@@ -60,7 +60,7 @@ impl Notebook {
             Err(fault) => return Ok((None, format!("{} ({})", fault.what, fault.cause))),
         };
         if view.ambiguous {
-            return Err(Fault::input("the board looks the same after a turn: where its origin is cannot be told")
+            return Err(Fault::input("the board looks the same after a turn: its origin is not determined")
                 .cause("a chessboard with even or odd numbers of corners both ways, or a symmetric circle grid")
                 .next("use a board with one even and one odd number of corners, or a ChArUco board"));
         }

@@ -306,7 +306,7 @@ impl<'a> Session<'a> {
         let moved = self.fit.left_out.iter().filter(|l| l.part == Part::RobotPlace).count();
         if moved * 4 > self.shots.len() {
             return Err(Fault::input(format!(
-                "the board does not stand still: at {moved} of {} stops it is not where the others say",
+                "the board moved: at {moved} of {} stops it is not where the others show it",
                 self.shots.len()
             ))
             .cause("it was moved or slips, or the robot's poses are of another tool or work frame")
@@ -350,7 +350,7 @@ fn alike(a: &Rigid<Base, Flange>, b: &Rigid<Base, Flange>, distance: f64) -> boo
 }
 
 fn lost(why: &str) -> Fault {
-    Fault::input(format!("the board was not found at {LOST} poses in a row from which it ought to be seen: {why}"))
+    Fault::input(format!("the board was not found at {LOST} poses in a row from which it should be visible: {why}"))
         .cause("its squares or markers are too small at this distance, it is hidden or badly lit, or the poses are not the flange's")
         .next("take a board of larger squares or begin nearer to it; check tool and work number of the controller (0)")
 }

@@ -90,7 +90,7 @@ fn without(mut recording: Recording, leave_out: &[usize]) -> Result<Recording> {
     let all = recording.meta.frames.len();
     if let Some(strange) = leave_out.iter().find(|i| **i >= all) {
         return Err(
-            Fault::usage(format!("frame {strange} is to be left out, there are {all}")).next("choose one of them")
+            Fault::usage(format!("frame {strange} shall be excluded, but there are {all}")).next("choose one of them")
         );
     }
     for (i, frame) in recording.meta.frames.iter_mut().enumerate() {
@@ -140,7 +140,7 @@ pub fn accept(jobs: &Jobs, job: &Job) -> Result<Job> {
     let target = match (&job.order, job.state) {
         (Order::Calibrate(ask), JobState::Done) => Some(ask.target),
         (Order::Joint(_) | Order::Auto(_), JobState::Done) => None,
-        _ => return refuse(format!("{}: is no finished calibration", job.id)),
+        _ => return refuse(format!("{}: is not a finished calibration", job.id)),
     };
     let mut job = job.clone();
     let standing = match &mut job.outcome {
