@@ -1,7 +1,7 @@
 // Fits one peak at each skeleton pixel of a batch. A peak that fails a test of its own gets the reason for rejection.
 // Of the others the strongest on each line across the stripe is noted, for the comparison in point.wgsl. Units: pixels,
-// grey levels. Twin: src/stages/peak/fit.rs, across/centre.rs, across/direction.rs, profile.rs, scoring.rs, methods.rs and
-// stripe/choose.rs, which explains the reasons; docs/math.md, Stripe peak (0) to (5).
+// grey levels. Twin: src/stages/peak/fit.rs, across/centre.rs, across/direction.rs, profile.rs, scoring.rs,
+// methods.rs and stripe/choose.rs, which explains the reasons; docs/math.md, Stripe peak (0) to (5).
 @group(0) @binding(0) var<uniform> frame: PeakFrame;
 @group(0) @binding(1) var<storage, read> image: array<u32>;
 @group(0) @binding(2) var<storage, read> header: array<u32>;
@@ -176,8 +176,8 @@ var<private> gain: f32;
 var<private> speckle2: f32;
 var<private> ceiling: f32;
 var<private> soft: f32;
-// Sums over certainty times model squared times z^0, z^1, .. z^4; certainty, residual, model and z^0, z^1, z^2; certainty
-// and residual squared; weights.
+// Sums over certainty times model squared times z^0, z^1, .. z^4; certainty, residual, model and z^0, z^1, z^2;
+// certainty and residual squared; weights.
 var<private> e0: vec2<f32>;
 var<private> e1: vec2<f32>;
 var<private> e2: vec2<f32>;
@@ -252,8 +252,8 @@ fn gaussian(at: vec2<i32>) -> Peak {
         let z0 = (profile.offset - m) * inverse;
         z = vec2(z0, z0 - wide);
         dz = vec2(wide, -wide);
-        // A Gaussian at equal steps: its ratio from sample to sample falls by a constant factor. From the middle to both
-        // sides, because what has become 0 stays 0.
+        // A Gaussian at equal steps: its ratio from sample to sample falls by a constant factor. From the middle to
+        // both sides, because what has become 0 stays 0.
         model = a * exponential(-0.5 * (z * z));
         ratio = exponential(-0.5 * (dz * dz) - dz * z);
         fall = exponential(vec2(-(wide * wide))).x;
@@ -350,7 +350,8 @@ fn centroid(at: vec2<i32>) -> Peak {
     centroid_pair(18); centroid_pair(19);
     let all = sum.x + sum.y;
     let middle = (moment.x + moment.y) / all;
-    let m = select(m0, clamp(profile.offset + profile.step * middle, m0 - 2.0 * frame.s0, m0 + 2.0 * frame.s0), all > 0.0);
+    let m = select(m0, clamp(profile.offset + profile.step * middle, m0 - 2.0 * frame.s0, m0 + 2.0 * frame.s0),
+        all > 0.0);
     let spread = (second.x + second.y) / max(all, 1e-6) - middle * middle;
     let width = sqrt(max((profile.step * profile.step) * spread - profile.blur2, 0.0));
     let share = profile.square / (profile.weight * profile.weight);

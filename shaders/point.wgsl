@@ -1,6 +1,6 @@
 // Rejects peaks that are weak beside the strongest on the lines nearby: echoes, and spots cut by an edge. Computes the
-// points of the others in the poses' frame, mm, with their standard deviation. A rejected peak's point has the bits `none`.
-// Twin and reasons: src/stages/stripe/choose.rs, point.rs; docs/math.md, Stripe peak (7), (8).
+// points of the others in the poses' frame, mm, with their standard deviation. A rejected peak's point has the bits
+// `none`. Twin and reasons: src/stages/stripe/choose.rs, point.rs; docs/math.md, Stripe peak (7), (8).
 struct PointFrame {
     fx: f32,
     fy: f32,
@@ -142,7 +142,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
         let my = dz * y + z * dy;
         let sigma = sqrt(mx * mx + (my * my + dz * dz)) * k.sigma_px;
         let p = vec3(x * z, y * z, z);
-        let spot = vec4(row(poses[3u * k.shot], p), row(poses[3u * k.shot + 1u], p), row(poses[3u * k.shot + 2u], p), sigma);
+        let spot = vec4(row(poses[3u * k.shot], p), row(poses[3u * k.shot + 1u], p), row(poses[3u * k.shot + 2u],
+            p), sigma);
         // The first reason stays.
         let alone = k.flags & REASON;
         let compared = select(alone, beside(k), alone == 0u);

@@ -6,6 +6,8 @@ mod commands;
 mod help;
 #[path = "docs/idioms.rs"]
 mod idioms;
+#[path = "docs/lines.rs"]
+mod lines;
 #[path = "docs/links.rs"]
 mod links;
 #[path = "docs/markdown.rs"]

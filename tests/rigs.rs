@@ -1,5 +1,5 @@
-//! In: the designs in data/rigs. Out: each simulated, calibrated, scanned on GPU and twins and searched through the command
-//! line, judged by what its own pixels, light and geometry predict; with UPDATE_RIGS=1 the table docs/rigs.md.
+//! In: the designs in data/rigs. Out: each simulated, calibrated, scanned on GPU and twins and searched through the
+//! command line, judged by what its own pixels, light and geometry predict; with UPDATE_RIGS=1 the table docs/rigs.md.
 //! Frame and unit: scene frame of the simulated scan, mm; errors also in pixel footprints of the rig.
 
 mod common;
@@ -76,11 +76,12 @@ impl Known {
         (known, truth)
     }
 
-    /// Least standard deviation of a centre across a stripe of `sigma` px whose peak is `grey` of full scale, averaged along
-    /// the stripe as the fit does, from the light that it reads, three sigmas to both sides (docs/math.md, Stripe peak): H⁻¹ (sum w² F) H⁻¹,
-    /// H = sum w F, F a pixel's Fisher information of height, centre and width. A narrow stripe's centre is known better between two
-    /// pixels than on one, and not apart from its width: the mean over all places. (Of a quiet sensor and speckle the fourth sigma, light of
-    /// 1 % and less of the peak, would halve the variance where nothing else sheds so little light.)
+    /// Least standard deviation of a centre across a stripe of `sigma` px whose peak is `grey` of full scale,
+    /// averaged along the stripe as the fit does, from the light that it reads, three sigmas to both sides
+    /// (docs/math.md, Stripe peak): H⁻¹ (sum w² F) H⁻¹, H = sum w F, F a pixel's Fisher information of height, centre
+    /// and width. A narrow stripe's centre is known better between two pixels than on one, and not apart from its
+    /// width: the mean over all places. (Of a quiet sensor and speckle the fourth sigma, light of 1 % and less of the
+    /// peak, would halve the variance where nothing else sheds so little light.)
     fn bound_px(&self, sigma: f64, grey: f64) -> f64 {
         let peak = grey / self.full * self.full_well;
         let quantum = self.full_well / self.full;
@@ -104,14 +105,15 @@ impl Known {
         ((0..places).map(variance).sum::<f64>() / f64::from(places)).sqrt()
     }
 
-    /// Tangent of the angle between the stripe's normal and the image axis that is nearer to it, in the picture's middle; 0..=1.
+    /// Tangent of the angle between the stripe's normal and the image axis that is nearer to it, in the picture's
+    /// middle; 0..=1.
     fn lean(&self) -> f64 {
         let [x, y] = [self.plane.normal.x.abs(), self.plane.normal.y.abs()];
         x.min(y) / x.max(y)
     }
 
-    /// How far a point of a level surface moves up for one pixel across the stripe's picture, mm: the viewing ray of the
-    /// moved pixel meets the sheet elsewhere.
+    /// How far a point of a level surface moves up for one pixel across the stripe's picture, mm: the viewing ray of
+    /// the moved pixel meets the sheet elsewhere.
     fn rise_per_px(&self, p: &CloudPoint) -> f64 {
         let pose = &self.scene_from_camera[p.shot as usize];
         let at = |px: Vec2| self.camera.ray_from_pixel(&px).and_then(|r| r.meet(&self.plane)).unwrap();
@@ -143,7 +145,8 @@ struct Row {
     step_sigmas: [f64; 4],
     /// Place (mm, in the plane), height (mm) and turn (degrees) of the part against the truth; or why not found.
     part: Result<[f64; 3], String>,
-    /// The sheet is thicker (four sigmas) than the part's notch is deep: over half of the edges it lies on both sides at once.
+    /// The sheet is thicker (four sigmas) than the part's notch is deep: over half of the edges it lies on both sides
+    /// at once.
     thick: bool,
     /// How GPU and twins differ.
     gpu: Option<Apart>,
@@ -225,8 +228,9 @@ fn run(name: &str, file: &Path, at: &Path, width: Option<u32>, shots: Option<usi
             })
             .collect(),
     );
-    // Near a tread's edge a part of the stripe's profile falls beside it: the fit reads it as far as 2.4 sigma, and the lens blurs. A profile
-    // along an image axis that is not the stripe's normal reads its flanks, three sigmas out, farther along by the tangent.
+    // Near a tread's edge a part of the stripe's profile falls beside it: the fit reads it as far as 2.4 sigma, and
+    // the lens blurs. A profile along an image axis that is not the stripe's normal reads its flanks, three sigmas
+    // out, farther along by the tangent.
     let profile = |lean: f64| 3.0 * sigma * (1.0 + lean) * footprint;
     let lean = known.lean();
     let margin = [(0.2 * TREAD_MM[0] * u).max(profile(lean)), (0.15 * TREAD_MM[1] * u).max(profile(0.0))];
@@ -304,7 +308,8 @@ fn find(at: &Path, truth: &Truth) -> Result<[f64; 3], String> {
     Ok([t.x.hypot(t.y), t.z.abs(), off.rotation_vector().norm().to_degrees()])
 }
 
-/// `over`: what own-plane rms may be over the prediction. `coarse`: a part may be refused, with its reason, but not misplaced.
+/// `over`: what own-plane rms may be over the prediction. `coarse`: a part may be refused, with its reason, but not
+/// misplaced.
 fn judged(row: &Row, over: f64, coarse: bool) -> Vec<String> {
     let mut faults = Vec::new();
     let mut want = |ok: bool, what: String| {
@@ -324,7 +329,8 @@ fn judged(row: &Row, over: f64, coarse: bool) -> Vec<String> {
         Err(why) => want(coarse && why.contains("no pose:"), format!("part not found: {why}")),
     }
     if let Some(Apart { alone, worst_mm, .. }) = row.gpu {
-        // 0.001 mm at the reference rigs' pixel of 0.25 mm, and a step of the numbers that clouds are written in: 30 nm from 256 mm on.
+        // 0.001 mm at the reference rigs' pixel of 0.25 mm, and a step of the numbers that clouds are written in: 30
+        // nm from 256 mm on.
         want(worst_mm <= 0.004 * p + row.step, format!("GPU and twins differ by {worst_mm:.6} mm, footprint {p:.4}"));
         want(alone * 20_000 <= row.points, format!("{alone} points on GPU or twins alone"));
     }
@@ -360,7 +366,8 @@ fn table(rows: &[Row]) -> String {
     format!("{points}\n{parts}{refused}")
 }
 
-/// One rig with small pictures and few shots on the twins; all of them, as they are and on the GPU too, with SHEETLIGHT_LONG.
+/// One rig with small pictures and few shots on the twins; all of them, as they are and on the GPU too, with
+/// SHEETLIGHT_LONG.
 #[test]
 fn rigs_are_calibrated_scanned_and_searched() {
     let long = std::env::var_os("SHEETLIGHT_LONG").is_some();
@@ -414,16 +421,18 @@ fn the_shipped_designs_are_many_and_sound() {
     some("a field of 10 mm", &|r| r.field_mm()[0] <= 10.1);
 }
 
-/// Own-plane rms over the prediction that a drawn rig may have. Most have 1.0 to 1.15; a quiet sensor's speckled stripe has 1.2 where it is
-/// narrow and slanted (a sample's pixels lie up to half a pixel apart across it, and their light differs) and 1.3 to 1.45 where it is wider
-/// than 4 px (its skeleton wanders, and the window with it).
+/// Own-plane rms over the prediction that a drawn rig may have. Most have 1.0 to 1.15; a quiet sensor's speckled
+/// stripe has 1.2 where it is narrow and slanted (a sample's pixels lie up to half a pixel apart across it, and their
+/// light differs) and 1.3 to 1.45 where it is wider than 4 px (its skeleton wanders, and the window with it).
 const DRAWN: f64 = 1.5;
 
-/// Rigs drawn from the space that stations are built in, calibrated, scanned and searched as the designed ones. `SHEETLIGHT_DRAWN=1-40`: these seeds.
+/// Rigs drawn from the space that stations are built in, calibrated, scanned and searched as the designed ones.
+/// `SHEETLIGHT_DRAWN=1-40`: these seeds.
 #[test]
 fn rigs_that_nobody_designed_are_as_good() {
     let long = std::env::var("SHEETLIGHT_DRAWN").ok();
-    // The short form's: a small picture on which noise that is measured across edges makes the error 1.9 of the prediction.
+    // The short form's: a small picture on which noise that is measured across edges makes the error 1.9 of the
+    // prediction.
     let (first, last, shots, over) = match &long {
         Some(seeds) => {
             let (first, last) = seeds.split_once('-').expect("first-last");

@@ -1,5 +1,5 @@
-// In: a picture, a skeleton pixel. Out: the unit vector across the stripe there. Twin and reasons: src/stages/peak/across/direction.rs;
-// docs/math.md, Stripe peak (1). Frame and unit: pixels.
+// In: a picture, a skeleton pixel. Out: the unit vector across the stripe there. Twin and reasons:
+// src/stages/peak/across/direction.rs; docs/math.md, Stripe peak (1). Frame and unit: pixels.
 
 // Directions that are taken in turn beside a border.
 const BORDER_STEPS = 2u;
@@ -24,15 +24,17 @@ const TWO = 36;
 const FAR = 16;
 const NONE = 64;
 
-// The structure tensor from 13 gradients on 24 grey levels, every other place of a lattice, in whole numbers: half the difference of
-// its diagonal, the other element, half the difference of its eigenvalues.
+// The structure tensor from 13 gradients on 24 grey levels, every other place of a lattice, in whole numbers: half
+// the difference of its diagonal, the other element, half the difference of its eigenvalues.
 fn tensor(x: i32, y: i32, u: i32, v: i32) -> vec3<f32> {
     let a = vec3(whole(x - 2 * u, y - 3 * v), whole(x, y - 3 * v), whole(x + 2 * u, y - 3 * v));
-    let b = vec4(whole(x - 3 * u, y - 2 * v), whole(x - u, y - 2 * v), whole(x + u, y - 2 * v), whole(x + 3 * u, y - 2 * v));
+    let b = vec4(whole(x - 3 * u, y - 2 * v), whole(x - u, y - 2 * v), whole(x + u, y - 2 * v), whole(x + 3 * u,
+        y - 2 * v));
     let c = vec3(whole(x - 2 * u, y - v), whole(x, y - v), whole(x + 2 * u, y - v));
     let d = vec4(whole(x - 3 * u, y), whole(x - u, y), whole(x + u, y), whole(x + 3 * u, y));
     let e = vec3(whole(x - 2 * u, y + v), whole(x, y + v), whole(x + 2 * u, y + v));
-    let f = vec4(whole(x - 3 * u, y + 2 * v), whole(x - u, y + 2 * v), whole(x + u, y + 2 * v), whole(x + 3 * u, y + 2 * v));
+    let f = vec4(whole(x - 3 * u, y + 2 * v), whole(x - u, y + 2 * v), whole(x + u, y + 2 * v), whole(x + 3 * u, y
+        + 2 * v));
     let g = vec3(whole(x - 2 * u, y + 3 * v), whole(x, y + 3 * v), whole(x + 2 * u, y + 3 * v));
     // Ten bits a gradient.
     let deep = max(countOneBits(u32(frame.full_scale)), 10u) - 10u;

@@ -9,8 +9,8 @@ use std::path::PathBuf;
 /// Where a robot is.
 #[derive(Clone, Debug, PartialEq)]
 pub enum RobotUri {
-    /// `bcap://HOST[:PORT][?network=udp][&full=MM_S][&turn=DEG_S]`: a Denso controller; `full` and `turn` are the speeds of straight motions at
-    /// 100 %.
+    /// `bcap://HOST[:PORT][?network=udp][&full=MM_S][&turn=DEG_S]`: a Denso controller; `full` and `turn` are the
+    /// speeds of straight motions at 100 %.
     Bcap {
         /// HOST:PORT.
         address: String,
@@ -31,7 +31,8 @@ pub enum RobotUri {
 const BCAP_PORT: u16 = 5007;
 /// The port of Universal Robots' real-time interface.
 const UR_PORT: u16 = 30_003;
-/// Straight motions at 100 %, mm/s. What the VS-060 does is to be measured; a motion that is faster than asked is halted.
+/// Straight motions at 100 %, mm/s. What the VS-060 does is to be measured; a motion that is faster than asked is
+/// halted.
 const FULL_MM_S: f64 = 1000.0;
 /// The same for turning, degrees/s.
 const FULL_DEG_S: f64 = 200.0;

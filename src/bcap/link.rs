@@ -7,8 +7,8 @@ use std::io::{ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream, ToSocketAddrs, UdpSocket};
 use std::time::{Duration, Instant};
 
-/// How frames travel. TCP unless the controller is set to UDP: there, all clients of Denso's library share one thread, so
-/// that a Halt waits for the motion.
+/// How frames travel. TCP unless the controller is set to UDP: there, all clients of Denso's library share one
+/// thread, so that a Halt waits for the motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Network {
     /// A stream; frames of any length.
@@ -94,8 +94,8 @@ impl Link {
         sent.map_err(|e| closed(self.address, &e))
     }
 
-    /// The next frame; `None` when `until` has come. A damaged datagram is passed over; a damaged stream is an error, because
-    /// its place is lost.
+    /// The next frame; `None` when `until` has come. A damaged datagram is passed over; a damaged stream is an error,
+    /// because its place is lost.
     pub fn receive(&mut self, until: Instant) -> Result<Option<Frame>> {
         let mut buffer = [0; 4096];
         loop {

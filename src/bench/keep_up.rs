@@ -1,5 +1,5 @@
-//! In: pictures a second. Out: what of a camera that sends so many the newest-picture chain measures, at half and at full resolution, counted
-//! while it runs: every picture stands under its own name.
+//! In: pictures a second. Out: what of a camera that sends so many the newest-picture chain measures, at half and at
+//! full resolution, counted while it runs: every picture stands under its own name.
 //! Frame and unit: px, pictures, ms from a picture's last byte to its points.
 
 use super::scenes::{Scene, pictures};

@@ -1,5 +1,5 @@
-//! In: points of a part that was passed to and fro, each with the way it went a second. Out: by how much the pictures' times are late against
-//! the poses', so that both passes show one part.
+//! In: points of a part that was passed to and fro, each with the way it went a second. Out: by how much the
+//! pictures' times are late against the poses', so that both passes show one part.
 //! Frame and unit: the cloud's frame, mm; seconds.
 
 use crate::fault::{Fault, Result};
@@ -88,7 +88,8 @@ pub fn delay(shots: &[Vec<Passing>], up: &Vec3) -> Result<Delay> {
     if all.is_empty() || total(&coarse[best].1) > DISTINCT * all[all.len() / 2] {
         return Err(flat());
     }
-    // Where the passes nearly agree their scatter is known: what differs by much more, edges and shadows, says nothing of a part of a step.
+    // Where the passes nearly agree their scatter is known: what differs by much more, edges and shadows, says
+    // nothing of a part of a step.
     let scale = (3.0 * scatter(&pairs, spacing, seconds)).clamp(FINEST, SCALE);
     let mut fine = Vec::new();
     for _ in 0..ROUNDS {

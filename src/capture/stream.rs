@@ -1,4 +1,5 @@
-//! In: a feed, a way to pair. Out: shots in order, each with where things stood; what was left out, listed; the account.
+//! In: a feed, a way to pair. Out: shots in order, each with where things stood; what was left out, listed; the
+//! account.
 //! Frame and unit: as [`super::pair`].
 
 use super::account::Account;

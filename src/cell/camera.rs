@@ -1,5 +1,6 @@
 //! In: the cell at a moment. Out: the picture that the camera on the flange takes, or the small one in the gripper.
-//! Frame and unit: grey levels of the sensor's depth; s of the cell. A picture shows the middle of its exposure, unmoved.
+//! Frame and unit: grey levels of the sensor's depth; s of the cell. A picture shows the middle of its exposure,
+//! unmoved.
 
 use crate::geometry::{Camera, Flange, Rigid, Vec3};
 use crate::raster::Image;

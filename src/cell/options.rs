@@ -15,7 +15,8 @@ pub struct CellOptions {
     pub board: Option<BoardSpec>,
     /// The arm begins over the board, as an operator jogs it there to calibrate; else over the scene.
     pub over_board: bool,
-    /// The sensor stands still and the flange carries board and scene before it, as for a sensor that is fixed in the cell.
+    /// The sensor stands still and the flange carries board and scene before it, as for a sensor that is fixed in the
+    /// cell.
     pub eye_to_hand: bool,
     /// The design of the sensor.
     pub rig: RigSpec,
@@ -74,7 +75,8 @@ impl CellOptions {
         }
         if self.eye_to_hand && (self.board.is_none() || self.over_board) {
             return Err(Fault::usage(
-                "the flange shall carry a board before the sensor, but no board is given or the arm shall begin over it",
+                "the flange shall carry a board before the sensor, but no board is given or the arm shall begin over \
+                 it",
             )
             .next("give a board, and omit --over-board"));
         }

@@ -90,8 +90,9 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         && (a + b) % 2 == 0
     {
         console.warn(format!(
-                "{a}x{b} inner corners look the same after a half turn; choose one even and one odd number where poses matter"
-            ));
+            "{a}x{b} inner corners look the same after a half turn; choose one even and one odd number where \
+                 poses matter"
+        ));
     }
     console.say(format!(
         "{}.svg .pdf .json written: {:.1} x {:.1} mm; print without scaling and check the rule",

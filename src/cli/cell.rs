@@ -1,5 +1,5 @@
-//! In: a scene and a seed. Out: a simulated robot cell that answers on this machine's ports until Ctrl-C: controller, camera,
-//! gripper's camera; what happened, judged by its truth.
+//! In: a scene and a seed. Out: a simulated robot cell that answers on this machine's ports until Ctrl-C: controller,
+//! camera, gripper's camera; what happened, judged by its truth.
 //! Frame and unit: base frame, mm, degrees; s of the cell.
 
 use crate::cell::{Cell, CellOptions, Event, Served};

@@ -1,5 +1,5 @@
-//! In: a running camera, a station. Out: one line a measured picture: its points, how long it took, how many were passed over meanwhile; the
-//! account. Frame and unit: camera frame, mm; milliseconds.
+//! In: a running camera, a station. Out: one line a measured picture: its points, how long it took, how many were
+//! passed over meanwhile; the account. Frame and unit: camera frame, mm; milliseconds.
 
 use super::capture::options::Running;
 use super::terminal::console::Console;

@@ -79,7 +79,8 @@ fn table(r: &RangeReport, robot: Convention) -> String {
     }
     if let Some(q) = &r.square {
         s += &format!(
-            "the tool leant {:.4} ± {:.4} degrees at the last shot; square there, by turning about its origin: flange {}\n",
+            "the tool leant {:.4} ± {:.4} degrees at the last shot; square there, by turning about its origin: \
+             flange {}\n",
             q.tilt_deg,
             q.tilt_sigma_deg,
             written(robot, robot.write(&q.base_from_flange))

@@ -122,7 +122,8 @@ fn summary(r: &ShiftReport) -> String {
     s + &match r.plateau {
         None => "no level surface stands on the bed\n".into(),
         Some(p) => format!(
-            "level surface {:.3} mm above the bed ({} points in {} pictures, noise {:.3} mm, between pictures {:.3} mm)\n",
+            "level surface {:.3} mm above the bed ({} points in {} pictures, noise {:.3} mm, between pictures {:.3} \
+             mm)\n",
             p.height_mm, p.points, p.shots, p.noise_mm, p.between_shots_mm
         ),
     }

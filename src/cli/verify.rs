@@ -64,7 +64,8 @@ fn text(r: &VerifyReport) -> String {
     }
     if let Some(f) = &r.flat {
         s += &format!(
-            "Flat surface, {} views: heights spread by {:.4} mm (range {:.4}), tilts up to {:.4} degrees, points {:.4} mm rms about their own planes and {:.4} about the common one\n",
+            "Flat surface, {} views: heights spread by {:.4} mm (range {:.4}), tilts up to {:.4} degrees, points \
+             {:.4} mm rms about their own planes and {:.4} about the common one\n",
             f.views.len(),
             f.height_spread_mm,
             f.height_range_mm,
@@ -95,7 +96,8 @@ fn text(r: &VerifyReport) -> String {
     if let Some(t) = &r.touch {
         let [x, y, z] = t.mean_mm;
         s += &format!(
-            "Touch test, {} points: {:.3} mm rms, worst {:.3} mm (number {}), mean {x:+.3} {y:+.3} {z:+.3} mm, {:.3} mm about the mean\n",
+            "Touch test, {} points: {:.3} mm rms, worst {:.3} mm (number {}), mean {x:+.3} {y:+.3} {z:+.3} mm, {:.3} \
+             mm about the mean\n",
             t.points, t.rms_mm, t.worst_mm, t.worst, t.scatter_mm
         );
     }

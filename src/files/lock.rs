@@ -12,7 +12,8 @@ pub struct Lock {
     _file: File,
 }
 
-/// How long a lock is asked for. A process that this one is just starting holds copies of its open files until it has begun.
+/// How long a lock is asked for. A process that this one is just starting holds copies of its open files until it has
+/// begun.
 const PATIENCE: Duration = Duration::from_millis(400);
 
 impl Lock {

@@ -48,8 +48,8 @@ const SLENDER: f64 = 3.0;
 
 /// A picture whose brightest pixel is below this share of full scale is dark.
 const DARK: f64 = 0.06;
-/// A picture is white with more than this share of its pixels saturated, or with its median above that share of full scale and
-/// nothing dark in it: black print on white paper is not.
+/// A picture is white with more than this share of its pixels saturated, or with its median above that share of full
+/// scale and nothing dark in it: black print on white paper is not.
 const WHITE: f64 = 0.2;
 const BRIGHT: f64 = 0.9;
 const NO_DARK: f64 = 0.5;
@@ -85,7 +85,8 @@ impl Light {
 }
 
 impl Light {
-    /// Likely cause and next step where the light is what is wrong: hardly any, or far too much. `None` where it is neither.
+    /// Likely cause and next step where the light is what is wrong: hardly any, or far too much. `None` where it is
+    /// neither.
     pub fn why(&self) -> Option<(&'static str, &'static str)> {
         let full = f64::from(self.full_scale);
         if f64::from(self.levels[2]) < DARK * full {

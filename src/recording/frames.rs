@@ -1,4 +1,5 @@
-//! In: a file with one frame a line, as a recorder writes it while it runs. Out: the frames; a last line that was cut off is none.
+//! In: a file with one frame a line, as a recorder writes it while it runs. Out: the frames; a last line that was cut
+//! off is none.
 //! Frame and unit: as `frames` of meta.json.
 
 use super::frame::FrameRef;

@@ -139,8 +139,8 @@ impl Recording {
             .next("copy the pictures into the recording, or allow it with --pictures-outside"))
     }
 
-    /// Reads a picture of the recording's camera from anywhere, its levels made linear; of another size than meta.json says
-    /// none is decoded.
+    /// Reads a picture of the recording's camera from anywhere, its levels made linear; of another size than
+    /// meta.json says none is decoded.
     pub fn load(&self, path: &Path) -> Result<Image> {
         let spec = &self.meta.image;
         let depth = Depth {
@@ -160,8 +160,8 @@ impl Recording {
         Ok(spec.response.linear(raw::load(&path, number, [spec.width, spec.height], spec.bits)?))
     }
 
-    /// Which of `poses` the robot stood at in frame `index`. Frames that do not say are paired in order, and then there must
-    /// be as many poses as frames.
+    /// Which of `poses` the robot stood at in frame `index`. Frames that do not say are paired in order, and then
+    /// there must be as many poses as frames.
     pub fn pose_of<'a, T>(&self, index: usize, poses: &'a [T]) -> Result<&'a T> {
         let frame = &self.meta.frames[index];
         let frames = self.meta.frames.len();
@@ -186,7 +186,8 @@ impl Recording {
         self.pose_file(name).map(|f| f.poses)
     }
 
-    /// The poses in file `name` (without extension), or in the file that meta.json names, and what a person should know of them.
+    /// The poses in file `name` (without extension), or in the file that meta.json names, and what a person should
+    /// know of them.
     pub fn pose_file(&self, name: Option<&str>) -> Result<PoseFile> {
         if name.is_none() && self.meta.pose_file.is_none() {
             let poses = self.carried();

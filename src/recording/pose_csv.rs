@@ -1,5 +1,5 @@
-//! In: a pose file in CSV. Out: numbered rows of numbers in the convention that the file names; columns, units and order must
-//! be that convention's.
+//! In: a pose file in CSV. Out: numbered rows of numbers in the convention that the file names; columns, units and
+//! order must be that convention's.
 //! Frame and unit: as the convention says (docs/conventions.md).
 
 use crate::fault::{Fault, Result};

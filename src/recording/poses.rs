@@ -114,7 +114,10 @@ fn collect(rows: Vec<Row>) -> Result<PoseFile> {
             _ => 0.0,
         };
         if departure > ORTHONORMAL_WARN {
-            out.warnings.push(format!("pose {index}: rotation repaired, it was {departure:.1e} from orthonormal (limit {ORTHONORMAL_WARN:.0e})"));
+            out.warnings.push(format!(
+                "pose {index}: rotation repaired, it was {departure:.1e} from orthonormal \
+                                       (limit {ORTHONORMAL_WARN:.0e})"
+            ));
         }
         let pose = convention.read(&numbers).map_err(|e| e.at(format!("pose {index}")))?;
         let far = pose.translation.norm();
@@ -138,7 +141,8 @@ impl PoseFile {
         let reach = self.poses.iter().map(|p| p.translation.norm()).fold(0.0, f64::max);
         (self.poses.len() > 2 && reach < METRES).then(|| {
             format!(
-                "all {} poses lie within {reach:.2} mm of the base's origin: they look like metres, and are read as millimetres",
+                "all {} poses lie within {reach:.2} mm of the base's origin: they look like metres, and are read as \
+                 millimetres",
                 self.poses.len()
             )
         })
@@ -170,9 +174,7 @@ fn looks_like_another_unit(convention: Convention, rows: &[Row]) -> Result<()> {
     let asked = |is: &str, want: &str| {
         Err(Fault::refused(format!("no angle is above {largest:.3} in {} poses: {is}, {name} has {want}", rows.len()))
             .cause(format!("the file is in {is} or of another convention"))
-            .next(format!(
-                "name the right convention, or state the unit in the header if it is correct: {column},..."
-            )))
+            .next(format!("name the right convention, or state the unit in the header if it is correct: {column},...")))
     };
     if degrees && largest > 0.0 && largest < 7.0 {
         return asked("radians", "degrees");

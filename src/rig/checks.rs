@@ -1,5 +1,5 @@
-//! In: calibrated values, from solvers, files and people. Out: a refusal of what no rig is, and a question about what looks
-//! like another unit.
+//! In: calibrated values, from solvers, files and people. Out: a refusal of what no rig is, and a question about what
+//! looks like another unit.
 //! Frame and unit: as the values; mm, px.
 
 use super::measured::Measured;

@@ -22,9 +22,10 @@ impl Calibration<Intrinsics> {
         };
         let stated = readout.expect("all others are answered above");
         if stated.reversed != known.reversed {
-            return Err(self.another(size).cause("the pictures are mirrored, or those of the calibration were").next(
-                "set ReverseX and ReverseY of the camera as at its calibration, or calibrate it again",
-            ));
+            return Err(self
+                .another(size)
+                .cause("the pictures are mirrored, or those of the calibration were")
+                .next("set ReverseX and ReverseY of the camera as at its calibration, or calibrate it again"));
         }
         let whole = known.to_whole(camera);
         let (sensor, reach) = (known.sensor_px.or(stated.sensor_px), stated.reach(size));

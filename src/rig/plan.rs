@@ -98,7 +98,8 @@ mod tests {
         f_number: 8.0,
     };
 
-    /// Where a point of the sheet at depth z appears, px from the picture's middle, by the ray and the plane themselves.
+    /// Where a point of the sheet at depth z appears, px from the picture's middle, by the ray and the plane
+    /// themselves.
     fn row(plan: &RigPlan, z: f64) -> f64 {
         let aside = (plan.distance_mm - z) * plan.angle_deg.to_radians().tan();
         aside / z * plan.focal_mm / (plan.pixel_um / 1000.0)

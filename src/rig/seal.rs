@@ -1,5 +1,5 @@
-//! In: a record that the program writes and must find unchanged. Out: its JSON with a SHA-256 of all the rest in `seal`, and
-//! the record back from it. A seal tells of edits and damage; it is no signature.
+//! In: a record that the program writes and must find unchanged. Out: its JSON with a SHA-256 of all the rest in
+//! `seal`, and the record back from it. A seal tells of edits and damage; it is no signature.
 //! Frame and unit: none.
 
 use crate::fault::{Fault, Result};

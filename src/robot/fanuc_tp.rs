@@ -116,7 +116,12 @@ mod tests {
     use super::*;
     use crate::geometry::{Base, Flange};
 
-    const LISTING: &str = "/PROG  BALL\n/MN\n   1:J P[1] 100% FINE    ;\n   2:  !X = 3 ;\n/POS\nP[1]{\n   GP1:\n\tUF : 0, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n\tX =   500.125  mm,\tY =   -20.500  mm,\tZ =   300.000  mm,\n\tW =   180.000 deg,\tP =    10.000 deg,\tR =   -90.000 deg\n};\nP[2:\"over the ball\"]{\n   GP1:\n\tUF : 0, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n\tX =  1.0  mm,\tY =  2.0  mm,\tZ =  3.0  mm,\n\tW =  0.0 deg,\tP =  0.0 deg,\tR =  90.0 deg\n};\n/END\n";
+    const LISTING: &str = "/PROG  BALL\n/MN\n   1:J P[1] 100% FINE    ;\n   2:  !X = 3 ;\n/POS\nP[1]{\n   GP1:\n\tUF \
+                           : 0, UT : 1,\t\tCONFIG : 'N U T, 0, 0, 0',\n\tX =   500.125  mm,\tY =   -20.500  mm,\tZ \
+                           =   300.000  mm,\n\tW =   180.000 deg,\tP =    10.000 deg,\tR =   -90.000 \
+                           deg\n};\nP[2:\"over the ball\"]{\n   GP1:\n\tUF : 0, UT : 1,\t\tCONFIG : 'N U T, 0, 0, \
+                           0',\n\tX =  1.0  mm,\tY =  2.0  mm,\tZ =  3.0  mm,\n\tW =  0.0 deg,\tP =  0.0 deg,\tR =  \
+                           90.0 deg\n};\n/END\n";
 
     #[test]
     fn positions_are_read_with_comment_and_frames() {

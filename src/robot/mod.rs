@@ -94,8 +94,8 @@ impl Convention {
         }
     }
 
-    /// Denso writes a figure behind a pose: which way round shoulder, elbow and wrist are. A pose without its joints does not need
-    /// it; what stands there must be one, though, or the numbers are in another order.
+    /// Denso writes a figure behind a pose: which way round shoulder, elbow and wrist are. A pose without its joints
+    /// does not need it; what stands there must be one, though, or the numbers are in another order.
     fn without_figure(self, numbers: &[f64]) -> Result<&[f64]> {
         let (pose, figure) = match (self, numbers.split_last()) {
             (Convention::Denso, Some((figure, pose))) if pose.len() == 6 => (pose, *figure),

@@ -1,4 +1,5 @@
-//! In: a running camera's pictures, paired with what moves; straight, or as a recorder hands them on. Out: a source of shots.
+//! In: a running camera's pictures, paired with what moves; straight, or as a recorder hands them on. Out: a source
+//! of shots.
 //! Frame and unit: as [`super::Shot`].
 
 use super::source::{BadShot, Shot, Source};
@@ -90,7 +91,8 @@ impl Source for StreamSource {
     }
 }
 
-/// What a recorder on another thread hands on, scanned while it goes on recording. Shots that have to wait are read from its disk again.
+/// What a recorder on another thread hands on, scanned while it goes on recording. Shots that have to wait are read
+/// from its disk again.
 pub struct RecordedSource {
     format: Format,
     recording: Recording,

@@ -1,6 +1,7 @@
 //! In: points as they leave the scanner, shot by shot. Out: a binary PLY that grows on disk, can be
 //! resumed after a crash, and gets its final name only when it is complete; and the way back.
-//! Frame and unit: the frame that the header names, mostly the robot's base, mm; (u, v) in pixels of the shot; byte layout in docs/file-formats.md.
+//! Frame and unit: the frame that the header names, mostly the robot's base, mm; (u, v) in pixels of the shot; byte
+//! layout in docs/file-formats.md.
 
 use crate::fault::{Fault, Result};
 use crate::files::{moment, remove};

@@ -1,6 +1,7 @@
 //! In: `truth.json` of a simulated recording. Out: the exact surface and poses, and how far measured
 //! points are from them.
-//! Frame and unit: the cloud's frame (base; of a part that rides on an axis the axis frame), mm; keys named `A_T_b` map coordinates in frame b to frame A.
+//! Frame and unit: the cloud's frame (base; of a part that rides on an axis the axis frame), mm; keys named `A_T_b`
+//! map coordinates in frame b to frame A.
 
 use super::light::InScene;
 use super::scene::{Scene, SceneSpec, part_pose};

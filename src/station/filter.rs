@@ -1,4 +1,5 @@
-//! In: a finished scan, filters. Out: another scan folder with the points and cells that they leave, and what was done in its report.
+//! In: a finished scan, filters. Out: another scan folder with the points and cells that they leave, and what was
+//! done in its report.
 //! Frame and unit: the scan's; filters in its height map's grid, mm.
 
 use super::scan::products;

@@ -24,8 +24,9 @@ pub struct Looked<'a> {
     pub range: Option<&'a Recording>,
 }
 
-/// Finds the recipe's part in one or more finished scans of it and brings them together ([`agree`]), with the pointer's distances
-/// as a witness of the height; the picture is the first scan's. Errors: those of each scan; of several, the first.
+/// Finds the recipe's part in one or more finished scans of it and brings them together ([`agree`]), with the
+/// pointer's distances as a witness of the height; the picture is the first scan's. Errors: those of each scan; of
+/// several, the first.
 pub fn find_part_in_all(
     looked: &Looked,
     recipe: &Recipe,
@@ -56,8 +57,8 @@ pub fn find_part_in_all(
     Ok((agree(reports, witness.as_ref(), recipe, options.robot)?, picture))
 }
 
-/// Refuses looks that cannot show anything: without the station nothing says what they may disagree about, and one scan agrees
-/// with itself whatever is wrong.
+/// Refuses looks that cannot show anything: without the station nothing says what they may disagree about, and one
+/// scan agrees with itself whatever is wrong.
 fn comparable(scans: &[PathBuf], station: Option<&Path>) -> Result<()> {
     if station.is_none() {
         return Err(Fault::usage("several scans are compared, but no station is given")

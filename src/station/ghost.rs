@@ -1,5 +1,6 @@
-//! In: where a part was found, its drawing, a rig whose camera rides on the robot, where the flange stood. Out: the part's outlines as that
-//! camera sees them: over its picture they lie on the part, or the calibration, the pose or the part is not what it is taken for.
+//! In: where a part was found, its drawing, a rig whose camera rides on the robot, where the flange stood. Out: the
+//! part's outlines as that camera sees them: over its picture they lie on the part, or the calibration, the pose or
+//! the part is not what it is taken for.
 //! Frame and unit: base frame, mm; pixels of the camera's picture, an integer pixel is a pixel's centre.
 
 use crate::camera::Intrinsics;

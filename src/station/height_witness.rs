@@ -1,5 +1,6 @@
-//! In: pictures of the pointer's spot on a part, the part as scans found it, the station. Out: by how much each spot lies above
-//! the part's surfaces, with all that it depends on: a witness of the height that knows nothing of the laser plane.
+//! In: pictures of the pointer's spot on a part, the part as scans found it, the station. Out: by how much each spot
+//! lies above the part's surfaces, with all that it depends on: a witness of the height that knows nothing of the
+//! laser plane.
 //! Frame and unit: base axes; mm, rad. docs/math.md, Second look (7).
 
 use super::range::{RangeRun, Touched, touched};

@@ -47,7 +47,8 @@ pub struct Settings {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ToolSpec {
-    /// Flange from tool, 16 numbers row by row, mm. The tool's origin is what goes to the part's, its z points against the insertion.
+    /// Flange from tool, 16 numbers row by row, mm. The tool's origin is what goes to the part's, its z points
+    /// against the insertion.
     pub flange_from_tool: Rigid<Flange, Tool>,
 }
 
@@ -55,8 +56,8 @@ pub struct ToolSpec {
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct HeadSpec {
-    /// Its outermost points in the flange's frame, mm, at most 2000 from the flange: every motion keeps them slow and out of keep-outs.
-    /// None of them: nothing of the sensor rides on the flange.
+    /// Its outermost points in the flange's frame, mm, at most 2000 from the flange: every motion keeps them slow and
+    /// out of keep-outs. None of them: nothing of the sensor rides on the flange.
     pub points_mm: Vec<[f64; 3]>,
 }
 

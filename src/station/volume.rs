@@ -1,5 +1,5 @@
-//! In: station.toml, the calibrations of a rig, what the command line states. Out: the depths in which points are believed
-//! and those at which calibrations are judged, each with its origin.
+//! In: station.toml, the calibrations of a rig, what the command line states. Out: the depths in which points are
+//! believed and those at which calibrations are judged, each with its origin.
 //! Frame and unit: along the camera's optical axis, mm.
 
 use super::Settings;
@@ -15,8 +15,8 @@ pub fn calibrated(rig: &Rig) -> Option<Volume> {
     (near < far).then(|| Volume::new(near, far, "where the laser plane's boards stood"))
 }
 
-/// Depths at which a scan's points are believed: those that station.toml states, else those of the laser plane's boards and
-/// as far again. `None`: nobody knows, every depth is believed.
+/// Depths at which a scan's points are believed: those that station.toml states, else those of the laser plane's
+/// boards and as far again. `None`: nobody knows, every depth is believed.
 pub fn believed(settings: &Settings, rig: &Rig) -> Option<Volume> {
     settings.volume().or_else(|| calibrated(rig).map(|v| v.extended()))
 }

@@ -1,5 +1,5 @@
-//! In: a job that found a part, a picture of the camera on the gripper, where the robot stood then. Out: the part's outlines over that
-//! picture, and how far they may be off because the arm moved.
+//! In: a job that found a part, a picture of the camera on the gripper, where the robot stood then. Out: the part's
+//! outlines over that picture, and how far they may be off because the arm moved.
 //! Frame and unit: base frame, mm; px of the picture.
 
 use super::message::{Ghost, Outlines};
@@ -48,7 +48,8 @@ pub fn over(screen: &Screen, id: &str, number: u64, at_ns: u64) -> Result<Ghost>
     Ok(Ghost { number, lines, moved_px })
 }
 
-/// The farthest that a point of the one lies from the same point of the other, px; as far as the picture is long where they are not alike.
+/// The farthest that a point of the one lies from the same point of the other, px; as far as the picture is long
+/// where they are not alike.
 fn farthest(a: &[Vec<[f64; 2]>], b: &[Vec<[f64; 2]>]) -> f64 {
     const LOST: f64 = 1e4;
     if a.iter().map(Vec::len).ne(b.iter().map(Vec::len)) {

@@ -68,11 +68,13 @@ const LOOK: Duration = Duration::from_millis(100);
 /// The bar is told so often.
 const BAR: Duration = Duration::from_secs(1);
 
-/// Serves until `stop`; `simulated` is the cell that robot and camera are of, where it is one of ours. `ready` is told the address to open, with
-/// the token of this start behind `#`, and where its port is another than was asked for why.
+/// Serves until `stop`; `simulated` is the cell that robot and camera are of, where it is one of ours. `ready` is
+/// told the address to open, with the token of this start behind `#`, and where its port is another than was asked
+/// for why.
 ///
 /// # Errors
-/// A station that is none or in use by another server, an address that cannot be listened on or is not guarded, bad TLS files.
+/// A station that is none or in use by another server, an address that cannot be listened on or is not guarded, bad
+/// TLS files.
 pub fn serve(
     options: &ServeOptions,
     simulated: Option<SimulatedRobot>,

@@ -1,4 +1,5 @@
-//! In: what an operator changes of the station. Out: its station.toml changed, backed up before, or a refusal; backups and the way back.
+//! In: what an operator changes of the station. Out: its station.toml changed, backed up before, or a refusal;
+//! backups and the way back.
 //! Frame and unit: none.
 
 use super::message::{BackupInfo, SettingsAsk, SettingsState};

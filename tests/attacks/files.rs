@@ -1,5 +1,5 @@
-//! In: calibration files, recordings, scan folders and outputs that were edited, mixed or exchanged. Out: each is refused by
-//! name with a next step, and nothing of what was there is lost.
+//! In: calibration files, recordings, scan folders and outputs that were edited, mixed or exchanged. Out: each is
+//! refused by name with a next step, and nothing of what was there is lost.
 //! Frame and unit: base frame, mm.
 
 use super::bench::{Bench, VALUES, refused, run, snapshot, stripe};

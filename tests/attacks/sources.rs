@@ -1,5 +1,6 @@
-//! In: addresses of cameras, robots and cells, templates and maps as careless and hostile people write them. Out: each is answered within
-//! seconds by a result or by a fault that says what is wrong; nothing is run that an address names.
+//! In: addresses of cameras, robots and cells, templates and maps as careless and hostile people write them. Out:
+//! each is answered within seconds by a result or by a fault that says what is wrong; nothing is run that an address
+//! names.
 //! Frame and unit: none.
 
 use super::common::sheetlight_fails;

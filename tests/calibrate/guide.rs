@@ -1,5 +1,5 @@
-//! In: a simulated station: the pointer's spots on a circuit board, the line over the part on it. Out: `sheetlight guide`
-//! from the touch to the retract, against the station's truth, and where it must stop.
+//! In: a simulated station: the pointer's spots on a circuit board, the line over the part on it. Out:
+//! `sheetlight guide` from the touch to the retract, against the station's truth, and where it must stop.
 //! Frame and unit: base frame, part axes; mm, degrees.
 
 use crate::common::{sheetlight, sheetlight_fails};

@@ -1,5 +1,6 @@
-//! In: pictures of a part that is passed to and fro, their times late by a known delay; streams of poses with gaps, jumps, clocks that run
-//! backwards and wrong units. Out: the delay found, the cloud as good as the still one; excluded shots listed, never extrapolated.
+//! In: pictures of a part that is passed to and fro, their times late by a known delay; streams of poses with gaps,
+//! jumps, clocks that run backwards and wrong units. Out: the delay found, the cloud as good as the still one;
+//! excluded shots listed, never extrapolated.
 //! Frame and unit: base frame, mm; ms.
 
 use super::{json, scan_folder, text};

@@ -1,5 +1,5 @@
-//! In: the program as a person starts it, against cells in which one thing is not as it has to be. Out: whether it ends with a clear
-//! error and its exit code, and the arm has stood still.
+//! In: the program as a person starts it, against cells in which one thing is not as it has to be. Out: whether it
+//! ends with a clear error and its exit code, and the arm has stood still.
 //! Frame and unit: mm.
 
 use super::workplace::{Set, scene, set};

@@ -1,5 +1,5 @@
-//! In: plans of which one thing is wrong, confirmations that do not belong, links and people that go while the arm moves. Out:
-//! no motion in the controller's log, or a Halt there in time.
+//! In: plans of which one thing is wrong, confirmations that do not belong, links and people that go while the arm
+//! moves. Out: no motion in the controller's log, or a Halt there in time.
 //! Frame and unit: base frame; mm, degrees; ms.
 
 use super::cell;
@@ -16,7 +16,8 @@ use std::time::{Duration, Instant};
 
 const SPACE: Space = Space { from_mm: [150.0, -300.0, 200.0], to_mm: [500.0, 300.0, 700.0] };
 
-/// The usual limits, and the longest silence: a machine that stands still is silent too, and only one test is about silence.
+/// The usual limits, and the longest silence: a machine that stands still is silent too, and only one test is about
+/// silence.
 fn limits() -> Limits {
     Limits { max_silence_ms: 5000.0, max_still_ms: 5000.0, ..Limits::within(SPACE) }
 }
@@ -194,8 +195,9 @@ struct Stopped<'a> {
 }
 
 impl Stopped<'_> {
-    /// Stops a motion of 100 mm at 20 mm/s: how long after there was a reason the Halt was at the controller, ms of the cell, which runs in
-    /// real time. Where the machine stood still the motion may have ended, or silence may have stopped it, before anything is done to it.
+    /// Stops a motion of 100 mm at 20 mm/s: how long after there was a reason the Halt was at the controller, ms of
+    /// the cell, which runs in real time. Where the machine stood still the motion may have ended, or silence may
+    /// have stopped it, before anything is done to it.
     fn once(&self) -> Result<f64, String> {
         let served = cell(7, 1.0);
         served.controller.set_motor(true);
@@ -289,7 +291,8 @@ fn whoever_goes_while_the_arm_moves_halts_it_in_time() {
     let frozen = frozen.in_time();
     println!("halt at the controller after ms: poses that stand for 300 {frozen:.1}");
     println!(
-        "halt at the controller after ms: STOP {stop:.1}, signal {signal:.1}, lease of 100 {lease:.1}, link cut {cut:.1}, four times as fast {fast:.1}, silence of 200 {silent:.1}"
+        "halt at the controller after ms: STOP {stop:.1}, signal {signal:.1}, lease of 100 {lease:.1}, link cut \
+         {cut:.1}, four times as fast {fast:.1}, silence of 200 {silent:.1}"
     );
 }
 

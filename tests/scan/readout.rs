@@ -1,4 +1,5 @@
-//! Pictures of a region of the sensor, and binned ones, give the points of the whole ones; unexplained ones are refused.
+//! Pictures of a region of the sensor, and binned ones, give the points of the whole ones; unexplained ones are
+//! refused.
 
 use crate::common::{sheetlight, sheetlight_fails};
 use sheetlight::camera::Readout;

@@ -30,7 +30,8 @@ const ORTHONORMAL: f64 = 1e-6;
 
 /// No leg is slower, mm/s: below it an arm that moves cannot be told from one that stands.
 pub const SLOWEST_MM_S: f64 = 0.1;
-/// A way is looked at in turns of at most so much, rad: a point 300 mm off the flange passes 0.02 mm from the chord of such a turn.
+/// A way is looked at in turns of at most so much, rad: a point 300 mm off the flange passes 0.02 mm from the chord
+/// of such a turn.
 const PIECE: f64 = 0.02;
 
 /// How far a matrix is from a rotation; infinite where a number is.

@@ -1,5 +1,5 @@
-//! In: recordings of boards that one camera took. Out: the boards' corners, picture by picture, why the others have none,
-//! and the hashes of what went in.
+//! In: recordings of boards that one camera took. Out: the boards' corners, picture by picture, why the others have
+//! none, and the hashes of what went in.
 //! Frame and unit: px.
 
 use super::intrinsics::Observation;
@@ -25,7 +25,8 @@ impl Source<'_> {
     }
 }
 
-/// Looks for the board in one picture; `white` is the colour of its first square where its description leaves that open.
+/// Looks for the board in one picture; `white` is the colour of its first square where its description leaves that
+/// open.
 fn look(source: &Source<'_>, white: Option<bool>, options: &FindOptions) -> Result<Observation> {
     let board = source.recording.meta.board_of(source.frame).ok_or_else(no_board)?;
     let known = white.map_or_else(|| board.clone(), |white| board.beginning(white));

@@ -1,5 +1,5 @@
-//! In: a picture with a spot, the places of bad pixels, and (on a board) the picture in room light. Out: the brightest place, cut
-//! out, with the shape at which a fit begins.
+//! In: a picture with a spot, the places of bad pixels, and (on a board) the picture in room light. Out: the
+//! brightest place, cut out, with the shape at which a fit begins.
 //! Frame and unit: px, grey levels (docs/math.md, Pointer (1), (2)).
 
 use crate::fault::{Fault, Result};

@@ -63,7 +63,10 @@ pub fn judge(fit: &PointerFit, camera: &Intrinsics, spot_px: f64, limits: &Limit
     let overruled = used.len() < fit.spots.len();
     j.at_best(Verdict::Usable, fit.sigma_ratio > LOUD && !overruled, || loud.clone());
     j.at_best(Verdict::BadlyDetermined, fit.sigma_ratio > LOUD && overruled, || {
-        format!("{loud}, {LOUD:.0} times are allowed if others are excluded: they do not agree well enough to overrule any")
+        format!(
+            "{loud}, {LOUD:.0} times are allowed if others are excluded: they do not agree well enough to \
+                 overrule any"
+        )
     });
     j.advise(low > near + 0.25 * (far - near), || format!("show the board nearer, at about {} mm", work.depth(near)));
     j.advise(high < far - 0.25 * (far - near), || {
@@ -104,7 +107,8 @@ fn by_spots(fit: &PointerFit, used: &[&SpotResidual], work: &Volume, j: &mut Jud
     for s in used.iter().filter(|s| s.beside > gate) {
         j.at_best(Verdict::BadlyDetermined, true, || {
             format!(
-                "{}: its spot lies {:.1} sigmas from the beam of the others, {:.1} are allowed, and too few pictures are \
+                "{}: its spot lies {:.1} sigmas from the beam of the others, {:.1} are allowed, and too few pictures \
+                 are \
                  left to do without it",
                 s.name,
                 s.beside.sqrt(),

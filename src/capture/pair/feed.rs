@@ -77,8 +77,11 @@ impl PoseFeed {
             }
             PoseUri::Sim(word) => {
                 let spec = sim.ok_or_else(|| {
-                    Fault::usage(format!("{word}: these poses belong to a simulated station, but the camera is another"))
-                        .next("give the same URI as --camera")
+                    Fault::usage(format!(
+                        "{word}: these poses belong to a simulated station, but the camera is \
+                                          another"
+                    ))
+                    .next("give the same URI as --camera")
                 })?;
                 let motion = SimMotion::new(spec)?;
                 thread(Box::new(move |s| simulate(&motion, &s)))?;
@@ -263,7 +266,8 @@ fn sample(pose: &TimedPose, clock: &mut ClockMap) -> Sample {
     Sample { ns, sigma_ns, stand: Stand::Robot(pose.base_from_flange) }
 }
 
-/// Asks a robot until it is told to stop; `again` connects anew where a connection broke. A list of poses that is at its end stays so.
+/// Asks a robot until it is told to stop; `again` connects anew where a connection broke. A list of poses that is at
+/// its end stays so.
 fn ask(poses: Box<dyn PoseSource>, again: impl Fn() -> Result<Box<dyn PoseSource>>, shared: &Shared) {
     let (mut clock, mut poses, mut answers) = (ClockMap::default(), Some(poses), true);
     while !shared.1.load(Ordering::Relaxed) {

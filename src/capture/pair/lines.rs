@@ -1,5 +1,5 @@
-//! In: lines of text that say where something stood: a head that names convention and clock, then a time and a pose, or a count, each. Out: what each
-//! line says; refused where units or order are not what was named.
+//! In: lines of text that say where something stood: a head that names convention and clock, then a time and a pose,
+//! or a count, each. Out: what each line says; refused where units or order are not what was named.
 //! Frame and unit: base_from_flange, mm, or counts; ns of the clock that the head names.
 
 use crate::fault::{Fault, Result};
@@ -55,7 +55,8 @@ pub struct Lines {
 }
 
 fn head() -> &'static str {
-    "begin the stream with '# convention: denso' (or another name) or '# counts: count', and '# clock: unix' or '# clock: own'"
+    "begin the stream with '# convention: denso' (or another name) or '# counts: count', and '# clock: unix' or '# \
+     clock: own'"
 }
 
 impl Lines {
@@ -69,8 +70,8 @@ impl Lines {
         self.unit
     }
 
-    /// Reads a line that was here at `here_ns`; `None` for the head and for empty lines. `paced`: lines come as they are written, not
-    /// out of a file.
+    /// Reads a line that was here at `here_ns`; `None` for the head and for empty lines. `paced`: lines come as they
+    /// are written, not out of a file.
     ///
     /// # Errors
     /// Numbers before the head, another number of them, a unit that is not the one that was named.
@@ -167,11 +168,9 @@ impl Lines {
             let unit = [(1e3, "milliseconds"), (1e6, "microseconds"), (1.0, "seconds")];
             let near =
                 unit.iter().find(|(n, _)| (0.5..=2.0).contains(&(per / n))).map_or("another unit", |(_, name)| name);
-            return Err(Fault::refused(format!(
-                "t_ns increases by {per:.0} in a second, expected are 1000000000"
-            ))
-            .cause(format!("the times are in {near}, or the sender runs at another speed than time"))
-            .next("send true times in nanoseconds"));
+            return Err(Fault::refused(format!("t_ns increases by {per:.0} in a second, expected are 1000000000"))
+                .cause(format!("the times are in {near}, or the sender runs at another speed than time"))
+                .next("send true times in nanoseconds"));
         }
         if self.clock == Some(LineClock::Unix) && paced && here_ns.abs_diff(t_ns) > 3_600_000_000_000 && !self.meant {
             return Err(Fault::refused(format!(
@@ -196,7 +195,10 @@ impl Lines {
             return Ok(());
         }
         let asked = |what: String, cause: &str| {
-            Err(Fault::refused(what).cause(cause.to_owned()).next("name the convention that the robot really writes, or confirm the unit with '# units: as named' in the head"))
+            Err(Fault::refused(what).cause(cause.to_owned()).next(
+                "name the convention that the robot really writes, \
+                or confirm the unit with '# units: as named' in the head",
+            ))
         };
         let name = convention.name();
         if self.reach < METRES {

@@ -40,8 +40,8 @@ struct Link {
 }
 
 impl CellCamera {
-    /// Connects to `HOST:PORT` and asks for `rate_hz` pictures a second; 0: as the cell likes, negative: only those that
-    /// are asked for one by one ([`CellCamera::snap`]).
+    /// Connects to `HOST:PORT` and asks for `rate_hz` pictures a second; 0: as the cell likes, negative: only those
+    /// that are asked for one by one ([`CellCamera::snap`]).
     ///
     /// # Errors
     /// Nobody answers, or something else than a cell.

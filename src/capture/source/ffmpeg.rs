@@ -25,7 +25,8 @@ pub struct Ffmpeg {
 const LIVE: [&str; 9] = ["v4l2", "dshow", "avfoundation", "rtsp:", "rtp:", "udp:", "srt:", "tcp:", "-re"];
 
 impl Ffmpeg {
-    /// Starts ffmpeg with `arguments` before the output that we ask for, `bits` deep. What it opens is asked for its size first.
+    /// Starts ffmpeg with `arguments` before the output that we ask for, `bits` deep. What it opens is asked for its
+    /// size first.
     ///
     /// # Errors
     /// ffmpeg is missing, or cannot open it.

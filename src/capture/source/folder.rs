@@ -1,4 +1,5 @@
-//! In: a folder that another program fills with pictures. Out: each picture once it is complete: its size has settled and it decodes.
+//! In: a folder that another program fills with pictures. Out: each picture once it is complete: its size has settled
+//! and it decodes.
 //! Frame and unit: the host's time at which it was seen complete, ns.
 
 use crate::capture::clock::now_ns;
@@ -36,7 +37,8 @@ pub struct FolderCamera {
 }
 
 impl FolderCamera {
-    /// Waits up to `patience` for the first new picture, which tells the format. `bits` is the sensor's depth of 16-bit files.
+    /// Waits up to `patience` for the first new picture, which tells the format. `bits` is the sensor's depth of
+    /// 16-bit files.
     ///
     /// # Errors
     /// No folder, no picture within the time, one that is no grey level picture of that depth.

@@ -1,4 +1,5 @@
-//! In: lines of text from whoever looks at a camera of the cell. Out: its pictures and answers (capture::wire has the protocol).
+//! In: lines of text from whoever looks at a camera of the cell. Out: its pictures and answers (capture::wire has the
+//! protocol).
 //! Frame and unit: grey levels; ns of the cell's clock.
 
 use super::Faults;
@@ -142,8 +143,8 @@ impl Viewer {
         }
     }
 
-    /// Takes pictures at the rate that was asked for, at even moments of the cell's time, which goes on meanwhile: those whose moment
-    /// has passed when the one before is made are taken and not sent, and their numbers are missing.
+    /// Takes pictures at the rate that was asked for, at even moments of the cell's time, which goes on meanwhile:
+    /// those whose moment has passed when the one before is made are taken and not sent, and their numbers are missing.
     fn run(&self, over: &AtomicBool, faults: &Faults) {
         let mut next = None::<f64>;
         while !over.load(Ordering::Relaxed) && !Faults::on(&faults.camera_gone) {

@@ -1,4 +1,5 @@
-//! In: a robot and a camera on their wires, a board below them. Out: the station's whole rig, by moves of the program's choice.
+//! In: a robot and a camera on their wires, a board below them. Out: the station's whole rig, by moves of the
+//! program's choice.
 //! Frame and unit: mm, mm/s.
 
 use super::joint::finish;
@@ -77,7 +78,8 @@ pub fn run(args: &Args, console: &Console) -> Result<()> {
         if args.out.join("line/meta.json").is_file() {
             let (out, station) = (args.out.display(), moving.station.display());
             console.warn(format!(
-                "the pictures so far are kept: sheetlight calibrate joint {out}/* --station {station} makes of them what it can"
+                "the pictures so far are kept: sheetlight calibrate joint {out}/* --station {station} makes of them \
+                 what it can"
             ));
         }
     })?;

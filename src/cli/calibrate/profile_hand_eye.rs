@@ -75,7 +75,8 @@ fn put_to_the_test(args: &Args, transform: &Path, options: &BallOptions, console
     let (found, warnings) = evaluate_profile_hand_eye(&args.profiles, &args.poses, transform, options)?;
     warnings.iter().for_each(|w| console.warn(w));
     let mut text = format!(
-        "the profiles' points lie on one ball of {:.3} mm to {:.4} mm rms; with the diameter left free on one of {:.3} mm to {:.4} mm\n",
+        "the profiles' points lie on one ball of {:.3} mm to {:.4} mm rms; with the diameter left free on one of \
+         {:.3} mm to {:.4} mm\n",
         options.diameter, found.rms, found.free_diameter, found.free_rms
     );
     text += &format!("ball in the base: {:.3} {:.3} {:.3} mm\n", found.ball.x, found.ball.y, found.ball.z);

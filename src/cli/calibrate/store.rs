@@ -1,4 +1,5 @@
-//! In: a calibration and its page. Out: both stored in the station, or refused where it is badly determined; what is said of it.
+//! In: a calibration and its page. Out: both stored in the station, or refused where it is badly determined; what is
+//! said of it.
 //! Frame and unit: none.
 
 use crate::calibrate::report::Page;

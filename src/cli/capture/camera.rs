@@ -1,4 +1,5 @@
-//! In: a camera. Out: what cameras there are, what one can be set to, one picture with what it shows, the exposure that suits the stripe.
+//! In: a camera. Out: what cameras there are, what one can be set to, one picture with what it shows, the exposure
+//! that suits the stripe.
 //! Frame and unit: features by the standard names (SFNC); px, us.
 
 use crate::capture::{CameraUri, PictureSource, RawFormat, Value, fresh, look, tune, unexposed};

@@ -222,8 +222,14 @@ impl Capture {
                 (None, None) if self.motion.0.axis().is_some() => Table::Chunk,
                 _ => {
                     return Err(Fault::usage("--pair count needs one table of poses or counts")
-                        .cause("a robot's poses by number, or an axis that triggers the camera or counts into its pictures")
-                        .next("give --poses FILE, or --motion linear:count with --counts-per-shot N or a camera that sends its count"));
+                        .cause(
+                            "a robot's poses by number, or an axis that triggers the camera or counts into its \
+                                pictures",
+                        )
+                        .next(
+                            "give --poses FILE, or --motion linear:count with --counts-per-shot N or a camera that \
+                               sends its count",
+                        ));
                 }
             })),
         })

@@ -7,7 +7,8 @@ use crate::camera::Readout;
 pub struct ReadoutArgs {
     /// Left upper corner of the sensor region that the pictures show (OffsetX, OffsetY), if neither camera nor
     /// meta.json states it
-    #[arg(long, hide_short_help = true, value_name = "X,Y", value_parser = crate::cli::terminal::arguments::parse::<Corner>)]
+    #[arg(long, hide_short_help = true, value_name = "X,Y",
+        value_parser = crate::cli::terminal::arguments::parse::<Corner>)]
     region: Option<Corner>,
     /// Binning of the pictures in both directions, if neither camera nor meta.json states it
     #[arg(long, hide_short_help = true, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]

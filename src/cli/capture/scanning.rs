@@ -28,7 +28,8 @@ pub struct Taken<'a> {
     pub ambient: &'a dyn Fn(Format) -> Result<Option<Image>>,
 }
 
-/// Scans a camera while it runs. With `keep` it is recorded there, and what cannot be scanned in time waits on that disk.
+/// Scans a camera while it runs. With `keep` it is recorded there, and what cannot be scanned in time waits on that
+/// disk.
 pub fn scan_camera(
     &Taken { capture, raw, poses, station, keep, ambient }: &Taken<'_>,
     rig: &Rig,

@@ -1,5 +1,5 @@
-//! In: this machine. Out: its adapters, every stage compared with its CPU twin, transfer rates, the time of a shot, and a
-//! plain verdict, each as soon as it is known.
+//! In: this machine. Out: its adapters, every stage compared with its CPU twin, transfer rates, the time of a shot,
+//! and a plain verdict, each as soon as it is known.
 //! Frame and unit: words that differ, or the stage's own measure; GB/s, ms.
 
 use super::trial;
@@ -81,7 +81,8 @@ impl Findings {
             Event::Device { name, reads_texels } if self.used.is_none() => {
                 if reads_texels {
                     console.part(
-                        "stages read arrays as texels of images on the same memory, which is faster on a software adapter",
+                        "stages read arrays as texels of images on the same memory, which is faster on a software \
+                         adapter",
                     );
                 }
                 (self.used, self.reads_texels) = (Some(name), reads_texels);
@@ -122,7 +123,8 @@ fn verdict(used: Option<&str>, wrong: &[&str]) -> String {
 
 fn adapter(a: &AdapterInfo) -> String {
     format!(
-        "adapter {} ({}, {}), driver {}\n  binds {} MiB, {} buffers a stage, workgroups of {}, {}timestamps, {} memory\n",
+        "adapter {} ({}, {}), driver {}\n  binds {} MiB, {} buffers a stage, workgroups of {}, {}timestamps, {} \
+         memory\n",
         a.name,
         a.kind,
         a.backend,

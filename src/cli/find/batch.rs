@@ -1,4 +1,5 @@
-//! In: recordings, a station, a recipe. Out: a scan of each and what was found in it, one after the other; a table, and how the places repeat.
+//! In: recordings, a station, a recipe. Out: a scan of each and what was found in it, one after the other; a table,
+//! and how the places repeat.
 //! Frame and unit: the scans' frame; mm, degrees.
 
 use crate::cli::terminal::arguments::{changes, parse};

@@ -25,7 +25,8 @@ pub struct Args {
     /// Folder from sheetlight scan --out
     scan: PathBuf,
     /// Filter: sigma:MM, heights:LOW,HIGH, cut:X0,Y0,X1,Y1, keep:X0,Y0,X1,Y1 or islands:CELLS,STEP; may be repeated
-    #[arg(long = "filter", required = true, value_parser = crate::cli::terminal::arguments::parse::<Filter>, allow_hyphen_values = true)]
+    #[arg(long = "filter", required = true, value_parser = crate::cli::terminal::arguments::parse::<Filter>,
+        allow_hyphen_values = true)]
     filters: Vec<Filter>,
     /// Folder for the filtered scan
     #[arg(long)]

@@ -1,4 +1,5 @@
-//! In: a report of find, its recipe, a recording whose robot's poses are known. Out: the part's outlines over one of its pictures.
+//! In: a report of find, its recipe, a recording whose robot's poses are known. Out: the part's outlines over one of
+//! its pictures.
 //! Frame and unit: base frame, mm; px of the picture.
 
 use crate::cli::terminal::console::Console;

@@ -47,7 +47,8 @@ pub struct Args {
     #[arg(long, value_parser = crate::cli::terminal::arguments::parse::<Convention>)]
     robot: Option<Convention>,
     /// Direction towards the camera, base frame [default: from the station, else 0,0,1]
-    #[arg(long, value_name = "X,Y,Z", value_parser = crate::cli::terminal::arguments::numbers::<3>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y,Z", value_parser = crate::cli::terminal::arguments::numbers::<3>,
+        allow_hyphen_values = true)]
     up: Option<[f64; 3]>,
     /// List every match, not only the best
     #[arg(long)]
@@ -92,7 +93,8 @@ pub(super) fn summary(r: &Report) -> String {
     s += &seen(r);
     if let Some(z) = &r.sizes {
         s += &format!(
-            "sizes        along the stripe {:+.3} %, from shot to shot {:+.3} %, difference {:+.3} %, shear {:+.4} degrees against the \
+            "sizes        along the stripe {:+.3} %, from shot to shot {:+.3} %, difference {:+.3} %, shear {:+.4} \
+             degrees against the \
              drawing; {:.3} {:.3} {:.3} {:.4} are expected\n",
             z.along_percent,
             z.across_percent,
@@ -194,7 +196,8 @@ fn row(v: &[f64; 3], digits: usize) -> String {
 pub fn looks(l: &Disagreement) -> String {
     let mut s = String::new();
     s += &format!(
-        "looks        {} of them, turned by {:.0} and tilted by {:.0} degrees; looks {} and {} disagree by {} mm, {} degrees; \
+        "looks        {} of them, turned by {:.0} and tilted by {:.0} degrees; looks {} and {} disagree by {} mm, {} \
+         degrees; \
          {} mm, {} degrees are expected{}\n",
         l.looks,
         l.turn_deg,
@@ -210,7 +213,8 @@ pub fn looks(l: &Disagreement) -> String {
     for e in &l.explained_by {
         let off: Vec<String> = e.off_by.iter().map(|(name, by)| format!("{name} {by:+.3}")).collect();
         s += &format!(
-            "  {:16} would explain {:.0} % of it, were it wrong by {}; wrong by {:.0} of its sigmas it could go unnoticed and move the part by {} mm\n",
+            "  {:16} would explain {:.0} % of it, were it wrong by {}; wrong by {:.0} of its sigmas it could go \
+             unnoticed and move the part by {} mm\n",
             e.name,
             100.0 * e.share,
             off.join(", "),

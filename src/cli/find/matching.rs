@@ -1,4 +1,5 @@
-//! In: a part's template and pictures. Out: where the part lies in each of them: JSON, CSV, a picture with the matches drawn in.
+//! In: a part's template and pictures. Out: where the part lies in each of them: JSON, CSV, a picture with the
+//! matches drawn in.
 //! Frame and unit: pixels of each picture (x right, y down, an integer is a pixel's centre); degrees, x towards y.
 
 use crate::cli::terminal::arguments::{numbers, parse};
@@ -39,7 +40,8 @@ pub struct Args {
     #[arg(long, default_value_t = ModelOptions::default().contrast)]
     contrast: f64,
     /// Only matches with their middle in this rectangle, px
-    #[arg(long, value_name = "X,Y,W,H", value_parser = numbers::<4>, allow_hyphen_values = true, conflicts_with = "polygon")]
+    #[arg(long, value_name = "X,Y,W,H", value_parser = numbers::<4>, allow_hyphen_values = true,
+        conflicts_with = "polygon")]
     region: Option<[f64; 4]>,
     /// Only matches with their middle in this polygon: its corners, px
     #[arg(long, value_name = "X,Y,X,Y,...", value_delimiter = ',', allow_hyphen_values = true)]
@@ -241,7 +243,8 @@ fn overlays(args: &Args) -> Vec<PathBuf> {
 }
 
 fn said_of(t: &Template) -> serde_json::Value {
-    serde_json::json!({"name": t.name, "picture": t.picture, "picture_sha256": t.picture_sha256, "region_px": t.region_px,
+    serde_json::json!({"name": t.name, "picture": t.picture, "picture_sha256": t.picture_sha256,
+        "region_px": t.region_px,
         "edges": t.model.levels[0].len(), "reference": "the middle of the region"})
 }
 
@@ -305,7 +308,8 @@ fn summary(all: &[Found]) -> String {
         );
         for (k, m) in f.matches.iter().enumerate() {
             s += &format!(
-                "{:4}  {:9.3} {:9.3} px  {:8.3} degrees  scale {:.4}  score {:.3}  sigma {:.3} {:.3} px, {:.3} degrees{}\n",
+                "{:4}  {:9.3} {:9.3} px  {:8.3} degrees  scale {:.4}  score {:.3}  sigma {:.3} {:.3} px, {:.3} \
+                 degrees{}\n",
                 k + 1,
                 m.x_px,
                 m.y_px,

@@ -36,7 +36,8 @@ pub struct Args {
     #[arg(long = "layer")]
     layers: Vec<String>,
     /// Insertion datum in the drawing, in its unit [default: middle of the largest outline's box]
-    #[arg(long, value_name = "X,Y", value_parser = crate::cli::terminal::arguments::numbers::<2>, allow_hyphen_values = true)]
+    #[arg(long, value_name = "X,Y", value_parser = crate::cli::terminal::arguments::numbers::<2>,
+        allow_hyphen_values = true)]
     origin: Option<[f64; 2]>,
     /// Number of turns at which the part looks nearly alike (2: half a turn)
     #[arg(long, value_name = "N", default_value_t = 1)]

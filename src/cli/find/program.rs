@@ -1,4 +1,5 @@
-//! In: a found position (the JSON of find --out). Out: approach, insertion and retract as a program in a robot's own language.
+//! In: a found position (the JSON of find --out). Out: approach, insertion and retract as a program in a robot's own
+//! language.
 //! Frame and unit: the tool in the robot's base frame; mm, mm/s.
 
 use crate::cli::terminal::console::Console;

@@ -1,5 +1,5 @@
-//! In: a finished scan of a part, its recording's poses, a recipe, a station. Out: the robot poses of a second scan of the same
-//! part from another side, and which errors of which calibration the two together can show.
+//! In: a finished scan of a part, its recording's poses, a recipe, a station. Out: the robot poses of a second scan
+//! of the same part from another side, and which errors of which calibration the two together can show.
 //! Frame and unit: base frame; mm, degrees.
 
 use crate::cli::terminal::console::Console;

@@ -1,5 +1,6 @@
-//! In: a scan folder and where the part's outline, windows and holes lie in its height map, or a picture and a region of it. Out: a
-//! recipe, proven on that scan, and a picture of the proof; or a template for `match` and a picture of its edges.
+//! In: a scan folder and where the part's outline, windows and holes lie in its height map, or a picture and a region
+//! of it. Out: a recipe, proven on that scan, and a picture of the proof; or a template for `match` and a picture of
+//! its edges.
 //! Frame and unit: height map's grid frame, mm from its corner; pixels of the picture.
 
 use super::matching::taught;
@@ -42,7 +43,8 @@ pub struct Args {
     #[arg(long, requires = "region", default_value_t = ModelOptions::default().contrast)]
     contrast: f64,
     /// With --region: channel of a colour picture: red, green, blue or luma
-    #[arg(long, requires = "region", default_value = "luma", value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
+    #[arg(long, requires = "region", default_value = "luma",
+        value_parser = crate::cli::terminal::arguments::parse::<Channel>)]
     channel: Channel,
     /// With --region: depth of the picture, 8 to 16 bits
     #[arg(long, requires = "region", default_value_t = 8, value_parser = clap::value_parser!(u8).range(8..=16))]

@@ -1,4 +1,5 @@
-//! In: a station, a robot, a camera, a recipe. Out: the insertion, step by step, each motion shown and confirmed; the job's report.
+//! In: a station, a robot, a camera, a recipe. Out: the insertion, step by step, each motion shown and confirmed; the
+//! job's report.
 //! Frame and unit: base frame; poses in the robot's own notation; mm, s.
 
 use super::moving::Moving;

@@ -1,5 +1,5 @@
-//! In: what every command that moves a robot is told: station, robot, camera, speed, leave to move. Out: the robot behind its rules,
-//! taken; the person at the terminal, who is asked before each motion.
+//! In: what every command that moves a robot is told: station, robot, camera, speed, leave to move. Out: the robot
+//! behind its rules, taken; the person at the terminal, who is asked before each motion.
 //! Frame and unit: mm/s.
 
 use crate::arm::rules::{Confirmation, Guard};
@@ -36,7 +36,8 @@ pub(in crate::cli) struct Moving {
 }
 
 impl Moving {
-    /// The robot behind its rules, taken for motions; Ctrl-C halts it, the station's motions.jsonl has what is asked and made.
+    /// The robot behind its rules, taken for motions; Ctrl-C halts it, the station's motions.jsonl has what is asked
+    /// and made.
     ///
     /// # Errors
     /// `--yes` for a robot that does not say that it is a simulated one; no leave to move; no controller.
@@ -45,7 +46,10 @@ impl Moving {
         // An address on this machine says nothing: a tunnel to a real controller has one too.
         if self.yes && !guard.link().simulated()? {
             return Err(Fault::usage(format!("--yes with the robot {}", self.robot))
-                .cause("its controller does not say that it is a simulated one, and only such a robot moves without a person's yes")
+                .cause(
+                    "its controller does not say that it is a simulated one, and only such a robot moves without \
+                        a person's yes",
+                )
                 .next("leave --yes out"));
         }
         guard.stop_button().listen(interrupt::asked_for());

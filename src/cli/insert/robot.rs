@@ -1,4 +1,5 @@
-//! In: a station, a camera, recipes, an address. Out: what a robot's own program asks for over TCP, answered until Ctrl-C.
+//! In: a station, a camera, recipes, an address. Out: what a robot's own program asks for over TCP, answered until
+//! Ctrl-C.
 //! Frame and unit: poses in the robot's own notation.
 
 use crate::capture::CameraUri;

@@ -1,4 +1,5 @@
-//! In: a station. Out: its settings changed by name, all that was chosen and measured of it in one file, and the way back.
+//! In: a station. Out: its settings changed by name, all that was chosen and measured of it in one file, and the way
+//! back.
 //! Frame and unit: as docs/file-formats.md says of each setting.
 
 use crate::cli::terminal::arguments;

@@ -1,4 +1,5 @@
-//! In: a station folder, an address. Out: the operator's screen, served until Ctrl-C; a password's hash for other machines.
+//! In: a station folder, an address. Out: the operator's screen, served until Ctrl-C; a password's hash for other
+//! machines.
 //! Frame and unit: as the screen's procedures.
 
 use crate::cli::terminal::console::Console;

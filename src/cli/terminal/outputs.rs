@@ -1,4 +1,5 @@
-//! In: where results are to go, and the folders and files that a command reads. Out: a refusal where one would replace another.
+//! In: where results are to go, and the folders and files that a command reads. Out: a refusal where one would
+//! replace another.
 //! Frame and unit: none.
 
 use crate::fault::{Fault, Result};

@@ -1,4 +1,5 @@
-//! In: the entities of a DXF file. Out: its curves as polylines and circles, blocks inserted, in one plane seen from above.
+//! In: the entities of a DXF file. Out: its curves as polylines and circles, blocks inserted, in one plane seen from
+//! above.
 //! Frame and unit: the drawing's own x y z and its own unit; angles in degrees in the file.
 
 use super::entity::{ellipse, heavy, level, light, mirrored, point, size, turn, wide};
@@ -171,7 +172,8 @@ impl Reader<'_> {
         let named = self.wanted.contains(&key(layer));
         let table = self.file.layers.get(&key(layer));
         let (off, frozen) = table.map_or((false, false), |l| (l.off, l.frozen));
-        // What a block holds on other layers is seen even where its insertion's layer is off, but not where that is frozen.
+        // What a block holds on other layers is seen even where its insertion's layer is off, but not where that is
+        // frozen.
         let block = e.kind == "INSERT";
         let why = if ANNOTATION.contains(&e.kind.as_str()) {
             String::new()

@@ -1,4 +1,5 @@
-//! In: one entity of a DXF file. Out: what its tags say: places, sizes, corners, what lies flat and what is seen from below.
+//! In: one entity of a DXF file. Out: what its tags say: places, sizes, corners, what lies flat and what is seen from
+//! below.
 //! Frame and unit: the entity's own x y z, the drawing's own unit; angles in rad.
 
 use super::flatten::arc;

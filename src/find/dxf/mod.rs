@@ -1,5 +1,7 @@
-//! In: an ASCII DXF file (LINE, ARC, CIRCLE, ELLIPSE, SPLINE, LWPOLYLINE, POLYLINE, INSERT). Out: a drawing of the part.
-//! Frame and unit: part frame, x and y as drawn, z towards the viewer; mm, from the unit that the file or the user states.
+//! In: an ASCII DXF file (LINE, ARC, CIRCLE, ELLIPSE, SPLINE, LWPOLYLINE, POLYLINE, INSERT). Out: a drawing of the
+//! part.
+//! Frame and unit: part frame, x and y as drawn, z towards the viewer; mm, from the unit that the file or the user
+//! states.
 
 use super::dxf::flatten::FLAT;
 use super::model::drawing::Drawing;

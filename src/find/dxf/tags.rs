@@ -1,4 +1,5 @@
-//! In: the bytes of a DXF file (ASCII). Out: its unit, layers that are off, blocks and entities, each as its group codes.
+//! In: the bytes of a DXF file (ASCII). Out: its unit, layers that are off, blocks and entities, each as its group
+//! codes.
 //! Frame and unit: none; values are text as they stand in the file, lines are counted from 1.
 
 use crate::fault::{Fault, Result};
@@ -150,8 +151,9 @@ fn cut(tags: &[Tag]) -> Fault {
         .next("export the drawing again as ASCII DXF")
 }
 
-/// UTF-8 since 2007, before that the code page of the writer's Windows. Only names are text here: that they differ where
-/// the file's bytes differ is enough, so each byte is taken for a character, which for the western code page is the right one.
+/// UTF-8 since 2007, before that the code page of the writer's Windows. Only names are text here: that they differ
+/// where the file's bytes differ is enough, so each byte is taken for a character, which for the western code page is
+/// the right one.
 fn text(bytes: &[u8]) -> String {
     let plain = match std::str::from_utf8(bytes) {
         Ok(text) => text.to_owned(),

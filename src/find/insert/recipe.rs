@@ -153,13 +153,13 @@ pub struct Gates {
     pub second_look: bool,
     /// Largest disagreement of two looks over what all covariances make expect, 1 to 10.
     pub max_look_ratio: f64,
-    /// Least turn about the part's normal and least tilt against it from one look to the other, degrees, 0 to 180 and 0 to 60:
-    /// looks from one side make the same error twice.
+    /// Least turn about the part's normal and least tilt against it from one look to the other, degrees, 0 to 180 and
+    /// 0 to 60: looks from one side make the same error twice.
     pub min_look_turn_deg: f64,
     /// Least tilt against the part's normal from one look to the other, degrees, 0 to 60.
     pub min_look_tilt_deg: f64,
-    /// Largest error along the part's normal that several looks may leave unseen, mm, 0.00001 to 100; in the plane and as a turn
-    /// the insertion's tolerances hold.
+    /// Largest error along the part's normal that several looks may leave unseen, mm, 0.00001 to 100; in the plane
+    /// and as a turn the insertion's tolerances hold.
     pub max_unseen_height_mm: f64,
 }
 
@@ -292,7 +292,8 @@ fn above(name: &str, mm: f64, least: f64) -> Result<()> {
     }
     Err(Fault::input(format!("insertion.{name} is {mm}; allowed: {least:.3} to {MOST_ABOVE_MM}"))
         .cause(format!(
-            "below {least:.3} mm, the drawn depth of the part and {CLEAR_MM} mm, the tool there is not clear of the part"
+            "below {least:.3} mm, the drawn depth of the part and {CLEAR_MM} mm, the tool there is not clear of the \
+             part"
         ))
         .next(format!("set {name} in the recipe to more than the component reaches into the part, 30 for example")))
 }

@@ -1,4 +1,5 @@
-//! In: where in a scene parts may lie, as corners. Out: the cells that a search there needs, and whether a match lies in it.
+//! In: where in a scene parts may lie, as corners. Out: the cells that a search there needs, and whether a match lies
+//! in it.
 //! Frame and unit: pixels of the scene, an integer is a pixel's centre.
 
 use super::options::SearchOptions;

@@ -88,8 +88,8 @@ fn page(bytes: &[u8], index: usize, wanted: &Wanted) -> Result<Samples> {
     Ok(samples.upright(orientation))
 }
 
-/// The `tiff` crate turns the samples of a picture whose white is 0 round, and reads no palettes and masks. It gets a copy
-/// of the file that says "black is 0", and gives the samples as they are written.
+/// The `tiff` crate turns the samples of a picture whose white is 0 round, and reads no palettes and masks. It gets a
+/// copy of the file that says "black is 0", and gives the samples as they are written.
 fn as_black_is_zero<'a>(bytes: &'a [u8], file: &mut Decoder<Cursor<&'a [u8]>>, tags: &Tags) -> Result<Cow<'a, [u8]>> {
     if tags.shades == Shades::Rgb || (tags.shades == Shades::Grey && !tags.says.white_is_zero) {
         return Ok(Cow::Borrowed(bytes));

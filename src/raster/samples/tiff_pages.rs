@@ -66,7 +66,6 @@ impl Pages {
     /// What was passed over, in words.
     pub fn note(&self, chosen: usize) -> Option<String> {
         let reduced = self.reduced.iter().filter(|k| **k != chosen).count();
-        (reduced > 0)
-            .then(|| format!("{reduced} reduced copies in the file were skipped (NewSubfileType, tag 254)"))
+        (reduced > 0).then(|| format!("{reduced} reduced copies in the file were skipped (NewSubfileType, tag 254)"))
     }
 }

@@ -1,6 +1,6 @@
-//! Makes of a foreign file, and of what its user states about it, a cloud in lines, as if a scan had made a shot of each.
-//! Places are in the file's own frame, mm. A height picture's x runs along its columns, z towards the sensor, and y makes the
-//! frame right-handed: against the rows of a picture that is seen from the sensor.
+//! Makes of a foreign file, and of what its user states about it, a cloud in lines, as if a scan had made a shot of
+//! each. Places are in the file's own frame, mm. A height picture's x runs along its columns, z towards the sensor,
+//! and y makes the frame right-handed: against the rows of a picture that is seen from the sensor.
 
 use super::missing;
 use super::raw::Raw;
@@ -42,8 +42,12 @@ pub fn lines(raw: &Raw, light: Option<&Raw>, stated: &Stated) -> Result<Lines> {
             .next("give --unit-mm: mm in one level of a picture, or in one unit of a cloud (1 for mm, 1000 for m)")
     })?;
     if !UNITS_MM.contains(&unit) {
-        return Err(Fault::usage(format!("the unit is {unit} mm; allowed: {} to {}", UNITS_MM.start(), UNITS_MM.end()))
-            .next("correct --unit-mm"));
+        return Err(Fault::usage(format!(
+            "the unit is {unit} mm; allowed: {} to {}",
+            UNITS_MM.start(),
+            UNITS_MM.end()
+        ))
+        .next("correct --unit-mm"));
     }
     if let Some(wrong) = stated.spacing_mm.iter().flatten().find(|v| !UNITS_MM.contains(v)) {
         let (least, most) = (UNITS_MM.start(), UNITS_MM.end());

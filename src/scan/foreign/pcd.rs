@@ -165,8 +165,8 @@ fn number(kind: char, size: usize) -> Option<Number> {
     })
 }
 
-/// LZF: a control byte below 32 is followed by one byte more than it says as they are; others repeat what was written before:
-/// length in the upper three bits (7: another byte adds to it), distance in the lower five and the byte after.
+/// LZF: a control byte below 32 is followed by one byte more than it says as they are; others repeat what was written
+/// before: length in the upper three bits (7: another byte adds to it), distance in the lower five and the byte after.
 fn unpack(packed: &[u8], length: usize) -> Option<Vec<u8>> {
     let mut out = Vec::with_capacity(length.min(packed.len().saturating_mul(264)));
     let mut bytes = packed.iter().map(|&b| usize::from(b));

@@ -1,5 +1,5 @@
-//! In: pictures of a board that rides on a linear axis or turntable, with the counts there, and a station with a camera. Out: the
-//! axis' calibration, its report, and the files it came from.
+//! In: pictures of a board that rides on a linear axis or turntable, with the counts there, and a station with a
+//! camera. Out: the axis' calibration, its report, and the files it came from.
 //! Frame and unit: camera frame, mm, rad, counts.
 
 use super::board_views::{FrameBoard, boards};

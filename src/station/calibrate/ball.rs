@@ -105,7 +105,8 @@ fn poses_of(path: &Path) -> Result<(Vec<Rigid<Base, Flange>>, Vec<String>)> {
     let (uf, ut) = (read[0].user_frame, read[0].tool_frame);
     if uf != 0 || ut != 0 {
         warnings.push(format!(
-            "the listing's poses are those of tool frame {ut} in user frame {uf}: the result is the sensor in that tool frame; \
+            "the listing's poses are those of tool frame {ut} in user frame {uf}: the result is the sensor in that \
+             tool frame; \
              it is the flange's only if UT {ut} is zero"
         ));
     }
@@ -132,7 +133,8 @@ fn judge(fit: &BallFit, limits: &Limits) -> Quality {
         ),
     );
     j.reasons.push(format!(
-        "the ball's centre lies on the {} side of the profile plane in most profiles; the other side fits worse by {:.0}",
+        "the ball's centre lies on the {} side of the profile plane in most profiles; the other side fits worse by \
+         {:.0}",
         if fit.side == crate::calibrate::ball::options::Side::Plus { "plus" } else { "minus" },
         fit.side_margin
     ));
@@ -146,7 +148,10 @@ fn judge(fit: &BallFit, limits: &Limits) -> Quality {
     let high = fit.profiles.iter().map(|p| p.height).fold(f64::NEG_INFINITY, f64::max);
     let low = fit.profiles.iter().map(|p| p.height).fold(f64::INFINITY, f64::min);
     j.advise(j.verdict != Verdict::Good, || {
-        format!("take more profiles with the flange tilted by 20 degrees and more, the ball's centre {low:.0} to {high:.0} mm over the profile plane so far")
+        format!(
+            "take more profiles with the flange tilted by 20 degrees and more, the ball's centre {low:.0} to \
+                 {high:.0} mm over the profile plane so far"
+        )
     });
     let figures = BTreeMap::from([
         ("expected_error_at_working_distance_mm".to_string(), expected),

@@ -1,4 +1,5 @@
-//! In: a recording of a part that was passed to and fro, paired by clock; a station. Out: by how much its pictures are late against its poses.
+//! In: a recording of a part that was passed to and fro, paired by clock; a station. Out: by how much its pictures
+//! are late against its poses.
 //! Frame and unit: the cloud's frame, mm; ms.
 
 use crate::calibrate::latency::{Delay, Passing, delay};

@@ -1,5 +1,5 @@
-//! In: an arm that stands over the board, a camera, the line on its output. Out: that the line is seen, from one picture, before
-//! a sweep is made with it.
+//! In: an arm that stands over the board, a camera, the line on its output. Out: that the line is seen, from one
+//! picture, before a sweep is made with it.
 //! Frame and unit: points of one shot, counted.
 
 use super::eye::Eye;

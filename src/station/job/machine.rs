@@ -1,5 +1,5 @@
-//! In: a job's state, a robot behind its rules, a camera, a station, a recipe, a person. Out: the job done, or stopped where it says.
-//! A crash at any moment leaves a state from which it goes on or backs out.
+//! In: a job's state, a robot behind its rules, a camera, a station, a recipe, a person. Out: the job done, or
+//! stopped where it says. A crash at any moment leaves a state from which it goes on or backs out.
 //! Frame and unit: base frame; mm, mm/s, degrees, s.
 
 use super::eye::Eye;
@@ -331,7 +331,8 @@ impl<'a> Job<'a> {
         Ok(Phase::Approach)
     }
 
-    /// What was found, for those who look: the report, its picture, and what the camera sees of the part in the room's light.
+    /// What was found, for those who look: the report, its picture, and what the camera sees of the part in the
+    /// room's light.
     fn keep(&mut self, report: &Report) -> Result<()> {
         let text = serde_json::to_string_pretty(report).expect("plain data");
         let png = picture::draw(report, &self.recipe.drawing()).to_png();
@@ -433,11 +434,15 @@ fn way_up(at: &Vec3, down: &Vec3, up: &Vec3) -> Result<Vec3> {
     let way = up - down;
     if !(way.norm() > LEAST_WAY_MM && way.norm().is_finite()) {
         return Err(Fault::input(format!(
-            "the job's retract pose is {:.3} mm from its insertion pose, more than {LEAST_WAY_MM} is needed to know the direction up",
+            "the job's retract pose is {:.3} mm from its insertion pose, more than {LEAST_WAY_MM} is needed to know \
+             the direction up",
             way.norm()
         ))
         .cause("its recipe had retract_mm = 0, or the pose is not finite")
-        .next("take the tool up with the pendant, set retract_mm in the recipe, then begin a new job in another folder"));
+        .next(
+            "take the tool up with the pendant, set retract_mm in the recipe, then begin a new job in another \
+               folder",
+        ));
     }
     let axis = way.normalize();
     let mm = (up - at).dot(&axis);

@@ -1,5 +1,5 @@
-//! In: a step, a speed, what camera, chain and arm can. Out: speed, step and pictures a second that go together, and which of the three
-//! allows no more. Pure.
+//! In: a step, a speed, what camera, chain and arm can. Out: speed, step and pictures a second that go together, and
+//! which of the three allows no more. Pure.
 //! Frame and unit: mm/s, mm a shot, pictures a second (Hz), s.
 
 use crate::fault::{Fault, Result};

@@ -1,4 +1,5 @@
-//! In: an arm that has come to a stop, a camera, a beam. Out: a picture of the beam in a recording, with the pose at which it was taken.
+//! In: an arm that has come to a stop, a camera, a beam. Out: a picture of the beam in a recording, with the pose at
+//! which it was taken.
 //! Frame and unit: base_from_flange, mm; ms.
 
 use super::eye::Eye;

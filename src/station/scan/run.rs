@@ -1,6 +1,7 @@
 //! In: a source of shots, a calibrated rig, an output folder. Out: the scan folder — cloud, height
 //! map, overlays, figures — written so that whatever ends it costs nothing that was done.
-//! Frame and unit: cloud in the frame of what moved (mostly the robot's base), height map in its grid frame; mm (docs/file-formats.md).
+//! Frame and unit: cloud in the frame of what moved (mostly the robot's base), height map in its grid frame; mm
+//! (docs/file-formats.md).
 
 use super::overlays::Overlays;
 use super::progress::{Checkpoint, fingerprint_of};
@@ -71,10 +72,11 @@ pub fn scan(
     scan_on(|| options.place.open(), id, label, open, rig, options, progress)
 }
 
-/// Runs a scan from the first shot to the last file. `processor` is asked for once the source is open; `id` names the recording (a hash of its
-/// meta.json, poses and ambient picture), so that a resumed scan cannot continue another one; `open` gives the source
-/// from a shot on; `progress` is told (shots done, shots in all). Whatever ends it early, the shots that were done stay
-/// done and the next run can resume there; a former scan in the folder stays until this one is whole.
+/// Runs a scan from the first shot to the last file. `processor` is asked for once the source is open; `id` names the
+/// recording (a hash of its meta.json, poses and ambient picture), so that a resumed scan cannot continue another
+/// one; `open` gives the source from a shot on; `progress` is told (shots done, shots in all). Whatever ends it
+/// early, the shots that were done stay done and the next run can resume there; a former scan in the folder stays
+/// until this one is whole.
 pub fn scan_on(
     processor: impl FnOnce() -> Result<Processor>,
     id: &str,

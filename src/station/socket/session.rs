@@ -1,4 +1,5 @@
-//! In: requests of a robot's program, one after the other; a camera, a station, recipes. Out: what is done about each, and its answer.
+//! In: requests of a robot's program, one after the other; a camera, a station, recipes. Out: what is done about
+//! each, and its answer.
 //! Frame and unit: base_from_flange as the notation has it, mm here; tool 0 and work frame 0 on the controller.
 
 use super::words::{self, Code, Of, Request, Which, Wrong};

@@ -85,8 +85,8 @@ impl Wrong {
     }
 }
 
-/// Reads a request. Words may be in small letters; what parts numbers may be blanks, commas, semicolons or the brackets that UR and
-/// ABB write around their poses (`p[0.1, ...]`, `[1,2,3],[...]`).
+/// Reads a request. Words may be in small letters; what parts numbers may be blanks, commas, semicolons or the
+/// brackets that UR and ABB write around their poses (`p[0.1, ...]`, `[1,2,3],[...]`).
 ///
 /// # Errors
 /// What is wrong, in a few words.
@@ -215,7 +215,8 @@ mod tests {
 
     proptest! {
         #[test]
-        fn whatever_comes_is_read_or_answered_by_one_plain_line(line in "\\PC{0,80}|(pose|find|give|scan) [\\x00-\\x7f]{0,60}") {
+        fn whatever_comes_is_read_or_answered_by_one_plain_line(line in "\\PC{0,80}|(pose|find|give|scan) \
+            [\\x00-\\x7f]{0,60}") {
             let answer = match read(&line) {
                 Ok(_) => yes("1"),
                 Err(wrong) => no(&wrong),

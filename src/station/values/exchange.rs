@@ -60,7 +60,10 @@ impl Values {
         serde_json::from_str(&text).map_err(|e| {
             Fault::input(format!("{}: contains no rig values: {e}", path.display()))
                 .cause(crate::files::slip_in(&text, e.line(), "not JSON, or an entry of another shape"))
-                .next("use the keys intrinsics, flange_T_camera, laser_plane_camera, pointer_camera, base_T_camera, linear_axis, turntable of docs/file-formats.md")
+                .next(
+                    "use the keys intrinsics, flange_T_camera, laser_plane_camera, pointer_camera, base_T_camera, \
+                       linear_axis, turntable of docs/file-formats.md",
+                )
         })
     }
 
@@ -83,9 +86,9 @@ impl Values {
         }
     }
 
-    /// Makes each value a calibration, naming `source` as its input, and stores all of them or none. Camera, laser plane and
-    /// the camera's place have the covariance that `sigmas` says, others an unknown one. What looks like another unit is
-    /// refused unless it is so `as_stated`. Returns what was stored.
+    /// Makes each value a calibration, naming `source` as its input, and stores all of them or none. Camera, laser
+    /// plane and the camera's place have the covariance that `sigmas` says, others an unknown one. What looks like
+    /// another unit is refused unless it is so `as_stated`. Returns what was stored.
     pub fn store(&self, station: &Path, source: &Path, as_stated: bool, sigmas: &Sigmas) -> Result<Vec<Kind>> {
         sigmas.check()?;
         let camera = self
@@ -147,7 +150,10 @@ impl Values {
         if stored.is_empty() {
             return Err(Fault::input(format!("{}: contains no values of a rig", source.display()))
                 .cause("another kind of JSON file")
-                .next("use the keys intrinsics, flange_T_camera, laser_plane_camera, pointer_camera, base_T_camera, linear_axis, turntable"));
+                .next(
+                    "use the keys intrinsics, flange_T_camera, laser_plane_camera, pointer_camera, base_T_camera, \
+                       linear_axis, turntable",
+                ));
         }
         Ok(stored)
     }

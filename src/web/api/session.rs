@@ -97,7 +97,8 @@ pub struct Who {
     tab: String,
 }
 
-/// GET /events: the WebSocket. A tab that holds the button says `held GRANT` over it; its end halts what that tab moves.
+/// GET /events: the WebSocket. A tab that holds the button says `held GRANT` over it; its end halts what that tab
+/// moves.
 pub async fn events(
     State(screen): State<Arc<Screen>>,
     Extension(asks): Extension<Tab>,

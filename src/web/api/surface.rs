@@ -119,8 +119,8 @@ fn usual() -> usize {
 /// Most points that are sent: 40 MB.
 const MOST_POINTS: usize = 2_000_000;
 
-/// GET /scans/{id}/points?most=: points in the cloud and sent (u32 each), origin (3 doubles), then x y z sigma_mm intensity of
-/// each as floats; every share from the start on covers the whole scan.
+/// GET /scans/{id}/points?most=: points in the cloud and sent (u32 each), origin (3 doubles), then x y z sigma_mm
+/// intensity of each as floats; every share from the start on covers the whole scan.
 pub async fn points(
     State(screen): Shared,
     UrlPath(id): UrlPath<String>,

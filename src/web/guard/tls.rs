@@ -1,5 +1,5 @@
-//! In: a listening socket, perhaps a certificate and its key. Out: connections, encrypted where those were given, never more
-//! than a bounded number at a time.
+//! In: a listening socket, perhaps a certificate and its key. Out: connections, encrypted where those were given,
+//! never more than a bounded number at a time.
 //! Frame and unit: connections, seconds.
 
 use crate::fault::{Fault, Result};
@@ -24,12 +24,14 @@ use tokio_rustls::rustls::pki_types::pem::PemObject;
 use tokio_rustls::rustls::pki_types::{CertificateDer, PrivateKeyDer};
 use tokio_rustls::server::TlsStream;
 
-/// Connections at a time; a browser has a handful. When all places are taken, the connection that has been silent for longest
-/// since it was opened makes room: a client that opens connections and says nothing locks nobody out.
+/// Connections at a time; a browser has a handful. When all places are taken, the connection that has been silent for
+/// longest since it was opened makes room: a client that opens connections and says nothing locks nobody out.
 const MOST: usize = 256;
-/// A connection on which nothing was ever read is closed after this time. Browsers open some in advance and never use them.
+/// A connection on which nothing was ever read is closed after this time. Browsers open some in advance and never use
+/// them.
 const SILENT: Duration = Duration::from_secs(10);
-/// A connection on which nothing moves either way is closed after this time; the screen's own socket is told something every second.
+/// A connection on which nothing moves either way is closed after this time; the screen's own socket is told
+/// something every second.
 const IDLE: Duration = Duration::from_secs(300);
 /// A place becomes free within this time after a silent connection was told to go.
 const ROOM: Duration = Duration::from_secs(1);

@@ -1,5 +1,5 @@
-//! In: what tabs do (arm, press, hold, let go, STOP), what jobs ask. Out: each motion confirmed by one tab that held its button while it
-//! was shown; a Halt where it lets go, goes, or loses the lease.
+//! In: what tabs do (arm, press, hold, let go, STOP), what jobs ask. Out: each motion confirmed by one tab that held
+//! its button while it was shown; a Halt where it lets go, goes, or loses the lease.
 //! Frame and unit: s.
 
 use super::grants::Grants;
@@ -109,7 +109,8 @@ impl At {
     }
 }
 
-/// Takes the guard out, so that nobody holds the desk while the controller is asked. With it comes the turn that it is of.
+/// Takes the guard out, so that nobody holds the desk while the controller is asked. With it comes the turn that it
+/// is of.
 pub(super) fn taken(at: &mut At) -> Result<(Guard, u64)> {
     let guard = at.guard.take().ok_or_else(|| {
         Fault::refused("the robot is in use")
@@ -181,7 +182,8 @@ impl Desk {
             Some(guard)
         };
         let mut at = self.at();
-        // Of two who arm at once the second one's guard is dropped after the desk: giving an arm back asks the controller.
+        // Of two who arm at once the second one's guard is dropped after the desk: giving an arm back asks the
+        // controller.
         let late = match made {
             Some(guard) if at.button.is_none() => {
                 (at.button, at.guard, at.turn) = (Some(guard.stop_button()), Some(guard), at.turn + 1);

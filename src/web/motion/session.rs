@@ -1,4 +1,5 @@
-//! In: an armed robot. Out: the same for one job; whatever ends the job, it comes back to the desk with what has to be looked at.
+//! In: an armed robot. Out: the same for one job; whatever ends the job, it comes back to the desk with what has to
+//! be looked at.
 //! Frame and unit: none.
 
 use super::desk::Desk;

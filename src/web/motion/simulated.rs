@@ -1,5 +1,5 @@
-//! In: a folder. Out: a simulated cell in this process, on ports of this machine, and a station that fits it; what happens in it goes
-//! into cell.jsonl.
+//! In: a folder. Out: a simulated cell in this process, on ports of this machine, and a station that fits it; what
+//! happens in it goes into cell.jsonl.
 //! Frame and unit: scene, mm; s of the cell.
 
 use crate::cell::{Cell, CellOptions, Over, Served};
@@ -96,8 +96,8 @@ impl SimulatedRobot {
         SimulatedCell { parts: PARTS.iter().map(|(name, _)| (*name).to_owned()).collect(), holds, over_board }
     }
 
-    /// A person lays the board with a part's socket before the robot, puts its component into the gripper, and jogs the arm there, or
-    /// over the calibration board.
+    /// A person lays the board with a part's socket before the robot, puts its component into the gripper, and jogs
+    /// the arm there, or over the calibration board.
     pub fn put(&self, holds: Option<&str>, over_board: bool) -> Result<()> {
         let mut at = self.at.lock().unwrap_or_else(|e| e.into_inner());
         let part = holds.unwrap_or(&at.0).to_owned();

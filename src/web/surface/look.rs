@@ -1,5 +1,5 @@
-//! In: a scan's folder, the filters through which it is looked at. Out: its map through them; the filters are kept beside the scan, so that
-//! reload, second tab and restart see the same.
+//! In: a scan's folder, the filters through which it is looked at. Out: its map through them; the filters are kept
+//! beside the scan, so that reload, second tab and restart see the same.
 //! Frame and unit: the height map's grid frame, mm.
 
 use crate::fault::{Fault, Result};

@@ -1,5 +1,5 @@
-//! In: a height map, a line over it, pieces of that line. Out: heights along it, straight lines through the pieces, the step
-//! and the angle between them.
+//! In: a height map, a line over it, pieces of that line. Out: heights along it, straight lines through the pieces,
+//! the step and the angle between them.
 //! Frame and unit: grid frame, mm, degrees.
 
 use super::fit::Surface;
@@ -10,8 +10,8 @@ use crate::web::message::{Distance, Fit, Section, SectionAsk, SectionPoint};
 /// Most places of a section; a longer one has them farther apart.
 const MOST: usize = 8192;
 
-/// Samples the map each half cell. Errors: a line of no length, numbers that are not finite, more than two pieces or pieces
-/// with fewer than two cells.
+/// Samples the map each half cell. Errors: a line of no length, numbers that are not finite, more than two pieces or
+/// pieces with fewer than two cells.
 pub fn section(map: &HeightMap, ask: &SectionAsk) -> Result<Section> {
     let [dx, dy] = [ask.to[0] - ask.from[0], ask.to[1] - ask.from[1]];
     let length = dx.hypot(dy);

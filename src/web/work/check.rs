@@ -1,5 +1,5 @@
-//! In: a station, this machine. Out: one line a check, good or with what is wrong; the GPU's stages run in a process of their
-//! own, because a driver can end it.
+//! In: a station, this machine. Out: one line a check, good or with what is wrong; the GPU's stages run in a process
+//! of their own, because a driver can end it.
 //! Frame and unit: mm, days, GB.
 
 use super::run::Run;
@@ -94,7 +94,8 @@ fn camera(camera: Option<&Camera>, calibrated: Option<[u32; 2]>, add: &mut impl 
     }
 }
 
-/// What the controller says of itself; its reported pose is that of the flange in the base, or poses mean something else.
+/// What the controller says of itself; its reported pose is that of the flange in the base, or poses mean something
+/// else.
 fn robot(robot: Option<&Robot>, add: &mut impl FnMut(&str, &str, &str, String)) {
     let Some(robot) = robot else {
         return add("robot", "robot", "absent", "the screen was served without --robot".into());

@@ -22,8 +22,8 @@ const SHIPPED: [(&str, &str); 4] = [
     ("osc", include_str!("../../../data/recipes/osc.toml")),
 ];
 
-/// All of them: the station's own first, in the order of their names; a station's own replaces a shipped one of that name.
-/// One that cannot be read stands in the list with what is wrong with it.
+/// All of them: the station's own first, in the order of their names; a station's own replaces a shipped one of that
+/// name. One that cannot be read stands in the list with what is wrong with it.
 pub fn recipes(place: &Place) -> Vec<RecipeText> {
     let entries = std::fs::read_dir(place.recipes()).into_iter().flatten().flatten();
     let mut own: Vec<RecipeText> = entries.filter_map(|entry| of_file(&entry.path())).collect();
@@ -124,7 +124,8 @@ pub fn change_points(ask: &PointsChange) -> Result<PointsChanged> {
     Ok(PointsChanged { points: points(&text)?, text })
 }
 
-/// Every point by which a recipe's text can say where the tool goes: shapes with names, and what is constructed of them.
+/// Every point by which a recipe's text can say where the tool goes: shapes with names, and what is constructed of
+/// them.
 ///
 /// # Errors
 /// The text is no recipe.

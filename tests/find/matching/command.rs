@@ -1,4 +1,5 @@
-//! In: pictures with several equal parts, drawn here. Out: judgement on `sheetlight match` and `teach --region` run as commands.
+//! In: pictures with several equal parts, drawn here. Out: judgement on `sheetlight match` and `teach --region` run
+//! as commands.
 //! Frame and unit: pixels, degrees.
 
 use super::scenes::{Picture, bracket, draw};

@@ -82,11 +82,15 @@ fn choose(
         (true, false) => Ok(Some(white)),
         (false, true) => Ok(Some(black)),
         _ if black.markers > 0 => Err(Fault::refused(format!(
-            "the picture does not show which colour the {columns}x{rows} ChArUco board begins with: {} markers fit both",
+            "the picture does not show which colour the {columns}x{rows} ChArUco board begins with: {} markers fit \
+             both",
             black.markers
         ))
         .cause("the board's outer columns are out of view")
-        .next("state \"first_square\" in the board's description: \"white\" for boards of OpenCV before 4.6, else \"black\"")),
+        .next(
+            "state \"first_square\" in the board's description: \"white\" for boards of OpenCV before 4.6, else \
+               \"black\"",
+        )),
         _ => Ok(Some(black)),
     }
 }
@@ -191,6 +195,9 @@ fn why_not(layout: &Layout, span: f64, reason: &str) -> Fault {
         .next("adjust the exposure so that white squares reach half of full scale");
     }
     Fault::refused(if reason.is_empty() { wanted } else { format!("{wanted} ({reason})") })
-        .cause("the board is out of view or out of focus, its markers are smaller than 15 px, or the description names another dictionary or size")
+        .cause(
+            "the board is out of view or out of focus, its markers are smaller than 15 px, or the description \
+                names another dictionary or size",
+        )
         .next("look at the picture and compare the printed board with its description")
 }

@@ -99,7 +99,8 @@ fn serial(device: &DeviceInfo) -> String {
 }
 
 impl GigeCamera {
-    /// Takes control of the camera; it sends nothing yet. `packet`: bytes of a packet; none: as large as the network carries.
+    /// Takes control of the camera; it sends nothing yet. `packet`: bytes of a packet; none: as large as the network
+    /// carries.
     ///
     /// # Errors
     /// No such camera, or one that is in use, or whose pixels are not grey.
@@ -370,7 +371,8 @@ impl GigeCamera {
         SETTINGS.iter().filter_map(kept).collect()
     }
 
-    /// What this camera calls a standard feature: cameras from before the standard's second version have names of their own.
+    /// What this camera calls a standard feature: cameras from before the standard's second version have names of
+    /// their own.
     fn own_name<'a>(&self, name: &'a str) -> &'a str {
         let has = |n: &&str| self.camera.nodemap().node(n).is_some();
         let former = FORMER.iter().filter(|(now, _)| *now == name).map(|(_, then)| *then);

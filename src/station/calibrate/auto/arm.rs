@@ -1,5 +1,7 @@
-//! In: a robot behind its rules, a camera with its lights, somebody who confirms. Out: the cell that a calibration drives.
-//! Frame and unit: base_from_flange, mm, mm/s. Every move is shown and confirmed; what the rules do not allow is not made.
+//! In: a robot behind its rules, a camera with its lights, somebody who confirms. Out: the cell that a calibration
+//! drives.
+//! Frame and unit: base_from_flange, mm, mm/s. Every move is shown and confirmed; what the rules do not allow is not
+//! made.
 
 use super::cell::{Cell, Light, Went};
 use crate::arm::rules::{Confirmation, Guard, Limits, Plan, Proposal, Straight};

@@ -1,5 +1,5 @@
-//! In: a board below an armed robot. Out: the whole rig by moves that the program chooses, each shown at the screen and confirmed; kept
-//! until it is accepted.
+//! In: a board below an armed robot. Out: the whole rig by moves that the program chooses, each shown at the screen
+//! and confirmed; kept until it is accepted.
 //! Frame and unit: mm.
 
 use super::super::place::Place;

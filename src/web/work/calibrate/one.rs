@@ -1,5 +1,5 @@
-//! In: a recording of boards, frames to leave out. Out: a calibration with its figures beside the station's present one; stored
-//! in the station when it is accepted.
+//! In: a recording of boards, frames to leave out. Out: a calibration with its figures beside the station's present
+//! one; stored in the station when it is accepted.
 //! Frame and unit: as the calibrations; px, mm, degrees.
 
 use super::super::jobs::Jobs;
@@ -134,7 +134,8 @@ fn former(station: &Path, kind: Kind) -> BTreeMap<String, f64> {
     told.map(|t| t.quality.figures).unwrap_or_default()
 }
 
-/// Stores a finished calibration in the station. Errors: another job, a verdict that is not good enough, accepted before.
+/// Stores a finished calibration in the station. Errors: another job, a verdict that is not good enough, accepted
+/// before.
 pub fn accept(jobs: &Jobs, job: &Job) -> Result<Job> {
     let refuse = |what: String| Err(Fault::usage(what).next("calibrate again"));
     let target = match (&job.order, job.state) {
